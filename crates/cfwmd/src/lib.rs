@@ -1,0 +1,1 @@
+//! Censoring sensors, and a fusion centre that hears their silence.

@@ -1,0 +1,115 @@
+//! The error every constructor shares, and the checks that raise it.
+
+use thiserror::Error;
+
+/// An argument that a constructor or function refuses.
+///
+/// The message names the argument, shows its value and says what was expected, so that it can be shown to a user as it
+/// stands. Crates above wrap it (`#[from]`) in their own error enum.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("argument `{name}` is {value}: expected {expected}")]
+pub struct ArgumentError {
+    /// Name of the argument as the signature spells it.
+    pub name: &'static str,
+    /// The offending value, formatted.
+    pub value: String,
+    /// What would have been accepted.
+    pub expected: String,
+}
+
+impl ArgumentError {
+    /// Builds the error from any printable value.
+    pub fn new(name: &'static str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
+        Self {
+            name,
+            value: value.to_string(),
+            expected: expected.into(),
+        }
+    }
+}
+
+/// Returns `value` if `accepted` holds of it, the error otherwise.
+fn require(
+    name: &'static str,
+    value: f64,
+    accepted: impl Fn(f64) -> bool,
+    expected: &'static str,
+) -> Result<f64, ArgumentError> {
+    if accepted(value) {
+        Ok(value)
+    } else {
+        Err(ArgumentError::new(name, value, expected))
+    }
+}
+
+/// Accepts any finite number.
+pub fn finite(name: &'static str, value: f64) -> Result<f64, ArgumentError> {
+    require(name, value, f64::is_finite, "a finite number")
+}
+
+/// Accepts finite numbers above zero.
+pub fn positive(name: &'static str, value: f64) -> Result<f64, ArgumentError> {
+    require(name, value, |v| v.is_finite() && v > 0.0, "a finite number above 0")
+}
+
+/// Accepts finite numbers from zero up.
+pub fn non_negative(name: &'static str, value: f64) -> Result<f64, ArgumentError> {
+    require(name, value, |v| v.is_finite() && v >= 0.0, "a finite number, 0 or above")
+}
+
+/// Accepts numbers in the closed interval `[low, high]`.
+pub fn within(name: &'static str, value: f64, low: f64, high: f64) -> Result<f64, ArgumentError> {
+    if (low..=high).contains(&value) {
+        Ok(value)
+    } else {
+        Err(ArgumentError::new(
+            name,
+            value,
+            format!("a number in [{low}, {high}]"),
+        ))
+    }
+}
+
+/// Accepts counts of at least one.
+pub fn at_least_one(name: &'static str, value: usize) -> Result<usize, ArgumentError> {
+    if value >= 1 {
+        Ok(value)
+    } else {
+        Err(ArgumentError::new(name, value, "at least 1"))
+    }
+}
+
+/// Accepts slices whose entries are all finite.
+pub fn all_finite(name: &'static str, values: &[f64]) -> Result<(), ArgumentError> {
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(at) => Err(ArgumentError::new(
+            name,
+            format!("{} at index {at}", values[at]),
+            "finite numbers only",
+        )),
+    }
+}
+
+/// Accepts a probability vector: entries in `[0, 1]` that sum to one within `1e-9`.
+pub fn probabilities(name: &'static str, values: &[f64]) -> Result<(), ArgumentError> {
+    if values.is_empty() {
+        return Err(ArgumentError::new(name, "empty", "at least one probability"));
+    }
+    if let Some(at) = values.iter().position(|v| !(0.0..=1.0).contains(v)) {
+        return Err(ArgumentError::new(
+            name,
+            format!("{} at index {at}", values[at]),
+            "probabilities in [0, 1]",
+        ));
+    }
+    let sum: f64 = values.iter().sum();
+    if (sum - 1.0).abs() > 1e-9 {
+        return Err(ArgumentError::new(
+            name,
+            format!("a vector summing to {sum}"),
+            "probabilities that sum to 1",
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,6 @@
+//! Core of fewbits.
+pub mod error;
+pub mod normal;
+pub mod quadrature;
+pub use error::ArgumentError;
+pub use nalgebra;

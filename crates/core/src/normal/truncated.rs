@@ -1,0 +1,129 @@
+//! A standard normal variable known to lie in a cell.
+
+use super::{cdf, log_interval, log_pdf, quantile};
+use crate::error::ArgumentError;
+use crate::quadrature::gauss_legendre;
+use rand::{Rng, RngExt};
+
+/// Mean and variance of `N(0, 1)` truncated to a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TruncatedMoments {
+    /// `E[X | lower <= X < upper]`, inside the closed cell.
+    pub mean: f64,
+    /// `Var[X | lower <= X < upper]`, in `(0, 1]`.
+    pub variance: f64,
+}
+
+/// The closed form of the variance needs a cell at least this wide ...
+const CLOSED_FORM_WIDTH: f64 = 0.5;
+/// ... whose inner edge is at most this far from zero; else it cancels.
+const CLOSED_FORM_EDGE: f64 = 5.0;
+/// Decay lengths beyond which the rest of an unbounded cell is below rounding.
+const CUT: f64 = 48.0;
+
+/// Moments of `N(0, 1)` restricted to `[lower, upper)`; either end may be infinite.
+///
+/// With `Z = Phi(b) - Phi(a)`: mean `(phi(a) - phi(b))/Z`, variance `1 + (a phi(a) - b phi(b))/Z - mean^2`. For narrow or
+/// far cells these cancel, and 64 Gauss-Legendre nodes of the density, scaled by its value at the edge nearest zero, replace
+/// them. Relative error of the variance below 1e-12.
+///
+/// # Errors
+/// If `lower < upper` does not hold (NaN included).
+pub fn truncated_moments(lower: f64, upper: f64) -> Result<TruncatedMoments, ArgumentError> {
+    if !(lower < upper) || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
+        return Err(ArgumentError::new(
+            "cell",
+            format!("[{lower}, {upper})"),
+            "lower < upper",
+        ));
+    }
+    if lower >= 0.0 {
+        Ok(right_moments(lower, upper))
+    } else if upper <= 0.0 {
+        let mirrored = right_moments(-upper, -lower);
+        Ok(TruncatedMoments {
+            mean: -mirrored.mean,
+            variance: mirrored.variance,
+        })
+    } else if upper - lower > CLOSED_FORM_WIDTH {
+        Ok(closed_form(lower, upper))
+    } else {
+        Ok(by_quadrature(lower, upper))
+    }
+}
+
+/// Cells with `0 <= lower`.
+fn right_moments(lower: f64, upper: f64) -> TruncatedMoments {
+    if upper - lower > CLOSED_FORM_WIDTH && lower <= CLOSED_FORM_EDGE {
+        closed_form(lower, upper)
+    } else {
+        by_quadrature(lower, upper.min(lower + CUT / lower.max(1.0)))
+    }
+}
+
+fn closed_form(lower: f64, upper: f64) -> TruncatedMoments {
+    let log_mass = log_interval(lower, upper);
+    let ratio = |edge: f64| if edge.is_finite() { (log_pdf(edge) - log_mass).exp() } else { 0.0 };
+    let times = |edge: f64, density: f64| if density > 0.0 { edge * density } else { 0.0 };
+    let (at_lower, at_upper) = (ratio(lower), ratio(upper));
+    let mean = at_lower - at_upper;
+    TruncatedMoments {
+        mean,
+        variance: 1.0 + times(lower, at_lower) - times(upper, at_upper) - mean * mean,
+    }
+}
+
+fn by_quadrature(lower: f64, upper: f64) -> TruncatedMoments {
+    let rule = gauss_legendre::<64>();
+    let width = upper - lower;
+    // Offsets from the lower edge keep the digits of a narrow cell.
+    let density = |t: f64| (-t * (lower + 0.5 * t)).exp();
+    let (mut mass, mut first) = (0.0, 0.0);
+    for (t, w) in rule.on(0.0, width) {
+        let p = w * density(t);
+        mass += p;
+        first += p * t;
+    }
+    let centre = first / mass;
+    let second: f64 = rule
+        .on(0.0, width)
+        .map(|(t, w)| w * density(t) * (t - centre) * (t - centre))
+        .sum();
+    TruncatedMoments {
+        mean: lower + centre,
+        variance: second / mass,
+    }
+}
+
+/// Beyond this edge inversion gives way to exponential rejection.
+const REJECTION_EDGE: f64 = 8.0;
+
+/// Draws from `N(0, 1)` restricted to `[lower, upper]`, `lower < upper`.
+///
+/// Inverts the distribution function in the tail where it is accurate; beyond eight standard deviations an exponential
+/// proposal at the inner edge is accepted with probability above 0.98 (Robert 1995).
+pub fn sample_truncated<R: Rng + ?Sized>(rng: &mut R, lower: f64, upper: f64) -> f64 {
+    if lower + upper > 0.0 || upper == f64::INFINITY {
+        return -sample_left(rng, -upper, -lower);
+    }
+    sample_left(rng, lower, upper)
+}
+
+/// Cells whose bulk lies left of zero.
+fn sample_left<R: Rng + ?Sized>(rng: &mut R, lower: f64, upper: f64) -> f64 {
+    if upper < -REJECTION_EDGE {
+        let edge = -upper;
+        let width = upper - lower;
+        // Mass of the exponential proposal inside the cell, so that no draw falls outside.
+        let inside = -(-edge * width).exp_m1();
+        loop {
+            let t = -(-rng.random::<f64>() * inside).ln_1p() / edge;
+            if rng.random::<f64>() <= (-0.5 * t * t).exp() {
+                return (upper - t).max(lower);
+            }
+        }
+    }
+    let (from, to) = (cdf(lower), cdf(upper));
+    let p = from + rng.random::<f64>() * (to - from);
+    quantile(p).clamp(lower, upper)
+}

@@ -1,0 +1,74 @@
+//! Quadrature rules, computed once a process.
+
+use gauss_quad::GaussLegendre;
+use std::num::NonZeroUsize;
+use std::sync::OnceLock;
+
+/// A Gauss-Legendre rule on `[-1, 1]`: exact for polynomials of degree `2 n - 1`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rule {
+    nodes: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Rule {
+    /// The rule with `points` nodes, in increasing order. `points = 0` is read as 1.
+    pub fn gauss_legendre(points: usize) -> Self {
+        let rule = GaussLegendre::new(NonZeroUsize::new(points).unwrap_or(NonZeroUsize::MIN));
+        let mut pairs: Vec<(f64, f64)> = rule.iter().copied().collect();
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Self {
+            nodes: pairs.iter().map(|p| p.0).collect(),
+            weights: pairs.iter().map(|p| p.1).collect(),
+        }
+    }
+
+    /// Nodes on `[-1, 1]`, increasing.
+    pub fn nodes(&self) -> &[f64] {
+        &self.nodes
+    }
+
+    /// Weights, summing to 2.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// Nodes and weights moved to `[a, b]`.
+    pub fn on(&self, a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+        self.nodes
+            .iter()
+            .zip(&self.weights)
+            .map(move |(x, w)| (middle + half * x, half * w))
+    }
+
+    /// `sum w f(x)` over `[a, b]`.
+    #[inline]
+    pub fn sum(&self, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
+        self.on(a, b).map(|(x, w)| w * f(x)).sum()
+    }
+
+    /// `sum w f(x)` over `panels` equal parts of `[a, b]`.
+    pub fn composite(&self, a: f64, b: f64, panels: usize, f: impl Fn(f64) -> f64) -> f64 {
+        self.panels(a, b, panels).map(|(x, w)| w * f(x)).sum()
+    }
+
+    /// Nodes and weights of `panels` equal parts of `[a, b]`, increasing.
+    pub fn panels(&self, a: f64, b: f64, panels: usize) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let width = (b - a) / panels.max(1) as f64;
+        (0..panels.max(1)).flat_map(move |i| {
+            let left = a + i as f64 * width;
+            self.on(left, left + width)
+        })
+    }
+}
+
+/// The largest rule that is kept for the life of the process.
+const CACHED: usize = 128;
+
+/// The `N`-point Gauss-Legendre rule, computed at first use and kept. `N` is at most 128.
+pub fn gauss_legendre<const N: usize>() -> &'static Rule {
+    const { assert!(N >= 1 && N <= CACHED) };
+    static RULES: [OnceLock<Rule>; CACHED + 1] = [const { OnceLock::new() }; CACHED + 1];
+    RULES[N].get_or_init(|| Rule::gauss_legendre(N))
+}

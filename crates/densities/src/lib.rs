@@ -1,0 +1,1 @@
+//! Beliefs as values: particles, mixtures and the operations on them.

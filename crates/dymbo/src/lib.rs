@@ -1,0 +1,1 @@
+//! Kalman-like filters fed with one sign bit a sample.

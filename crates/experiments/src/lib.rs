@@ -1,0 +1,1 @@
+//! The papers' experiments as functions: configuration in, table and claims out.

@@ -1,0 +1,1 @@
+//! Kalman, particle and exact grid filters that hear any message through its likelihood.

@@ -1,0 +1,1 @@
+//! Design and decoding of scalar and binary quantizers for distributed estimation.
