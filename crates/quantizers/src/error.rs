@@ -10,9 +10,7 @@ pub enum Error {
     #[error(transparent)]
     Argument(#[from] ArgumentError),
     /// An iteration stopped at its limit before its tolerance was met.
-    #[error(
-        "{algorithm} did not converge in {iterations} iterations: the last change was {change:e}"
-    )]
+    #[error("{algorithm} did not converge in {iterations} iterations: the last change was {change:e}")]
     NotConverged {
         /// Which iteration.
         algorithm: &'static str,

@@ -201,11 +201,7 @@ impl<F: Fn(f64) -> f64> SmoothDensity<F> {
         };
         let total = this.integral(low, high, |_| 1.0);
         if !(total.is_finite() && total > 0.0) {
-            return refuse(
-                "density",
-                format!("a function of integral {total}"),
-                "a positive finite integral",
-            );
+            return refuse("density", format!("a function of integral {total}"), "a positive finite integral");
         }
         this.scale = 1.0 / total;
         Ok(this)
@@ -317,11 +313,7 @@ impl LloydMax {
 /// unique optimum to be found.
 pub fn design(density: &impl Density, levels: usize) -> Result<LloydMax, Error> {
     if !(2..=MAX_LEVELS).contains(&levels) {
-        return refuse(
-            "levels",
-            levels,
-            format!("a number of levels from 2 to {MAX_LEVELS}"),
-        );
+        return refuse("levels", levels, format!("a number of levels from 2 to {MAX_LEVELS}"));
     }
     let (low, high) = density.extent();
     let scale = high - low;
@@ -350,10 +342,7 @@ pub fn design(density: &impl Density, levels: usize) -> Result<LloydMax, Error> 
                 break (swept, swept_cells);
             }
         };
-        change = b
-            .iter()
-            .zip(&next)
-            .fold(0.0, |m, (p, q)| f64::max(m, (p - q).abs()));
+        change = b.iter().zip(&next).fold(0.0, |m, (p, q)| f64::max(m, (p - q).abs()));
         (b, cells) = (next, next_cells);
         if change <= STEP_TOLERANCE * scale {
             return Ok(cells.finish(density, b));
@@ -395,8 +384,7 @@ pub const TABLE_BITS: usize = 8;
 /// # Errors
 /// If `bits` is not in `1..=8`.
 pub fn gaussian_table(bits: usize) -> Result<&'static LloydMax, Error> {
-    static TABLES: [OnceLock<Result<LloydMax, Error>>; TABLE_BITS] =
-        [const { OnceLock::new() }; TABLE_BITS];
+    static TABLES: [OnceLock<Result<LloydMax, Error>>; TABLE_BITS] = [const { OnceLock::new() }; TABLE_BITS];
     if !(1..=TABLE_BITS).contains(&bits) {
         return refuse("bits", bits, "a word length from 1 to 8");
     }
@@ -427,9 +415,7 @@ fn high_rate_edges(density: &impl Density, levels: usize) -> Vec<f64> {
     (1..levels)
         .map(|l| {
             let target = total * l as f64 / levels as f64;
-            let at = cumulative
-                .partition_point(|c| *c < target)
-                .clamp(1, START_GRID);
+            let at = cumulative.partition_point(|c| *c < target).clamp(1, START_GRID);
             let (before, after) = (cumulative[at - 1], cumulative[at]);
             let inside = if after > before {
                 (target - before) / (after - before)
@@ -508,12 +494,7 @@ impl Cells {
     }
 
     fn finish(self, density: &impl Density, breakpoints: Vec<f64>) -> LloydMax {
-        let explained: f64 = self
-            .mass
-            .iter()
-            .zip(&self.centroid)
-            .map(|(p, c)| p * c * c)
-            .sum();
+        let explained: f64 = self.mass.iter().zip(&self.centroid).map(|(p, c)| p * c * c).sum();
         LloydMax {
             breakpoints,
             mean_squared_error: (density.second_moment() - explained).max(0.0),
@@ -542,28 +523,19 @@ mod tests {
             let q = gaussian_table(bits).unwrap();
             assert_eq!(q.breakpoints().len() + 1, 1 << bits);
             let cells = Cells::of(&Gaussian::STANDARD, q.breakpoints());
-            assert!(
-                largest(&cells.residual(q.breakpoints())) < 1e-11,
-                "bits {bits}"
-            );
+            assert!(largest(&cells.residual(q.breakpoints())) < 1e-11, "bits {bits}");
             assert_eq!(q.breakpoints()[(1 << bits) / 2 - 1], 0.0);
             assert!(q.entropy_bits() <= bits as f64);
         }
         // Panter and Dite: mse -> sqrt(3) pi / (2 L^2).
-        let ratio = gaussian_table(8).unwrap().mean_squared_error() * 65536.0
-            / (3f64.sqrt() * std::f64::consts::FRAC_PI_2);
+        let ratio =
+            gaussian_table(8).unwrap().mean_squared_error() * 65536.0 / (3f64.sqrt() * std::f64::consts::FRAC_PI_2);
         assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
     }
 
     #[test]
     fn a_density_by_quadrature_agrees_with_its_closed_form() {
-        let smooth = SmoothDensity::new(
-            |x: f64| (-0.5 * (x - 1.0) * (x - 1.0) / 4.0).exp(),
-            -19.0,
-            21.0,
-            80,
-        )
-        .unwrap();
+        let smooth = SmoothDensity::new(|x: f64| (-0.5 * (x - 1.0) * (x - 1.0) / 4.0).exp(), -19.0, 21.0, 80).unwrap();
         let exact = gaussian(8).unwrap().affine(1.0, 2.0).unwrap();
         let found = design(&smooth, 8).unwrap();
         for (a, b) in exact.breakpoints().iter().zip(found.breakpoints()) {
@@ -574,13 +546,9 @@ mod tests {
 
     #[test]
     fn newton_agrees_with_the_fixed_point_on_a_skewed_mixture() {
-        let mixture = SmoothDensity::new(
-            |x: f64| 0.7 * normal::pdf(x) + 0.3 * normal::pdf((x - 2.0) / 0.5) / 0.5,
-            -9.0,
-            9.0,
-            60,
-        )
-        .unwrap();
+        let mixture =
+            SmoothDensity::new(|x: f64| 0.7 * normal::pdf(x) + 0.3 * normal::pdf((x - 2.0) / 0.5) / 0.5, -9.0, 9.0, 60)
+                .unwrap();
         let found = design(&mixture, 5).unwrap();
         let mut b = vec![-2.0, -1.0, 0.0, 1.0];
         for _ in 0..300 {
