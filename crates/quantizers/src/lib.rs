@@ -1,5 +1,7 @@
 //! Design and decoding of scalar and binary quantizers for distributed estimation.
 
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
 pub mod lloyd_max;
 
 mod error;
