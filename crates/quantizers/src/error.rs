@@ -29,6 +29,32 @@ pub enum Error {
         /// Entries allowed.
         limit: u64,
     },
+    /// The noise of three sensors or more needs more than one shared factor.
+    #[error(
+        "unsupported correlation: the noise of these {sensors} sensors is not independent noise plus one shared factor"
+    )]
+    UnsupportedCorrelation {
+        /// Number of sensors.
+        sensors: usize,
+    },
+    /// A design drives a cell out of existence: fewer levels serve as well.
+    #[error(
+        "cell {cell} of quantizer {quantizer} vanishes (its probability falls to {probability:e}): design fewer levels"
+    )]
+    VanishingCell {
+        /// Which quantizer of the system.
+        quantizer: usize,
+        /// Which of its cells.
+        cell: usize,
+        /// Its probability when the design stopped.
+        probability: f64,
+    },
+    /// The best cells of a level are not one interval, and a contiguous quantizer was asked for.
+    #[error("the best cells are labelled {labels:?}: no contiguous quantizer is a fixed point here")]
+    NotContiguous {
+        /// Labels of the best cells from left to right.
+        labels: Vec<usize>,
+    },
 }
 
 /// Shorthand for an argument error of this crate.

@@ -7,3 +7,24 @@ pub mod lloyd_max;
 mod error;
 
 pub use error::Error;
+
+pub mod channel;
+pub mod design;
+pub mod labelling;
+pub mod quantizer;
+pub mod scene;
+pub mod system;
+
+mod compositions;
+mod criterion;
+mod moments;
+mod newton;
+mod problem;
+
+pub use channel::Channel;
+pub use criterion::Criterion;
+pub use labelling::{Labelling, Symbol};
+pub use newton::Newton;
+pub use quantizer::Quantizer;
+pub use scene::{Noise, Prior, Scene};
+pub use system::{Group, System};
