@@ -108,7 +108,8 @@ impl Compositions {
         &self.log_multiplicity
     }
 
-    pub(crate) fn vectors(&self) -> &[Vec<usize>] {
+    #[cfg(test)]
+    fn vectors(&self) -> &[Vec<usize>] {
         &self.vectors
     }
 

@@ -163,12 +163,6 @@ impl Scored {
     }
 
     fn best(&self, q: &[f64]) -> usize {
-        let mut best = 0;
-        for k in 1..q.len() {
-            if self.weights[k] * q[k] > self.weights[best] * q[best] {
-                best = k;
-            }
-        }
-        best
+        crate::table::most_probable(&self.weights, q)
     }
 }

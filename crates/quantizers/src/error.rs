@@ -55,6 +55,9 @@ pub enum Error {
         /// Labels of the best cells from left to right.
         labels: Vec<usize>,
     },
+    /// Symbols arrived together that cannot do so under the model.
+    #[error("these symbols cannot be received together under the model: nothing follows from them")]
+    ImpossibleOutcome,
 }
 
 /// Shorthand for an argument error of this crate.

@@ -8,12 +8,15 @@ mod error;
 
 pub use error::Error;
 
+pub mod bounds;
 pub mod channel;
+pub mod decoder;
 pub mod design;
 pub mod labelling;
 pub mod quantizer;
 pub mod scene;
 pub mod system;
+pub mod table;
 
 mod compositions;
 mod criterion;
@@ -28,3 +31,4 @@ pub use newton::Newton;
 pub use quantizer::Quantizer;
 pub use scene::{Noise, Prior, Scene};
 pub use system::{Group, System};
+pub use table::JointTable;

@@ -4,12 +4,13 @@ use crate::error::Error;
 use crate::system::Derivatives;
 use nalgebra::{DVector, SymmetricEigen};
 
-/// Curvatures smaller than this are replaced by it, so that flat directions take bounded steps.
-const CURVATURE_FLOOR: f64 = 1e-7;
+/// Curvatures smaller than this share of the largest are replaced by it, so that flat directions take finite steps.
+const CURVATURE_FLOOR: f64 = 1e-10;
 /// A step may lower the objective by this, relative to its size: rounding.
 const SLACK: f64 = 1e-15;
-/// Below this share of the scale Newton's quadratic convergence is trusted and the objective not consulted.
-const TRUSTED: f64 = 1e-8;
+/// Where the predicted gain is below this, relative to the objective, rounding hides it: Newton's quadratic convergence is
+/// trusted and the objective not consulted.
+const HIDDEN_GAIN: f64 = 1e-13;
 /// A Hessian eigenvalue above this marks a saddle.
 pub const SADDLE: f64 = 1e-8;
 
@@ -85,7 +86,7 @@ pub(crate) struct Stationary {
 /// ```text
 /// repeat
 ///     g, H     <- gradient and Hessian at b;  H = V diag(lambda) V'
-///     step     <- V diag(1 / max(|lambda|, 1e-7)) V' g       # ascent even where H is not negative definite
+///     step     <- V diag(1 / max(|lambda|, 1e-10 max |lambda|)) V' g       # ascent even where H is not negative definite
 ///     shorten so that no entry exceeds max_step
 ///     halve until b + step is in order and the objective does not fall
 ///     b        <- b + step
@@ -107,7 +108,9 @@ pub(crate) fn climb(
         evaluations += 1;
         let eigen = SymmetricEigen::new(here.hessian);
         let along = eigen.eigenvectors.transpose() * &here.gradient;
-        let shares = along.zip_map(&eigen.eigenvalues, |g, lambda| g / lambda.abs().max(CURVATURE_FLOOR));
+        let floor = (CURVATURE_FLOOR * eigen.eigenvalues.amax()).max(f64::MIN_POSITIVE);
+        let shares = along.zip_map(&eigen.eigenvalues, |g, lambda| g / lambda.abs().max(floor));
+        let predicted_gain = 0.5 * along.dot(&shares);
         let mut step: DVector<f64> = &eigen.eigenvectors * shares;
         if step.iter().any(|s| !s.is_finite()) {
             break;
@@ -116,7 +119,7 @@ pub(crate) fn climb(
         if longest > newton.max_step * scale {
             step *= newton.max_step * scale / longest;
         }
-        let trusted = longest <= TRUSTED * scale;
+        let trusted = longest <= 1e-3 * scale && predicted_gain <= HIDDEN_GAIN * here.value.abs().max(1.0);
         // Rounding in the gradient stops the quadratic decrease before any fixed tolerance on flat objectives.
         let arrived = longest <= newton.tolerance * scale || (trusted && longest >= 0.5 * last_step);
         if arrived {

@@ -17,6 +17,7 @@ use crate::compositions::Compositions;
 use crate::criterion::{Criterion, LOG_FLOOR, Scored};
 use crate::error::Error;
 use crate::moments::{Table, moments};
+use crate::scene::Feature;
 use crate::system::{Derivatives, Group, System};
 use fewbits_core::normal;
 use nalgebra::{DMatrix, DVector};
@@ -27,8 +28,8 @@ pub(crate) struct Problem<'a> {
     system: &'a System,
     scored: Scored,
     active: Vec<Active<'a>>,
-    /// Joint report probabilities of the fixed groups.
-    fixed: Table,
+    /// Report probabilities of each fixed group.
+    fixed: Vec<Table>,
     /// Log multiplicity of every joint outcome, fixed groups slowest.
     log_multiplicity: Vec<f64>,
     constant: f64,
@@ -43,6 +44,37 @@ struct Active<'a> {
     sd: f64,
     /// `c[i][t]`: change of the probability of symbol `t` when breakpoint `i` moves up, per density.
     exchange: Vec<Vec<f64>>,
+}
+
+/// Report probabilities of every group at every node, and the log multiplicity of every joint outcome.
+pub(crate) struct Reports {
+    tables: Vec<Table>,
+    pub(crate) log_multiplicity: Vec<f64>,
+}
+
+impl Reports {
+    pub(crate) fn of(system: &System) -> Result<Self, Error> {
+        // The reports do not depend on the criterion.
+        let problem = Problem::new(system, Criterion::MeanSquaredError, &[])?;
+        Ok(Self {
+            tables: problem.fixed,
+            log_multiplicity: problem.log_multiplicity,
+        })
+    }
+
+    /// The features' moments of every joint outcome.
+    pub(crate) fn moments(&self, features: &[Feature]) -> Vec<f64> {
+        moments(&self.tables.iter().collect::<Vec<_>>(), features)
+    }
+}
+
+/// One sensor's symbol probabilities (a row a symbol), and how breakpoints move them.
+#[derive(Debug, Default)]
+pub(crate) struct SensorLaw<'a> {
+    pub(crate) symbols: Vec<f64>,
+    pub(crate) densities: Vec<Vec<f64>>,
+    pub(crate) slopes: Vec<Vec<f64>>,
+    pub(crate) exchange: &'a [Vec<f64>],
 }
 
 /// What the node sums of one group need at given breakpoints.
@@ -82,22 +114,27 @@ impl<'a> Active<'a> {
         self.exchange.len()
     }
 
+    /// Probability of each cell at each node.
+    fn cells(&self, b: &[f64]) -> Vec<Vec<f64>> {
+        (0..=b.len())
+            .map(|cell| {
+                let lower = if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
+                let upper = b.get(cell).copied().unwrap_or(f64::INFINITY);
+                let inside = |m: &f64| normal::interval((lower - m) / self.sd, (upper - m) / self.sd);
+                self.means.iter().map(inside).collect()
+            })
+            .collect()
+    }
+
     /// Probability of each received symbol at each node.
     fn symbols(&self, b: &[f64]) -> Vec<f64> {
         let nodes = self.means.len();
         let mut symbols = vec![0.0; self.compositions.parts() * nodes];
-        for cell in 0..=b.len() {
-            let lower = if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
-            let upper = b.get(cell).copied().unwrap_or(f64::INFINITY);
-            let column: Vec<f64> = self
-                .means
-                .iter()
-                .map(|m| normal::interval((lower - m) / self.sd, (upper - m) / self.sd))
-                .collect();
+        for (cell, column) in self.cells(b).iter().enumerate() {
             for (t, row) in symbols.chunks_exact_mut(nodes).enumerate() {
                 let p = self.group.cell_transition(t, cell);
                 if p != 0.0 {
-                    row.iter_mut().zip(&column).for_each(|(r, c)| *r += p * c);
+                    row.iter_mut().zip(column).for_each(|(r, c)| *r += p * c);
                 }
             }
         }
@@ -172,8 +209,7 @@ impl<'a> Problem<'a> {
         system.check_outcomes()?;
         let scene = system.scene();
         let scored = Scored::new(criterion, scene)?;
-        let nodes = scene.nodes();
-        let mut fixed = Table::new(vec![1.0; nodes], nodes);
+        let mut fixed = Vec::new();
         let mut log_multiplicity = vec![0.0];
         let mut constant = match criterion {
             Criterion::MeanSquaredError => -scene.second_moment,
@@ -190,7 +226,7 @@ impl<'a> Problem<'a> {
             if scored.has_separable_entropy() {
                 constant += entry.group.sensors().len() as f64 * negative_entropy(&symbols, &scene.mass.weights);
             }
-            fixed = fixed.outer(&reports);
+            fixed.push(reports);
             log_multiplicity = sums(&log_multiplicity, entry.compositions.log_multiplicity());
         }
         for entry in &chosen {
@@ -233,13 +269,8 @@ impl<'a> Problem<'a> {
     pub(crate) fn rarest_cell(&self, b: &[f64]) -> Option<(usize, usize, f64)> {
         let mass = &self.system.scene().mass.weights;
         let cells = self.active.iter().zip(self.split(b)).flat_map(|(a, b)| {
-            (0..=b.len()).map(move |cell| {
-                let lower = if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
-                let upper = b.get(cell).copied().unwrap_or(f64::INFINITY);
-                let inside = |m: &f64| normal::interval((lower - m) / a.sd, (upper - m) / a.sd);
-                let probability: f64 = a.means.iter().zip(mass).map(|(m, w)| w * inside(m)).sum();
-                (a.index, cell, probability)
-            })
+            let cells = a.cells(b).into_iter().enumerate();
+            cells.map(move |(cell, p)| (a.index, cell, inner_product(&p, mass)))
         });
         cells.min_by(|x, y| x.2.total_cmp(&y.2))
     }
@@ -269,8 +300,86 @@ impl<'a> Problem<'a> {
                 reports
             })
             .collect();
-        let tables: Vec<&Table> = std::iter::once(&self.fixed).chain(&reports).collect();
+        let tables: Vec<&Table> = self.fixed.iter().chain(&reports).collect();
         value + self.score(&moments(&tables, self.scored.features()))
+    }
+
+    /// Joint report probabilities of the fixed groups and, for the single active group, its symbol probabilities.
+    pub(crate) fn surroundings(&self) -> (Table, Table) {
+        let nodes = self.system.scene().nodes();
+        let symbols = self
+            .active
+            .first()
+            .map(|a| a.symbols(a.group.quantizer().breakpoints()));
+        let joint = self
+            .fixed
+            .iter()
+            .fold(Table::new(vec![1.0; nodes], nodes), |joint, t| joint.outer(t));
+        (joint, Table::new(symbols.unwrap_or_default(), nodes))
+    }
+
+    fn fixed_outcomes(&self) -> usize {
+        self.fixed.iter().map(Table::rows).product()
+    }
+
+    /// Everything about one sensor of the active group number `at` with breakpoints `b`.
+    pub(crate) fn single_sensor_law(&self, at: usize, b: &[f64]) -> SensorLaw<'_> {
+        let Some(a) = self.active.get(at) else {
+            return SensorLaw::default();
+        };
+        let (densities, slopes) = a.densities(b);
+        SensorLaw {
+            symbols: a.symbols(b),
+            densities,
+            slopes,
+            exchange: &a.exchange,
+        }
+    }
+
+    /// What does not depend on the active groups.
+    pub(crate) fn constant(&self) -> f64 {
+        self.constant
+    }
+
+    /// Contribution of every cell between two of the edges `-inf, candidates, inf` of the single active sensor, ideal channel:
+    /// entry `a * edges + b` for the cell from edge `a` to edge `b`.
+    pub(crate) fn cell_values(&self, candidates: &[f64]) -> Vec<f64> {
+        let edges = candidates.len() + 2;
+        let mut values = vec![f64::NEG_INFINITY; edges * edges];
+        let Some(active) = self.active.first() else {
+            return values;
+        };
+        let nodes = active.means.len();
+        let mass = &self.system.scene().mass.weights;
+        let slivers = Table::new(active.cells(candidates).concat(), nodes);
+        let width = self.scored.features().len();
+        let tables: Vec<&Table> = self.fixed.iter().chain([&slivers]).collect();
+        let sums = moments(&tables, self.scored.features());
+        let outputs = active.compositions.len();
+        let mut joint = vec![0.0; self.fixed_outcomes() * width];
+        let mut own = vec![0.0; nodes];
+        for a in 0..edges - 1 {
+            joint.fill(0.0);
+            own.fill(0.0);
+            for b in a + 1..edges {
+                // Slivers are added up, never differenced, so far cells keep their relative accuracy.
+                for (other, m) in joint.chunks_exact_mut(width).enumerate() {
+                    let at = (other * (edges - 1) + b - 1) * width;
+                    m.iter_mut().zip(&sums[at..at + width]).for_each(|(m, s)| *m += s);
+                }
+                let mut value: f64 = joint
+                    .chunks_exact(width)
+                    .enumerate()
+                    .map(|(other, m)| self.scored.value(m, self.log_multiplicity[other * outputs]))
+                    .sum();
+                if self.scored.has_separable_entropy() {
+                    own.iter_mut().zip(slivers.row(b - 1)).for_each(|(o, s)| *o += s);
+                    value += negative_entropy(&own, mass);
+                }
+                values[a * edges + b] = value;
+            }
+        }
+        values
     }
 
     fn entropy_share(&self, a: &Active<'_>, symbols: &[f64]) -> f64 {
@@ -468,11 +577,9 @@ impl<'a> Problem<'a> {
     }
 
     fn node_sums(&self, slots: &[Slots], replaced: &[(usize, Slot)]) -> Vec<f64> {
-        let mut tables: Vec<&Table> = std::iter::once(&self.fixed)
-            .chain(slots.iter().map(|s| &s.reports))
-            .collect();
+        let mut tables: Vec<&Table> = self.fixed.iter().chain(slots.iter().map(|s| &s.reports)).collect();
         for (g, slot) in replaced {
-            tables[g + 1] = match slot {
+            tables[self.fixed.len() + g] = match slot {
                 Slot::First => &slots[*g].first,
                 Slot::Slope => &slots[*g].first_slope,
                 Slot::Second => &slots[*g].second,
@@ -484,7 +591,7 @@ impl<'a> Problem<'a> {
     fn axis(&self, g: usize, width: usize) -> Axis {
         let sizes = self.active.iter().map(|a| a.compositions.len());
         Axis {
-            outer: self.fixed.rows() * sizes.clone().take(g).product::<usize>(),
+            outer: self.fixed_outcomes() * sizes.clone().take(g).product::<usize>(),
             inner: sizes.skip(g + 1).product::<usize>() * width,
         }
     }

@@ -1,7 +1,7 @@
 //! Laws that hold for every system of quantizers.
 
-use fewbits_quantizers::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System};
 use fewbits_quantizers::system::Group;
+use fewbits_quantizers::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System};
 use proptest::prelude::*;
 
 fn breakpoints(count: usize) -> impl Strategy<Value = Vec<f64>> {
@@ -26,8 +26,10 @@ fn pair() -> impl Strategy<Value = System> {
             let rho = if rho.abs() < 0.2 { 0.0 } else { rho };
             let scene = Scene::new(Prior::gaussian(1.0).unwrap(), Noise::equicorrelated(&sds, rho).unwrap()).unwrap();
             let channel = Channel::binary_symmetric(&Labelling::natural(4).unwrap(), eps).unwrap();
-            let quantizers =
-                vec![Quantizer::new(a).unwrap(), Quantizer::with_labels(b, vec![0, 1, 2, 3, 0]).unwrap()];
+            let quantizers = vec![
+                Quantizer::new(a).unwrap(),
+                Quantizer::with_labels(b, vec![0, 1, 2, 3, 0]).unwrap(),
+            ];
             System::distinct(scene, quantizers, vec![channel.clone(), channel]).unwrap()
         },
     )
@@ -41,7 +43,11 @@ fn grouped() -> impl Strategy<Value = System> {
         } else {
             Prior::gaussian(1.0).unwrap()
         };
-        let noise = if kind == 1 { Noise::equicorrelated(&[sd; 4], 0.3) } else { Noise::independent(&[sd, sd, sd, 0.8]) };
+        let noise = if kind == 1 {
+            Noise::equicorrelated(&[sd; 4], 0.3)
+        } else {
+            Noise::independent(&[sd, sd, sd, 0.8])
+        };
         let scene = Scene::new(prior, noise.unwrap()).unwrap();
         let three = Group::new(Quantizer::new(a).unwrap(), Channel::symbol_erasure(3, loss).unwrap(), vec![0, 1, 2]);
         let one = Group::new(Quantizer::new(b).unwrap(), Channel::ideal(2).unwrap(), vec![3]);
