@@ -1,1 +1,5 @@
-//! Design and decoding of scalar and binary quantizers for distributed estimation.
+//! Quantizers for estimation from few bits.
+pub mod assignment;
+pub mod binary;
+pub mod error;
+pub use error::Error;
