@@ -75,11 +75,7 @@ impl Ar1 {
 
 impl From<Ar1> for LinearGaussian<1, 1> {
     fn from(model: Ar1) -> Self {
-        Self::from_checked(
-            Matrix1::new(model.coefficient),
-            Matrix1::identity(),
-            Vector1::new(model.noise_variance),
-        )
+        Self::from_checked(Matrix1::new(model.coefficient), Matrix1::identity(), Vector1::new(model.noise_variance))
     }
 }
 
@@ -91,23 +87,12 @@ mod tests {
     #[test]
     fn refuses_what_would_explode() {
         assert!(Ar1::new(-1.0, 0.0).is_ok());
-        assert_eq!(
-            Ar1::new(1.2, 0.5),
-            Err(Error::UnstablePlant { coefficient: 1.2 })
-        );
+        assert_eq!(Ar1::new(1.2, 0.5), Err(Error::UnstablePlant { coefficient: 1.2 }));
         assert!(Ar1::new_unstable(1.2, 0.5).is_ok());
-        for (a, q) in [
-            (f64::NAN, 1.0),
-            (0.5, -1e-9),
-            (f64::INFINITY, 1.0),
-            (0.5, f64::NAN),
-        ] {
+        for (a, q) in [(f64::NAN, 1.0), (0.5, -1e-9), (f64::INFINITY, 1.0), (0.5, f64::NAN)] {
             assert!(matches!(Ar1::new_unstable(a, q), Err(Error::Argument(_))));
         }
-        assert_eq!(
-            Ar1::new(1.0, 1.0).unwrap().stationary_variance(),
-            Err(Error::NotStationary)
-        );
+        assert_eq!(Ar1::new(1.0, 1.0).unwrap().stationary_variance(), Err(Error::NotStationary));
     }
 
     #[test]

@@ -10,9 +10,7 @@ pub enum Error {
     #[error(transparent)]
     Argument(#[from] ArgumentError),
     /// A coefficient outside `[-1, 1]` where the state would grow without bound.
-    #[error(
-        "the coefficient is {coefficient}: the state grows without bound unless it lies in [-1, 1]"
-    )]
+    #[error("the coefficient is {coefficient}: the state grows without bound unless it lies in [-1, 1]")]
     UnstablePlant {
         /// The offending coefficient.
         coefficient: f64,

@@ -98,11 +98,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
 
     /// A draw of the next state.
     #[inline]
-    pub fn sample_next<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        state: &SVector<f64, D>,
-    ) -> SVector<f64, D> {
+    pub fn sample_next<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, D> {
         self.predict(state) + self.sample_noise(rng)
     }
 
@@ -172,17 +168,11 @@ mod tests {
 
     #[test]
     fn draws_have_the_stated_moments_and_rank() {
-        let model = LinearGaussian::new(
-            Matrix2::identity(),
-            Matrix2x1::new(0.5, 1.0),
-            Vector1::new(4.0),
-        )
-        .unwrap();
+        let model = LinearGaussian::new(Matrix2::identity(), Matrix2x1::new(0.5, 1.0), Vector1::new(4.0)).unwrap();
         let mut rng = Pcg64Mcg::seed_from_u64(1);
         let (mut sum, n) = (Matrix2::zeros(), 20_000);
         for _ in 0..n {
-            let noise =
-                model.sample_next(&mut rng, &Vector2::new(1.0, 2.0)) - Vector2::new(1.0, 2.0);
+            let noise = model.sample_next(&mut rng, &Vector2::new(1.0, 2.0)) - Vector2::new(1.0, 2.0);
             assert!((noise[1] - 2.0 * noise[0]).abs() < 1e-12);
             sum += noise * noise.transpose();
         }

@@ -73,19 +73,14 @@ impl<const D: usize, const M: usize> LinearSensing<D, M> {
     ///
     /// # Errors
     /// Entries that are not finite; [`Error::NotCovariance`].
-    pub fn new(
-        matrix: SMatrix<f64, M, D>,
-        noise_covariance: SMatrix<f64, M, M>,
-    ) -> Result<Self, Error> {
+    pub fn new(matrix: SMatrix<f64, M, D>, noise_covariance: SMatrix<f64, M, M>) -> Result<Self, Error> {
         all_finite("matrix", matrix.as_slice())?;
         all_finite("noise_covariance", noise_covariance.as_slice())?;
         let refusal = Error::NotCovariance {
             name: "noise_covariance",
             kind: "definite",
         };
-        if (noise_covariance - noise_covariance.transpose()).amax()
-            > 1e-12 * noise_covariance.amax()
-        {
+        if (noise_covariance - noise_covariance.transpose()).amax() > 1e-12 * noise_covariance.amax() {
             return Err(refusal);
         }
         let noise_factor = Cholesky::new(noise_covariance).ok_or(refusal)?.unpack();
@@ -120,8 +115,7 @@ impl<const D: usize, const M: usize> LinearSensing<D, M> {
     /// Noisy measurements.
     #[inline]
     pub fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M> {
-        self.predict(state)
-            + self.noise_factor * SVector::<f64, M>::from_fn(|_, _| StandardNormal.sample(rng))
+        self.predict(state) + self.noise_factor * SVector::<f64, M>::from_fn(|_, _| StandardNormal.sample(rng))
     }
 }
 
@@ -140,10 +134,7 @@ impl<const D: usize> TryFrom<LinearSensing<D, 1>> for ScalarSensing<D> {
     type Error = Error;
 
     fn try_from(sensors: LinearSensing<D, 1>) -> Result<Self, Error> {
-        Self::new(
-            sensors.matrix.transpose(),
-            finite("noise_covariance", sensors.noise_covariance[(0, 0)])?,
-        )
+        Self::new(sensors.matrix.transpose(), finite("noise_covariance", sensors.noise_covariance[(0, 0)])?)
     }
 }
 
@@ -160,10 +151,7 @@ mod tests {
         let vector = LinearSensing::from(scalar);
         let state = Vector2::new(3.0, 1.0);
         let (mut a, mut b) = (Pcg64Mcg::seed_from_u64(3), Pcg64Mcg::seed_from_u64(3));
-        assert_eq!(
-            vector.sample(&mut a, &state)[0],
-            scalar.sample(&mut b, &state)
-        );
+        assert_eq!(vector.sample(&mut a, &state)[0], scalar.sample(&mut b, &state));
         assert_eq!(ScalarSensing::try_from(vector).unwrap(), scalar);
         assert_eq!(*vector.matrix(), Matrix1x2::new(2.0, -1.0));
     }
