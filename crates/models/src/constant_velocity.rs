@@ -43,6 +43,7 @@ fn axis(interval: f64) -> Result<(Matrix2<f64>, Vector2<f64>), Error> {
 #[cfg(test)]
 mod tests {
     use super::{constant_velocity_1d, constant_velocity_2d};
+    use fewbits_core::Dynamics;
     use nalgebra::{Matrix2, Vector4};
 
     #[test]
@@ -52,7 +53,7 @@ mod tests {
         let plane = constant_velocity_2d(2.0, 3.0).unwrap();
         assert_eq!(plane.noise_covariance().fixed_view::<2, 2>(2, 2), *line.noise_covariance());
         assert_eq!(plane.noise_covariance().fixed_view::<2, 2>(0, 2), Matrix2::zeros());
-        let moved = plane.predict(&Vector4::new(1.0, 10.0, 5.0, -1.0));
+        let moved = plane.mean(&Vector4::new(1.0, 10.0, 5.0, -1.0));
         assert_eq!(moved, Vector4::new(21.0, 10.0, 3.0, -1.0));
     }
 

@@ -20,12 +20,4 @@ pub enum Error {
         "the dynamics have no stationary distribution: an eigenvalue of the transition lies on or outside the unit circle"
     )]
     NotStationary,
-    /// A matrix that must be a covariance is none.
-    #[error("`{name}` is not a covariance: expected a symmetric positive {kind} matrix")]
-    NotCovariance {
-        /// Name of the argument.
-        name: &'static str,
-        /// `"definite"` or `"semidefinite"`.
-        kind: &'static str,
-    },
 }
