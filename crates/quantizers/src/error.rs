@@ -1,15 +1,34 @@
-//! What this crate refuses.
+//! The error of this crate.
 
 use fewbits_core::ArgumentError;
-use thiserror::Error;
 
-/// Everything that a constructor, a design or a decoder of this crate may refuse.
-#[derive(Debug, Clone, PartialEq, Error)]
+/// Why a quantizer, channel, design, decoder or bound was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument outside its range.
+    /// An argument is outside its domain.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
+    /// An iteration stopped at its limit before its tolerance was met.
+    #[error("{algorithm} did not converge in {iterations} iterations: the last change was {change:e}")]
+    NotConverged {
+        /// Which iteration.
+        algorithm: &'static str,
+        /// Iterations spent.
+        iterations: usize,
+        /// Size of the last change, in the units of the stop rule.
+        change: f64,
+    },
+    /// A table would be larger than the caller allows.
+    #[error("{table} would need {needed} entries: at most {limit} are allowed")]
+    TooLarge {
+        /// Which table.
+        table: &'static str,
+        /// Entries needed, saturated at `u64::MAX`.
+        needed: u64,
+        /// Entries allowed.
+        limit: u64,
+    },
     /// A pattern whose bit is the same in every cell tells nothing.
     #[error("the pattern gives the same bit in all {cells} cells: expected at least one 0 and one 1")]
     ConstantPattern {
@@ -85,4 +104,13 @@ pub enum Error {
         /// Number of sensors.
         count: usize,
     },
+}
+
+/// Shorthand for an argument error of this crate.
+pub(crate) fn refuse<T>(
+    name: &'static str,
+    value: impl std::fmt::Display,
+    expected: impl Into<String>,
+) -> Result<T, Error> {
+    Err(ArgumentError::new(name, value, expected).into())
 }

@@ -1,0 +1,136 @@
+//! The first-order autoregression.
+
+use crate::{Error, LinearGaussian};
+use fewbits_core::error::{finite, non_negative};
+use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics};
+use nalgebra::{Matrix1, Vector1};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// `x(n) = a x(n-1) + u(n)`, `u ~ N(0, q)`: a scalar that decays towards zero and is pushed by white noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ar1 {
+    transition: Matrix1<f64>,
+    noise_covariance: Matrix1<f64>,
+}
+
+impl Ar1 {
+    /// The model with coefficient `a` in `[-1, 1]` and noise variance `q >= 0` (state units squared).
+    ///
+    /// # Errors
+    /// [`Error::UnstablePlant`] for `|a| > 1`; see [`Ar1::new_unstable`].
+    pub fn new(coefficient: f64, noise_variance: f64) -> Result<Self, Error> {
+        let model = Self::new_unstable(coefficient, noise_variance)?;
+        if coefficient.abs() > 1.0 {
+            return Err(Error::UnstablePlant { coefficient });
+        }
+        Ok(model)
+    }
+
+    /// The same for any finite coefficient. The name is the opt-in: a state that grows without bound is beyond most
+    /// estimators that hear only a few bits.
+    ///
+    /// # Errors
+    /// A coefficient that is not finite, a negative variance.
+    pub fn new_unstable(coefficient: f64, noise_variance: f64) -> Result<Self, Error> {
+        Ok(Self {
+            transition: Matrix1::new(finite("coefficient", coefficient)?),
+            noise_covariance: Matrix1::new(non_negative("noise_variance", noise_variance)?),
+        })
+    }
+
+    /// `a`.
+    pub fn coefficient(&self) -> f64 {
+        self.transition[0]
+    }
+
+    /// `q`.
+    pub fn noise_variance(&self) -> f64 {
+        self.noise_covariance[0]
+    }
+
+    /// Variance of the next state when that of the present one is `variance`: `a^2 P + q`.
+    #[inline]
+    pub fn predict_variance(&self, variance: f64) -> f64 {
+        self.coefficient() * self.coefficient() * variance + self.noise_variance()
+    }
+
+    /// Variance of the stationary distribution, `q / (1 - a^2)`.
+    ///
+    /// # Errors
+    /// [`Error::NotStationary`] for `|a| >= 1`.
+    pub fn stationary_variance(&self) -> Result<f64, Error> {
+        let a = self.coefficient();
+        if a.abs() < 1.0 {
+            // The factored form keeps the digits of 1 - a^2 near |a| = 1.
+            Ok(self.noise_variance() / ((1.0 - a) * (1.0 + a)))
+        } else {
+            Err(Error::NotStationary)
+        }
+    }
+}
+
+impl Dynamics<1> for Ar1 {
+    #[inline]
+    fn mean(&self, state: &Vector1<f64>) -> Vector1<f64> {
+        self.transition * state
+    }
+
+    #[inline]
+    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector1<f64>) -> Vector1<f64> {
+        let normal: f64 = StandardNormal.sample(rng);
+        Vector1::new(self.coefficient() * state[0] + self.noise_variance().sqrt() * normal)
+    }
+}
+
+impl GaussianDynamics<1> for Ar1 {
+    fn jacobian(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+        self.transition
+    }
+
+    fn noise_covariance(&self) -> &Matrix1<f64> {
+        &self.noise_covariance
+    }
+}
+
+impl LinearDynamics<1> for Ar1 {
+    fn transition(&self) -> &Matrix1<f64> {
+        &self.transition
+    }
+
+    fn noise_covariance(&self) -> &Matrix1<f64> {
+        &self.noise_covariance
+    }
+}
+
+impl From<Ar1> for LinearGaussian<1, 1> {
+    fn from(model: Ar1) -> Self {
+        Self::from_checked(model.transition, Matrix1::identity(), model.noise_covariance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Ar1;
+    use crate::{Error, LinearGaussian};
+
+    #[test]
+    fn refuses_what_would_explode() {
+        assert!(Ar1::new(-1.0, 0.0).is_ok());
+        assert_eq!(Ar1::new(1.2, 0.5), Err(Error::UnstablePlant { coefficient: 1.2 }));
+        assert!(Ar1::new_unstable(1.2, 0.5).is_ok());
+        for (a, q) in [(f64::NAN, 1.0), (0.5, -1e-9), (f64::INFINITY, 1.0), (0.5, f64::NAN)] {
+            assert!(matches!(Ar1::new_unstable(a, q), Err(Error::Argument(_))));
+        }
+        assert_eq!(Ar1::new(1.0, 1.0).unwrap().stationary_variance(), Err(Error::NotStationary));
+    }
+
+    #[test]
+    fn stationary_variance_is_the_fixed_point_and_the_vector_models() {
+        let model = Ar1::new(-0.97, 0.3).unwrap();
+        let variance = model.stationary_variance().unwrap();
+        assert!((model.predict_variance(variance) - variance).abs() < 1e-13);
+        let same = LinearGaussian::from(model).stationary_covariance().unwrap()[(0, 0)];
+        assert!((same - variance).abs() < 1e-12 * variance);
+    }
+}
