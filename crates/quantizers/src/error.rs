@@ -44,7 +44,9 @@ pub enum Error {
         grid: usize,
     },
     /// Two cells get the same bit from every sensor, so that no decoder can tell them apart.
-    #[error("cells {first} and {second} get the same bits from every sensor: expected patterns that separate all cells")]
+    #[error(
+        "cells {first} and {second} get the same bits from every sensor: expected patterns that separate all cells"
+    )]
     NotSeparating {
         /// Index of one cell, from 0.
         first: usize,
@@ -95,7 +97,9 @@ pub enum Error {
     #[error("linear assignment: {0}")]
     Assignment(String),
     /// No vector of positive variances has this mean and standard deviation.
-    #[error("variances of mean {mean} and standard deviation {std} over {count} sensors: expected std <= mean sqrt(count - 1)")]
+    #[error(
+        "variances of mean {mean} and standard deviation {std} over {count} sensors: expected std <= mean sqrt(count - 1)"
+    )]
     InfeasibleVariances {
         /// Mean asked for.
         mean: f64,

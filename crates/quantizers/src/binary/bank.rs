@@ -132,10 +132,6 @@ impl Bank {
         &self.groups
     }
 
-    pub(crate) fn membership(&self) -> &[usize] {
-        &self.membership
-    }
-
     /// Number of distinguishable outcomes, `prod (count + 1)` over the groups, saturated.
     pub fn outcomes(&self) -> u128 {
         self.groups
@@ -156,7 +152,10 @@ impl Bank {
 
     /// Smallest noise in the bank.
     pub(crate) fn finest_noise(&self) -> f64 {
-        self.groups.iter().map(|g| g.sensor.noise_std).fold(f64::INFINITY, f64::min)
+        self.groups
+            .iter()
+            .map(|g| g.sensor.noise_std)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Total Fisher information about `x`, `sum_n P1'^2 / (P0 P1)`.
@@ -174,7 +173,10 @@ impl Bank {
 
     /// `P(k of the group say 1 | x)` for every group, count and node.
     pub(crate) fn count_tables(&self, nodes: &Nodes) -> Vec<CountTable> {
-        self.groups.iter().map(|g| CountTable::new(&g.sensor, g.count, nodes)).collect()
+        self.groups
+            .iter()
+            .map(|g| CountTable::new(&g.sensor, g.count, nodes))
+            .collect()
     }
 
     /// Walks all outcomes. `visit` gets the counts' index (last group fastest) and `w p(x) P(outcome|x)` at the nodes.
@@ -188,7 +190,9 @@ impl Bank {
     /// Refuses bit strings of another length, and turns the others into the index of their counts.
     pub(crate) fn index_of(&self, bits: &[bool]) -> Result<usize, Error> {
         if bits.len() != self.sensors() {
-            return Err(ArgumentError::new("bits", format!("{} bits", bits.len()), format!("{} bits", self.sensors())).into());
+            return Err(
+                ArgumentError::new("bits", format!("{} bits", bits.len()), format!("{} bits", self.sensors())).into()
+            );
         }
         let mut counts = vec![0usize; self.groups.len()];
         for (&bit, &group) in bits.iter().zip(&self.membership) {

@@ -11,7 +11,7 @@ const MOST_POINTS: usize = 64_001;
 /// Points a noise standard deviation.
 const PER_NOISE: f64 = 8.0;
 /// Log densities this close belong to one plateau.
-const PLATEAU: f64 = 1e-13;
+const PLATEAU: f64 = 1e-12;
 /// Relative width at which golden-section search stops.
 const GOLDEN_STOP: f64 = 1e-10;
 
@@ -42,7 +42,10 @@ pub(crate) fn estimates(bank: &Bank, outcomes: usize) -> Vec<f64> {
             let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let enough = best - PLATEAU * best.abs().max(1.0);
             let first = score.iter().position(|&s| s >= enough).unwrap_or(0);
-            let last = (first..points.len()).take_while(|&i| score[i] >= enough).last().unwrap_or(first);
+            let last = (first..points.len())
+                .take_while(|&i| score[i] >= enough)
+                .last()
+                .unwrap_or(first);
             if last > first + 2 {
                 return 0.5 * (points[first] + points[last]);
             }

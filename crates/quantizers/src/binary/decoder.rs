@@ -187,7 +187,11 @@ impl Bank {
                     .nodes_between(low, high, 2.0 * self.finest_noise(), gauss_legendre::<12>());
                 let mass = nodes.expect(|_| 1.0);
                 Cell {
-                    centroid: if mass > 0.0 { nodes.expect(|x| x) / mass } else { 0.5 * (low + high) },
+                    centroid: if mass > 0.0 {
+                        nodes.expect(|x| x) / mass
+                    } else {
+                        0.5 * (low + high)
+                    },
                     mass,
                     nodes,
                 }
@@ -270,7 +274,9 @@ fn first_largest(scores: &[f64], slack: impl Fn(f64) -> f64) -> usize {
 
 /// `(sum w, sum w x)`.
 pub(crate) fn moments(w: &[f64], x: &[f64]) -> (f64, f64) {
-    w.iter().zip(x).fold((0.0, 0.0), |(m0, m1), (w, x)| (m0 + w, m1 + w * x))
+    w.iter()
+        .zip(x)
+        .fold((0.0, 0.0), |(m0, m1), (w, x)| (m0 + w, m1 + w * x))
 }
 
 /// `sum w (x - estimate)^2`.

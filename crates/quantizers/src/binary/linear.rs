@@ -48,7 +48,13 @@ pub fn natural_basis(bits: usize) -> Result<Vec<Mask>, Error> {
 pub fn gray_basis(bits: usize) -> Result<Vec<Mask>, Error> {
     let natural = natural_basis(bits)?;
     Ok((0..natural.len())
-        .map(|b| if b == 0 { natural[0] } else { natural[b - 1] | natural[b] })
+        .map(|b| {
+            if b == 0 {
+                natural[0]
+            } else {
+                natural[b - 1] | natural[b]
+            }
+        })
         .collect())
 }
 
@@ -107,7 +113,9 @@ pub fn mask_of(pattern: &Pattern) -> Option<Mask> {
     }
     let bits = cells.trailing_zeros() as usize;
     // A linear pattern is fixed by its bits at the powers of two.
-    let mask = (0..bits).filter(|&at| pattern.bits()[1 << at]).fold(0, |m, at| m | 1 << at);
+    let mask = (0..bits)
+        .filter(|&at| pattern.bits()[1 << at])
+        .fold(0, |m, at| m | 1 << at);
     (linear_pattern(mask, bits).as_ref() == Ok(pattern)).then_some(mask)
 }
 
@@ -132,7 +140,10 @@ mod tests {
     use proptest::prelude::*;
 
     fn strings(masks: &[Mask], bits: usize) -> Vec<String> {
-        masks.iter().map(|&m| linear_pattern(m, bits).unwrap().to_string()).collect()
+        masks
+            .iter()
+            .map(|&m| linear_pattern(m, bits).unwrap().to_string())
+            .collect()
     }
 
     #[test]
@@ -141,11 +152,7 @@ mod tests {
         assert_eq!(gray_basis(3).unwrap(), [4, 6, 3]);
         assert_eq!(gray_basis(4).unwrap(), [8, 12, 6, 3]);
         assert_eq!(strings(&[4, 2, 1], 3), ["00001111", "00110011", "01010101"]);
-        assert_eq!(strings(&[14, 5, 11], 4), [
-            "0011110011000011",
-            "0101101001011010",
-            "0110011010011001"
-        ]);
+        assert_eq!(strings(&[14, 5, 11], 4), ["0011110011000011", "0101101001011010", "0110011010011001"]);
     }
 
     #[test]

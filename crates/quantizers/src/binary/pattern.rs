@@ -95,7 +95,9 @@ impl Pattern {
 
 impl fmt::Display for Pattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.bits.iter().try_for_each(|&b| f.write_str(if b { "1" } else { "0" }))
+        self.bits
+            .iter()
+            .try_for_each(|&b| f.write_str(if b { "1" } else { "0" }))
     }
 }
 
@@ -165,10 +167,7 @@ mod tests {
     fn runs_merge_into_thresholds() {
         let grid = Grid::uniform(1.0, 2).unwrap();
         assert_eq!(pattern("0110").on(&grid).unwrap().thresholds(), [-0.5, 0.5]);
-        assert_eq!(
-            pattern("01100110").on(&grid),
-            Err(Error::PatternLength { pattern: 8, grid: 4 })
-        );
+        assert_eq!(pattern("01100110").on(&grid), Err(Error::PatternLength { pattern: 8, grid: 4 }));
     }
 
     #[test]

@@ -148,7 +148,13 @@ mod tests {
 
     #[test]
     fn thresholds_must_increase() {
-        for bad in [vec![], vec![1.0, 1.0], vec![2.0, 1.0], vec![f64::NAN], vec![f64::INFINITY]] {
+        for bad in [
+            vec![],
+            vec![1.0, 1.0],
+            vec![2.0, 1.0],
+            vec![f64::NAN],
+            vec![f64::INFINITY],
+        ] {
             assert!(BinaryQuantizer::new(bad).is_err());
         }
     }

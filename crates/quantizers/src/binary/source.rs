@@ -27,7 +27,9 @@ impl Source {
     /// If `half_width` is not a finite number above zero.
     pub fn uniform(half_width: f64) -> Result<Self, Error> {
         let half_width = positive("half_width", half_width)?;
-        Ok(Self { kind: Kind::Uniform { half_width } })
+        Ok(Self {
+            kind: Kind::Uniform { half_width },
+        })
     }
 
     /// `N(0, std^2)`.
@@ -36,7 +38,9 @@ impl Source {
     /// If `std` is not a finite number above zero.
     pub fn gaussian(std: f64) -> Result<Self, Error> {
         let std = positive("std", std)?;
-        Ok(Self { kind: Kind::Gaussian { std } })
+        Ok(Self {
+            kind: Kind::Gaussian { std },
+        })
     }
 
     pub(crate) fn kind(&self) -> Kind {

@@ -214,7 +214,11 @@ fn maximum_likelihood(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> f64 {
             high = x;
         }
         let newton = x - noise_std * value / slope;
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
         if (next - x).abs() <= MLE_STOP * bound {
             return next;
         }

@@ -44,7 +44,9 @@ impl Luo {
         let mut allocation: Vec<usize> = (1..bits).map(|b| sensors.checked_shr(b as u32).unwrap_or(0)).collect();
         allocation.push(sensors - allocation.iter().sum::<usize>());
         if allocation.contains(&0) {
-            return Err(ArgumentError::new("sensors", sensors, format!("at least {} sensors", 1usize << (bits - 1))).into());
+            return Err(
+                ArgumentError::new("sensors", sensors, format!("at least {} sensors", 1usize << (bits - 1))).into()
+            );
         }
         let grid = Grid::uniform(half_width, bits)?;
         let quantizers = natural_basis(bits)?

@@ -69,7 +69,11 @@ impl EstimateDensity {
                 high = y;
             }
             let newton = y - (mean - v) * noise * noise / variance;
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            let next = if newton > low && newton < high {
+                newton
+            } else {
+                0.5 * (low + high)
+            };
             if (next - y).abs() <= 1e-14 * reach {
                 return next;
             }

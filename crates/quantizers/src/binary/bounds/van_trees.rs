@@ -49,7 +49,13 @@ pub fn van_trees(bank: &Bank) -> Result<f64, Error> {
             // The old nodes stay; only the midpoints are new.
             intervals *= 2;
             rates = (0..=intervals)
-                .map(|i| if i % 2 == 0 { rates[i / 2] } else { rate(at(i, intervals)) })
+                .map(|i| {
+                    if i % 2 == 0 {
+                        rates[i / 2]
+                    } else {
+                        rate(at(i, intervals))
+                    }
+                })
                 .collect();
         }
         let last = extrapolated.last().copied();
@@ -87,7 +93,11 @@ fn weighted_mean(rates: &[f64], reach: f64, clamped: bool, density: impl Fn(f64)
         let mass = density(x(i as f64)) * if i == 0 || i == n { 0.5 * h } else { h };
         let left = if i > 0 { flux(i - 1) } else { 0.0 };
         let right = if i < n { flux(i) } else { 0.0 };
-        let (above_ratio, above_value) = if i > first { (ratio[i - 1], value[i - 1]) } else { (0.0, 0.0) };
+        let (above_ratio, above_value) = if i > first {
+            (ratio[i - 1], value[i - 1])
+        } else {
+            (0.0, 0.0)
+        };
         let pivot = left + right + mass * rates[i] - left * above_ratio;
         ratio[i] = right / pivot;
         value[i] = (mass + left * above_value) / pivot;
