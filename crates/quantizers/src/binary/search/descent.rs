@@ -29,7 +29,7 @@ const MAX_SWEEPS: usize = 60;
 ///
 /// Equal sensors with equal choices are counted, not enumerated. If all candidates are symmetric about zero, half of the
 /// nodes suffice. The result is a local optimum; several starts make it the global one in every case that can be checked
-/// exhaustively (three bits, eight and ten sensors).
+/// exhaustively (three bits, eight and ten sensors). Good starts are all sensors alike, and a basis repeated.
 #[derive(Debug, Clone)]
 pub struct Descent {
     source: Source,
@@ -337,7 +337,8 @@ mod tests {
             let exact = descent.bank(&[c, 5, 5]).unwrap().mmse().unwrap();
             assert_relative_eq!(source.variance() - explained, exact, max_relative = 1e-8);
         }
-        let found = descent.run(&[vec![0, 0, 0]], 12, |_| true).unwrap();
+        let constant: Vec<_> = (0..7).map(|c| vec![c; 3]).collect();
+        let found = descent.run(&constant, 3, |_| true).unwrap();
         let mut least = f64::INFINITY;
         for a in 0..7 {
             for b in 0..7 {
