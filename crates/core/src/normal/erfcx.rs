@@ -55,7 +55,8 @@ const FAR_DENOMINATOR: [f64; 6] = [
     98.69338018994513,
 ];
 
-fn polynomial(coefficients: &[f64], x: f64) -> f64 {
+#[inline]
+pub(super) fn polynomial(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
