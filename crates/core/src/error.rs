@@ -62,11 +62,7 @@ pub fn within(name: &'static str, value: f64, low: f64, high: f64) -> Result<f64
     if (low..=high).contains(&value) {
         Ok(value)
     } else {
-        Err(ArgumentError::new(
-            name,
-            value,
-            format!("a number in [{low}, {high}]"),
-        ))
+        Err(ArgumentError::new(name, value, format!("a number in [{low}, {high}]")))
     }
 }
 
@@ -83,11 +79,7 @@ pub fn at_least_one(name: &'static str, value: usize) -> Result<usize, ArgumentE
 pub fn all_finite(name: &'static str, values: &[f64]) -> Result<(), ArgumentError> {
     match values.iter().position(|v| !v.is_finite()) {
         None => Ok(()),
-        Some(at) => Err(ArgumentError::new(
-            name,
-            format!("{} at index {at}", values[at]),
-            "finite numbers only",
-        )),
+        Some(at) => Err(ArgumentError::new(name, format!("{} at index {at}", values[at]), "finite numbers only")),
     }
 }
 
@@ -97,19 +89,11 @@ pub fn probabilities(name: &'static str, values: &[f64]) -> Result<(), ArgumentE
         return Err(ArgumentError::new(name, "empty", "at least one probability"));
     }
     if let Some(at) = values.iter().position(|v| !(0.0..=1.0).contains(v)) {
-        return Err(ArgumentError::new(
-            name,
-            format!("{} at index {at}", values[at]),
-            "probabilities in [0, 1]",
-        ));
+        return Err(ArgumentError::new(name, format!("{} at index {at}", values[at]), "probabilities in [0, 1]"));
     }
     let sum: f64 = values.iter().sum();
     if (sum - 1.0).abs() > 1e-9 {
-        return Err(ArgumentError::new(
-            name,
-            format!("a vector summing to {sum}"),
-            "probabilities that sum to 1",
-        ));
+        return Err(ArgumentError::new(name, format!("a vector summing to {sum}"), "probabilities that sum to 1"));
     }
     Ok(())
 }

@@ -25,7 +25,11 @@ pub fn bivariate_rectangle(lower: [f64; 2], upper: [f64; 2], rho: f64) -> Result
         }
     }
     if rho.abs() == 1.0 {
-        let (l, u) = if rho > 0.0 { (lower[1], upper[1]) } else { (-upper[1], -lower[1]) };
+        let (l, u) = if rho > 0.0 {
+            (lower[1], upper[1])
+        } else {
+            (-upper[1], -lower[1])
+        };
         return Ok(interval(lower[0].max(l), upper[0].min(u)));
     }
     let s = ((1.0 - rho) * (1.0 + rho)).sqrt();

@@ -30,12 +30,9 @@ const CUT: f64 = 48.0;
 /// # Errors
 /// If `lower < upper` does not hold (NaN included).
 pub fn truncated_moments(lower: f64, upper: f64) -> Result<TruncatedMoments, ArgumentError> {
-    if !(lower < upper) || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
-        return Err(ArgumentError::new(
-            "cell",
-            format!("[{lower}, {upper})"),
-            "lower < upper",
-        ));
+    let ordered = lower < upper;
+    if !ordered || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
+        return Err(ArgumentError::new("cell", format!("[{lower}, {upper})"), "lower < upper"));
     }
     if lower >= 0.0 {
         Ok(right_moments(lower, upper))
@@ -63,7 +60,13 @@ fn right_moments(lower: f64, upper: f64) -> TruncatedMoments {
 
 fn closed_form(lower: f64, upper: f64) -> TruncatedMoments {
     let log_mass = log_interval(lower, upper);
-    let ratio = |edge: f64| if edge.is_finite() { (log_pdf(edge) - log_mass).exp() } else { 0.0 };
+    let ratio = |edge: f64| {
+        if edge.is_finite() {
+            (log_pdf(edge) - log_mass).exp()
+        } else {
+            0.0
+        }
+    };
     let times = |edge: f64, density: f64| if density > 0.0 { edge * density } else { 0.0 };
     let (at_lower, at_upper) = (ratio(lower), ratio(upper));
     let mean = at_lower - at_upper;

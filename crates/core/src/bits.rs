@@ -1,0 +1,239 @@
+//! Messages as real bits.
+//!
+//! What a sensor says is written bit by bit, so that its cost is counted and never claimed. Bits are packed most significant
+//! first; the last byte is padded with zeros.
+//!
+//! ```
+//! use fewbits_core::bits::{BitReader, BitWriter};
+//! let mut writer = BitWriter::new();
+//! writer.write(true as u64, 1)?;
+//! writer.write(5, 3)?;
+//! let message = writer.finish();
+//! assert_eq!((message.bits(), message.bytes()), (4, &[0b1101_0000][..]));
+//! let mut reader = BitReader::new(&message);
+//! assert_eq!((reader.read(1)?, reader.read(3)?), (1, 5));
+//! assert!(reader.read(1).is_err());
+//! # Ok::<(), fewbits_core::bits::CodecError>(())
+//! ```
+
+use thiserror::Error;
+
+/// Why bits could not be written or read.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CodecError {
+    /// The reader ran out of bits.
+    #[error("message ends after {available} bits: {requested} more were expected")]
+    EndOfMessage {
+        /// Bits that were asked for.
+        requested: u32,
+        /// Bits that were left.
+        available: usize,
+    },
+    /// A field wider than a machine word.
+    #[error("field of {width} bits: expected at most 64")]
+    FieldTooWide {
+        /// Requested width.
+        width: u32,
+    },
+    /// The value does not fit into its field.
+    #[error("value {value} does not fit into {width} bits")]
+    ValueTooLarge {
+        /// The value.
+        value: u64,
+        /// Width of the field in bits.
+        width: u32,
+    },
+    /// The bits are no message of this type.
+    #[error("{what} is {value}: expected {expected}")]
+    Invalid {
+        /// The decoded field.
+        what: &'static str,
+        /// Its value.
+        value: String,
+        /// What would have been accepted.
+        expected: &'static str,
+    },
+    /// Bits were left over behind a complete message.
+    #[error("{left} bits are left over behind the message")]
+    TrailingBits {
+        /// Bits that were not read.
+        left: usize,
+    },
+}
+
+/// A finished sequence of bits.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct BitString {
+    bytes: Vec<u8>,
+    bits: usize,
+}
+
+impl BitString {
+    /// The first `bits` bits of `bytes`.
+    ///
+    /// # Errors
+    /// If `bytes` is too short.
+    pub fn from_bytes(bytes: Vec<u8>, bits: usize) -> Result<Self, CodecError> {
+        if bits > bytes.len() * 8 {
+            return Err(CodecError::EndOfMessage {
+                requested: u32::try_from(bits).unwrap_or(u32::MAX),
+                available: bytes.len() * 8,
+            });
+        }
+        Ok(Self { bytes, bits })
+    }
+
+    /// Length in bits: the price of the message.
+    pub fn bits(&self) -> usize {
+        self.bits
+    }
+
+    /// The packed bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// The same message with bit `index` inverted, as a noisy link would deliver it; unchanged beyond the end.
+    pub fn with_flipped(mut self, index: usize) -> Self {
+        if index < self.bits {
+            self.bytes[index / 8] ^= 0x80 >> (index % 8);
+        }
+        self
+    }
+}
+
+/// Appends fields of 0 to 64 bits. Allocates once a message if made [`with_capacity`](Self::with_capacity).
+#[derive(Debug, Clone, Default)]
+pub struct BitWriter {
+    message: BitString,
+}
+
+impl BitWriter {
+    /// An empty writer.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// An empty writer with room for `bits` bits.
+    pub fn with_capacity(bits: usize) -> Self {
+        Self {
+            message: BitString {
+                bytes: Vec::with_capacity(bits.div_ceil(8)),
+                bits: 0,
+            },
+        }
+    }
+
+    /// Bits written so far.
+    pub fn bits(&self) -> usize {
+        self.message.bits
+    }
+
+    /// Writes the low `width` bits of `value`, most significant first.
+    ///
+    /// # Errors
+    /// If `width > 64` or `value >= 2^width`; nothing is written then.
+    pub fn write(&mut self, value: u64, width: u32) -> Result<(), CodecError> {
+        if width > 64 {
+            return Err(CodecError::FieldTooWide { width });
+        }
+        if width < 64 && value >> width != 0 {
+            return Err(CodecError::ValueTooLarge { value, width });
+        }
+        for shift in (0..width).rev() {
+            if self.message.bits.is_multiple_of(8) {
+                self.message.bytes.push(0);
+            }
+            let bit = (value >> shift & 1) as u8;
+            if let Some(last) = self.message.bytes.last_mut() {
+                *last |= bit << (7 - self.message.bits % 8);
+            }
+            self.message.bits += 1;
+        }
+        Ok(())
+    }
+
+    /// Writes one bit.
+    pub fn write_bit(&mut self, bit: bool) {
+        // A one-bit field always fits.
+        let _ = self.write(u64::from(bit), 1);
+    }
+
+    /// Empties the writer and keeps its memory.
+    pub fn clear(&mut self) {
+        self.message.bytes.clear();
+        self.message.bits = 0;
+    }
+
+    /// The bits so far.
+    pub fn as_bit_string(&self) -> &BitString {
+        &self.message
+    }
+
+    /// The finished message.
+    pub fn finish(self) -> BitString {
+        self.message
+    }
+}
+
+/// Reads fields back. Total: any bits give a value or a [`CodecError`].
+#[derive(Debug, Clone)]
+pub struct BitReader<'a> {
+    message: &'a BitString,
+    position: usize,
+}
+
+impl<'a> BitReader<'a> {
+    /// A reader at the first bit.
+    pub fn new(message: &'a BitString) -> Self {
+        Self { message, position: 0 }
+    }
+
+    /// Bits not yet read.
+    pub fn remaining(&self) -> usize {
+        self.message.bits - self.position
+    }
+
+    /// Reads a field of `width` bits.
+    ///
+    /// # Errors
+    /// If `width > 64` or fewer bits are left; nothing is consumed then.
+    pub fn read(&mut self, width: u32) -> Result<u64, CodecError> {
+        if width > 64 {
+            return Err(CodecError::FieldTooWide { width });
+        }
+        if self.remaining() < width as usize {
+            return Err(CodecError::EndOfMessage {
+                requested: width,
+                available: self.remaining(),
+            });
+        }
+        let mut value = 0;
+        for _ in 0..width {
+            let bit = self.message.bytes[self.position / 8] >> (7 - self.position % 8) & 1;
+            value = value << 1 | u64::from(bit);
+            self.position += 1;
+        }
+        Ok(value)
+    }
+
+    /// Reads one bit.
+    ///
+    /// # Errors
+    /// If none is left.
+    pub fn read_bit(&mut self) -> Result<bool, CodecError> {
+        Ok(self.read(1)? == 1)
+    }
+
+    /// Confirms that the message was read to its end.
+    ///
+    /// # Errors
+    /// If bits are left.
+    pub fn finish(self) -> Result<(), CodecError> {
+        match self.remaining() {
+            0 => Ok(()),
+            left => Err(CodecError::TrailingBits { left }),
+        }
+    }
+}

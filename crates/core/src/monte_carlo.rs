@@ -1,0 +1,177 @@
+//! The Monte-Carlo engine.
+//!
+//! Trials run in parallel in chunks of fixed size; each chunk is folded in trial order and the chunks are merged in index
+//! order, so the result is the same to the last bit on any number of threads. A trial draws only from its own [`Stream`], so
+//! one that fails can be run again alone.
+
+use crate::stream::Stream;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use thiserror::Error;
+
+/// Trials folded together before results are merged. Part of the result's definition: do not tune at run time.
+const CHUNK: u64 = 64;
+
+/// One trial: its number and its private random stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Trial {
+    /// Number of the trial, from 0.
+    pub index: u64,
+    /// Root of the trial's random streams.
+    pub stream: Stream,
+}
+
+/// Why a run has no result.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MonteCarloError<E> {
+    /// A trial failed. The failing trial of lowest index among those that ran is reported.
+    #[error("trial {index} failed ({source}); run it alone with `MonteCarlo::single({index}, ..)`")]
+    Trial {
+        /// Number of the trial.
+        index: u64,
+        /// Its random stream.
+        stream: Stream,
+        /// What went wrong.
+        source: E,
+    },
+    /// The run was cancelled.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// A number of independent trials on the streams of one experiment.
+///
+/// ```
+/// use fewbits_core::{MonteCarlo, Moments, Stream};
+/// use rand::RngExt;
+/// let run = MonteCarlo::new(Stream::new(1).named("mean of a uniform"), 10_000);
+/// let moments = run.fold(
+///     Moments::default,
+///     |sum, trial| Ok::<_, std::convert::Infallible>(sum.add(trial.stream.rng().random())),
+///     |total, chunk| total.merge(&chunk),
+/// )?;
+/// assert!(moments.estimate().z_score(0.5).abs() < 4.0);
+/// # Ok::<(), fewbits_core::monte_carlo::MonteCarloError<std::convert::Infallible>>(())
+/// ```
+#[derive(Clone, Copy)]
+pub struct MonteCarlo<'a> {
+    stream: Stream,
+    trials: u64,
+    progress: Option<&'a (dyn Fn(u64) + Sync)>,
+    cancel: Option<&'a AtomicBool>,
+}
+
+impl<'a> MonteCarlo<'a> {
+    /// `trials` trials; trial `i` draws from `stream.indexed(i)`.
+    pub fn new(stream: Stream, trials: u64) -> Self {
+        Self {
+            stream,
+            trials,
+            progress: None,
+            cancel: None,
+        }
+    }
+
+    /// Calls `progress` with the number of trials just finished, from any thread.
+    pub fn with_progress(self, progress: &'a (dyn Fn(u64) + Sync)) -> Self {
+        Self {
+            progress: Some(progress),
+            ..self
+        }
+    }
+
+    /// Stops between trials once `cancel` is set.
+    pub fn with_cancellation(self, cancel: &'a AtomicBool) -> Self {
+        Self {
+            cancel: Some(cancel),
+            ..self
+        }
+    }
+
+    /// Number of trials.
+    pub fn trials(&self) -> u64 {
+        self.trials
+    }
+
+    /// The trial of the given index.
+    pub fn trial(&self, index: u64) -> Trial {
+        Trial {
+            index,
+            stream: self.stream.indexed(index),
+        }
+    }
+
+    /// Runs one trial alone, exactly as the full run would.
+    ///
+    /// # Errors
+    /// If the trial fails.
+    pub fn single<T, E>(&self, index: u64, trial: impl FnOnce(Trial) -> Result<T, E>) -> Result<T, MonteCarloError<E>> {
+        let it = self.trial(index);
+        trial(it).map_err(|source| MonteCarloError::Trial {
+            index,
+            stream: it.stream,
+            source,
+        })
+    }
+
+    /// Runs all trials and returns their results in trial order.
+    ///
+    /// # Errors
+    /// If a trial fails or the run is cancelled.
+    pub fn run<T: Send, E: Send>(
+        &self,
+        trial: impl Fn(Trial) -> Result<T, E> + Sync,
+    ) -> Result<Vec<T>, MonteCarloError<E>> {
+        self.fold(
+            Vec::new,
+            |results, it| {
+                results.push(trial(it)?);
+                Ok(())
+            },
+            |all, mut chunk| all.append(&mut chunk),
+        )
+    }
+
+    /// Folds all trials into one accumulator, in trial order within chunks and chunk order between them.
+    ///
+    /// # Errors
+    /// If a trial fails or the run is cancelled.
+    pub fn fold<A: Send, E: Send>(
+        &self,
+        empty: impl Fn() -> A + Sync,
+        trial: impl Fn(&mut A, Trial) -> Result<(), E> + Sync,
+        merge: impl Fn(&mut A, A),
+    ) -> Result<A, MonteCarloError<E>> {
+        let chunks: Vec<Result<A, MonteCarloError<E>>> = (0..self.trials.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|chunk| self.fold_chunk(chunk, &empty, &trial))
+            .collect();
+        let mut total = empty();
+        for chunk in chunks {
+            merge(&mut total, chunk?);
+        }
+        Ok(total)
+    }
+
+    fn fold_chunk<A, E>(
+        &self,
+        chunk: u64,
+        empty: impl Fn() -> A,
+        trial: impl Fn(&mut A, Trial) -> Result<(), E>,
+    ) -> Result<A, MonteCarloError<E>> {
+        let mut accumulator = empty();
+        let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.trials);
+        let finished = indices.end - indices.start;
+        for index in indices {
+            if self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                return Err(MonteCarloError::Cancelled);
+            }
+            self.single(index, |it| trial(&mut accumulator, it))?;
+        }
+        if let Some(progress) = self.progress {
+            progress(finished);
+        }
+        Ok(accumulator)
+    }
+}

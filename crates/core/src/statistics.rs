@@ -1,0 +1,154 @@
+//! Summary statistics with standard errors.
+
+use crate::error::ArgumentError;
+use crate::gaussian::Gaussian;
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+/// Running count, mean and variance (Welford's recursion; merging is Chan's).
+///
+/// ```
+/// use fewbits_core::Moments;
+/// let m: Moments = [1.0, 2.0, 3.0, 4.0].into_iter().collect();
+/// assert_eq!((m.count(), m.mean()), (4, 2.5));
+/// assert!((m.variance() - 5.0 / 3.0).abs() < 1e-15);
+/// assert!((m.standard_error() - (5.0 / 12.0_f64).sqrt()).abs() < 1e-15);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Moments {
+    count: u64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Moments {
+    /// Adds one value.
+    #[inline]
+    pub fn add(&mut self, value: f64) {
+        self.count += 1;
+        let deviation = value - self.mean;
+        self.mean += deviation / self.count as f64;
+        self.squares += deviation * (value - self.mean);
+    }
+
+    /// Adds all values that another accumulator saw.
+    pub fn merge(&mut self, other: &Self) {
+        if other.count == 0 {
+            return;
+        }
+        let total = (self.count + other.count) as f64;
+        let deviation = other.mean - self.mean;
+        let share = other.count as f64 / total;
+        self.squares += other.squares + deviation * deviation * self.count as f64 * share;
+        self.mean += deviation * share;
+        self.count += other.count;
+    }
+
+    /// Number of values.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Mean; 0 before the first value.
+    pub fn mean(&self) -> f64 {
+        self.mean
+    }
+
+    /// Unbiased sample variance; 0 for fewer than two values.
+    pub fn variance(&self) -> f64 {
+        if self.count < 2 {
+            0.0
+        } else {
+            self.squares / (self.count - 1) as f64
+        }
+    }
+
+    /// Standard error of the mean of independent values.
+    pub fn standard_error(&self) -> f64 {
+        (self.variance() / self.count.max(1) as f64).sqrt()
+    }
+
+    /// Square root of the mean with its standard error by the delta method: an RMSE from squared errors.
+    pub fn root_mean(&self) -> Estimate {
+        let root = self.mean.max(0.0).sqrt();
+        Estimate {
+            value: root,
+            standard_error: if root > 0.0 {
+                self.standard_error() / (2.0 * root)
+            } else {
+                0.0
+            },
+        }
+    }
+
+    /// Mean and standard error together.
+    pub fn estimate(&self) -> Estimate {
+        Estimate {
+            value: self.mean,
+            standard_error: self.standard_error(),
+        }
+    }
+}
+
+impl FromIterator<f64> for Moments {
+    fn from_iter<I: IntoIterator<Item = f64>>(values: I) -> Self {
+        let mut moments = Self::default();
+        for value in values {
+            moments.add(value);
+        }
+        moments
+    }
+}
+
+/// A Monte-Carlo estimate and its standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// The estimate.
+    pub value: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+}
+
+impl Estimate {
+    /// Deviation from `truth` in standard errors; 0 if both agree exactly.
+    pub fn z_score(&self, truth: f64) -> f64 {
+        let deviation = self.value - truth;
+        if deviation == 0.0 {
+            0.0
+        } else {
+            deviation / self.standard_error
+        }
+    }
+}
+
+/// Paired comparison of two schemes that ran on common random numbers: statistics of the per-trial difference `a - b`.
+///
+/// # Errors
+/// If the slices differ in length or are empty.
+pub fn paired_difference(a: &[f64], b: &[f64]) -> Result<Moments, ArgumentError> {
+    if a.len() != b.len() || a.is_empty() {
+        return Err(ArgumentError::new(
+            "b",
+            format!("{} values against {}", b.len(), a.len()),
+            "as many values as in `a`, at least 1",
+        ));
+    }
+    Ok(a.iter().zip(b).map(|(x, y)| x - y).collect())
+}
+
+/// Normalised estimation error squared, `(x - mean)' P^-1 (x - mean) / D`: expectation 1 for a consistent belief.
+///
+/// # Errors
+/// If the belief's covariance is singular.
+pub fn nees<const D: usize>(belief: &Gaussian<D>, truth: &SVector<f64, D>) -> Result<f64, ArgumentError> {
+    Ok(belief.mahalanobis_squared(truth)? / D as f64)
+}
+
+/// Normalised innovation squared, `nu' S^-1 nu / M`: expectation 1 for a consistent filter. `innovation` is a Gaussian with
+/// the predicted measurement as mean and the innovation covariance `S`.
+///
+/// # Errors
+/// If `S` is singular.
+pub fn nis<const M: usize>(predicted: &Gaussian<M>, measurement: &SVector<f64, M>) -> Result<f64, ArgumentError> {
+    nees(predicted, measurement)
+}

@@ -1,0 +1,121 @@
+//! The first-order autoregression.
+
+use crate::{Error, LinearGaussian};
+use fewbits_core::error::{finite, non_negative};
+use nalgebra::{Matrix1, Vector1};
+
+/// `x(n) = a x(n-1) + u(n)`, `u ~ N(0, q)`: a scalar that decays towards zero and is pushed by white noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ar1 {
+    coefficient: f64,
+    noise_variance: f64,
+}
+
+impl Ar1 {
+    /// The model with coefficient `a` in `[-1, 1]` and noise variance `q >= 0` (state units squared).
+    ///
+    /// # Errors
+    /// [`Error::UnstablePlant`] for `|a| > 1`; see [`Ar1::new_unstable`].
+    pub fn new(coefficient: f64, noise_variance: f64) -> Result<Self, Error> {
+        let model = Self::new_unstable(coefficient, noise_variance)?;
+        if coefficient.abs() > 1.0 {
+            return Err(Error::UnstablePlant { coefficient });
+        }
+        Ok(model)
+    }
+
+    /// The same for any finite coefficient. The name is the opt-in: a state that grows without bound is beyond most
+    /// estimators that hear only a few bits.
+    ///
+    /// # Errors
+    /// A coefficient that is not finite, a negative variance.
+    pub fn new_unstable(coefficient: f64, noise_variance: f64) -> Result<Self, Error> {
+        Ok(Self {
+            coefficient: finite("coefficient", coefficient)?,
+            noise_variance: non_negative("noise_variance", noise_variance)?,
+        })
+    }
+
+    /// `a`.
+    pub fn coefficient(&self) -> f64 {
+        self.coefficient
+    }
+
+    /// `q`.
+    pub fn noise_variance(&self) -> f64 {
+        self.noise_variance
+    }
+
+    /// Mean of the next state.
+    #[inline]
+    pub fn predict(&self, state: f64) -> f64 {
+        self.coefficient * state
+    }
+
+    /// Variance of the next state when that of the present one is `variance`: `a^2 P + q`.
+    #[inline]
+    pub fn predict_variance(&self, variance: f64) -> f64 {
+        self.coefficient * self.coefficient * variance + self.noise_variance
+    }
+
+    /// Variance of the stationary distribution, `q / (1 - a^2)`.
+    ///
+    /// # Errors
+    /// [`Error::NotStationary`] for `|a| >= 1`.
+    pub fn stationary_variance(&self) -> Result<f64, Error> {
+        let a = self.coefficient;
+        if a.abs() < 1.0 {
+            // The factored form keeps the digits of 1 - a^2 near |a| = 1.
+            Ok(self.noise_variance / ((1.0 - a) * (1.0 + a)))
+        } else {
+            Err(Error::NotStationary)
+        }
+    }
+}
+
+impl From<Ar1> for LinearGaussian<1, 1> {
+    fn from(model: Ar1) -> Self {
+        Self::from_checked(
+            Matrix1::new(model.coefficient),
+            Matrix1::identity(),
+            Vector1::new(model.noise_variance),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Ar1;
+    use crate::{Error, LinearGaussian};
+
+    #[test]
+    fn refuses_what_would_explode() {
+        assert!(Ar1::new(-1.0, 0.0).is_ok());
+        assert_eq!(
+            Ar1::new(1.2, 0.5),
+            Err(Error::UnstablePlant { coefficient: 1.2 })
+        );
+        assert!(Ar1::new_unstable(1.2, 0.5).is_ok());
+        for (a, q) in [
+            (f64::NAN, 1.0),
+            (0.5, -1e-9),
+            (f64::INFINITY, 1.0),
+            (0.5, f64::NAN),
+        ] {
+            assert!(matches!(Ar1::new_unstable(a, q), Err(Error::Argument(_))));
+        }
+        assert_eq!(
+            Ar1::new(1.0, 1.0).unwrap().stationary_variance(),
+            Err(Error::NotStationary)
+        );
+    }
+
+    #[test]
+    fn stationary_variance_is_the_fixed_point_and_the_vector_models() {
+        let model = Ar1::new(-0.97, 0.3).unwrap();
+        let variance = model.stationary_variance().unwrap();
+        assert!((model.predict_variance(variance) - variance).abs() < 1e-13);
+        let same = LinearGaussian::from(model).stationary_covariance().unwrap()[(0, 0)];
+        assert!((same - variance).abs() < 1e-12 * variance);
+    }
+}

@@ -1,0 +1,33 @@
+//! What a model refuses.
+
+use fewbits_core::ArgumentError;
+
+/// Errors of this crate.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument out of range.
+    #[error(transparent)]
+    Argument(#[from] ArgumentError),
+    /// A coefficient outside `[-1, 1]` where the state would grow without bound.
+    #[error(
+        "the coefficient is {coefficient}: the state grows without bound unless it lies in [-1, 1]"
+    )]
+    UnstablePlant {
+        /// The offending coefficient.
+        coefficient: f64,
+    },
+    /// The dynamics have no stationary distribution.
+    #[error(
+        "the dynamics have no stationary distribution: an eigenvalue of the transition lies on or outside the unit circle"
+    )]
+    NotStationary,
+    /// A matrix that must be a covariance is none.
+    #[error("`{name}` is not a covariance: expected a symmetric positive {kind} matrix")]
+    NotCovariance {
+        /// Name of the argument.
+        name: &'static str,
+        /// `"definite"` or `"semidefinite"`.
+        kind: &'static str,
+    },
+}

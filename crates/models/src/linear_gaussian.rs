@@ -1,0 +1,201 @@
+//! Linear dynamics driven by Gaussian noise.
+
+use crate::Error;
+use crate::factor::semidefinite_factor;
+use fewbits_core::error::{all_finite, non_negative};
+use nalgebra::{SMatrix, SVector};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// `x(n) = F x(n-1) + G u(n)` with independent `u_i ~ N(0, q_i)`: `D` state coordinates, `U` causes of noise.
+///
+/// The noise covariance `Q = G diag(q) G'` has rank at most `U`; nothing here factors or inverts it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearGaussian<const D: usize, const U: usize> {
+    transition: SMatrix<f64, D, D>,
+    gain: SMatrix<f64, D, U>,
+    noise_variances: SVector<f64, U>,
+    /// `G diag(sqrt q)`, which turns standard normals into process noise.
+    noise_factor: SMatrix<f64, D, U>,
+    noise_covariance: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize, const U: usize> LinearGaussian<D, U> {
+    /// The model with transition `F` (D x D), noise gain `G` (D x U) and noise variances `q` (U).
+    ///
+    /// # Errors
+    /// Entries that are not finite, a negative variance.
+    pub fn new(
+        transition: SMatrix<f64, D, D>,
+        gain: SMatrix<f64, D, U>,
+        noise_variances: SVector<f64, U>,
+    ) -> Result<Self, Error> {
+        all_finite("transition", transition.as_slice())?;
+        all_finite("gain", gain.as_slice())?;
+        for &variance in noise_variances.iter() {
+            non_negative("noise_variances", variance)?;
+        }
+        Ok(Self::from_checked(transition, gain, noise_variances))
+    }
+
+    pub(crate) fn from_checked(
+        transition: SMatrix<f64, D, D>,
+        gain: SMatrix<f64, D, U>,
+        noise_variances: SVector<f64, U>,
+    ) -> Self {
+        let noise_factor = SMatrix::from_fn(|i, j| gain[(i, j)] * noise_variances[j].sqrt());
+        Self {
+            transition,
+            gain,
+            noise_variances,
+            noise_factor,
+            noise_covariance: noise_factor * noise_factor.transpose(),
+        }
+    }
+
+    /// `F`.
+    pub fn transition(&self) -> &SMatrix<f64, D, D> {
+        &self.transition
+    }
+
+    /// `G`.
+    pub fn gain(&self) -> &SMatrix<f64, D, U> {
+        &self.gain
+    }
+
+    /// `q`.
+    pub fn noise_variances(&self) -> &SVector<f64, U> {
+        &self.noise_variances
+    }
+
+    /// `G diag(sqrt q)`: multiplied with `U` standard normals it is a draw of the process noise.
+    pub fn noise_factor(&self) -> &SMatrix<f64, D, U> {
+        &self.noise_factor
+    }
+
+    /// `Q = G diag(q) G'`, possibly singular.
+    pub fn noise_covariance(&self) -> &SMatrix<f64, D, D> {
+        &self.noise_covariance
+    }
+
+    /// Mean of the next state, `F x`.
+    #[inline]
+    pub fn predict(&self, state: &SVector<f64, D>) -> SVector<f64, D> {
+        self.transition * state
+    }
+
+    /// Covariance of the next state, `F P F' + Q`.
+    #[inline]
+    pub fn predict_covariance(&self, covariance: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+        self.transition * covariance * self.transition.transpose() + self.noise_covariance
+    }
+
+    /// A draw of the process noise `G u`.
+    #[inline]
+    pub fn sample_noise<R: Rng + ?Sized>(&self, rng: &mut R) -> SVector<f64, D> {
+        self.noise_factor * SVector::<f64, U>::from_fn(|_, _| StandardNormal.sample(rng))
+    }
+
+    /// A draw of the next state.
+    #[inline]
+    pub fn sample_next<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        state: &SVector<f64, D>,
+    ) -> SVector<f64, D> {
+        self.predict(state) + self.sample_noise(rng)
+    }
+
+    /// Covariance of the stationary distribution: the root of `P = F P F' + Q`.
+    ///
+    /// Doubling: after `k` rounds `P` holds the first `2^k` terms of `sum F^i Q F'^i`.
+    ///
+    /// # Errors
+    /// [`Error::NotStationary`] if an eigenvalue of `F` lies on or outside the unit circle.
+    pub fn stationary_covariance(&self) -> Result<SMatrix<f64, D, D>, Error> {
+        let mut power = self.transition;
+        let mut sum = self.noise_covariance;
+        // An eigenvalue one rounding unit inside the circle is squared away in 60 rounds.
+        for _ in 0..64 {
+            sum += power * sum * power.transpose();
+            power *= power;
+            let left = power.amax();
+            if left == 0.0 || left < f64::MIN_POSITIVE {
+                return Ok((sum + sum.transpose()) * 0.5);
+            }
+            if !left.is_finite() {
+                break;
+            }
+        }
+        Err(Error::NotStationary)
+    }
+}
+
+impl<const D: usize> LinearGaussian<D, D> {
+    /// The model with a given noise covariance `Q`, symmetric positive semidefinite of any rank.
+    ///
+    /// # Errors
+    /// Entries that are not finite; [`Error::NotCovariance`].
+    pub fn with_covariance(
+        transition: SMatrix<f64, D, D>,
+        noise_covariance: SMatrix<f64, D, D>,
+    ) -> Result<Self, Error> {
+        let gain = semidefinite_factor("noise_covariance", &noise_covariance)?;
+        Self::new(transition, gain, SVector::repeat(1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::LinearGaussian;
+    use crate::Error;
+    use nalgebra::{Matrix1, Matrix2, Matrix2x1, Vector1, Vector2};
+    use rand::SeedableRng;
+    use rand_pcg::Pcg64Mcg;
+
+    fn rotation(scale: f64) -> Matrix2<f64> {
+        Matrix2::new(0.8, -0.6, 0.6, 0.8) * scale
+    }
+
+    #[test]
+    fn stationary_covariance_is_a_fixed_point() {
+        let q = Matrix2::new(0.3, 0.1, 0.1, 0.2);
+        let model = LinearGaussian::with_covariance(rotation(0.99), q).unwrap();
+        let covariance = model.stationary_covariance().unwrap();
+        let again = model.predict_covariance(&covariance);
+        assert!((again - covariance).amax() < 1e-12 * covariance.amax());
+        for scale in [1.0, 1.5] {
+            let model = LinearGaussian::with_covariance(rotation(scale), q).unwrap();
+            assert_eq!(model.stationary_covariance(), Err(Error::NotStationary));
+        }
+    }
+
+    #[test]
+    fn draws_have_the_stated_moments_and_rank() {
+        let model = LinearGaussian::new(
+            Matrix2::identity(),
+            Matrix2x1::new(0.5, 1.0),
+            Vector1::new(4.0),
+        )
+        .unwrap();
+        let mut rng = Pcg64Mcg::seed_from_u64(1);
+        let (mut sum, n) = (Matrix2::zeros(), 20_000);
+        for _ in 0..n {
+            let noise =
+                model.sample_next(&mut rng, &Vector2::new(1.0, 2.0)) - Vector2::new(1.0, 2.0);
+            assert!((noise[1] - 2.0 * noise[0]).abs() < 1e-12);
+            sum += noise * noise.transpose();
+        }
+        let covariance = sum / f64::from(n);
+        assert!((covariance[(1, 1)] - 4.0).abs() < 4.5 * 4.0 * (2.0 / f64::from(n)).sqrt());
+        assert_eq!(model.noise_covariance()[(0, 1)], 2.0);
+    }
+
+    #[test]
+    fn refuses_bad_matrices() {
+        let one = Matrix1::new(1.0);
+        assert!(LinearGaussian::new(Matrix1::new(f64::NAN), one, Vector1::new(1.0)).is_err());
+        assert!(LinearGaussian::new(one, one, Vector1::new(-1.0)).is_err());
+        assert!(LinearGaussian::with_covariance(one, Matrix1::new(-1.0)).is_err());
+    }
+}
