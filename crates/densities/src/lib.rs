@@ -10,8 +10,8 @@
 //! ```
 //! use fewbits_densities::Particles;
 //! let belief = Particles::uniform([vec![1.0, 2.0, 3.0], vec![0.0, 1.0, 2.0]])?;
-//! assert_eq!(belief.mean()?.as_slice(), &[2.0, 1.0]);
-//! assert!((belief.covariance()?[(0, 1)] - 2.0 / 3.0).abs() < 1e-15);
+//! assert_eq!(belief.mean().as_slice(), &[2.0, 1.0]);
+//! assert!((belief.covariance()[(0, 1)] - 2.0 / 3.0).abs() < 1e-15);
 //! # Ok::<(), fewbits_densities::Error>(())
 //! ```
 //!
@@ -22,4 +22,4 @@ mod particles;
 pub mod sums;
 
 pub use error::Error;
-pub use particles::{Normalisation, Particles};
+pub use particles::Particles;

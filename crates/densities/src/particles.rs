@@ -2,76 +2,85 @@
 
 use crate::Error;
 use crate::sums::{dot, lanes, sum};
-use fewbits_core::ArgumentError;
 use fewbits_core::error::{all_finite, at_least_one};
+use fewbits_core::{ArgumentError, Columns, ColumnsMut};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// A belief `sum_i w_i delta(x - x_i)` over `R^D`.
+/// A belief `sum_i w_i delta(x - x_i)` over `R^D`, always normalised.
 ///
-/// Each coordinate is one contiguous column and the weights are logarithms, so that a filter's inner loops run over plain
-/// slices and a weight cannot underflow. The weights need not be normalised: `log_weights` of equal size mean a uniform
-/// belief whatever the size. [`normalise_into`](Self::normalise_into) is the one place where exponentials are taken; the
-/// moments then use its result, so that a filter pays for one exponential a particle.
+/// Each coordinate is one contiguous column and the weights are kept as logarithms and as themselves, so that a filter's
+/// inner loops run over plain slices, no weight underflows on the way, and one exponential a particle is paid where the
+/// weights change. They change only through [`reweigh`](Self::reweigh), which either succeeds or leaves the belief as it was.
 ///
 /// ```
 /// use fewbits_densities::Particles;
-/// let belief = Particles::new([vec![0.0, 1.0, 4.0]], vec![0.0, 0.0, f64::NEG_INFINITY])?;
-/// assert_eq!(belief.mean()?[0], 0.5);
-/// assert_eq!(belief.effective_sample_size()?, 2.0);
+/// let belief = Particles::new([vec![0.0, 1.0, 4.0]], &[0.0, 0.0, f64::NEG_INFINITY])?;
+/// assert_eq!(belief.mean()[0], 0.5);
+/// assert_eq!(belief.effective_sample_size(), 2.0);
 /// # Ok::<(), fewbits_densities::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Particles<const D: usize> {
     columns: [Vec<f64>; D],
     log_weights: Vec<f64>,
-}
-
-/// What [`Particles::normalise_into`] learns on the way.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Normalisation {
-    /// `ln sum_i exp(log_weight_i)` before normalisation.
-    pub log_sum: f64,
-    /// `1 / sum_i w_i^2`, between 1 and the number of particles.
-    pub effective_sample_size: f64,
+    weights: Vec<f64>,
+    effective_sample_size: f64,
+    /// Room for a column or for weights under construction, so that no step allocates.
+    scratch: Vec<f64>,
 }
 
 impl<const D: usize> Particles<D> {
-    /// Particles from their columns and log weights (of any common offset; `-inf` is a weight of zero).
+    /// Particles from their columns and log weights, which may share any offset; `-inf` is a weight of zero.
     ///
     /// # Errors
     /// Lengths that differ, no particle, a coordinate that is not finite, a log weight that is NaN or `+inf`, or all weights
     /// zero.
-    pub fn new(columns: [Vec<f64>; D], log_weights: Vec<f64>) -> Result<Self, Error> {
-        at_least_one("particles", log_weights.len())?;
-        for column in &columns {
-            if column.len() != log_weights.len() {
-                return Err(ArgumentError::new(
-                    "columns",
-                    format!("a column of length {}", column.len()),
-                    format!("length {}, one entry a log weight", log_weights.len()),
-                )
-                .into());
-            }
-            all_finite("columns", column)?;
-        }
+    pub fn new(columns: [Vec<f64>; D], log_weights: &[f64]) -> Result<Self, Error> {
         if let Some(bad) = log_weights.iter().find(|w| w.is_nan() || **w == f64::INFINITY) {
             return Err(ArgumentError::new("log_weights", bad, "log weights below infinity").into());
         }
-        let belief = Self { columns, log_weights };
-        belief.largest_log_weight()?;
+        let mut belief = Self::uniform(columns)?;
+        if belief.len() != log_weights.len() {
+            return Err(ArgumentError::new(
+                "log_weights",
+                format!("{} numbers", log_weights.len()),
+                format!("{}, one a particle", belief.len()),
+            )
+            .into());
+        }
+        belief.reweigh(|_, own| own.copy_from_slice(log_weights))?;
         Ok(belief)
     }
 
     /// Equally weighted particles from their columns.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Lengths that differ, no particle, a coordinate that is not finite.
     pub fn uniform(columns: [Vec<f64>; D]) -> Result<Self, Error> {
         let count = columns.first().map_or(0, Vec::len);
-        let weight = -(count.max(1) as f64).ln();
-        Self::new(columns, vec![weight; count])
+        at_least_one("particles", count)?;
+        for column in &columns {
+            if column.len() != count {
+                return Err(ArgumentError::new(
+                    "columns",
+                    format!("a column of length {}", column.len()),
+                    format!("length {count}, as the first column"),
+                )
+                .into());
+            }
+            all_finite("columns", column)?;
+        }
+        let mut belief = Self {
+            columns,
+            log_weights: Vec::with_capacity(count),
+            weights: Vec::with_capacity(count),
+            effective_sample_size: 0.0,
+            scratch: Vec::with_capacity(count),
+        };
+        belief.equalise(count);
+        Ok(belief)
     }
 
     /// Equally weighted particles, drawn one after the other.
@@ -79,7 +88,6 @@ impl<const D: usize> Particles<D> {
     /// # Errors
     /// No particle, or a draw that is not finite.
     pub fn from_draws(count: usize, mut draw: impl FnMut() -> SVector<f64, D>) -> Result<Self, Error> {
-        at_least_one("particles", count)?;
         let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| Vec::with_capacity(count));
         for _ in 0..count {
             let point = draw();
@@ -92,25 +100,30 @@ impl<const D: usize> Particles<D> {
 
     /// Number of particles, at least one.
     pub fn len(&self) -> usize {
-        self.log_weights.len()
+        self.weights.len()
     }
 
     /// Never true: a belief has at least one particle.
     pub fn is_empty(&self) -> bool {
-        self.log_weights.is_empty()
+        self.weights.is_empty()
     }
 
     /// The coordinates, one contiguous column each.
-    pub fn columns(&self) -> &[Vec<f64>; D] {
-        &self.columns
+    pub fn columns(&self) -> Columns<'_, D> {
+        self.columns.each_ref().map(Vec::as_slice)
     }
 
-    /// The columns and log weights for work in place. The lengths must be left as they are, all equal.
-    pub fn parts_mut(&mut self) -> (&mut [Vec<f64>; D], &mut Vec<f64>) {
-        (&mut self.columns, &mut self.log_weights)
+    /// The coordinates for work in place, such as propagation. Finite numbers must stay finite.
+    pub fn columns_mut(&mut self) -> ColumnsMut<'_, D> {
+        self.columns.each_mut().map(Vec::as_mut_slice)
     }
 
-    /// Logarithms of the weights, up to a common offset.
+    /// Normalised weights.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// Logarithms of the normalised weights.
     pub fn log_weights(&self) -> &[f64] {
         &self.log_weights
     }
@@ -120,125 +133,127 @@ impl<const D: usize> Particles<D> {
         (i < self.len()).then(|| SVector::from_fn(|d, _| self.columns[d][i]))
     }
 
-    /// Gives all particles the same weight.
-    pub fn reset_weights(&mut self) {
-        let weight = -(self.len() as f64).ln();
-        self.log_weights.fill(weight);
+    /// `1 / sum w_i^2`, between 1 and the number of particles.
+    pub fn effective_sample_size(&self) -> f64 {
+        self.effective_sample_size
     }
 
-    fn largest_log_weight(&self) -> Result<f64, Error> {
-        // `max` drops NaN, so a sum over the weights has to look for it.
-        let largest = self.log_weights.iter().fold(f64::NEG_INFINITY, |m, w| m.max(*w));
-        if largest.is_finite() {
-            Ok(largest)
-        } else {
-            Err(Error::Degenerate { largest })
-        }
-    }
-
-    /// Normalises the log weights to sum to one and writes the weights themselves to `weights` (resized as needed).
+    /// Lets `change` edit the log weights (typically: add log likelihoods) and normalises them. Returns
+    /// `ln sum_i exp(log weight_i)` after the change: the log-likelihood estimate if log likelihoods were added.
     ///
     /// # Errors
-    /// [`Error::Degenerate`] if no weight is above zero or one is NaN; the belief is then left as it was.
-    pub fn normalise_into(&mut self, weights: &mut Vec<f64>) -> Result<Normalisation, Error> {
-        let normalisation = self.weights_into(weights)?;
-        self.log_weights.iter_mut().for_each(|w| *w -= normalisation.log_sum);
-        Ok(normalisation)
-    }
-
-    /// Writes the normalised weights to `weights` (resized as needed) and leaves the belief as it is.
-    ///
-    /// # Errors
-    /// [`Error::Degenerate`] if no weight is above zero or one is NaN.
-    pub fn weights_into(&self, weights: &mut Vec<f64>) -> Result<Normalisation, Error> {
-        let largest = self.largest_log_weight()?;
-        weights.resize(self.len(), 0.0);
-        for (w, l) in weights.iter_mut().zip(&self.log_weights) {
-            *w = (l - largest).exp();
+    /// [`Error::Degenerate`] if no weight is left or one is NaN or infinite; the belief is then as it was before.
+    pub fn reweigh(&mut self, change: impl FnOnce(Columns<'_, D>, &mut [f64])) -> Result<f64, Error> {
+        self.scratch.clear();
+        self.scratch.extend_from_slice(&self.log_weights);
+        change(self.columns.each_ref().map(Vec::as_slice), &mut self.scratch);
+        // `max` drops NaN; the sum below does not.
+        let largest = self
+            .scratch
+            .iter()
+            .fold(f64::NEG_INFINITY, |m, w| if *w > m { *w } else { m });
+        if !largest.is_finite() {
+            return Err(Error::Degenerate { largest });
         }
-        let total = sum(weights);
+        for (new, log_weight) in self.weights.iter_mut().zip(&self.scratch) {
+            *new = (log_weight - largest).exp();
+        }
+        let total = sum(&self.weights);
         if !total.is_finite() {
+            for (old, log_weight) in self.weights.iter_mut().zip(&self.log_weights) {
+                *old = log_weight.exp();
+            }
             return Err(Error::Degenerate { largest: total });
         }
+        let log_sum = largest + total.ln();
         let scale = 1.0 / total;
-        let mut squares = 0.0;
-        for w in weights.iter_mut() {
-            *w *= scale;
-            squares += *w * *w;
+        self.weights.iter_mut().for_each(|w| *w *= scale);
+        self.scratch.iter_mut().for_each(|w| *w -= log_sum);
+        std::mem::swap(&mut self.log_weights, &mut self.scratch);
+        self.effective_sample_size = 1.0 / dot(&self.weights, &self.weights);
+        Ok(log_sum)
+    }
+
+    /// Replaces the particles by copies of the chosen ones, equally weighted. Indices must be below [`len`](Self::len); the
+    /// number of particles becomes that of the indices.
+    ///
+    /// # Errors
+    /// No index, or one out of range; the belief is then as it was.
+    pub fn select(&mut self, ancestors: &[u32]) -> Result<(), Error> {
+        at_least_one("ancestors", ancestors.len())?;
+        let count = self.len();
+        if let Some(bad) = ancestors.iter().find(|a| **a as usize >= count) {
+            return Err(ArgumentError::new("ancestors", bad, format!("indices below {count}")).into());
         }
-        Ok(Normalisation {
-            log_sum: largest + total.ln(),
-            effective_sample_size: 1.0 / squares,
-        })
+        for column in &mut self.columns {
+            self.scratch.clear();
+            self.scratch.extend(ancestors.iter().map(|a| column[*a as usize]));
+            std::mem::swap(column, &mut self.scratch);
+        }
+        self.equalise(ancestors.len());
+        Ok(())
     }
 
-    /// The normalised weights.
-    ///
-    /// # Errors
-    /// [`Error::Degenerate`] as [`normalise_into`](Self::normalise_into).
-    pub fn weights(&self) -> Result<Vec<f64>, Error> {
-        let mut weights = Vec::new();
-        self.weights_into(&mut weights)?;
-        Ok(weights)
+    /// Gives all particles the same weight.
+    pub fn equalise_weights(&mut self) {
+        self.equalise(self.len());
     }
 
-    /// `1 / sum w_i^2` of the normalised weights.
-    ///
-    /// # Errors
-    /// [`Error::Degenerate`] as [`normalise_into`](Self::normalise_into).
-    pub fn effective_sample_size(&self) -> Result<f64, Error> {
-        Ok(self.weights_into(&mut Vec::new())?.effective_sample_size)
+    fn equalise(&mut self, count: usize) {
+        let weight = 1.0 / count as f64;
+        self.weights.clear();
+        self.weights.resize(count, weight);
+        self.log_weights.clear();
+        self.log_weights.resize(count, weight.ln());
+        self.effective_sample_size = count as f64;
     }
 
     /// Weighted mean.
-    ///
-    /// # Errors
-    /// [`Error::Degenerate`] as [`normalise_into`](Self::normalise_into).
-    pub fn mean(&self) -> Result<SVector<f64, D>, Error> {
-        Ok(self.mean_with(&self.weights()?))
+    pub fn mean(&self) -> SVector<f64, D> {
+        SVector::from_fn(|d, _| dot(&self.weights, &self.columns[d]))
     }
 
-    /// Weighted covariance `sum w (x - mean)(x - mean)^T`, without a small-sample correction.
-    ///
-    /// # Errors
-    /// [`Error::Degenerate`] as [`normalise_into`](Self::normalise_into).
-    pub fn covariance(&self) -> Result<SMatrix<f64, D, D>, Error> {
-        let weights = self.weights()?;
-        Ok(self.covariance_with(&weights, &self.mean_with(&weights)))
-    }
-
-    /// Weighted mean under weights already normalised, one a particle.
-    pub fn mean_with(&self, weights: &[f64]) -> SVector<f64, D> {
-        SVector::from_fn(|d, _| dot(weights, &self.columns[d]))
-    }
-
-    /// Weighted covariance about `mean` under weights already normalised, one a particle.
-    pub fn covariance_with(&self, weights: &[f64], mean: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+    /// Weighted covariance `sum w (x - mean)(x - mean)^T` about a given mean, without a small-sample correction.
+    pub fn covariance_about(&self, mean: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        let w = self.weights.as_slice();
         let mut covariance = SMatrix::zeros();
         for i in 0..D {
             for j in 0..=i {
-                let (a, b) = (&self.columns[i], &self.columns[j]);
-                let sum = lanes(weights.len(), |k| weights[k] * (a[k] - mean[i]) * (b[k] - mean[j]));
-                covariance[(i, j)] = sum;
-                covariance[(j, i)] = sum;
+                let (a, b) = (&self.columns[i][..w.len()], &self.columns[j][..w.len()]);
+                let (ma, mb) = (mean[i], mean[j]);
+                let entry = lanes(w.len(), |k| w[k] * (a[k] - ma) * (b[k] - mb));
+                covariance[(i, j)] = entry;
+                covariance[(j, i)] = entry;
             }
         }
         covariance
     }
+
+    /// Weighted covariance about the mean.
+    pub fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.covariance_about(&self.mean())
+    }
 }
 
-/// The plain form in which particles are stored.
+/// Equality of the belief: columns and weights.
+impl<const D: usize> PartialEq for Particles<D> {
+    fn eq(&self, other: &Self) -> bool {
+        self.columns == other.columns && self.log_weights == other.log_weights
+    }
+}
+
+/// The plain form in which particles are stored. Weights rather than their logarithms: JSON has no infinity.
 #[derive(Serialize, Deserialize)]
 struct Stored {
     columns: Vec<Vec<f64>>,
-    log_weights: Vec<f64>,
+    weights: Vec<f64>,
 }
 
 impl<const D: usize> From<Particles<D>> for Stored {
     fn from(belief: Particles<D>) -> Self {
         Self {
             columns: belief.columns.into(),
-            log_weights: belief.log_weights,
+            weights: belief.weights,
         }
     }
 }
@@ -250,6 +265,7 @@ impl<const D: usize> TryFrom<Stored> for Particles<D> {
         let columns = stored.columns.try_into().map_err(|columns: Vec<Vec<f64>>| {
             ArgumentError::new("columns", format!("{} columns", columns.len()), format!("{D} columns"))
         })?;
-        Self::new(columns, stored.log_weights)
+        let log_weights: Vec<f64> = stored.weights.iter().map(|w| w.ln()).collect();
+        Self::new(columns, &log_weights)
     }
 }

@@ -15,7 +15,7 @@ proptest! {
     #[test]
     fn moments_are_the_weighted_sums((x, y, logs) in weighted()) {
         let total: f64 = logs.iter().map(|l| l.exp()).sum();
-        let belief = Particles::new([x.clone(), y.clone()], logs.clone());
+        let belief = Particles::new([x.clone(), y.clone()], &logs);
         if total == 0.0 {
             prop_assert!(matches!(belief, Err(Error::Degenerate { .. })), "{belief:?}");
             return Ok(());
@@ -26,42 +26,56 @@ proptest! {
         let (mx, my) = (mean(&x), mean(&y));
         let cov: f64 = (0..w.len()).map(|i| w[i] * (x[i] - mx) * (y[i] - my)).sum();
         let ess = 1.0 / w.iter().map(|w| w * w).sum::<f64>();
-        prop_assert!((belief.mean().unwrap()[0] - mx).abs() < 1e-9);
-        prop_assert!((belief.covariance().unwrap()[(1, 0)] - cov).abs() < 1e-9);
-        prop_assert!((belief.effective_sample_size().unwrap() - ess).abs() < 1e-9 * ess);
-        let mut weights = Vec::new();
-        let normalisation = belief.normalise_into(&mut weights).unwrap();
-        prop_assert!((normalisation.log_sum - total.ln()).abs() < 1e-9);
+        prop_assert!((belief.mean()[0] - mx).abs() < 1e-9);
+        prop_assert!((belief.covariance()[(1, 0)] - cov).abs() < 1e-9);
+        prop_assert!((belief.effective_sample_size() - ess).abs() < 1e-9 * ess);
+        prop_assert!(belief.weights().iter().zip(&w).all(|(a, b)| (a - b).abs() < 1e-12));
+        let log_sum = belief.reweigh(|_, log_weights| log_weights.copy_from_slice(&logs)).unwrap();
+        prop_assert!((log_sum - total.ln()).abs() < 1e-9);
         prop_assert!((belief.log_weights().iter().map(|l| l.exp()).sum::<f64>() - 1.0).abs() < 1e-12);
-        prop_assert!(weights.iter().zip(&w).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+
+    #[test]
+    fn selection_copies_and_equalises((x, y, _) in weighted(), picks in prop::collection::vec(0..40u32, 1..60)) {
+        let mut belief = Particles::uniform([x.clone(), y.clone()]).unwrap();
+        let picks: Vec<u32> = picks.iter().map(|p| p % x.len() as u32).collect();
+        belief.select(&picks).unwrap();
+        prop_assert_eq!(belief.len(), picks.len());
+        prop_assert!((belief.effective_sample_size() - picks.len() as f64).abs() < 1e-9);
+        for (i, p) in picks.iter().enumerate() {
+            let point = belief.point(i).unwrap();
+            prop_assert_eq!((point[0], point[1]), (x[*p as usize], y[*p as usize]));
+        }
+        let before = belief.clone();
+        prop_assert!(belief.select(&[belief.len() as u32]).is_err());
+        prop_assert_eq!(belief, before);
     }
 }
 
 #[test]
-fn a_failed_normalisation_keeps_the_belief() {
-    let mut belief = Particles::uniform([vec![0.0, 1.0]]).unwrap();
-    belief.parts_mut().1.fill(f64::NEG_INFINITY);
+fn a_failed_reweighing_keeps_the_belief() {
+    let mut belief = Particles::new([vec![0.0, 1.0]], &[0.0, 3.0_f64.ln()]).unwrap();
     let before = belief.clone();
-    let mut weights = vec![0.25, 0.75];
-    assert!(matches!(belief.normalise_into(&mut weights), Err(Error::Degenerate { .. })));
-    assert_eq!(belief, before);
-    assert_eq!(weights, [0.25, 0.75]);
-    belief.parts_mut().1[0] = f64::NAN;
-    belief.parts_mut().1[1] = 0.0;
-    assert!(matches!(belief.weights(), Err(Error::Degenerate { .. })));
+    for bad in [[f64::NEG_INFINITY; 2], [f64::NAN, 0.0], [f64::INFINITY, 0.0]] {
+        let result = belief.reweigh(|_, log_weights| log_weights.copy_from_slice(&bad));
+        assert!(matches!(result, Err(Error::Degenerate { .. })));
+        assert_eq!(belief, before);
+        assert!((belief.weights()[1] - 0.75).abs() < 1e-15);
+        assert!((belief.effective_sample_size() - 1.6).abs() < 1e-14);
+    }
 }
 
 #[test]
 fn log_weights_far_below_underflow_still_count() {
-    let belief = Particles::new([vec![0.0, 4.0]], vec![-1e6, -1e6]).unwrap();
-    assert_eq!(belief.mean().unwrap()[0], 2.0);
+    let belief = Particles::new([vec![0.0, 4.0]], &[-1e6, -1e6]).unwrap();
+    assert_eq!(belief.mean()[0], 2.0);
 }
 
 #[test]
 fn bad_particles_are_refused() {
-    let refused = |columns: [Vec<f64>; 1], logs: Vec<f64>| Particles::new(columns, logs).unwrap_err().to_string();
+    let refused = |columns: [Vec<f64>; 1], logs: Vec<f64>| Particles::new(columns, &logs).unwrap_err().to_string();
     assert!(refused([vec![]], vec![]).contains("at least 1"));
-    assert!(refused([vec![1.0]], vec![0.0, 0.0]).contains("length 2"));
+    assert!(refused([vec![1.0]], vec![0.0, 0.0]).contains("one a particle"));
     assert!(refused([vec![f64::NAN]], vec![0.0]).contains("columns"));
     assert!(refused([vec![1.0]], vec![f64::NAN]).contains("log_weights"));
     assert!(refused([vec![1.0]], vec![f64::INFINITY]).contains("log_weights"));
@@ -74,5 +88,5 @@ fn storage_round_trips_and_checks() {
     let text = serde_json::to_string(&belief).unwrap();
     assert_eq!(serde_json::from_str::<Particles<2>>(&text).unwrap(), belief);
     assert!(serde_json::from_str::<Particles<3>>(&text).is_err());
-    assert!(serde_json::from_str::<Particles<1>>(r#"{"columns":[[1.0]],"log_weights":[0.0,0.0]}"#).is_err());
+    assert!(serde_json::from_str::<Particles<1>>(r#"{"columns":[[1.0]],"weights":[0.5,0.5]}"#).is_err());
 }
