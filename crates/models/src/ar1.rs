@@ -2,13 +2,16 @@
 
 use crate::{Error, LinearGaussian};
 use fewbits_core::error::{finite, non_negative};
+use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics};
 use nalgebra::{Matrix1, Vector1};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 /// `x(n) = a x(n-1) + u(n)`, `u ~ N(0, q)`: a scalar that decays towards zero and is pushed by white noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ar1 {
-    coefficient: f64,
-    noise_variance: f64,
+    transition: Matrix1<f64>,
+    noise_covariance: Matrix1<f64>,
 }
 
 impl Ar1 {
@@ -31,31 +34,25 @@ impl Ar1 {
     /// A coefficient that is not finite, a negative variance.
     pub fn new_unstable(coefficient: f64, noise_variance: f64) -> Result<Self, Error> {
         Ok(Self {
-            coefficient: finite("coefficient", coefficient)?,
-            noise_variance: non_negative("noise_variance", noise_variance)?,
+            transition: Matrix1::new(finite("coefficient", coefficient)?),
+            noise_covariance: Matrix1::new(non_negative("noise_variance", noise_variance)?),
         })
     }
 
     /// `a`.
     pub fn coefficient(&self) -> f64 {
-        self.coefficient
+        self.transition[0]
     }
 
     /// `q`.
     pub fn noise_variance(&self) -> f64 {
-        self.noise_variance
-    }
-
-    /// Mean of the next state.
-    #[inline]
-    pub fn predict(&self, state: f64) -> f64 {
-        self.coefficient * state
+        self.noise_covariance[0]
     }
 
     /// Variance of the next state when that of the present one is `variance`: `a^2 P + q`.
     #[inline]
     pub fn predict_variance(&self, variance: f64) -> f64 {
-        self.coefficient * self.coefficient * variance + self.noise_variance
+        self.coefficient() * self.coefficient() * variance + self.noise_variance()
     }
 
     /// Variance of the stationary distribution, `q / (1 - a^2)`.
@@ -63,23 +60,52 @@ impl Ar1 {
     /// # Errors
     /// [`Error::NotStationary`] for `|a| >= 1`.
     pub fn stationary_variance(&self) -> Result<f64, Error> {
-        let a = self.coefficient;
+        let a = self.coefficient();
         if a.abs() < 1.0 {
             // The factored form keeps the digits of 1 - a^2 near |a| = 1.
-            Ok(self.noise_variance / ((1.0 - a) * (1.0 + a)))
+            Ok(self.noise_variance() / ((1.0 - a) * (1.0 + a)))
         } else {
             Err(Error::NotStationary)
         }
     }
 }
 
+impl Dynamics<1> for Ar1 {
+    #[inline]
+    fn mean(&self, state: &Vector1<f64>) -> Vector1<f64> {
+        self.transition * state
+    }
+
+    #[inline]
+    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector1<f64>) -> Vector1<f64> {
+        let normal: f64 = StandardNormal.sample(rng);
+        Vector1::new(self.coefficient() * state[0] + self.noise_variance().sqrt() * normal)
+    }
+}
+
+impl GaussianDynamics<1> for Ar1 {
+    fn jacobian(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+        self.transition
+    }
+
+    fn noise_covariance(&self) -> &Matrix1<f64> {
+        &self.noise_covariance
+    }
+}
+
+impl LinearDynamics<1> for Ar1 {
+    fn transition(&self) -> &Matrix1<f64> {
+        &self.transition
+    }
+
+    fn noise_covariance(&self) -> &Matrix1<f64> {
+        &self.noise_covariance
+    }
+}
+
 impl From<Ar1> for LinearGaussian<1, 1> {
     fn from(model: Ar1) -> Self {
-        Self::from_checked(
-            Matrix1::new(model.coefficient),
-            Matrix1::identity(),
-            Vector1::new(model.noise_variance),
-        )
+        Self::from_checked(model.transition, Matrix1::identity(), model.noise_covariance)
     }
 }
 
@@ -91,23 +117,12 @@ mod tests {
     #[test]
     fn refuses_what_would_explode() {
         assert!(Ar1::new(-1.0, 0.0).is_ok());
-        assert_eq!(
-            Ar1::new(1.2, 0.5),
-            Err(Error::UnstablePlant { coefficient: 1.2 })
-        );
+        assert_eq!(Ar1::new(1.2, 0.5), Err(Error::UnstablePlant { coefficient: 1.2 }));
         assert!(Ar1::new_unstable(1.2, 0.5).is_ok());
-        for (a, q) in [
-            (f64::NAN, 1.0),
-            (0.5, -1e-9),
-            (f64::INFINITY, 1.0),
-            (0.5, f64::NAN),
-        ] {
+        for (a, q) in [(f64::NAN, 1.0), (0.5, -1e-9), (f64::INFINITY, 1.0), (0.5, f64::NAN)] {
             assert!(matches!(Ar1::new_unstable(a, q), Err(Error::Argument(_))));
         }
-        assert_eq!(
-            Ar1::new(1.0, 1.0).unwrap().stationary_variance(),
-            Err(Error::NotStationary)
-        );
+        assert_eq!(Ar1::new(1.0, 1.0).unwrap().stationary_variance(), Err(Error::NotStationary));
     }
 
     #[test]

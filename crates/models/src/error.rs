@@ -10,9 +10,7 @@ pub enum Error {
     #[error(transparent)]
     Argument(#[from] ArgumentError),
     /// A coefficient outside `[-1, 1]` where the state would grow without bound.
-    #[error(
-        "the coefficient is {coefficient}: the state grows without bound unless it lies in [-1, 1]"
-    )]
+    #[error("the coefficient is {coefficient}: the state grows without bound unless it lies in [-1, 1]")]
     UnstablePlant {
         /// The offending coefficient.
         coefficient: f64,
@@ -22,12 +20,4 @@ pub enum Error {
         "the dynamics have no stationary distribution: an eigenvalue of the transition lies on or outside the unit circle"
     )]
     NotStationary,
-    /// A matrix that must be a covariance is none.
-    #[error("`{name}` is not a covariance: expected a symmetric positive {kind} matrix")]
-    NotCovariance {
-        /// Name of the argument.
-        name: &'static str,
-        /// `"definite"` or `"semidefinite"`.
-        kind: &'static str,
-    },
 }

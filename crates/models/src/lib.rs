@@ -3,6 +3,8 @@
 //! A model here is a checked, immutable value: the matrices of a state equation or of a sensing equation, nothing else. It
 //! can predict, draw and describe its noise; what to do with a measurement is the business of the crates above.
 //!
+//! All implement the traits of [`fewbits_core::state_space`], so any filter takes them.
+//!
 //! The central choice is that process noise is stored as it is caused, `Q = G diag(q) G'` with a few independent causes `q`
 //! and their effect `G`, never as a bare `Q`. A constant-velocity target is pushed by one acceleration per axis, so its `Q`
 //! has half rank; a factorisation of `Q` would fail or invent noise, while `x' = F x + G u` draws from it exactly. The cost is
@@ -13,17 +15,18 @@
 //! | scalar first-order autoregression | [`Ar1`] |
 //! | linear with Gaussian noise, any dimension | [`LinearGaussian`] |
 //! | white-noise acceleration on a line, in a plane | [`constant_velocity_1d`], [`constant_velocity_2d`] |
-//! | linear sensing, scalar and vector | [`ScalarSensing`], [`LinearSensing`] |
+//! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
 //!
 //! ```
 //! use fewbits_models::{constant_velocity_1d, Ar1};
+//! use fewbits_core::Dynamics;
 //! use nalgebra::Vector2;
 //!
 //! let plant = Ar1::new(0.9, 0.5)?;
 //! assert!((plant.stationary_variance()? - 0.5 / (1.0 - 0.81)).abs() < 1e-12);
 //!
 //! let target = constant_velocity_1d(1.0, 0.04)?;
-//! assert_eq!(target.predict(&Vector2::new(10.0, 2.0)), Vector2::new(12.0, 2.0));
+//! assert_eq!(target.mean(&Vector2::new(10.0, 2.0)), Vector2::new(12.0, 2.0));
 //! # Ok::<(), fewbits_models::Error>(())
 //! ```
 //!
@@ -32,13 +35,11 @@
 mod ar1;
 mod constant_velocity;
 mod error;
-mod factor;
 mod linear_gaussian;
-mod linear_sensing;
+mod linear_sensor;
 
 pub use ar1::Ar1;
 pub use constant_velocity::{constant_velocity_1d, constant_velocity_2d};
 pub use error::Error;
-pub use factor::semidefinite_factor;
 pub use linear_gaussian::LinearGaussian;
-pub use linear_sensing::{LinearSensing, ScalarSensing};
+pub use linear_sensor::{LinearSensor, ScalarSensor};

@@ -1,8 +1,9 @@
 //! Linear dynamics driven by Gaussian noise.
 
 use crate::Error;
-use crate::factor::semidefinite_factor;
 use fewbits_core::error::{all_finite, non_negative};
+use fewbits_core::linalg::semidefinite_factor;
+use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics};
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -78,12 +79,6 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
         &self.noise_covariance
     }
 
-    /// Mean of the next state, `F x`.
-    #[inline]
-    pub fn predict(&self, state: &SVector<f64, D>) -> SVector<f64, D> {
-        self.transition * state
-    }
-
     /// Covariance of the next state, `F P F' + Q`.
     #[inline]
     pub fn predict_covariance(&self, covariance: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
@@ -94,16 +89,6 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
     #[inline]
     pub fn sample_noise<R: Rng + ?Sized>(&self, rng: &mut R) -> SVector<f64, D> {
         self.noise_factor * SVector::<f64, U>::from_fn(|_, _| StandardNormal.sample(rng))
-    }
-
-    /// A draw of the next state.
-    #[inline]
-    pub fn sample_next<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        state: &SVector<f64, D>,
-    ) -> SVector<f64, D> {
-        self.predict(state) + self.sample_noise(rng)
     }
 
     /// Covariance of the stationary distribution: the root of `P = F P F' + Q`.
@@ -135,7 +120,7 @@ impl<const D: usize> LinearGaussian<D, D> {
     /// The model with a given noise covariance `Q`, symmetric positive semidefinite of any rank.
     ///
     /// # Errors
-    /// Entries that are not finite; [`Error::NotCovariance`].
+    /// Entries that are not finite, a matrix that is no covariance.
     pub fn with_covariance(
         transition: SMatrix<f64, D, D>,
         noise_covariance: SMatrix<f64, D, D>,
@@ -145,10 +130,43 @@ impl<const D: usize> LinearGaussian<D, D> {
     }
 }
 
+impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
+    #[inline]
+    fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, D> {
+        self.transition * state
+    }
+
+    #[inline]
+    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, D> {
+        self.transition * state + self.sample_noise(rng)
+    }
+}
+
+impl<const D: usize, const U: usize> GaussianDynamics<D> for LinearGaussian<D, U> {
+    fn jacobian(&self, _: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        self.transition
+    }
+
+    fn noise_covariance(&self) -> &SMatrix<f64, D, D> {
+        &self.noise_covariance
+    }
+}
+
+impl<const D: usize, const U: usize> LinearDynamics<D> for LinearGaussian<D, U> {
+    fn transition(&self) -> &SMatrix<f64, D, D> {
+        &self.transition
+    }
+
+    fn noise_covariance(&self) -> &SMatrix<f64, D, D> {
+        &self.noise_covariance
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::LinearGaussian;
     use crate::Error;
+    use fewbits_core::Dynamics;
     use nalgebra::{Matrix1, Matrix2, Matrix2x1, Vector1, Vector2};
     use rand::SeedableRng;
     use rand_pcg::Pcg64Mcg;
@@ -172,17 +190,11 @@ mod tests {
 
     #[test]
     fn draws_have_the_stated_moments_and_rank() {
-        let model = LinearGaussian::new(
-            Matrix2::identity(),
-            Matrix2x1::new(0.5, 1.0),
-            Vector1::new(4.0),
-        )
-        .unwrap();
+        let model = LinearGaussian::new(Matrix2::identity(), Matrix2x1::new(0.5, 1.0), Vector1::new(4.0)).unwrap();
         let mut rng = Pcg64Mcg::seed_from_u64(1);
         let (mut sum, n) = (Matrix2::zeros(), 20_000);
         for _ in 0..n {
-            let noise =
-                model.sample_next(&mut rng, &Vector2::new(1.0, 2.0)) - Vector2::new(1.0, 2.0);
+            let noise = model.propagate(&mut rng, &Vector2::new(1.0, 2.0)) - Vector2::new(1.0, 2.0);
             assert!((noise[1] - 2.0 * noise[0]).abs() < 1e-12);
             sum += noise * noise.transpose();
         }

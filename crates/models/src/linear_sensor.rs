@@ -1,0 +1,160 @@
+//! Linear sensing with Gaussian noise.
+
+use crate::Error;
+use fewbits_core::error::{ArgumentError, all_finite, positive};
+use fewbits_core::linalg::SYMMETRY_TOLERANCE;
+use fewbits_core::{LinearSensing, Sensing};
+use nalgebra::{Cholesky, SMatrix, SVector};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// `M` measurements of a `D`-dimensional state at once: `z = H x + w`, `w ~ N(0, R)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearSensor<const D: usize, const M: usize> {
+    matrix: SMatrix<f64, M, D>,
+    noise_covariance: SMatrix<f64, M, M>,
+    noise_factor: SMatrix<f64, M, M>,
+}
+
+/// One sensor of one number: `z = h'x + w`, `w ~ N(0, r)`.
+pub type ScalarSensor<const D: usize> = LinearSensor<D, 1>;
+
+impl<const D: usize, const M: usize> LinearSensor<D, M> {
+    /// The sensor with matrix `H` (M x D) and noise covariance `R` (M x M), symmetric positive definite.
+    ///
+    /// # Errors
+    /// Entries that are not finite, a covariance that is not positive definite.
+    pub fn new(matrix: SMatrix<f64, M, D>, noise_covariance: SMatrix<f64, M, M>) -> Result<Self, Error> {
+        all_finite("matrix", matrix.as_slice())?;
+        all_finite("noise_covariance", noise_covariance.as_slice())?;
+        let asymmetry = (noise_covariance - noise_covariance.transpose()).amax();
+        let factor = Cholesky::new(noise_covariance)
+            .filter(|_| asymmetry <= SYMMETRY_TOLERANCE * noise_covariance.amax())
+            .ok_or_else(|| {
+                let expected = "a symmetric positive definite matrix";
+                ArgumentError::new("noise_covariance", format!("{noise_covariance:?}"), expected)
+            })?;
+        Ok(Self {
+            matrix,
+            noise_covariance,
+            noise_factor: factor.unpack(),
+        })
+    }
+
+    /// `H`.
+    pub fn matrix(&self) -> &SMatrix<f64, M, D> {
+        &self.matrix
+    }
+
+    /// `R`.
+    pub fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
+        &self.noise_covariance
+    }
+
+    /// The lower Cholesky factor of `R`.
+    pub fn noise_factor(&self) -> &SMatrix<f64, M, M> {
+        &self.noise_factor
+    }
+}
+
+impl<const D: usize> ScalarSensor<D> {
+    /// The sensor with direction `h` and noise variance `r > 0` (measurement units squared).
+    ///
+    /// # Errors
+    /// Entries that are not finite, a variance that is not positive.
+    pub fn scalar(direction: SVector<f64, D>, noise_variance: f64) -> Result<Self, Error> {
+        let variance = positive("noise_variance", noise_variance)?;
+        Self::new(direction.transpose(), SMatrix::from([[variance]]))
+    }
+
+    /// `h`.
+    #[inline]
+    pub fn direction(&self) -> SVector<f64, D> {
+        self.matrix.transpose()
+    }
+
+    /// `r`.
+    #[inline]
+    pub fn noise_variance(&self) -> f64 {
+        self.noise_covariance[0]
+    }
+}
+
+impl LinearSensor<1, 1> {
+    /// Sensing of a scalar state as it is: `z = x + w`.
+    ///
+    /// # Errors
+    /// A variance that is not positive.
+    pub fn direct(noise_variance: f64) -> Result<Self, Error> {
+        Self::scalar(SVector::from([1.0]), noise_variance)
+    }
+}
+
+impl<const D: usize, const M: usize> Sensing<D, M> for LinearSensor<D, M> {
+    #[inline]
+    fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, M> {
+        self.matrix * state
+    }
+
+    fn jacobian(&self, _: &SVector<f64, D>) -> SMatrix<f64, M, D> {
+        self.matrix
+    }
+
+    fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
+        &self.noise_covariance
+    }
+
+    #[inline]
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M> {
+        self.matrix * state + self.noise_factor * SVector::<f64, M>::from_fn(|_, _| StandardNormal.sample(rng))
+    }
+}
+
+impl<const D: usize, const M: usize> LinearSensing<D, M> for LinearSensor<D, M> {
+    fn matrix(&self) -> &SMatrix<f64, M, D> {
+        &self.matrix
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LinearSensor, ScalarSensor};
+    use fewbits_core::Sensing;
+    use nalgebra::{Matrix2, Vector2};
+    use rand::SeedableRng;
+    use rand_pcg::Pcg64Mcg;
+
+    #[test]
+    fn correlated_noise_is_drawn_with_its_covariance() {
+        let covariance = Matrix2::new(2.0, 0.9, 0.9, 1.0);
+        let sensor = LinearSensor::new(Matrix2::identity(), covariance).unwrap();
+        let mut rng = Pcg64Mcg::seed_from_u64(9);
+        let n = 20_000;
+        let sum: Matrix2<f64> = (0..n)
+            .map(|_| sensor.sample(&mut rng, &Vector2::zeros()))
+            .map(|w| w * w.transpose())
+            .sum();
+        assert!((sum / f64::from(n) - covariance).amax() < 4.5 * 2.0 * (2.0 / f64::from(n)).sqrt());
+    }
+
+    #[test]
+    fn scalar_sensors_read_along_their_direction() {
+        let sensor = ScalarSensor::scalar(Vector2::new(2.0, -1.0), 0.25).unwrap();
+        assert_eq!(sensor.mean(&Vector2::new(3.0, 1.0))[0], 5.0);
+        assert_eq!((sensor.direction(), sensor.noise_variance()), (Vector2::new(2.0, -1.0), 0.25));
+        assert_eq!(sensor.noise_factor()[0], 0.5);
+    }
+
+    #[test]
+    fn refuses_bad_noise() {
+        assert!(LinearSensor::direct(0.0).is_err());
+        assert!(ScalarSensor::scalar(Vector2::new(f64::NAN, 0.0), 1.0).is_err());
+        for bad in [
+            Matrix2::new(1.0, 2.0, 2.0, 1.0),
+            Matrix2::new(1.0, 0.2, 0.1, 1.0),
+            Matrix2::zeros(),
+        ] {
+            assert!(LinearSensor::new(Matrix2::identity(), bad).is_err());
+        }
+    }
+}
