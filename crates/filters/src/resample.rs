@@ -92,11 +92,7 @@ fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
     let total: f64 = weights.iter().sum();
     match weights.iter().rposition(|w| *w > 0.0) {
         Some(last) if total.is_finite() => Ok((total, last)),
-        _ => Err(ArgumentError::new(
-            "weights",
-            format!("a vector summing to {total}"),
-            "a positive finite sum",
-        )),
+        _ => Err(ArgumentError::new("weights", format!("a vector summing to {total}"), "a positive finite sum")),
     }
 }
 
