@@ -1,7 +1,8 @@
 //! Weighted particles in structure-of-arrays form.
 
 use crate::Error;
-use crate::sums::{dot, lanes, sum};
+use crate::exponential::exp_minus;
+use crate::sums::{dot, lanes, largest, sum};
 use fewbits_core::error::{all_finite, at_least_one};
 use fewbits_core::{ArgumentError, Columns, ColumnsMut};
 use nalgebra::{SMatrix, SVector};
@@ -147,22 +148,14 @@ impl<const D: usize> Particles<D> {
         self.scratch.clear();
         self.scratch.extend_from_slice(&self.log_weights);
         change(self.columns.each_ref().map(Vec::as_slice), &mut self.scratch);
-        // `max` drops NaN; the sum below does not.
-        let largest = self
-            .scratch
-            .iter()
-            .fold(f64::NEG_INFINITY, |m, w| if *w > m { *w } else { m });
+        let largest = largest(&self.scratch);
         if !largest.is_finite() {
             return Err(Error::Degenerate { largest });
         }
-        for (new, log_weight) in self.weights.iter_mut().zip(&self.scratch) {
-            *new = (log_weight - largest).exp();
-        }
+        exp_minus(&self.scratch, largest, &mut self.weights);
         let total = sum(&self.weights);
         if !total.is_finite() {
-            for (old, log_weight) in self.weights.iter_mut().zip(&self.log_weights) {
-                *old = log_weight.exp();
-            }
+            exp_minus(&self.log_weights, 0.0, &mut self.weights);
             return Err(Error::Degenerate { largest: total });
         }
         let log_sum = largest + total.ln();

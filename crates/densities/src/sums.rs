@@ -32,6 +32,21 @@ pub fn sum(a: &[f64]) -> f64 {
     lanes(a.len(), |i| a[i])
 }
 
+/// The largest entry; `-inf` of nothing. NaN is passed over.
+#[inline]
+pub fn largest(a: &[f64]) -> f64 {
+    let mut lane = [f64::NEG_INFINITY; 8];
+    let chunks = a.chunks_exact(8);
+    let rest = chunks.remainder();
+    for chunk in chunks {
+        for (largest, x) in lane.iter_mut().zip(chunk) {
+            *largest = if *x > *largest { *x } else { *largest };
+        }
+    }
+    let whole = lane.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x));
+    rest.iter().fold(whole, |m, x| m.max(*x))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -42,6 +57,7 @@ mod tests {
             let values: Vec<f64> = (0..count).map(|i| i as f64 + 1.0).collect();
             assert_eq!(sum(&values), (count * (count + 1) / 2) as f64);
             assert_eq!(dot(&values, &values), values.iter().map(|v| v * v).sum::<f64>());
+            assert_eq!(largest(&values), if count == 0 { f64::NEG_INFINITY } else { count as f64 });
         }
     }
 }

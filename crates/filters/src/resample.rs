@@ -1,7 +1,9 @@
 //! Resampling: from weighted particles to equally weighted ones.
 
 use fewbits_core::ArgumentError;
+use fewbits_densities::sums::sum;
 use rand::{Rng, RngExt};
+use rand_distr::Open01;
 use serde::{Deserialize, Serialize};
 
 /// A law that draws `M` ancestors from `N` weighted particles; `M` and `N` are independent.
@@ -70,10 +72,7 @@ impl Resampling {
         let count = ancestors.len();
         let step = total / count as f64;
         match self {
-            Self::Systematic => {
-                let offset: f64 = rng.random();
-                pick(weights, last, ancestors, |m| (m as f64 + offset) * step);
-            }
+            Self::Systematic => systematic(rng.sample(Open01), weights, 1.0 / step, last, ancestors),
             Self::Stratified => pick(weights, last, ancestors, |m| (m as f64 + rng.random::<f64>()) * step),
             Self::Multinomial => {
                 let mut points = OrderedUniforms::new(count);
@@ -89,10 +88,35 @@ fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
     if let Some(bad) = weights.iter().find(|w| !(**w >= 0.0 && w.is_finite())) {
         return Err(ArgumentError::new("weights", bad, "finite weights, 0 or above"));
     }
-    let total: f64 = weights.iter().sum();
+    let total = sum(weights);
     match weights.iter().rposition(|w| *w > 0.0) {
         Some(last) if total.is_finite() => Ok((total, last)),
         _ => Err(ArgumentError::new("weights", format!("a vector summing to {total}"), "a positive finite sum")),
+    }
+}
+
+/// Systematic resampling without a branch that depends on the weights: particle `i` gets the places between
+/// `floor(offset + cumulative_{i-1}/step)` and `floor(offset + cumulative_i/step)`.
+///
+/// Each particle writes its index at its first place; one without a place is overwritten by the next. A running maximum then
+/// fills the places between.
+fn systematic(offset: f64, weights: &[f64], per_weight: f64, last: usize, ancestors: &mut [u32]) {
+    let count = ancestors.len();
+    ancestors.fill(0);
+    let mut cumulative = 0.0;
+    let mut first = 0_usize;
+    for (i, weight) in weights[..=last].iter().enumerate() {
+        // Rounding may give the last particles a first place beyond the end.
+        if let Some(place) = ancestors.get_mut(first) {
+            *place = i as u32;
+        }
+        cumulative += weight;
+        first = (cumulative * per_weight + offset) as u32 as usize;
+    }
+    let mut so_far = 0;
+    for ancestor in &mut ancestors[..count] {
+        so_far = so_far.max(*ancestor);
+        *ancestor = so_far;
     }
 }
 

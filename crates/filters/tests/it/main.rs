@@ -1,0 +1,6 @@
+//! Filters against independent truth.
+
+mod particle;
+mod rao_blackwell;
+mod resample;
+mod tangent;
