@@ -3,6 +3,8 @@
 //! Read the medians: `step_ar1 / (10_000 draws)` is at most 4, `step_plane / (40_000 draws)` at most 2.5, for 10 000
 //! particles with systematic resampling at every step. The allocation columns of the steps are zero.
 
+#![allow(clippy::unwrap_used)]
+
 use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_core::likelihood::{Heard, ScalarLikelihood};
 use fewbits_core::{Dynamics, Gaussian, Likelihood, Stream};

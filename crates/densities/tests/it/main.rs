@@ -1,5 +1,8 @@
 //! Particles against sums written out by hand.
 
+// Helpers fail loudly, as tests do.
+#![allow(clippy::unwrap_used)]
+
 use fewbits_densities::{Error, Particles};
 use proptest::prelude::*;
 
