@@ -113,7 +113,11 @@ pub fn full_rank_multisets(bits: usize, sensors: usize) -> Result<u128, Error> {
             .and_then(|sign| sign.checked_mul(subspaces(bits, j)?))
             .and_then(|c| c.checked_mul(multisets((1u128 << j) - 1, sensors as u128).ok()?))
             .ok_or(overflow(what))?;
-        let side = if codimension % 2 == 0 { &mut plus } else { &mut minus };
+        let side = if codimension.is_multiple_of(2) {
+            &mut plus
+        } else {
+            &mut minus
+        };
         *side = side.checked_add(term).ok_or(overflow(what))?;
     }
     plus.checked_sub(minus).ok_or(overflow(what))

@@ -1,6 +1,5 @@
 //! The Bayesian Cramer-Rao bound with the best weight function.
 
-use crate::Error;
 use crate::binary::Bank;
 use crate::binary::source::Kind;
 
@@ -28,10 +27,7 @@ const TOLERANCE: f64 = 1e-11;
 /// Both are `-(p q')' + p r q = p` with the density `p` as weight, solved by finite volumes (tridiagonal) on grids of
 /// doubling fineness with Romberg extrapolation. Without information the bound is `Var X`; as the noise vanishes the
 /// information makes walls at the thresholds and the bound tends to `Delta^2/12`.
-///
-/// # Errors
-/// None at present; the signature leaves room for a grid that cannot be resolved.
-pub fn van_trees(bank: &Bank) -> Result<f64, Error> {
+pub fn van_trees(bank: &Bank) -> f64 {
     let source = bank.source();
     let reach = source.reach();
     let (prior, clamped) = match source.kind() {
@@ -76,7 +72,7 @@ pub fn van_trees(bank: &Bank) -> Result<f64, Error> {
             break;
         }
     }
-    Ok(extrapolated.last().copied().unwrap_or(source.variance()))
+    extrapolated.last().copied().unwrap_or(source.variance())
 }
 
 /// `E[q]` for `-(p q')' + p r q = p` on a uniform grid, by elimination.
@@ -123,14 +119,14 @@ mod tests {
     #[test]
     fn without_information_the_bound_is_the_variance() {
         for source in [Source::uniform(2.0).unwrap(), Source::gaussian(0.3).unwrap()] {
-            let bound = van_trees(&bank(source, 1e6)).unwrap();
+            let bound = van_trees(&bank(source, 1e6));
             assert_relative_eq!(bound, source.variance(), max_relative = 1e-9);
         }
     }
 
     #[test]
     fn without_noise_the_walls_leave_cells() {
-        let bound = van_trees(&bank(Source::uniform(1.0).unwrap(), 1e-4)).unwrap();
+        let bound = van_trees(&bank(Source::uniform(1.0).unwrap(), 1e-4));
         assert!(bound <= 1.0 / 12.0);
         assert_relative_eq!(bound, 1.0 / 12.0, max_relative = 2e-3);
     }

@@ -30,49 +30,18 @@ pub(crate) fn minimise(mut f: impl FnMut(&[f64], &mut [f64]) -> f64, start: Vec<
     for _ in 0..stop.iterations {
         let direction = descent_direction(&gradient, &pairs);
         let slope = dot(&gradient, &direction);
-        if !(slope < 0.0) {
+        if slope >= 0.0 || slope.is_nan() {
             break;
         }
-        let (mut low, mut high, mut step) = (0.0, f64::INFINITY, 1.0);
-        if pairs.is_empty() {
-            // No curvature is known yet: a first step of moderate length.
-            step = 0.1 / dot(&direction, &direction).sqrt();
-        }
-        let mut trial = vec![0.0; n];
-        let mut trial_gradient = vec![0.0; n];
-        let mut accepted = None;
-        for _ in 0..LINE_STEPS {
-            for i in 0..n {
-                trial[i] = x[i] + step * direction[i];
-            }
-            let at = f(&trial, &mut trial_gradient);
-            if !(at <= value + DECREASE * step * slope) {
-                high = step;
-            } else if dot(&trial_gradient, &direction) < CURVATURE * slope {
-                accepted = Some(at);
-                low = step;
-            } else {
-                accepted = Some(at);
-                break;
-            }
-            step = if high.is_finite() {
-                0.5 * (low + high)
-            } else {
-                2.0 * step
-            };
-        }
-        let Some(at) = accepted.filter(|_| trial.iter().all(|t| t.is_finite())) else {
-            break;
-        };
-        // The last trial may have failed after an earlier success; evaluate what is kept.
-        let at = if at <= value && step > 0.0 {
-            f(&trial, &mut trial_gradient)
+        // No curvature is known at first: a step of moderate length.
+        let first = if pairs.is_empty() {
+            0.1 / dot(&direction, &direction).sqrt()
         } else {
-            at
+            1.0
         };
-        if !(at <= value) {
+        let Some((trial, trial_gradient, at)) = line_search(&mut f, &x, value, &direction, slope, first) else {
             break;
-        }
+        };
         let s: Vec<f64> = trial.iter().zip(&x).map(|(a, b)| a - b).collect();
         let y: Vec<f64> = trial_gradient.iter().zip(&gradient).map(|(a, b)| a - b).collect();
         let curvature = dot(&s, &y);
@@ -94,6 +63,41 @@ pub(crate) fn minimise(mut f: impl FnMut(&[f64], &mut [f64]) -> f64, start: Vec<
         }
     }
     (x, value)
+}
+
+/// A step along `direction` with sufficient decrease and, if it can be had, a flatter slope: point, gradient, value.
+fn line_search(
+    f: &mut impl FnMut(&[f64], &mut [f64]) -> f64,
+    x: &[f64],
+    value: f64,
+    direction: &[f64],
+    slope: f64,
+    first: f64,
+) -> Option<(Vec<f64>, Vec<f64>, f64)> {
+    let (mut low, mut high, mut step) = (0.0, f64::INFINITY, first);
+    let mut best: Option<(Vec<f64>, Vec<f64>, f64)> = None;
+    for _ in 0..LINE_STEPS {
+        let trial: Vec<f64> = x.iter().zip(direction).map(|(x, d)| x + step * d).collect();
+        let mut gradient = vec![0.0; x.len()];
+        let at = f(&trial, &mut gradient);
+        // NaN counts as too far.
+        if at <= value + DECREASE * step * slope {
+            let flat = dot(&gradient, direction) >= CURVATURE * slope;
+            best = Some((trial, gradient, at));
+            if flat {
+                break;
+            }
+            low = step;
+        } else {
+            high = step;
+        }
+        step = if high.is_finite() {
+            0.5 * (low + high)
+        } else {
+            2.0 * step
+        };
+    }
+    best
 }
 
 fn descent_direction(gradient: &[f64], pairs: &VecDeque<(Vec<f64>, Vec<f64>, f64)>) -> Vec<f64> {
