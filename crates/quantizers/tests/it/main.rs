@@ -1,5 +1,5 @@
-//! Integration tests: the public interface against values computed by independent programs.
-#![allow(clippy::unwrap_used, clippy::panic)]
+//! Integration tests of the quantizers crate.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod assignment;
 mod binary;
