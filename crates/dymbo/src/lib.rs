@@ -42,18 +42,26 @@
 //!
 //! Not here: energy and links (`fewbits-network`), the true state, any choice of which sensor speaks.
 
+pub mod chain;
 mod error;
 mod filter;
 mod initial;
+pub mod iterated;
 mod multibit;
+mod parallel;
 mod plant;
 mod sensor;
+pub mod skew_normal;
+pub mod steady;
+pub mod tree;
 mod update;
+pub mod vector;
 
 pub use error::Error;
 pub use filter::{DymboFilter, StepInfo, ThresholdRule};
 pub use initial::{FirstMessageValue, Initialisation, first_message_mse, first_message_value};
 pub use multibit::MultibitFilter;
+pub use parallel::{CountFusion, ParallelFilter};
 pub use plant::ScalarPlant;
 pub use sensor::{CellIndex, FineMessage, FineSensor, MultibitSensor, OneBitSensor, Prediction};
 pub use update::{UpdateInfo, bit_update, cell_update, expected_bit_information};

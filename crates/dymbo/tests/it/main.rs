@@ -1,0 +1,3 @@
+//! Integration tests of the Dymbo filters.
+
+mod fixtures;
