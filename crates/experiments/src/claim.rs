@@ -4,7 +4,9 @@
 //! statement is a [`Claim`] with a measured value, what was expected of it, and the tolerance between. A claim of the paper
 //! that is false becomes a claim of ours with the right sign and a pointer into `docs/errata.md`.
 
+use crate::table::Value;
 use serde::Serialize;
+use std::fmt;
 
 /// Whether a claim held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -16,6 +18,25 @@ pub enum Verdict {
     Fail,
     /// It was not decided: it needs the full trial count, or the figure's own parameters.
     Skipped,
+}
+
+/// What was expected of a measured value.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Expected {
+    /// A number, within the claim's tolerance.
+    Number(f64),
+    /// A condition, such as `<= 2`.
+    Condition(String),
+}
+
+impl fmt::Display for Expected {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{}", Value::Number(*number)),
+            Self::Condition(condition) => f.write_str(condition),
+        }
+    }
 }
 
 /// A statement about a figure, measured.
@@ -30,7 +51,7 @@ pub struct Claim {
     /// What was measured.
     pub value: f64,
     /// What was expected of it.
-    pub expected: String,
+    pub expected: Expected,
     /// Allowed deviation, where the expectation is a number.
     pub tolerance: Option<f64>,
     /// Holds only at the figure's own parameters.
@@ -42,7 +63,13 @@ pub struct Claim {
 }
 
 impl Claim {
-    fn decided(id: impl Into<String>, statement: impl Into<String>, value: f64, expected: String, holds: bool) -> Self {
+    fn decided(
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: f64,
+        expected: Expected,
+        holds: bool,
+    ) -> Self {
         Self {
             id: id.into(),
             statement: statement.into(),
@@ -66,7 +93,7 @@ impl Claim {
         let holds = (value - expected).abs() <= tolerance;
         Self {
             tolerance: Some(tolerance),
-            ..Self::decided(id, statement, value, expected.to_string(), holds)
+            ..Self::decided(id, statement, value, Expected::Number(expected), holds)
         }
     }
 
@@ -83,27 +110,27 @@ impl Claim {
 
     /// `value <= bound`.
     pub fn at_most(id: impl Into<String>, statement: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self::decided(id, statement, value, format!("<= {bound}"), value <= bound)
+        Self::decided(id, statement, value, Expected::Condition(format!("<= {bound}")), value <= bound)
     }
 
     /// `value >= bound`.
     pub fn at_least(id: impl Into<String>, statement: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self::decided(id, statement, value, format!(">= {bound}"), value >= bound)
+        Self::decided(id, statement, value, Expected::Condition(format!(">= {bound}")), value >= bound)
     }
 
     /// `value < bound`.
     pub fn below(id: impl Into<String>, statement: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self::decided(id, statement, value, format!("< {bound}"), value < bound)
+        Self::decided(id, statement, value, Expected::Condition(format!("< {bound}")), value < bound)
     }
 
     /// `value > bound`.
     pub fn above(id: impl Into<String>, statement: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self::decided(id, statement, value, format!("> {bound}"), value > bound)
+        Self::decided(id, statement, value, Expected::Condition(format!("> {bound}")), value > bound)
     }
 
     /// No counterexample among those looked at: `violations` counts the rows that break the statement.
     pub fn never(id: impl Into<String>, statement: impl Into<String>, violations: usize) -> Self {
-        Self::decided(id, statement, violations as f64, "0 violations".to_owned(), violations == 0)
+        Self::decided(id, statement, violations as f64, Expected::Condition("0 violations".to_owned()), violations == 0)
     }
 
     /// The claim is made for the figure's own parameters only; skipped after `--set`.

@@ -62,7 +62,7 @@ pub mod mi;
 pub mod plot;
 mod table;
 
-pub use claim::{Claim, Verdict};
+pub use claim::{Claim, Expected, Verdict};
 pub use error::Error;
 pub use figure::{About, AnyFigure, Context, Figure, Outcome};
 pub use table::{Column, Table, Tables, Value, column};

@@ -294,6 +294,8 @@ pub enum Legend {
     BottomRight,
     /// Bottom left.
     BottomLeft,
+    /// In a column of its own, right of the panel: for many layers.
+    Outside,
     /// None.
     Hidden,
 }

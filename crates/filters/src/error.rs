@@ -12,6 +12,9 @@ pub enum Error {
     /// A model refused its parameters.
     #[error(transparent)]
     Model(#[from] fewbits_models::Error),
+    /// A particle belief that cannot be, most often because what was heard is impossible for every particle.
+    #[error(transparent)]
+    Density(#[from] fewbits_densities::Error),
     /// The innovation covariance has no Cholesky factor.
     #[error("the innovation covariance is not positive definite: the belief or the sensing noise is no covariance")]
     SingularInnovation,

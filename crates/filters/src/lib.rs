@@ -9,6 +9,10 @@
 //! | linear Gaussian filtering | [`kalman`] (Joseph form) |
 //! | its steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) |
 //! | smoothing of Gaussian beliefs | [`smoother`] (Rauch-Tung-Striebel), [`FixedLagSmoother`] |
+//! | any dynamics, any message | [`ParticleFilter`] (bootstrap, guided, auxiliary), [`Resampling`] |
+//! | linear Gaussian state, any message | [`RaoBlackwellised`] (measurements imputed, states exact) |
+//! | mildly nonlinear sensing | [`extended_kalman`] |
+//! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) |
 //! | the exact scalar answer | [`PointMassFilter`] (filter and smoother on a grid) |
 //!
 //! ```
@@ -24,13 +28,23 @@
 //!
 //! Not here: the schemes of any one paper, and time-varying models (pass another model at each step).
 
+pub mod cramer_rao;
 mod error;
+pub mod extended_kalman;
+mod guided;
 pub mod kalman;
+mod particle;
 mod point_mass;
+mod rao_blackwell;
+mod resample;
 pub mod smoother;
 mod steady_state;
 
 pub use error::Error;
+pub use guided::OptimalProposal;
+pub use particle::{ParticleFilter, ParticleInfo, Proposal, Workspace};
 pub use point_mass::{Grid, PointMass, PointMassFilter};
+pub use rao_blackwell::RaoBlackwellised;
+pub use resample::{Resampling, Schedule};
 pub use smoother::{FixedLagSmoother, scalar_fixed_lag_variance};
 pub use steady_state::{ScalarSteadyState, SteadyState, scalar_steady_state, steady_state};
