@@ -85,7 +85,8 @@ fn every_fixture() {
         assert_eq!(actual.len(), expected.len(), "{id}");
         let tolerance = entry["tolerance"].as_f64().unwrap();
         for (a, e) in actual.iter().zip(&expected) {
-            if !((a - e).abs() <= tolerance) {
+            let within = (a - e).abs() <= tolerance;
+            if !within {
                 misses.push(format!("{id}: {a} instead of {e}, off by {:e}, allowed {tolerance:e}", (a - e).abs()));
             }
         }
