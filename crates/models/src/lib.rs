@@ -16,6 +16,7 @@
 //! | linear with Gaussian noise, any dimension | [`LinearGaussian`] |
 //! | white-noise acceleration on a line, in a plane | [`constant_velocity_1d`], [`constant_velocity_2d`] |
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
+//! | received amplitude that falls with distance | [`ReceivedPower`] |
 //!
 //! ```
 //! use fewbits_models::{constant_velocity_1d, Ar1};
@@ -37,9 +38,11 @@ mod constant_velocity;
 mod error;
 mod linear_gaussian;
 mod linear_sensor;
+mod received_power;
 
 pub use ar1::Ar1;
 pub use constant_velocity::{constant_velocity_1d, constant_velocity_2d};
 pub use error::Error;
 pub use linear_gaussian::LinearGaussian;
 pub use linear_sensor::{LinearSensor, ScalarSensor};
+pub use received_power::ReceivedPower;

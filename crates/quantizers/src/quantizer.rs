@@ -232,6 +232,6 @@ mod tests {
         assert_eq!(b.breakpoints(), [-2.0, -0.3, 1.0]);
         let pairs = [[a.clone(), b.clone()], [b.clone(), a.clone()]];
         assert_eq!(canonical(&pairs[0], &[0, 0]), canonical(&pairs[1], &[0, 0]));
-        assert_eq!(canonical(&[a.clone()], &[0]), canonical(&[b], &[0]));
+        assert_eq!(canonical(std::slice::from_ref(&a), &[0]), canonical(&[b], &[0]));
     }
 }

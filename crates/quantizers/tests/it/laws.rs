@@ -5,7 +5,7 @@ use fewbits_quantizers::{Channel, Criterion, Labelling, Noise, Prior, Quantizer,
 use proptest::prelude::*;
 
 fn breakpoints(count: usize) -> impl Strategy<Value = Vec<f64>> {
-    prop::collection::vec(0.05..1.2f64, count + 1).prop_map(|gaps| {
+    prop::collection::vec(0.15..1.2f64, count + 1).prop_map(|gaps| {
         let middle: f64 = gaps.iter().sum::<f64>() * 0.5;
         let mut at = -middle;
         gaps[..gaps.len() - 1]
@@ -70,19 +70,26 @@ fn moved(system: &System, at: usize, by: f64) -> System {
     system.with_quantizers(quantizers).unwrap()
 }
 
+/// Fourth-order central difference of `f` along breakpoint `i`.
+fn difference<T>(system: &System, i: usize, f: impl Fn(&System) -> T) -> T
+where
+    T: std::ops::Sub<T, Output = T> + std::ops::Mul<f64, Output = T>,
+{
+    let h = 3e-4;
+    let at = |steps: f64| f(&moved(system, i, steps * h));
+    (at(1.0) - at(-1.0)) * (2.0 / (3.0 * h)) - (at(2.0) - at(-2.0)) * (1.0 / (12.0 * h))
+}
+
 fn agree_with_differences(system: &System, criterion: Criterion) {
-    let h = 1e-4;
     let found = system.derivatives(criterion).unwrap();
     assert!((found.value - system.value(criterion).unwrap()).abs() < 1e-13);
     for i in 0..found.gradient.len() {
-        let (up, down) = (moved(system, i, h), moved(system, i, -h));
-        let slope = (up.value(criterion).unwrap() - down.value(criterion).unwrap()) / (2.0 * h);
-        assert!((slope - found.gradient[i]).abs() < 3e-8, "{criterion:?} {i}: {slope} {}", found.gradient[i]);
-        let (up, down) = (up.derivatives(criterion).unwrap(), down.derivatives(criterion).unwrap());
-        let column = (up.gradient - down.gradient) / (2.0 * h);
+        let slope = difference(system, i, |s| s.value(criterion).unwrap());
+        assert!((slope - found.gradient[i]).abs() < 1e-8, "{criterion:?} {i}: {slope} {}", found.gradient[i]);
+        let column = difference(system, i, |s| s.derivatives(criterion).unwrap().gradient);
         for j in 0..column.len() {
             let entry = found.hessian[(j, i)];
-            assert!((column[j] - entry).abs() < 3e-7, "{criterion:?} {i} {j}: {} {entry}", column[j]);
+            assert!((column[j] - entry).abs() < 1e-7, "{criterion:?} {i} {j}: {} {entry}", column[j]);
         }
     }
 }

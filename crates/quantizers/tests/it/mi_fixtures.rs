@@ -36,8 +36,10 @@ fn entries() -> &'static [Entry] {
     })
 }
 
+type Check = fn(&Entry);
+
 /// The families of the file, each tested below. An id that belongs to none, or to two, fails.
-const FAMILIES: [(&str, fn(&Entry)); 21] = [
+const FAMILIES: [(&str, Check); 21] = [
     ("lm_", lloyd_max_of_the_normal),
     ("dr_", remote),
     ("ceo_", ceo),
@@ -61,7 +63,7 @@ const FAMILIES: [(&str, fn(&Entry)); 21] = [
     ("m", modulo_or_monte_carlo),
 ];
 
-fn family(id: &str) -> fn(&Entry) {
+fn family(id: &str) -> Check {
     let own: Vec<_> = FAMILIES.iter().filter(|(prefix, _)| id.starts_with(prefix)).collect();
     match own.as_slice() {
         [(_, check)] => *check,

@@ -1,0 +1,19 @@
+//! Errors of this crate.
+
+use fewbits_core::ArgumentError;
+use thiserror::Error;
+
+/// What a density refuses.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument outside its range.
+    #[error(transparent)]
+    Argument(#[from] ArgumentError),
+    /// No particle has any weight left, or a weight is not a number.
+    #[error("degenerate particles: the largest log weight is {largest}, expected a finite number")]
+    Degenerate {
+        /// The largest log weight found.
+        largest: f64,
+    },
+}

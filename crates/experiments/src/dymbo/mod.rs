@@ -1,0 +1,8 @@
+//! The Dymbo filter: figures and tables.
+
+use crate::AnyFigure;
+
+/// The figures of this system, in the order of the publication.
+pub fn figures() -> Vec<&'static dyn AnyFigure> {
+    vec![]
+}

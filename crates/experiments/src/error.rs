@@ -1,0 +1,59 @@
+//! Why an experiment could not run.
+
+use thiserror::Error;
+
+/// Why an experiment could not run.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parameter the figure does not have.
+    #[error("figure `{figure}` has no parameter `{name}`: expected one of {valid}")]
+    UnknownParameter {
+        /// Id of the figure.
+        figure: &'static str,
+        /// The unknown name.
+        name: String,
+        /// The parameters it has.
+        valid: String,
+    },
+    /// A parameter of the wrong type or out of range.
+    #[error("parameter `{name}` of figure `{figure}` is `{value}`: expected {expected}")]
+    BadParameter {
+        /// Id of the figure.
+        figure: &'static str,
+        /// Name of the parameter.
+        name: String,
+        /// The refused value.
+        value: String,
+        /// What would have been accepted.
+        expected: String,
+    },
+    /// A table was built or read wrongly.
+    #[error("table: {0}")]
+    Table(String),
+    /// The run was cancelled.
+    #[error("cancelled")]
+    Cancelled,
+    /// An argument was refused further down.
+    #[error(transparent)]
+    Argument(#[from] fewbits_core::ArgumentError),
+    /// A crate below failed.
+    #[error("{0}")]
+    Failed(#[source] Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl Error {
+    /// Wraps the error of a crate below.
+    pub fn failed(source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::Failed(Box::new(source))
+    }
+}
+
+impl<E: std::error::Error + Send + Sync + 'static> From<fewbits_core::MonteCarloError<E>> for Error {
+    fn from(error: fewbits_core::MonteCarloError<E>) -> Self {
+        match error {
+            fewbits_core::MonteCarloError::Cancelled => Self::Cancelled,
+            other => Self::failed(other),
+        }
+    }
+}

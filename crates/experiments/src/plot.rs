@@ -1,0 +1,349 @@
+//! Pictures as data: what to draw, not how.
+//!
+//! A [`Plot`] is a grid of [`Panel`]s, a panel a pair of axes and a stack of [`Layer`]s. `xtask figures` turns it into SVG.
+//! Colours are indices into one palette that stays readable in print and for colour-blind readers; give the same scheme
+//! the same index in every panel of a figure.
+//!
+//! ```
+//! use fewbits_experiments::plot::{Axis, Layer, Panel, Plot};
+//! let curve = vec![(0.001, 1.0), (1.0, 2.0)];
+//! let plot = Plot::of(
+//!     Panel::new("Loss", Axis::log("gamma = sigma_u^2 / sigma^2"), Axis::linear("loss"))
+//!         .with(Layer::line("closed form", curve.clone()).coloured(0))
+//!         .with(Layer::points("simulated", curve).with_errors(vec![0.1, 0.1]).coloured(1)),
+//! );
+//! assert_eq!(plot.panels.len(), 1);
+//! ```
+
+/// A grid of panels, filled row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plot {
+    /// The panels.
+    pub panels: Vec<Panel>,
+    /// Panels a row.
+    pub columns: usize,
+}
+
+impl Plot {
+    /// A single panel.
+    pub fn of(panel: Panel) -> Self {
+        Self {
+            panels: vec![panel],
+            columns: 1,
+        }
+    }
+
+    /// Panels in rows of `columns`.
+    pub fn grid(columns: usize, panels: Vec<Panel>) -> Self {
+        Self {
+            panels,
+            columns: columns.max(1),
+        }
+    }
+}
+
+/// How values map to positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// Proportional.
+    Linear,
+    /// By decimal logarithm; values of 0 and below are not drawn.
+    Log,
+}
+
+/// One axis of a panel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// What it shows, with its unit.
+    pub label: String,
+    /// Linear or logarithmic.
+    pub scale: Scale,
+    /// Limits; from the data where absent.
+    pub range: Option<(f64, f64)>,
+    /// Places with names of their own instead of numbers, for categories.
+    pub names: Vec<(f64, String)>,
+}
+
+impl Axis {
+    /// A linear axis.
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            scale: Scale::Linear,
+            range: None,
+            names: Vec::new(),
+        }
+    }
+
+    /// A logarithmic axis.
+    pub fn log(label: impl Into<String>) -> Self {
+        Self {
+            scale: Scale::Log,
+            ..Self::linear(label)
+        }
+    }
+
+    /// Fixes the limits.
+    #[must_use]
+    pub fn between(self, low: f64, high: f64) -> Self {
+        Self {
+            range: Some((low, high)),
+            ..self
+        }
+    }
+
+    /// Names places: category axes.
+    #[must_use]
+    pub fn named(self, names: impl IntoIterator<Item = (f64, String)>) -> Self {
+        Self {
+            names: names.into_iter().collect(),
+            ..self
+        }
+    }
+}
+
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stroke {
+    /// Solid.
+    Solid,
+    /// Dashed: bounds, references, asymptotes.
+    Dashed,
+}
+
+/// The shape of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Marker {
+    /// A filled circle.
+    Circle,
+    /// A cross.
+    Cross,
+    /// A filled triangle.
+    Triangle,
+    /// A filled square.
+    Square,
+}
+
+/// What a layer draws.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// Straight pieces between points.
+    Line {
+        /// The points in drawing order.
+        points: Vec<(f64, f64)>,
+        /// Solid or dashed.
+        stroke: Stroke,
+    },
+    /// Markers, with vertical error bars of one standard error (half lengths) where given.
+    Points {
+        /// The points.
+        points: Vec<(f64, f64)>,
+        /// Half lengths of the error bars; empty for none.
+        errors: Vec<f64>,
+        /// The marker.
+        marker: Marker,
+    },
+    /// Vertical bars from zero (from the lower limit on a log axis), `width` wide in units of the horizontal axis.
+    Bars {
+        /// Centre and height.
+        points: Vec<(f64, f64)>,
+        /// Width.
+        width: f64,
+    },
+    /// A coloured field over a rectangular grid, with a colour bar: `values[j][i]` at `(x[i], y[j])`.
+    Heat {
+        /// Cell centres, increasing.
+        x: Vec<f64>,
+        /// Cell centres, increasing.
+        y: Vec<f64>,
+        /// Values, one row for each `y`.
+        values: Vec<Vec<f64>>,
+    },
+    /// Filled rectangles `(left, right, bottom, top)`: bit patterns, cells, intervals.
+    Boxes {
+        /// The rectangles.
+        boxes: Vec<(f64, f64, f64, f64)>,
+    },
+    /// A filled band between two curves `(x, low, high)`.
+    Band {
+        /// Position and limits.
+        limits: Vec<(f64, f64, f64)>,
+    },
+    /// Short texts, centred at their points.
+    Texts {
+        /// Position and text.
+        texts: Vec<(f64, f64, String)>,
+    },
+}
+
+/// One drawn thing and its entry in the legend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    /// Entry in the legend; none if empty.
+    pub label: String,
+    /// Index into the palette; by order of layers where absent.
+    pub colour: Option<usize>,
+    /// What is drawn.
+    pub shape: Shape,
+}
+
+impl Layer {
+    fn new(label: impl Into<String>, shape: Shape) -> Self {
+        Self {
+            label: label.into(),
+            colour: None,
+            shape,
+        }
+    }
+
+    /// A solid line: theory.
+    pub fn line(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::new(
+            label,
+            Shape::Line {
+                points,
+                stroke: Stroke::Solid,
+            },
+        )
+    }
+
+    /// A dashed line: a bound or a reference.
+    pub fn dashed(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::new(
+            label,
+            Shape::Line {
+                points,
+                stroke: Stroke::Dashed,
+            },
+        )
+    }
+
+    /// Markers: measurements.
+    pub fn points(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::new(
+            label,
+            Shape::Points {
+                points,
+                errors: Vec::new(),
+                marker: Marker::Circle,
+            },
+        )
+    }
+
+    /// Vertical bars.
+    pub fn bars(label: impl Into<String>, points: Vec<(f64, f64)>, width: f64) -> Self {
+        Self::new(label, Shape::Bars { points, width })
+    }
+
+    /// A coloured field; the label stands at its colour bar.
+    pub fn heat(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, values: Vec<Vec<f64>>) -> Self {
+        Self::new(label, Shape::Heat { x, y, values })
+    }
+
+    /// Filled rectangles.
+    pub fn boxes(label: impl Into<String>, boxes: Vec<(f64, f64, f64, f64)>) -> Self {
+        Self::new(label, Shape::Boxes { boxes })
+    }
+
+    /// A filled band.
+    pub fn band(label: impl Into<String>, limits: Vec<(f64, f64, f64)>) -> Self {
+        Self::new(label, Shape::Band { limits })
+    }
+
+    /// Short texts.
+    pub fn texts(texts: Vec<(f64, f64, String)>) -> Self {
+        Self::new("", Shape::Texts { texts })
+    }
+
+    /// Fixes the colour.
+    #[must_use]
+    pub fn coloured(self, colour: usize) -> Self {
+        Self {
+            colour: Some(colour),
+            ..self
+        }
+    }
+
+    /// Adds error bars of one standard error to markers; ignored by other shapes.
+    #[must_use]
+    pub fn with_errors(mut self, half_lengths: Vec<f64>) -> Self {
+        if let Shape::Points { errors, .. } = &mut self.shape {
+            *errors = half_lengths;
+        }
+        self
+    }
+
+    /// Chooses the marker; ignored by other shapes.
+    #[must_use]
+    pub fn marked(mut self, with: Marker) -> Self {
+        if let Shape::Points { marker, .. } = &mut self.shape {
+            *marker = with;
+        }
+        self
+    }
+}
+
+/// Where the legend stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Legend {
+    /// Top right.
+    TopRight,
+    /// Top left.
+    TopLeft,
+    /// Bottom right.
+    BottomRight,
+    /// Bottom left.
+    BottomLeft,
+    /// In a column of its own, right of the panel: for many layers.
+    Outside,
+    /// None.
+    Hidden,
+}
+
+/// A pair of axes with layers on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    /// Title.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Layers, drawn in order.
+    pub layers: Vec<Layer>,
+    /// Place of the legend.
+    pub legend: Legend,
+}
+
+impl Panel {
+    /// An empty panel.
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
+        Self {
+            title: title.into(),
+            x,
+            y,
+            layers: Vec::new(),
+            legend: Legend::TopRight,
+        }
+    }
+
+    /// Adds a layer.
+    #[must_use]
+    pub fn with(mut self, layer: Layer) -> Self {
+        self.layers.push(layer);
+        self
+    }
+
+    /// Adds layers.
+    #[must_use]
+    pub fn with_all(mut self, layers: impl IntoIterator<Item = Layer>) -> Self {
+        self.layers.extend(layers);
+        self
+    }
+
+    /// Places the legend.
+    #[must_use]
+    pub fn legend(self, legend: Legend) -> Self {
+        Self { legend, ..self }
+    }
+}

@@ -1,0 +1,49 @@
+//! Posterior Cramer-Rao recursions: a lower bound on the mean squared error of any filter.
+//!
+//! Tichavsky, Muravchik and Nehorai (1998) give the bound's inverse recursively. In information form, for any dynamics with a
+//! density, `J_k = D22 - D21 (J_{k-1} + D11)^-1 D12` ([`information_step`]). With linear dynamics and a Fisher information
+//! of what is heard, `I_k = E[-d^2 ln p(heard | x) / dx^2]`, the same recursion runs on the bound itself and needs no
+//! inverse of the process noise, which may then be singular ([`covariance_step`]).
+
+use crate::Error;
+use fewbits_core::linalg::{semidefinite_factor, symmetrised};
+use fewbits_core::{ArgumentError, LinearDynamics};
+use nalgebra::{Cholesky, SMatrix};
+
+/// One step of the bound: `P = F P F' + Q`, then `P - P L (1 + L' P L)^-1 L' P` with `L L' = information`.
+///
+/// `information` is the expected Fisher information of everything heard in this step about the state.
+///
+/// # Errors
+/// A matrix that is not symmetric positive semidefinite.
+pub fn covariance_step<const D: usize>(
+    dynamics: &impl LinearDynamics<D>,
+    bound: &SMatrix<f64, D, D>,
+    information: &SMatrix<f64, D, D>,
+) -> Result<SMatrix<f64, D, D>, Error> {
+    semidefinite_factor("bound", bound)?;
+    let root = semidefinite_factor("information", information)?;
+    let transition = dynamics.transition();
+    let predicted = transition * bound * transition.transpose() + dynamics.noise_covariance();
+    let cross = predicted * root;
+    let inner = SMatrix::<f64, D, D>::identity() + root.transpose() * cross;
+    let factor = Cholesky::new(inner).ok_or(Error::SingularInnovation)?;
+    Ok(symmetrised(&(predicted - cross * factor.solve(&cross.transpose()))))
+}
+
+/// One step of the bound's inverse: `D22 - D21 (J + D11)^-1 D12`, where the `D` are the expected second derivatives of
+/// `-ln p(x_k | x_{k-1}) - ln p(heard_k | x_k)`: `D11` in `x_{k-1}` twice, `D12` mixed, `D22` in `x_k` twice.
+///
+/// # Errors
+/// `J + D11` not positive definite.
+pub fn information_step<const D: usize>(
+    information: &SMatrix<f64, D, D>,
+    d11: &SMatrix<f64, D, D>,
+    d12: &SMatrix<f64, D, D>,
+    d22: &SMatrix<f64, D, D>,
+) -> Result<SMatrix<f64, D, D>, Error> {
+    let factor = Cholesky::new(information + d11).ok_or_else(|| {
+        ArgumentError::new("information", "J + D11 without a Cholesky factor", "a positive definite sum")
+    })?;
+    Ok(symmetrised(&(d22 - d12.transpose() * factor.solve(d12))))
+}

@@ -1,0 +1,137 @@
+//! The Kalman filter.
+
+use crate::Error;
+use fewbits_core::error::all_finite;
+use fewbits_core::normal::LN_SQRT_2PI;
+use fewbits_core::{Gaussian, LinearDynamics, LinearSensing};
+use nalgebra::{Cholesky, SMatrix, SVector};
+
+/// What an update reveals besides the new belief.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KalmanInfo<const D: usize, const M: usize> {
+    /// Measurement minus its prediction.
+    pub innovation: SVector<f64, M>,
+    /// Covariance `S = H P H' + R` of the innovation.
+    pub innovation_covariance: SMatrix<f64, M, M>,
+    /// Kalman gain `K = P H' S^-1`.
+    pub gain: SMatrix<f64, D, M>,
+    /// `ln N(innovation; 0, S)`, the increment of the log-likelihood of the data.
+    pub log_likelihood: f64,
+    /// `innovation' S^-1 innovation / M`: expectation 1 for a consistent filter.
+    pub normalised_innovation_squared: f64,
+}
+
+/// Time update: mean `F m`, covariance `F P F' + Q`.
+#[inline]
+pub fn predict<const D: usize>(dynamics: &impl LinearDynamics<D>, belief: &Gaussian<D>) -> Gaussian<D> {
+    let transition = dynamics.transition();
+    let covariance = transition * belief.covariance() * transition.transpose() + dynamics.noise_covariance();
+    Gaussian::from_trusted_parts(transition * belief.mean(), covariance)
+}
+
+/// Measurement update in Joseph form, which keeps the covariance positive semidefinite under rounding.
+///
+/// ```text
+/// innovation = z - H mean
+/// S = H P H' + R
+/// K = P H' S^-1                      (Cholesky of S)
+/// mean = mean + K innovation
+/// P = (I - K H) P (I - K H)' + K R K'
+/// log_likelihood = ln N(innovation; 0, S)
+/// ```
+///
+/// # Errors
+/// A measurement that is not finite; [`Error::SingularInnovation`].
+pub fn update<const D: usize, const M: usize>(
+    sensing: &impl LinearSensing<D, M>,
+    belief: &Gaussian<D>,
+    measurement: &SVector<f64, M>,
+) -> Result<(Gaussian<D>, KalmanInfo<D, M>), Error> {
+    all_finite("measurement", measurement.as_slice())?;
+    let matrix = sensing.matrix();
+    let noise = sensing.noise_covariance();
+    let cross = belief.covariance() * matrix.transpose();
+    let innovation_covariance = matrix * cross + noise;
+    let factor = Cholesky::new(innovation_covariance).ok_or(Error::SingularInnovation)?;
+    let gain = factor.solve(&cross.transpose()).transpose();
+    let innovation = measurement - matrix * belief.mean();
+    let keep = SMatrix::<f64, D, D>::identity() - gain * matrix;
+    let covariance = keep * belief.covariance() * keep.transpose() + gain * noise * gain.transpose();
+
+    let squared = innovation.dot(&factor.solve(&innovation));
+    let log_root_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+    let info = KalmanInfo {
+        innovation,
+        innovation_covariance,
+        gain,
+        log_likelihood: -0.5 * squared - log_root_determinant - M as f64 * LN_SQRT_2PI,
+        normalised_innovation_squared: squared / M as f64,
+    };
+    Ok((Gaussian::from_trusted_parts(belief.mean() + gain * innovation, covariance), info))
+}
+
+/// One cycle of the Kalman filter: [`predict`], then [`update`].
+///
+/// # Errors
+/// As [`update`].
+pub fn step<const D: usize, const M: usize>(
+    dynamics: &impl LinearDynamics<D>,
+    sensing: &impl LinearSensing<D, M>,
+    belief: &Gaussian<D>,
+    measurement: &SVector<f64, M>,
+) -> Result<(Gaussian<D>, KalmanInfo<D, M>), Error> {
+    update(sensing, &predict(dynamics, belief), measurement)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{predict, step, update};
+    use crate::Error;
+    use fewbits_core::Gaussian;
+    use fewbits_models::{LinearSensor, constant_velocity_1d};
+    use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
+
+    /// The posterior of a linear-Gaussian problem in information form, an independent formula.
+    #[test]
+    fn update_is_the_information_form() {
+        let prior = Gaussian::new(Vector2::new(1.0, -1.0), Matrix2::new(2.0, 0.3, 0.3, 1.0)).unwrap();
+        let h = Matrix3x2::new(1.0, 0.0, 0.5, 2.0, -1.0, 1.0);
+        let r = Matrix3::new(1.0, 0.2, 0.0, 0.2, 0.5, 0.1, 0.0, 0.1, 2.0);
+        let z = Vector3::new(0.4, -2.0, 1.0);
+        let (posterior, info) = update(&LinearSensor::new(h, r).unwrap(), &prior, &z).unwrap();
+        let prior_information = prior.covariance().try_inverse().unwrap();
+        let noise_information = r.try_inverse().unwrap();
+        let covariance = (prior_information + h.transpose() * noise_information * h)
+            .try_inverse()
+            .unwrap();
+        let mean = covariance * (prior_information * prior.mean() + h.transpose() * noise_information * z);
+        assert!((posterior.covariance() - covariance).amax() < 1e-13);
+        assert!((posterior.mean() - mean).amax() < 1e-13);
+        let predicted = Gaussian::new(h * prior.mean(), info.innovation_covariance).unwrap();
+        assert!((info.log_likelihood - predicted.log_pdf(&z).unwrap()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_known_start_stays_semidefinite() {
+        let dynamics = constant_velocity_1d(1.0, 0.1).unwrap();
+        let sensing = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
+        let mut belief = Gaussian::known(Vector2::new(0.0, 1.0)).unwrap();
+        assert_eq!(*predict(&dynamics, &belief).mean(), Vector2::new(1.0, 1.0));
+        for n in 0..200 {
+            belief = step(&dynamics, &sensing, &belief, &SVector::from([f64::from(n)]))
+                .unwrap()
+                .0;
+            assert!(Gaussian::new(*belief.mean(), *belief.covariance()).is_ok());
+        }
+    }
+
+    #[test]
+    fn refuses_what_it_cannot_hear() {
+        let sensing = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
+        let belief = Gaussian::known(Vector2::zeros()).unwrap();
+        let nothing = update(&sensing, &belief, &SVector::from([f64::NAN]));
+        assert!(matches!(nothing, Err(Error::Argument(_))));
+        let bad = Gaussian::from_trusted_parts(Vector2::zeros(), -SMatrix::identity() * 3.0);
+        assert_eq!(update(&sensing, &bad, &SVector::from([1.0])), Err(Error::SingularInnovation));
+    }
+}

@@ -1,0 +1,215 @@
+//! Resampling: from weighted particles to equally weighted ones.
+
+use fewbits_core::ArgumentError;
+use fewbits_densities::sums::sum;
+use rand::{Rng, RngExt};
+use rand_distr::Open01;
+use serde::{Deserialize, Serialize};
+
+/// A law that draws `M` ancestors from `N` weighted particles; `M` and `N` are independent.
+///
+/// For every law the expected number of copies of particle `i` is `M w_i`, a particle of weight zero is never chosen, and the
+/// ancestors come out in increasing order, so that gathering them walks memory forward. They differ in the noise they add
+/// (Douc, Cappe and Moulines 2005): systematic and residual at most stratified or multinomial, multinomial the most.
+///
+/// | law | uniforms drawn | copies of particle `i` |
+/// |---|---|---|
+/// | systematic | 1 | `floor(M w_i)` or `ceil(M w_i)` |
+/// | stratified | `M` | within 1 of `M w_i` at both ends of its interval |
+/// | residual | `M - sum floor(M w_i)` | at least `floor(M w_i)` |
+/// | multinomial | `M` | binomial |
+///
+/// ```text
+/// cumulative = running sum of the weights
+/// for each point u_1 <= u_2 <= ... <= u_M of the law, in units of the total weight:
+///     ancestor = first i with u < cumulative_i
+/// systematic:  u_m = (m - 1 + U) / M, one U          stratified: u_m = (m - 1 + U_m) / M
+/// multinomial: order statistics of M uniforms        residual:   floor(M w_i) copies, then multinomial on what is left
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Resampling {
+    /// One uniform, evenly spaced points. The default: cheapest and least noisy in practice.
+    #[default]
+    Systematic,
+    /// One uniform in each of `M` equal strata.
+    Stratified,
+    /// Whole copies first, multinomial for the fractional parts.
+    Residual,
+    /// Independent draws.
+    Multinomial,
+}
+
+impl Resampling {
+    /// All four laws.
+    pub const ALL: [Self; 4] = [Self::Systematic, Self::Stratified, Self::Residual, Self::Multinomial];
+
+    /// Fills `ancestors` with indices into `weights`, in increasing order. The weights need not be normalised.
+    ///
+    /// # Errors
+    /// A weight that is negative or not finite, or weights that do not sum to a positive finite number. `ancestors` is then
+    /// left as it was.
+    pub fn ancestors<R: Rng + ?Sized>(
+        self,
+        rng: &mut R,
+        weights: &[f64],
+        ancestors: &mut [u32],
+    ) -> Result<(), ArgumentError> {
+        let (total, last) = check(weights)?;
+        self.ancestors_unchecked(rng, weights, total, last, ancestors);
+        Ok(())
+    }
+
+    /// The same for weights known to be non-negative with the sum `total`, the last positive one at `last`.
+    fn ancestors_unchecked<R: Rng + ?Sized>(
+        self,
+        rng: &mut R,
+        weights: &[f64],
+        total: f64,
+        last: usize,
+        ancestors: &mut [u32],
+    ) {
+        let count = ancestors.len();
+        let step = total / count as f64;
+        match self {
+            Self::Systematic => systematic(rng.sample(Open01), weights, 1.0 / step, last, ancestors),
+            Self::Stratified => pick(weights, last, ancestors, |m| (m as f64 + rng.random::<f64>()) * step),
+            Self::Multinomial => {
+                let mut points = OrderedUniforms::new(count);
+                pick(weights, last, ancestors, |_| points.next(rng) * total);
+            }
+            Self::Residual => residual(rng, weights, step, last, ancestors),
+        }
+    }
+}
+
+/// Sum of the weights and the index of the last positive one.
+fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
+    if let Some(bad) = weights.iter().find(|w| !(**w >= 0.0 && w.is_finite())) {
+        return Err(ArgumentError::new("weights", bad, "finite weights, 0 or above"));
+    }
+    let total = sum(weights);
+    match weights.iter().rposition(|w| *w > 0.0) {
+        Some(last) if total.is_finite() => Ok((total, last)),
+        _ => Err(ArgumentError::new("weights", format!("a vector summing to {total}"), "a positive finite sum")),
+    }
+}
+
+/// Systematic resampling without a branch that depends on the weights: particle `i` gets the places between
+/// `floor(offset + cumulative_{i-1}/step)` and `floor(offset + cumulative_i/step)`.
+///
+/// Each particle writes its index at its first place; one without a place is overwritten by the next. A running maximum then
+/// fills the places between.
+fn systematic(offset: f64, weights: &[f64], per_weight: f64, last: usize, ancestors: &mut [u32]) {
+    let count = ancestors.len();
+    ancestors.fill(0);
+    let mut cumulative = 0.0;
+    let mut first = 0_usize;
+    for (i, weight) in weights[..=last].iter().enumerate() {
+        // Rounding may give the last particles a first place beyond the end.
+        if let Some(place) = ancestors.get_mut(first) {
+            *place = i as u32;
+        }
+        cumulative += weight;
+        first = (cumulative * per_weight + offset) as u32 as usize;
+    }
+    let mut so_far = 0;
+    for ancestor in &mut ancestors[..count] {
+        so_far = so_far.max(*ancestor);
+        *ancestor = so_far;
+    }
+}
+
+/// For each point of an increasing sequence the first particle whose cumulative weight exceeds it. Rounding may leave the
+/// last points at or above the total; they go to the last particle of positive weight.
+fn pick(weights: &[f64], last: usize, ancestors: &mut [u32], mut point: impl FnMut(usize) -> f64) {
+    let mut at = 0;
+    let mut cumulative = weights[0];
+    for (m, ancestor) in ancestors.iter_mut().enumerate() {
+        let u = point(m);
+        while u >= cumulative && at < last {
+            at += 1;
+            cumulative += weights[at];
+        }
+        *ancestor = at as u32;
+    }
+}
+
+/// Whole copies `floor(w / step)`, then multinomial draws from the fractional parts, merged in one sweep.
+fn residual<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], step: f64, last: usize, ancestors: &mut [u32]) {
+    // An exact multiple of 1/M must not lose a copy to rounding.
+    let whole = |w: f64| (w / step + 1e-9).floor();
+    let fraction = |w: f64| (w / step - whole(w)).max(0.0);
+    let copies: f64 = weights.iter().map(|w| whole(*w)).sum();
+    let left = ancestors.len().saturating_sub(copies as usize);
+    let rest: f64 = weights.iter().map(|w| fraction(*w)).sum();
+    let last_fraction = weights.iter().rposition(|w| fraction(*w) > 0.0).unwrap_or(last);
+    let mut points = OrderedUniforms::new(left);
+    let mut pending = (left > 0).then(|| points.next(rng) * rest);
+    let mut drawn = 0;
+    let (mut filled, mut cumulative) = (0, 0.0);
+    for (i, w) in weights.iter().enumerate().take(last + 1) {
+        let mut count = whole(*w) as usize;
+        cumulative += fraction(*w);
+        while let Some(u) = pending {
+            if u >= cumulative && i < last_fraction {
+                break;
+            }
+            count += 1;
+            drawn += 1;
+            pending = (drawn < left).then(|| points.next(rng) * rest);
+        }
+        let end = (filled + count).min(ancestors.len());
+        ancestors[filled..end].fill(i as u32);
+        filled = end;
+    }
+    ancestors[filled..].fill(last as u32);
+}
+
+/// Order statistics of independent uniforms, smallest first, without storing them: the largest of `k` uniforms is `U^(1/k)`,
+/// and what remains below it is again a sample of uniforms.
+struct OrderedUniforms {
+    left: usize,
+    above: f64,
+}
+
+impl OrderedUniforms {
+    fn new(count: usize) -> Self {
+        Self {
+            left: count,
+            above: 1.0,
+        }
+    }
+
+    fn next<R: Rng + ?Sized>(&mut self, rng: &mut R) -> f64 {
+        // 1 - U lies in (0, 1], so that the logarithm exists.
+        let u = 1.0 - rng.random::<f64>();
+        self.above *= (u.ln() / self.left.max(1) as f64).exp();
+        self.left = self.left.saturating_sub(1);
+        1.0 - self.above
+    }
+}
+
+/// When to resample.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Schedule {
+    /// After every weighting.
+    #[default]
+    Always,
+    /// When the effective sample size falls below this fraction of the number of particles.
+    Below(f64),
+    /// Never: sequential importance sampling.
+    Never,
+}
+
+impl Schedule {
+    /// Whether particles of this effective sample size are due.
+    pub fn is_due(self, effective_sample_size: f64, particles: usize) -> bool {
+        match self {
+            Self::Always => true,
+            Self::Below(fraction) => effective_sample_size < fraction * particles as f64,
+            Self::Never => false,
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Rauch-Tung-Striebel smoothing, of a whole record and at a fixed lag.
+//!
+//! Both need nothing but the filtered beliefs and the dynamics, so they smooth the output of any filter that keeps Gaussian
+//! beliefs, whatever its messages were.
+
+use crate::{Error, kalman};
+use fewbits_core::error::at_least_one;
+use fewbits_core::linalg::semidefinite_factor;
+use fewbits_core::{Gaussian, LinearDynamics};
+use nalgebra::{Cholesky, SMatrix};
+use std::collections::VecDeque;
+
+/// One backward step: the belief at `n` given the future, from the filtered belief at `n` and the smoothed belief at `n + 1`.
+///
+/// ```text
+/// P+ = F P F' + Q
+/// C = P F' P+^-1                                    (pseudo-inverse where P+ is singular)
+/// mean = mean + C (next mean - F mean)
+/// P = (I - C F) P (I - C F)' + C (next P + Q) C'
+/// ```
+///
+/// # Errors
+/// A filtered covariance that is none.
+pub fn smooth_step<const D: usize>(
+    dynamics: &impl LinearDynamics<D>,
+    filtered: &Gaussian<D>,
+    smoothed_next: &Gaussian<D>,
+) -> Result<Gaussian<D>, Error> {
+    let transition = dynamics.transition();
+    let predicted = kalman::predict(dynamics, filtered);
+    let gain = solve_semidefinite(predicted.covariance(), &(transition * filtered.covariance()))?.transpose();
+    let keep = SMatrix::<f64, D, D>::identity() - gain * transition;
+    let future = smoothed_next.covariance() + dynamics.noise_covariance();
+    Ok(Gaussian::from_trusted_parts(
+        filtered.mean() + gain * (smoothed_next.mean() - predicted.mean()),
+        keep * filtered.covariance() * keep.transpose() + gain * future * gain.transpose(),
+    ))
+}
+
+/// Solves `S X = B` for a covariance `S`, in the sense of the pseudo-inverse if it is singular.
+fn solve_semidefinite<const D: usize>(
+    covariance: &SMatrix<f64, D, D>,
+    right: &SMatrix<f64, D, D>,
+) -> Result<SMatrix<f64, D, D>, Error> {
+    if let Some(factor) = Cholesky::new(*covariance) {
+        return Ok(factor.solve(right));
+    }
+    // S = L L' with r independent columns, so S^+ = L (L'L)^-2 L'; ones stand in for the columns beyond the rank.
+    let factor = semidefinite_factor("covariance", covariance)?;
+    let mut gram = factor.transpose() * factor;
+    for i in 0..D {
+        if gram[(i, i)] == 0.0 {
+            gram[(i, i)] = 1.0;
+        }
+    }
+    let gram = Cholesky::new(gram).ok_or(Error::SingularInnovation)?;
+    Ok(factor * gram.solve(&gram.solve(&(factor.transpose() * right))))
+}
+
+/// Smooths a whole record of filtered beliefs, oldest first.
+///
+/// # Errors
+/// As [`smooth_step`].
+pub fn smooth<const D: usize>(
+    dynamics: &impl LinearDynamics<D>,
+    filtered: &[Gaussian<D>],
+) -> Result<Vec<Gaussian<D>>, Error> {
+    let mut smoothed = filtered.to_vec();
+    for n in (0..filtered.len().saturating_sub(1)).rev() {
+        smoothed[n] = smooth_step(dynamics, &filtered[n], &smoothed[n + 1])?;
+    }
+    Ok(smoothed)
+}
+
+/// A smoother that runs beside a filter and reports each state `lag` steps late.
+///
+/// ```
+/// use fewbits_core::Gaussian;
+/// use fewbits_filters::FixedLagSmoother;
+/// use fewbits_models::Ar1;
+/// let mut smoother = FixedLagSmoother::new(Ar1::new(0.9, 0.5)?, 2)?;
+/// assert!(smoother.push(Gaussian::scalar(0.0, 1.0)?)?.is_none());
+/// assert!(smoother.push(Gaussian::scalar(1.0, 0.5)?)?.is_none());
+/// let late = smoother.push(Gaussian::scalar(1.0, 0.5)?)?;
+/// assert!(late.is_some_and(|belief| belief.mean()[0] > 0.0));
+/// # Ok::<(), fewbits_filters::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct FixedLagSmoother<F, const D: usize> {
+    dynamics: F,
+    lag: usize,
+    window: VecDeque<Gaussian<D>>,
+}
+
+impl<const D: usize, F: LinearDynamics<D>> FixedLagSmoother<F, D> {
+    /// A smoother for filtered beliefs under `dynamics`, `lag >= 1` steps late.
+    ///
+    /// # Errors
+    /// A lag of zero.
+    pub fn new(dynamics: F, lag: usize) -> Result<Self, Error> {
+        Ok(Self {
+            dynamics,
+            lag: at_least_one("lag", lag)?,
+            window: VecDeque::with_capacity(lag),
+        })
+    }
+
+    /// Takes the newest filtered belief; returns the smoothed belief of `lag` steps ago once there is one. Costs `lag`
+    /// backward steps and no allocation.
+    ///
+    /// # Errors
+    /// As [`smooth_step`]; the window is then as before.
+    pub fn push(&mut self, filtered: Gaussian<D>) -> Result<Option<Gaussian<D>>, Error> {
+        let mut smoothed = None;
+        if self.window.len() == self.lag {
+            let mut past = self.window.iter().rev();
+            smoothed = Some(past.try_fold(filtered, |next, belief| smooth_step(&self.dynamics, belief, &next))?);
+            self.window.pop_front();
+        }
+        self.window.push_back(filtered);
+        Ok(smoothed)
+    }
+}
+
+/// Steady variance of a scalar fixed-lag smoother: `V_0 = M`, `V_l = M + C^2 (V_{l-1} - P)` with `C = a M / P`, from the
+/// filter's steady predicted variance `P` and filtered variance `M`.
+pub fn scalar_fixed_lag_variance(coefficient: f64, steady: &crate::ScalarSteadyState, lag: usize) -> f64 {
+    let (p, m) = (steady.predicted_variance, steady.filtered_variance);
+    if p == 0.0 {
+        return 0.0;
+    }
+    let gain = coefficient * m / p;
+    (0..lag).fold(m, |variance, _| m + gain * gain * (variance - p))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FixedLagSmoother, scalar_fixed_lag_variance, smooth};
+    use crate::{kalman, scalar_steady_state};
+    use fewbits_core::{Dynamics, Gaussian, Sensing};
+    use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
+    use nalgebra::{DMatrix, DVector, SMatrix, Vector2};
+    use rand::SeedableRng;
+    use rand_pcg::Pcg64Mcg;
+
+    fn record(known: bool) -> (Vec<Gaussian<2>>, Vec<f64>) {
+        let dynamics = constant_velocity_1d(1.0, 0.3).unwrap();
+        let sensing = LinearSensor::scalar(Vector2::new(1.0, 0.0), 0.7).unwrap();
+        let mut rng = Pcg64Mcg::seed_from_u64(5);
+        let covariance = if known {
+            SMatrix::zeros()
+        } else {
+            SMatrix::identity() * 2.0
+        };
+        let mut belief = Gaussian::new(Vector2::new(0.5, -0.5), covariance).unwrap();
+        let (mut beliefs, mut data, mut state) = (vec![belief], vec![], Vector2::new(0.5, -0.5));
+        for _ in 0..6 {
+            state = dynamics.propagate(&mut rng, &state);
+            let z = sensing.sample(&mut rng, &state);
+            belief = kalman::step(&dynamics, &sensing, &belief, &z).unwrap().0;
+            beliefs.push(belief);
+            data.push(z[0]);
+        }
+        (beliefs, data)
+    }
+
+    /// The joint Gaussian of all states and measurements, conditioned at once.
+    fn joint_posterior(known: bool, data: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let dynamics = constant_velocity_1d(1.0, 0.3).unwrap();
+        let n = data.len();
+        let f = DMatrix::from_row_slice(2, 2, dynamics.transition().transpose().as_slice());
+        let q = DMatrix::from_row_slice(2, 2, dynamics.noise_covariance().as_slice());
+        let start = if known { 0.0 } else { 2.0 };
+        let mut covariance = DMatrix::zeros(2 * n + 2, 2 * n + 2);
+        let mut mean = DVector::zeros(2 * n + 2);
+        covariance
+            .view_mut((0, 0), (2, 2))
+            .copy_from(&(DMatrix::identity(2, 2) * start));
+        mean.rows_mut(0, 2).copy_from_slice(&[0.5, -0.5]);
+        for k in 1..=n {
+            let row = &f * covariance.view((2 * k - 2, 0), (2, 2 * k));
+            covariance.view_mut((2 * k, 0), (2, 2 * k)).copy_from(&row);
+            covariance.view_mut((0, 2 * k), (2 * k, 2)).copy_from(&row.transpose());
+            let own = row.columns(2 * k - 2, 2) * f.transpose() + &q;
+            covariance.view_mut((2 * k, 2 * k), (2, 2)).copy_from(&own);
+            let next = &f * mean.rows(2 * k - 2, 2);
+            mean.rows_mut(2 * k, 2).copy_from(&next);
+        }
+        let h = DMatrix::from_fn(n, 2 * n + 2, |i, j| f64::from(u8::from(j == 2 * i + 2)));
+        let s = &h * &covariance * h.transpose() + DMatrix::identity(n, n) * 0.7;
+        let gain = &covariance * h.transpose() * s.try_inverse().unwrap();
+        let innovation = DVector::from_row_slice(data) - &h * &mean;
+        (&mean + &gain * innovation, &covariance - &gain * &h * &covariance)
+    }
+
+    #[test]
+    fn smoothing_is_conditioning_on_the_whole_record() {
+        for known in [false, true] {
+            let (filtered, data) = record(known);
+            let smoothed = smooth(&constant_velocity_1d(1.0, 0.3).unwrap(), &filtered).unwrap();
+            let (mean, covariance) = joint_posterior(known, &data);
+            for (n, belief) in smoothed.iter().enumerate() {
+                assert!((belief.mean() - mean.fixed_rows::<2>(2 * n)).amax() < 1e-10);
+                assert!((belief.covariance() - covariance.fixed_view::<2, 2>(2 * n, 2 * n)).amax() < 1e-10);
+            }
+        }
+    }
+
+    #[test]
+    fn fixed_lag_is_the_smoother_of_the_record_so_far() {
+        let dynamics = constant_velocity_1d(1.0, 0.3).unwrap();
+        let (filtered, _) = record(false);
+        let mut lagged = FixedLagSmoother::new(dynamics, 3).unwrap();
+        for (n, belief) in filtered.iter().enumerate() {
+            let out = lagged.push(*belief).unwrap();
+            assert_eq!(out.is_some(), n >= 3);
+            if let Some(out) = out {
+                let whole = smooth(&dynamics, &filtered[..=n]).unwrap();
+                assert!((out.mean() - whole[n - 3].mean()).amax() < 1e-13);
+                assert!((out.covariance() - whole[n - 3].covariance()).amax() < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn steady_lag_variance_is_where_the_recursion_settles() {
+        let dynamics = Ar1::new(0.9, 0.5).unwrap();
+        let sensing = LinearSensor::direct(1.0).unwrap();
+        let mut smoother = FixedLagSmoother::new(dynamics, 4).unwrap();
+        let mut belief = Gaussian::scalar(0.0, 1.0).unwrap();
+        let mut last = f64::NAN;
+        for _ in 0..200 {
+            belief = kalman::step(&dynamics, &sensing, &belief, &SMatrix::zeros()).unwrap().0;
+            if let Some(out) = smoother.push(belief).unwrap() {
+                last = out.covariance()[0];
+            }
+        }
+        let steady = scalar_steady_state(0.9, 0.5, 1.0, 1.0).unwrap();
+        assert!((last - scalar_fixed_lag_variance(0.9, &steady, 4)).abs() < 1e-13);
+    }
+}

@@ -1,0 +1,206 @@
+//! Sensing of a source's received amplitude, which falls with distance.
+
+use crate::Error;
+use fewbits_core::error::{finite, positive};
+use fewbits_core::{ArgumentError, Columns, Sensing};
+use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// `z = sqrt(P0 / (1 + alpha d^n)) + w`, `w ~ N(0, r)`, with `d` the distance from the sensor to a source in the plane.
+///
+/// `D` is the dimension of the state and `axes` says which two coordinates are the position. `P0` is the power at distance
+/// zero (measurement units squared), `alpha` is in distance units to the power `-n`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReceivedPower<const D: usize> {
+    position: Vector2<f64>,
+    axes: [usize; 2],
+    power: f64,
+    attenuation: f64,
+    exponent: f64,
+    noise_covariance: Matrix1<f64>,
+}
+
+impl<const D: usize> ReceivedPower<D> {
+    /// The sensor at `position` that senses the source at `(x[axes[0]], x[axes[1]])`.
+    ///
+    /// # Errors
+    /// Numbers that are not finite; power, attenuation or noise variance not positive; an exponent below 1, where the slope
+    /// is infinite at the sensor; equal axes or axes beyond the state.
+    pub fn new(
+        position: Vector2<f64>,
+        axes: [usize; 2],
+        power: f64,
+        attenuation: f64,
+        exponent: f64,
+        noise_variance: f64,
+    ) -> Result<Self, Error> {
+        finite("position", position[0])?;
+        finite("position", position[1])?;
+        if axes[0] == axes[1] || axes.iter().any(|a| *a >= D) {
+            return Err(ArgumentError::new("axes", format!("{axes:?}"), format!("two different axes below {D}")).into());
+        }
+        positive("exponent", exponent)?;
+        if exponent < 1.0 {
+            return Err(ArgumentError::new("exponent", exponent, "a number of at least 1").into());
+        }
+        Ok(Self {
+            position,
+            axes,
+            power: positive("power", power)?,
+            attenuation: positive("attenuation", attenuation)?,
+            exponent,
+            noise_covariance: Matrix1::new(positive("noise_variance", noise_variance)?),
+        })
+    }
+
+    /// Where the sensor stands.
+    pub fn position(&self) -> Vector2<f64> {
+        self.position
+    }
+
+    /// `r`.
+    pub fn noise_variance(&self) -> f64 {
+        self.noise_covariance[0]
+    }
+
+    /// The amplitude at squared distance `d^2`.
+    #[inline]
+    fn amplitude(&self, squared_distance: f64) -> f64 {
+        let spread = squared_distance.powf(0.5 * self.exponent);
+        (self.power / (1.0 + self.attenuation * spread)).sqrt()
+    }
+
+    /// Amplitude without noise at `(x, y)`.
+    pub fn amplitude_at(&self, x: f64, y: f64) -> f64 {
+        let (dx, dy) = (x - self.position[0], y - self.position[1]);
+        self.amplitude(dx * dx + dy * dy)
+    }
+
+    /// Slope `(dh/dx, dh/dy)` at `(x, y)`: `c (x - sx)`, `c (y - sy)` with
+    /// `c = -(1/2) sqrt(P0) alpha n d^(n-2) (1 + alpha d^n)^(-3/2)`.
+    ///
+    /// At the sensor itself it is zero for `n > 1` (the limit); for `n = 1` it has no limit and zero is returned.
+    pub fn slope_at(&self, x: f64, y: f64) -> Vector2<f64> {
+        let offset = Vector2::new(x, y) - self.position;
+        let distance = offset.norm();
+        if distance == 0.0 {
+            return Vector2::zeros();
+        }
+        let spread = 1.0 + self.attenuation * distance.powf(self.exponent);
+        // d^(n-1) times a unit vector: no negative power, so that n < 2 is safe close to the sensor.
+        let steepness = -0.5 * self.power.sqrt() * self.attenuation * self.exponent / (spread * spread.sqrt());
+        offset / distance * (steepness * distance.powf(self.exponent - 1.0))
+    }
+
+    /// Writes the noise-free amplitude of every state of a cloud to `amplitudes`.
+    pub fn mean_columns(&self, states: &Columns<'_, D>, amplitudes: &mut [f64]) {
+        let count = amplitudes.len();
+        let (x, y) = (&states[self.axes[0]][..count], &states[self.axes[1]][..count]);
+        let (sx, sy) = (self.position[0], self.position[1]);
+        let squared = |i: usize| {
+            let (dx, dy) = (x[i] - sx, y[i] - sy);
+            dx * dx + dy * dy
+        };
+        // The inverse square law needs no power function and vectorises.
+        if self.exponent == 2.0 {
+            for (i, amplitude) in amplitudes.iter_mut().enumerate() {
+                *amplitude = (self.power / (1.0 + self.attenuation * squared(i))).sqrt();
+            }
+        } else {
+            for (i, amplitude) in amplitudes.iter_mut().enumerate() {
+                *amplitude = self.amplitude(squared(i));
+            }
+        }
+    }
+}
+
+impl<const D: usize> Sensing<D, 1> for ReceivedPower<D> {
+    fn mean(&self, state: &SVector<f64, D>) -> Vector1<f64> {
+        Vector1::new(self.amplitude_at(state[self.axes[0]], state[self.axes[1]]))
+    }
+
+    fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, 1, D> {
+        let slope = self.slope_at(state[self.axes[0]], state[self.axes[1]]);
+        let mut row = SMatrix::zeros();
+        row[self.axes[0]] = slope[0];
+        row[self.axes[1]] = slope[1];
+        row
+    }
+
+    fn noise_covariance(&self) -> &Matrix1<f64> {
+        &self.noise_covariance
+    }
+
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> Vector1<f64> {
+        let normal: f64 = StandardNormal.sample(rng);
+        self.mean(state) + Vector1::new(self.noise_variance().sqrt() * normal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ReceivedPower;
+    use fewbits_core::Sensing;
+    use nalgebra::{Vector2, Vector4};
+
+    #[test]
+    fn the_slope_is_the_derivative() {
+        for exponent in [1.0, 1.5, 2.0, 3.7] {
+            let sensor = ReceivedPower::<4>::new(Vector2::new(1.0, -2.0), [0, 2], 50.0, 0.3, exponent, 1.0).unwrap();
+            for state in [Vector4::new(4.0, 9.0, 1.0, 9.0), Vector4::new(1.1, 0.0, -2.3, 0.0)] {
+                let slope = sensor.jacobian(&state);
+                for axis in 0..4 {
+                    let mut ahead = state;
+                    ahead[axis] += 1e-6;
+                    let mut behind = state;
+                    behind[axis] -= 1e-6;
+                    let numeric = (sensor.mean(&ahead)[0] - sensor.mean(&behind)[0]) / 2e-6;
+                    assert!((numeric - slope[axis]).abs() < 1e-7, "n={exponent} axis {axis}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_slope_at_the_sensor_is_zero() {
+        for exponent in [1.0, 1.2, 2.0] {
+            let sensor = ReceivedPower::<4>::new(Vector2::zeros(), [0, 2], 1000.0, 1.0, exponent, 1.0).unwrap();
+            assert_eq!(sensor.slope_at(0.0, 0.0), Vector2::zeros());
+            assert!(sensor.slope_at(1e-200, 0.0)[0].is_finite());
+        }
+    }
+
+    #[test]
+    fn clouds_and_single_states_agree() {
+        for exponent in [2.0, 3.0] {
+            let sensor = ReceivedPower::<4>::new(Vector2::new(-3.0, 5.0), [0, 2], 1000.0, 1.0, exponent, 1.0).unwrap();
+            let x: Vec<f64> = (0..70).map(|i| i as f64 * 0.3 - 8.0).collect();
+            let y: Vec<f64> = (0..70).map(|i| 4.0 - i as f64 * 0.1).collect();
+            let (unused, mut out) = (vec![0.0; 70], vec![0.0; 70]);
+            sensor.mean_columns(&[&x, &unused, &y, &unused], &mut out);
+            for i in 0..70 {
+                let single = sensor.mean(&Vector4::new(x[i], 0.0, y[i], 0.0))[0];
+                assert!((out[i] - single).abs() < 1e-12 * single);
+            }
+        }
+    }
+
+    #[test]
+    fn bad_parameters_are_refused() {
+        let new = |axes, power, alpha, n, r| ReceivedPower::<4>::new(Vector2::zeros(), axes, power, alpha, n, r);
+        assert!(new([0, 2], 1.0, 1.0, 2.0, 1.0).is_ok());
+        assert!(new([0, 0], 1.0, 1.0, 2.0, 1.0).is_err());
+        assert!(new([0, 4], 1.0, 1.0, 2.0, 1.0).is_err());
+        for (power, alpha, n, r) in [
+            (0.0, 1.0, 2.0, 1.0),
+            (1.0, -1.0, 2.0, 1.0),
+            (1.0, 1.0, 0.9, 1.0),
+            (1.0, 1.0, 2.0, 0.0),
+            (1.0, 1.0, f64::NAN, 1.0),
+        ] {
+            assert!(new([0, 2], power, alpha, n, r).is_err());
+        }
+        assert!(ReceivedPower::<4>::new(Vector2::new(f64::INFINITY, 0.0), [0, 2], 1.0, 1.0, 2.0, 1.0).is_err());
+    }
+}

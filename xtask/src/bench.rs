@@ -1,0 +1,172 @@
+//! `cargo xtask bench`: the benchmarks, each as a multiple of a unit measured in the same run.
+//!
+//! A bare time says more about the machine than about the code. Every bench binary therefore measures a unit of its own,
+//! a benchmark named `standard_normal` (one draw) or ending in `_unit`, and each median is printed as a multiple of the
+//! unit's median.
+
+use clap::Args;
+use std::path::PathBuf;
+use std::process::Command;
+use thiserror::Error;
+
+/// Options of `cargo xtask bench`.
+#[derive(Debug, Clone, Args)]
+pub struct Options {
+    /// Crates to measure, by folder name (`core`, `dymbo`, ...); all with benchmarks without any.
+    pub crates: Vec<String>,
+}
+
+/// Why benchmarks could not be run.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// No such crate, or it has no benchmarks.
+    #[error("crate `{name}` has no benchmarks; these have: {valid}")]
+    UnknownCrate {
+        /// What was asked for.
+        name: String,
+        /// Crates with benchmarks.
+        valid: String,
+    },
+    /// cargo could not be run, or the output not read.
+    #[error("cannot run cargo bench: {0}")]
+    Cargo(#[from] std::io::Error),
+}
+
+/// One measured line.
+#[derive(Debug, Clone, PartialEq)]
+struct Measured {
+    name: String,
+    median_ns: f64,
+}
+
+/// Runs the benchmarks and prints ratios; `Ok(false)` if a bench binary failed.
+///
+/// # Errors
+/// If a crate is unknown or cargo cannot be run.
+pub fn run(options: &Options) -> Result<bool, Error> {
+    let known = crates_with_benches()?;
+    for name in &options.crates {
+        if !known.contains(name) {
+            return Err(Error::UnknownCrate {
+                name: name.clone(),
+                valid: known.join(", "),
+            });
+        }
+    }
+    let chosen = if options.crates.is_empty() {
+        &known
+    } else {
+        &options.crates
+    };
+    let mut fine = true;
+    for name in chosen {
+        let output = Command::new(env!("CARGO"))
+            .args(["bench", "-q", "-p", &format!("fewbits-{name}"), "--benches"])
+            .output()?;
+        if !output.status.success() {
+            eprintln!("{}", String::from_utf8_lossy(&output.stderr));
+            fine = false;
+        }
+        for group in parse(&String::from_utf8_lossy(&output.stdout)) {
+            print(name, &group);
+        }
+    }
+    Ok(fine)
+}
+
+fn crates_with_benches() -> Result<Vec<String>, Error> {
+    let crates = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../crates");
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(crates)? {
+        let entry = entry?;
+        if entry.path().join("benches").is_dir() {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// Splits the output of divan into bench binaries and reads name and median of each line.
+fn parse(output: &str) -> Vec<Vec<Measured>> {
+    let mut groups: Vec<Vec<Measured>> = Vec::new();
+    let mut path: Vec<String> = Vec::new();
+    for line in output.lines() {
+        if line.contains("fastest") && line.contains("median") {
+            groups.push(Vec::new());
+            path.clear();
+            continue;
+        }
+        let tree: usize = line.chars().take_while(|c| "│├╰─ ".contains(*c)).count();
+        let rest: String = line.chars().skip(tree).collect();
+        let cells: Vec<&str> = rest.split('│').map(str::trim).collect();
+        let Some(name) = cells[0].split_whitespace().next() else {
+            continue;
+        };
+        if !line.starts_with(['├', '╰', '│', ' ']) {
+            continue;
+        }
+        let depth = (tree / 3).max(1);
+        path.truncate(depth - 1);
+        path.push(name.to_owned());
+        // Columns: name and fastest, slowest, median, mean, samples, iterations.
+        let median = cells.get(2).and_then(|cell| nanoseconds(cell));
+        if let (Some(median_ns), Some(group)) = (median, groups.last_mut()) {
+            group.push(Measured {
+                name: path.join("/"),
+                median_ns,
+            });
+        }
+    }
+    groups
+}
+
+fn nanoseconds(cell: &str) -> Option<f64> {
+    let (number, unit) = cell.split_once(' ')?;
+    let factor = match unit.trim() {
+        "ps" => 1e-3,
+        "ns" => 1.0,
+        "µs" => 1e3,
+        "ms" => 1e6,
+        "s" => 1e9,
+        _ => return None,
+    };
+    number.parse::<f64>().ok().map(|value| value * factor)
+}
+
+fn print(name: &str, group: &[Measured]) {
+    let unit = group
+        .iter()
+        .find(|m| m.name.ends_with("standard_normal"))
+        .or_else(|| group.iter().find(|m| m.name.ends_with("_unit")));
+    for measured in group {
+        match unit {
+            Some(unit) => {
+                let ratio = measured.median_ns / unit.median_ns;
+                println!("{name:12} {:52} {ratio:>12.2} x {}", measured.name, unit.name);
+            }
+            None => println!("{name:12} {:52} {:>12.1} ns (no unit)", measured.name, measured.median_ns),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_are_read_from_the_table_of_divan() {
+        let output = "\
+Timer precision: 20 ns
+filter             fastest       │ slowest       │ median        │ mean          │ samples │ iters
+├─ standard_normal  4.5 ns        │ 9 ns          │ 5 ns          │ 5.1 ns        │ 100     │ 6400
+╰─ step                           │               │               │               │         │
+   ├─ 100           1 µs          │ 2 µs          │ 1.5 µs        │ 1.6 µs        │ 100     │ 100
+   ╰─ 1000          1 ms          │ 2 ms          │ 1.25 ms       │ 1.6 ms        │ 100     │ 100
+";
+        let groups = parse(output);
+        let names: Vec<_> = groups[0].iter().map(|m| (m.name.as_str(), m.median_ns)).collect();
+        assert_eq!(names, [("standard_normal", 5.0), ("step/100", 1500.0), ("step/1000", 1.25e6)]);
+    }
+}

@@ -1,0 +1,101 @@
+//! Which figures, with which parameters.
+
+use super::{Error, Options};
+use fewbits_experiments::{AnyFigure, all};
+use globset::Glob;
+use serde_json::{Map, Value as Json};
+
+/// A figure and its parameters.
+pub(super) struct Job {
+    pub(super) figure: &'static dyn AnyFigure,
+    pub(super) parameters: Map<String, Json>,
+}
+
+/// The figures that match any of the patterns, in the registry's order; all if there is no pattern.
+pub(super) fn figures(patterns: &[String]) -> Result<Vec<&'static dyn AnyFigure>, Error> {
+    let figures = all();
+    let mut chosen = vec![patterns.is_empty(); figures.len()];
+    for pattern in patterns {
+        let matcher = Glob::new(pattern)
+            .map_err(|error| Error::BadPattern {
+                pattern: pattern.clone(),
+                reason: error.kind().to_string(),
+            })?
+            .compile_matcher();
+        let mut found = false;
+        for (figure, chosen) in figures.iter().zip(&mut chosen) {
+            if matcher.is_match(figure.about().id) {
+                *chosen = true;
+                found = true;
+            }
+        }
+        if !found {
+            let valid: Vec<_> = figures.iter().map(|figure| figure.about().id).collect();
+            return Err(Error::UnknownFigure {
+                pattern: pattern.clone(),
+                valid: valid.join(", "),
+            });
+        }
+    }
+    Ok(figures
+        .into_iter()
+        .zip(chosen)
+        .filter(|(_, chosen)| *chosen)
+        .map(|(figure, _)| figure)
+        .collect())
+}
+
+/// Prints the figures with their parameters.
+pub(super) fn list(figures: &[&'static dyn AnyFigure]) {
+    for figure in figures {
+        let about = figure.about();
+        println!("{}  {}", about.id, about.title);
+        let defaults: Vec<_> = figure
+            .defaults()
+            .iter()
+            .map(|(name, value)| format!("{name}={value}"))
+            .collect();
+        if !defaults.is_empty() {
+            println!("    {}", defaults.join("  "));
+        }
+    }
+}
+
+/// Applies `--set`, `--trials` and `--quick`.
+///
+/// Each setting goes to all chosen figures that have the parameter and must fit at least one of them.
+pub(super) fn configure(figures: &[&'static dyn AnyFigure], options: &Options) -> Result<Vec<Job>, Error> {
+    let mut settings = Vec::new();
+    for text in &options.set {
+        let (name, value) = text
+            .split_once('=')
+            .filter(|(name, _)| !name.trim().is_empty())
+            .ok_or_else(|| Error::BadSetting { text: text.clone() })?;
+        settings.push((name.trim().to_owned(), value.to_owned()));
+    }
+    if let Some(trials) = options.trials {
+        settings.push(("trials".to_owned(), trials.to_string()));
+    }
+    for setting in &settings {
+        let known = figures.iter().any(|figure| figure.defaults().contains_key(&setting.0));
+        if let (false, Some(first)) = (known, figures.first()) {
+            // The figure's own refusal names the parameters it has.
+            first
+                .configure(std::slice::from_ref(setting), options.quick)
+                .map_err(Error::Setting)?;
+        }
+    }
+    figures
+        .iter()
+        .map(|&figure| {
+            let defaults = figure.defaults();
+            let own: Vec<_> = settings
+                .iter()
+                .filter(|(name, _)| defaults.contains_key(name))
+                .cloned()
+                .collect();
+            let parameters = figure.configure(&own, options.quick).map_err(Error::Setting)?;
+            Ok(Job { figure, parameters })
+        })
+        .collect()
+}

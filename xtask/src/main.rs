@@ -1,0 +1,38 @@
+//! `cargo xtask <task>`.
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// The project's tasks.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Cli {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Regenerate figures and tables as CSV, JSON and SVG, with a gallery, and check their claims.
+    Figures(xtask::figures::Options),
+    /// Run the benchmarks and print each as a multiple of its unit.
+    Bench(xtask::bench::Options),
+    /// Check the house rules.
+    Tidy,
+}
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().task {
+        Task::Figures(options) => xtask::figures::run(&options).map_err(|error| error.to_string()),
+        Task::Bench(options) => xtask::bench::run(&options).map_err(|error| error.to_string()),
+        Task::Tidy => xtask::tidy::run().map_err(|error| error.to_string()),
+    };
+    match done {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
