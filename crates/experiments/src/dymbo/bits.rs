@@ -7,6 +7,7 @@ use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_dymbo::{MultibitFilter, chain, iterated};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_2_PI;
 
 const ID: &str = "dymbo-bits";
 
@@ -119,7 +120,7 @@ impl Figure for WordLength {
             claims.push(Claim::never(format!("falls-{a}-{gamma}"), statement, not_decreasing(&losses)).at_defaults());
         }
         let information = [
-            0.636619772368,
+            FRAC_2_PI,
             0.882518152171,
             0.965452239211,
             0.990498991992,
@@ -164,7 +165,10 @@ impl Figure for WordLength {
     }
 
     fn plot(&self, p: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let (x, y) = (Axis::linear("bits a sample"), Axis::log("error over the Kalman filter's, minus 1"));
+        let (x, y) = (
+            Axis::linear("bits a sample").between(0.7, 8.3),
+            Axis::log("error over the Kalman filter's, minus 1"),
+        );
         let mut left = Panel::new("Loss against word length", x, y);
         for (i, (a, gamma)) in pairs(ID, &p.a, &p.gamma)?.into_iter().enumerate() {
             let rows = tables.main.only("a", a)?.only("gamma", gamma)?;
@@ -182,7 +186,7 @@ impl Figure for WordLength {
         let rows = tables.named("successive")?;
         let right = Panel::new(
             "Bits about one sample",
-            Axis::linear("bits"),
+            Axis::linear("bits").between(0.7, 5.3),
             Axis::log("fraction of the information lost, 1 - c"),
         )
         .with(Layer::line("Lloyd-Max word", rows.points("bits", "batch")?).coloured(2))

@@ -340,7 +340,7 @@ impl Figure for Convergence {
 /// The printed and recomputed numbers at the default plants.
 fn number_claims(tables: &Tables) -> Result<Vec<Claim>, Error> {
     let mut claims = Vec::new();
-    let expected: [(f64, [f64; 7], [f64; 5], [f64; 4], (usize, usize), (f64, f64)); 2] = [
+    let expected = [
         (
             0.5,
             [1.083333, 0.869244, 0.786614, 0.753234, 0.739463, 0.733723, 0.731316],

@@ -29,7 +29,7 @@ impl Default for Parameters {
             gamma: vec![0.5, 0.05, 1.0, 1.0],
             tau: 1.0,
             depth: 12,
-            trials: 600,
+            trials: 400,
         }
     }
 }

@@ -239,6 +239,6 @@ impl Figure for Smoothing {
             }
             panels.push(panel);
         }
-        Ok(Plot::grid(panels.len().min(3), panels))
+        Ok(Plot::grid(panels.len().min(2), panels))
     }
 }
