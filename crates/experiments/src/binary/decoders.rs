@@ -80,7 +80,7 @@ impl Figure for Decoders {
             id: "binary-fig5-8",
             title: "Decoders and bounds, three Gray bits",
             caption: "The caption of the thesis says Gaussian, the text uniform: both are here. The posterior mean is best everywhere. The \
-                      continuous maximum a posteriori decoder is worse than the discrete one for a uniform source, and better only up to 10 dB for a \
+                      continuous maximum a posteriori decoder is worse than the discrete one for a uniform source, and better only up to 13 dB for a \
                       Gaussian one. Equation 5.13 is no bound for a uniform source; the optimal-weight van Trees bound is one, and tight.",
             source: "Movaghati, thesis, figure 5.8",
         }
@@ -177,12 +177,12 @@ impl Figure for Decoders {
                 claims.push(
                     Claim::never(
                         "gaussian-cmap",
-                        "for a Gaussian source continuous MAP beats discrete MAP up to 9 dB and loses from 12 dB on",
+                        "for a Gaussian source continuous MAP beats discrete MAP up to 13 dB and loses from 14 dB on",
                         count(&|i| {
-                            if snr[i] <= 9.0 {
+                            if snr[i] <= 13.0 {
                                 cmap[i] >= dmap[i]
                             } else {
-                                snr[i] >= 12.0 && snr[i] <= 30.0 && cmap[i] <= dmap[i]
+                                snr[i] >= 14.0 && cmap[i] <= dmap[i]
                             }
                         }),
                     )

@@ -6,6 +6,7 @@ use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_quantizers::binary::{
     BinaryQuantizer, Grid, Mask, Pattern, Source, check_separation, generator_matrix, gray_basis, natural_basis,
 };
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-2`.
@@ -80,19 +81,29 @@ impl Figure for Clipping {
             grid: Grid::from_edges(edges).map_err(Error::failed)?,
             ..scene
         };
-        let swapped = p
-            .masks
-            .iter()
-            .map(|&mask| {
-                let inner = pattern(mask, p.bits)?;
-                let mut bits = vec![inner.bits()[cells - 1]];
-                bits.extend(inner.bits());
-                bits.push(inner.bits()[0]);
-                Pattern::new(bits).map_err(Error::failed)
-            })
+        let swapped_mse = |masks: &[Mask]| -> Result<f64, Error> {
+            let patterns = masks
+                .iter()
+                .map(|&mask| {
+                    let inner = pattern(mask, p.bits)?;
+                    let mut bits = vec![inner.bits()[cells - 1]];
+                    bits.extend(inner.bits());
+                    bits.push(inner.bits()[0]);
+                    Pattern::new(bits).map_err(Error::failed)
+                })
+                .collect::<Result<Vec<_>, _>>()?;
+            wide.pattern_bank(&patterns)?.mmse().map_err(Error::failed)
+        };
+        errors.push(row!["sides swapped", swapped_mse(&p.masks)?])?;
+        let all = Scene::uniform(p.bits, p.snr_db)?
+            .search(p.masks.len())?
+            .ranking()
+            .map_err(Error::failed)?;
+        let best = all
+            .par_iter()
+            .map(|set| swapped_mse(&set.masks))
             .collect::<Result<Vec<_>, _>>()?;
-        let mse = wide.pattern_bank(&swapped)?.mmse().map_err(Error::failed)?;
-        errors.push(row!["sides swapped", mse])?;
+        errors.push(row!["sides swapped, best masks for that", crate::claim::smallest(best)])?;
         Ok(Tables::from(table).with("errors", errors))
     }
 
@@ -115,8 +126,8 @@ impl Figure for Clipping {
             .at_defaults(),
             Claim::near(
                 "swapped",
-                "the printed sides make them about thirteen times worse (erratum binary-1)",
-                errors[1],
+                "with the printed sides even the best masks are thirteen times worse (erratum binary-1)",
+                errors[2],
                 0.0409,
                 5e-4,
             )
