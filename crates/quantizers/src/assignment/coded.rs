@@ -48,8 +48,11 @@ impl CodedSensors {
             .into_iter()
             .map(|mask| linear_pattern(mask, sensors)?.on(&grid))
             .collect::<Result<Vec<_>, _>>()?;
-        let finest = noise_stds.iter().copied().fold(f64::INFINITY, f64::min);
-        let mut nodes = source.nodes_between(0.0, half_width, PANEL * finest, gauss_legendre::<12>());
+        let blurs: Vec<(f64, f64)> = noise_stds
+            .iter()
+            .flat_map(|&noise| grid.edges().iter().map(move |&t| (t, noise)))
+            .collect();
+        let mut nodes = Nodes::adapted(&source, 0.0, half_width, &blurs, PANEL, gauss_legendre::<12>());
         nodes.w.iter_mut().for_each(|w| *w *= 2.0);
         let probability: Vec<Vec<[Vec<f64>; 2]>> = quantizers
             .iter()

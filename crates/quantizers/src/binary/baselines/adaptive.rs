@@ -54,9 +54,9 @@ pub struct AdaptiveErrors {
 /// Each node of the tree carries `p(x) P(bits|x)` on the quadrature nodes, so that nothing is simulated.
 ///
 /// # Errors
-/// If the noise or a parameter of the rule is out of range, or `sensors` is not in `1..=20`.
+/// If the noise is below `1e-4` of the source's reach, a parameter of the rule is out of range, or `sensors` is not in `1..=20`.
 pub fn adaptive(source: &Source, noise_std: f64, sensors: usize, rule: AdaptiveRule) -> Result<AdaptiveErrors, Error> {
-    let noise_std = noise_in_range(noise_std)?;
+    let noise_std = source.resolvable(noise_std)?;
     at_least_one("sensors", sensors)?;
     if sensors > MAX_SENSORS {
         return Err(Error::TooManyOutcomes {
