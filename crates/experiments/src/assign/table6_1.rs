@@ -1,6 +1,6 @@
 //! `assign-table6-1`: eight sensors, three assignments.
 
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use fewbits_quantizers::assignment::{
     CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, pair_costs,
@@ -245,7 +245,7 @@ impl Figure for Table {
             .split(' ')
             .filter_map(|s| s.parse::<f64>().ok())
             .enumerate()
-            .map(|(bit, sensor)| (sensor, (n - bit) as f64, "X".to_owned()))
+            .map(|(bit, sensor)| (sensor, (n - bit) as f64))
             .collect();
         let errors = |name: &str, shift: f64| -> Result<Vec<(f64, f64)>, Error> {
             Ok(tables
@@ -265,12 +265,12 @@ impl Figure for Table {
             2,
             vec![
                 Panel::new(
-                    "Cost of giving a bit to a sensor; X: optimal",
-                    Axis::linear("sensor, noisiest first"),
+                    "Cost of giving a bit to a sensor; crosses: optimal",
+                    Axis::linear("sensor, noisiest first").named((1..=n).map(|s| (s as f64, s.to_string()))),
                     Axis::linear("").named(names()),
                 )
                 .with(Layer::heat("log10 cost / V^2", index.clone(), index, field))
-                .with(Layer::texts(chosen).coloured(6))
+                .with(Layer::points("", chosen).marked(Marker::Cross).coloured(1))
                 .legend(Legend::Hidden),
                 Panel::new(
                     "Error of the assignments",

@@ -409,7 +409,10 @@ impl Figure for Beyond {
             .enumerate()
             .map(|(i, c)| (c.min(0.0), 0.0, place(i) - 0.35, place(i) + 0.35))
             .collect();
-        let names = (0..change.len()).map(|i| (place(i), format!("{}: {}", ideas[i], cases[i])));
+        // The descriptions stand right of the bars: no axis has room for them.
+        let names = (0..change.len())
+            .map(|i| (58.0, place(i), format!("{}: {}", ideas[i], cases[i])))
+            .collect();
         let numbers = change
             .iter()
             .enumerate()
@@ -418,11 +421,16 @@ impl Figure for Beyond {
         Ok(Plot::of(
             Panel::new(
                 "Change of the mean squared error",
-                Axis::linear("change / %").between(-110.0, 2.0),
-                Axis::linear("").between(0.4, change.len() as f64 + 0.6).named(names),
+                Axis::linear("change / %")
+                    .between(-105.0, 115.0)
+                    .named([-100.0, -75.0, -50.0, -25.0, 0.0].map(|at| (at, format!("{at}")))),
+                Axis::linear("")
+                    .between(0.4, change.len() as f64 + 0.6)
+                    .named([(1.0, String::new())]),
             )
             .with(Layer::boxes("", bars).coloured(0))
             .with(Layer::texts(numbers).coloured(6))
+            .with(Layer::texts(names).coloured(6))
             .legend(Legend::Hidden),
         ))
     }

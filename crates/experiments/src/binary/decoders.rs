@@ -246,14 +246,14 @@ impl Figure for Decoders {
 
     fn plot(&self, _: &Parameters, tables: &Tables) -> Result<Plot, Error> {
         let mut panels = Vec::new();
-        for source in ["uniform", "gaussian"] {
+        for (source, name) in [("uniform", "uniform"), ("gaussian", "Gaussian")] {
             let rows = tables.main.only("source", source)?;
             let axis = || Axis::linear("signal-to-noise ratio / dB");
             let mut decoders =
-                Panel::new(format!("Decoders, {source} source"), axis(), Axis::log("mean squared error / V^2"));
-            let mut bounds = Panel::new(format!("Bounds, {source} source"), axis(), Axis::log("V^2"));
-            for (at, (name, label)) in CURVES.iter().enumerate() {
-                let points = rows.points("snr_db", name)?;
+                Panel::new(format!("Decoders, {name} source"), axis(), Axis::log("mean squared error / V^2"));
+            let mut bounds = Panel::new(format!("Bounds, {name} source"), axis(), Axis::log("V^2"));
+            for (at, (curve, label)) in CURVES.iter().enumerate() {
+                let points = rows.points("snr_db", curve)?;
                 if at < 4 {
                     decoders = decoders.with(Layer::line(*label, points).coloured(at));
                 } else if at > 4 {
