@@ -96,7 +96,7 @@ impl<const M: usize> Ellipsoid<M> {
 /// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi rotations: for the two or three dimensions of a
 /// measurement as fast as anything, exact in small eigenvalues, and free of the dimension arithmetic that nalgebra's own
 /// solver would impose on every caller.
-fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f64, M>, SMatrix<f64, M, M>) {
+pub(crate) fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f64, M>, SMatrix<f64, M, M>) {
     let mut vectors = SMatrix::<f64, M, M>::identity();
     for _sweep in 0..32 {
         let mut off = 0.0;
@@ -260,7 +260,7 @@ impl Bulk {
 
 /// `ln P(|q|^2 < eta)` for independent `q_j ~ N(means_j, variances_j)`, the variances in decreasing order.
 fn log_mass(variances: &[f64], means: &[f64], eta: f64) -> f64 {
-    if !(eta > 0.0) {
+    if eta <= 0.0 {
         return f64::NEG_INFINITY;
     }
     let (Some((w, inner_variances)), Some((b, inner_means))) = (variances.split_first(), means.split_first()) else {
@@ -358,7 +358,7 @@ fn moments<const M: usize>(variances: &[f64], means: &SVector<f64, M>, first: us
     let (Some((w, inner)), Some(b)) = (variances.split_first(), tail.first()) else {
         return RawMoments::with_mass(if eta > 0.0 { 0.0 } else { f64::NEG_INFINITY });
     };
-    if !(eta > 0.0) {
+    if eta <= 0.0 {
         return RawMoments::with_mass(f64::NEG_INFINITY);
     }
     if let (Some((last_w, rest)), Some(last_b)) = (variances.split_last(), tail.last())
