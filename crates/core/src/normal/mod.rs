@@ -25,10 +25,12 @@
 
 mod bivariate;
 mod erfcx;
+mod one_sided;
 mod truncated;
 
 pub use bivariate::bivariate_rectangle;
 pub use erfcx::erfcx;
+pub use one_sided::one_sided_variance;
 pub use truncated::{TruncatedMoments, sample_truncated, truncated_moments};
 
 use crate::quadrature::gauss_legendre;
@@ -60,7 +62,8 @@ pub fn log_pdf_with(x: f64, mean: f64, variance: f64) -> f64 {
     -0.5 * d * d / variance - 0.5 * variance.ln() - LN_SQRT_2PI
 }
 
-/// Distribution function `Phi(x)`, accurate relative to itself in the left tail. The right tail is `cdf(-x)`.
+/// Distribution function `Phi(x)`, accurate in the left tail up to the rounding of `x` itself (relative error below
+/// `(4 + x^2) 2^-53`). The right tail is `cdf(-x)`.
 #[inline]
 pub fn cdf(x: f64) -> f64 {
     0.5 * libm::erfc(-x * FRAC_1_SQRT_2)
@@ -166,37 +169,5 @@ pub fn inverse_mills(x: f64) -> f64 {
         SQRT_2_OVER_PI / erfcx(-x * FRAC_1_SQRT_2)
     } else {
         pdf(x) / cdf(x)
-    }
-}
-
-/// Left of this the closed form of [`one_sided_variance`] cancels and its asymptotic series is complete.
-const SERIES_EDGE: f64 = -20.0;
-
-/// Series of `Var[X | X > t]` in `1/t^2`, from the reciprocal of the Mills-ratio series.
-const VARIANCE_SERIES: [f64; 11] = [
-    1.0,
-    -6.0,
-    50.0,
-    -518.0,
-    6354.0,
-    -89782.0,
-    1435330.0,
-    -25625910.0,
-    505785122.0,
-    -10944711398.0,
-    257834384850.0,
-];
-
-/// Variance of a standard normal variable known to exceed `-x`: `1 - lambda (lambda + x)` with `lambda = phi(x)/Phi(x)`.
-///
-/// Equals 1 for `x -> inf`, `1 - 2/pi` at 0 and `~ 1/x^2` for `x -> -inf`, where the formula would cancel.
-#[inline]
-pub fn one_sided_variance(x: f64) -> f64 {
-    if x < SERIES_EDGE {
-        let u = 1.0 / (x * x);
-        u * VARIANCE_SERIES.iter().rev().fold(0.0, |sum, c| sum * u + c)
-    } else {
-        let lambda = inverse_mills(x);
-        1.0 - lambda * (lambda + x)
     }
 }

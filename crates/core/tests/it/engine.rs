@@ -1,0 +1,125 @@
+//! The Monte-Carlo engine: determinism, failures, cancellation; summary statistics.
+
+use fewbits_core::statistics::{nees, paired_difference};
+use fewbits_core::{Gaussian, Moments, MonteCarlo, MonteCarloError, Stream, Trial};
+use nalgebra::Vector2;
+use proptest::prelude::*;
+use rand::RngExt;
+use std::convert::Infallible;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+fn sum_of_uniforms(threads: usize) -> f64 {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let run = MonteCarlo::new(Stream::new(9).named("threads"), 1000);
+    let total = pool.install(|| {
+        run.fold(
+            || 0.0,
+            |sum, trial| {
+                *sum += trial.stream.rng().random::<f64>();
+                Ok::<(), Infallible>(())
+            },
+            |sum, part| *sum += part,
+        )
+    });
+    total.unwrap()
+}
+
+#[test]
+fn the_result_is_the_same_to_the_last_bit_on_any_number_of_threads() {
+    let one = sum_of_uniforms(1);
+    for threads in [2, 7] {
+        assert_eq!(one.to_bits(), sum_of_uniforms(threads).to_bits());
+    }
+}
+
+#[test]
+fn results_come_in_trial_order_and_progress_is_complete() {
+    let seen = AtomicU64::new(0);
+    let count = |trials| {
+        seen.fetch_add(trials, Ordering::Relaxed);
+    };
+    let run = MonteCarlo::new(Stream::new(1), 333).with_progress(&count);
+    let indices = run.run(|trial| Ok::<_, Infallible>(trial.index)).unwrap();
+    assert_eq!(indices, (0..333).collect::<Vec<_>>());
+    assert_eq!(seen.load(Ordering::Relaxed), 333);
+    assert!(
+        MonteCarlo::new(Stream::new(1), 0)
+            .run(|t| Ok::<_, Infallible>(t.index))
+            .unwrap()
+            .is_empty()
+    );
+}
+
+#[test]
+fn a_failing_trial_can_be_run_again_alone() {
+    let draw = |trial: Trial| trial.stream.rng().random::<f64>();
+    let run = MonteCarlo::new(Stream::new(4).named("failing"), 200);
+    let error = run
+        .run(|t| {
+            if draw(t) < 0.05 {
+                Err(format!("drew {}", draw(t)))
+            } else {
+                Ok(())
+            }
+        })
+        .unwrap_err();
+    let MonteCarloError::Trial { index, stream, source } = error else {
+        panic!("not a failed trial")
+    };
+    let alone = run.single(index, |t| Ok::<_, Infallible>(draw(t))).unwrap();
+    assert_eq!(source, format!("drew {alone}"));
+    assert_eq!(stream, run.trial(index).stream);
+    assert!((0..index).all(|i| draw(run.trial(i)) >= 0.05), "the first failing trial is reported");
+}
+
+#[test]
+fn a_cancelled_run_stops() {
+    let cancel = AtomicBool::new(false);
+    let started = AtomicU64::new(0);
+    let run = MonteCarlo::new(Stream::new(1), 1_000_000).with_cancellation(&cancel);
+    let result = run.run(|_| {
+        started.fetch_add(1, Ordering::Relaxed);
+        cancel.store(true, Ordering::Relaxed);
+        Ok::<_, Infallible>(())
+    });
+    assert_eq!(result, Err(MonteCarloError::Cancelled));
+    assert!(started.load(Ordering::Relaxed) < 1000);
+}
+
+proptest! {
+    #[test]
+    fn merged_moments_are_the_moments_of_all(values in prop::collection::vec(-1e3..1e3_f64, 2..60), cut in 0_usize..60) {
+        let cut = cut.min(values.len());
+        let mut merged: Moments = values[..cut].iter().copied().collect();
+        merged.merge(&values[cut..].iter().copied().collect());
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        prop_assert_eq!(merged.count(), values.len() as u64);
+        prop_assert!((merged.mean() - mean).abs() <= 1e-10);
+        prop_assert!((merged.variance() - variance).abs() <= 1e-9 * (1.0 + variance));
+    }
+}
+
+#[test]
+fn a_root_mean_square_has_the_standard_error_of_the_delta_method() {
+    // Squared standard normal draws: RMSE 1, standard error sqrt(2/n)/2.
+    let n = 40_000;
+    let mut rng = Stream::new(2).rng();
+    let squares: Moments = (0..n)
+        .map(|_| rng.sample::<f64, _>(rand_distr::StandardNormal).powi(2))
+        .collect();
+    let rmse = squares.root_mean();
+    let expected = (2.0 / f64::from(n)).sqrt() / 2.0;
+    assert!((rmse.standard_error / expected - 1.0).abs() < 0.05);
+    assert!(rmse.z_score(1.0).abs() < 4.0);
+}
+
+#[test]
+fn paired_comparison_and_consistency() {
+    let difference = paired_difference(&[1.0, 2.0, 4.0], &[0.5, 1.5, 3.5]).unwrap();
+    assert_eq!((difference.mean(), difference.standard_error()), (0.5, 0.0));
+    assert!(paired_difference(&[1.0], &[]).is_err());
+    let belief = Gaussian::new(Vector2::zeros(), nalgebra::Matrix2::new(4.0, 0.0, 0.0, 1.0)).unwrap();
+    assert!((nees(&belief, &Vector2::new(2.0, 3.0)).unwrap() - 5.0).abs() < 1e-15);
+}
