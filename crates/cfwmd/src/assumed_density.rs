@@ -98,8 +98,10 @@ impl ScalarSilence {
         if count == 1 {
             let total = variance + self.noise_variance;
             let deviation = total.sqrt();
-            let (low, high) =
-                ((self.centre - self.half_width - mean) / deviation, (self.centre + self.half_width - mean) / deviation);
+            let (low, high) = (
+                (self.centre - self.half_width - mean) / deviation,
+                (self.centre + self.half_width - mean) / deviation,
+            );
             let cell = normal::truncated_moments(low, high)?;
             let gain = variance / total;
             return Ok(ScalarMoments {
@@ -185,7 +187,11 @@ fn bulk(f: impl Fn(f64) -> f64, a: f64, b: f64, narrowest: f64) -> (f64, f64) {
 impl ScalarMoments {
     /// The mixture of two parts whose masses include their shares.
     fn mixed_with(self, other: Self) -> Self {
-        let (large, small) = if self.log_mass >= other.log_mass { (self, other) } else { (other, self) };
+        let (large, small) = if self.log_mass >= other.log_mass {
+            (self, other)
+        } else {
+            (other, self)
+        };
         let ratio = (small.log_mass - large.log_mass).exp();
         let share = ratio / (1.0 + ratio);
         let distance = small.mean - large.mean;

@@ -74,7 +74,8 @@ impl<const M: usize> Ellipsoid<M> {
         let half = lower.solve_lower_triangular(covariance).ok_or_else(refuse)?;
         let white = lower.solve_lower_triangular(&half.transpose()).ok_or_else(refuse)?;
         let (values, vectors) = symmetric_eigen(symmetrised(&white));
-        if values.min() < -1e-9 * values.amax() {
+        // In whitened coordinates 1 is the scale of the innovation itself.
+        if values.min() < -1e-9 * values.amax().max(1e-3) {
             return Err(refuse());
         }
         let mut order: [usize; M] = std::array::from_fn(|i| i);

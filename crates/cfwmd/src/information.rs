@@ -113,11 +113,9 @@ mod tests {
 
     #[test]
     fn the_scalar_forms_are_the_divergences_of_a_kalman_update() {
-        let prior = Gaussian::new(
-            Vector3::new(0.3, -1.0, 2.0),
-            Matrix3::new(2.0, 0.4, 0.1, 0.4, 1.0, -0.3, 0.1, -0.3, 1.5),
-        )
-        .unwrap();
+        let prior =
+            Gaussian::new(Vector3::new(0.3, -1.0, 2.0), Matrix3::new(2.0, 0.4, 0.1, 0.4, 1.0, -0.3, 0.1, -0.3, 1.5))
+                .unwrap();
         let sensor = LinearSensor::scalar(Vector3::new(1.0, 0.5, -0.7), 0.8).unwrap();
         for z in [-4.0, 0.0, 1.3, 9.0] {
             let (posterior, info) = kalman::update(&sensor, &prior, &SVector::from([z])).unwrap();
@@ -163,7 +161,7 @@ mod tests {
             let silent = (normal::pdf(b) - normal::pdf(a)).powi(2) / pi;
             let ours = fisher_information(mu, c, r).unwrap();
             assert!((ours - (sent + silent) / r).abs() < 1e-12, "{ours}");
-            assert!(ours > 0.0 && ours <= 1.0 / r);
+            assert!((0.0..=1.0 / r).contains(&ours));
         }
         assert_eq!(fisher_information(0.0, 0.0, 2.0).unwrap(), 0.5);
         assert!(fisher_information(0.0, -1.0, 2.0).is_err());

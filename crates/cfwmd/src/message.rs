@@ -102,7 +102,9 @@ fn top(bits: u32) -> f64 {
 }
 
 fn nearest(lower: f64, upper: f64, bits: u32, value: f64) -> u64 {
-    ((value - lower) / (upper - lower) * top(bits)).round().clamp(0.0, top(bits)) as u64
+    ((value - lower) / (upper - lower) * top(bits))
+        .round()
+        .clamp(0.0, top(bits)) as u64
 }
 
 fn level(lower: f64, upper: f64, bits: u32, index: u64) -> f64 {
@@ -152,7 +154,7 @@ impl<const M: usize> Message for Report<M> {
         if reader.remaining() == 0 {
             return Ok(Self::Silence);
         }
-        let mut value = SVector::zeros();
+        let mut value = SVector::<f64, M>::zeros();
         for z in value.iter_mut() {
             *z = format.read(reader)?;
         }
@@ -180,5 +182,8 @@ pub fn gather<const M: usize>(
         }
         *slot = Some(report.heard());
     }
-    Ok(heard.into_iter().map(|slot| slot.unwrap_or(Observation::Silent)).collect())
+    Ok(heard
+        .into_iter()
+        .map(|slot| slot.unwrap_or(Observation::Silent))
+        .collect())
 }

@@ -228,7 +228,8 @@ impl<const D: usize, const M: usize> HeardVectors<D, M> {
                     let factor = sensor.noise_factor();
                     let white = |m: &SMatrix<f64, M, D>| factor.solve_lower_triangular(m);
                     let log_determinant: f64 = factor.diagonal().iter().map(|d| d.ln()).sum();
-                    if let (Some(matrix), Some(value)) = (white(sensor.matrix()), factor.solve_lower_triangular(value)) {
+                    if let (Some(matrix), Some(value)) = (white(sensor.matrix()), factor.solve_lower_triangular(value))
+                    {
                         values.push(VectorValue {
                             matrix,
                             value,

@@ -113,6 +113,23 @@ impl CensoringRule<1> {
     }
 }
 
+impl<const M: usize> CensoringRule<M> {
+    /// The rule weighed with a fed-back belief (the paper's CFwMD2): `S = R + H (F P F' + Q) H'`, the dynamics linearised at
+    /// the belief's mean and the sensing at its prediction.
+    ///
+    /// # Errors
+    /// `S` not positive definite, a negative threshold.
+    pub fn under<const D: usize>(
+        dynamics: &impl GaussianDynamics<D>,
+        sensing: &impl Sensing<D, M>,
+        belief: &Gaussian<D>,
+        threshold: f64,
+    ) -> Result<Self, Error> {
+        let step = OwnRecursion::new(belief).advance(dynamics, sensing, belief.mean())?;
+        Self::new(&step.innovation_covariance, threshold)
+    }
+}
+
 /// The covariance recursion of one sensor's own (extended) Kalman filter, which uses all its own measurements.
 ///
 /// It needs no data in a linear model, and the fed-back estimate to linearise about in a nonlinear one; either way sensor and
@@ -173,4 +190,22 @@ impl<const D: usize> OwnRecursion<D> {
             predicted: *predicted.covariance(),
         })
     }
+}
+
+/// One step of the cross-covariance of the prediction errors of two sensors' own filters:
+/// `C <- (1 - W_i H_i) C (1 - W_j H_j)'`, then `F C F' + Q`.
+///
+/// All sensors share the start: the recursion begins with `F P0 F' + Q`, not with `Q` alone unless the start is known exactly
+/// (erratum `cfwmd-cross-covariance`).
+pub fn cross_covariance_step<const D: usize, const M: usize>(
+    dynamics: &impl GaussianDynamics<D>,
+    cross: &SMatrix<f64, D, D>,
+    first: (&OwnStep<D, M>, &SMatrix<f64, M, D>),
+    second: (&OwnStep<D, M>, &SMatrix<f64, M, D>),
+) -> SMatrix<f64, D, D> {
+    let keep =
+        |(step, matrix): (&OwnStep<D, M>, &SMatrix<f64, M, D>)| SMatrix::<f64, D, D>::identity() - step.gain * matrix;
+    let transition = dynamics.jacobian(&SVector::zeros());
+    let after = keep(first) * cross * keep(second).transpose();
+    transition * after * transition.transpose() + dynamics.noise_covariance()
 }
