@@ -443,6 +443,38 @@ where
     }
 }
 
+/// The filters alone, for timing: trials drawn beforehand, the sensors' comparisons included.
+pub(super) struct Stopwatch {
+    linear: Linear<1>,
+    draws: Vec<Draws<1>>,
+    stream: Stream,
+}
+
+impl Stopwatch {
+    /// Twenty trials of a setting.
+    pub(super) fn new(context: &Context<'_>, setting: &Setting, messages: f64) -> Result<Self, Error> {
+        let linear = Linear::<1>::new(context, setting, messages, false)?;
+        let stream = context.stream("cfwmd-linear");
+        let draws = (0..20)
+            .map(|trial| linear.draw(stream.indexed(trial)))
+            .collect::<Result<_, _>>()?;
+        Ok(Self { linear, draws, stream })
+    }
+
+    /// Runs a scheme over all trials; the number of steps done.
+    pub(super) fn run(&self, scheme: Scheme) -> Result<usize, Error> {
+        let mut steps = 0;
+        for draws in &self.draws {
+            steps += self
+                .linear
+                .trial(scheme, draws, self.stream.named("scheme"))?
+                .position
+                .len();
+        }
+        Ok(steps)
+    }
+}
+
 /// Offline runs behind a scheduled threshold.
 const SCHEDULE_RUNS: usize = 500;
 

@@ -1,6 +1,6 @@
 //! Scalar measurements with feedback: figures 1 and 2, table I.
 
-use super::case::{Case, by_budget, distinct};
+use super::case::{Case, distinct};
 use super::ensemble::{Ensemble, Part, agrees, beats, find, ordered_at_every_step, value};
 use super::linear::{Scheme, Setting, run};
 use crate::claim::{Claim, largest};
@@ -457,9 +457,4 @@ impl Case for Table1 {
     fn plot(tables: &Tables) -> Result<Plot, Error> {
         rate_plot(&tables.main)
     }
-}
-
-/// Position error against the budget, for other figures.
-pub(super) fn error_panel(tables: &Tables) -> Result<Panel, Error> {
-    by_budget(tables.named("summary")?, "Position error", "pos_armse_m", "pos_se", "time-averaged RMSE (m)")
 }
