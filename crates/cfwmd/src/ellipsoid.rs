@@ -180,7 +180,7 @@ impl<const M: usize> GaussianInEllipsoid<M> {
 }
 
 /// A variance below this share of the ball's squared radius is a known number.
-const KNOWN: f64 = 1e-20;
+const KNOWN: f64 = 1e-16;
 /// Means up to this many deviations ...
 const TAME_MEAN: f64 = 6.0;
 /// ... and radii up to this many deviations need no search for the bulk.

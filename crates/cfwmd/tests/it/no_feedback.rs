@@ -200,3 +200,23 @@ fn bad_steps_are_typed_errors() {
     let mut half = LocalSensor::new(sensor, 1.0, Format::Double, &known()).unwrap();
     assert!(half.step(&dynamics, &Vector1::new(f64::NAN)).is_err());
 }
+
+#[test]
+fn beliefs_stay_covariances_from_a_singular_start() {
+    // Process noise of rank one and a known start keep the joint covariance singular for several steps.
+    fn check<const M: usize>(network: &Network<2, M>, seeds: std::ops::Range<u64>) {
+        let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
+        for seed in seeds {
+            let run = simulate(network, &dynamics, &known(), seed);
+            let (beliefs, total) = track(network, &known(), NoFeedback::AssumedDensity, &run);
+            assert!(total.is_finite());
+            for belief in beliefs {
+                let slack = SMatrix::<f64, 2, 2>::identity() * 1e-10;
+                let sound = Gaussian::new(*belief.mean(), belief.covariance() + slack);
+                assert!(sound.is_ok() && belief.covariance().amax() < 100.0, "seed {seed}: {belief:?}");
+            }
+        }
+    }
+    check(&vector(), 0..120);
+    check(&scalar(0.0), 0..300);
+}

@@ -246,7 +246,7 @@ impl Case for Scheduled {
             claims.push(
                 Claim::near(
                     format!("error-l{l}"),
-                    format!("and the error of covariance feedback, l = {l}"),
+                    format!("and the error of covariance feedback or less, l = {l} (ratio)"),
                     ratio,
                     1.0,
                     0.025,

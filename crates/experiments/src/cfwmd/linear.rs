@@ -13,6 +13,7 @@ use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_cfwmd::trigger::StochasticTrigger;
 use fewbits_core::likelihood::Heard;
+use fewbits_core::linalg::semidefinite_factor;
 use fewbits_core::message::Cell;
 use fewbits_core::{Dynamics, Gaussian, Observation, Sensing, Stream};
 use fewbits_densities::Particles;
@@ -20,6 +21,7 @@ use fewbits_filters::{ParticleFilter, RaoBlackwellised, Resampling, Schedule, Wo
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
 use nalgebra::{SMatrix, SVector, Vector2};
 use rand::RngExt;
+use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of a linear figure.
@@ -423,8 +425,9 @@ where
     ) -> Result<(), Error> {
         let network = self.network(0.0)?;
         let mut rng = track.stream.named("particles").fast_rng();
-        let mut cloud = Particles::from_draws(count, || self.start.sample(&mut rng).unwrap_or(*self.start.mean()))
-            .map_err(failed)?;
+        let root = semidefinite_factor("initial covariance", self.start.covariance())?;
+        let mut draw = || self.start.mean() + root * Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
+        let mut cloud = Particles::from_draws(count, &mut draw).map_err(failed)?;
         let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Always);
         let mut workspace = Workspace::default();
         for k in 0..self.steps {
