@@ -114,14 +114,14 @@ fn distance<const M: usize>(network: &Network<2, M>, start: &Gaussian<2>, partic
 
 #[test]
 fn the_assumed_density_stays_close_to_the_exact_filter() {
-    let (worst, typical) = distance(&scalar(0.0), &known(), 2000);
+    let (worst, typical) = distance(&scalar(0.0), &known(), 800);
     assert!(typical < 0.12 && worst < 0.6, "known start: {typical} {worst}");
     let uncertain = Gaussian::new(Vector2::new(0.0, 10.0), Matrix2::identity() * 5.0).unwrap();
-    let (worst, typical) = distance(&scalar(0.0), &uncertain, 2000);
+    let (worst, typical) = distance(&scalar(0.0), &uncertain, 800);
     assert!(typical < 0.15 && worst < 0.8, "uncertain start: {typical} {worst}");
-    let (worst, typical) = distance(&scalar(0.2), &known(), 2000);
+    let (worst, typical) = distance(&scalar(0.2), &known(), 800);
     assert!(typical < 0.25 && worst < 1.2, "lossy link: {typical} {worst}");
-    let (worst, typical) = distance(&vector(), &known(), 1500);
+    let (worst, typical) = distance(&vector(), &known(), 600);
     assert!(typical < 0.2 && worst < 1.0, "vector: {typical} {worst}");
 }
 
@@ -135,7 +135,7 @@ fn hearing_silence_pays() {
         NoFeedback::AssumedDensity,
         NoFeedback::RaoBlackwell(60),
     ];
-    for seed in 0..150 {
+    for seed in 0..120 {
         let run = simulate(&network, &dynamics, &known(), 1000 + seed);
         for (error, method) in errors.iter_mut().zip(methods) {
             let (beliefs, _) = track(&network, &known(), method, &run);
