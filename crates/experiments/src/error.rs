@@ -57,3 +57,12 @@ impl<E: std::error::Error + Send + Sync + 'static> From<fewbits_core::MonteCarlo
         }
     }
 }
+
+impl From<fewbits_quantizers::Error> for Error {
+    fn from(error: fewbits_quantizers::Error) -> Self {
+        match error {
+            fewbits_quantizers::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
