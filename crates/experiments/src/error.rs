@@ -66,3 +66,15 @@ impl From<fewbits_quantizers::Error> for Error {
         }
     }
 }
+
+impl From<fewbits_dymbo::Error> for Error {
+    fn from(error: fewbits_dymbo::Error) -> Self {
+        Self::failed(error)
+    }
+}
+
+impl From<fewbits_filters::Error> for Error {
+    fn from(error: fewbits_filters::Error) -> Self {
+        Self::failed(error)
+    }
+}

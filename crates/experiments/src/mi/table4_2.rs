@@ -26,8 +26,10 @@ impl Default for Parameters {
     }
 }
 
-/// A printed pair: positive breakpoints of both sensors, its error, and that of the printed Lloyd-Max baseline.
-const PRINTED: [(usize, &[f64], &[f64], f64, f64); 2] = [
+/// A printed pair: levels, positive breakpoints of both sensors, its error, and that of the printed Lloyd-Max baseline.
+type Printed = (usize, &'static [f64], &'static [f64], f64, f64);
+
+const PRINTED: [Printed; 2] = [
     (4, &[1.38], &[1.135], 0.310, 0.332),
     (8, &[0.69, 1.45, 2.43], &[0.58, 1.22, 2.05], 0.264, 0.281),
 ];
