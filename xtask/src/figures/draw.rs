@@ -231,9 +231,12 @@ fn draw_layer<'a, 'b: 'a>(
                 .iter()
                 .enumerate()
                 .flat_map(|(j, row)| row.iter().enumerate().map(move |(i, v)| (i, j, *v)));
+            // Each cell reaches under its next neighbours, drawn later, so that no seam shines through.
+            let under = |edges: &[f64], i: usize| edges[(i + 2).min(edges.len() - 1)];
             let cells = cells.map(|(i, j, v)| {
                 let shade = heat_colour((v - low) / (high - low).max(f64::MIN_POSITIVE));
-                Rectangle::new([(left[i], bottom[j]), (left[i + 1], bottom[j + 1])], shade.filled())
+                let far = (under(&left, i), under(&bottom, j));
+                Rectangle::new([(left[i], bottom[j]), far], shade.filled())
             });
             chart.draw_series(cells).map_err(why)?;
         }

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+mod draw;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -21,7 +23,9 @@ fn text(bytes: &[u8]) -> String {
 
 /// Name and content of every file, hidden ones included.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let Ok(entries) = std::fs::read_dir(folder) else { return BTreeMap::new() };
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return BTreeMap::new();
+    };
     entries
         .map(|entry| entry.unwrap().path())
         .map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(path).unwrap()))
@@ -58,8 +62,16 @@ fn a_figure_leaves_csv_json_svg_and_a_gallery() {
 fn the_bytes_do_not_depend_on_the_number_of_threads() {
     let run = |threads: &str| {
         let out = tempfile::tempdir().unwrap();
-        let arguments =
-            ["dymbo-fig5", "dymbo-erasure", "cfwmd-fig1", "--quick", "--trials", "300", "--threads", threads];
+        let arguments = [
+            "dymbo-fig5",
+            "dymbo-erasure",
+            "cfwmd-fig1",
+            "--quick",
+            "--trials",
+            "300",
+            "--threads",
+            threads,
+        ];
         // Claims may fail at so few trials; the files are what matters here.
         figures(out.path(), &arguments);
         let mut files = files(out.path());
@@ -76,14 +88,31 @@ fn the_bytes_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn settings_reach_the_figure_and_its_default_claims_step_back() {
     let out = tempfile::tempdir().unwrap();
-    let run =
-        figures(out.path(), &["dymbo-fig5", "--set", "a=0.8", "--set", "gamma=0.3", "--quick", "--seed", "5"]);
+    let run = figures(
+        out.path(),
+        &[
+            "dymbo-fig5",
+            "--set",
+            "a=0.8",
+            "--set",
+            "gamma=0.3",
+            "--quick",
+            "--seed",
+            "5",
+        ],
+    );
     assert!(run.status.success(), "{}{}", text(&run.stdout), text(&run.stderr));
     let document: serde_json::Value = serde_json::from_slice(&files(out.path())["dymbo-fig5.json"]).unwrap();
     assert_eq!(document["parameters"]["a"], 0.8);
     assert_eq!(document["parameters"]["gamma"], serde_json::json!([0.3]));
     assert_eq!(document["seed"], 5);
-    assert!(document["claims"].as_array().unwrap().iter().any(|claim| claim["verdict"] == "skipped"));
+    assert!(
+        document["claims"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|claim| claim["verdict"] == "skipped")
+    );
 }
 
 #[test]
