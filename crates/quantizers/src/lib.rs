@@ -2,6 +2,8 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod assignment;
+pub mod binary;
 pub mod lloyd_max;
 
 mod error;

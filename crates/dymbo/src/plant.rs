@@ -1,0 +1,146 @@
+//! The scalar plant that one-bit sensors watch.
+
+use crate::Error;
+use fewbits_core::Gaussian;
+use fewbits_filters::{ScalarSteadyState, scalar_steady_state};
+use fewbits_models::{Ar1, LinearSensor};
+use nalgebra::SMatrix;
+
+/// A first-order autoregression `theta(n) = a theta(n-1) + u(n)` sensed as `x(n) = theta(n) + w(n)`.
+///
+/// Everything scales: with measurement standard deviation `sigma` all variances are `sigma^2` times those of unit noise at
+/// the same coefficient and the same [`noise_ratio`](Self::noise_ratio).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScalarPlant {
+    dynamics: Ar1,
+    sensor: LinearSensor<1, 1>,
+}
+
+impl ScalarPlant {
+    /// The plant with coefficient `a` in `[-1, 1]`, process variance `sigma_u^2 >= 0` and measurement variance
+    /// `sigma^2 > 0`.
+    ///
+    /// # Errors
+    /// [`Error::UnstablePlant`] for `|a| > 1`; [`Error::Argument`] for anything else out of range.
+    pub fn new(coefficient: f64, process_variance: f64, measurement_variance: f64) -> Result<Self, Error> {
+        Self::of(Ar1::new(coefficient, process_variance)?, measurement_variance)
+    }
+
+    /// The same for any finite coefficient: the opt-in to a plant that one bit a sample cannot hold for certain.
+    ///
+    /// # Errors
+    /// [`Error::Argument`].
+    pub fn new_unstable(coefficient: f64, process_variance: f64, measurement_variance: f64) -> Result<Self, Error> {
+        Self::of(Ar1::new_unstable(coefficient, process_variance)?, measurement_variance)
+    }
+
+    /// The plant of unit measurement noise with `gamma = sigma_u^2 / sigma^2`.
+    ///
+    /// # Errors
+    /// As [`ScalarPlant::new`].
+    pub fn with_noise_ratio(coefficient: f64, noise_ratio: f64) -> Result<Self, Error> {
+        Self::new(coefficient, noise_ratio, 1.0)
+    }
+
+    fn of(dynamics: Ar1, measurement_variance: f64) -> Result<Self, Error> {
+        Ok(Self {
+            dynamics,
+            sensor: LinearSensor::direct(measurement_variance)?,
+        })
+    }
+
+    /// The dynamics.
+    pub fn dynamics(&self) -> &Ar1 {
+        &self.dynamics
+    }
+
+    /// The sensor.
+    pub fn sensor(&self) -> &LinearSensor<1, 1> {
+        &self.sensor
+    }
+
+    /// `a`.
+    #[inline]
+    pub fn coefficient(&self) -> f64 {
+        self.dynamics.coefficient()
+    }
+
+    /// `sigma_u^2`.
+    #[inline]
+    pub fn process_variance(&self) -> f64 {
+        self.dynamics.noise_variance()
+    }
+
+    /// `sigma^2`.
+    #[inline]
+    pub fn measurement_variance(&self) -> f64 {
+        self.sensor.noise_variance()
+    }
+
+    /// `gamma = sigma_u^2 / sigma^2`, besides `a` the only parameter of the plant that is not a scale.
+    pub fn noise_ratio(&self) -> f64 {
+        self.process_variance() / self.measurement_variance()
+    }
+
+    /// The belief one step later: mean `a m`, variance `a^2 M + sigma_u^2`.
+    #[inline]
+    pub fn predict(&self, belief: &Gaussian<1>) -> Gaussian<1> {
+        scalar(self.coefficient() * belief.mean()[0], self.dynamics.predict_variance(belief.covariance()[0]))
+    }
+
+    /// Variance after a message that brings the fraction `information` of what the measurement itself would bring:
+    /// `P - c P^2/(P + sigma^2)`, in the form that does not cancel.
+    #[inline]
+    pub fn filtered_variance(&self, predicted_variance: f64, information: f64) -> f64 {
+        let (p, r) = (predicted_variance, self.measurement_variance());
+        p * (r + (1.0 - information) * p) / (p + r)
+    }
+
+    /// `P/sqrt(P + sigma^2)`: the correction of the estimate per unit of the normalised innovation.
+    #[inline]
+    pub fn innovation_gain(&self, predicted_variance: f64) -> f64 {
+        predicted_variance / (predicted_variance + self.measurement_variance()).sqrt()
+    }
+
+    /// Where the variances settle when each message brings the fraction `information` of a full measurement.
+    ///
+    /// # Errors
+    /// An information outside `[0, 1]`; no finite steady state.
+    pub fn steady_state(&self, information: f64) -> Result<ScalarSteadyState, Error> {
+        Ok(scalar_steady_state(
+            self.coefficient(),
+            self.process_variance(),
+            self.measurement_variance(),
+            information,
+        )?)
+    }
+}
+
+/// A scalar belief from numbers already known to be sound.
+#[inline]
+pub(crate) fn scalar(mean: f64, variance: f64) -> Gaussian<1> {
+    Gaussian::from_trusted_parts([mean].into(), SMatrix::from([[variance]]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ScalarPlant;
+    use crate::Error;
+
+    #[test]
+    fn refuses_plants_it_cannot_hold() {
+        let unstable = ScalarPlant::new(1.2, 0.5, 1.0);
+        assert_eq!(unstable, Err(Error::UnstablePlant { coefficient: 1.2 }));
+        assert!(unstable.unwrap_err().to_string().contains("1.2"));
+        assert!(ScalarPlant::new_unstable(-1.2, 0.5, 1.0).is_ok());
+        for bad in [
+            (f64::NAN, 1.0, 1.0),
+            (0.9, -0.1, 1.0),
+            (0.9, 0.1, 0.0),
+            (0.9, f64::INFINITY, 1.0),
+            (0.9, 0.1, f64::NAN),
+        ] {
+            assert!(matches!(ScalarPlant::new(bad.0, bad.1, bad.2), Err(Error::Argument(_))), "{bad:?}");
+        }
+    }
+}

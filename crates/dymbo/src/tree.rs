@@ -1,0 +1,128 @@
+//! The exact posterior for every bit string: how much a better estimator could gain from the same bits.
+//!
+//! For a dozen steps all strings can be followed, each with its exact density on a grid. The mean over the strings of the
+//! posterior variance is the minimum mean squared error given the bits that the Dymbo filter asked for; the mean squared
+//! distance of its estimate from the posterior mean is its excess. They add up to its mean squared error, which
+//! [`chain`](crate::chain) computes by another way, and the two agree to 13 digits.
+
+use crate::plant::scalar;
+use crate::{DymboFilter, Error, ScalarPlant};
+use fewbits_core::error::{ArgumentError, positive};
+use fewbits_core::normal::{log_cdf, log_interval};
+use fewbits_core::{Gaussian, Sign};
+use fewbits_filters::{Grid, PointMass, PointMassFilter};
+
+/// Averages over all bit strings of one length.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TreeLevel {
+    /// Minimum mean squared error given the first message and the bits.
+    pub mmse: f64,
+    /// Mean squared distance of the Dymbo estimate from the exact posterior mean.
+    pub excess: f64,
+}
+
+impl TreeLevel {
+    /// Mean squared error of the Dymbo filter.
+    pub fn mse(&self) -> f64 {
+        self.mmse + self.excess
+    }
+}
+
+/// Longest bit strings that are followed.
+const DEEPEST: usize = 16;
+/// Grid spacing as a share of the smaller noise deviation.
+const SPACING: f64 = 0.35;
+
+/// Follows all bit strings of lengths `1..=depth` after a first message of the given resolution about a state of unknown
+/// place. By symmetry strings that start with `+1` are enough.
+///
+/// # Errors
+/// A depth outside `1..=16`, a resolution that is not positive, a plant without process noise.
+pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) -> Result<Vec<TreeLevel>, Error> {
+    let tau = positive("resolution", resolution)?;
+    if !(1..=DEEPEST).contains(&depth) {
+        return Err(ArgumentError::new("depth", depth, format!("a depth from 1 to {DEEPEST}")).into());
+    }
+    let sigma = plant.measurement_variance().sqrt();
+    let filter = DymboFilter::new(*plant);
+    let start = scalar(0.0, plant.measurement_variance() + tau * tau / 12.0);
+
+    // The estimate strays farthest on a run of equal bits.
+    let (mut belief, mut farthest, mut widest) = (start, 0.0_f64, start.covariance()[0]);
+    for _ in 0..depth {
+        let predicted = filter.predict(&belief);
+        belief = filter.update(&predicted, Sign::Above).0;
+        farthest = farthest.max(belief.mean()[0].abs());
+        widest = widest.max(predicted.covariance()[0]);
+    }
+    let half_width = farthest + 0.5 * tau + 9.0 * widest.sqrt();
+    let finest = plant.process_variance().sqrt().min(sigma);
+    let grid = Grid::symmetric(half_width, SPACING * positive("process_variance", finest)?)?;
+    let walk = Walk {
+        filter,
+        exact: PointMassFilter::new(plant.dynamics(), grid)?,
+        sigma,
+    };
+    let density = PointMass::new(grid, |x| log_interval((-0.5 * tau - x) / sigma, (0.5 * tau - x) / sigma))?;
+    let mut levels = vec![TreeLevel::default(); depth];
+    walk.descend(&start, &density, 1.0, &mut levels)?;
+    Ok(levels)
+}
+
+struct Walk {
+    filter: DymboFilter,
+    exact: PointMassFilter,
+    sigma: f64,
+}
+
+impl Walk {
+    /// Adds the children of a string of probability `weight` and all their offspring to `levels`.
+    fn descend(
+        &self,
+        belief: &Gaussian<1>,
+        density: &PointMass,
+        weight: f64,
+        levels: &mut [TreeLevel],
+    ) -> Result<(), Error> {
+        let Some((level, deeper)) = levels.split_first_mut() else {
+            return Ok(());
+        };
+        let predicted = self.filter.predict(belief);
+        let threshold = predicted.mean()[0];
+        let ahead = self.exact.predict(density)?;
+        // At the first bit the two halves mirror each other.
+        let first = belief.mean()[0] == 0.0 && weight == 1.0;
+        for bit in [Sign::Above, Sign::Below].into_iter().take(if first { 1 } else { 2 }) {
+            let mut heard = ahead.clone();
+            let log_evidence = heard.update(|x| log_cdf(bit.value() * (x - threshold) / self.sigma))?;
+            let weight = if first { 1.0 } else { weight * log_evidence.exp() };
+            let posterior = self.filter.update(&predicted, bit).0;
+            let distance = posterior.mean()[0] - heard.mean();
+            level.mmse += weight * heard.variance();
+            level.excess += weight * distance * distance;
+            self.descend(&posterior, &heard, weight, deeper)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_message_tree;
+    use crate::{ScalarPlant, chain};
+
+    #[test]
+    fn mmse_and_excess_add_up_to_the_chains_error() {
+        for (a, gamma) in [(0.9, 0.5), (-0.6, 2.0), (1.0, 0.1)] {
+            let plant = ScalarPlant::with_noise_ratio(a, gamma).unwrap();
+            let levels = first_message_tree(&plant, 1.0, 6).unwrap();
+            let exact = chain::first_message_transient(&plant, 1.0, 13.0 / 12.0, 6).unwrap();
+            for (level, step) in levels.iter().zip(&exact[1..]) {
+                assert!((level.mse() - step.mse).abs() < 1e-12, "{a} {gamma} {}", level.mse() - step.mse);
+            }
+        }
+        let plant = ScalarPlant::with_noise_ratio(0.9, 0.5).unwrap();
+        assert!(first_message_tree(&plant, 1.0, 0).is_err() && first_message_tree(&plant, 0.0, 3).is_err());
+        assert!(first_message_tree(&ScalarPlant::new(0.9, 0.0, 1.0).unwrap(), 1.0, 3).is_err());
+    }
+}

@@ -1,0 +1,5 @@
+//! Integration tests of the Dymbo filters.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod fixtures;

@@ -1,0 +1,211 @@
+//! Linear assignment: a published solver behind a trait of ours, with a proof of optimality for every answer.
+
+use super::coded::check_permutation;
+use crate::Error;
+use fewbits_core::ArgumentError;
+use fewbits_core::error::all_finite;
+
+/// Relative slack of the certificate's inequalities, in units of the largest cost.
+const SLACK: f64 = 1e-12;
+
+/// A square matrix of finite costs, rows to be matched with columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CostMatrix {
+    /// Stored as the solver takes it, so that solving copies nothing.
+    costs: lapjv::Matrix<f64>,
+}
+
+impl CostMatrix {
+    /// From `size * size` costs, row by row.
+    ///
+    /// # Errors
+    /// If there are not `size^2` costs, `size` is 0, or one is not finite.
+    pub fn new(size: usize, costs: Vec<f64>) -> Result<Self, Error> {
+        let entries = costs.len();
+        if size == 0 || size.checked_mul(size) != Some(entries) {
+            return Err(Error::NotSquare { entries, size });
+        }
+        all_finite("costs", &costs)?;
+        lapjv::Matrix::from_shape_vec((size, size), costs)
+            .map(|costs| Self { costs })
+            .map_err(|_| Error::NotSquare { entries, size })
+    }
+
+    /// Number of rows.
+    pub fn size(&self) -> usize {
+        self.costs.nrows()
+    }
+
+    /// The cost of matching `row` with `column`, if both exist.
+    pub fn get(&self, row: usize, column: usize) -> Option<f64> {
+        self.costs.get((row, column)).copied()
+    }
+
+    /// Total cost of an assignment, the column of each row.
+    ///
+    /// # Errors
+    /// If the assignment is not a permutation.
+    pub fn cost(&self, assignment: &[usize]) -> Result<f64, Error> {
+        check_permutation(assignment, self.size())?;
+        Ok(assignment.iter().enumerate().map(|(i, &j)| self.costs[(i, j)]).sum())
+    }
+
+    /// Dual variables that prove (or disprove) that an assignment is optimal.
+    ///
+    /// Feasible duals have `u_i + v_j <= c_ij`; their sum bounds every assignment from below and equals the cost of an optimal
+    /// one. Given the assignment, `v` solves the shortest-path inequalities `v_j - v_a(i) <= c_ij - c_i,a(i)` (Bellman-Ford,
+    /// `O(n^2)` a pass, few passes); a negative cycle means that the assignment can be improved.
+    ///
+    /// # Errors
+    /// If the assignment is not a permutation.
+    pub fn certificate(&self, assignment: &[usize]) -> Result<Certificate, Error> {
+        let cost = self.cost(assignment)?;
+        let n = self.size();
+        let scale = self.costs.iter().fold(0.0f64, |m, c| m.max(c.abs()));
+        let tolerance = SLACK * scale;
+        let mut columns = vec![0.0f64; n];
+        for _ in 0..=n {
+            let mut changed = false;
+            for (i, row) in self.costs.outer_iter().enumerate() {
+                let own = assignment[i];
+                let base = columns[own] - row[own];
+                for (j, c) in row.iter().enumerate() {
+                    let reached = base + c;
+                    if reached < columns[j] - tolerance * 1e-3 {
+                        columns[j] = reached;
+                        changed = true;
+                    }
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        let rows: Vec<f64> = (0..n)
+            .map(|i| self.costs[(i, assignment[i])] - columns[assignment[i]])
+            .collect();
+        let mut violation = 0.0f64;
+        for (i, row) in self.costs.outer_iter().enumerate() {
+            for (c, v) in row.iter().zip(&columns) {
+                violation = violation.max(rows[i] + v - c);
+            }
+        }
+        let dual: f64 = rows.iter().sum::<f64>() + columns.iter().sum::<f64>();
+        Ok(Certificate {
+            rows,
+            columns,
+            cost,
+            gap: cost - dual,
+            violation,
+            tolerance,
+        })
+    }
+}
+
+/// Dual variables of an assignment, and how far they are from proving it optimal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Certificate {
+    /// Dual variable `u_i` of each row.
+    pub rows: Vec<f64>,
+    /// Dual variable `v_j` of each column.
+    pub columns: Vec<f64>,
+    /// Cost of the assignment.
+    pub cost: f64,
+    /// Cost minus the sum of the duals.
+    pub gap: f64,
+    /// Largest `u_i + v_j - c_ij`.
+    pub violation: f64,
+    tolerance: f64,
+}
+
+impl Certificate {
+    /// True if the duals are feasible and their sum is the cost, to `1e-12` of the largest cost (a row).
+    pub fn is_optimal(&self) -> bool {
+        self.violation <= self.tolerance && self.gap.abs() <= self.tolerance * self.rows.len() as f64
+    }
+}
+
+/// A solver of the linear assignment problem.
+///
+/// Laws: the answer is a permutation whose [`CostMatrix::certificate`] is optimal, and equal input gives equal output.
+pub trait LinearAssignment {
+    /// The column of each row such that the total cost is least.
+    ///
+    /// # Errors
+    /// If the solver gives up.
+    fn solve(&self, costs: &CostMatrix) -> Result<Vec<usize>, Error>;
+}
+
+/// The shortest-augmenting-path algorithm of Jonker and Volgenant (1987), from the `lapjv` crate.
+///
+/// `O(n^3)` in the worst case. The thesis describes the older Hungarian method with its Hopcroft-Karp step; the answer is the
+/// same, which the certificate proves.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct JonkerVolgenant;
+
+impl LinearAssignment for JonkerVolgenant {
+    fn solve(&self, costs: &CostMatrix) -> Result<Vec<usize>, Error> {
+        if costs.size() == 1 {
+            return Ok(vec![0]);
+        }
+        lapjv::lapjv(&costs.costs)
+            .map(|(columns, _)| columns)
+            .map_err(|error| ArgumentError::new("costs", error, "a matrix that the solver accepts").into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::enumerate::for_permutations;
+    use super::*;
+    use proptest::prelude::*;
+
+    fn least(costs: &CostMatrix) -> f64 {
+        let mut best = f64::INFINITY;
+        for_permutations(costs.size(), |p| best = best.min(costs.cost(p).unwrap()));
+        best
+    }
+
+    proptest! {
+        #[test]
+        fn the_solver_is_optimal_and_proves_it(size in 1usize..7, seed in prop::collection::vec(-50i32..50, 36)) {
+            // Small whole numbers make many ties.
+            let costs = CostMatrix::new(size, seed.iter().take(size * size).map(|&c| f64::from(c / 7)).collect()).unwrap();
+            let found = JonkerVolgenant.solve(&costs).unwrap();
+            prop_assert_eq!(costs.cost(&found).unwrap(), least(&costs));
+            prop_assert!(costs.certificate(&found).unwrap().is_optimal());
+        }
+
+        #[test]
+        fn wide_ranges_of_costs_do_no_harm(size in 2usize..6, exponents in prop::collection::vec(-250f64..250.0, 25)) {
+            let costs = CostMatrix::new(size, exponents.iter().take(size * size).map(|e| e.exp2()).collect()).unwrap();
+            let found = JonkerVolgenant.solve(&costs).unwrap();
+            let (cost, best) = (costs.cost(&found).unwrap(), least(&costs));
+            let largest = exponents.iter().take(size * size).fold(f64::NEG_INFINITY, |m, e| m.max(*e)).exp2();
+            prop_assert!(cost - best <= 1e-12 * largest);
+        }
+
+        #[test]
+        fn the_certificate_refuses_what_is_not_optimal(seed in prop::collection::vec(0.0f64..1.0, 25)) {
+            let costs = CostMatrix::new(5, seed).unwrap();
+            let best = least(&costs);
+            let mut all_right = true;
+            for_permutations(5, |p| {
+                let optimal = costs.cost(p).unwrap() <= best + 1e-13;
+                all_right &= costs.certificate(p).unwrap().is_optimal() == optimal;
+            });
+            prop_assert!(all_right);
+        }
+    }
+
+    #[test]
+    fn bad_matrices_are_refused() {
+        assert!(matches!(CostMatrix::new(2, vec![1.0; 3]), Err(Error::NotSquare { .. })));
+        assert!(matches!(CostMatrix::new(0, vec![]), Err(Error::NotSquare { .. })));
+        assert!(CostMatrix::new(1, vec![f64::NAN]).is_err());
+        assert!(CostMatrix::new(1, vec![f64::INFINITY]).is_err());
+        let costs = CostMatrix::new(2, vec![1.0; 4]).unwrap();
+        assert!(costs.cost(&[0, 0]).is_err());
+        assert_eq!((costs.get(1, 1), costs.get(2, 0)), (Some(1.0), None));
+    }
+}

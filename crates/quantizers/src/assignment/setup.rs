@@ -1,0 +1,74 @@
+//! Test networks, and the two assignments that need no optimisation.
+
+use crate::Error;
+use fewbits_core::ArgumentError;
+use fewbits_core::error::{all_finite, non_negative, positive};
+
+/// Smallest variance of a random network.
+const SMALLEST: f64 = 1e-4;
+
+/// Variances with exactly this mean and population standard deviation, in the direction of `direction`.
+///
+/// The direction is centred and scaled, then moved to the mean; drawn from a standard normal vector it gives networks uniform
+/// on the sphere of that radius. `Ok(None)` if a variance falls below `1e-4`: draw again.
+///
+/// # Errors
+/// [`Error::InfeasibleVariances`] unless `std <= mean sqrt(N - 1)`, beyond which one variance is always negative;
+/// [`Error::Argument`] if the mean is not positive, the deviation negative, or the direction constant or not finite.
+pub fn variances_with_moments(mean: f64, std: f64, direction: &[f64]) -> Result<Option<Vec<f64>>, Error> {
+    let mean = positive("mean", mean)?;
+    let std = non_negative("std", std)?;
+    all_finite("direction", direction)?;
+    let count = direction.len();
+    if count == 0 || std > mean * (count as f64 - 1.0).sqrt() {
+        return Err(Error::InfeasibleVariances { mean, std, count });
+    }
+    if std == 0.0 {
+        return Ok((mean >= SMALLEST).then(|| vec![mean; count]));
+    }
+    let centre = direction.iter().sum::<f64>() / count as f64;
+    let spread = (direction.iter().map(|z| (z - centre) * (z - centre)).sum::<f64>() / count as f64).sqrt();
+    if !(spread > 0.0 && spread.is_finite()) {
+        return Err(ArgumentError::new("direction", "constant", "numbers that differ").into());
+    }
+    let variances: Vec<f64> = direction.iter().map(|z| mean + std * (z - centre) / spread).collect();
+    Ok(variances.iter().all(|&v| v >= SMALLEST).then_some(variances))
+}
+
+/// "Assignment II": the most precise sensor takes the coarsest bit, and so on; the lower index first among equals.
+pub fn by_precision(variances: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..variances.len()).collect();
+    order.sort_by(|&a, &b| variances[a].total_cmp(&variances[b]));
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn moments_are_exact() {
+        let v = variances_with_moments(0.03, 0.01, &[0.3, -1.2, 2.0, 0.1])
+            .unwrap()
+            .unwrap();
+        let mean = v.iter().sum::<f64>() / 4.0;
+        let var = v.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / 4.0;
+        assert_relative_eq!(mean, 0.03, max_relative = 1e-14);
+        assert_relative_eq!(var, 1e-4, max_relative = 1e-12);
+        assert_eq!(by_precision(&[0.04, 0.01, 0.02, 0.01]), [1, 3, 2, 0]);
+    }
+
+    #[test]
+    fn infeasible_moments_are_typed_errors() {
+        assert!(matches!(
+            variances_with_moments(0.03, 0.06, &[1.0, 2.0, 3.0, 4.0]),
+            Err(Error::InfeasibleVariances { .. })
+        ));
+        assert!(variances_with_moments(0.03, 0.01, &[1.0; 4]).is_err());
+        assert!(variances_with_moments(-0.03, 0.01, &[1.0, 2.0]).is_err());
+        assert!(variances_with_moments(0.03, 0.01, &[1.0, f64::NAN]).is_err());
+        assert!(variances_with_moments(0.03, 0.0, &[]).is_err());
+        assert_eq!(variances_with_moments(0.03, 0.05, &[3.0, 0.0, 0.0, -3.1]).unwrap(), None);
+    }
+}

@@ -1,0 +1,285 @@
+//! Fusion-centre decoders as look-up tables, and their exact mean squared errors.
+
+use super::bank::{Bank, IMPOSSIBLE};
+use super::source::Nodes;
+use super::{Grid, continuous_map};
+use crate::Error;
+use fewbits_core::quadrature::gauss_legendre;
+
+/// Probabilities below this are taken as this when their logarithm is multiplied by a count that may be zero.
+const FLOOR: f64 = 1e-300;
+/// Scores closer than this are ties, and the lowest cell wins; symmetric outcomes tie up to rounding.
+const TIE: f64 = 1e-11;
+/// Most sensors for a table over bit strings.
+pub const MAX_TABLE_SENSORS: usize = 24;
+
+/// How the fusion centre turns the bits into an estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Decoder<'a> {
+    /// Posterior mean: the least mean squared error.
+    Mmse,
+    /// Centroid of the cell `l` that maximises `ln P(c_l) + sum_n ln P(z_n|c_l)` (equation 5.10 with the missing division of
+    /// `P(z_n, c_l)` by `P(c_l)` put back, erratum `binary-4`). Bits count as independent given the cell, which they are
+    /// only given `X` (erratum `binary-5`).
+    DiscreteMap(&'a Grid),
+    /// Equation 5.10 as printed, with joint in place of conditional probabilities. Equal to [`Self::DiscreteMap`] for
+    /// equally likely cells; up to three times its error for a Gaussian source.
+    PrintedDiscreteMap(&'a Grid),
+    /// Centroid of the cell of greatest posterior probability `int_cell p(x) prod_n P(z_n|x) dx`.
+    ExactDivisionMap(&'a Grid),
+    /// The `x` on the support that maximises `ln p(x) + sum_n ln P(z_n|x)`; the middle of a plateau, the lowest of equals.
+    ContinuousMap,
+}
+
+/// Estimates for every outcome of a bank.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LookupTable {
+    bank: Bank,
+    estimates: Vec<f64>,
+}
+
+impl LookupTable {
+    /// The estimate for one bit a sensor.
+    ///
+    /// # Errors
+    /// If the number of bits is not the number of sensors.
+    pub fn estimate(&self, bits: &[bool]) -> Result<f64, Error> {
+        Ok(self.estimates[self.bank.index_of(bits)?])
+    }
+
+    /// Number of distinguishable outcomes stored.
+    pub fn outcomes(&self) -> usize {
+        self.estimates.len()
+    }
+
+    /// Expanded to all `2^N` bit strings, sensor 1 the most significant bit of the index.
+    ///
+    /// # Errors
+    /// If there are more than 24 sensors.
+    pub fn expand(&self) -> Result<Vec<f64>, Error> {
+        let sensors = self.bank.sensors();
+        if sensors > MAX_TABLE_SENSORS {
+            return Err(Error::TooManyOutcomes {
+                outcomes: 1u128.checked_shl(sensors as u32).unwrap_or(u128::MAX),
+                limit: 1 << MAX_TABLE_SENSORS,
+            });
+        }
+        (0usize..1 << sensors)
+            .map(|word| {
+                let bits: Vec<bool> = (0..sensors).rev().map(|at| word >> at & 1 == 1).collect();
+                self.estimate(&bits)
+            })
+            .collect()
+    }
+}
+
+impl Bank {
+    /// The look-up table of a decoder.
+    ///
+    /// # Errors
+    /// If there are more than `2^26` outcomes.
+    pub fn table(&self, decoder: Decoder<'_>) -> Result<LookupTable, Error> {
+        let outcomes = self.checked_outcomes()?;
+        let estimates = match decoder {
+            Decoder::Mmse => self.posterior_means(outcomes),
+            Decoder::DiscreteMap(grid) => self.division_map(grid, outcomes, true),
+            Decoder::PrintedDiscreteMap(grid) => self.division_map(grid, outcomes, false),
+            Decoder::ExactDivisionMap(grid) => self.exact_division_map(grid, outcomes),
+            Decoder::ContinuousMap => continuous_map::estimates(self, outcomes),
+        };
+        Ok(LookupTable {
+            bank: self.clone(),
+            estimates,
+        })
+    }
+
+    /// Exact mean squared error of a decoder.
+    ///
+    /// # Errors
+    /// If there are more than `2^26` outcomes.
+    pub fn mse(&self, decoder: Decoder<'_>) -> Result<f64, Error> {
+        match decoder {
+            Decoder::Mmse => self.mmse(),
+            other => Ok(self.mse_of(&self.table(other)?.estimates)),
+        }
+    }
+
+    /// Exact mean squared error of the posterior mean, `sum_z int (x - E[X|z])^2 p(x) P(z|x) dx`.
+    ///
+    /// Every term is positive, so that no digit is lost when the error is small.
+    ///
+    /// # Errors
+    /// If there are more than `2^26` outcomes.
+    pub fn mmse(&self) -> Result<f64, Error> {
+        self.checked_outcomes()?;
+        let nodes = self.fine_nodes();
+        let mut error = 0.0;
+        self.for_outcomes(&nodes, |_, w| {
+            let (mass, first) = moments(w, &nodes.x);
+            if mass > IMPOSSIBLE {
+                error += squared_error(w, &nodes.x, first / mass);
+            }
+        });
+        Ok(error)
+    }
+
+    fn mse_of(&self, estimates: &[f64]) -> f64 {
+        let nodes = self.fine_nodes();
+        let mut error = 0.0;
+        self.for_outcomes(&nodes, |index, w| error += squared_error(w, &nodes.x, estimates[index]));
+        error
+    }
+
+    fn posterior_means(&self, outcomes: usize) -> Vec<f64> {
+        let nodes = self.fine_nodes();
+        let mut estimates = vec![0.0; outcomes];
+        let mut impossible = Vec::new();
+        self.for_outcomes(&nodes, |index, w| {
+            let (mass, first) = moments(w, &nodes.x);
+            if mass > IMPOSSIBLE {
+                estimates[index] = first / mass;
+            } else {
+                impossible.push(index);
+            }
+        });
+        if !impossible.is_empty() {
+            let logs = self.log_rows(&nodes.x);
+            let mut counts = Vec::new();
+            let mut score = vec![0.0; nodes.len()];
+            for index in impossible {
+                self.counts_at(index, &mut counts);
+                self.log_likelihood(&logs, &counts, &mut score);
+                let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let w: Vec<f64> = score.iter().zip(&nodes.w).map(|(s, w)| w * (s - best).exp()).collect();
+                let (mass, first) = moments(&w, &nodes.x);
+                estimates[index] = if mass > 0.0 { first / mass } else { 0.0 };
+            }
+        }
+        estimates
+    }
+
+    /// `[ln P0, ln P1]` at every point for every group.
+    pub(crate) fn log_rows(&self, points: &[f64]) -> Vec<Vec<[f64; 2]>> {
+        self.groups()
+            .iter()
+            .map(|g| points.iter().map(|&x| g.sensor.log_probabilities(x)).collect())
+            .collect()
+    }
+
+    /// `sum_g k ln P1 + (m - k) ln P0` at every point.
+    pub(crate) fn log_likelihood(&self, rows: &[Vec<[f64; 2]>], counts: &[usize], score: &mut [f64]) {
+        score.fill(0.0);
+        for ((row, group), &ones) in rows.iter().zip(self.groups()).zip(counts) {
+            let (ones, zeros) = (ones as f64, (group.count - ones) as f64);
+            for (s, [l0, l1]) in score.iter_mut().zip(row) {
+                *s += ones * l1 + zeros * l0;
+            }
+        }
+    }
+
+    /// Nodes with breaks at the edges of `grid`, cell by cell.
+    fn cells(&self, grid: &Grid) -> Vec<Cell> {
+        (0..grid.cells())
+            .filter_map(|cell| grid.support(cell, self.source()))
+            .map(|(low, high)| {
+                let nodes = self
+                    .source()
+                    .nodes_between(low, high, 2.0 * self.finest_noise(), gauss_legendre::<12>());
+                let mass = nodes.expect(|_| 1.0);
+                Cell {
+                    centroid: if mass > 0.0 {
+                        nodes.expect(|x| x) / mass
+                    } else {
+                        0.5 * (low + high)
+                    },
+                    mass,
+                    nodes,
+                }
+            })
+            .collect()
+    }
+
+    fn division_map(&self, grid: &Grid, outcomes: usize, conditional: bool) -> Vec<f64> {
+        let cells = self.cells(grid);
+        let log = |p: f64| p.max(FLOOR).ln();
+        let logs: Vec<Vec<[f64; 2]>> = self
+            .groups()
+            .iter()
+            .map(|g| {
+                cells
+                    .iter()
+                    .map(|cell| {
+                        let mut joint = [0.0; 2];
+                        for (&x, &w) in cell.nodes.x.iter().zip(&cell.nodes.w) {
+                            let [p0, p1] = g.sensor.probabilities(x);
+                            joint[0] += w * p0;
+                            joint[1] += w * p1;
+                        }
+                        let scale = if conditional { cell.mass.max(FLOOR) } else { 1.0 };
+                        joint.map(|p| log(p / scale))
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut counts = Vec::new();
+        let mut score = vec![0.0; cells.len()];
+        (0..outcomes)
+            .map(|index| {
+                self.counts_at(index, &mut counts);
+                self.log_likelihood(&logs, &counts, &mut score);
+                for (s, cell) in score.iter_mut().zip(&cells) {
+                    *s += log(cell.mass);
+                }
+                cells[first_largest(&score, |best| TIE * best.abs().max(1.0))].centroid
+            })
+            .collect()
+    }
+
+    fn exact_division_map(&self, grid: &Grid, outcomes: usize) -> Vec<f64> {
+        let cells = self.cells(grid);
+        let mut nodes = Nodes::default();
+        let mut ends = Vec::with_capacity(cells.len());
+        for cell in &cells {
+            nodes.x.extend(&cell.nodes.x);
+            nodes.w.extend(&cell.nodes.w);
+            ends.push(nodes.len());
+        }
+        let mut estimates = vec![0.0; outcomes];
+        let mut score = vec![0.0; cells.len()];
+        self.for_outcomes(&nodes, |index, w| {
+            let mut from = 0;
+            for (s, &to) in score.iter_mut().zip(&ends) {
+                *s = w[from..to].iter().sum();
+                from = to;
+            }
+            estimates[index] = cells[first_largest(&score, |best| TIE * best)].centroid;
+        });
+        estimates
+    }
+}
+
+/// A cell of the grid within the support.
+struct Cell {
+    nodes: Nodes,
+    mass: f64,
+    centroid: f64,
+}
+
+/// The first index whose score is within `slack(best)` of the best.
+fn first_largest(scores: &[f64], slack: impl Fn(f64) -> f64) -> usize {
+    let best = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let enough = best - slack(best);
+    scores.iter().position(|&s| s >= enough).unwrap_or(0)
+}
+
+/// `(sum w, sum w x)`.
+pub(crate) fn moments(w: &[f64], x: &[f64]) -> (f64, f64) {
+    w.iter()
+        .zip(x)
+        .fold((0.0, 0.0), |(m0, m1), (w, x)| (m0 + w, m1 + w * x))
+}
+
+/// `sum w (x - estimate)^2`.
+pub(crate) fn squared_error(w: &[f64], x: &[f64], estimate: f64) -> f64 {
+    w.iter().zip(x).map(|(w, x)| w * (x - estimate) * (x - estimate)).sum()
+}

@@ -1,0 +1,192 @@
+//! The sensor's half: thresholds that turn a measurement into one bit.
+
+use crate::Error;
+use fewbits_core::ArgumentError;
+use fewbits_core::error::all_finite;
+use fewbits_core::normal::{interval, log_interval, pdf};
+
+/// Beyond this many standard deviations a normal tail is below the smallest double.
+const VANISHED: f64 = 39.0;
+
+/// A one-bit quantizer: the bit is 0 below the first threshold and changes at each threshold.
+///
+/// Every one-bit quantizer of a scalar has this form up to the name of its two outputs, whatever [`Pattern`] it came from.
+///
+/// [`Pattern`]: super::Pattern
+#[derive(Debug, Clone, PartialEq)]
+pub struct BinaryQuantizer {
+    thresholds: Vec<f64>,
+}
+
+impl BinaryQuantizer {
+    /// From strictly increasing finite thresholds, at least one.
+    ///
+    /// # Errors
+    /// If there is no threshold, one is not finite, or they do not increase strictly.
+    pub fn new(thresholds: Vec<f64>) -> Result<Self, Error> {
+        if thresholds.is_empty() {
+            return Err(ArgumentError::new("thresholds", "empty", "at least one threshold").into());
+        }
+        increasing("thresholds", &thresholds)?;
+        Ok(Self { thresholds })
+    }
+
+    /// The thresholds, increasing.
+    pub fn thresholds(&self) -> &[f64] {
+        &self.thresholds
+    }
+
+    /// The bit of a measurement: the parity of the number of thresholds at or below it.
+    ///
+    /// Infinite measurements fall into the outermost cells.
+    ///
+    /// # Errors
+    /// If the measurement is NaN.
+    pub fn encode(&self, measurement: f64) -> Result<bool, Error> {
+        Ok(cell_of(&self.thresholds, measurement)? % 2 == 1)
+    }
+
+    /// `[P(0|x), P(1|x)]` for the measurement `Y = x + N(0, noise_std^2)`.
+    ///
+    /// Each is a sum of interval probabilities of its own cells, so that neither loses digits when it is small.
+    pub fn probabilities(&self, x: f64, noise_std: f64) -> [f64; 2] {
+        let mut mass = [0.0; 2];
+        self.for_cells(x, noise_std, |bit, low, high| {
+            if high > -VANISHED && low < VANISHED {
+                mass[bit] += interval(low, high);
+            }
+        });
+        mass
+    }
+
+    /// `[ln P(0|x), ln P(1|x)]`, finite however far `x` lies from the cells.
+    pub fn log_probabilities(&self, x: f64, noise_std: f64) -> [f64; 2] {
+        let mut largest = [f64::NEG_INFINITY; 2];
+        self.for_cells(x, noise_std, |bit, low, high| {
+            largest[bit] = largest[bit].max(log_interval(low, high));
+        });
+        let mut sum = [0.0; 2];
+        self.for_cells(x, noise_std, |bit, low, high| {
+            if largest[bit] > f64::NEG_INFINITY {
+                sum[bit] += (log_interval(low, high) - largest[bit]).exp();
+            }
+        });
+        [largest[0] + sum[0].ln(), largest[1] + sum[1].ln()]
+    }
+
+    /// `dP(1|x)/dx`, the sum of `+-phi((t - x)/s)/s` over the thresholds.
+    pub fn slope(&self, x: f64, noise_std: f64) -> f64 {
+        let mut sign = 1.0;
+        let mut slope = 0.0;
+        for &t in &self.thresholds {
+            slope += sign * pdf((t - x) / noise_std);
+            sign = -sign;
+        }
+        slope / noise_std
+    }
+
+    /// Fisher information about `x` in the bit: `P1'^2 / (P0 P1)`, 0 where that is below the smallest double.
+    pub fn fisher_information(&self, x: f64, noise_std: f64) -> f64 {
+        let [p0, p1] = self.probabilities(x, noise_std);
+        let slope = self.slope(x, noise_std);
+        // Both factors of the product may be tiny; dividing by the smaller one last keeps the quotient in range.
+        let information = (slope / p0.max(p1)) * (slope / p0.min(p1));
+        if information.is_finite() { information } else { 0.0 }
+    }
+
+    fn for_cells(&self, x: f64, noise_std: f64, mut visit: impl FnMut(usize, f64, f64)) {
+        let mut low = f64::NEG_INFINITY;
+        let mut bit = 0;
+        for &t in &self.thresholds {
+            let high = (t - x) / noise_std;
+            visit(bit, low, high);
+            bit ^= 1;
+            low = high;
+        }
+        visit(bit, low, f64::INFINITY);
+    }
+}
+
+/// Strictly increasing finite numbers.
+pub(crate) fn increasing(name: &'static str, values: &[f64]) -> Result<(), Error> {
+    all_finite(name, values)?;
+    match values.windows(2).position(|w| w[0] >= w[1]) {
+        None => Ok(()),
+        Some(at) => Err(ArgumentError::new(
+            name,
+            format!("{} followed by {} at index {}", values[at], values[at + 1], at + 1),
+            "strictly increasing numbers",
+        )
+        .into()),
+    }
+}
+
+/// Number of edges at or below `y`.
+pub(crate) fn cell_of(edges: &[f64], y: f64) -> Result<usize, Error> {
+    if y.is_nan() {
+        return Err(ArgumentError::new("measurement", y, "a number").into());
+    }
+    Ok(edges.partition_point(|&edge| edge <= y))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    #[test]
+    fn edges_belong_to_the_cell_above() {
+        let quantizer = BinaryQuantizer::new(vec![-1.0, 0.5]).unwrap();
+        let bits: Vec<bool> = [f64::NEG_INFINITY, -1.0, 0.4, 0.5, f64::INFINITY]
+            .iter()
+            .map(|&y| quantizer.encode(y).unwrap())
+            .collect();
+        assert_eq!(bits, [false, true, true, false, false]);
+        assert!(quantizer.encode(f64::NAN).is_err());
+    }
+
+    #[test]
+    fn thresholds_must_increase() {
+        for bad in [
+            vec![],
+            vec![1.0, 1.0],
+            vec![2.0, 1.0],
+            vec![f64::NAN],
+            vec![f64::INFINITY],
+        ] {
+            assert!(BinaryQuantizer::new(bad).is_err());
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn both_probabilities_are_exact_on_their_own(x in -60.0..60.0f64, first in -2.0..2.0f64, gap in 0.01..3.0f64) {
+            let quantizer = BinaryQuantizer::new(vec![first, first + gap]).unwrap();
+            let [p0, p1] = quantizer.probabilities(x, 1.0);
+            prop_assert!((p0 + p1 - 1.0).abs() < 1e-14);
+            let logs = quantizer.log_probabilities(x, 1.0);
+            for (p, log) in [p0, p1].into_iter().zip(logs) {
+                prop_assert!(log.is_finite());
+                if p > 1e-290 {
+                    prop_assert!((p.ln() - log).abs() < 1e-11 * log.abs().max(1.0));
+                }
+            }
+        }
+
+        #[test]
+        fn slope_is_the_derivative(x in -3.0..3.0f64) {
+            let quantizer = BinaryQuantizer::new(vec![-0.7, 0.1, 1.2]).unwrap();
+            let h = 1e-5;
+            let numeric = (quantizer.probabilities(x + h, 0.6)[1] - quantizer.probabilities(x - h, 0.6)[1]) / (2.0 * h);
+            prop_assert!((quantizer.slope(x, 0.6) - numeric).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn information_of_a_sign_is_that_of_a_probit() {
+        let sign = BinaryQuantizer::new(vec![0.0]).unwrap();
+        assert_relative_eq!(sign.fisher_information(0.0, 0.5), 2.0 / std::f64::consts::PI / 0.25, max_relative = 1e-14);
+        assert_eq!(sign.fisher_information(100.0, 0.5), 0.0);
+    }
+}

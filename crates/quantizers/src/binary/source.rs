@@ -1,0 +1,161 @@
+//! The scalar under observation.
+
+use crate::Error;
+use fewbits_core::error::{finite, positive};
+use fewbits_core::normal::pdf;
+use fewbits_core::quadrature::Rule;
+
+/// A Gaussian source is integrated over this many standard deviations to either side; the rest is below `1e-18`.
+const GAUSSIAN_REACH: f64 = 9.0;
+
+/// A zero-mean scalar source `X`, symmetric about zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Source {
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Kind {
+    Uniform { half_width: f64 },
+    Gaussian { std: f64 },
+}
+
+impl Source {
+    /// Uniform on `[-half_width, half_width]`.
+    ///
+    /// # Errors
+    /// If `half_width` is not a finite number above zero.
+    pub fn uniform(half_width: f64) -> Result<Self, Error> {
+        let half_width = positive("half_width", half_width)?;
+        Ok(Self {
+            kind: Kind::Uniform { half_width },
+        })
+    }
+
+    /// `N(0, std^2)`.
+    ///
+    /// # Errors
+    /// If `std` is not a finite number above zero.
+    pub fn gaussian(std: f64) -> Result<Self, Error> {
+        let std = positive("std", std)?;
+        Ok(Self {
+            kind: Kind::Gaussian { std },
+        })
+    }
+
+    pub(crate) fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Variance: `V^2/3` for the uniform source.
+    pub fn variance(&self) -> f64 {
+        match self.kind {
+            Kind::Uniform { half_width } => half_width * half_width / 3.0,
+            Kind::Gaussian { std } => std * std,
+        }
+    }
+
+    /// Density at `x`.
+    pub fn density(&self, x: f64) -> f64 {
+        match self.kind {
+            Kind::Uniform { half_width } if x.abs() <= half_width => 0.5 / half_width,
+            Kind::Uniform { .. } => 0.0,
+            Kind::Gaussian { std } => pdf(x / std) / std,
+        }
+    }
+
+    /// Half the width of the interval that carries the source: `V`, or nine standard deviations.
+    pub fn reach(&self) -> f64 {
+        match self.kind {
+            Kind::Uniform { half_width } => half_width,
+            Kind::Gaussian { std } => GAUSSIAN_REACH * std,
+        }
+    }
+
+    /// Standard deviation of the sensor noise at a signal-to-noise ratio `10 log10(Var X / noise variance)` in dB.
+    ///
+    /// # Errors
+    /// If `snr_db` is not finite or so extreme that the result is not a positive finite number.
+    pub fn noise_std(&self, snr_db: f64) -> Result<f64, Error> {
+        let snr_db = finite("snr_db", snr_db)?;
+        Ok(positive("noise_std", (self.variance() / 10f64.powf(snr_db / 10.0)).sqrt())?)
+    }
+
+    /// Panels no wider than `width`, half of `V`, or one and a half standard deviations of the source.
+    fn panels(&self, from: f64, to: f64, width: f64) -> usize {
+        let widest = match self.kind {
+            Kind::Uniform { half_width } => 0.5 * half_width,
+            Kind::Gaussian { std } => 1.5 * std,
+        };
+        // A noise far below the resolution of any grid must not ask for unbounded memory.
+        (((to - from) / width.min(widest)).ceil() as usize).clamp(1, MAX_PANELS)
+    }
+
+    /// Composite Gauss-Legendre nodes over `[from, to]`, weighted by the density.
+    pub(crate) fn nodes_between(&self, from: f64, to: f64, width: f64, rule: &Rule) -> Nodes {
+        let mut nodes = Nodes::default();
+        nodes.extend(self, from, to, width, rule);
+        nodes
+    }
+
+    /// The same over the whole support.
+    pub(crate) fn nodes(&self, width: f64, rule: &Rule) -> Nodes {
+        self.nodes_between(-self.reach(), self.reach(), width, rule)
+    }
+}
+
+/// Enough for 60 dB at twelve nodes a panel.
+const MAX_PANELS: usize = 200_000;
+
+/// Quadrature nodes `x` and weights `w` with the source density inside: `E[f(X)] = sum w f(x)`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Nodes {
+    pub x: Vec<f64>,
+    pub w: Vec<f64>,
+}
+
+impl Nodes {
+    /// Appends a part of the support.
+    pub fn extend(&mut self, source: &Source, from: f64, to: f64, width: f64, rule: &Rule) {
+        for (x, w) in rule.panels(from, to, source.panels(from, to, width)) {
+            self.x.push(x);
+            self.w.push(w * source.density(x));
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    /// `sum w f(x)`.
+    pub fn expect(&self, f: impl Fn(f64) -> f64) -> f64 {
+        self.x.iter().zip(&self.w).map(|(&x, &w)| w * f(x)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use fewbits_core::quadrature::gauss_legendre;
+
+    #[test]
+    fn nodes_carry_mass_and_variance() {
+        for source in [Source::uniform(1.3).unwrap(), Source::gaussian(0.4).unwrap()] {
+            let nodes = source.nodes(0.2, gauss_legendre::<12>());
+            assert_relative_eq!(nodes.expect(|_| 1.0), 1.0, max_relative = 1e-14);
+            assert_relative_eq!(nodes.expect(|x| x * x), source.variance(), max_relative = 1e-14);
+        }
+    }
+
+    #[test]
+    fn scales_are_checked() {
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Source::uniform(bad).is_err());
+            assert!(Source::gaussian(bad).is_err());
+        }
+        let source = Source::uniform(1.0).unwrap();
+        assert!(source.noise_std(f64::NAN).is_err());
+        assert!(source.noise_std(1e6).is_err());
+    }
+}
