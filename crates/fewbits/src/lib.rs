@@ -25,3 +25,8 @@ pub use fewbits_filters as filters;
 pub use fewbits_models as models;
 #[cfg(feature = "quantizers")]
 pub use fewbits_quantizers as quantizers;
+
+/// The README's program, kept compiling.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
