@@ -29,6 +29,35 @@ pub enum Error {
         /// Entries allowed.
         limit: u64,
     },
+    /// The noise of three sensors or more needs more than one shared factor.
+    #[error(
+        "unsupported correlation: the noise of these {sensors} sensors is not independent noise plus one shared factor"
+    )]
+    UnsupportedCorrelation {
+        /// Number of sensors.
+        sensors: usize,
+    },
+    /// A design drives a cell out of existence: fewer levels serve as well.
+    #[error(
+        "cell {cell} of quantizer {quantizer} vanishes (its probability falls to {probability:e}): design fewer levels"
+    )]
+    VanishingCell {
+        /// Which quantizer of the system.
+        quantizer: usize,
+        /// Which of its cells.
+        cell: usize,
+        /// Its probability when the design stopped.
+        probability: f64,
+    },
+    /// The best cells of a level are not one interval, and a contiguous quantizer was asked for.
+    #[error("the best cells are labelled {labels:?}: no contiguous quantizer is a fixed point here")]
+    NotContiguous {
+        /// Labels of the best cells from left to right.
+        labels: Vec<usize>,
+    },
+    /// Symbols arrived together that cannot do so under the model.
+    #[error("these symbols cannot be received together under the model: nothing follows from them")]
+    ImpossibleOutcome,
     /// A pattern whose bit is the same in every cell tells nothing.
     #[error("the pattern gives the same bit in all {cells} cells: expected at least one 0 and one 1")]
     ConstantPattern {

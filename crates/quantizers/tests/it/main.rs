@@ -4,3 +4,5 @@
 mod assignment;
 mod binary;
 mod bounds;
+mod laws;
+mod mi_fixtures;

@@ -1,0 +1,244 @@
+//! Discrete memoryless channels from quantizer levels to received symbols.
+
+use crate::error::{Error, refuse};
+use crate::labelling::Labelling;
+use fewbits_core::normal;
+
+/// Columns may miss one by this much; they are not renormalised.
+const SUM_TOLERANCE: f64 = 1e-9;
+
+/// `P(received = t | sent = z)`, with any number of outputs: a column-stochastic matrix.
+///
+/// More outputs than inputs describe soft decisions or erasures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    inputs: usize,
+    outputs: usize,
+    /// Row-major, outputs by inputs.
+    transition: Vec<f64>,
+}
+
+impl Channel {
+    /// What is sent is received.
+    ///
+    /// # Errors
+    /// If `levels < 2`.
+    pub fn ideal(levels: usize) -> Result<Self, Error> {
+        Self::from_fn(levels, levels, |t, z| if t == z { 1.0 } else { 0.0 })
+    }
+
+    /// Any column-stochastic matrix, given by rows: `rows[t][z]`.
+    ///
+    /// # Errors
+    /// If the rows differ in length, there are fewer than two columns or no row, an entry is no probability, or a column does
+    /// not sum to 1 within 1e-9.
+    pub fn from_rows(rows: &[Vec<f64>]) -> Result<Self, Error> {
+        let inputs = rows.first().map_or(0, Vec::len);
+        if let Some(t) = rows.iter().position(|r| r.len() != inputs) {
+            return refuse("rows", format!("{} entries in row {t}", rows[t].len()), format!("{inputs} entries"));
+        }
+        Self::from_fn(inputs, rows.len(), |t, z| rows[t][z])
+    }
+
+    fn from_fn(inputs: usize, outputs: usize, p: impl Fn(usize, usize) -> f64) -> Result<Self, Error> {
+        if inputs < 2 {
+            return refuse("levels", inputs, "at least two channel inputs");
+        }
+        if outputs == 0 {
+            return refuse("rows", "empty", "at least one channel output");
+        }
+        let transition: Vec<f64> = (0..outputs)
+            .flat_map(|t| (0..inputs).map(move |z| (t, z)))
+            .map(|(t, z)| p(t, z))
+            .collect();
+        if let Some(at) = transition.iter().position(|p| !(0.0..=1.0).contains(p)) {
+            let place = format!("{} in row {}, column {}", transition[at], at / inputs, at % inputs);
+            return refuse("channel", place, "probabilities in [0, 1]");
+        }
+        for z in 0..inputs {
+            let sum: f64 = (0..outputs).map(|t| transition[t * inputs + z]).sum();
+            if (sum - 1.0).abs() > SUM_TOLERANCE {
+                return refuse("channel", format!("column {z} with sum {sum}"), "columns that sum to 1");
+            }
+        }
+        Ok(Self {
+            inputs,
+            outputs,
+            transition,
+        })
+    }
+
+    /// Each bit of the word is inverted with probability `crossover`, independently.
+    ///
+    /// `C[t, z] = eps^d (1 - eps)^(k - d)`, `d` the Hamming distance of the words. A crossover above 1/2 is a channel below 1/2
+    /// with all received bits complemented; it is accepted as it stands.
+    ///
+    /// # Errors
+    /// If the labelling leaves words unused (use [`Channel::binary_symmetric_with_gaps`]) or `crossover` is not in `[0, 1]`.
+    pub fn binary_symmetric(labelling: &Labelling, crossover: f64) -> Result<Self, Error> {
+        if !labelling.is_complete() {
+            return refuse("levels", labelling.levels(), "a power of two, or `binary_symmetric_with_gaps`");
+        }
+        Self::binary_symmetric_with_gaps(labelling, crossover)
+    }
+
+    /// As [`Channel::binary_symmetric`], for labellings that leave words unused: those are outputs without an input.
+    ///
+    /// # Errors
+    /// If `crossover` is not in `[0, 1]`.
+    pub fn binary_symmetric_with_gaps(labelling: &Labelling, crossover: f64) -> Result<Self, Error> {
+        let eps = fewbits_core::error::within("crossover", crossover, 0.0, 1.0)?;
+        let bits = labelling.bits();
+        Self::from_fn(labelling.levels(), labelling.symbols(), |t, z| {
+            let distance = match (labelling.word(t), labelling.word(z)) {
+                (Some(a), Some(b)) => (a ^ b).count_ones(),
+                _ => bits,
+            };
+            eps.powi(distance as i32) * (1.0 - eps).powi((bits - distance) as i32)
+        })
+    }
+
+    /// The symbol is lost, and known to be lost, with probability `erasure`: output `levels` is the erasure.
+    ///
+    /// # Errors
+    /// If `levels < 2` or `erasure` is not in `[0, 1]`.
+    pub fn symbol_erasure(levels: usize, erasure: f64) -> Result<Self, Error> {
+        fewbits_core::error::within("erasure", erasure, 0.0, 1.0)?;
+        Self::from_fn(levels, levels + 1, |t, z| match t {
+            t if t == levels => erasure,
+            t if t == z => 1.0 - erasure,
+            _ => 0.0,
+        })
+    }
+
+    /// An error with probability `error`, every wrong symbol equally likely (orthogonal signals, hard decision).
+    ///
+    /// # Errors
+    /// If `levels < 2` or `error` is not in `[0, 1]`.
+    pub fn symmetric(levels: usize, error: f64) -> Result<Self, Error> {
+        fewbits_core::error::within("error", error, 0.0, 1.0)?;
+        Self::from_fn(levels, levels, |t, z| {
+            if t == z {
+                1.0 - error
+            } else {
+                error / (levels - 1) as f64
+            }
+        })
+    }
+
+    /// Pulse amplitude modulation with hard decisions: equidistant amplitudes, unit-variance noise, thresholds midway.
+    ///
+    /// Half the distance of two amplitudes is `sqrt(3 snr / (levels^2 - 1))` noise standard deviations, `snr` being mean signal
+    /// power over noise power (10 dB is 10).
+    ///
+    /// # Errors
+    /// If `levels < 2` or `snr` is not a positive number.
+    pub fn pulse_amplitude(levels: usize, snr: f64) -> Result<Self, Error> {
+        fewbits_core::error::positive("snr", snr)?;
+        let half = (3.0 * snr / ((levels * levels) as f64 - 1.0)).sqrt();
+        Self::from_fn(levels, levels, |t, z| {
+            let offset = 2.0 * (t as f64 - z as f64);
+            let lower = if t == 0 {
+                f64::NEG_INFINITY
+            } else {
+                (offset - 1.0) * half
+            };
+            let upper = if t + 1 == levels {
+                f64::INFINITY
+            } else {
+                (offset + 1.0) * half
+            };
+            normal::interval(lower, upper)
+        })
+    }
+
+    /// Levels that can be sent.
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// Symbols that can be received.
+    pub fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    /// `P(received = output | sent = input)`; 0 for symbols there are not.
+    pub fn probability(&self, output: usize, input: usize) -> f64 {
+        if input < self.inputs {
+            self.transition
+                .get(output * self.inputs + input)
+                .copied()
+                .unwrap_or(0.0)
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether the channel is the identity.
+    pub fn is_ideal(&self) -> bool {
+        self.inputs == self.outputs
+            && (0..self.inputs).all(|t| (0..self.inputs).all(|z| self.probability(t, z) == f64::from(u8::from(t == z))))
+    }
+
+    /// This channel followed by `next`.
+    ///
+    /// # Errors
+    /// If `next` does not take this channel's outputs.
+    pub fn then(&self, next: &Self) -> Result<Self, Error> {
+        if next.inputs != self.outputs {
+            return refuse("next", format!("{} inputs", next.inputs), format!("{} inputs", self.outputs));
+        }
+        Self::from_fn(self.inputs, next.outputs, |t, z| {
+            (0..self.outputs)
+                .map(|m| next.probability(t, m) * self.probability(m, z))
+                .sum::<f64>()
+                .min(1.0)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clean_binary_channel_is_the_identity_for_any_labelling() {
+        for labelling in [Labelling::gray(8).unwrap(), Labelling::new(vec![0, 3, 1, 2]).unwrap()] {
+            assert!(Channel::binary_symmetric(&labelling, 0.0).unwrap().is_ideal());
+        }
+    }
+
+    #[test]
+    fn cascades_multiply() {
+        let words = Labelling::natural(4).unwrap();
+        let [once, twice] = [0.1, 2.0 * 0.1 * 0.9].map(|eps| Channel::binary_symmetric(&words, eps).unwrap());
+        let cascade = once.then(&once).unwrap();
+        for (t, z) in [(0, 0), (0, 3), (2, 1)] {
+            assert!((cascade.probability(t, z) - twice.probability(t, z)).abs() < 1e-15);
+        }
+        assert!(once.then(&Channel::ideal(3).unwrap()).is_err());
+    }
+
+    #[test]
+    fn what_is_no_channel_is_refused() {
+        assert!(
+            Channel::from_rows(&[vec![0.5, 1.0], vec![0.4, 0.0]])
+                .unwrap_err()
+                .to_string()
+                .contains("column 0")
+        );
+        assert!(Channel::from_rows(&[vec![1.5, 1.0], vec![-0.5, 0.0]]).is_err());
+        assert!(Channel::from_rows(&[vec![0.5, 1.0], vec![0.5]]).is_err());
+        assert!(Channel::from_rows(&[]).is_err());
+        let three = Labelling::natural(3).unwrap();
+        assert!(
+            Channel::binary_symmetric(&three, 0.1)
+                .unwrap_err()
+                .to_string()
+                .contains("power of two")
+        );
+        assert!(Channel::binary_symmetric(&Labelling::natural(4).unwrap(), -0.1).is_err());
+        assert!(Channel::symbol_erasure(4, f64::NAN).is_err());
+        assert!(Channel::pulse_amplitude(4, 0.0).is_err());
+    }
+}

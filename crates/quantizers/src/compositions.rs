@@ -1,0 +1,190 @@
+//! Count vectors: what a group of identical sensors says, up to who said it.
+//!
+//! The likelihood of `N` identical sensors depends on how many reported each symbol, so `L^N` outcomes collapse to
+//! `C(N + L - 1, L - 1)` count vectors with multinomial coefficients: 220 instead of 262144 for nine sensors of four levels.
+
+/// `C(n, k)`, saturating.
+pub(crate) fn binomial(n: usize, k: usize) -> u64 {
+    let k = k.min(n.saturating_sub(k));
+    let mut value: u128 = 1;
+    for i in 0..k {
+        value = value * (n - i) as u128 / (i + 1) as u128;
+        if value > u128::from(u64::MAX) {
+            return u64::MAX;
+        }
+    }
+    value as u64
+}
+
+/// Number of ways to spread `total` reports over `parts` symbols.
+pub(crate) fn count(total: usize, parts: usize) -> u64 {
+    if parts == 0 {
+        u64::from(total == 0)
+    } else {
+        binomial(total + parts - 1, parts - 1)
+    }
+}
+
+/// All count vectors of `0..=total` reports, level by level, in decreasing lexicographic order.
+#[derive(Debug, Clone)]
+pub(crate) struct Compositions {
+    total: usize,
+    parts: usize,
+    /// `up[m][r * parts + t]`: rank at level `m + 1` of vector `r` of level `m` with one more report of `t`.
+    up: Vec<Vec<usize>>,
+    steps: Vec<Vec<Step>>,
+    /// Log multinomial coefficients of the top level.
+    log_multiplicity: Vec<f64>,
+    /// The top level's vectors.
+    vectors: Vec<Vec<usize>>,
+}
+
+impl Compositions {
+    pub(crate) fn new(total: usize, parts: usize) -> Self {
+        let mut up = Vec::with_capacity(total);
+        let mut steps = Vec::with_capacity(total);
+        let mut vectors = vec![vec![0; parts]];
+        for m in 0..total {
+            let mut ranks = Vec::with_capacity(vectors.len() * parts);
+            let mut next = vec![Vec::new(); count(m + 1, parts) as usize];
+            let mut step = vec![Step::default(); next.len()];
+            for (from, vector) in vectors.iter().enumerate() {
+                for t in 0..parts {
+                    let mut raised = vector.clone();
+                    raised[t] += 1;
+                    let at = rank(&raised);
+                    ranks.push(at);
+                    step[at] = Step {
+                        from,
+                        symbol: t,
+                        factor: (m + 1) as f64 / raised[t] as f64,
+                    };
+                    next[at] = raised;
+                }
+            }
+            up.push(ranks);
+            steps.push(step);
+            vectors = next;
+        }
+        let ln_factorial = |n: usize| (2..=n).map(|i| (i as f64).ln()).sum::<f64>();
+        let log_multiplicity = vectors
+            .iter()
+            .map(|v| ln_factorial(total) - v.iter().map(|n| ln_factorial(*n)).sum::<f64>())
+            .collect();
+        Self {
+            total,
+            parts,
+            up,
+            steps,
+            log_multiplicity,
+            vectors,
+        }
+    }
+
+    pub(crate) fn total(&self) -> usize {
+        self.total
+    }
+
+    pub(crate) fn parts(&self) -> usize {
+        self.parts
+    }
+
+    /// Number of vectors of the top level.
+    pub(crate) fn len(&self) -> usize {
+        self.vectors.len()
+    }
+
+    /// Number of vectors with `missing` reports fewer than the total.
+    pub(crate) fn len_below(&self, missing: usize) -> usize {
+        count(self.total - missing, self.parts) as usize
+    }
+
+    /// Ranks one level up from the level with `missing` reports fewer than the total.
+    pub(crate) fn up(&self, missing: usize) -> &[usize] {
+        &self.up[self.total - missing]
+    }
+
+    pub(crate) fn log_multiplicity(&self) -> &[f64] {
+        &self.log_multiplicity
+    }
+
+    #[cfg(test)]
+    fn vectors(&self) -> &[Vec<usize>] {
+        &self.vectors
+    }
+
+    /// Multinomial probabilities at every node; `symbol[t * nodes + i]` is the probability of symbol `t` at node `i`.
+    ///
+    /// From `R_m(n) = (m / n_t) P_t R_{m-1}(n - e_t)`, any `t` that occurs. Returns the tables of `total`, `total - 1` and
+    /// `total - 2` reports, the last two as far as they exist.
+    pub(crate) fn probabilities(&self, symbol: &[f64], nodes: usize) -> Vec<Vec<f64>> {
+        let mut levels = vec![vec![1.0; nodes]];
+        for steps in &self.steps {
+            let below = &levels[levels.len() - 1];
+            let mut table = Vec::with_capacity(steps.len() * nodes);
+            for step in steps {
+                let from = &below[step.from * nodes..(step.from + 1) * nodes];
+                let p = &symbol[step.symbol * nodes..(step.symbol + 1) * nodes];
+                table.extend(from.iter().zip(p).map(|(from, p)| step.factor * p * from));
+            }
+            levels.push(table);
+            if levels.len() > 3 {
+                levels.remove(0);
+            }
+        }
+        levels.reverse();
+        levels
+    }
+}
+
+/// How a multinomial probability follows from one with a report fewer.
+#[derive(Debug, Clone, Copy, Default)]
+struct Step {
+    from: usize,
+    symbol: usize,
+    factor: f64,
+}
+
+/// Position of a count vector among those of its sum and length, in decreasing lexicographic order.
+pub(crate) fn rank(vector: &[usize]) -> usize {
+    let mut left: usize = vector.iter().sum();
+    let mut rank = 0;
+    for (i, n) in vector.iter().enumerate() {
+        let after = vector.len() - i - 1;
+        if left > *n && after > 0 {
+            rank += count(left - n - 1, after + 1) as usize;
+        }
+        left -= n;
+    }
+    rank
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_number_the_vectors_in_order() {
+        let all = Compositions::new(4, 3);
+        assert_eq!(all.len(), 15);
+        for (i, v) in all.vectors().iter().enumerate() {
+            assert_eq!(rank(v), i);
+            assert_eq!(v.iter().sum::<usize>(), 4);
+        }
+        assert!(all.vectors().windows(2).all(|w| w[0] > w[1]));
+        let sum: f64 = all.log_multiplicity().iter().map(|l| l.exp()).sum();
+        assert!((sum - 81.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn probabilities_are_multinomial() {
+        let all = Compositions::new(5, 3);
+        let p = [0.2, 0.3, 0.5];
+        let levels = all.probabilities(&p, 1);
+        assert_eq!(levels.iter().map(Vec::len).collect::<Vec<_>>(), [21, 15, 10]);
+        for ((v, q), l) in all.vectors().iter().zip(&levels[0]).zip(all.log_multiplicity()) {
+            let direct: f64 = v.iter().zip(&p).map(|(n, p)| p.powi(*n as i32)).product();
+            assert!((q - l.exp() * direct).abs() < 1e-15);
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! What a design is good for, as a sum over joint outcomes.
+
+use crate::error::{Error, refuse};
+use crate::scene::{Feature, Scene};
+
+/// Below this a probability counts as zero inside a logarithm.
+pub(crate) const LOG_FLOOR: f64 = 1e-300;
+
+/// The figure of merit of a system of quantizers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Criterion {
+    /// `I(X; T)` in nats, to be maximised.
+    MutualInformation,
+    /// `E (X - E[X | T])^2`, to be minimised.
+    MeanSquaredError,
+    /// Error probability of the maximum a posteriori decision, to be minimised; for finite priors.
+    BayesError,
+}
+
+impl Criterion {
+    /// `+1` if larger is better, `-1` if smaller is.
+    pub fn sense(self) -> f64 {
+        match self {
+            Self::MutualInformation => 1.0,
+            Self::MeanSquaredError | Self::BayesError => -1.0,
+        }
+    }
+}
+
+/// A criterion in the scene where it is evaluated.
+///
+/// Every criterion is `constant + sense * sum_outcomes psi(m)` where `m` are a few moments of the outcome's likelihood:
+///
+/// | criterion | moments | `psi` |
+/// |---|---|---|
+/// | information, independent noise | `Q = sum w q` | `-Q ln Q`; the conditional entropy is a sum over sensors |
+/// | information, shared noise | `q_k`, each value of `X` | `sum w q ln(q / Q)` |
+/// | squared error | `Q`, `M = sum w x q` | `M^2 / Q`, subtracted from `E X^2` |
+/// | Bayes error | `q_k` | `-(sum_k w q - max_k w q)` |
+#[derive(Debug, Clone)]
+pub(crate) struct Scored {
+    kind: Kind,
+    features: Vec<Feature>,
+    weights: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Entropy,
+    Information,
+    Explained,
+    Decision,
+}
+
+impl Scored {
+    pub(crate) fn new(criterion: Criterion, scene: &Scene) -> Result<Self, Error> {
+        let (kind, features) = match criterion {
+            Criterion::MutualInformation if scene.is_independent() => (Kind::Entropy, vec![scene.mass.clone()]),
+            Criterion::MutualInformation => (Kind::Information, scene.given.clone()),
+            Criterion::MeanSquaredError => (Kind::Explained, vec![scene.mass.clone(), scene.moment.clone()]),
+            Criterion::BayesError if scene.is_discrete() => (Kind::Decision, scene.given.clone()),
+            Criterion::BayesError => {
+                return refuse("prior", "a continuous prior", "a discrete prior for a Bayes error");
+            }
+        };
+        Ok(Self {
+            kind,
+            features,
+            weights: scene.weights.clone(),
+        })
+    }
+
+    pub(crate) fn features(&self) -> &[Feature] {
+        &self.features
+    }
+
+    /// Whether the conditional entropy of the symbols must be subtracted, sensor by sensor.
+    pub(crate) fn has_separable_entropy(&self) -> bool {
+        self.kind == Kind::Entropy
+    }
+
+    /// `psi` of one outcome that stands for `exp(log_multiplicity)` equally likely ones.
+    pub(crate) fn value(&self, m: &[f64], log_multiplicity: f64) -> f64 {
+        match self.kind {
+            Kind::Entropy if m[0] > 0.0 => -m[0] * (m[0].max(LOG_FLOOR).ln() - log_multiplicity),
+            Kind::Explained if m[0] > 0.0 => m[1] * (m[1] / m[0]),
+            Kind::Entropy | Kind::Explained => 0.0,
+            Kind::Information => {
+                let total = self.total(m);
+                self.weights
+                    .iter()
+                    .zip(m)
+                    .filter(|(w, q)| **w > 0.0 && **q > 0.0)
+                    .map(|(w, q)| w * q * (q.max(LOG_FLOOR) / total.max(LOG_FLOOR)).ln())
+                    .sum()
+            }
+            Kind::Decision => {
+                let best = self.best(m);
+                -self
+                    .weights
+                    .iter()
+                    .zip(m)
+                    .enumerate()
+                    .filter(|(k, _)| *k != best)
+                    .map(|(_, (w, q))| w * q)
+                    .sum::<f64>()
+            }
+        }
+    }
+
+    /// Derivatives of `psi` with respect to the moments.
+    pub(crate) fn slope(&self, m: &[f64], log_multiplicity: f64, out: &mut [f64]) {
+        match self.kind {
+            Kind::Entropy => out[0] = log_multiplicity - m[0].max(LOG_FLOOR).ln() - 1.0,
+            Kind::Explained => {
+                let r = if m[0] > 0.0 { m[1] / m[0] } else { 0.0 };
+                out[0] = -r * r;
+                out[1] = 2.0 * r;
+            }
+            Kind::Information => {
+                let total = self.total(m).max(LOG_FLOOR);
+                for ((o, w), q) in out.iter_mut().zip(&self.weights).zip(m) {
+                    *o = w * (q.max(LOG_FLOOR) / total).ln();
+                }
+            }
+            Kind::Decision => {
+                let best = self.best(m);
+                for (k, (o, w)) in out.iter_mut().zip(&self.weights).enumerate() {
+                    *o = if k == best { 0.0 } else { -w };
+                }
+            }
+        }
+    }
+
+    /// The matrix of second derivatives of `psi`, applied to `direction`.
+    pub(crate) fn curvature(&self, m: &[f64], direction: &[f64], out: &mut [f64]) {
+        match self.kind {
+            Kind::Entropy => out[0] = if m[0] > 0.0 { -direction[0] / m[0] } else { 0.0 },
+            Kind::Explained => {
+                if m[0] > 0.0 {
+                    let r = m[1] / m[0];
+                    let bend = 2.0 * (direction[1] - r * direction[0]) / m[0];
+                    out[0] = -r * bend;
+                    out[1] = bend;
+                } else {
+                    out.fill(0.0);
+                }
+            }
+            Kind::Information => {
+                let total = self.total(m);
+                let change = self.total(direction);
+                let shared = if total > 0.0 { change / total } else { 0.0 };
+                for (((o, w), q), d) in out.iter_mut().zip(&self.weights).zip(m).zip(direction) {
+                    *o = if *q > LOG_FLOOR { w * (d / q - shared) } else { 0.0 };
+                }
+            }
+            Kind::Decision => out.fill(0.0),
+        }
+    }
+
+    fn total(&self, q: &[f64]) -> f64 {
+        self.weights.iter().zip(q).map(|(w, q)| w * q).sum()
+    }
+
+    fn best(&self, q: &[f64]) -> usize {
+        crate::table::most_probable(&self.weights, q)
+    }
+}

@@ -1,0 +1,45 @@
+//! Where identical quantizers stop being a local optimum.
+
+use crate::criterion::Criterion;
+use crate::error::{Error, refuse};
+use crate::system::System;
+use nalgebra::SymmetricEigen;
+
+/// Bisections: enough to exhaust the precision of the bracket.
+const BISECTIONS: usize = 60;
+
+/// The parameter between `low` and `high` at which the largest curvature of `criterion` changes its sign.
+///
+/// `family(parameter)` is a system at a stationary point of the criterion, such as two sign quantizers at zero in noise of
+/// that standard deviation; beyond the returned parameter some asymmetric change improves it.
+///
+/// # Errors
+/// [`Error::Argument`] if the curvature has the same sign at both ends; whatever `family` raises.
+pub fn symmetry_breaking(
+    mut low: f64,
+    mut high: f64,
+    criterion: Criterion,
+    family: impl Fn(f64) -> Result<System, Error>,
+) -> Result<f64, Error> {
+    let curvature = |parameter: f64| -> Result<f64, Error> {
+        let found = family(parameter)?.derivatives(criterion)?;
+        Ok(SymmetricEigen::new(found.hessian * criterion.sense()).eigenvalues.max())
+    };
+    let positive_at_low = curvature(low)? > 0.0;
+    if positive_at_low == (curvature(high)? > 0.0) {
+        return refuse(
+            "range",
+            format!("[{low}, {high}]"),
+            "ends between which the symmetric design loses its optimality",
+        );
+    }
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if (curvature(middle)? > 0.0) == positive_at_low {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Ok(0.5 * (low + high))
+}

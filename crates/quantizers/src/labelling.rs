@@ -1,0 +1,202 @@
+//! Which binary word stands for which level, and the message that carries it.
+
+use crate::error::{Error, refuse};
+use crate::quantizer::Quantizer;
+use fewbits_core::bits::{BitReader, BitWriter, CodecError};
+use fewbits_core::message::{Encoder, Message};
+
+/// Longest word.
+pub const MAX_WORD_BITS: u32 = 16;
+
+/// An injective map from levels to words of a fixed number of bits.
+///
+/// Words that no level uses can still be received over a noisy link. They are given the symbol numbers behind the levels, in
+/// increasing order of the word, so that every received word is one symbol in `0..2^bits`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Labelling {
+    bits: u32,
+    levels: usize,
+    /// Word of each symbol, levels first.
+    words: Vec<u32>,
+    /// Symbol of each word.
+    symbols: Vec<u32>,
+}
+
+impl Labelling {
+    /// Level `z` is sent as the number `z` in `ceil(log2 levels)` bits.
+    ///
+    /// # Errors
+    /// Unless `levels` is in `2..=65536`.
+    pub fn natural(levels: usize) -> Result<Self, Error> {
+        Self::with_words(word_bits(levels)?, (0..levels as u32).collect())
+    }
+
+    /// Level `z` is sent as `z ^ (z >> 1)`: neighbours differ in one bit.
+    ///
+    /// # Errors
+    /// Unless `levels` is in `2..=65536`.
+    pub fn gray(levels: usize) -> Result<Self, Error> {
+        Self::with_words(word_bits(levels)?, (0..levels as u32).map(|z| z ^ (z >> 1)).collect())
+    }
+
+    /// Level `z` is sent as `words[z]` in the fewest bits that number the levels.
+    ///
+    /// # Errors
+    /// As [`Labelling::with_words`].
+    pub fn new(words: Vec<u32>) -> Result<Self, Error> {
+        Self::with_words(word_bits(words.len())?, words)
+    }
+
+    /// Level `z` is sent as `words[z]` in `bits` bits.
+    ///
+    /// # Errors
+    /// If `bits` is not in `1..=16`, there are fewer than two words, one does not fit, or two are equal.
+    pub fn with_words(bits: u32, mut words: Vec<u32>) -> Result<Self, Error> {
+        if !(1..=MAX_WORD_BITS).contains(&bits) {
+            return refuse("bits", bits, format!("a word length from 1 to {MAX_WORD_BITS}"));
+        }
+        let levels = words.len();
+        if levels < 2 {
+            return refuse("words", format!("{levels} words"), "at least two words");
+        }
+        let mut symbols = vec![u32::MAX; 1 << bits];
+        for (symbol, word) in words.iter().enumerate() {
+            match symbols.get_mut(*word as usize) {
+                Some(slot) if *slot == u32::MAX => *slot = symbol as u32,
+                Some(_) => return refuse("words", format!("{word} twice"), "a permutation: every word at most once"),
+                None => return refuse("words", word, format!("words below 2^{bits}")),
+            }
+        }
+        for (word, slot) in symbols.iter_mut().enumerate() {
+            if *slot == u32::MAX {
+                *slot = words.len() as u32;
+                words.push(word as u32);
+            }
+        }
+        Ok(Self {
+            bits,
+            levels,
+            words,
+            symbols,
+        })
+    }
+
+    /// Bits a word.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// Levels that can be sent.
+    pub fn levels(&self) -> usize {
+        self.levels
+    }
+
+    /// Symbols that can be received, `2^bits`; those from `levels` up belong to words never sent.
+    pub fn symbols(&self) -> usize {
+        self.words.len()
+    }
+
+    /// Whether every word is used.
+    pub fn is_complete(&self) -> bool {
+        self.levels == self.words.len()
+    }
+
+    /// Word of symbol `symbol`, if there is one.
+    pub fn word(&self, symbol: usize) -> Option<u32> {
+        self.words.get(symbol).copied()
+    }
+
+    /// Symbol of a received word; bits above the word length are ignored.
+    pub fn symbol(&self, word: u32) -> usize {
+        self.symbols[word as usize & (self.symbols.len() - 1)] as usize
+    }
+}
+
+fn word_bits(levels: usize) -> Result<u32, Error> {
+    if !(2..=1 << MAX_WORD_BITS).contains(&levels) {
+        return refuse("levels", levels, format!("2 to {} levels", 1 << MAX_WORD_BITS));
+    }
+    Ok(usize::BITS - (levels - 1).leading_zeros())
+}
+
+/// A quantizer level on its way, or the symbol that was received.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Symbol(pub usize);
+
+impl Message for Symbol {
+    type Format = Labelling;
+
+    fn encode(&self, labelling: &Labelling, writer: &mut BitWriter) -> Result<(), CodecError> {
+        let word = labelling.word(self.0).ok_or_else(|| CodecError::Invalid {
+            what: "symbol",
+            value: self.0.to_string(),
+            expected: "a symbol of the labelling",
+        })?;
+        writer.write(u64::from(word), labelling.bits)
+    }
+
+    fn decode(labelling: &Labelling, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        Ok(Self(labelling.symbol(reader.read(labelling.bits)? as u32)))
+    }
+}
+
+/// The sensor's half: sample in, level out.
+impl Encoder for Quantizer {
+    type Measurement = f64;
+    type Feedback = ();
+    type Message = Symbol;
+
+    #[inline]
+    fn encode(&self, measurement: &f64, (): &()) -> Symbol {
+        Symbol(self.encode(*measurement))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fewbits_core::message::laws;
+
+    #[test]
+    fn every_symbol_survives_its_bits() {
+        for labelling in [
+            Labelling::natural(5).unwrap(),
+            Labelling::gray(8).unwrap(),
+            Labelling::new(vec![0, 3, 1, 2]).unwrap(),
+            Labelling::with_words(2, vec![0, 1, 3]).unwrap(),
+        ] {
+            for symbol in 0..labelling.symbols() {
+                assert_eq!(laws::round_trip(&Symbol(symbol), &labelling), Ok(labelling.bits() as usize));
+            }
+            assert!(Symbol(labelling.symbols()).to_bits(&labelling).is_err());
+        }
+    }
+
+    #[test]
+    fn neighbours_in_gray_code_differ_in_one_bit() {
+        let gray = Labelling::gray(16).unwrap();
+        for z in 0..15 {
+            assert_eq!((gray.word(z).unwrap() ^ gray.word(z + 1).unwrap()).count_ones(), 1);
+        }
+    }
+
+    #[test]
+    fn unused_words_come_behind_the_levels() {
+        let three = Labelling::with_words(2, vec![0, 1, 3]).unwrap();
+        assert_eq!((three.levels(), three.symbols(), three.symbol(2), three.symbol(3)), (3, 4, 3, 2));
+        assert!(!three.is_complete());
+    }
+
+    #[test]
+    fn bad_words_are_refused() {
+        assert!(
+            Labelling::new(vec![0, 1, 1, 2])
+                .unwrap_err()
+                .to_string()
+                .contains("permutation")
+        );
+        assert!(Labelling::new(vec![0, 4, 1, 2]).is_err());
+        assert!(Labelling::natural(1).is_err());
+        assert!(Labelling::with_words(17, vec![0, 1]).is_err());
+    }
+}

@@ -1,0 +1,95 @@
+//! Sums over nodes of products of per-group tables: where all the time is spent.
+
+use crate::scene::Feature;
+
+/// Functions on the nodes, one a row.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Table {
+    pub(crate) values: Vec<f64>,
+    pub(crate) nodes: usize,
+}
+
+impl Table {
+    pub(crate) fn new(values: Vec<f64>, nodes: usize) -> Self {
+        Self { values, nodes }
+    }
+
+    pub(crate) fn rows(&self) -> usize {
+        self.values.len() / self.nodes
+    }
+
+    pub(crate) fn row(&self, r: usize) -> &[f64] {
+        &self.values[r * self.nodes..(r + 1) * self.nodes]
+    }
+
+    /// All products of a row of `self` with a row of `other`, the latter running faster.
+    pub(crate) fn outer(&self, other: &Self) -> Self {
+        let mut values = Vec::with_capacity(self.values.len() * other.rows());
+        for a in 0..self.rows() {
+            for b in 0..other.rows() {
+                values.extend(self.row(a).iter().zip(other.row(b)).map(|(x, y)| x * y));
+            }
+        }
+        Self::new(values, self.nodes)
+    }
+}
+
+/// Inner product with four independent sums, so that it vectorises.
+#[inline]
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a4.zip(b4) {
+        for i in 0..4 {
+            sums[i] += x[i] * y[i];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+/// `sum_node feature(node) prod_g table_g[r_g](node)` for every choice of one row a table and every feature.
+///
+/// Layout of the result: rows of the first table slowest, features fastest.
+pub(crate) fn moments(tables: &[&Table], features: &[Feature]) -> Vec<f64> {
+    let combinations: usize = tables.iter().map(|t| t.rows()).product();
+    let mut out = Vec::with_capacity(combinations * features.len());
+    if let Some((last, first)) = tables.split_last() {
+        let ones = vec![1.0; last.nodes];
+        let mut weighted = vec![0.0; last.nodes];
+        descend(first, last, features, &ones, &mut weighted, &mut out);
+    }
+    out
+}
+
+fn descend(
+    first: &[&Table],
+    last: &Table,
+    features: &[Feature],
+    prefix: &[f64],
+    weighted: &mut [f64],
+    out: &mut Vec<f64>,
+) {
+    if let Some((table, rest)) = first.split_first() {
+        let mut product = vec![0.0; prefix.len()];
+        for r in 0..table.rows() {
+            for ((p, x), y) in product.iter_mut().zip(prefix).zip(table.row(r)) {
+                *p = x * y;
+            }
+            descend(rest, last, features, &product, weighted, out);
+        }
+        return;
+    }
+    let base = out.len();
+    out.resize(base + last.rows() * features.len(), 0.0);
+    for (f, feature) in features.iter().enumerate() {
+        let range = feature.start..feature.start + feature.weights.len();
+        let weighted = &mut weighted[range.clone()];
+        for ((w, x), y) in weighted.iter_mut().zip(&prefix[range.clone()]).zip(&feature.weights) {
+            *w = x * y;
+        }
+        for r in 0..last.rows() {
+            out[base + r * features.len() + f] = dot(weighted, &last.row(r)[range.clone()]);
+        }
+    }
+}

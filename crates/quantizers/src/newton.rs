@@ -1,0 +1,193 @@
+//! Newton's method with a spectrally modified Hessian, for breakpoints that must stay in order.
+
+use crate::error::Error;
+use crate::system::Derivatives;
+use nalgebra::{DVector, SymmetricEigen};
+
+/// Curvatures smaller than this share of the largest are replaced by it, so that flat directions take finite steps.
+const CURVATURE_FLOOR: f64 = 1e-10;
+/// A step may lower the objective by this, relative to its size: rounding.
+const SLACK: f64 = 1e-15;
+/// Where the predicted gain is below this, relative to the objective, rounding hides it: Newton's quadratic convergence is
+/// trusted and the objective not consulted.
+const HIDDEN_GAIN: f64 = 1e-13;
+/// A Hessian eigenvalue above this marks a saddle.
+pub const SADDLE: f64 = 1e-8;
+
+/// Stopping and safeguards of a Newton design.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Newton {
+    /// Most iterations, escapes from saddles included.
+    pub max_iterations: usize,
+    /// The iteration ends when no breakpoint moves by more than this times the scale.
+    pub tolerance: f64,
+    /// No breakpoint moves by more than this times the scale at once.
+    pub max_step: f64,
+    /// On arriving at a saddle, step off along its direction of ascent and go on. Without this a symmetric start stays
+    /// symmetric, and the saddle is returned with its positive curvature.
+    pub escape_saddles: bool,
+}
+
+impl Default for Newton {
+    fn default() -> Self {
+        Self {
+            max_iterations: 300,
+            tolerance: 1e-13,
+            max_step: 0.3,
+            escape_saddles: true,
+        }
+    }
+}
+
+impl Newton {
+    /// Stays at the stationary point that the start leads to, be it a saddle.
+    pub fn to_nearest_stationary_point() -> Self {
+        Self {
+            escape_saddles: false,
+            ..Self::default()
+        }
+    }
+}
+
+/// What is maximised.
+pub(crate) trait Objective {
+    fn value(&self, b: &[f64]) -> f64;
+    fn derivatives(&self, b: &[f64]) -> Derivatives;
+    /// Lengths of the runs of `b` that must be increasing.
+    fn blocks(&self) -> Vec<usize>;
+}
+
+impl Objective for crate::problem::Problem<'_> {
+    fn value(&self, b: &[f64]) -> f64 {
+        self.value(b)
+    }
+
+    fn derivatives(&self, b: &[f64]) -> Derivatives {
+        self.derivatives(b)
+    }
+
+    fn blocks(&self) -> Vec<usize> {
+        self.blocks()
+    }
+}
+
+/// Where Newton's method ended.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stationary {
+    pub(crate) point: Vec<f64>,
+    pub(crate) value: f64,
+    pub(crate) largest_curvature: f64,
+    pub(crate) iterations: usize,
+    pub(crate) evaluations: usize,
+}
+
+/// Climbs from `start`.
+///
+/// ```text
+/// repeat
+///     g, H     <- gradient and Hessian at b;  H = V diag(lambda) V'
+///     step     <- V diag(1 / max(|lambda|, 1e-10 max |lambda|)) V' g       # ascent even where H is not negative definite
+///     shorten so that no entry exceeds max_step
+///     halve until b + step is in order and the objective does not fall
+///     b        <- b + step
+/// until |step| <= tolerance; at a saddle step off along the top eigenvector and go on
+/// ```
+pub(crate) fn climb(
+    objective: &impl Objective,
+    start: &[f64],
+    scale: f64,
+    newton: &Newton,
+) -> Result<Stationary, Error> {
+    let blocks = objective.blocks();
+    let mut b = start.to_vec();
+    let mut evaluations = 0;
+    let mut last_step = f64::INFINITY;
+    let mut escapes = 0;
+    for iteration in 1..=newton.max_iterations {
+        let here = objective.derivatives(&b);
+        evaluations += 1;
+        let eigen = SymmetricEigen::new(here.hessian);
+        let along = eigen.eigenvectors.transpose() * &here.gradient;
+        let floor = (CURVATURE_FLOOR * eigen.eigenvalues.amax()).max(f64::MIN_POSITIVE);
+        let shares = along.zip_map(&eigen.eigenvalues, |g, lambda| g / lambda.abs().max(floor));
+        let predicted_gain = 0.5 * along.dot(&shares);
+        let mut step: DVector<f64> = &eigen.eigenvectors * shares;
+        if step.iter().any(|s| !s.is_finite()) {
+            break;
+        }
+        let longest = step.amax();
+        if longest > newton.max_step * scale {
+            step *= newton.max_step * scale / longest;
+        }
+        let trusted = longest <= 1e-3 * scale && predicted_gain <= HIDDEN_GAIN * here.value.abs().max(1.0);
+        // Rounding in the gradient stops the quadratic decrease before any fixed tolerance on flat objectives.
+        let arrived = longest <= newton.tolerance * scale || (trusted && longest >= 0.5 * last_step);
+        if arrived {
+            let largest_curvature = eigen.eigenvalues.max();
+            if newton.escape_saddles && largest_curvature > SADDLE && escapes < 20 {
+                escapes += 1;
+                last_step = f64::INFINITY;
+                let top = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+                let off = top * (0.05 * scale / top.amax());
+                b = shifted(&b, &off.into_owned(), &blocks);
+                continue;
+            }
+            return Ok(Stationary {
+                point: b,
+                value: here.value,
+                largest_curvature,
+                iterations: iteration,
+                evaluations,
+            });
+        }
+        last_step = longest;
+        let floor = here.value - SLACK * here.value.abs().max(1.0);
+        let mut share = 1.0;
+        b = loop {
+            let trial: Vec<f64> = b.iter().zip(step.iter()).map(|(b, s)| b + share * s).collect();
+            if in_order(&trial, &blocks) {
+                if trusted {
+                    break trial;
+                }
+                evaluations += 1;
+                if objective.value(&trial) >= floor {
+                    break trial;
+                }
+            }
+            share *= 0.5;
+            if share < 1e-14 {
+                return Err(Error::NotConverged {
+                    algorithm: "Newton",
+                    iterations: iteration,
+                    change: longest,
+                });
+            }
+        };
+    }
+    Err(Error::NotConverged {
+        algorithm: "Newton",
+        iterations: newton.max_iterations,
+        change: last_step,
+    })
+}
+
+/// `b + off`, halved until in order.
+fn shifted(b: &[f64], off: &DVector<f64>, blocks: &[usize]) -> Vec<f64> {
+    let mut share = 1.0;
+    loop {
+        let trial: Vec<f64> = b.iter().zip(off.iter()).map(|(b, s)| b + share * s).collect();
+        if in_order(&trial, blocks) || share < 1e-12 {
+            return trial;
+        }
+        share *= 0.5;
+    }
+}
+
+fn in_order(b: &[f64], blocks: &[usize]) -> bool {
+    let mut rest = b;
+    blocks.iter().all(|n| {
+        let (head, tail) = rest.split_at(*n);
+        rest = tail;
+        head.iter().all(|x| x.is_finite()) && head.windows(2).all(|w| w[0] < w[1])
+    })
+}

@@ -1,0 +1,180 @@
+//! The joint outcome table of a system, for inspection and for decisions.
+
+use crate::compositions::rank;
+use crate::error::{Error, refuse};
+use crate::problem::Reports;
+use crate::scene::Scene;
+use crate::system::System;
+
+/// Most entries of a table (outcomes times values of the unknown).
+const ENTRY_LIMIT: u64 = 1 << 25;
+
+/// Index of the largest `w_k q_k`; the first on ties.
+pub(crate) fn most_probable(weights: &[f64], q: &[f64]) -> usize {
+    let mut best = 0;
+    for k in 1..q.len() {
+        if weights[k] * q[k] > weights[best] * q[best] {
+            best = k;
+        }
+    }
+    best
+}
+
+/// Where a joint report stands in the tables of a system: counts within groups, groups in order.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Layout {
+    groups: Vec<(Vec<usize>, usize, usize)>,
+    sensors: usize,
+}
+
+impl Layout {
+    pub(crate) fn new(system: &System) -> Self {
+        let groups = system.groups();
+        let entries = groups
+            .iter()
+            .map(|g| (g.sensors().to_vec(), g.channel().outputs(), g.outcomes() as usize));
+        Self {
+            groups: entries.collect(),
+            sensors: system.scene().sensors(),
+        }
+    }
+
+    /// Number of the outcome in which sensor `n` was heard as `symbols[n]`.
+    pub(crate) fn index(&self, symbols: &[usize]) -> Result<usize, Error> {
+        if symbols.len() != self.sensors {
+            return refuse("symbols", format!("{} symbols", symbols.len()), format!("one a sensor, {}", self.sensors));
+        }
+        let mut index = 0;
+        for (sensors, outputs, size) in &self.groups {
+            let mut counts = [0; 64];
+            let mut large;
+            let counts: &mut [usize] = if *outputs <= counts.len() {
+                &mut counts[..*outputs]
+            } else {
+                large = vec![0; *outputs];
+                &mut large
+            };
+            for n in sensors {
+                match counts.get_mut(symbols[*n]) {
+                    Some(count) => *count += 1,
+                    None => return refuse("symbol", symbols[*n], format!("a number below {outputs}")),
+                }
+            }
+            index = index * size + rank(counts);
+        }
+        Ok(index)
+    }
+}
+
+/// `P(outcome | x)` for every joint outcome, up to permutations within groups, and every value of the unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointTable {
+    layout: Layout,
+    scene: Scene,
+    /// Outcomes by values.
+    likelihood: Vec<f64>,
+    log_multiplicity: Vec<f64>,
+}
+
+impl JointTable {
+    /// Tabulates a system.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] beyond the system's outcome limit or 33 million entries.
+    pub fn new(system: &System) -> Result<Self, Error> {
+        let needed = system.outcomes().saturating_mul(system.scene().values().len() as u64);
+        if needed > ENTRY_LIMIT {
+            return Err(Error::TooLarge {
+                table: "joint outcome table",
+                needed,
+                limit: ENTRY_LIMIT,
+            });
+        }
+        let reports = Reports::of(system)?;
+        Ok(Self {
+            layout: Layout::new(system),
+            scene: system.scene().clone(),
+            likelihood: reports.moments(&system.scene().given),
+            log_multiplicity: reports.log_multiplicity,
+        })
+    }
+
+    /// Number of outcomes.
+    pub fn outcomes(&self) -> usize {
+        self.log_multiplicity.len()
+    }
+
+    /// Values of the unknown, the columns of the table.
+    pub fn values(&self) -> &[f64] {
+        self.scene.values()
+    }
+
+    /// Outcome in which sensor `n` was heard as symbol `symbols[n]`.
+    ///
+    /// # Errors
+    /// If there is not one symbol a sensor, or one is out of range.
+    pub fn outcome(&self, symbols: &[usize]) -> Result<usize, Error> {
+        self.layout.index(symbols)
+    }
+
+    /// `P(outcome | x_k)` for all `k`; sums to 1 over outcomes. Sensors of a group are not told apart: divide by the
+    /// [`multiplicity`](Self::multiplicity) for one particular report.
+    pub fn likelihood(&self, outcome: usize) -> &[f64] {
+        let values = self.scene.values().len();
+        self.likelihood
+            .get(outcome * values..(outcome + 1) * values)
+            .unwrap_or_default()
+    }
+
+    /// Number of reports of individual sensors that make up the outcome.
+    pub fn multiplicity(&self, outcome: usize) -> f64 {
+        self.log_multiplicity.get(outcome).map_or(0.0, |l| l.exp().round())
+    }
+
+    /// Prior probability of an outcome.
+    pub fn probability(&self, outcome: usize) -> f64 {
+        self.scene
+            .weights()
+            .iter()
+            .zip(self.likelihood(outcome))
+            .map(|(w, q)| w * q)
+            .sum()
+    }
+
+    /// Maximum a posteriori value of the unknown, as an index into [`values`](Self::values); the first on ties.
+    pub fn decide(&self, outcome: usize) -> usize {
+        most_probable(self.scene.weights(), self.likelihood(outcome))
+    }
+
+    /// Entropy of the unknown given the outcome, `H(X | T)` in nats, for a finite prior.
+    ///
+    /// `H(X) - I(X; T)` loses all digits where the decision is almost sure; this sum of small positive terms does not.
+    ///
+    /// # Errors
+    /// If the prior is continuous.
+    pub fn equivocation(&self) -> Result<f64, Error> {
+        if !self.scene.is_discrete() {
+            return refuse("prior", "a continuous prior", "a discrete prior for a conditional entropy");
+        }
+        let mut total = 0.0;
+        for outcome in 0..self.outcomes() {
+            let mass = self.probability(outcome);
+            let best = self.decide(outcome);
+            if mass <= 0.0 {
+                continue;
+            }
+            let mut others = 0.0;
+            for (k, (w, q)) in self.scene.weights().iter().zip(self.likelihood(outcome)).enumerate() {
+                let joint = w * q;
+                if k != best && joint > 0.0 {
+                    others += joint;
+                    total += joint * (mass / joint).ln();
+                }
+            }
+            // -(1 - d) ln(1 - d) of the favourite.
+            let d = others / mass;
+            total -= mass * (1.0 - d) * (-d).ln_1p();
+        }
+        Ok(total)
+    }
+}
