@@ -1,8 +1,180 @@
 //! Binary distributed quantization: figures and tables.
+//!
+//! Everything here is exact: no figure of this system draws a random number.
 
-use crate::AnyFigure;
+mod beyond;
+mod crlb;
+mod decoders;
+mod feedback;
+mod gaussian;
+mod optimum;
+mod patterns;
+mod table5_1;
+mod table5_2;
+
+use crate::plot::{Axis, Layer, Legend, Panel};
+use crate::{AnyFigure, Error};
+use fewbits_quantizers::binary::search::LinearSearch;
+use fewbits_quantizers::binary::{Bank, Grid, Mask, Pattern, Source, linear_pattern};
+use rayon::prelude::*;
 
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
-    vec![]
+    vec![
+        &patterns::Clipping,
+        &patterns::Natural,
+        &patterns::Gray,
+        &patterns::Extra,
+        &patterns::Response,
+        &crlb::PrintedBounds,
+        &table5_1::Table,
+        &optimum::Optimum,
+        &decoders::Decoders,
+        &gaussian::GaussianSource,
+        &table5_2::Table,
+        &feedback::Feedback,
+        &beyond::Beyond,
+    ]
+}
+
+/// Variance of the thesis's Gaussian source.
+const GAUSSIAN_VARIANCE: f64 = 0.1;
+
+/// A source, its grid and the noise at one signal-to-noise ratio.
+#[derive(Clone)]
+struct Scene {
+    source: Source,
+    grid: Grid,
+    noise: f64,
+}
+
+impl Scene {
+    /// Uniform on `[-1, 1]` over `2^bits` cells.
+    fn uniform(bits: usize, snr_db: f64) -> Result<Self, Error> {
+        let source = Source::uniform(1.0).map_err(Error::failed)?;
+        let grid = Grid::uniform(1.0, bits).map_err(Error::failed)?;
+        Self::new(source, grid, snr_db)
+    }
+
+    /// Gaussian of variance 0.1 over the eight cells with the printed Lloyd-Max edges.
+    fn gaussian(snr_db: f64) -> Result<Self, Error> {
+        let std = GAUSSIAN_VARIANCE.sqrt();
+        let source = Source::gaussian(std).map_err(Error::failed)?;
+        let grid = Grid::printed_gaussian(std).map_err(Error::failed)?;
+        Self::new(source, grid, snr_db)
+    }
+
+    fn new(source: Source, grid: Grid, snr_db: f64) -> Result<Self, Error> {
+        let noise = source.noise_std(snr_db).map_err(Error::failed)?;
+        Ok(Self { source, grid, noise })
+    }
+
+    fn search(&self, sensors: usize) -> Result<LinearSearch, Error> {
+        LinearSearch::new(self.source, self.grid.clone(), self.noise, sensors).map_err(Error::failed)
+    }
+
+    fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
+        self.search(masks.len())?.bank(masks).map_err(Error::failed)
+    }
+
+    fn pattern_bank(&self, patterns: &[Pattern]) -> Result<Bank, Error> {
+        let quantizers = patterns
+            .iter()
+            .map(|p| p.on(&self.grid))
+            .collect::<Result<_, _>>()
+            .map_err(Error::failed)?;
+        Bank::homogeneous(self.source, quantizers, self.noise).map_err(Error::failed)
+    }
+
+    /// Exact error of the posterior mean.
+    fn mmse(&self, masks: &[Mask]) -> Result<f64, Error> {
+        self.bank(masks)?.mmse().map_err(Error::failed)
+    }
+}
+
+/// Checks a sweep: finite limits in order and a positive step of not too many points.
+fn check_sweep(figure: &'static str, from: f64, to: f64, step: f64) -> Result<(), Error> {
+    let fine = from.is_finite() && to.is_finite() && from <= to && step > 0.0 && (to - from) / step < 10_000.0;
+    if fine && from >= -60.0 && to <= 60.0 {
+        return Ok(());
+    }
+    Err(Error::BadParameter {
+        figure,
+        name: "from_db, to_db, step_db".into(),
+        value: format!("{from}, {to}, {step}"),
+        expected: "-60 <= from_db <= to_db <= 60 and a positive step".into(),
+    })
+}
+
+/// `from, from + step, ..., to`.
+fn sweep(from: f64, to: f64, step: f64) -> Vec<f64> {
+    (0..=((to - from) / step + 1e-9) as usize)
+        .map(|i| from + step * i as f64)
+        .collect()
+}
+
+/// Computes one result a sweep point, in parallel and in order.
+fn each<T: Send>(points: &[f64], f: impl Fn(f64) -> Result<T, Error> + Sync) -> Result<Vec<T>, Error> {
+    points.par_iter().map(|&point| f(point)).collect()
+}
+
+/// Where `f` changes sign between `low` and `high`, to `1e-8`.
+fn crossing(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, Error>) -> Result<f64, Error> {
+    let sign = f(low)?.signum();
+    if f(high)?.signum() == sign {
+        return Err(Error::Table(format!("no crossing between {low} and {high}")));
+    }
+    while high - low > 1e-8 {
+        let middle = 0.5 * (low + high);
+        if f(middle)?.signum() == sign {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Ok(0.5 * (low + high))
+}
+
+/// Masks as text, in decreasing order of their first column: `4 6 3`.
+fn mask_text(masks: &[Mask]) -> String {
+    masks.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// The pattern of a mask.
+fn pattern(mask: Mask, bits: usize) -> Result<Pattern, Error> {
+    linear_pattern(mask, bits).map_err(Error::failed)
+}
+
+/// A picture of patterns: a row each, dark where the bit is 1, light where it is 0, over the cells of the unit grid.
+fn pattern_panel(title: impl Into<String>, rows: &[(String, Pattern)]) -> Panel {
+    let cells = rows.iter().map(|r| r.1.cells()).max().unwrap_or(1);
+    let mut ones = Vec::new();
+    let mut zeros = Vec::new();
+    let mut texts = Vec::new();
+    for (at, (_, pattern)) in rows.iter().enumerate() {
+        let middle = (rows.len() - at) as f64;
+        for (cell, &bit) in pattern.bits().iter().enumerate() {
+            let left = cell as f64 + 0.5;
+            let cell_box = (left + 0.03, left + 0.97, middle - 0.36, middle + 0.36);
+            if bit {
+                ones.push(cell_box)
+            } else {
+                zeros.push(cell_box)
+            }
+            texts.push((left + 0.5, middle, if bit { "1" } else { "0" }.to_owned()));
+        }
+    }
+    let names = rows
+        .iter()
+        .enumerate()
+        .map(|(at, (name, _))| ((rows.len() - at) as f64, name.clone()));
+    Panel::new(
+        title,
+        Axis::linear("cell of the measurement").between(0.4, cells as f64 + 0.6),
+        Axis::linear("").between(0.4, rows.len() as f64 + 0.6).named(names),
+    )
+    .with(Layer::boxes("", zeros).coloured(5))
+    .with(Layer::boxes("", ones).coloured(4))
+    .with(Layer::texts(texts).coloured(6))
+    .legend(Legend::Hidden)
 }

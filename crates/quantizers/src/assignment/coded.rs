@@ -1,8 +1,7 @@
 //! Sensors of unequal noise, one for each bit of a Gray code, and the exact errors of their assignments.
 
 use crate::Error;
-use crate::binary::Nodes;
-use crate::binary::{Bank, BinaryQuantizer, Decoder, Grid, Sensor, Source, gray_basis, linear_pattern};
+use crate::binary::{Bank, BinaryQuantizer, Grid, IMPOSSIBLE, Nodes, Sensor, Source, gray_basis, linear_pattern};
 use fewbits_core::ArgumentError;
 use fewbits_core::error::positive;
 use fewbits_core::quadrature::gauss_legendre;
@@ -49,8 +48,11 @@ impl CodedSensors {
             .into_iter()
             .map(|mask| linear_pattern(mask, sensors)?.on(&grid))
             .collect::<Result<Vec<_>, _>>()?;
-        let finest = noise_stds.iter().copied().fold(f64::INFINITY, f64::min);
-        let mut nodes = source.nodes_between(0.0, half_width, PANEL * finest, gauss_legendre::<12>());
+        let blurs: Vec<(f64, f64)> = noise_stds
+            .iter()
+            .flat_map(|&noise| grid.edges().iter().map(move |&t| (t, noise)))
+            .collect();
+        let mut nodes = Nodes::adapted(&source, 0.0, half_width, &blurs, PANEL, gauss_legendre::<12>());
         nodes.w.iter_mut().for_each(|w| *w *= 2.0);
         let probability: Vec<Vec<[Vec<f64>; 2]>> = quantizers
             .iter()
@@ -139,7 +141,39 @@ impl CodedSensors {
     /// # Errors
     /// If the assignment is not a permutation.
     pub fn mmse(&self, assignment: &[usize]) -> Result<f64, Error> {
-        self.bank(assignment)?.mse(Decoder::Mmse)
+        self.check(assignment)?;
+        let mut levels = vec![self.nodes.w.clone(); self.sensors()];
+        // The nodes cover one side; both sides share the weight.
+        levels[0].iter_mut().for_each(|w| *w *= 0.5);
+        Ok(self.source.variance() - self.explained(assignment, 1, &mut levels))
+    }
+
+    /// `sum M1^2/M0` over the outcomes of the bits from `bit` on, given `w p(x) P(bits 1, ..., bit - 1|x)`; bit 0 comes last.
+    ///
+    /// Reflecting `x` flips bit 0 and no other, so its two values are mirror images and one side has all it takes.
+    fn explained(&self, assignment: &[usize], bit: usize, levels: &mut [Vec<f64>]) -> f64 {
+        let (own, below) = levels.split_at_mut(1);
+        if bit == assignment.len() {
+            let [zero, one] = self.probability(0, assignment[0]);
+            let (mut mass, mut moment) = (0.0, 0.0);
+            for (((w, x), zero), one) in own[0].iter().zip(&self.nodes.x).zip(zero).zip(one) {
+                mass += w * (zero + one);
+                moment += w * x * (zero - one);
+            }
+            return if mass > IMPOSSIBLE {
+                2.0 * moment * moment / mass
+            } else {
+                0.0
+            };
+        }
+        let mut explained = 0.0;
+        for p in self.probability(bit, assignment[bit]) {
+            for ((child, w), p) in below[0].iter_mut().zip(&own[0]).zip(p) {
+                *child = w * p;
+            }
+            explained += self.explained(assignment, bit + 1, below);
+        }
+        explained
     }
 
     /// Exact error of the decoder that reads the Gray bits as a cell and answers its centre, `O(N)` a node.
@@ -231,7 +265,9 @@ mod tests {
                 .sum::<f64>();
         });
         assert_relative_eq!(sensors.centre_mse(&assignment).unwrap(), exact, max_relative = 1e-11);
-        assert!(sensors.mmse(&assignment).unwrap() < exact);
+        let mmse = sensors.mmse(&assignment).unwrap();
+        assert!(mmse < exact);
+        assert_relative_eq!(mmse, bank.mmse().unwrap(), max_relative = 1e-11);
     }
 
     #[test]

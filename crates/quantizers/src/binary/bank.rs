@@ -2,7 +2,7 @@
 
 use super::BinaryQuantizer;
 use super::grid::noise_in_range;
-use super::source::{Nodes, Source};
+use super::source::{Blur, Nodes, Source};
 use crate::Error;
 use fewbits_core::ArgumentError;
 use fewbits_core::error::at_least_one;
@@ -168,7 +168,21 @@ impl Bank {
 
     /// Nodes fine enough for `1e-12`.
     pub(crate) fn fine_nodes(&self) -> Nodes {
-        self.source.nodes(PANEL * self.finest_noise(), gauss_legendre::<12>())
+        let reach = self.source.reach();
+        self.nodes_between(-reach, reach)
+    }
+
+    /// The same for a part of the support.
+    pub(crate) fn nodes_between(&self, from: f64, to: f64) -> Nodes {
+        Nodes::adapted(&self.source, from, to, &self.blurs(), PANEL, gauss_legendre::<12>())
+    }
+
+    /// All thresholds with their noise.
+    pub(crate) fn blurs(&self) -> Vec<Blur> {
+        self.groups
+            .iter()
+            .flat_map(|g| g.sensor.quantizer.thresholds().iter().map(|&t| (t, g.sensor.noise_std)))
+            .collect()
     }
 
     /// `P(k of the group say 1 | x)` for every group, count and node.

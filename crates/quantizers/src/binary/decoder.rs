@@ -4,7 +4,6 @@ use super::bank::{Bank, IMPOSSIBLE};
 use super::source::Nodes;
 use super::{Grid, continuous_map};
 use crate::Error;
-use fewbits_core::quadrature::gauss_legendre;
 
 /// Probabilities below this are taken as this when their logarithm is multiplied by a count that may be zero.
 const FLOOR: f64 = 1e-300;
@@ -50,6 +49,25 @@ impl LookupTable {
     /// Number of distinguishable outcomes stored.
     pub fn outcomes(&self) -> usize {
         self.estimates.len()
+    }
+
+    /// `(E[xhat|x] - x, Var[xhat|x])`: bias and variance of the estimate for one value of the source.
+    ///
+    /// # Errors
+    /// If `x` is not finite.
+    pub fn conditional_error(&self, x: f64) -> Result<(f64, f64), Error> {
+        let x = fewbits_core::error::finite("x", x)?;
+        let at = Nodes {
+            x: vec![x],
+            w: vec![1.0],
+        };
+        let (mut mean, mut second) = (0.0, 0.0);
+        self.bank.for_outcomes(&at, |index, w| {
+            let off = self.estimates[index] - x;
+            mean += w[0] * off;
+            second += w[0] * off * off;
+        });
+        Ok((mean, (second - mean * mean).max(0.0)))
     }
 
     /// Expanded to all `2^N` bit strings, sensor 1 the most significant bit of the index.
@@ -182,9 +200,7 @@ impl Bank {
         (0..grid.cells())
             .filter_map(|cell| grid.support(cell, self.source()))
             .map(|(low, high)| {
-                let nodes = self
-                    .source()
-                    .nodes_between(low, high, 2.0 * self.finest_noise(), gauss_legendre::<12>());
+                let nodes = self.nodes_between(low, high);
                 let mass = nodes.expect(|_| 1.0);
                 Cell {
                     centroid: if mass > 0.0 {

@@ -1,6 +1,7 @@
 //! The scalar under observation.
 
 use crate::Error;
+use fewbits_core::ArgumentError;
 use fewbits_core::error::{finite, positive};
 use fewbits_core::normal::pdf;
 use fewbits_core::quadrature::Rule;
@@ -98,14 +99,31 @@ impl Source {
         nodes
     }
 
-    /// The same over the whole support.
+    /// The same over the whole support, for noise that blurs all of it.
     pub(crate) fn nodes(&self, width: f64, rule: &Rule) -> Nodes {
         self.nodes_between(-self.reach(), self.reach(), width, rule)
     }
+
+    /// Refuses noise too small for an even grid of nodes to resolve.
+    pub(crate) fn resolvable(&self, noise_std: f64) -> Result<f64, Error> {
+        let noise_std = super::grid::noise_in_range(noise_std)?;
+        let least = FINEST * self.reach();
+        if noise_std >= least {
+            return Ok(noise_std);
+        }
+        Err(ArgumentError::new("noise_std", noise_std, format!("at least {least}, 1e-4 of the source's reach")).into())
+    }
 }
 
-/// Enough for 60 dB at twelve nodes a panel.
-const MAX_PANELS: usize = 200_000;
+/// Enough for 75 dB where all of the support has to be resolved.
+const MAX_PANELS: usize = 20_000;
+/// The smallest noise, as a share of the support, that an even grid of so many panels resolves.
+const FINEST: f64 = 1e-4;
+/// Beyond this many noise standard deviations from a threshold its bit is certain to `1e-50`.
+const ZONE: f64 = 15.0;
+
+/// A threshold and the noise that blurs it: the integrands vary there, and nowhere else.
+pub(crate) type Blur = (f64, f64);
 
 /// Quadrature nodes `x` and weights `w` with the source density inside: `E[f(X)] = sum w f(x)`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -127,6 +145,40 @@ impl Nodes {
         self.x.len()
     }
 
+    /// Nodes on `[from, to]` that are dense where a threshold is blurred and sparse where all bits are certain.
+    ///
+    /// Panels within reach of a threshold are `share` of its noise wide. The number of nodes so depends on the number of
+    /// thresholds and not on how small the noise is.
+    pub fn adapted(source: &Source, from: f64, to: f64, blurs: &[Blur], share: f64, rule: &Rule) -> Self {
+        let mut nodes = Self::default();
+        let widest = match source.kind() {
+            Kind::Uniform { half_width } => 0.5 * half_width,
+            Kind::Gaussian { std } => 1.5 * std,
+        };
+        let mut x = from;
+        while x < to {
+            let mut step = widest.min(to - x);
+            for &(threshold, noise) in blurs {
+                let ahead = threshold - ZONE * noise - x;
+                if ahead > 0.0 {
+                    step = step.min(ahead);
+                } else if x < threshold + ZONE * noise {
+                    step = step.min(share * noise);
+                }
+            }
+            // Rounding must neither stop the march nor leave a sliver.
+            let end = if x + step >= to - 1e-12 * widest {
+                to
+            } else {
+                (x + step).max(x + 1e-13 * widest)
+            };
+            nodes.x.extend(rule.on(x, end).map(|(x, _)| x));
+            nodes.w.extend(rule.on(x, end).map(|(x, w)| w * source.density(x)));
+            x = end;
+        }
+        nodes
+    }
+
     /// `sum w f(x)`.
     pub fn expect(&self, f: impl Fn(f64) -> f64) -> f64 {
         self.x.iter().zip(&self.w).map(|(&x, &w)| w * f(x)).sum()
@@ -137,6 +189,7 @@ impl Nodes {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+    use fewbits_core::normal::cdf;
     use fewbits_core::quadrature::gauss_legendre;
 
     #[test]
@@ -146,6 +199,23 @@ mod tests {
             assert_relative_eq!(nodes.expect(|_| 1.0), 1.0, max_relative = 1e-14);
             assert_relative_eq!(nodes.expect(|x| x * x), source.variance(), max_relative = 1e-14);
         }
+    }
+
+    #[test]
+    fn adapted_nodes_do_not_grow_as_the_noise_vanishes() {
+        let source = Source::uniform(1.0).unwrap();
+        let mut last = 0;
+        for noise in [0.3, 1e-3, 1e-6, 1e-9] {
+            let nodes =
+                Nodes::adapted(&source, -1.0, 1.0, &[(-0.5, noise), (0.25, noise)], 2.0, gauss_legendre::<12>());
+            assert_relative_eq!(nodes.expect(|x| x * x), source.variance(), max_relative = 1e-13);
+            let p = nodes.expect(|x| cdf((x - 0.25) / noise));
+            let integral = |u: f64| u * cdf(u) + pdf(u);
+            let exact = 0.5 * noise * (integral(0.75 / noise) - integral(-1.25 / noise));
+            assert_relative_eq!(p, exact, max_relative = 1e-12);
+            last = nodes.len();
+        }
+        assert!(last < 600, "{last}");
     }
 
     #[test]

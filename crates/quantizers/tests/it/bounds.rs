@@ -216,3 +216,58 @@ fn free_thresholds_beat_the_grid() {
     assert!(free.mse < before, "{} from {before}", free.mse);
     assert!(van_trees(&Bank::new(source, free.sensors).unwrap()) < free.mse);
 }
+
+/// The posterior mean is unbiased on average over the source only: erratum `binary-10`.
+#[test]
+fn the_posterior_mean_is_biased_at_the_ends() {
+    let source = Source::uniform(1.0).unwrap();
+    let grid = Grid::uniform(1.0, 3).unwrap();
+    let quantizers: Vec<_> = ["00001111", "00111100", "01100110"]
+        .iter()
+        .map(|p| {
+            p.parse::<fewbits_quantizers::binary::Pattern>()
+                .unwrap()
+                .on(&grid)
+                .unwrap()
+        })
+        .collect();
+    let bank = Bank::homogeneous(source, quantizers, source.noise_std(18.2).unwrap()).unwrap();
+    let table = bank.table(Decoder::Mmse).unwrap();
+    let (bias, _) = table.conditional_error(1.0).unwrap();
+    assert!((bias + 0.135).abs() < 5e-4, "{bias}");
+    assert!(table.conditional_error(f64::NAN).is_err());
+    let (mut mean, mut error) = (0.0, 0.0);
+    for i in 0..4000 {
+        let (bias, variance) = table.conditional_error((f64::from(i) + 0.5) / 2000.0 - 1.0).unwrap();
+        mean += bias / 4000.0;
+        error += (bias * bias + variance) / 4000.0;
+    }
+    assert!(mean.abs() < 1e-12);
+    assert!((error / bank.mmse().unwrap() - 1.0).abs() < 1e-6);
+}
+
+/// As the noise vanishes everything tends to the centroids' error, at no greater cost.
+#[test]
+fn vanishing_noise_is_resolved() {
+    let source = Source::uniform(1.0).unwrap();
+    let grid = Grid::uniform(1.0, 3).unwrap();
+    let floor = grid.noiseless_mse(&source);
+    for snr in [80.0, 140.0] {
+        let quantizers: Vec<_> = ["00001111", "00111100", "01100110"]
+            .iter()
+            .map(|p| {
+                p.parse::<fewbits_quantizers::binary::Pattern>()
+                    .unwrap()
+                    .on(&grid)
+                    .unwrap()
+            })
+            .collect();
+        let bank = Bank::homogeneous(source, quantizers, source.noise_std(snr).unwrap()).unwrap();
+        let mmse = bank.mmse().unwrap();
+        assert!((mmse / floor - 1.0).abs() < 2e-4, "{mmse} at {snr} dB");
+        assert!(van_trees(&bank) <= mmse * (1.0 + 1e-9));
+        for decoder in [Decoder::DiscreteMap(&grid), Decoder::ExactDivisionMap(&grid)] {
+            assert!((bank.mse(decoder).unwrap() / floor - 1.0).abs() < 2e-4);
+        }
+    }
+}

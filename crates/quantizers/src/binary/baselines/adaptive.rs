@@ -9,7 +9,7 @@ use crate::binary::grid::noise_in_range;
 use crate::binary::source::Nodes;
 use fewbits_core::ArgumentError;
 use fewbits_core::error::{all_finite, at_least_one, positive};
-use fewbits_core::normal::{cdf, inverse_mills};
+use fewbits_core::normal::{cdf, inverse_mills, log_cdf, log_pdf};
 use fewbits_core::quadrature::gauss_legendre;
 
 /// Most sensors: the bit tree has `2^N` leaves.
@@ -54,9 +54,9 @@ pub struct AdaptiveErrors {
 /// Each node of the tree carries `p(x) P(bits|x)` on the quadrature nodes, so that nothing is simulated.
 ///
 /// # Errors
-/// If the noise or a parameter of the rule is out of range, or `sensors` is not in `1..=20`.
+/// If the noise is below `1e-4` of the source's reach, a parameter of the rule is out of range, or `sensors` is not in `1..=20`.
 pub fn adaptive(source: &Source, noise_std: f64, sensors: usize, rule: AdaptiveRule) -> Result<AdaptiveErrors, Error> {
-    let noise_std = noise_in_range(noise_std)?;
+    let noise_std = source.resolvable(noise_std)?;
     at_least_one("sensors", sensors)?;
     if sensors > MAX_SENSORS {
         return Err(Error::TooManyOutcomes {
@@ -174,8 +174,8 @@ impl Tree<'_> {
 
 /// Maximum-likelihood estimate of `x` in `[-bound, bound]` from bits `Y > threshold` in normal noise.
 ///
-/// The log likelihood is concave, so its derivative is bracketed and Newton's method is safe. All bits equal means an end of
-/// the interval.
+/// The log likelihood is concave, so the sign of its derivative brackets the maximum and Newton's method is safe. All bits
+/// equal means an end of the interval.
 ///
 /// # Errors
 /// If a threshold is not finite, or the noise or the bound is not positive and finite.
@@ -186,34 +186,22 @@ pub fn bounded_mle(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> Result<f
 }
 
 fn maximum_likelihood(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> f64 {
-    // Score and its derivative, both times powers of the noise.
-    let score = |x: f64| {
-        bits.iter().fold((0.0, 0.0), |(score, slope), &(t, bit)| {
-            let sign = if bit { 1.0 } else { -1.0 };
-            let u = sign * (x - t) / noise_std;
-            let mills = inverse_mills(u);
-            (score + sign * mills, slope - mills * (mills + u))
-        })
-    };
     let (mut low, mut high) = (-bound, bound);
-    if score(low).0 <= 0.0 {
+    if balance(bits, noise_std, low).0 <= 0.0 {
         return low;
     }
-    if score(high).0 >= 0.0 {
+    if balance(bits, noise_std, high).0 >= 0.0 {
         return high;
     }
     let mut x = 0.0;
     while high - low > MLE_STOP * bound {
-        let (value, slope) = score(x);
-        if value == 0.0 {
-            return x;
-        }
+        let (value, slope) = balance(bits, noise_std, x);
         if value > 0.0 {
             low = x;
         } else {
             high = x;
         }
-        let newton = x - noise_std * value / slope;
+        let newton = x - value / slope;
         let next = if newton > low && newton < high {
             newton
         } else {
@@ -227,6 +215,40 @@ fn maximum_likelihood(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> f64 {
     x
 }
 
+/// Logarithm of the pull of the 1s over that of the 0s, and its derivative: zero where the score is, decreasing.
+///
+/// The score is a difference of sums of inverse Mills ratios. Between thresholds many deviations apart all of them are below
+/// the smallest double, and only the logarithms still say which side is stronger.
+fn balance(bits: &[(f64, bool)], noise_std: f64, x: f64) -> (f64, f64) {
+    // For each side the largest log ratio, the sum relative to it, and the sum weighted with the derivative of the logarithm.
+    let mut sides = [(f64::NEG_INFINITY, 0.0, 0.0); 2];
+    for &(t, bit) in bits {
+        let sign = if bit { 1.0 } else { -1.0 };
+        let u = sign * (x - t) / noise_std;
+        let log_cdf = log_cdf(u);
+        let log_ratio = log_pdf(u) - log_cdf;
+        // d/dx ln(phi/Phi)(u) = -(u + phi/Phi) du/dx.
+        let derivative = -sign * (u + inverse_mills(u)) / noise_std;
+        let side = &mut sides[usize::from(bit)];
+        if log_ratio > side.0 {
+            let shrink = (side.0 - log_ratio).exp();
+            *side = (log_ratio, side.1 * shrink + 1.0, side.2 * shrink + derivative);
+        } else {
+            let share = (log_ratio - side.0).exp();
+            side.1 += share;
+            side.2 += share * derivative;
+        }
+    }
+    let [zeros, ones] = sides;
+    if zeros.1 == 0.0 {
+        return (f64::INFINITY, -1.0);
+    }
+    if ones.1 == 0.0 {
+        return (f64::NEG_INFINITY, -1.0);
+    }
+    (ones.0 + ones.1.ln() - zeros.0 - zeros.1.ln(), ones.2 / ones.1 - zeros.2 / zeros.1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -235,6 +257,9 @@ mod tests {
     #[test]
     fn likelihood_is_largest_between_disagreeing_bits() {
         assert_relative_eq!(bounded_mle(&[(0.0, true), (0.4, false)], 0.3, 1.0).unwrap(), 0.2, epsilon = 1e-12);
+        // A hundred deviations from both thresholds, where no density is left.
+        let far = bounded_mle(&[(0.0, true), (0.5, true), (1.0, false)], 0.0025, 2.0).unwrap();
+        assert_relative_eq!(far, 0.75, epsilon = 1e-6);
         assert_eq!(bounded_mle(&[(0.0, true), (0.5, true)], 0.3, 1.0).unwrap(), 1.0);
         assert_eq!(bounded_mle(&[(0.0, false)], 0.3, 1.0).unwrap(), -1.0);
         assert!(bounded_mle(&[(f64::NAN, false)], 0.3, 1.0).is_err());

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::binary::bank::CountTable;
 use crate::binary::grid::{bits_in_range, noise_in_range};
-use crate::binary::source::Kind;
+use crate::binary::source::{Blur, Kind, Nodes};
 use crate::binary::{Bank, BinaryQuantizer, Decoder, Grid, Sensor, Source, linear_pattern, natural_basis};
 use fewbits_core::ArgumentError;
 use fewbits_core::quadrature::gauss_legendre;
@@ -86,7 +86,13 @@ impl Luo {
     /// # Errors
     /// If the bank has too many outcomes.
     pub fn errors(&self) -> Result<LuoErrors, Error> {
-        let nodes = self.source.nodes(self.noise_std, gauss_legendre::<12>());
+        let blurs: Vec<Blur> = self
+            .quantizers
+            .iter()
+            .flat_map(|q| q.thresholds().iter().map(|&t| (t, self.noise_std)))
+            .collect();
+        let v = self.half_width;
+        let nodes = Nodes::adapted(&self.source, -v, v, &blurs, 1.0, gauss_legendre::<12>());
         let (mut soft, mut majority) = (0.0, 0.0);
         for (&x, &w) in nodes.x.iter().zip(&nodes.w) {
             // (mean, variance) of both estimates given x.

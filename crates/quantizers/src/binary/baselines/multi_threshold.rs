@@ -2,7 +2,6 @@
 
 use crate::Error;
 use crate::binary::Source;
-use crate::binary::grid::noise_in_range;
 use crate::binary::source::Nodes;
 use fewbits_core::error::at_least_one;
 use fewbits_core::normal::log_cdf;
@@ -53,10 +52,10 @@ fn log_information(u: f64, noise_std: f64) -> f64 {
 /// ```
 ///
 /// # Errors
-/// If there is no sensor or `noise_std` is not positive and finite.
+/// If there is no sensor or `noise_std` is not finite or below `1e-4` of the source's reach.
 pub fn multi_threshold_bound(source: &Source, noise_std: f64, sensors: usize) -> Result<MultiThreshold, Error> {
     let total = at_least_one("sensors", sensors)? as f64;
-    let noise_std = noise_in_range(noise_std)?;
+    let noise_std = source.resolvable(noise_std)?;
     let nodes = source.nodes(noise_std, gauss_legendre::<8>());
     let limit = source.reach() + MARGIN * noise_std;
     let thresholds: Vec<f64> = (0..THRESHOLDS)

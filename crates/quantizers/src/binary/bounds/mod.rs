@@ -17,15 +17,18 @@ pub use rate_distortion::{ConditionalMean, RemoteDistortion, network_rate_distor
 pub use van_trees::van_trees;
 
 use super::Bank;
-use super::source::Kind;
+use super::source::{Kind, Nodes};
 use crate::Error;
 use fewbits_core::ArgumentError;
 use fewbits_core::quadrature::gauss_legendre;
 
+/// Panel width in noise standard deviations; the quotient is less smooth than the probabilities.
+const INFORMATION_PANEL: f64 = 0.5;
+
 /// Mean Fisher information `E[J(X)]` of the bits about the source.
 pub fn mean_information(bank: &Bank) -> f64 {
-    bank.source()
-        .nodes(0.5 * bank.finest_noise(), gauss_legendre::<12>())
+    let reach = bank.source().reach();
+    Nodes::adapted(bank.source(), -reach, reach, &bank.blurs(), INFORMATION_PANEL, gauss_legendre::<12>())
         .expect(|x| bank.fisher_information(x))
 }
 

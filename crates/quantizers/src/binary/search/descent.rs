@@ -4,7 +4,7 @@ use super::{SEARCH_PANEL, scattered};
 use crate::Error;
 use crate::binary::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::binary::grid::noise_in_range;
-use crate::binary::source::Nodes;
+use crate::binary::source::{Blur, Nodes};
 use crate::binary::{Bank, BinaryQuantizer, Sensor, Source};
 use fewbits_core::ArgumentError;
 use fewbits_core::error::at_least_one;
@@ -154,13 +154,20 @@ impl<'a> Kernel<'a> {
             .collect();
         let folded = descent.candidates.iter().all(|q| symmetry(q).is_some());
         let reach = descent.source.reach();
-        let finest = noises.iter().copied().fold(f64::INFINITY, f64::min);
-        let nodes = descent.source.nodes_between(
-            if folded { 0.0 } else { -reach },
-            reach,
-            SEARCH_PANEL * finest,
-            gauss_legendre::<8>(),
-        );
+        let mut thresholds: Vec<f64> = descent
+            .candidates
+            .iter()
+            .flat_map(|q| q.thresholds())
+            .copied()
+            .collect();
+        thresholds.sort_by(f64::total_cmp);
+        thresholds.dedup();
+        let blurs: Vec<Blur> = noises
+            .iter()
+            .flat_map(|&noise| thresholds.iter().map(move |&t| (t, noise)))
+            .collect();
+        let from = if folded { 0.0 } else { -reach };
+        let nodes = Nodes::adapted(&descent.source, from, reach, &blurs, SEARCH_PANEL, gauss_legendre::<8>());
         let p: Vec<Vec<Vec<[f64; 2]>>> = noises
             .iter()
             .map(|&noise| {

@@ -6,7 +6,7 @@ use crate::binary::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::binary::count::{full_rank_multisets, multisets};
 use crate::binary::grid::noise_in_range;
 use crate::binary::linear::{Span, check_mask, flips_under_reflection, grid_bits};
-use crate::binary::source::Nodes;
+use crate::binary::source::{Blur, Nodes};
 use crate::binary::{Bank, Grid, Mask, Sensor, Source, linear_pattern};
 use fewbits_core::error::at_least_one;
 use fewbits_core::quadrature::gauss_legendre;
@@ -252,12 +252,9 @@ impl<'a> Walk<'a> {
     fn new(search: &'a LinearSearch, keep: usize) -> Result<Self, Error> {
         let folded = search.grid.is_symmetric();
         let reach = search.source.reach();
-        let nodes = search.source.nodes_between(
-            if folded { 0.0 } else { -reach },
-            reach,
-            SEARCH_PANEL * search.noise_std,
-            gauss_legendre::<8>(),
-        );
+        let blurs: Vec<Blur> = search.grid.edges().iter().map(|&t| (t, search.noise_std)).collect();
+        let from = if folded { 0.0 } else { -reach };
+        let nodes = Nodes::adapted(&search.source, from, reach, &blurs, SEARCH_PANEL, gauss_legendre::<8>());
         let kinds = search.forced.len();
         let mut tables = Vec::with_capacity(kinds);
         for mask in 1..=kinds {

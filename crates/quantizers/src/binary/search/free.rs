@@ -39,13 +39,18 @@ pub struct FreeDesign {
 /// up to `jitter` (in units of the source), break that symmetry; the best run is returned.
 ///
 /// # Errors
-/// If there is no sensor or more than 16, `starts` is 0, or `jitter` is negative or not finite.
+/// If there is no sensor or more than 16, a noise is below `1e-4` of the source's reach, `starts` is 0, or `jitter` is
+/// negative or not finite.
 pub fn free_thresholds(source: &Source, sensors: &[Sensor], jitter: f64, starts: usize) -> Result<FreeDesign, Error> {
     at_least_one("sensors", sensors.len())?;
     at_least_one("starts", starts)?;
     non_negative("jitter", jitter)?;
     if sensors.len() > MAX_SENSORS {
         return Err(ArgumentError::new("sensors", sensors.len(), "at most 16 sensors").into());
+    }
+    for sensor in sensors {
+        // The thresholds move, so the nodes must be dense everywhere.
+        source.resolvable(sensor.noise_std())?;
     }
     let mut tree = OutcomeTree::new(source, sensors);
     let mut best = FreeDesign {
