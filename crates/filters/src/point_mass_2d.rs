@@ -8,9 +8,9 @@ use nalgebra::{Cholesky, Matrix2, Vector2};
 /// Deviations of the belief that the lattice covers.
 const REACH: f64 = 7.0;
 /// Deviations of the process noise beyond which the kernel is left out.
-const KERNEL_REACH: f64 = 6.5;
+const KERNEL_REACH: f64 = 7.0;
 /// Nodes whose density falls below this share of the peak send nothing on.
-const NEGLIGIBLE: f64 = 1e-12;
+const NEGLIGIBLE: f64 = 1e-14;
 /// Most nodes of a lattice.
 const MOST_NODES: usize = 1_000_000;
 
