@@ -74,7 +74,8 @@ impl<const M: usize> Ellipsoid<M> {
         let half = lower.solve_lower_triangular(covariance).ok_or_else(refuse)?;
         let white = lower.solve_lower_triangular(&half.transpose()).ok_or_else(refuse)?;
         let (values, vectors) = symmetric_eigen(symmetrised(&white));
-        if values.min() < -1e-9 * values.amax() {
+        // In whitened coordinates 1 is the scale of the innovation itself.
+        if values.min() < -1e-9 * values.amax().max(1e-3) {
             return Err(refuse());
         }
         let mut order: [usize; M] = std::array::from_fn(|i| i);
@@ -96,7 +97,7 @@ impl<const M: usize> Ellipsoid<M> {
 /// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi rotations: for the two or three dimensions of a
 /// measurement as fast as anything, exact in small eigenvalues, and free of the dimension arithmetic that nalgebra's own
 /// solver would impose on every caller.
-fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f64, M>, SMatrix<f64, M, M>) {
+pub(crate) fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f64, M>, SMatrix<f64, M, M>) {
     let mut vectors = SMatrix::<f64, M, M>::identity();
     for _sweep in 0..32 {
         let mut off = 0.0;
@@ -179,7 +180,7 @@ impl<const M: usize> GaussianInEllipsoid<M> {
 }
 
 /// A variance below this share of the ball's squared radius is a known number.
-const KNOWN: f64 = 1e-20;
+const KNOWN: f64 = 1e-16;
 /// Means up to this many deviations ...
 const TAME_MEAN: f64 = 6.0;
 /// ... and radii up to this many deviations need no search for the bulk.
@@ -260,7 +261,7 @@ impl Bulk {
 
 /// `ln P(|q|^2 < eta)` for independent `q_j ~ N(means_j, variances_j)`, the variances in decreasing order.
 fn log_mass(variances: &[f64], means: &[f64], eta: f64) -> f64 {
-    if !(eta > 0.0) {
+    if eta <= 0.0 {
         return f64::NEG_INFINITY;
     }
     let (Some((w, inner_variances)), Some((b, inner_means))) = (variances.split_first(), means.split_first()) else {
@@ -358,7 +359,7 @@ fn moments<const M: usize>(variances: &[f64], means: &SVector<f64, M>, first: us
     let (Some((w, inner)), Some(b)) = (variances.split_first(), tail.first()) else {
         return RawMoments::with_mass(if eta > 0.0 { 0.0 } else { f64::NEG_INFINITY });
     };
-    if !(eta > 0.0) {
+    if eta <= 0.0 {
         return RawMoments::with_mass(f64::NEG_INFINITY);
     }
     if let (Some((last_w, rest)), Some(last_b)) = (variances.split_last(), tail.last())

@@ -93,66 +93,87 @@ const REACH: f64 = 10.0;
 /// Below this many evaluations a table costs more than it saves.
 const WORTHWHILE: usize = 400;
 
-/// A [`SilentFactor`] tabulated for a whole cloud of particles.
+/// A [`SilentFactor`] made cheap for a whole cloud of particles.
 ///
 /// `ln pi` is a smooth even function of `mu`, flat inside the interval and close to a parabola outside. Ten standard
 /// deviations around the edge are covered by quintic Hermite pieces that match value, slope and curvature (error below
 /// 2e-10); nearer the centre it is constant, farther out the exact function is called. One table costs 160 exact
 /// evaluations and makes one particle about ten times cheaper. Keep it between steps: it reuses its memory.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct SilentTable {
+    factor: SilentFactor,
     pieces: Vec<[f64; 6]>,
+    /// Position `|mu| scale - offset` counts cells.
+    scale: f64,
+    offset: f64,
+    flat: f64,
 }
 
 impl SilentTable {
-    /// Adds `multiplicity` times the factor at `values[i] - centre` to `log_weights[i]`.
-    pub fn add(
-        &mut self,
-        factor: &SilentFactor,
-        multiplicity: f64,
-        centre: f64,
-        values: &[f64],
-        log_weights: &mut [f64],
-    ) {
-        if values.len() < WORTHWHILE {
-            for (log_weight, value) in log_weights.iter_mut().zip(values) {
-                *log_weight += multiplicity * factor.log_probability(value - centre);
-            }
+    /// Prepares `factor` for `evaluations` calls; for few the table stays empty and the exact function is used.
+    pub fn new(factor: SilentFactor, evaluations: usize) -> Self {
+        let mut table = Self {
+            factor,
+            pieces: Vec::new(),
+            scale: 0.0,
+            offset: 0.0,
+            flat: 0.0,
+        };
+        table.prepare(factor, evaluations);
+        table
+    }
+
+    /// The same in the memory of an older table.
+    pub fn prepare(&mut self, factor: SilentFactor, evaluations: usize) {
+        self.factor = factor;
+        self.pieces.clear();
+        if evaluations < WORTHWHILE {
             return;
         }
         let k = factor.half_width / factor.deviation;
         let start = (k - REACH).max(0.0);
-        self.tabulate(factor, start, ((k + REACH - start) * CELLS).ceil() as usize);
-        let scale = CELLS / factor.deviation;
-        let offset = start * CELLS;
-        let flat = multiplicity * factor.log_probability(0.0);
+        self.tabulate(start, ((k + REACH - start) * CELLS).ceil() as usize);
+        self.scale = CELLS / factor.deviation;
+        self.offset = start * CELLS;
+        self.flat = factor.log_probability(0.0);
+    }
+
+    /// The factor behind the table.
+    pub fn factor(&self) -> &SilentFactor {
+        &self.factor
+    }
+
+    /// Adds `multiplicity` times the factor at `values[i] - centre` to `log_weights[i]`.
+    pub fn add(&self, multiplicity: f64, centre: f64, values: &[f64], log_weights: &mut [f64]) {
         for (log_weight, value) in log_weights.iter_mut().zip(values) {
-            let mu = (value - centre).abs();
-            let position = mu * scale - offset;
-            if position < 0.0 {
-                *log_weight += flat;
-                continue;
+            *log_weight += multiplicity * self.log_probability(value - centre);
+        }
+    }
+
+    /// The factor at `mu`, from the table where there is one.
+    #[inline]
+    pub fn log_probability(&self, mu: f64) -> f64 {
+        let position = mu.abs() * self.scale - self.offset;
+        let cell = position as usize;
+        match self.pieces.get(cell) {
+            Some(_) if position < 0.0 => self.flat,
+            Some(c) => {
+                let t = position - cell as f64;
+                self.factor
+                    .mixed(((((c[5] * t + c[4]) * t + c[3]) * t + c[2]) * t + c[1]) * t + c[0])
             }
-            let cell = position as usize;
-            *log_weight += multiplicity
-                * match self.pieces.get(cell) {
-                    Some(c) => {
-                        let t = position - cell as f64;
-                        factor.mixed(((((c[5] * t + c[4]) * t + c[3]) * t + c[2]) * t + c[1]) * t + c[0])
-                    }
-                    None => factor.log_probability(mu),
-                };
+            None => self.factor.log_probability(mu),
         }
     }
 
     /// Quintic Hermite pieces on cells of width `1/CELLS`, in the local coordinate `t` of `[0, 1)`.
-    fn tabulate(&mut self, factor: &SilentFactor, start: f64, cells: usize) {
+    fn tabulate(&mut self, start: f64, cells: usize) {
+        let factor = self.factor;
         let step = 1.0 / CELLS;
         let jet = |i: usize| {
             let [value, slope, bend] = factor.jet(start + i as f64 * step);
             [value, slope * step, 0.5 * bend * step * step]
         };
-        self.pieces.clear();
         let mut left = jet(0);
         for i in 0..cells {
             let right = jet(i + 1);
@@ -179,7 +200,6 @@ mod tests {
 
     #[test]
     fn the_table_is_the_function() {
-        let mut table = SilentTable::default();
         for (c, r, loss) in [
             (1.1, 1.0, 0.0),
             (1e-6, 1.0, 0.0),
@@ -192,7 +212,7 @@ mod tests {
             let reach = c + 14.0 * r.sqrt();
             let values: Vec<f64> = (0..=4000).map(|i| 7.0 + reach * (i as f64 / 2000.0 - 1.0)).collect();
             let mut sums = vec![0.0; values.len()];
-            table.add(&factor, 2.0, 7.0, &values, &mut sums);
+            SilentTable::new(factor, values.len()).add(2.0, 7.0, &values, &mut sums);
             for (value, sum) in values.iter().zip(&sums) {
                 let exact = 2.0 * factor.log_probability(value - 7.0);
                 assert!(

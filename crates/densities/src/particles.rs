@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(belief.effective_sample_size(), 2.0);
 /// # Ok::<(), fewbits_densities::Error>(())
 /// ```
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Particles<const D: usize> {
     columns: [Vec<f64>; D],
@@ -225,6 +225,26 @@ impl<const D: usize> Particles<D> {
     /// Weighted covariance about the mean.
     pub fn covariance(&self) -> SMatrix<f64, D, D> {
         self.covariance_about(&self.mean())
+    }
+}
+
+/// `clone_from` reuses memory, so that a filter can keep a belief to fall back to without allocating.
+impl<const D: usize> Clone for Particles<D> {
+    fn clone(&self) -> Self {
+        Self {
+            columns: self.columns.clone(),
+            log_weights: self.log_weights.clone(),
+            weights: self.weights.clone(),
+            effective_sample_size: self.effective_sample_size,
+            scratch: Vec::with_capacity(self.len()),
+        }
+    }
+
+    fn clone_from(&mut self, other: &Self) {
+        self.columns.clone_from(&other.columns);
+        self.log_weights.clone_from(&other.log_weights);
+        self.weights.clone_from(&other.weights);
+        self.effective_sample_size = other.effective_sample_size;
     }
 }
 

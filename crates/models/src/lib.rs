@@ -39,6 +39,7 @@ mod error;
 mod linear_gaussian;
 mod linear_sensor;
 mod received_power;
+mod scalar_sensing;
 
 pub use ar1::Ar1;
 pub use constant_velocity::{constant_velocity_1d, constant_velocity_2d};
@@ -46,3 +47,4 @@ pub use error::Error;
 pub use linear_gaussian::LinearGaussian;
 pub use linear_sensor::{LinearSensor, ScalarSensor};
 pub use received_power::ReceivedPower;
+pub use scalar_sensing::ScalarSensing;

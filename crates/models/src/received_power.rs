@@ -94,7 +94,7 @@ impl<const D: usize> ReceivedPower<D> {
     }
 
     /// Writes the noise-free amplitude of every state of a cloud to `amplitudes`.
-    pub fn mean_columns(&self, states: &Columns<'_, D>, amplitudes: &mut [f64]) {
+    pub fn amplitudes(&self, states: &Columns<'_, D>, amplitudes: &mut [f64]) {
         let count = amplitudes.len();
         let (x, y) = (&states[self.axes[0]][..count], &states[self.axes[1]][..count]);
         let (sx, sy) = (self.position[0], self.position[1]);
@@ -178,7 +178,7 @@ mod tests {
             let x: Vec<f64> = (0..70).map(|i| i as f64 * 0.3 - 8.0).collect();
             let y: Vec<f64> = (0..70).map(|i| 4.0 - i as f64 * 0.1).collect();
             let (unused, mut out) = (vec![0.0; 70], vec![0.0; 70]);
-            sensor.mean_columns(&[&x, &unused, &y, &unused], &mut out);
+            sensor.amplitudes(&[&x, &unused, &y, &unused], &mut out);
             for i in 0..70 {
                 let single = sensor.mean(&Vector4::new(x[i], 0.0, y[i], 0.0))[0];
                 assert!((out[i] - single).abs() < 1e-12 * single);

@@ -154,3 +154,14 @@ proptest! {
         prop_assert_eq!((mirrored.mean, mirrored.variance), (-m.mean, m.variance));
     }
 }
+
+#[test]
+fn a_cell_ten_billion_deviations_out_still_has_moments() {
+    // There `lower + decay length` rounds to `lower`.
+    for (lower, upper) in [(1e10, f64::INFINITY), (1e10, 1e10 + 1.0), (-3e12, -1e12)] {
+        let cell = truncated_moments(lower, upper).unwrap();
+        let edge = lower.abs().min(upper.abs());
+        assert!((cell.mean.abs() / edge - 1.0).abs() < 1e-12, "{cell:?}");
+        assert!((cell.variance * edge * edge - 1.0).abs() < 1e-9, "{cell:?}");
+    }
+}

@@ -1,0 +1,117 @@
+//! One step of fusion, Gaussian against particles, and the silent factors, against a standard normal draw.
+//!
+//! Read the medians: `particles_1000 / gaussian` is at least 15. The allocation columns are zero but for the small vector of
+//! the vector likelihood.
+
+#![allow(clippy::unwrap_used)]
+
+use divan::{AllocProfiler, Bencher, black_box};
+use fewbits_cfwmd::ellipsoid::Ellipsoid;
+use fewbits_cfwmd::network::Network;
+use fewbits_cfwmd::particle::HeardScalars;
+use fewbits_cfwmd::rule::CensoringRule;
+use fewbits_cfwmd::silence::{SilentFactor, SilentTable};
+use fewbits_cfwmd::threshold::Budget;
+use fewbits_core::{Gaussian, Observation, Stream};
+use fewbits_densities::Particles;
+use fewbits_filters::{ParticleFilter, Workspace, kalman};
+use fewbits_models::{LinearSensor, constant_velocity_1d};
+use nalgebra::{Matrix2, Vector1, Vector2};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+#[global_allocator]
+static ALLOCATOR: AllocProfiler = AllocProfiler::system();
+
+fn main() {
+    divan::main();
+}
+
+/// The unit of account.
+#[divan::bench]
+fn normal_draw(bencher: Bencher<'_, '_>) {
+    let mut rng = Stream::new(1).fast_rng();
+    bencher.bench_local(|| rng.sample::<f64, _>(StandardNormal));
+}
+
+fn network() -> (Network<2, 1>, Vec<CensoringRule<1>>) {
+    let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
+    let threshold = Budget::new(1.0, 2).unwrap().threshold(1).unwrap();
+    let network = Network::new(vec![sensor; 2], threshold, 0.0).unwrap();
+    let rule = CensoringRule::scalar(6.854, threshold).unwrap();
+    (network, vec![rule; 2])
+}
+
+/// What a step may hear: two values, one, or none.
+fn heard(silent: usize) -> [Observation<Vector1<f64>>; 2] {
+    let value = Observation::Received(Vector1::new(3.5));
+    [
+        if silent > 1 { Observation::Silent } else { value },
+        if silent > 0 { Observation::Silent } else { value },
+    ]
+}
+
+#[divan::bench(args = [0, 1, 2])]
+fn gaussian(bencher: Bencher<'_, '_>, silent: usize) {
+    let (network, rules) = network();
+    let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
+    let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(0.6, 0.4, 0.4, 2.0)).unwrap();
+    let heard = heard(silent);
+    bencher.bench_local(|| {
+        let predicted = kalman::predict(&dynamics, black_box(&belief));
+        network.fuse(&predicted, &rules, &Vector2::zeros(), &heard).unwrap()
+    });
+}
+
+#[divan::bench(args = [0, 1, 2])]
+fn particles_1000(bencher: Bencher<'_, '_>, silent: usize) {
+    let (network, rules) = network();
+    let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
+    let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(0.6, 0.4, 0.4, 2.0)).unwrap();
+    let mut rng = Stream::new(2).fast_rng();
+    let start = Particles::from_draws(1000, || belief.sample(&mut rng).unwrap()).unwrap();
+    let (filter, mut workspace) = (ParticleFilter::default(), Workspace::default());
+    let (mut cloud, mut likelihood) = (start.clone(), HeardScalars::new());
+    let heard = heard(silent);
+    let mut step = || {
+        cloud.clone_from(&start);
+        filter.predict(&mut rng, &dynamics, &mut cloud, &mut workspace).unwrap();
+        network
+            .hear(&rules, &Vector2::zeros(), &heard, 1000, &mut likelihood)
+            .unwrap();
+        filter.update(&likelihood, &mut cloud).unwrap();
+        cloud.mean()
+    };
+    step();
+    bencher.bench_local(step);
+}
+
+/// A thousand exact scalar factors, and the same from the table (its construction included).
+#[divan::bench(args = [false, true])]
+fn scalar_factors_1000(bencher: Bencher<'_, '_>, tabulated: bool) {
+    let factor = SilentFactor::new(1.8, 1.0, 0.0).unwrap();
+    let values: Vec<f64> = (0..1000).map(|i| i as f64 * 0.006 - 3.0).collect();
+    let mut table = SilentTable::new(factor, 1000);
+    let mut sums = vec![0.0; 1000];
+    bencher.bench_local(|| {
+        table.prepare(factor, if tabulated { 1000 } else { 0 });
+        table.add(1.0, 0.0, &values, &mut sums);
+        sums[7]
+    });
+}
+
+/// One factor of a sensor with two components.
+#[divan::bench]
+fn vector_factor(bencher: Bencher<'_, '_>) {
+    let region = Ellipsoid::new(&Matrix2::new(3.5, 1.0, 1.0, 5.5), 1.386).unwrap();
+    let under = region.under(&Matrix2::new(2.0, 0.0, 0.0, 4.0)).unwrap();
+    bencher.bench_local(|| under.log_probability(black_box(&Vector2::new(0.7, -0.4))));
+}
+
+/// Its probability, mean and covariance together.
+#[divan::bench]
+fn vector_moments(bencher: Bencher<'_, '_>) {
+    let region = Ellipsoid::new(&Matrix2::new(3.5, 1.0, 1.0, 5.5), 1.386).unwrap();
+    let under = region.under(&Matrix2::new(2.8, 0.7, 0.7, 4.9)).unwrap();
+    bencher.bench_local(|| under.moments(black_box(&Vector2::new(0.7, -0.4))).unwrap());
+}

@@ -1,0 +1,211 @@
+//! The censoring rule, and where its innovation covariance comes from.
+
+use crate::Error;
+use crate::ellipsoid::Ellipsoid;
+use fewbits_core::error::positive;
+use fewbits_core::{Gaussian, GaussianDynamics, Sensing};
+use fewbits_filters::extended_kalman;
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+/// Which innovation covariance `S` a sensor weighs its innovation with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weighing {
+    /// That of the sensor's own Kalman filter, as if it used all its own measurements (the paper's CFwMD). Needs no covariance
+    /// feedback and no data, but the rate of messages is off by up to a quarter.
+    #[default]
+    OwnFilter,
+    /// `R + H P H'` with the fusion centre's predicted covariance (the paper's CFwMD2): the rate is met, at the price of a
+    /// covariance in every broadcast.
+    FusionCentre,
+    /// A sequence computed before deployment, the expected covariance at the fusion centre: the rate is met without covariance
+    /// feedback, and the error is that of [`FusionCentre`](Self::FusionCentre).
+    Scheduled,
+}
+
+/// `send iff nu' S^-1 nu >= eta`, `nu = z - prediction`; a tie is sent.
+///
+/// For the measurement of a scalar sensor this is also the rule that sends whatever moves the posterior far in
+/// Kullback-Leibler divergence; see [`information`](crate::information).
+#[derive(Debug, Clone)]
+pub struct CensoringRule<const M: usize> {
+    region: Ellipsoid<M>,
+    half_width: f64,
+}
+
+impl<const M: usize> CensoringRule<M> {
+    /// The rule with innovation covariance `S` (positive definite) and threshold `eta >= 0`.
+    ///
+    /// # Errors
+    /// `S` not positive definite, a negative threshold.
+    pub fn new(innovation_covariance: &SMatrix<f64, M, M>, threshold: f64) -> Result<Self, Error> {
+        Ok(Self {
+            region: Ellipsoid::new(innovation_covariance, threshold)?,
+            half_width: (threshold * innovation_covariance[(0, 0)]).sqrt(),
+        })
+    }
+
+    /// `eta`.
+    pub fn threshold(&self) -> f64 {
+        self.region.threshold()
+    }
+
+    /// Where the innovation of a silent sensor lies.
+    pub fn region(&self) -> &Ellipsoid<M> {
+        &self.region
+    }
+
+    /// `nu' S^-1 nu`.
+    #[inline]
+    pub fn statistic(&self, innovation: &SVector<f64, M>) -> f64 {
+        self.region.statistic(innovation)
+    }
+
+    /// Whether a sensor with this innovation speaks.
+    #[inline]
+    pub fn speaks(&self, innovation: &SVector<f64, M>) -> bool {
+        if M == 1 {
+            // The fusion centre works with this very interval.
+            innovation[0].abs() >= self.half_width
+        } else {
+            self.statistic(innovation) >= self.threshold()
+        }
+    }
+
+    /// Refuses a received measurement that the rule would have kept silent; rounding of the order 1e-9 is forgiven.
+    ///
+    /// # Errors
+    /// [`Error::ProtocolViolation`] naming `sensor`.
+    pub fn audit(&self, sensor: usize, innovation: &SVector<f64, M>) -> Result<(), Error> {
+        let statistic = self.statistic(innovation);
+        if statistic < self.threshold() * (1.0 - 1e-9) {
+            return Err(Error::ProtocolViolation {
+                sensor,
+                statistic,
+                threshold: self.threshold(),
+            });
+        }
+        Ok(())
+    }
+}
+
+impl<const M: usize> CensoringRule<M> {
+    /// `sqrt(eta S_11)`: half the width of the region of silence along the first axis through its centre.
+    pub(crate) fn first_half_width(&self) -> f64 {
+        self.half_width
+    }
+}
+
+impl CensoringRule<1> {
+    /// `c = sqrt(eta s)`: a silent innovation lies in `(-c, c)`.
+    pub fn half_width(&self) -> f64 {
+        self.half_width
+    }
+
+    /// The rule with innovation variance `s`.
+    ///
+    /// # Errors
+    /// `s` not positive, a negative threshold.
+    pub fn scalar(innovation_variance: f64, threshold: f64) -> Result<Self, Error> {
+        positive("innovation_variance", innovation_variance)?;
+        Self::new(&SMatrix::from([[innovation_variance]]), threshold)
+    }
+}
+
+impl<const M: usize> CensoringRule<M> {
+    /// The rule weighed with a fed-back belief (the paper's CFwMD2): `S = R + H (F P F' + Q) H'`, the dynamics linearised at
+    /// the belief's mean and the sensing at its prediction.
+    ///
+    /// # Errors
+    /// `S` not positive definite, a negative threshold.
+    pub fn under<const D: usize>(
+        dynamics: &impl GaussianDynamics<D>,
+        sensing: &impl Sensing<D, M>,
+        belief: &Gaussian<D>,
+        threshold: f64,
+    ) -> Result<Self, Error> {
+        let step = OwnRecursion::new(belief).advance(dynamics, sensing, belief.mean())?;
+        Self::new(&step.innovation_covariance, threshold)
+    }
+}
+
+/// The covariance recursion of one sensor's own (extended) Kalman filter, which uses all its own measurements.
+///
+/// It needs no data in a linear model, and the fed-back estimate to linearise about in a nonlinear one; either way sensor and
+/// fusion centre run the same recursion and agree on `S`.
+///
+/// ```text
+/// P = F P F' + Q, linearised at the last estimate
+/// S = H P H' + R,  H the Jacobian at the prediction
+/// P = P - P H' S^-1 H P
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnRecursion<const D: usize> {
+    covariance: SMatrix<f64, D, D>,
+}
+
+/// What one step of [`OwnRecursion`] gives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnStep<const D: usize, const M: usize> {
+    /// `S`.
+    pub innovation_covariance: SMatrix<f64, M, M>,
+    /// Gain `W = P H' S^-1` of the sensor's own filter.
+    pub gain: SMatrix<f64, D, M>,
+    /// Predicted covariance, before the measurement.
+    pub predicted: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> OwnRecursion<D> {
+    /// The recursion from an initial covariance.
+    pub fn new(start: &Gaussian<D>) -> Self {
+        Self {
+            covariance: *start.covariance(),
+        }
+    }
+
+    /// Covariance after the last measurement.
+    pub fn covariance(&self) -> &SMatrix<f64, D, D> {
+        &self.covariance
+    }
+
+    /// One step. `estimate` is the state the models are linearised about, of the step before; linear models ignore it.
+    ///
+    /// # Errors
+    /// An innovation covariance that is not positive definite.
+    pub fn advance<const M: usize>(
+        &mut self,
+        dynamics: &impl GaussianDynamics<D>,
+        sensing: &impl Sensing<D, M>,
+        estimate: &SVector<f64, D>,
+    ) -> Result<OwnStep<D, M>, Error> {
+        let before = Gaussian::from_trusted_parts(*estimate, self.covariance);
+        let predicted = extended_kalman::predict(dynamics, &before);
+        let expected = sensing.mean(predicted.mean());
+        let (after, info) = extended_kalman::update(sensing, &predicted, &expected)?;
+        self.covariance = *after.covariance();
+        Ok(OwnStep {
+            innovation_covariance: info.innovation_covariance,
+            gain: info.gain,
+            predicted: *predicted.covariance(),
+        })
+    }
+}
+
+/// One step of the cross-covariance of the prediction errors of two sensors' own filters:
+/// `C <- (1 - W_i H_i) C (1 - W_j H_j)'`, then `F C F' + Q`.
+///
+/// All sensors share the start: the recursion begins with `F P0 F' + Q`, not with `Q` alone unless the start is known exactly
+/// (erratum `cfwmd-cross-covariance`).
+pub fn cross_covariance_step<const D: usize, const M: usize>(
+    dynamics: &impl GaussianDynamics<D>,
+    cross: &SMatrix<f64, D, D>,
+    first: (&OwnStep<D, M>, &SMatrix<f64, M, D>),
+    second: (&OwnStep<D, M>, &SMatrix<f64, M, D>),
+) -> SMatrix<f64, D, D> {
+    let keep =
+        |(step, matrix): (&OwnStep<D, M>, &SMatrix<f64, M, D>)| SMatrix::<f64, D, D>::identity() - step.gain * matrix;
+    let transition = dynamics.jacobian(&SVector::zeros());
+    let after = keep(first) * cross * keep(second).transpose();
+    transition * after * transition.transpose() + dynamics.noise_covariance()
+}

@@ -1,0 +1,637 @@
+//! The linear experiments: a target with constant velocity, identical sensors, every scheme on the same truth and noise.
+
+use super::ensemble::{Ensemble, Record};
+use crate::error::Error;
+use crate::figure::Context;
+use fewbits_cfwmd::assumed_density::{ScalarSilence, hear_scalar_silence};
+use fewbits_cfwmd::message::Format;
+use fewbits_cfwmd::network::Network;
+use fewbits_cfwmd::no_feedback::{LocalSensor, NoFeedback, NoFeedbackCentre};
+use fewbits_cfwmd::particle::{HeardScalars, HeardVectors};
+use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep, Weighing};
+use fewbits_cfwmd::schedule::expected_covariances;
+use fewbits_cfwmd::threshold::Budget;
+use fewbits_cfwmd::trigger::StochasticTrigger;
+use fewbits_core::likelihood::Heard;
+use fewbits_core::linalg::semidefinite_factor;
+use fewbits_core::message::Cell;
+use fewbits_core::{Dynamics, Gaussian, Observation, Sensing, Stream};
+use fewbits_densities::Particles;
+use fewbits_filters::{ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
+use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
+use nalgebra::{SMatrix, SVector, Vector2};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of a linear figure.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Setting {
+    /// Monte-Carlo trials.
+    pub(super) trials: u64,
+    /// Time steps of a trial.
+    pub(super) steps: u64,
+    /// Number of sensors `N`.
+    pub(super) sensors: u64,
+    /// Message budgets `l`.
+    pub(super) messages: Vec<f64>,
+    /// Variance of the acceleration (m^2/s^4).
+    pub(super) acceleration_variance: f64,
+    /// Noise variance of each measured component (m^2; m^2/s^2).
+    pub(super) noise_variances: Vec<f64>,
+    /// Initial variance of position and velocity; zero is a known start, and a positive one draws the truth too.
+    pub(super) initial_variance: f64,
+    /// Particles of particle schemes.
+    pub(super) particles: u64,
+}
+
+impl Setting {
+    /// The scalar experiment with `N` sensors.
+    pub(super) fn scalar(sensors: u64, messages: Vec<f64>) -> Self {
+        Self {
+            trials: 5000,
+            steps: 20,
+            sensors,
+            messages,
+            acceleration_variance: 4.0,
+            noise_variances: vec![1.0],
+            initial_variance: 0.0,
+            particles: 1000,
+        }
+    }
+
+    /// The vector experiment with `N` sensors. The acceleration variance that fits the printed table is 1, not the 4 of the text.
+    pub(super) fn vector(sensors: u64, messages: Vec<f64>) -> Self {
+        Self {
+            acceleration_variance: 1.0,
+            noise_variances: vec![2.0, 4.0],
+            ..Self::scalar(sensors, messages)
+        }
+    }
+
+    /// About a second of work.
+    pub(super) fn quicken(&mut self) {
+        self.trials = 150;
+    }
+}
+
+/// What is sent, and how the fusion centre listens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Scheme {
+    /// Everything is sent.
+    All,
+    /// A coin decides.
+    Random,
+    /// Censoring, silence ignored (CFoMD), own feedback loop.
+    Deaf,
+    /// Censoring, silence fused by the Gaussian centre.
+    Gaussian(Weighing),
+    /// Censoring, silence fused by a bootstrap particle filter.
+    Particles(usize, Weighing),
+    /// Censoring, silence fused by the Rao-Blackwellised filter.
+    RaoBlackwell(usize),
+    /// Random Gaussian-preserving trigger, weighed with the sensor's own or the centre's innovation variance.
+    Trigger(Weighing),
+    /// As `Gaussian`, over a link that loses messages; the centre knows the loss rate or believes there is none.
+    Lossy { loss: f64, modelled: bool },
+    /// No feedback.
+    Blind(NoFeedback),
+    /// No feedback, silence as if each sensor's estimate were scattered about the centre's own (a heuristic).
+    Centred,
+    /// No feedback, silence with the sensor's estimate given the state but not the data (the paper's law, corrected).
+    Unconditional,
+}
+
+/// One linear experiment at one budget.
+pub(super) struct Linear<const M: usize> {
+    dynamics: LinearGaussian<2, 1>,
+    sensor: LinearSensor<2, M>,
+    sensors: usize,
+    budget: Budget,
+    threshold: f64,
+    start: Gaussian<2>,
+    steps: usize,
+    /// The sensors' own recursion and its rule, step by step.
+    own: Vec<(OwnStep<2, M>, CensoringRule<M>)>,
+    /// Prior covariance of the state without any data.
+    open_loop: Vec<SMatrix<f64, 2, 2>>,
+    /// Scheduled innovation rule, where a scheme asks for it.
+    scheduled: Vec<CensoringRule<M>>,
+}
+
+/// What all schemes of one trial share.
+struct Draws<const M: usize> {
+    truth: Vec<Vector2<f64>>,
+    measurements: Vec<Vec<SVector<f64, M>>>,
+    coins: Vec<Vec<f64>>,
+    losses: Vec<Vec<f64>>,
+    /// What the sensors say without feedback.
+    blind: Vec<Vec<Observation<SVector<f64, M>>>>,
+}
+
+/// Measurement dimension that an experiment supports: which of the special schemes exist in it.
+pub(super) trait Dimension<const M: usize> {
+    /// Noise model of one sensor.
+    fn sensor(variances: &[f64]) -> Result<LinearSensor<2, M>, Error>;
+    /// Schemes with particles or with closed forms of their own.
+    fn special(linear: &Linear<M>, scheme: Scheme, track: Track<'_, M>) -> Result<(), Error>;
+}
+
+/// The dimension of the measurement, as a type.
+pub(super) struct Measured;
+
+/// One trial in the making.
+pub(super) struct Track<'a, const M: usize> {
+    draws: &'a Draws<M>,
+    stream: Stream,
+    record: &'a mut Record,
+}
+
+impl<const M: usize> Track<'_, M> {
+    fn note(&mut self, k: usize, belief: &Gaussian<2>, sent: usize) {
+        let error = self.draws.truth[k] - belief.mean();
+        self.record.position.push(error[0] * error[0]);
+        self.record.velocity.push(error[1] * error[1]);
+        self.record.sent.push(sent as f64);
+        self.record
+            .consistency
+            .push(error[0] * error[0] / belief.covariance()[(0, 0)]);
+    }
+}
+
+fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
+    Error::failed(error)
+}
+
+/// Runs schemes over the trials of a setting at one budget, on common random numbers.
+pub(super) fn run<const M: usize>(
+    context: &Context<'_>,
+    setting: &Setting,
+    messages: f64,
+    schemes: &[(&str, Scheme)],
+) -> Result<Vec<Ensemble>, Error>
+where
+    Measured: Dimension<M>,
+{
+    let needs_schedule = schemes
+        .iter()
+        .any(|(_, s)| matches!(s, Scheme::Gaussian(Weighing::Scheduled) | Scheme::Particles(_, Weighing::Scheduled)));
+    let linear = Linear::<M>::new(context, setting, messages, needs_schedule)?;
+    // One stream for all figures and budgets: schemes differ by what they do, not by their luck.
+    let stream = context.stream("cfwmd-linear");
+    let trials = context
+        .monte_carlo(stream, setting.trials)
+        .run(|trial| -> Result<_, Error> {
+            let draws = linear.draw(trial.stream)?;
+            schemes
+                .iter()
+                .map(|(_, scheme)| linear.trial(*scheme, &draws, trial.stream.named("scheme")))
+                .collect::<Result<Vec<_>, _>>()
+        })?;
+    let mut ensembles: Vec<_> = schemes
+        .iter()
+        .map(|(name, _)| Ensemble {
+            scheme: (*name).to_owned(),
+            messages,
+            records: Vec::with_capacity(trials.len()),
+        })
+        .collect();
+    for records in trials {
+        for (ensemble, record) in ensembles.iter_mut().zip(records) {
+            ensemble.records.push(record);
+        }
+    }
+    Ok(ensembles)
+}
+
+impl<const M: usize> Linear<M>
+where
+    Measured: Dimension<M>,
+{
+    fn new(context: &Context<'_>, setting: &Setting, messages: f64, schedule: bool) -> Result<Self, Error> {
+        let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance).map_err(failed)?;
+        let sensor = Measured::sensor(&setting.noise_variances)?;
+        let sensors = setting.sensors as usize;
+        let budget = Budget::new(messages, sensors).map_err(failed)?;
+        let threshold = budget.threshold(M).map_err(failed)?;
+        fewbits_core::error::non_negative("initial_variance", setting.initial_variance)?;
+        let start = Gaussian::new(Vector2::new(0.0, 10.0), SMatrix::identity() * setting.initial_variance)?;
+        let steps = setting.steps as usize;
+        let mut recursion = OwnRecursion::new(&start);
+        let (mut own, mut open_loop) = (Vec::new(), Vec::new());
+        let mut prior = start;
+        for _ in 0..steps {
+            let step = recursion.advance(&dynamics, &sensor, start.mean()).map_err(failed)?;
+            let rule = CensoringRule::new(&step.innovation_covariance, threshold).map_err(failed)?;
+            own.push((step, rule));
+            prior = kalman::predict(&dynamics, &prior);
+            open_loop.push(*prior.covariance());
+        }
+        let mut linear = Self {
+            dynamics,
+            sensor,
+            sensors,
+            budget,
+            threshold,
+            start,
+            steps,
+            own,
+            open_loop,
+            scheduled: Vec::new(),
+        };
+        if schedule {
+            let network = linear.network(0.0)?;
+            let mut rng = context.stream("cfwmd-schedule").rng();
+            let covariances =
+                expected_covariances(&mut rng, &network, &linear.dynamics, &linear.start, steps, SCHEDULE_RUNS)
+                    .map_err(failed)?;
+            let rule = |p: &SMatrix<f64, 2, 2>| network.rule_under(0, p).map_err(failed);
+            linear.scheduled = covariances.iter().map(rule).collect::<Result<_, _>>()?;
+        }
+        Ok(linear)
+    }
+
+    fn network(&self, loss: f64) -> Result<Network<2, M>, Error> {
+        Network::new(vec![self.sensor; self.sensors], self.threshold, loss).map_err(failed)
+    }
+
+    fn draw(&self, stream: Stream) -> Result<Draws<M>, Error> {
+        let mut rng = stream.named("truth").rng();
+        let mut noise = stream.named("noise").rng();
+        let mut coins = stream.named("coins").rng();
+        let mut losses = stream.named("losses").rng();
+        let mut state = self.start.sample(&mut rng)?;
+        let mut halves = (0..self.sensors)
+            .map(|_| LocalSensor::new(self.sensor, self.threshold, Format::Double, &self.start))
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(failed)?;
+        let mut draws = Draws {
+            truth: Vec::new(),
+            measurements: Vec::new(),
+            coins: Vec::new(),
+            losses: Vec::new(),
+            blind: Vec::new(),
+        };
+        for _ in 0..self.steps {
+            state = self.dynamics.propagate(&mut rng, &state);
+            let measurements: Vec<_> = (0..self.sensors)
+                .map(|_| self.sensor.sample(&mut noise, &state))
+                .collect();
+            let blind = halves
+                .iter_mut()
+                .zip(&measurements)
+                .map(|(half, z)| half.step(&self.dynamics, z).map(|report| report.heard()))
+                .collect::<Result<_, _>>()
+                .map_err(failed)?;
+            draws.truth.push(state);
+            draws.measurements.push(measurements);
+            draws.blind.push(blind);
+            draws.coins.push((0..self.sensors).map(|_| coins.random()).collect());
+            draws.losses.push((0..self.sensors).map(|_| losses.random()).collect());
+        }
+        Ok(draws)
+    }
+
+    fn trial(&self, scheme: Scheme, draws: &Draws<M>, stream: Stream) -> Result<Record, Error> {
+        let mut record = Record::default();
+        let mut track = Track {
+            draws,
+            stream,
+            record: &mut record,
+        };
+        match scheme {
+            Scheme::All => self.values_only(&mut track, |_, _, _, _| true)?,
+            Scheme::Random => {
+                let rate = self.budget.rate();
+                self.values_only(&mut track, |k, i, _, _| draws.coins[k][i] < rate)?;
+            }
+            Scheme::Deaf => {
+                self.values_only(&mut track, |k, _, z, prediction| self.own[k].1.speaks(&(z - prediction)))?;
+            }
+            Scheme::Gaussian(weighing) => self.gaussian(&mut track, weighing, 0.0, 0.0)?,
+            Scheme::Lossy { loss, modelled } => {
+                self.gaussian(&mut track, Weighing::OwnFilter, loss, if modelled { loss } else { 0.0 })?;
+            }
+            Scheme::Blind(method) => {
+                let network = self.network(0.0)?;
+                let mut centre =
+                    NoFeedbackCentre::new(network, &self.start, method, self.budget.rate()).map_err(failed)?;
+                let mut rng = track.stream.named("particles").fast_rng();
+                for (k, heard) in draws.blind.iter().enumerate() {
+                    let info = centre.step(&mut rng, &self.dynamics, heard).map_err(failed)?;
+                    track.note(k, &centre.belief(), info.received);
+                }
+            }
+            special => Measured::special(self, special, track)?,
+        }
+        Ok(record)
+    }
+
+    /// A Kalman filter on what is sent, with its own feedback loop.
+    fn values_only(
+        &self,
+        track: &mut Track<'_, M>,
+        sends: impl Fn(usize, usize, &SVector<f64, M>, &SVector<f64, M>) -> bool,
+    ) -> Result<(), Error> {
+        let mut belief = self.start;
+        for k in 0..self.steps {
+            belief = kalman::predict(&self.dynamics, &belief);
+            let prediction = self.sensor.matrix() * belief.mean();
+            let mut sent = 0;
+            for (i, z) in track.draws.measurements[k].iter().enumerate() {
+                if sends(k, i, z, &prediction) {
+                    belief = kalman::update(&self.sensor, &belief, z).map_err(failed)?.0;
+                    sent += 1;
+                }
+            }
+            track.note(k, &belief, sent);
+        }
+        Ok(())
+    }
+
+    fn rules(
+        &self,
+        k: usize,
+        weighing: Weighing,
+        network: &Network<2, M>,
+        predicted: &SMatrix<f64, 2, 2>,
+    ) -> Result<Vec<CensoringRule<M>>, Error> {
+        let rule = match weighing {
+            Weighing::OwnFilter => self.own[k].1.clone(),
+            Weighing::FusionCentre => network.rule_under(0, predicted).map_err(failed)?,
+            Weighing::Scheduled => self.scheduled[k].clone(),
+        };
+        Ok(vec![rule; self.sensors])
+    }
+
+    /// What the centre hears of step `k` under these rules, and how many messages were sent.
+    fn hear(
+        &self,
+        k: usize,
+        draws: &Draws<M>,
+        rules: &[CensoringRule<M>],
+        broadcast: &Vector2<f64>,
+        loss: f64,
+    ) -> (Vec<Observation<SVector<f64, M>>>, usize) {
+        let prediction = self.sensor.matrix() * broadcast;
+        let mut sent = 0;
+        let heard = draws.measurements[k]
+            .iter()
+            .enumerate()
+            .map(|(i, z)| {
+                let speaks = rules[i].speaks(&(z - prediction));
+                sent += usize::from(speaks);
+                if speaks && draws.losses[k][i] >= loss {
+                    Observation::Received(*z)
+                } else {
+                    Observation::Silent
+                }
+            })
+            .collect();
+        (heard, sent)
+    }
+
+    fn gaussian(&self, track: &mut Track<'_, M>, weighing: Weighing, loss: f64, believed: f64) -> Result<(), Error> {
+        let network = self.network(believed)?;
+        let mut belief = self.start;
+        for k in 0..self.steps {
+            let predicted = kalman::predict(&self.dynamics, &belief);
+            let rules = self.rules(k, weighing, &network, predicted.covariance())?;
+            let (heard, sent) = self.hear(k, track.draws, &rules, predicted.mean(), loss);
+            belief = network
+                .fuse(&predicted, &rules, predicted.mean(), &heard)
+                .map_err(failed)?
+                .0;
+            track.note(k, &belief, sent);
+        }
+        Ok(())
+    }
+
+    /// A bootstrap filter; `weigh` updates the cloud by what was heard.
+    fn particles(
+        &self,
+        track: &mut Track<'_, M>,
+        count: usize,
+        weighing: Weighing,
+        mut weigh: impl FnMut(
+            &Network<2, M>,
+            &ParticleFilter,
+            &[CensoringRule<M>],
+            &Vector2<f64>,
+            &[Observation<SVector<f64, M>>],
+            &mut Particles<2>,
+        ) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let network = self.network(0.0)?;
+        let mut rng = track.stream.named("particles").fast_rng();
+        let root = semidefinite_factor("initial covariance", self.start.covariance())?;
+        let mut draw = || self.start.mean() + root * Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
+        let mut cloud = Particles::from_draws(count, &mut draw).map_err(failed)?;
+        let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Always);
+        let mut workspace = Workspace::default();
+        for k in 0..self.steps {
+            filter
+                .predict(&mut rng, &self.dynamics, &mut cloud, &mut workspace)
+                .map_err(failed)?;
+            let broadcast = cloud.mean();
+            let rules = self.rules(k, weighing, &network, &cloud.covariance_about(&broadcast))?;
+            let (heard, sent) = self.hear(k, track.draws, &rules, &broadcast, 0.0);
+            weigh(&network, &filter, &rules, &broadcast, &heard, &mut cloud)?;
+            let mean = cloud.mean();
+            let belief = Gaussian::from_trusted_parts(mean, cloud.covariance_about(&mean));
+            track.note(k, &belief, sent);
+        }
+        Ok(())
+    }
+}
+
+/// The filters alone, for timing: trials drawn beforehand, the sensors' comparisons included.
+pub(super) struct Stopwatch {
+    linear: Linear<1>,
+    draws: Vec<Draws<1>>,
+    stream: Stream,
+}
+
+impl Stopwatch {
+    /// Twenty trials of a setting.
+    pub(super) fn new(context: &Context<'_>, setting: &Setting, messages: f64) -> Result<Self, Error> {
+        let linear = Linear::<1>::new(context, setting, messages, false)?;
+        let stream = context.stream("cfwmd-linear");
+        let draws = (0..20)
+            .map(|trial| linear.draw(stream.indexed(trial)))
+            .collect::<Result<_, _>>()?;
+        Ok(Self { linear, draws, stream })
+    }
+
+    /// Runs a scheme over all trials; the number of steps done.
+    pub(super) fn run(&self, scheme: Scheme) -> Result<usize, Error> {
+        let mut steps = 0;
+        for draws in &self.draws {
+            steps += self
+                .linear
+                .trial(scheme, draws, self.stream.named("scheme"))?
+                .position
+                .len();
+        }
+        Ok(steps)
+    }
+}
+
+/// Offline runs behind a scheduled threshold.
+const SCHEDULE_RUNS: usize = 500;
+
+impl Dimension<1> for Measured {
+    fn sensor(variances: &[f64]) -> Result<LinearSensor<2, 1>, Error> {
+        let variance = variances.first().copied().unwrap_or(0.0);
+        LinearSensor::scalar(Vector2::new(1.0, 0.0), variance).map_err(failed)
+    }
+
+    fn special(linear: &Linear<1>, scheme: Scheme, mut track: Track<'_, 1>) -> Result<(), Error> {
+        match scheme {
+            Scheme::Particles(count, weighing) => {
+                let mut likelihood = HeardScalars::new();
+                linear.particles(&mut track, count, weighing, |network, filter, rules, broadcast, heard, cloud| {
+                    network
+                        .hear(rules, broadcast, heard, count, &mut likelihood)
+                        .map_err(failed)?;
+                    filter.update(&likelihood, cloud).map(drop).map_err(failed)
+                })
+            }
+            Scheme::RaoBlackwell(count) => linear.rao_blackwell(&mut track, count),
+            Scheme::Trigger(weighing) => linear.trigger(&mut track, weighing),
+            _ => linear.heuristic(&mut track, scheme == Scheme::Centred),
+        }
+    }
+}
+
+impl Dimension<2> for Measured {
+    fn sensor(variances: &[f64]) -> Result<LinearSensor<2, 2>, Error> {
+        if variances.len() != 2 {
+            let got = format!("{} numbers", variances.len());
+            return Err(fewbits_core::ArgumentError::new("noise_variances", got, "2 variances").into());
+        }
+        let covariance = SMatrix::<f64, 2, 2>::from_diagonal(&Vector2::from_column_slice(variances));
+        LinearSensor::new(SMatrix::identity(), covariance).map_err(failed)
+    }
+
+    fn special(linear: &Linear<2>, scheme: Scheme, mut track: Track<'_, 2>) -> Result<(), Error> {
+        match scheme {
+            Scheme::Particles(count, weighing) => {
+                linear.particles(&mut track, count, weighing, |network, filter, rules, broadcast, heard, cloud| {
+                    let likelihood = HeardVectors::new(network, rules, broadcast, heard).map_err(failed)?;
+                    filter.update(&likelihood, cloud).map(drop).map_err(failed)
+                })
+            }
+            other => Err(Error::Table(format!("{other:?} exists for scalar measurements only"))),
+        }
+    }
+}
+
+impl Linear<1> {
+    fn rao_blackwell(&self, track: &mut Track<'_, 1>, count: usize) -> Result<(), Error> {
+        let mut rng = track.stream.named("particles").fast_rng();
+        let mut cloud = RaoBlackwellised::new(&self.start, count).map_err(failed)?;
+        let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5));
+        let mut workspace = Workspace::default();
+        for k in 0..self.steps {
+            cloud
+                .predict(&mut rng, &filter, &self.dynamics, &mut workspace)
+                .map_err(failed)?;
+            let broadcast = cloud.means().mean();
+            let rules = vec![self.own[k].1.clone(); self.sensors];
+            let (heard, sent) = self.hear(k, track.draws, &rules, &broadcast, 0.0);
+            let c = rules[0].half_width();
+            for observation in &heard {
+                let what = match observation {
+                    Observation::Received(z) => Heard::Value(z[0]),
+                    _ => Heard::Silence {
+                        cell: Cell::new(broadcast[0] - c, broadcast[0] + c)?,
+                        loss: 0.0,
+                    },
+                };
+                cloud.update(&mut rng, &self.sensor, &what).map_err(failed)?;
+            }
+            track.note(k, &cloud.gaussian(), sent);
+        }
+        Ok(())
+    }
+
+    fn trigger(&self, track: &mut Track<'_, 1>, weighing: Weighing) -> Result<(), Error> {
+        let mut belief = self.start;
+        for k in 0..self.steps {
+            belief = kalman::predict(&self.dynamics, &belief);
+            let prediction = self.sensor.matrix() * belief.mean();
+            let s = match weighing {
+                Weighing::OwnFilter => self.own[k].0.innovation_covariance[(0, 0)],
+                _ => belief.covariance()[(0, 0)] + self.sensor.noise_variance(),
+            };
+            let trigger = StochasticTrigger::for_rate(self.budget.rate(), s).map_err(failed)?;
+            let silent = trigger.silent_sensor(&self.sensor).map_err(failed)?;
+            let mut sent = 0;
+            for (i, z) in track.draws.measurements[k].iter().enumerate() {
+                let speaks = track.draws.coins[k][i] < trigger.probability(z[0] - prediction[0]);
+                sent += usize::from(speaks);
+                let (sensor, value) = if speaks {
+                    (&self.sensor, z)
+                } else {
+                    (&silent, &prediction)
+                };
+                belief = kalman::update(sensor, &belief, value).map_err(failed)?.0;
+            }
+            track.note(k, &belief, sent);
+        }
+        Ok(())
+    }
+
+    /// Two ways to guess at the sensors' estimates without a joint belief; both for comparison only.
+    fn heuristic(&self, track: &mut Track<'_, 1>, centred: bool) -> Result<(), Error> {
+        let mut belief = self.start;
+        let row = self.sensor.direction();
+        for k in 0..self.steps {
+            belief = kalman::predict(&self.dynamics, &belief);
+            let (step, rule) = &self.own[k];
+            let s = step.innovation_covariance[(0, 0)];
+            // The direction in which silence measures the state, the centre of its interval, and its noise.
+            let (direction, centre, noise) = if centred {
+                (row, row.dot(belief.mean()), s)
+            } else {
+                // nu given x has mean h P Sigma^-1 (x - m) and variance h (P - P Sigma^-1 P) h' + r.
+                let spread = self.open_loop[k] + SMatrix::identity() * 1e-9;
+                let inverse = spread.try_inverse().unwrap_or_else(SMatrix::zeros);
+                let direction = inverse * step.predicted * row;
+                let variance = row.dot(&(step.predicted * row)) - direction.dot(&(step.predicted * row));
+                let prior = self.prior_mean(k);
+                (direction, direction.dot(&prior), variance.max(0.0) + self.sensor.noise_variance())
+            };
+            let mut received = 0;
+            let mut silent = 0;
+            for observation in &track.draws.blind[k] {
+                match observation {
+                    Observation::Received(z) => {
+                        belief = kalman::update(&self.sensor, &belief, z).map_err(failed)?.0;
+                        received += 1;
+                    }
+                    _ => silent += 1,
+                }
+            }
+            if silent > 0 {
+                let silence = ScalarSilence {
+                    centre,
+                    half_width: rule.half_width(),
+                    noise_variance: noise,
+                    loss: 0.0,
+                    count: silent,
+                };
+                belief = hear_scalar_silence(&belief, &direction, &silence).map_err(failed)?.0;
+            }
+            track.note(k, &belief, received);
+        }
+        Ok(())
+    }
+
+    /// Mean of the state at step `k` without data.
+    fn prior_mean(&self, k: usize) -> Vector2<f64> {
+        (0..=k).fold(*self.start.mean(), |m, _| self.dynamics.mean(&m))
+    }
+}
