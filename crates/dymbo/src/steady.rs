@@ -117,16 +117,23 @@ pub fn erasure_bound(plant: &ScalarPlant, loss: f64) -> Result<ScalarSteadyState
 /// Steps after which a variance recursion that has not settled is given up.
 const MOST_STEPS: usize = 1_000_000;
 
+/// Relative changes below this that no longer shrink are rounding.
+const ROUNDING: f64 = 1e-13;
+
 /// The fixed point of a slot's variance recursion: `slot` maps a predicted variance to the filtered one.
 ///
 /// # Errors
 /// [`Error::NotConverged`].
 pub fn settle(plant: &ScalarPlant, slot: impl Fn(f64) -> f64) -> Result<ScalarSteadyState, Error> {
     let mut filtered = plant.measurement_variance();
+    let mut last_change = f64::INFINITY;
     for _ in 0..MOST_STEPS {
         let predicted_variance = plant.dynamics().predict_variance(filtered);
         let next = slot(predicted_variance);
-        let settled = (next - filtered).abs() <= 1e-15 * next;
+        let change = (next - filtered).abs();
+        // Near the fixed point changes shrink until rounding is all that is left of them.
+        let settled = change <= 1e-15 * next || change <= ROUNDING * next && change >= last_change;
+        last_change = change;
         filtered = next;
         if settled {
             return Ok(ScalarSteadyState {

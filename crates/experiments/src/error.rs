@@ -57,3 +57,15 @@ impl<E: std::error::Error + Send + Sync + 'static> From<fewbits_core::MonteCarlo
         }
     }
 }
+
+impl From<fewbits_dymbo::Error> for Error {
+    fn from(error: fewbits_dymbo::Error) -> Self {
+        Self::failed(error)
+    }
+}
+
+impl From<fewbits_filters::Error> for Error {
+    fn from(error: fewbits_filters::Error) -> Self {
+        Self::failed(error)
+    }
+}

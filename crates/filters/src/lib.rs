@@ -13,7 +13,7 @@
 //! | linear Gaussian state, any message | [`RaoBlackwellised`] (measurements imputed, states exact) |
 //! | mildly nonlinear sensing | [`extended_kalman`] |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) |
-//! | the exact scalar answer | [`PointMassFilter`] (filter and smoother on a grid) |
+//! | the exact answer | [`PointMassFilter`] (scalar filter and smoother on a grid), [`PlaneFilter`] (two dimensions) |
 //!
 //! ```
 //! use fewbits_core::Gaussian;
@@ -35,6 +35,7 @@ mod guided;
 pub mod kalman;
 mod particle;
 mod point_mass;
+mod point_mass_2d;
 mod rao_blackwell;
 mod resample;
 pub mod smoother;
@@ -44,6 +45,7 @@ pub use error::Error;
 pub use guided::OptimalProposal;
 pub use particle::{ParticleFilter, ParticleInfo, Proposal, Workspace};
 pub use point_mass::{Grid, PointMass, PointMassFilter};
+pub use point_mass_2d::{PlaneFilter, PlaneMass};
 pub use rao_blackwell::RaoBlackwellised;
 pub use resample::{Resampling, Schedule};
 pub use smoother::{FixedLagSmoother, scalar_fixed_lag_variance};

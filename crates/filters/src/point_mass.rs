@@ -157,6 +157,27 @@ impl PointMass {
         Ok(evidence.ln() + peak)
     }
 
+    /// The same with the likelihood tabulated at the nodes, up to a factor, and without allocation; returns the evidence in
+    /// units of that factor. Prefer [`PointMass::update`] where the likelihood may underflow.
+    ///
+    /// # Errors
+    /// A table of wrong length; [`Error::Impossible`], which leaves the belief as it was.
+    pub fn reweight(&mut self, likelihood: &[f64]) -> Result<f64, Error> {
+        if likelihood.len() != self.density.len() {
+            let expected = "one value a node";
+            return Err(ArgumentError::new("likelihood", format!("{} values", likelihood.len()), expected).into());
+        }
+        let sum: f64 = self.density.iter().zip(likelihood).map(|(p, l)| p * l).sum();
+        let evidence = sum * self.grid.spacing;
+        if !(evidence > 0.0 && evidence.is_finite()) {
+            return Err(Error::Impossible);
+        }
+        for (p, l) in self.density.iter_mut().zip(likelihood) {
+            *p *= l / evidence;
+        }
+        Ok(evidence)
+    }
+
     /// Scales the density to integrate to one.
     fn normalise(&mut self) -> Result<(), Error> {
         let total = self.density.iter().sum::<f64>() * self.grid.spacing;
@@ -314,10 +335,7 @@ impl PointMassFilter {
             message.iter_mut().for_each(|m| *m /= peak);
         }
         let mut smoothed = filtered.clone();
-        for (p, m) in smoothed.density.iter_mut().zip(&message) {
-            *p *= m;
-        }
-        smoothed.normalise()?;
+        smoothed.reweight(&message)?;
         Ok(smoothed)
     }
 }
@@ -380,6 +398,13 @@ mod tests {
         // A likelihood far below the smallest double is no obstacle.
         assert!(belief.update(|x| -1e5 - x * x).is_ok());
         assert!((belief.variance() - 1.0 / 3.0).abs() < 1e-12);
+        let mut tabulated = belief.clone();
+        let table: Vec<f64> = grid.nodes().map(|x| (-x).exp()).collect();
+        let evidence = tabulated.reweight(&table).unwrap();
+        assert!((evidence.ln() - belief.update(|x| -x).unwrap()).abs() < 1e-12);
+        assert!((tabulated.mean() - belief.mean()).abs() < 1e-12);
+        assert_eq!(tabulated.reweight(&vec![0.0; table.len()]), Err(Error::Impossible));
+        assert!(tabulated.reweight(&[1.0]).is_err());
     }
 
     #[test]

@@ -202,7 +202,11 @@ fn draw_layer<'a, 'b: 'a>(
                 let drawn = chart.draw_series([PathElement::new(points, pen)]).map_err(why)?;
                 name(drawn, &layer.label, move |(x, y)| PathElement::new(vec![(x, y), (x + 40, y)], pen));
             } else {
-                let drawn = chart.draw_series(dashes(chart, &points).into_iter().map(|d| PathElement::new(d, pen)));
+                let drawn = chart.draw_series(
+                    dashes(chart, &points, x, y)
+                        .into_iter()
+                        .map(|d| PathElement::new(d, pen)),
+                );
                 name(drawn.map_err(why)?, &layer.label, move |(x, y)| {
                     EmptyElement::at((x, y))
                         + PathElement::new(vec![(0, 0), (15, 0)], pen)
@@ -327,12 +331,12 @@ fn draw_points<'a, 'b: 'a>(
 }
 
 /// Cuts a polyline into dashes of equal length on paper.
-fn dashes(chart: &Chart<'_, '_>, points: &[Point]) -> Vec<Vec<Point>> {
+fn dashes(chart: &Chart<'_, '_>, points: &[Point], x: &Scaled, y: &Scaled) -> Vec<Vec<Point>> {
     const PERIOD: f64 = 26.0;
     const DASH: f64 = 16.0;
     let place = |p: &Point| {
-        let (x, y) = chart.backend_coord(p);
-        (f64::from(x), f64::from(y))
+        let (right, down) = chart.backend_coord(p);
+        (f64::from(right), f64::from(down))
     };
     let (mut dashes, mut current, mut travelled) = (Vec::new(), Vec::new(), 0.0);
     for pair in points.windows(2) {
@@ -345,7 +349,7 @@ fn dashes(chart: &Chart<'_, '_>, points: &[Point]) -> Vec<Vec<Point>> {
             let next = (at + rest.max(1e-6)).min(length);
             let between = |t: f64| {
                 let share = t / length;
-                (pair[0].0 + share * (pair[1].0 - pair[0].0), pair[0].1 + share * (pair[1].1 - pair[0].1))
+                (x.between(pair[0].0, pair[1].0, share), y.between(pair[0].1, pair[1].1, share))
             };
             if phase < DASH {
                 if current.is_empty() {

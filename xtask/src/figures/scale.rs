@@ -42,6 +42,14 @@ impl Scaled {
         self.low
     }
 
+    /// The value a given share of the way on paper from `a` to `b`.
+    pub(super) fn between(&self, a: f64, b: f64, share: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => a + share * (b - a),
+            Scale::Log => a * (b / a).powf(share),
+        }
+    }
+
     fn position(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
