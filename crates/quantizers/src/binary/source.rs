@@ -161,7 +161,8 @@ impl Nodes {
             for &(threshold, noise) in blurs {
                 let ahead = threshold - ZONE * noise - x;
                 if ahead > 0.0 {
-                    step = step.min(ahead);
+                    // A panel fine enough for the zone need not stop at its edge.
+                    step = step.min(ahead.max(share * noise));
                 } else if x < threshold + ZONE * noise {
                     step = step.min(share * noise);
                 }

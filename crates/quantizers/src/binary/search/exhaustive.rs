@@ -19,6 +19,8 @@ const FINALISTS: usize = 16;
 const TIE: f64 = 1e-12;
 /// Most sets that a ranking may list.
 const MAX_RANKED: u128 = 1 << 26;
+/// Most sets that a search may visit: hours of work.
+const MAX_SETS: u128 = 1 << 32;
 /// Levels of the search tree whose branches are shared among threads.
 const PARALLEL_LEVELS: usize = 2;
 
@@ -123,7 +125,8 @@ impl LinearSearch {
     /// The best set. Its error is exact to `1e-12`; among equals the lowest masks win.
     ///
     /// # Errors
-    /// If full rank is required of fewer sensors than bits, or there are too many outcomes to enumerate.
+    /// If full rank is required of fewer sensors than bits, there are too many outcomes to enumerate, or more than `2^32` sets;
+    /// [`Descent`](super::Descent) is for those.
     pub fn best(&self) -> Result<MaskSet, Error> {
         let mut finalists = self.run(FINALISTS)?;
         for set in &mut finalists {
@@ -157,7 +160,13 @@ impl LinearSearch {
     }
 
     fn run(&self, keep: usize) -> Result<Vec<MaskSet>, Error> {
-        self.sets()?;
+        let sets = self.sets()?;
+        if sets > MAX_SETS {
+            return Err(Error::TooManyOutcomes {
+                outcomes: sets,
+                limit: MAX_SETS,
+            });
+        }
         // Distinct masks give the most outcomes.
         let distinct = self.sensors.min((1 << self.bits) - 1) as u32;
         let repeats = (self.sensors as u128 / u128::from(distinct)).saturating_add(1);
@@ -446,6 +455,7 @@ mod tests {
         assert!(search(3, 2, 10.0).with_forced(&[8]).is_err());
         let grid = Grid::from_edges(vec![0.0, 1.0]).unwrap();
         assert!(LinearSearch::new(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
+        assert!(matches!(search(10, 12, 10.0).best(), Err(Error::TooManyOutcomes { .. })));
         assert!(matches!(
             search(6, 40, 10.0).best(),
             Err(Error::TooManyOutcomes { .. } | Error::CountOverflow { .. })
