@@ -1,6 +1,6 @@
 //! All sets of linear patterns, by depth-first search over multisets.
 
-use super::SEARCH_PANEL;
+use super::{Outcomes, SEARCH_PANEL};
 use crate::Error;
 use crate::binary::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::binary::count::{full_rank_multisets, multisets};
@@ -10,7 +10,7 @@ use crate::binary::source::{Blur, Nodes};
 use crate::binary::{Bank, Grid, Mask, Sensor, Source, linear_pattern};
 use fewbits_core::error::at_least_one;
 use fewbits_core::quadrature::gauss_legendre;
-use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Candidates that are evaluated again on the fine nodes.
@@ -178,10 +178,7 @@ impl LinearSearch {
             });
         }
         let walk = Walk::new(self, keep)?;
-        let root = Level {
-            w: walk.nodes.w.clone(),
-            mirror: vec![0],
-        };
+        let root = Outcomes::new(&walk.nodes.w);
         let mut found = walk.branch(0, self.sensors, Span::default(), &[], root);
         found.finish();
         Ok(found.sets)
@@ -234,12 +231,6 @@ impl Top {
         self.finish();
         self
     }
-}
-
-/// `w p(x) P(outcome|x)`, one contiguous column an outcome, and the mirror image of each outcome.
-struct Level {
-    w: Vec<f64>,
-    mirror: Vec<usize>,
 }
 
 struct Walk<'a> {
@@ -305,7 +296,7 @@ impl<'a> Walk<'a> {
     }
 
     /// All sets that continue `chosen` with `left` sensors of masks from `first` on.
-    fn branch(&self, first: usize, left: usize, span: Span, chosen: &[(Mask, usize)], level: Level) -> Top {
+    fn branch(&self, first: usize, left: usize, span: Span, chosen: &[(Mask, usize)], level: Outcomes) -> Top {
         let mut found = Top::new(self.keep);
         self.close(first, left, span, chosen, &level, &mut found);
         let mut steps = Vec::new();
@@ -336,22 +327,20 @@ impl<'a> Walk<'a> {
     }
 
     /// One group of `m` sensors with mask `j + 1` more.
-    fn extend(&self, level: &Level, j: usize, m: usize) -> Level {
-        let n = self.nodes.len();
-        let flips = self.folded && flips_under_reflection(j as Mask + 1);
-        let mut w = Vec::with_capacity(level.w.len() * (m + 1));
-        let mut mirror = Vec::with_capacity(level.mirror.len() * (m + 1));
-        for (column, &image) in level.w.chunks_exact(n).zip(&level.mirror) {
-            for (k, row) in self.tables[j][m - 1].rows.iter().enumerate() {
-                w.extend(column.iter().zip(row).map(|(w, p)| w * p));
-                mirror.push(image * (m + 1) + if flips { m - k } else { k });
-            }
-        }
-        Level { w, mirror }
+    fn extend(&self, level: &Outcomes, j: usize, m: usize) -> Outcomes {
+        level.with(&self.tables[j][m - 1], self.folded && flips_under_reflection(j as Mask + 1))
     }
 
     /// Evaluates all sets in which the `left` sensors share one last mask.
-    fn close(&self, first: usize, left: usize, span: Span, chosen: &[(Mask, usize)], level: &Level, found: &mut Top) {
+    fn close(
+        &self,
+        first: usize,
+        left: usize,
+        span: Span,
+        chosen: &[(Mask, usize)],
+        level: &Outcomes,
+        found: &mut Top,
+    ) {
         let allowed = |j: usize| {
             self.forced_from[j + 1] == 0
                 && left >= self.search.forced[j]
@@ -365,15 +354,7 @@ impl<'a> Walk<'a> {
         };
         let rows_each = (left + 1) * 2;
         let rows = (until - from) * rows_each;
-        let outcomes = level.mirror.len();
-        let mut sums = vec![0.0; rows * outcomes];
-        let w = DMatrixView::from_slice(&level.w, self.nodes.len(), outcomes);
-        DMatrixViewMut::from_slice(&mut sums, rows, outcomes).gemm(
-            1.0,
-            &self.leaves[left - 1].rows(from * rows_each, rows),
-            &w,
-            0.0,
-        );
+        let sums = level.integrals(&self.leaves[left - 1].rows(from * rows_each, rows));
         for j in (from..until).filter(|&j| allowed(j)) {
             let mask = j as Mask + 1;
             let flips = flips_under_reflection(mask);
