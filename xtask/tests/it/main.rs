@@ -40,7 +40,13 @@ fn a_figure_leaves_csv_json_svg_and_a_gallery() {
     let files = files(out.path());
     assert_eq!(
         files.keys().collect::<Vec<_>>(),
-        ["dymbo-prop2.csv", "dymbo-prop2.json", "dymbo-prop2.svg", "index.html"]
+        [
+            "dymbo-prop2-starts.csv",
+            "dymbo-prop2.csv",
+            "dymbo-prop2.json",
+            "dymbo-prop2.svg",
+            "index.html"
+        ]
     );
     let document: serde_json::Value = serde_json::from_slice(&files["dymbo-prop2.json"]).unwrap();
     for key in ["parameters", "seed", "trials", "version", "wall_time_s", "claims"] {
