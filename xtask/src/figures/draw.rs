@@ -437,9 +437,10 @@ fn colour_bar(area: &Area<'_>, label: &str, (low, high): (f64, f64)) -> Result<(
     let (top, bottom) = (160, height as i32 - 220);
     let steps = 64;
     let at = |share: f64| bottom - (f64::from(bottom - top) * share).round() as i32;
-    for i in 0..steps {
+    // From the top down, each piece reaching to the bottom, so that no seam shines through.
+    for i in (0..steps).rev() {
         let (from, to) = (f64::from(i) / f64::from(steps), f64::from(i + 1) / f64::from(steps));
-        let bar = Rectangle::new([(20, at(to)), (100, at(from))], heat_colour(0.5 * (from + to)).filled());
+        let bar = Rectangle::new([(20, at(to)), (100, bottom)], heat_colour(0.5 * (from + to)).filled());
         area.draw(&bar).map_err(why)?;
     }
     let style = text(TEXT - 4).pos(Pos::new(HPos::Left, VPos::Center));
