@@ -26,7 +26,17 @@ pub use fewbits_models as models;
 #[cfg(feature = "quantizers")]
 pub use fewbits_quantizers as quantizers;
 
-/// The README's program, kept compiling.
+/// The programs of the README and of the pages in `docs`, kept running.
 #[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
-struct Readme;
+mod pages {
+    #[doc = include_str!("../../../README.md")]
+    struct Readme;
+    #[doc = include_str!("../../../docs/dymbo.md")]
+    struct Dymbo;
+    #[doc = include_str!("../../../docs/quantizers.md")]
+    struct Quantizers;
+    #[doc = include_str!("../../../docs/binary.md")]
+    struct Binary;
+    #[doc = include_str!("../../../docs/cfwmd.md")]
+    struct Cfwmd;
+}
