@@ -56,7 +56,8 @@ pub fn bit_update(
     let s = (p + r).sqrt();
     let zeta = bit.value() * (mean - threshold) / s;
     let (log_likelihood, lambda, rest) = if crossover == 0.0 {
-        (normal::log_cdf(zeta), normal::inverse_mills(zeta), normal::one_sided_variance(zeta))
+        let heard = normal::one_sided(zeta);
+        (heard.log_probability, heard.mean, heard.variance)
     } else {
         let clean = 1.0 - 2.0 * crossover;
         let probability = crossover + clean * normal::cdf(zeta);

@@ -9,7 +9,7 @@
 //! | `ln Phi(x)` | [`log_cdf`] | both tails |
 //! | `ln(Phi(b) - Phi(a))` | [`log_interval`] | both tails, narrow and wide |
 //! | `phi(x) / Phi(x)` | [`inverse_mills`] | both tails |
-//! | variance left of a one-sided cut | [`one_sided_variance`] | both tails |
+//! | mean and variance beyond a one-sided cut | [`one_sided`], [`one_sided_variance`] | both tails |
 //! | mean and variance in a cell | [`truncated_moments`] | narrow, far and unbounded cells |
 //! | a draw from a cell | [`sample_truncated`] | the same |
 //! | `P(a < (X, Y) < b)` | [`bivariate_rectangle`] | every correlation, far rectangles |
@@ -30,7 +30,7 @@ mod truncated;
 
 pub use bivariate::bivariate_rectangle;
 pub use erfcx::erfcx;
-pub use one_sided::one_sided_variance;
+pub use one_sided::{OneSided, one_sided, one_sided_variance};
 pub use truncated::{TruncatedMoments, sample_truncated, truncated_moments};
 
 use crate::quadrature::gauss_legendre;

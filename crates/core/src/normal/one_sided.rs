@@ -1,7 +1,9 @@
 //! The variance of a normal variable beyond a cut.
 
+use super::erfcx::erfcx;
 use super::erfcx::polynomial;
-use super::inverse_mills;
+use super::{SQRT_2_OVER_PI, cdf, inverse_mills, pdf};
+use std::f64::consts::{FRAC_1_SQRT_2, LN_2};
 
 /// Where the rational approximation in the cut hands over to the one in its inverse square.
 const SPLIT: f64 = 4.0;
@@ -65,12 +67,51 @@ const FAR_DENOMINATOR: [f64; 9] = [
 #[inline]
 pub fn one_sided_variance(x: f64) -> f64 {
     if x > 0.0 {
-        let lambda = inverse_mills(x);
-        1.0 - lambda * (lambda + x)
+        variance_with_mean(x, inverse_mills(x))
     } else if x >= -SPLIT {
         polynomial(&NEAR_NUMERATOR, -x) / polynomial(&NEAR_DENOMINATOR, -x)
     } else {
         let u = 1.0 / (x * x);
         u * polynomial(&FAR_NUMERATOR, u) / polynomial(&FAR_DENOMINATOR, u)
+    }
+}
+
+/// The variance by its formula, for a cut left of the mean.
+#[inline]
+fn variance_with_mean(x: f64, mean: f64) -> f64 {
+    // Where the mean has underflowed, x may be infinite, and their product is 0 all the same.
+    if mean == 0.0 { 1.0 } else { 1.0 - mean * (mean + x) }
+}
+
+/// What is known of a standard normal variable that exceeds `-x`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OneSided {
+    /// `ln Phi(x)`, as [`log_cdf`](super::log_cdf) gives it.
+    pub log_probability: f64,
+    /// Its mean `phi(x)/Phi(x)`, as [`inverse_mills`] gives it.
+    pub mean: f64,
+    /// Its variance, as [`one_sided_variance`] gives it.
+    pub variance: f64,
+}
+
+/// Probability, mean and variance beyond a cut together, for the price of one [`erfcx`].
+#[inline]
+pub fn one_sided(x: f64) -> OneSided {
+    if x > 0.0 {
+        let outside = cdf(-x);
+        // At most one half is taken from one: nothing cancels.
+        let mean = pdf(x) / (1.0 - outside);
+        OneSided {
+            log_probability: (-outside).ln_1p(),
+            mean,
+            variance: 1.0 - mean * (mean + x),
+        }
+    } else {
+        let scaled = erfcx(-x * FRAC_1_SQRT_2);
+        OneSided {
+            log_probability: scaled.ln() - LN_2 - 0.5 * x * x,
+            mean: SQRT_2_OVER_PI / scaled,
+            variance: one_sided_variance(x),
+        }
     }
 }

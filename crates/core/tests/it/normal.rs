@@ -75,6 +75,9 @@ fn degenerate_arguments_are_refused_or_have_their_limits() {
     assert_eq!((normal::quantile(0.0), normal::quantile(1.0)), (f64::NEG_INFINITY, f64::INFINITY));
     assert!(normal::quantile(-0.1).is_nan() && normal::quantile(f64::NAN).is_nan());
     assert_eq!(normal::one_sided_variance(f64::NEG_INFINITY), 0.0);
+    assert_eq!(normal::one_sided_variance(f64::INFINITY), 1.0);
+    let nothing = normal::one_sided(f64::INFINITY);
+    assert_eq!((nothing.log_probability, nothing.mean, nothing.variance), (0.0, 0.0, 1.0));
     for (lower, upper) in [
         (1.0, 1.0),
         (2.0, 1.0),
@@ -129,6 +132,15 @@ proptest! {
         // Above the median the spacing of p limits what can be recovered.
         let spacing = f64::EPSILON * p / normal::pdf(x);
         prop_assert!((normal::quantile(p) - x).abs() <= 8.0 * spacing + 1e-14 * x.abs());
+    }
+
+    #[test]
+    fn what_lies_beyond_a_cut_is_one_thing(x in -300.0..40.0_f64) {
+        let together = normal::one_sided(x);
+        let close = |a: f64, b: f64| (a - b).abs() <= 4e-15 * (1.0 + a.abs().min(b.abs()));
+        prop_assert!(close(together.log_probability, normal::log_cdf(x)));
+        prop_assert!(close(together.mean, normal::inverse_mills(x)));
+        prop_assert!(close(together.variance, normal::one_sided_variance(x)));
     }
 
     #[test]
