@@ -104,7 +104,7 @@ pub fn one_sided(x: f64) -> OneSided {
         OneSided {
             log_probability: (-outside).ln_1p(),
             mean,
-            variance: 1.0 - mean * (mean + x),
+            variance: variance_with_mean(x, mean),
         }
     } else {
         let scaled = erfcx(-x * FRAC_1_SQRT_2);
