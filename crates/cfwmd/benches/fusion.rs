@@ -1,7 +1,7 @@
 //! One step of fusion, Gaussian against particles, and the silent factors, against a standard normal draw.
 //!
-//! Read the medians: `particles_1000 / gaussian` is at least 15. The allocation columns are zero but for the small vector of
-//! the vector likelihood.
+//! Read the medians: `particles_1000 / gaussian`, averaged over what is heard (none silent in a quarter of the steps, one in
+//! half, two in a quarter), is at least 15. The allocation columns are zero but for the quadrature rule at first use.
 
 #![allow(clippy::unwrap_used)]
 

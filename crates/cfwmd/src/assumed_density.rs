@@ -122,12 +122,14 @@ impl ScalarSilence {
         // Nowhere is the integrand narrower than this.
         let narrowest = (1.0 / (1.0 / p + count as f64 / r)).sqrt();
         let spread = p.sqrt();
-        let mut low = (mean - REACH * spread).max(self.centre - self.half_width - REACH * deviation);
-        let mut high = (mean + REACH * spread).min(self.centre + self.half_width + REACH * deviation);
+        // Outside the interval the product of the factors falls at least as fast as a normal density of variance r/count.
+        let edge = self.half_width + REACH * deviation / (count as f64).sqrt();
+        let mut low = (mean - REACH * spread).max(self.centre - edge);
+        let mut high = (mean + REACH * spread).min(self.centre + edge);
         if (mean - self.centre).abs() > self.half_width + 3.0 * (spread + deviation) {
             (low, high) = bulk(log_density, mean, self.centre, narrowest);
         }
-        let nodes = (((high - low) / (0.6 * narrowest)).ceil() as usize).clamp(32, MOST_NODES);
+        let nodes = (((high - low) / (0.8 * narrowest)).ceil() as usize).clamp(16, MOST_NODES);
         let step = (high - low) / nodes as f64;
         let mut values = [0.0; MOST_NODES + 1];
         let mut largest = f64::NEG_INFINITY;
@@ -153,8 +155,8 @@ impl ScalarSilence {
     }
 }
 
-/// Deviations beyond which an integrand is below rounding.
-const REACH: f64 = 8.0;
+/// Deviations beyond which less than 3e-12 of a normal mass is left.
+const REACH: f64 = 7.0;
 /// Largest number of trapezoid intervals; enough for an interval of silence 140 noise deviations wide.
 const MOST_NODES: usize = 512;
 
