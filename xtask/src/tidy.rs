@@ -190,11 +190,11 @@ fn figure_problems(root: &Path) -> Result<Vec<String>, Error> {
     Ok(unknown.chain(missing).collect())
 }
 
-/// `<system>-<word>`, where the word names a figure, a table or an experiment of ours.
+/// `<system>-<word>`, where the word names a figure, a table or an experiment of ours; a bare number names an erratum.
 fn is_figure_id(word: &str, systems: &BTreeSet<&str>) -> bool {
     word.split_once('-').is_some_and(|(system, rest)| {
         systems.contains(system)
-            && !rest.is_empty()
+            && !rest.chars().all(|c| c.is_ascii_digit())
             && rest
                 .chars()
                 .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c.is_ascii_uppercase())

@@ -4,7 +4,7 @@
 //! belief is joint, over the state and every sensor's own estimate; given all that was heard it is what makes silence
 //! informative. The paper averages the silent factor over estimates drawn independently of the past instead; that factor is
 //! one constant for every state, cancels in the normalisation and leaves the filter that ignores silence
-//! ([`NoFeedback::Literal`]; erratum `cfwmd-no-feedback`).
+//! ([`NoFeedback::Literal`]; erratum `cfwmd-2`).
 
 use crate::Error;
 use crate::assumed_density::silent_moments;

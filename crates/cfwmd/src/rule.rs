@@ -196,7 +196,7 @@ impl<const D: usize> OwnRecursion<D> {
 /// `C <- (1 - W_i H_i) C (1 - W_j H_j)'`, then `F C F' + Q`.
 ///
 /// All sensors share the start: the recursion begins with `F P0 F' + Q`, not with `Q` alone unless the start is known exactly
-/// (erratum `cfwmd-cross-covariance`).
+/// (erratum `cfwmd-5`).
 pub fn cross_covariance_step<const D: usize, const M: usize>(
     dynamics: &impl GaussianDynamics<D>,
     cross: &SMatrix<f64, D, D>,

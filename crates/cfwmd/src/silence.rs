@@ -13,7 +13,7 @@ use fewbits_core::normal;
 /// `p = loss + (1 - loss) pi`, `pi = Phi((c - mu)/sqrt r) - Phi((-c - mu)/sqrt r)`.
 ///
 /// The root in `c` covers `eta s` only; the paper's printed formulas let it cover `mu` too, which is NaN for `mu > eta s`
-/// (erratum `cfwmd-root`).
+/// (erratum `cfwmd-1`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SilentFactor {
     half_width: f64,

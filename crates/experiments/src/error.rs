@@ -58,6 +58,15 @@ impl<E: std::error::Error + Send + Sync + 'static> From<fewbits_core::MonteCarlo
     }
 }
 
+impl From<fewbits_quantizers::Error> for Error {
+    fn from(error: fewbits_quantizers::Error) -> Self {
+        match error {
+            fewbits_quantizers::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
 impl From<fewbits_dymbo::Error> for Error {
     fn from(error: fewbits_dymbo::Error) -> Self {
         Self::failed(error)

@@ -237,6 +237,14 @@ impl<F: Figure> AnyFigure for F {
                 value: text.clone(),
                 expected,
             })?;
+            if is_effort(name) && value.as_u64() == Some(0) {
+                return Err(Error::BadParameter {
+                    figure,
+                    name: name.clone(),
+                    value: text.clone(),
+                    expected: "at least 1".to_owned(),
+                });
+            }
             map.insert(name.clone(), value);
         }
         self.check(&typed::<F>(figure, &map)?)?;

@@ -6,6 +6,9 @@
 /// `C(n, k)`, saturating.
 pub(crate) fn binomial(n: usize, k: usize) -> u64 {
     let k = k.min(n.saturating_sub(k));
+    if n <= 60 {
+        return (0..k).fold(1, |value, i| value * (n - i) as u64 / (i + 1) as u64);
+    }
     let mut value: u128 = 1;
     for i in 0..k {
         value = value * (n - i) as u128 / (i + 1) as u128;

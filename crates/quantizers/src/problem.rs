@@ -79,12 +79,12 @@ pub(crate) struct SensorLaw<'a> {
 
 /// What the node sums of one group need at given breakpoints.
 struct Slots {
-    reports: Table,
-    /// Rows `(i, m)`.
-    first: Table,
-    first_slope: Table,
-    /// Rows `(i, j >= i, m)`; empty for a single sensor.
-    second: Table,
+    /// Report probabilities of all sensors of the group, of all but one, and of all but two.
+    reports: [Table; 3],
+    densities: Table,
+    slopes: Table,
+    /// Products `phi_i phi_j`, `j >= i`.
+    pairs: Table,
 }
 
 impl<'a> Active<'a> {
@@ -163,21 +163,23 @@ impl<'a> Active<'a> {
             .unzip()
     }
 
-    fn slots(&self, b: &[f64], symbols: &[f64], densities: &[Vec<f64>], slopes: &[Vec<f64>]) -> Slots {
+    fn slots(&self, symbols: &[f64], densities: &[Vec<f64>], slopes: &[Vec<f64>]) -> Slots {
         let nodes = self.means.len();
         let mut levels = self.compositions.probabilities(symbols, nodes).into_iter();
-        let mut next = || Table::new(levels.next().unwrap_or_default(), nodes);
-        let (reports, one_less, two_less) = (next(), next(), next());
-        let stack = |rows: &[Vec<f64>]| Table::new(rows.concat(), nodes);
-        let pairs: Vec<Vec<f64>> = (0..b.len())
-            .flat_map(|i| (i..b.len()).map(move |j| (i, j)))
-            .map(|(i, j)| densities[i].iter().zip(&densities[j]).map(|(x, y)| x * y).collect())
-            .collect();
+        let reports = [(); 3].map(|()| Table::new(levels.next().unwrap_or_default(), nodes));
+        let mut pairs = Vec::new();
+        if self.compositions.total() >= 2 {
+            for (i, p) in densities.iter().enumerate() {
+                for q in &densities[i..] {
+                    pairs.extend(p.iter().zip(q).map(|(x, y)| x * y));
+                }
+            }
+        }
         Slots {
-            first: stack(densities).outer(&one_less),
-            first_slope: stack(slopes).outer(&one_less),
-            second: stack(&pairs).outer(&two_less),
             reports,
+            densities: Table::new(densities.concat(), nodes),
+            slopes: Table::new(slopes.concat(), nodes),
+            pairs: Table::new(pairs, nodes),
         }
     }
 }
@@ -425,7 +427,7 @@ impl<'a> Problem<'a> {
                     }
                 }
             }
-            slots.push(a.slots(b, &symbols, &densities, &slopes));
+            slots.push(a.slots(&symbols, &densities, &slopes));
             offsets.push(offset);
             offset += b.len();
         }
@@ -576,14 +578,22 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Moments over all joint outcomes, some groups' reports replaced; the rows of a replaced group are `(i, m)`.
     fn node_sums(&self, slots: &[Slots], replaced: &[(usize, Slot)]) -> Vec<f64> {
-        let mut tables: Vec<&Table> = self.fixed.iter().chain(slots.iter().map(|s| &s.reports)).collect();
-        for (g, slot) in replaced {
-            tables[self.fixed.len() + g] = match slot {
-                Slot::First => &slots[*g].first,
-                Slot::Slope => &slots[*g].first_slope,
-                Slot::Second => &slots[*g].second,
+        let mut tables: Vec<&Table> = self.fixed.iter().collect();
+        for (g, slots) in slots.iter().enumerate() {
+            let slot = replaced.iter().find(|(h, _)| *h == g).map(|(_, slot)| *slot);
+            let (factor, others) = match slot {
+                None => (None, &slots.reports[0]),
+                Some(Slot::First) => (Some(&slots.densities), &slots.reports[1]),
+                Some(Slot::Slope) => (Some(&slots.slopes), &slots.reports[1]),
+                Some(Slot::Second) => (Some(&slots.pairs), &slots.reports[2]),
             };
+            tables.extend(factor);
+            // With no sensor left the reports are a single row of ones.
+            if factor.is_none() || others.rows() > 1 {
+                tables.push(others);
+            }
         }
         moments(&tables, self.scored.features())
     }

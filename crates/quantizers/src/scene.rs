@@ -20,9 +20,9 @@ const FACTOR_REACH: f64 = 8.5;
 const PRIOR_STEP: f64 = 0.25;
 /// Largest step of the prior's rule in units of the narrowest noise. Folded cells put the zeros of `P(x)`, where `P ln P` is
 /// singular, close to the real axis: at 0.4 their information is off by 3e-8 in noise of 0.3, at 0.2 by 3e-12 (measured).
-const SMOOTHING_STEP: f64 = 0.2;
-/// The same for the axis of the shared factor, along which no logarithm is taken: products of cell probabilities only.
-const FACTOR_STEP: f64 = 0.4;
+const ENTROPY_STEP: f64 = 0.2;
+/// The same for products of cell probabilities of two sensors, which are entire functions; more sensors make them sharper.
+const PRODUCT_STEP: f64 = 0.4;
 /// Entries of a covariance matrix are compared within this share of its largest one.
 const COVARIANCE_TOLERANCE: f64 = 1e-10;
 /// Most nodes a rule may take; less noise than this resolves asks for another method.
@@ -294,7 +294,7 @@ impl Scene {
         let narrowest = (0..noise.sensors()).map(|n| noise.sd(n)).fold(f64::INFINITY, f64::min);
         let (values, weights) = match &prior {
             Prior::Gaussian { sd } => {
-                let step = f64::min(PRIOR_STEP * sd, SMOOTHING_STEP * narrowest / crowd);
+                let step = f64::min(PRIOR_STEP * sd, f64::min(ENTROPY_STEP, PRODUCT_STEP / crowd) * narrowest);
                 let values = grid(PRIOR_REACH * sd, step)?;
                 let weights = normalised(values.iter().map(|x| normal::pdf(x / sd)).collect());
                 (values, weights)
@@ -355,7 +355,7 @@ impl Scene {
         let equal = noise.loadings.iter().all(|a| *a == shared);
         if let (Prior::Gaussian { sd }, true) = (&self.prior, equal) {
             // Everything depends on s = x + a u alone: one axis of nodes instead of two.
-            let step = f64::min(FACTOR_STEP * residual / crowd, 0.5 * shared.abs());
+            let step = f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
             let reach = FACTOR_REACH * shared.abs();
             self.base = grid(PRIOR_REACH * sd + reach, step)?;
             self.factor = vec![0.0; self.base.len()];
@@ -375,7 +375,7 @@ impl Scene {
         let steepest = (0..noise.sensors())
             .map(|n| noise.residuals[n] / noise.loadings[n].abs())
             .fold(f64::INFINITY, f64::min);
-        let factor = grid(FACTOR_REACH, f64::min(2.0 * PRIOR_STEP, FACTOR_STEP * steepest / crowd))?;
+        let factor = grid(FACTOR_REACH, f64::min(2.0 * PRIOR_STEP, PRODUCT_STEP * steepest / crowd))?;
         let weights = normalised(factor.iter().map(|u| normal::pdf(*u)).collect());
         let nodes = factor.len();
         if self.values.len().saturating_mul(nodes) > NODE_LIMIT {

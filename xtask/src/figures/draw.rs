@@ -17,13 +17,13 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Scaled, Scaled>>;
 type Point = (f64, f64);
 
-/// Size of a panel; twice what a screen shows, because positions are whole units.
-const PANEL: (u32, u32) = (1240, 860);
+/// Size of a panel; four times what a screen shows, because positions are whole units.
+const PANEL: (u32, u32) = (2480, 1720);
 /// Extra width for a legend outside.
-const LEGEND_WIDTH: i32 = 360;
+const LEGEND_WIDTH: i32 = 720;
 const FONT: &str = "sans-serif";
-const TEXT: i32 = 25;
-const STROKE: u32 = 4;
+const TEXT: i32 = 50;
+const STROKE: u32 = 8;
 
 /// Colours that stay apart in print and for colour-blind readers (Okabe and Ito), black and grey last.
 const PALETTE: [RGBColor; 8] = [
@@ -81,7 +81,7 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), String> {
         _ => None,
     });
     let side = match (heat.is_some(), panel.legend) {
-        (true, _) => 190,
+        (true, _) => 380,
         (false, Legend::Outside) => LEGEND_WIDTH,
         (false, _) => 0,
     };
@@ -91,19 +91,19 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), String> {
     let y = Scaled::new(&panel.y, panel.layers.iter().flat_map(|layer| extent(layer).1));
     let widest = widest_label(&y);
     let mut chart = ChartBuilder::on(&main)
-        .caption(&panel.title, text(TEXT + 5))
-        .margin(18)
-        .margin_right(30)
-        .x_label_area_size(82)
-        .y_label_area_size(70 + 13 * widest.max(3))
+        .caption(&panel.title, text(TEXT + 10))
+        .margin(36)
+        .margin_right(60)
+        .x_label_area_size(164)
+        .y_label_area_size(140 + 26 * widest.max(3))
         .build_cartesian_2d(x.clone(), y.clone())
         .map_err(why)?;
     chart
         .configure_mesh()
         .light_line_style(PAPER)
-        .bold_line_style(GRID)
-        .axis_style(ShapeStyle::from(&INK).stroke_width(2))
-        .label_style(text(TEXT - 2))
+        .bold_line_style(ShapeStyle::from(&GRID).stroke_width(2))
+        .axis_style(ShapeStyle::from(&INK).stroke_width(4))
+        .label_style(text(TEXT - 4))
         .axis_desc_style(text(TEXT))
         .x_label_formatter(&|v| x.format_ext(v))
         .y_label_formatter(&|v| y.format_ext(v))
@@ -197,10 +197,10 @@ fn draw_layer<'a, 'b: 'a>(
         Shape::Line { points, stroke } => {
             let points: Vec<Point> = points.iter().copied().filter(on).collect();
             let solid = *stroke == Stroke::Solid;
-            let pen = colour.stroke_width(if solid { STROKE } else { STROKE - 1 });
+            let pen = colour.stroke_width(if solid { STROKE } else { STROKE - 2 });
             if solid {
                 let drawn = chart.draw_series([PathElement::new(points, pen)]).map_err(why)?;
-                name(drawn, &layer.label, move |(x, y)| PathElement::new(vec![(x, y), (x + 40, y)], pen));
+                name(drawn, &layer.label, move |(x, y)| PathElement::new(vec![(x, y), (x + 80, y)], pen));
             } else {
                 let drawn = chart.draw_series(
                     dashes(chart, &points, x, y)
@@ -209,8 +209,8 @@ fn draw_layer<'a, 'b: 'a>(
                 );
                 name(drawn.map_err(why)?, &layer.label, move |(x, y)| {
                     EmptyElement::at((x, y))
-                        + PathElement::new(vec![(0, 0), (15, 0)], pen)
-                        + PathElement::new(vec![(24, 0), (39, 0)], pen)
+                        + PathElement::new(vec![(0, 0), (30, 0)], pen)
+                        + PathElement::new(vec![(48, 0), (78, 0)], pen)
                 });
             }
         }
@@ -235,9 +235,12 @@ fn draw_layer<'a, 'b: 'a>(
                 .iter()
                 .enumerate()
                 .flat_map(|(j, row)| row.iter().enumerate().map(move |(i, v)| (i, j, *v)));
+            // Each cell reaches under its next neighbours, drawn later, so that no seam shines through.
+            let under = |edges: &[f64], i: usize| edges[(i + 2).min(edges.len() - 1)];
             let cells = cells.map(|(i, j, v)| {
                 let shade = heat_colour((v - low) / (high - low).max(f64::MIN_POSITIVE));
-                Rectangle::new([(left[i], bottom[j]), (left[i + 1], bottom[j + 1])], shade.filled())
+                let far = (under(&left, i), under(&bottom, j));
+                Rectangle::new([(left[i], bottom[j]), far], shade.filled())
             });
             chart.draw_series(cells).map_err(why)?;
         }
@@ -258,7 +261,7 @@ fn draw_layer<'a, 'b: 'a>(
             );
         }
         Shape::Texts { texts } => {
-            let style = text(TEXT - 5).pos(Pos::new(HPos::Center, VPos::Center));
+            let style = text(TEXT - 10).pos(Pos::new(HPos::Center, VPos::Center));
             let texts = texts
                 .iter()
                 .map(|(x, y, t)| Text::new(t.clone(), (*x, *y), style.clone()));
@@ -282,7 +285,7 @@ where
 
 fn boxed(series: &mut Series<'_, '_>, label: &str, colour: RGBColor) {
     name(series, label, move |(x, y)| {
-        Rectangle::new([(x + 4, y - 9), (x + 36, y + 9)], colour.mix(0.8).filled())
+        Rectangle::new([(x + 8, y - 18), (x + 72, y + 18)], colour.mix(0.8).filled())
     });
 }
 
@@ -295,7 +298,7 @@ fn draw_points<'a, 'b: 'a>(
     colour: RGBColor,
     on: &impl Fn(&Point) -> bool,
 ) -> Result<(), String> {
-    let pen = colour.stroke_width(STROKE - 1);
+    let pen = colour.stroke_width(STROKE - 2);
     let bars = points
         .iter()
         .zip(errors)
@@ -307,24 +310,24 @@ fn draw_points<'a, 'b: 'a>(
     match marker {
         Marker::Circle => {
             let drawn = chart
-                .draw_series(points.map(|p| Circle::new(p, 7, fill)))
+                .draw_series(points.map(|p| Circle::new(p, 14, fill)))
                 .map_err(why)?;
-            name(drawn, &layer.label, move |(x, y)| Circle::new((x + 20, y), 7, fill));
+            name(drawn, &layer.label, move |(x, y)| Circle::new((x + 40, y), 14, fill));
         }
         Marker::Cross => {
-            let drawn = chart.draw_series(points.map(|p| Cross::new(p, 7, pen))).map_err(why)?;
-            name(drawn, &layer.label, move |(x, y)| Cross::new((x + 20, y), 7, pen));
+            let drawn = chart.draw_series(points.map(|p| Cross::new(p, 14, pen))).map_err(why)?;
+            name(drawn, &layer.label, move |(x, y)| Cross::new((x + 40, y), 14, pen));
         }
         Marker::Triangle => {
             let drawn = chart
-                .draw_series(points.map(|p| TriangleMarker::new(p, 10, fill)))
+                .draw_series(points.map(|p| TriangleMarker::new(p, 20, fill)))
                 .map_err(why)?;
-            name(drawn, &layer.label, move |(x, y)| TriangleMarker::new((x + 20, y), 10, fill));
+            name(drawn, &layer.label, move |(x, y)| TriangleMarker::new((x + 40, y), 20, fill));
         }
         Marker::Square => {
-            let square = move |p| EmptyElement::at(p) + Rectangle::new([(-7, -7), (7, 7)], fill);
+            let square = move |p| EmptyElement::at(p) + Rectangle::new([(-14, -14), (14, 14)], fill);
             let drawn = chart.draw_series(points.map(square)).map_err(why)?;
-            name(drawn, &layer.label, move |(x, y)| Rectangle::new([(x + 13, y - 7), (x + 27, y + 7)], fill));
+            name(drawn, &layer.label, move |(x, y)| Rectangle::new([(x + 26, y - 14), (x + 54, y + 14)], fill));
         }
     }
     Ok(())
@@ -332,8 +335,8 @@ fn draw_points<'a, 'b: 'a>(
 
 /// Cuts a polyline into dashes of equal length on paper.
 fn dashes(chart: &Chart<'_, '_>, points: &[Point], x: &Scaled, y: &Scaled) -> Vec<Vec<Point>> {
-    const PERIOD: f64 = 26.0;
-    const DASH: f64 = 16.0;
+    const PERIOD: f64 = 52.0;
+    const DASH: f64 = 32.0;
     let place = |p: &Point| {
         let (right, down) = chart.backend_coord(p);
         (f64::from(right), f64::from(down))
@@ -378,17 +381,17 @@ fn inside_legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>, place: Legend) -> Result
     chart
         .configure_series_labels()
         .position(position)
-        .margin(14)
-        .legend_area_size(50)
+        .margin(28)
+        .legend_area_size(100)
         .background_style(PAPER.mix(0.85))
         .border_style(GRID)
-        .label_font(text(TEXT - 2))
+        .label_font(text(TEXT - 4))
         .draw()
         .map_err(why)
 }
 
 fn outside_legend(area: &Area<'_>, panel: &Panel) -> Result<(), String> {
-    let mut top = 70;
+    let mut top = 140;
     for (index, layer) in panel
         .layers
         .iter()
@@ -400,26 +403,26 @@ fn outside_legend(area: &Area<'_>, panel: &Panel) -> Result<(), String> {
             Shape::Line {
                 stroke: Stroke::Solid, ..
             } => {
-                area.draw(&PathElement::new(vec![(5, top), (45, top)], pen))
+                area.draw(&PathElement::new(vec![(10, top), (90, top)], pen))
                     .map_err(why)?;
             }
             Shape::Line {
                 stroke: Stroke::Dashed, ..
             } => {
-                area.draw(&PathElement::new(vec![(5, top), (20, top)], pen))
+                area.draw(&PathElement::new(vec![(10, top), (40, top)], pen))
                     .map_err(why)?;
-                area.draw(&PathElement::new(vec![(29, top), (44, top)], pen))
+                area.draw(&PathElement::new(vec![(58, top), (88, top)], pen))
                     .map_err(why)?;
             }
-            Shape::Points { .. } => area.draw(&Circle::new((25, top), 7, fill)).map_err(why)?,
+            Shape::Points { .. } => area.draw(&Circle::new((50, top), 14, fill)).map_err(why)?,
             _ => area
-                .draw(&Rectangle::new([(9, top - 9), (41, top + 9)], fill))
+                .draw(&Rectangle::new([(18, top - 18), (82, top + 18)], fill))
                 .map_err(why)?,
         }
-        let style = text(TEXT - 3).pos(Pos::new(HPos::Left, VPos::Center));
-        area.draw(&Text::new(layer.label.clone(), (58, top), style))
+        let style = text(TEXT - 6).pos(Pos::new(HPos::Left, VPos::Center));
+        area.draw(&Text::new(layer.label.clone(), (116, top), style))
             .map_err(why)?;
-        top += 36;
+        top += 72;
     }
     Ok(())
 }
@@ -431,12 +434,13 @@ fn value_range(values: &[Vec<f64>]) -> (f64, f64) {
 
 fn colour_bar(area: &Area<'_>, label: &str, (low, high): (f64, f64)) -> Result<(), String> {
     let (_, height) = area.dim_in_pixel();
-    let (top, bottom) = (80, height as i32 - 110);
+    let (top, bottom) = (160, height as i32 - 220);
     let steps = 64;
     let at = |share: f64| bottom - (f64::from(bottom - top) * share).round() as i32;
-    for i in 0..steps {
+    // From the top down, each piece reaching to the bottom, so that no seam shines through.
+    for i in (0..steps).rev() {
         let (from, to) = (f64::from(i) / f64::from(steps), f64::from(i + 1) / f64::from(steps));
-        let bar = Rectangle::new([(10, at(to)), (50, at(from))], heat_colour(0.5 * (from + to)).filled());
+        let bar = Rectangle::new([(20, at(to)), (100, bottom)], heat_colour(0.5 * (from + to)).filled());
         area.draw(&bar).map_err(why)?;
     }
     let style = text(TEXT - 4).pos(Pos::new(HPos::Left, VPos::Center));
@@ -445,10 +449,10 @@ fn colour_bar(area: &Area<'_>, label: &str, (low, high): (f64, f64)) -> Result<(
         let share = f64::from(i) / 4.0;
         let value = low + share * (high - low);
         let digits = format!("{value:.3}").parse::<f64>().unwrap_or(value);
-        area.draw(&Text::new(axis.format_ext(&digits), (60, at(share)), style.clone()))
+        area.draw(&Text::new(axis.format_ext(&digits), (120, at(share)), style.clone()))
             .map_err(why)?;
     }
-    area.draw(&Text::new(label.to_owned(), (10, top - 35), style))
+    area.draw(&Text::new(label.to_owned(), (20, top - 70), style))
         .map_err(why)
 }
 

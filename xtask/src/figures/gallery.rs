@@ -1,6 +1,7 @@
 //! `index.html`: each plot beside its claims.
 
 use super::Error;
+use super::select::brief;
 use super::write::Directory;
 use fewbits_experiments::all;
 use serde_json::Value as Json;
@@ -87,7 +88,7 @@ fn section(page: &mut String, id: &str, document: &Json) -> [usize; 3] {
         .as_object()
         .into_iter()
         .flatten()
-        .map(|(name, value)| format!("{name}={value}"))
+        .map(|(name, value)| format!("{name}={}", brief(value)))
         .collect();
     let _ = write!(
         page,

@@ -45,6 +45,20 @@ pub(super) fn figures(patterns: &[String]) -> Result<Vec<&'static dyn AnyFigure>
         .collect())
 }
 
+/// A parameter's value as `--set` would take it; long lists by their first and last entries.
+pub(super) fn brief(value: &Json) -> String {
+    const LONGEST: usize = 12;
+    match value {
+        Json::Array(entries) if entries.len() > LONGEST => {
+            let ends = [&entries[0], &entries[1], &entries[entries.len() - 1]].map(brief);
+            format!("{},{},..,{} ({} values)", ends[0], ends[1], ends[2], entries.len())
+        }
+        Json::Array(entries) => entries.iter().map(brief).collect::<Vec<_>>().join(","),
+        Json::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
 /// Prints the figures with their parameters.
 pub(super) fn list(figures: &[&'static dyn AnyFigure]) {
     for figure in figures {

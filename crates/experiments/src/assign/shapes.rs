@@ -153,8 +153,9 @@ impl Figure for BitErrors {
         About {
             id: "assign-figC-1",
             title: "Probability that a bit is wrong",
-            caption: "For each bit of a four-bit Gray code, the probability that noise turns it. It is one half at each of the bit's own edges and \
-                      nowhere near zero between the edges of the finest bit. The thesis calls the variance sigma.",
+            caption: "For each bit of a four-bit Gray code, the probability that noise turns it: one half at the bit's own edges, \
+                      except where noise reaches across further ones, and for the finest bit hardly less between them. The thesis \
+                      calls the variance sigma.",
             source: "Movaghati, thesis, figure C.1",
         }
     }

@@ -141,7 +141,7 @@ impl Figure for Clipping {
             Panel::new(
                 "Cell of a measurement",
                 Axis::linear("measurement y / V"),
-                Axis::linear("cell").between(0.0, top + 1.0),
+                Axis::linear("cell").between(0.0, top + 2.8),
             )
             .with(Layer::dashed("sides as printed", tables.main.points("y", "cell_swapped")?).coloured(1))
             .with(Layer::line("nearest outer cell", tables.main.points("y", "cell")?).coloured(0))

@@ -5,6 +5,9 @@ use fewbits_dymbo::ScalarPlant;
 use fewbits_filters::ScalarSteadyState;
 use std::f64::consts::FRAC_2_PI;
 
+/// Longest simulated run in steps.
+pub(super) const LONGEST_RUN: usize = 10_000;
+
 /// The plant of unit measurement noise, every refusal reported as that of a parameter.
 pub(super) fn plant(figure: &'static str, a: f64, gamma: f64) -> Result<ScalarPlant, Error> {
     let refuse = |name: &str, value: f64, expected: &str| Error::BadParameter {

@@ -1,6 +1,6 @@
 //! Lost bits.
 
-use super::common::{bad, dymbo_steady, not_empty, stationary_plant};
+use super::common::{LONGEST_RUN, bad, dymbo_steady, not_empty, stationary_plant};
 use crate::claim::smallest;
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
@@ -85,8 +85,8 @@ impl Figure for LostBits {
     fn check(&self, p: &Parameters) -> Result<(), Error> {
         not_empty(ID, "gamma", &p.gamma)?;
         not_empty(ID, "loss", &p.loss)?;
-        if p.steps == 0 {
-            return Err(bad(ID, "steps", 0, "at least 1"));
+        if !(1..=LONGEST_RUN).contains(&(p.steps as usize)) {
+            return Err(bad(ID, "steps", p.steps, "a number from 1 to 10000"));
         }
         if let Some(loss) = p.loss.iter().find(|loss| !(0.0..=1.0).contains(*loss)) {
             return Err(bad(ID, "loss", loss, "probabilities"));

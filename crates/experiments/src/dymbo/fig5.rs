@@ -1,6 +1,6 @@
 //! Convergence from the first message: simulated, exact and predicted.
 
-use super::common::{dymbo_steady, kalman_variance, nearest, not_empty, stationary_plant};
+use super::common::{LONGEST_RUN, bad, dymbo_steady, kalman_variance, nearest, not_empty, stationary_plant};
 use crate::claim::largest;
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
@@ -145,6 +145,9 @@ impl Figure for Convergence {
     fn check(&self, p: &Parameters) -> Result<(), Error> {
         not_empty(ID, "gamma", &p.gamma)?;
         FineSensor::new(p.tau)?;
+        if p.steps > LONGEST_RUN {
+            return Err(bad(ID, "steps", p.steps, "at most 10000"));
+        }
         p.gamma
             .iter()
             .try_for_each(|gamma| stationary_plant(ID, p.a, *gamma).map(drop))

@@ -1,6 +1,6 @@
 //! Where the threshold belongs, and what an unstable plant does.
 
-use super::common::{bad, pairs, stationary_plant};
+use super::common::{LONGEST_RUN, bad, pairs, stationary_plant};
 use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_core::{Dynamics, Encoder, Estimate, Gaussian, Moments, Observation, Sensing, Stream};
@@ -137,8 +137,8 @@ impl Figure for ThresholdPlace {
     }
 
     fn check(&self, p: &Parameters) -> Result<(), Error> {
-        if p.steps == 0 {
-            return Err(bad(ID, "steps", 0, "at least 1"));
+        if !(1..=LONGEST_RUN).contains(&(p.steps as usize)) {
+            return Err(bad(ID, "steps", p.steps, "a number from 1 to 10000"));
         }
         ScalarPlant::new_unstable(p.unstable_a, p.unstable_gamma, 1.0)?;
         pairs(ID, &p.a, &p.gamma)?

@@ -1,6 +1,6 @@
 //! A two-dimensional state watched by one or three one-bit sensors.
 
-use super::common::bad;
+use super::common::{LONGEST_RUN, bad};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_core::{Dynamics, Encoder, Gaussian, Moments, Sensing, Sign, Stream, normal};
@@ -175,8 +175,8 @@ impl Figure for VectorState {
         if p.transition.len() != 4 {
             return Err(bad(ID, "transition", format!("{} numbers", p.transition.len()), "four numbers, row by row"));
         }
-        if p.steps == 0 {
-            return Err(bad(ID, "steps", 0, "at least 1"));
+        if !(1..=LONGEST_RUN).contains(&p.steps) {
+            return Err(bad(ID, "steps", p.steps, "a number from 1 to 10000"));
         }
         if p.process_variance <= 0.0 {
             return Err(bad(ID, "process_variance", p.process_variance, "a number above 0"));

@@ -144,6 +144,8 @@ pub trait LinearAssignment {
 pub struct JonkerVolgenant;
 
 impl LinearAssignment for JonkerVolgenant {
+    // Inlined so that the generic solver is compiled once, in the caller, with the caller's optimisation.
+    #[inline]
     fn solve(&self, costs: &CostMatrix) -> Result<Vec<usize>, Error> {
         if costs.size() == 1 {
             return Ok(vec![0]);

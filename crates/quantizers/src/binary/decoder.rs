@@ -201,10 +201,10 @@ impl Bank {
             .filter_map(|cell| grid.support(cell, self.source()))
             .map(|(low, high)| {
                 let nodes = self.nodes_between(low, high);
-                let mass = nodes.expect(|_| 1.0);
+                let mass = nodes.expectation(|_| 1.0);
                 Cell {
                     centroid: if mass > 0.0 {
-                        nodes.expect(|x| x) / mass
+                        nodes.expectation(|x| x) / mass
                     } else {
                         0.5 * (low + high)
                     },

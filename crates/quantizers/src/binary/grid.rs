@@ -123,10 +123,10 @@ impl Grid {
                     Kind::Gaussian { std } => std,
                 };
                 let nodes = source.nodes_between(low, high, width, rule);
-                let mass = nodes.expect(|_| 1.0);
-                let centroid = nodes.expect(|x| x) / mass;
+                let mass = nodes.expectation(|_| 1.0);
+                let centroid = nodes.expectation(|x| x) / mass;
                 if mass > 0.0 {
-                    nodes.expect(|x| (x - centroid) * (x - centroid))
+                    nodes.expectation(|x| (x - centroid) * (x - centroid))
                 } else {
                     0.0
                 }

@@ -141,9 +141,8 @@ pub fn multi_start(
     newton: &Newton,
 ) -> Result<Design, Error> {
     let mut best = joint(system, criterion, newton);
-    for start in 0..starts {
-        let stream = Stream::new(seed).named("quantizer-starts").indexed(start as u64);
-        let Ok(candidate) = random_system(system, stream).and_then(|s| joint(&s, criterion, newton)) else {
+    for start in random_starts(system, starts, seed) {
+        let Ok(candidate) = joint(&start, criterion, newton) else {
             continue;
         };
         let better = match &best {
@@ -159,6 +158,13 @@ pub fn multi_start(
         }
     }
     best
+}
+
+/// The starts of [`multi_start`]; one whose breakpoints coincide is left out.
+pub fn random_starts(system: &System, starts: usize, seed: u64) -> Vec<System> {
+    (0..starts)
+        .filter_map(|i| random_system(system, Stream::new(seed).named("quantizer-starts").indexed(i as u64)).ok())
+        .collect()
 }
 
 /// The system with random ordered breakpoints.

@@ -12,7 +12,7 @@ mod symmetry;
 pub use alternating::{Alternated, Alternating, alternate, alternating_step};
 pub use dynamic_programme::{MAX_CANDIDATES, best_contiguous};
 pub use index_assignment::{Assignment, assign_words, word_classes};
-pub use joint::{Design, cyclic, greedy, joint, multi_start, optimise_groups};
+pub use joint::{Design, cyclic, greedy, joint, multi_start, optimise_groups, random_starts};
 pub use multi_interval::{Discovery, discover};
 pub use separation::{Separation, separate};
 pub use symmetry::symmetry_breaking;

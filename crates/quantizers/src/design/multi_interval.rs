@@ -5,8 +5,8 @@
 //! on a fine grid of the sample axis and polishes the edges by Newton's method:
 //!
 //! ```text
-//! for each start
-//!     labels <- a few random runs of levels, for every sensor
+//! for each start, periodic ones first
+//!     labels <- a few runs of levels, for every sensor
 //!     repeat
 //!         for each sensor: label of each grid cell <- the level worth most there, decoder and other sensors fixed
 //!     until no label changes
@@ -37,7 +37,7 @@ const MAX_CELLS: usize = 64;
 pub struct Discovery {
     /// Grid cells a sensor.
     pub grid: usize,
-    /// Random label sequences tried.
+    /// Random label sequences tried, besides the periodic ones.
     pub starts: usize,
     /// How many of the best are polished by Newton's method.
     pub polished: usize,
@@ -50,7 +50,7 @@ impl Default for Discovery {
         Self {
             grid: 160,
             starts: 60,
-            polished: 8,
+            polished: 12,
             seed: 1,
         }
     }
@@ -76,12 +76,14 @@ pub fn discover(system: &System, criterion: Criterion, settings: &Discovery) -> 
         .map(|g| Sensor::new(system, g, settings.grid))
         .collect();
     let mut found: Vec<(f64, Vec<Quantizer>)> = Vec::new();
-    for start in 0..settings.starts {
+    let random = (0..settings.starts).map(|start| {
         let mut rng = Stream::new(settings.seed)
             .named("label-starts")
             .indexed(start as u64)
             .rng();
-        let mut labels: Vec<Vec<usize>> = sensors.iter().map(|s| s.random_labels(&mut rng)).collect();
+        sensors.iter().map(|s| s.random_labels(&mut rng)).collect::<Vec<_>>()
+    });
+    for mut labels in periodic_starts(&sensors).into_iter().chain(random) {
         ascend(system, criterion, &sensors, &mut labels);
         let quantizers: Option<Vec<Quantizer>> = sensors.iter().zip(&labels).map(|(s, l)| s.quantizer(l)).collect();
         let Some(quantizers) = quantizers else { continue };
@@ -105,6 +107,31 @@ pub fn discover(system: &System, criterion: Criterion, settings: &Discovery) -> 
         }
     }
     best
+}
+
+/// One sensor folded, the others contiguous: every sensor in turn, from one to `levels + 1` cells more than levels, levels
+/// running round or to and fro.
+fn periodic_starts(sensors: &[Sensor]) -> Vec<Vec<Vec<usize>>> {
+    let mut starts = Vec::new();
+    for (folded, sensor) in sensors.iter().enumerate() {
+        let levels = sensor.levels;
+        for runs in levels + 1..=2 * levels + 1 {
+            let round: Vec<usize> = (0..runs).map(|r| r % levels).collect();
+            let turn = 2 * levels - 2;
+            let to_and_fro: Vec<usize> = (0..runs).map(|r| (r % turn).min(turn - r % turn)).collect();
+            for pattern in [round, to_and_fro] {
+                let labels = sensors.iter().enumerate().map(|(n, s)| {
+                    if n == folded {
+                        s.even_runs(&pattern)
+                    } else {
+                        s.even_runs(&(0..s.levels).collect::<Vec<_>>())
+                    }
+                });
+                starts.push(labels.collect());
+            }
+        }
+    }
+    starts
 }
 
 /// One sensor on its grid.
@@ -139,6 +166,14 @@ impl Sensor {
             cells: Table::new(cells, means.len()),
             edges,
         }
+    }
+
+    /// Labels in runs of equal width over the middle half of the grid, the outer ones going on to the ends.
+    fn even_runs(&self, pattern: &[usize]) -> Vec<usize> {
+        let grid = self.cells.rows();
+        let (low, width) = (grid / 4, grid.div_ceil(2));
+        let run = |c: usize| (c.saturating_sub(low) * pattern.len() / width).min(pattern.len() - 1);
+        (0..grid).map(|c| pattern[run(c)]).collect()
     }
 
     fn random_labels(&self, rng: &mut impl rand::Rng) -> Vec<usize> {

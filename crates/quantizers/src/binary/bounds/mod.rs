@@ -29,7 +29,7 @@ const INFORMATION_PANEL: f64 = 0.5;
 pub fn mean_information(bank: &Bank) -> f64 {
     let reach = bank.source().reach();
     Nodes::adapted(bank.source(), -reach, reach, &bank.blurs(), INFORMATION_PANEL, gauss_legendre::<12>())
-        .expect(|x| bank.fisher_information(x))
+        .expectation(|x| bank.fisher_information(x))
 }
 
 /// Equation 5.13: `1/(E[J] + J2)` with `J2 = 1/sigma_x^2` for a Gaussian source and 0 for a uniform one.

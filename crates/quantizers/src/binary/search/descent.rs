@@ -1,6 +1,6 @@
 //! Coordinate descent: one sensor at a time takes its best pattern, all candidates in one matrix product.
 
-use super::{SEARCH_PANEL, scattered};
+use super::{Outcomes, SEARCH_PANEL, scattered};
 use crate::Error;
 use crate::binary::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::binary::grid::noise_in_range;
@@ -9,7 +9,7 @@ use crate::binary::{Bank, BinaryQuantizer, Sensor, Source};
 use fewbits_core::ArgumentError;
 use fewbits_core::error::at_least_one;
 use fewbits_core::quadrature::gauss_legendre;
-use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
+use nalgebra::DMatrix;
 
 /// Relative improvement that counts as one.
 const IMPROVEMENT: f64 = 1e-11;
@@ -246,31 +246,14 @@ impl<'a> Kernel<'a> {
                 limit: MAX_OUTCOMES,
             });
         }
-        let size = self.nodes.len();
-        let mut w = self.nodes.w.clone();
-        let mut mirror = vec![0usize];
+        let mut others = Outcomes::new(&self.nodes.w);
         for (class, c, count) in groups {
             let table = CountTable::from_probabilities(&self.p[class][c], count);
-            let flips = symmetry(&self.descent.candidates[c]).unwrap_or(false);
-            let mut next = Vec::with_capacity(w.len() * (count + 1));
-            let mut next_mirror = Vec::with_capacity(mirror.len() * (count + 1));
-            for (column, &image) in w.chunks_exact(size).zip(&mirror) {
-                for (k, row) in table.rows.iter().enumerate() {
-                    next.extend(column.iter().zip(row).map(|(w, p)| w * p));
-                    next_mirror.push(image * (count + 1) + if flips { count - k } else { k });
-                }
-            }
-            (w, mirror) = (next, next_mirror);
+            others = others.with(&table, symmetry(&self.descent.candidates[c]).unwrap_or(false));
         }
         let product = &self.products[self.class[n]];
         let rows = product.nrows();
-        let mut sums = vec![0.0; rows * mirror.len()];
-        DMatrixViewMut::from_slice(&mut sums, rows, mirror.len()).gemm(
-            1.0,
-            product,
-            &DMatrixView::from_slice(&w, size, mirror.len()),
-            0.0,
-        );
+        let sums = others.integrals(product);
         let explained = self
             .descent
             .candidates
@@ -279,7 +262,7 @@ impl<'a> Kernel<'a> {
             .map(|(c, quantizer)| {
                 let flips = symmetry(quantizer).unwrap_or(false);
                 let mut explained = 0.0;
-                for (outcome, &image) in mirror.iter().enumerate() {
+                for (outcome, &image) in others.mirror.iter().enumerate() {
                     for bit in 0..2 {
                         let here = outcome * rows + 4 * c + 2 * bit;
                         let (mut mass, mut moment) = (sums[here], sums[here + 1]);

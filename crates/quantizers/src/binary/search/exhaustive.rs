@@ -1,6 +1,6 @@
 //! All sets of linear patterns, by depth-first search over multisets.
 
-use super::SEARCH_PANEL;
+use super::{Outcomes, SEARCH_PANEL};
 use crate::Error;
 use crate::binary::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::binary::count::{full_rank_multisets, multisets};
@@ -10,7 +10,7 @@ use crate::binary::source::{Blur, Nodes};
 use crate::binary::{Bank, Grid, Mask, Sensor, Source, linear_pattern};
 use fewbits_core::error::at_least_one;
 use fewbits_core::quadrature::gauss_legendre;
-use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Candidates that are evaluated again on the fine nodes.
@@ -19,6 +19,8 @@ const FINALISTS: usize = 16;
 const TIE: f64 = 1e-12;
 /// Most sets that a ranking may list.
 const MAX_RANKED: u128 = 1 << 26;
+/// Most sets that a search may visit: hours of work.
+const MAX_SETS: u128 = 1 << 32;
 /// Levels of the search tree whose branches are shared among threads.
 const PARALLEL_LEVELS: usize = 2;
 
@@ -123,7 +125,8 @@ impl LinearSearch {
     /// The best set. Its error is exact to `1e-12`; among equals the lowest masks win.
     ///
     /// # Errors
-    /// If full rank is required of fewer sensors than bits, or there are too many outcomes to enumerate.
+    /// If full rank is required of fewer sensors than bits, there are too many outcomes to enumerate, or more than `2^32` sets;
+    /// [`Descent`](super::Descent) is for those.
     pub fn best(&self) -> Result<MaskSet, Error> {
         let mut finalists = self.run(FINALISTS)?;
         for set in &mut finalists {
@@ -157,7 +160,13 @@ impl LinearSearch {
     }
 
     fn run(&self, keep: usize) -> Result<Vec<MaskSet>, Error> {
-        self.sets()?;
+        let sets = self.sets()?;
+        if sets > MAX_SETS {
+            return Err(Error::TooManyOutcomes {
+                outcomes: sets,
+                limit: MAX_SETS,
+            });
+        }
         // Distinct masks give the most outcomes.
         let distinct = self.sensors.min((1 << self.bits) - 1) as u32;
         let repeats = (self.sensors as u128 / u128::from(distinct)).saturating_add(1);
@@ -169,10 +178,7 @@ impl LinearSearch {
             });
         }
         let walk = Walk::new(self, keep)?;
-        let root = Level {
-            w: walk.nodes.w.clone(),
-            mirror: vec![0],
-        };
+        let root = Outcomes::new(&walk.nodes.w);
         let mut found = walk.branch(0, self.sensors, Span::default(), &[], root);
         found.finish();
         Ok(found.sets)
@@ -225,12 +231,6 @@ impl Top {
         self.finish();
         self
     }
-}
-
-/// `w p(x) P(outcome|x)`, one contiguous column an outcome, and the mirror image of each outcome.
-struct Level {
-    w: Vec<f64>,
-    mirror: Vec<usize>,
 }
 
 struct Walk<'a> {
@@ -296,7 +296,7 @@ impl<'a> Walk<'a> {
     }
 
     /// All sets that continue `chosen` with `left` sensors of masks from `first` on.
-    fn branch(&self, first: usize, left: usize, span: Span, chosen: &[(Mask, usize)], level: Level) -> Top {
+    fn branch(&self, first: usize, left: usize, span: Span, chosen: &[(Mask, usize)], level: Outcomes) -> Top {
         let mut found = Top::new(self.keep);
         self.close(first, left, span, chosen, &level, &mut found);
         let mut steps = Vec::new();
@@ -327,22 +327,20 @@ impl<'a> Walk<'a> {
     }
 
     /// One group of `m` sensors with mask `j + 1` more.
-    fn extend(&self, level: &Level, j: usize, m: usize) -> Level {
-        let n = self.nodes.len();
-        let flips = self.folded && flips_under_reflection(j as Mask + 1);
-        let mut w = Vec::with_capacity(level.w.len() * (m + 1));
-        let mut mirror = Vec::with_capacity(level.mirror.len() * (m + 1));
-        for (column, &image) in level.w.chunks_exact(n).zip(&level.mirror) {
-            for (k, row) in self.tables[j][m - 1].rows.iter().enumerate() {
-                w.extend(column.iter().zip(row).map(|(w, p)| w * p));
-                mirror.push(image * (m + 1) + if flips { m - k } else { k });
-            }
-        }
-        Level { w, mirror }
+    fn extend(&self, level: &Outcomes, j: usize, m: usize) -> Outcomes {
+        level.with(&self.tables[j][m - 1], self.folded && flips_under_reflection(j as Mask + 1))
     }
 
     /// Evaluates all sets in which the `left` sensors share one last mask.
-    fn close(&self, first: usize, left: usize, span: Span, chosen: &[(Mask, usize)], level: &Level, found: &mut Top) {
+    fn close(
+        &self,
+        first: usize,
+        left: usize,
+        span: Span,
+        chosen: &[(Mask, usize)],
+        level: &Outcomes,
+        found: &mut Top,
+    ) {
         let allowed = |j: usize| {
             self.forced_from[j + 1] == 0
                 && left >= self.search.forced[j]
@@ -356,15 +354,7 @@ impl<'a> Walk<'a> {
         };
         let rows_each = (left + 1) * 2;
         let rows = (until - from) * rows_each;
-        let outcomes = level.mirror.len();
-        let mut sums = vec![0.0; rows * outcomes];
-        let w = DMatrixView::from_slice(&level.w, self.nodes.len(), outcomes);
-        DMatrixViewMut::from_slice(&mut sums, rows, outcomes).gemm(
-            1.0,
-            &self.leaves[left - 1].rows(from * rows_each, rows),
-            &w,
-            0.0,
-        );
+        let sums = level.integrals(&self.leaves[left - 1].rows(from * rows_each, rows));
         for j in (from..until).filter(|&j| allowed(j)) {
             let mask = j as Mask + 1;
             let flips = flips_under_reflection(mask);
@@ -446,6 +436,7 @@ mod tests {
         assert!(search(3, 2, 10.0).with_forced(&[8]).is_err());
         let grid = Grid::from_edges(vec![0.0, 1.0]).unwrap();
         assert!(LinearSearch::new(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
+        assert!(matches!(search(10, 12, 10.0).best(), Err(Error::TooManyOutcomes { .. })));
         assert!(matches!(
             search(6, 40, 10.0).best(),
             Err(Error::TooManyOutcomes { .. } | Error::CountOverflow { .. })

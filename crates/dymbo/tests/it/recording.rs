@@ -1,0 +1,76 @@
+//! The example's logic on a small recording made for it: `a = 0.95`, `sigma_u = 0.3`, `sigma = 0.5` around 21, 300 rows.
+
+#[allow(dead_code)]
+#[path = "../../examples/recording.rs"]
+mod example;
+
+use example::{analyse, few_bits, fit, full_precision, read_column, rms_difference};
+use std::path::Path;
+
+fn samples() -> Vec<f64> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/recording.csv");
+    read_column(&file, "temp_degc").unwrap()
+}
+
+#[test]
+fn the_fit_finds_the_plant() {
+    let samples = samples();
+    assert_eq!(samples.len(), 300);
+    let fit = fit(&samples).unwrap();
+    // Three standard deviations of such estimates from 300 samples.
+    assert!((fit.plant.coefficient() - 0.95).abs() < 0.08, "{}", fit.plant.coefficient());
+    assert!((fit.plant.process_variance().sqrt() - 0.3).abs() < 0.12);
+    assert!((fit.plant.measurement_variance().sqrt() - 0.5).abs() < 0.1);
+    // No neighbour is likelier.
+    let (a, gamma) = (fit.plant.coefficient(), fit.plant.noise_ratio());
+    for (b, g) in [
+        (a + 1e-3, gamma),
+        (a - 1e-3, gamma),
+        (a, gamma * 1.01),
+        (a, gamma / 1.01),
+    ] {
+        let centred: Vec<f64> = samples.iter().map(|x| x - fit.mean).collect();
+        assert!(example::profile(&centred, b, g).unwrap().0 < fit.log_likelihood);
+    }
+}
+
+#[test]
+fn every_bit_brings_the_estimate_closer() {
+    let samples = samples();
+    let report = analyse(&samples).unwrap();
+    let deviations: Vec<f64> = report.rows.iter().map(|row| row.1).collect();
+    assert!(deviations[0] > 1.5 * deviations[1] && deviations[1] > 1.5 * deviations[2], "{deviations:?}");
+    // In the steady state the squared deviation is the loss in variance.
+    let kalman = report.fit.plant.steady_state(1.0).unwrap().filtered_variance;
+    for (bits, deviation, spent) in &report.rows {
+        let filter = fewbits_dymbo::MultibitFilter::new(report.fit.plant, *bits).unwrap();
+        let own = report
+            .fit
+            .plant
+            .steady_state(filter.information())
+            .unwrap()
+            .filtered_variance;
+        let ratio = deviation / (own - kalman).sqrt();
+        assert!((0.7..1.4).contains(&ratio), "{bits} bits: {ratio}");
+        assert_eq!(*spent, 16 + bits * 299);
+    }
+    assert!(report.to_string().contains("bits spent"));
+}
+
+#[test]
+fn eight_bits_are_nearly_the_sample() {
+    let samples = samples();
+    let fit = fit(&samples).unwrap();
+    let reference = full_precision(&fit, &samples).unwrap();
+    let (estimates, _) = few_bits(&fit, &samples, 8).unwrap();
+    assert!(rms_difference(&estimates[5..], &reference[5..]) < 0.02 * fit.plant.measurement_variance().sqrt());
+}
+
+#[test]
+fn bad_files_are_refused_with_reasons() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/recording.csv");
+    let missing = read_column(&file, "pressure").unwrap_err().to_string();
+    assert!(missing.contains("pressure") && missing.contains("temp_degc"));
+    assert!(read_column(Path::new("no such file.csv"), "x").is_err());
+    assert!(fit(&[1.0; 5]).is_err() && fit(&[1.0; 50]).is_err());
+}

@@ -1,0 +1,123 @@
+//! What the tables of this system share: scenes, starting quantizers, rows of designs, and looking values up again.
+
+use crate::{Claim, Column, Error, Table, Value, column};
+use fewbits_quantizers::design::Design;
+use fewbits_quantizers::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max};
+
+pub(super) const MI: Criterion = Criterion::MutualInformation;
+pub(super) const MSE: Criterion = Criterion::MeanSquaredError;
+
+/// Name of a criterion in the tables.
+pub(super) fn name(criterion: Criterion) -> &'static str {
+    match criterion {
+        Criterion::MutualInformation => "mi",
+        Criterion::MeanSquaredError => "mse",
+        Criterion::BayesError => "pe",
+    }
+}
+
+/// A standard normal unknown in noise of these standard deviations and this common correlation.
+pub(super) fn scene(sds: &[f64], rho: f64) -> Result<Scene, Error> {
+    Ok(Scene::new(Prior::gaussian(1.0)?, Noise::equicorrelated(sds, rho)?)?)
+}
+
+/// The Lloyd-Max quantizer of a normal variable of standard deviation `sd`.
+pub(super) fn lloyd(levels: usize, sd: f64) -> Result<Quantizer, Error> {
+    Ok(Quantizer::from(&lloyd_max::gaussian(levels)?.affine(0.0, sd)?))
+}
+
+/// A Lloyd-Max quantizer at every sensor, scaled as `sd` says.
+pub(super) fn lloyd_system(scene: &Scene, levels: usize, sd: impl Fn(usize) -> f64) -> Result<System, Error> {
+    let quantizers = (0..scene.sensors())
+        .map(|n| lloyd(levels, sd(n)))
+        .collect::<Result<_, _>>()?;
+    Ok(System::ideal(scene.clone(), quantizers)?)
+}
+
+/// The odd quantizer with these positive breakpoints and one at zero.
+pub(super) fn odd(positive: &[f64]) -> Result<Quantizer, Error> {
+    let mirrored = positive.iter().rev().map(|b| -b);
+    Ok(Quantizer::new(mirrored.chain([0.0]).chain(positive.iter().copied()).collect())?)
+}
+
+/// The binary symmetric channel of these words.
+pub(super) fn bsc(words: &[u32], crossover: f64) -> Result<Channel, Error> {
+    Ok(Channel::binary_symmetric_with_gaps(&Labelling::new(words.to_vec())?, crossover)?)
+}
+
+/// Breakpoints as text, ten decimals.
+pub(super) fn breakpoints(quantizer: &Quantizer) -> String {
+    // Zero has a sign, and an optimum at zero a rounding error.
+    let rounded = |b: &f64| format!("{:.10}", if b.abs() < 5e-11 { 0.0 } else { *b });
+    quantizer
+        .breakpoints()
+        .iter()
+        .map(rounded)
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+/// A table whose rows are designs of two sensors, behind the given key columns.
+pub(super) fn design_table(keys: &[Column]) -> Table {
+    let columns = [
+        column("gamma1", "", "breakpoints of sensor 1"),
+        column("gamma2", "", "breakpoints of sensor 2"),
+        column("outer1", "", "largest breakpoint of sensor 1"),
+        column("outer2", "", "largest breakpoint of sensor 2"),
+        column("mi_nats", "nat", "mutual information between the unknown and all symbols"),
+        column("mi_bits", "bit", "the same in bits"),
+        column("mse", "", "mean squared error of the posterior mean, in prior variances"),
+        column("curvature", "", "largest eigenvalue of the criterion's Hessian where it was a joint design"),
+        column("printed_mse", "", "the publication's value"),
+    ];
+    Table::new(keys.iter().cloned().chain(columns))
+}
+
+/// Appends a design to a [`design_table`].
+pub(super) fn push_design(
+    table: &mut Table,
+    keys: Vec<Value>,
+    system: &System,
+    curvature: Option<f64>,
+    printed_mse: Option<f64>,
+) -> Result<(), Error> {
+    let quantizers = system.quantizers();
+    let (first, last) = (&quantizers[0], &quantizers[quantizers.len() - 1]);
+    let outer = |q: &Quantizer| q.breakpoints().last().copied();
+    let mi = system.value(MI)?;
+    let mut row = keys;
+    row.extend([
+        Value::from(breakpoints(first).as_str()),
+        Value::from(breakpoints(last).as_str()),
+        outer(first).into(),
+        outer(last).into(),
+        mi.into(),
+        (mi / std::f64::consts::LN_2).into(),
+        system.value(MSE)?.into(),
+        curvature.into(),
+        printed_mse.into(),
+    ]);
+    table.push(row)
+}
+
+/// As [`push_design`] with the curvature of a joint design.
+pub(super) fn push_joint(table: &mut Table, keys: Vec<Value>, design: &Design) -> Result<(), Error> {
+    push_design(table, keys, &design.system, Some(design.largest_curvature), None)
+}
+
+/// The number in `column` of the only row with these keys.
+pub(super) fn cell(table: &Table, keys: &[(&str, Value)], column: &str) -> Result<f64, Error> {
+    let mut rows = table.clone();
+    for (name, value) in keys {
+        rows = rows.only(name, value.clone())?;
+    }
+    match rows.numbers(column)?.as_slice() {
+        [value] => Ok(*value),
+        found => Err(Error::Table(format!("{} rows with {keys:?}", found.len()))),
+    }
+}
+
+/// A claim that a computed number is a known one.
+pub(super) fn exact(id: impl Into<String>, what: impl Into<String>, value: f64, known: f64, tolerance: f64) -> Claim {
+    Claim::near(id, what, value, known, tolerance).at_defaults()
+}
