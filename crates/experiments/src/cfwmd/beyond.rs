@@ -105,8 +105,7 @@ impl Case for Lossy {
                     expected,
                     tolerance,
                 )
-                .at_defaults()
-                .needs_full_trials(),
+                .at_defaults(),
             );
         }
         let honest = value(summary, "modelled, loss 0.3", 1.0, "nees")?;
@@ -211,6 +210,10 @@ impl Case for Scheduled {
         ]
     }
 
+    fn exact() -> &'static [&'static str] {
+        &["bound-"]
+    }
+
     fn further(setting: &Setting, _: &Context<'_>, tables: Tables) -> Result<Tables, Error> {
         let mut table = Table::new([
             column("l", "messages/step", "message budget"),
@@ -249,8 +252,7 @@ impl Case for Scheduled {
                     l,
                     0.02,
                 )
-                .at_defaults()
-                .needs_full_trials(),
+                .at_defaults(),
             );
             let ratio = value(summary, "scheduled", l, "pos_armse_m")? / value(summary, "CFwMD2", l, "pos_armse_m")?;
             claims.push(
@@ -258,8 +260,8 @@ impl Case for Scheduled {
                     format!("error-l{l}"),
                     format!("and the error of covariance feedback or less, l = {l} (ratio)"),
                     ratio,
-                    1.0,
-                    0.025,
+                    0.99,
+                    0.03,
                 )
                 .at_defaults(),
             );
@@ -404,6 +406,10 @@ impl Case for Cost {
 
     fn measures_time() -> bool {
         true
+    }
+
+    fn exact() -> &'static [&'static str] {
+        &["cheaper"]
     }
 
     fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {

@@ -65,14 +65,12 @@ impl Case for Fig3 {
         let rate = value(summary, "CFwMD", 1.0, "lbar")?;
         claims.push(
             Claim::near("rate-exact", "without feedback the rate is exactly the budget", rate, 1.0, 0.012)
-                .at_defaults()
-                .needs_full_trials(),
+                .at_defaults(),
         );
         let gain = 1.0 - value(summary, "CFwMD", 1.0, "pos_armse_m")? / value(summary, "CFoMD", 1.0, "pos_armse_m")?;
         claims.push(
             Claim::near("gain", "hearing silence lowers the position RMSE by a tenth", gain, 0.105, 0.025)
-                .at_defaults()
-                .needs_full_trials(),
+                .at_defaults(),
         );
         Ok(claims)
     }
@@ -103,7 +101,6 @@ impl Case for NoFeedbackFigure {
 
     fn quicken(setting: &mut Setting) {
         setting.quicken();
-        setting.particles = 100;
     }
 
     fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
@@ -120,6 +117,10 @@ impl Case for NoFeedbackFigure {
             .map(|l| run::<1>(context, setting, *l, &schemes))
             .collect::<Result<Vec<_>, _>>()
             .map(|e| e.concat())
+    }
+
+    fn exact() -> &'static [&'static str] {
+        &["printed-is-deaf"]
     }
 
     fn pairs() -> Vec<(&'static str, &'static str)> {
@@ -175,8 +176,7 @@ impl Case for NoFeedbackFigure {
                 0.0,
                 0.01,
             )
-            .at_defaults()
-            .needs_full_trials(),
+            .at_defaults(),
         );
         Ok(claims)
     }

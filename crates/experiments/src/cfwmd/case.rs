@@ -25,6 +25,10 @@ pub(super) trait Case: Sync + 'static {
     /// Schemes to compare trial by trial, at each budget where both ran.
     fn pairs() -> Vec<(&'static str, &'static str)>;
     fn claims(setting: &Self::Setting, tables: &Tables) -> Result<Vec<Claim>, Error>;
+    /// Ids (or their beginnings) of claims that no trial count blurs; all others need the full one.
+    fn exact() -> &'static [&'static str] {
+        &[]
+    }
     /// The main table; the RMSE of every step unless overridden.
     fn main(ensembles: &[Ensemble]) -> Result<Table, Error> {
         step_table(ensembles)
@@ -102,7 +106,13 @@ impl<C: Case> Figure for Simulated<C> {
         let own = serde_json::to_value(&parameters.setting).ok() == serde_json::to_value(C::setting()).ok();
         match C::claims(&parameters.setting, tables) {
             Err(Error::Table(_)) if !own => Ok(Vec::new()),
-            claims => claims,
+            claims => Ok(claims?
+                .into_iter()
+                .map(|claim| {
+                    let exact = C::exact().iter().any(|id| claim.id.starts_with(id));
+                    if exact { claim } else { claim.needs_full_trials() }
+                })
+                .collect()),
         }
     }
 

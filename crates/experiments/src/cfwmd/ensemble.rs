@@ -227,8 +227,7 @@ pub(super) fn agrees(
                     *expected,
                     tolerance,
                 )
-                .at_defaults()
-                .needs_full_trials(),
+                .at_defaults(),
             );
         }
     }
@@ -257,8 +256,7 @@ pub(super) fn beats(paired: &Table, first: &str, second: &str, messages: f64, pa
         at(difference)? / at(error)?,
         -3.0,
     )
-    .at_defaults()
-    .needs_full_trials())
+    .at_defaults())
 }
 
 /// Claim that at every step the schemes are in this order, smallest RMSE first, beyond `sigmas` standard errors of a violation.
@@ -283,8 +281,7 @@ pub(super) fn ordered_at_every_step(
         format!("at every step {} in {column} (violations beyond two standard errors)", schemes.join(" < ")),
         violations,
     )
-    .at_defaults()
-    .needs_full_trials())
+    .at_defaults())
 }
 
 /// A number of the summary table.

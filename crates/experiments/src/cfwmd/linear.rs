@@ -72,7 +72,8 @@ impl Setting {
 
     /// About a second of work.
     pub(super) fn quicken(&mut self) {
-        self.trials = 150;
+        self.trials = 100;
+        self.particles = 100;
     }
 }
 

@@ -486,8 +486,7 @@ impl Case for Fig9 {
                         ratio,
                         1.0,
                     )
-                    .at_defaults()
-                    .needs_full_trials(),
+                    .at_defaults(),
                 );
             }
         }
@@ -495,8 +494,7 @@ impl Case for Fig9 {
             let ratio = at("CFoMD", l, "pos_armse_m")? / at("random", l, "pos_armse_m")?;
             claims.push(
                 Claim::below(format!("censoring-l{l}"), format!("CFoMD beats random at l = {l} (ratio)"), ratio, 1.0)
-                    .at_defaults()
-                    .needs_full_trials(),
+                    .at_defaults(),
             );
         }
         for l in [4.0, 5.0, 6.0] {
@@ -581,11 +579,7 @@ impl Case for Fig10 {
             let rows = paired.only("l", l)?;
             let z = rows.numbers("pos_mse_difference_m2")?[0] / rows.numbers("pos_se")?[0];
             let statement = "at l = 2 covariance feedback gains nothing measurable in position (paired difference in standard errors)";
-            claims.push(
-                Claim::near("no-gain-l2", statement, z, 0.0, 3.5)
-                    .at_defaults()
-                    .needs_full_trials(),
-            );
+            claims.push(Claim::near("no-gain-l2", statement, z, 0.0, 3.5).at_defaults());
         }
         Ok(claims)
     }
@@ -665,8 +659,7 @@ impl Case for Table3 {
                 drawn,
                 1.7,
             )
-            .at_defaults()
-            .needs_full_trials(),
+            .at_defaults(),
         );
         Ok(claims)
     }

@@ -134,8 +134,7 @@ impl Case for Fig1 {
                     expected,
                     0.025,
                 )
-                .at_defaults()
-                .needs_full_trials(),
+                .at_defaults(),
             );
         }
         let ratio = at("CFwMD particles", "pos_armse_m")? / at("CFwMD", "pos_armse_m")?;
@@ -287,11 +286,7 @@ pub(super) fn printed_rates(table: &Table, setting: &str, tolerance: f64) -> Res
         for (i, l) in budgets.iter().enumerate() {
             let id = format!("printed-{scheme}-l{l}-{}", setting.replace([' ', ',', '='], ""));
             let statement = format!("rate of {scheme} at l = {l} as printed ({setting})");
-            claims.push(
-                Claim::near(id, statement, ours[i], printed[i], tolerance)
-                    .at_defaults()
-                    .needs_full_trials(),
-            );
+            claims.push(Claim::near(id, statement, ours[i], printed[i], tolerance).at_defaults());
         }
     }
     Ok(claims)
@@ -444,8 +439,7 @@ impl Case for Table1 {
                     l,
                     0.02,
                 )
-                .at_defaults()
-                .needs_full_trials(),
+                .at_defaults(),
             );
         }
         let missed = value(summary, "CFwMD, 5", 2.0, "lbar")?;

@@ -201,8 +201,7 @@ impl Case for Fig5 {
                             expected,
                             0.015,
                         )
-                        .at_defaults()
-                        .needs_full_trials(),
+                        .at_defaults(),
                     );
                 }
             }
@@ -211,7 +210,7 @@ impl Case for Fig5 {
         // The stated variance contradicts the paper's claim at l = 1.
         let stated = paired.only("first", "CFwMD2 4")?.only("l", 1.0)?;
         let z = stated.numbers("pos_mse_difference_m2")?[0] / stated.numbers("pos_se")?[0];
-        claims.push(Claim::above("stated-variance-fails", "at the stated acceleration variance CFwMD2 is not better at l = 1 (paired difference in standard errors)", z, -2.0).at_defaults().needs_full_trials());
+        claims.push(Claim::above("stated-variance-fails", "at the stated acceleration variance CFwMD2 is not better at l = 1 (paired difference in standard errors)", z, -2.0).at_defaults());
         Ok(claims)
     }
 }
@@ -243,7 +242,6 @@ impl Case for Fig6 {
 
     fn quicken(setting: &mut Setting) {
         setting.quicken();
-        setting.particles = 100;
     }
 
     fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
@@ -406,8 +404,7 @@ impl Case for Table2 {
                 stated,
                 0.98,
             )
-            .at_defaults()
-            .needs_full_trials(),
+            .at_defaults(),
         );
         Ok(claims)
     }
