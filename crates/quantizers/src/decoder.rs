@@ -48,7 +48,11 @@ impl MmseDecoder {
             });
         }
         let scene = system.scene();
-        let reports = Reports::of(&system.clone().with_outcome_limit(limit as u64))?;
+        let reports = Reports::of(
+            &system
+                .clone()
+                .with_outcome_limit(system.outcome_limit().max(limit as u64)),
+        )?;
         let mut square = vec![0.0; scene.nodes()];
         for ((given, w), x) in scene.given.iter().zip(&scene.weights).zip(&scene.values) {
             for (i, p) in given.weights.iter().enumerate() {

@@ -62,9 +62,11 @@ pub mod scene;
 pub mod system;
 pub mod table;
 
+mod axis;
 mod compositions;
 mod criterion;
 mod error;
+mod law;
 mod moments;
 mod newton;
 mod problem;

@@ -13,13 +13,13 @@
 //! The node sums therefore run over the few functions `R_N`, `phi_i R_{N-1}`, `phi_i' R_{N-1}` and `phi_i phi_j R_{N-2}`; the
 //! channel's coefficients act on the results. No term divides by a cell probability, so empty cells are harmless.
 
-use crate::compositions::Compositions;
+use crate::axis::{Axis, reduce, scatter, slice};
 use crate::criterion::{Criterion, LOG_FLOOR, Scored};
 use crate::error::Error;
+use crate::law::{Active, SensorLaw, Slots, negative_entropy};
 use crate::moments::{Table, moments};
 use crate::scene::Feature;
-use crate::system::{Derivatives, Group, System};
-use fewbits_core::normal;
+use crate::system::{Derivatives, System};
 use nalgebra::{DMatrix, DVector};
 
 /// A criterion (signed so that larger is better) over the breakpoints of the active groups.
@@ -33,17 +33,6 @@ pub(crate) struct Problem<'a> {
     /// Log multiplicity of every joint outcome, fixed groups slowest.
     log_multiplicity: Vec<f64>,
     constant: f64,
-}
-
-#[derive(Debug, Clone)]
-struct Active<'a> {
-    index: usize,
-    group: &'a Group,
-    compositions: Compositions,
-    means: Vec<f64>,
-    sd: f64,
-    /// `c[i][t]`: change of the probability of symbol `t` when breakpoint `i` moves up, per density.
-    exchange: Vec<Vec<f64>>,
 }
 
 /// Report probabilities of every group at every node, and the log multiplicity of every joint outcome.
@@ -66,143 +55,6 @@ impl Reports {
     pub(crate) fn moments(&self, features: &[Feature]) -> Vec<f64> {
         moments(&self.tables.iter().collect::<Vec<_>>(), features)
     }
-}
-
-/// One sensor's symbol probabilities (a row a symbol), and how breakpoints move them.
-#[derive(Debug, Default)]
-pub(crate) struct SensorLaw<'a> {
-    pub(crate) symbols: Vec<f64>,
-    pub(crate) densities: Vec<Vec<f64>>,
-    pub(crate) slopes: Vec<Vec<f64>>,
-    pub(crate) exchange: &'a [Vec<f64>],
-}
-
-/// What the node sums of one group need at given breakpoints.
-struct Slots {
-    /// Report probabilities of all sensors of the group, of all but one, and of all but two.
-    reports: [Table; 3],
-    densities: Table,
-    slopes: Table,
-    /// Products `phi_i phi_j`, `j >= i`.
-    pairs: Table,
-}
-
-impl<'a> Active<'a> {
-    fn new(system: &'a System, index: usize) -> Result<Self, Error> {
-        let group = system.group(index)?;
-        let outputs = group.channel().outputs();
-        let (means, sd) = system.scene().sample_law(group.sensors()[0]);
-        let exchange = (0..group.quantizer().breakpoints().len())
-            .map(|i| {
-                (0..outputs)
-                    .map(|t| group.cell_transition(t, i) - group.cell_transition(t, i + 1))
-                    .collect()
-            })
-            .collect();
-        let compositions = Compositions::new(group.sensors().len(), outputs);
-        Ok(Self {
-            index,
-            group,
-            compositions,
-            means,
-            sd,
-            exchange,
-        })
-    }
-
-    fn parameters(&self) -> usize {
-        self.exchange.len()
-    }
-
-    /// Probability of each cell at each node.
-    fn cells(&self, b: &[f64]) -> Vec<Vec<f64>> {
-        (0..=b.len())
-            .map(|cell| {
-                let lower = if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
-                let upper = b.get(cell).copied().unwrap_or(f64::INFINITY);
-                let inside = |m: &f64| normal::interval((lower - m) / self.sd, (upper - m) / self.sd);
-                self.means.iter().map(inside).collect()
-            })
-            .collect()
-    }
-
-    /// Probability of each received symbol at each node.
-    fn symbols(&self, b: &[f64]) -> Vec<f64> {
-        let nodes = self.means.len();
-        let mut symbols = vec![0.0; self.compositions.parts() * nodes];
-        for (cell, column) in self.cells(b).iter().enumerate() {
-            for (t, row) in symbols.chunks_exact_mut(nodes).enumerate() {
-                let p = self.group.cell_transition(t, cell);
-                if p != 0.0 {
-                    row.iter_mut().zip(column).for_each(|(r, c)| *r += p * c);
-                }
-            }
-        }
-        symbols
-    }
-
-    /// Joint report probabilities, and `-H(T | node)` of one sensor where wanted.
-    fn reports(&self, b: &[f64]) -> (Table, Vec<f64>) {
-        let nodes = self.means.len();
-        let symbols = self.symbols(b);
-        let reports = self.compositions.probabilities(&symbols, nodes).swap_remove(0);
-        (Table::new(reports, nodes), symbols)
-    }
-
-    fn densities(&self, b: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
-        b.iter()
-            .map(|b| {
-                let standardised = self.means.iter().map(|m| (b - m) / self.sd);
-                standardised
-                    .map(|u| {
-                        let density = normal::pdf(u) / self.sd;
-                        (density, -u * density / self.sd)
-                    })
-                    .unzip()
-            })
-            .unzip()
-    }
-
-    fn slots(&self, symbols: &[f64], densities: &[Vec<f64>], slopes: &[Vec<f64>]) -> Slots {
-        let nodes = self.means.len();
-        let mut levels = self.compositions.probabilities(symbols, nodes).into_iter();
-        let reports = [(); 3].map(|()| Table::new(levels.next().unwrap_or_default(), nodes));
-        let mut pairs = Vec::new();
-        if self.compositions.total() >= 2 {
-            for (i, p) in densities.iter().enumerate() {
-                for q in &densities[i..] {
-                    pairs.extend(p.iter().zip(q).map(|(x, y)| x * y));
-                }
-            }
-        }
-        Slots {
-            reports,
-            densities: Table::new(densities.concat(), nodes),
-            slopes: Table::new(slopes.concat(), nodes),
-            pairs: Table::new(pairs, nodes),
-        }
-    }
-}
-
-/// `sum_node mass sum_t P_t ln P_t` of one sensor.
-fn negative_entropy(symbols: &[f64], mass: &[f64]) -> f64 {
-    symbols
-        .chunks_exact(mass.len())
-        .map(|row| {
-            row.iter()
-                .zip(mass)
-                .filter(|(p, _)| **p > 0.0)
-                .map(|(p, w)| w * p * p.ln())
-                .sum::<f64>()
-        })
-        .sum()
-}
-
-/// Where the axis of one group lies in a table of joint outcomes.
-#[derive(Clone, Copy)]
-struct Axis {
-    outer: usize,
-    inner: usize,
 }
 
 impl<'a> Problem<'a> {
@@ -462,7 +314,7 @@ impl<'a> Problem<'a> {
             let mut pair = 0;
             for i in 0..n {
                 let row = offsets[g] + i;
-                let reduced = reduce(&worth, axis, a, 0, &a.exchange[i]);
+                let reduced = reduce(&worth, axis, &a.compositions, 0, &a.exchange[i]);
                 let moved = slice(&first, axis, n, below, i);
                 gradient[row] += inner_product(&reduced, &moved);
                 hessian[(row, row)] += inner_product(&reduced, &slice(&bend, axis, n, below, i));
@@ -470,7 +322,7 @@ impl<'a> Problem<'a> {
                     let pairs = n * (n + 1) / 2;
                     let twice = a.compositions.len_below(2);
                     for j in i..n {
-                        let both = reduce(&reduced, axis, a, 1, &a.exchange[j]);
+                        let both = reduce(&reduced, axis, &a.compositions, 1, &a.exchange[j]);
                         let term = inner_product(&both, &slice(&second, axis, pairs, twice, pair));
                         add_symmetric(&mut hessian, row, offsets[g] + j, term);
                         pair += 1;
@@ -490,7 +342,7 @@ impl<'a> Problem<'a> {
                     };
                     let below_h = other.compositions.len_below(1);
                     for j in 0..other.parameters() {
-                        let both = reduce(&reduced, shrunk, other, 0, &other.exchange[j]);
+                        let both = reduce(&reduced, shrunk, &other.compositions, 0, &other.exchange[j]);
                         let of_j = slice(crossed, expanded, other.parameters(), below_h, j);
                         let inner = axis.inner / other.compositions.len() * below_h;
                         let of_ij = slice(
@@ -506,7 +358,7 @@ impl<'a> Problem<'a> {
                         add_symmetric(&mut hessian, row, offsets[h] + j, inner_product(&both, &of_ij));
                     }
                 }
-                changes.push(scatter(&moved, axis, a, &a.exchange[i]));
+                changes.push(scatter(&moved, axis, &a.compositions, &a.exchange[i]));
             }
         }
 
@@ -627,61 +479,4 @@ fn add_symmetric(matrix: &mut DMatrix<f64>, i: usize, j: usize, term: f64) {
     if i != j {
         matrix[(j, i)] += term;
     }
-}
-
-/// The part of a table whose axis has rows `(block, m)` that belongs to one block.
-fn slice(values: &[f64], axis: Axis, blocks: usize, rows: usize, block: usize) -> Vec<f64> {
-    let chunk = rows * axis.inner;
-    let mut out = Vec::with_capacity(axis.outer * chunk);
-    for o in 0..axis.outer {
-        let at = (o * blocks + block) * chunk;
-        out.extend_from_slice(&values[at..at + chunk]);
-    }
-    out
-}
-
-/// `out(m) = (N - missing) sum_t c_t worth(m + e_t)` along the group's axis.
-fn reduce(worth: &[f64], axis: Axis, a: &Active<'_>, missing: usize, c: &[f64]) -> Vec<f64> {
-    let sensors = (a.compositions.total() - missing) as f64;
-    let (above, below) = (a.compositions.len_below(missing), a.compositions.len_below(missing + 1));
-    let mut out = vec![0.0; axis.outer * below * axis.inner];
-    for (o, block) in out.chunks_exact_mut(below * axis.inner).enumerate() {
-        for (m, row) in block.chunks_exact_mut(axis.inner).enumerate() {
-            for (t, at) in a.compositions.up(missing + 1)[m * c.len()..(m + 1) * c.len()]
-                .iter()
-                .enumerate()
-            {
-                if c[t] != 0.0 {
-                    let from = (o * above + at) * axis.inner;
-                    let factor = sensors * c[t];
-                    for (r, w) in row.iter_mut().zip(&worth[from..from + axis.inner]) {
-                        *r += factor * w;
-                    }
-                }
-            }
-        }
-    }
-    out
-}
-
-/// The transpose of [`reduce`]: `out(m + e_t) += N c_t moved(m)`.
-fn scatter(moved: &[f64], axis: Axis, a: &Active<'_>, c: &[f64]) -> Vec<f64> {
-    let sensors = a.compositions.total() as f64;
-    let (above, below) = (a.compositions.len(), a.compositions.len_below(1));
-    let mut out = vec![0.0; axis.outer * above * axis.inner];
-    for o in 0..axis.outer {
-        for m in 0..below {
-            let from = (o * below + m) * axis.inner;
-            for (t, at) in a.compositions.up(1)[m * c.len()..(m + 1) * c.len()].iter().enumerate() {
-                if c[t] != 0.0 {
-                    let to = (o * above + at) * axis.inner;
-                    let factor = sensors * c[t];
-                    for i in 0..axis.inner {
-                        out[to + i] += factor * moved[from + i];
-                    }
-                }
-            }
-        }
-    }
-    out
 }

@@ -173,6 +173,11 @@ impl System {
         self.groups.iter().fold(1, |n: u64, g| n.saturating_mul(g.outcomes()))
     }
 
+    /// Most joint outcomes a computation may enumerate.
+    pub fn outcome_limit(&self) -> u64 {
+        self.outcome_limit
+    }
+
     /// Refuses tables of more outcomes than allowed.
     pub(crate) fn check_outcomes(&self) -> Result<(), Error> {
         let (needed, limit) = (self.outcomes(), self.outcome_limit);
@@ -182,6 +187,17 @@ impl System {
                 needed,
                 limit,
             });
+        }
+        // Counts of fewer reports are tabulated on the way.
+        for group in &self.groups {
+            let needed = count(group.sensors.len(), group.channel.outputs() + 1);
+            if needed > limit {
+                return Err(Error::TooLarge {
+                    table: "table of counts",
+                    needed,
+                    limit,
+                });
+            }
         }
         Ok(())
     }

@@ -107,10 +107,6 @@ impl Figure for Table41 {
         }
     }
 
-    fn quicken(&self, p: &mut Parameters) {
-        p.starts = 8;
-    }
-
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
         let keys = [
             column("case", "", "noise correlation and levels"),

@@ -82,10 +82,6 @@ impl Figure for Table42 {
         })
     }
 
-    fn quicken(&self, p: &mut Parameters) {
-        p.starts = 8;
-    }
-
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
         let keys = [
             column("levels", "", "levels of each sensor"),

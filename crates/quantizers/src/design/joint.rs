@@ -120,7 +120,7 @@ pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &N
             channels.push(group.channel().clone());
         }
         let scene = system.scene().subset(&sensors)?;
-        let partial = System::distinct(scene, quantizers, channels)?;
+        let partial = System::distinct(scene, quantizers, channels)?.with_outcome_limit(system.outcome_limit());
         stages.push(optimise_groups(&partial, &[n], criterion, newton)?);
     }
     Ok(stages)

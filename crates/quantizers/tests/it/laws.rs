@@ -364,6 +364,8 @@ fn impossible_requests_are_named() {
     assert!(design::discover(&counted, MI, &Discovery::default()).is_err());
     let many = System::ideal(Scene::gaussian(1.0, &[1.0; 11]).unwrap(), vec![q.clone(); 11]).unwrap();
     assert!(matches!(many.value(MI), Err(Error::TooLarge { .. })));
+    let crowd = System::identical(Scene::gaussian(1.0, &vec![1.0; 400]).unwrap(), q.clone()).unwrap();
+    assert!(matches!(crowd.value(MI), Err(Error::TooLarge { .. })));
     let separate = |signal, sd| {
         design::separate(Separation::Matusita, signal, sd, &q, &Channel::ideal(4).unwrap(), &Newton::default())
     };

@@ -1,0 +1,152 @@
+//! The laws of one group's reports, and how they move with its breakpoints.
+
+use crate::compositions::Compositions;
+use crate::error::Error;
+use crate::moments::Table;
+use crate::system::{Group, System};
+use fewbits_core::normal;
+
+/// A group whose breakpoints may move.
+#[derive(Debug, Clone)]
+pub(crate) struct Active<'a> {
+    pub(crate) index: usize,
+    pub(crate) group: &'a Group,
+    pub(crate) compositions: Compositions,
+    /// Mean of a sensor's sample at each node, and its standard deviation there.
+    pub(crate) means: Vec<f64>,
+    pub(crate) sd: f64,
+    /// `c[i][t]`: change of the probability of symbol `t` when breakpoint `i` moves up, per density.
+    pub(crate) exchange: Vec<Vec<f64>>,
+}
+
+/// One sensor's symbol probabilities (a row a symbol), and how breakpoints move them.
+#[derive(Debug, Default)]
+pub(crate) struct SensorLaw<'a> {
+    pub(crate) symbols: Vec<f64>,
+    pub(crate) densities: Vec<Vec<f64>>,
+    pub(crate) slopes: Vec<Vec<f64>>,
+    pub(crate) exchange: &'a [Vec<f64>],
+}
+
+/// What the node sums of one group need at given breakpoints.
+pub(crate) struct Slots {
+    /// Report probabilities of all sensors of the group, of all but one, and of all but two.
+    pub(crate) reports: [Table; 3],
+    pub(crate) densities: Table,
+    pub(crate) slopes: Table,
+    /// Products `phi_i phi_j`, `j >= i`.
+    pub(crate) pairs: Table,
+}
+
+impl<'a> Active<'a> {
+    pub(crate) fn new(system: &'a System, index: usize) -> Result<Self, Error> {
+        let group = system.group(index)?;
+        let outputs = group.channel().outputs();
+        let (means, sd) = system.scene().sample_law(group.sensors()[0]);
+        let exchange = (0..group.quantizer().breakpoints().len())
+            .map(|i| {
+                (0..outputs)
+                    .map(|t| group.cell_transition(t, i) - group.cell_transition(t, i + 1))
+                    .collect()
+            })
+            .collect();
+        let compositions = Compositions::new(group.sensors().len(), outputs);
+        Ok(Self {
+            index,
+            group,
+            compositions,
+            means,
+            sd,
+            exchange,
+        })
+    }
+
+    pub(crate) fn parameters(&self) -> usize {
+        self.exchange.len()
+    }
+
+    /// Probability of each cell at each node.
+    pub(crate) fn cells(&self, b: &[f64]) -> Vec<Vec<f64>> {
+        (0..=b.len())
+            .map(|cell| {
+                let lower = if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
+                let upper = b.get(cell).copied().unwrap_or(f64::INFINITY);
+                let inside = |m: &f64| normal::interval((lower - m) / self.sd, (upper - m) / self.sd);
+                self.means.iter().map(inside).collect()
+            })
+            .collect()
+    }
+
+    /// Probability of each received symbol at each node.
+    pub(crate) fn symbols(&self, b: &[f64]) -> Vec<f64> {
+        let nodes = self.means.len();
+        let mut symbols = vec![0.0; self.compositions.parts() * nodes];
+        for (cell, column) in self.cells(b).iter().enumerate() {
+            for (t, row) in symbols.chunks_exact_mut(nodes).enumerate() {
+                let p = self.group.cell_transition(t, cell);
+                if p != 0.0 {
+                    row.iter_mut().zip(column).for_each(|(r, c)| *r += p * c);
+                }
+            }
+        }
+        symbols
+    }
+
+    /// Report probabilities of the whole group, and the symbol probabilities of one sensor.
+    pub(crate) fn reports(&self, b: &[f64]) -> (Table, Vec<f64>) {
+        let nodes = self.means.len();
+        let symbols = self.symbols(b);
+        let reports = self.compositions.probabilities(&symbols, nodes).swap_remove(0);
+        (Table::new(reports, nodes), symbols)
+    }
+
+    /// Density of the sample at each breakpoint, and its derivative, at every node.
+    pub(crate) fn densities(&self, b: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+        b.iter()
+            .map(|b| {
+                let standardised = self.means.iter().map(|m| (b - m) / self.sd);
+                standardised
+                    .map(|u| {
+                        let density = normal::pdf(u) / self.sd;
+                        (density, -u * density / self.sd)
+                    })
+                    .unzip()
+            })
+            .unzip()
+    }
+
+    /// The tables whose products the node sums run over.
+    pub(crate) fn slots(&self, symbols: &[f64], densities: &[Vec<f64>], slopes: &[Vec<f64>]) -> Slots {
+        let nodes = self.means.len();
+        let mut levels = self.compositions.probabilities(symbols, nodes).into_iter();
+        let reports = [(); 3].map(|()| Table::new(levels.next().unwrap_or_default(), nodes));
+        let mut pairs = Vec::new();
+        if self.compositions.total() >= 2 {
+            for (i, p) in densities.iter().enumerate() {
+                for q in &densities[i..] {
+                    pairs.extend(p.iter().zip(q).map(|(x, y)| x * y));
+                }
+            }
+        }
+        Slots {
+            reports,
+            densities: Table::new(densities.concat(), nodes),
+            slopes: Table::new(slopes.concat(), nodes),
+            pairs: Table::new(pairs, nodes),
+        }
+    }
+}
+
+/// `sum_node mass sum_t P_t ln P_t` of one sensor.
+pub(crate) fn negative_entropy(symbols: &[f64], mass: &[f64]) -> f64 {
+    symbols
+        .chunks_exact(mass.len())
+        .map(|row| {
+            row.iter()
+                .zip(mass)
+                .filter(|(p, _)| **p > 0.0)
+                .map(|(p, w)| w * p * p.ln())
+                .sum::<f64>()
+        })
+        .sum()
+}
