@@ -1,6 +1,6 @@
 //! The Gaussian fusion centre: after each message the belief is the Gaussian with the exact mean and covariance.
 //!
-//! Twenty times cheaper than a thousand particles and not less accurate in the linear case, hence the default.
+//! Tens of times cheaper than a thousand particles and not less accurate in the linear case, hence the default.
 //!
 //! ```text
 //! for each received z:                    Kalman update
