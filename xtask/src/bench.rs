@@ -136,10 +136,12 @@ fn nanoseconds(cell: &str) -> Option<f64> {
 }
 
 fn print(name: &str, group: &[Measured]) {
-    let unit = group
-        .iter()
-        .find(|m| m.name.ends_with("standard_normal"))
-        .or_else(|| group.iter().find(|m| m.name.ends_with("_unit")));
+    let named = |suffix: &str| {
+        group
+            .iter()
+            .find(|m| m.name.split('/').any(|part| part.ends_with(suffix)))
+    };
+    let unit = named("standard_normal").or_else(|| named("_unit"));
     for measured in group {
         match unit {
             Some(unit) => {

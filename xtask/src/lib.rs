@@ -3,7 +3,7 @@
 //! | task | what it does |
 //! |---|---|
 //! | [`figures`] | runs experiments, writes CSV, JSON, SVG and the gallery, fails where a claim fails |
-//! | [`bench`] | runs the benchmarks and prints each as a multiple of its group's unit |
+//! | [`mod@bench`] | runs the benchmarks and prints each as a multiple of its group's unit |
 //! | [`tidy`] | checks the house rules: docs, lints, floors, panics, figure ids |
 //!
 //! No mathematics here: an experiment computes, this crate writes and draws.

@@ -29,7 +29,7 @@ fn main() {
 
 /// The unit of account.
 #[divan::bench]
-fn normal_draw(bencher: Bencher<'_, '_>) {
+fn standard_normal(bencher: Bencher<'_, '_>) {
     let mut rng = Stream::new(1).fast_rng();
     bencher.bench_local(|| rng.sample::<f64, _>(StandardNormal));
 }

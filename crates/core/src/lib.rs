@@ -1,7 +1,7 @@
 //! What every fewbits crate stands on.
 //!
 //! fewbits estimates the state of the world from sensors that may hardly speak. Each scheme has three parts: the sensor's
-//! half turns a measurement into a [`Message`](message::Message) of few bits (silence is one of zero bits); a link delivers
+//! half turns a measurement into a [`Message`] of few bits (silence is one of zero bits); a link delivers
 //! it, or loses it; and whoever hears it knows how likely it was under each state, a [`Likelihood`], and updates a belief.
 //! This crate holds the words of that sentence and the numerics they need:
 //!

@@ -26,7 +26,7 @@ fn main() {
 
 /// The unit of account: `DRAWS` standard normals a particle, summed.
 #[divan::bench(consts = [1, 2, 4])]
-fn normal_draws<const DRAWS: usize>(bencher: Bencher<'_, '_>) {
+fn normals_unit<const DRAWS: usize>(bencher: Bencher<'_, '_>) {
     let mut rng = Stream::new(1).fast_rng();
     bencher.bench_local(|| {
         let mut sum = 0.0;

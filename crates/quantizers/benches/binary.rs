@@ -29,7 +29,7 @@ fn encode(bencher: Bencher) {
 
 /// The exact error of one set of eight sensors.
 #[divan::bench]
-fn one_set(bencher: Bencher) {
+fn one_set_unit(bencher: Bencher) {
     let bank = search(3, 8).bank(&[2, 2, 3, 3, 3, 3, 4, 6]).unwrap();
     bencher.bench(|| bank.mmse());
 }

@@ -147,30 +147,32 @@ pub(super) fn budgets(table: &Table) -> Result<Vec<f64>, Error> {
 pub(super) fn rmse_by_step(steps: &Table) -> Result<Plot, Error> {
     let mut panels = Vec::new();
     let budgets = budgets(steps)?;
-    for (title, column, label) in [
-        ("Position", "pos_rmse_m", "RMSE (m)"),
-        ("Velocity", "vel_rmse_mps", "RMSE (m/s)"),
+    for (title, column, error, label) in [
+        ("Position", "pos_rmse_m", "pos_se", "RMSE (m)"),
+        ("Velocity", "vel_rmse_mps", "vel_se", "RMSE (m/s)"),
     ] {
         let mut panel = Panel::new(title, Axis::linear("time step k"), Axis::linear(label)).legend(Legend::Outside);
-        for (colour, scheme) in distinct(steps, "scheme")?.iter().enumerate() {
+        for (order, scheme) in distinct(steps, "scheme")?.iter().enumerate() {
             for (b, l) in budgets.iter().enumerate() {
                 let rows = steps.only("scheme", scheme.as_str())?.only("l", *l)?;
                 let points = rows.points("k", column)?;
                 if points.is_empty() {
                     continue;
                 }
-                let (name, colour) = if budgets.len() > 1 {
-                    (format!("{scheme}, l = {l}"), b)
+                let one_budget = budgets.len() == 1;
+                let (name, colour, solid) = if one_budget {
+                    // A suffix marks the same scheme in a second world.
+                    (scheme.clone(), colour_of(scheme, order), !scheme.ends_with(SECOND_WORLD))
                 } else {
-                    (scheme.clone(), colour)
+                    (format!("{scheme}, l = {l}"), b, scheme == "CFwMD")
                 };
-                let solid = budgets.len() == 1 || scheme == "CFwMD";
-                let layer = if solid {
-                    Layer::line(name, points)
+                let curve = if solid {
+                    Layer::line(name, points.clone())
                 } else {
-                    Layer::dashed(name, points)
+                    Layer::dashed(name, points.clone())
                 };
-                panel = panel.with(layer.coloured(colour));
+                let bars = Layer::points("", points).with_errors(rows.numbers(error)?);
+                panel = panel.with(curve.coloured(colour)).with(bars.coloured(colour));
             }
         }
         panels.push(panel);
@@ -178,10 +180,26 @@ pub(super) fn rmse_by_step(steps: &Table) -> Result<Plot, Error> {
     Ok(Plot::grid(1, panels))
 }
 
+/// Ends the names of schemes that run in a second world of the same figure.
+const SECOND_WORLD: &str = " 4";
+
+/// One colour a scheme in every figure; `otherwise` for schemes that stand in one figure only.
+fn colour_of(scheme: &str, otherwise: usize) -> usize {
+    match scheme.trim_end_matches(SECOND_WORLD) {
+        "all" => 0,
+        "random" => 1,
+        "CFoMD" => 2,
+        "CFwMD" => 3,
+        "CFwMD2" => 5,
+        _ => otherwise.max(4),
+    }
+}
+
 /// A number of the summary against the budget, a curve for each scheme, with error bars.
 pub(super) fn by_budget(summary: &Table, title: &str, column: &str, error: &str, label: &str) -> Result<Panel, Error> {
     let mut panel = Panel::new(title, Axis::linear("message budget l (messages/step)"), Axis::linear(label));
-    for (colour, scheme) in distinct(summary, "scheme")?.iter().enumerate() {
+    for (order, scheme) in distinct(summary, "scheme")?.iter().enumerate() {
+        let colour = colour_of(scheme, order);
         let rows = summary.only("scheme", scheme.as_str())?;
         let points = rows.points("l", column)?;
         panel = panel.with(Layer::line("", points.clone()).coloured(colour)).with(
