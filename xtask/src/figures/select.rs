@@ -67,7 +67,7 @@ pub(super) fn list(figures: &[&'static dyn AnyFigure]) {
         let defaults: Vec<_> = figure
             .defaults()
             .iter()
-            .map(|(name, value)| format!("{name}={value}"))
+            .map(|(name, value)| format!("{name}={}", brief(value)))
             .collect();
         if !defaults.is_empty() {
             println!("    {}", defaults.join("  "));

@@ -190,6 +190,7 @@ fn colour_of(scheme: &str, otherwise: usize) -> usize {
         "random" => 1,
         "CFoMD" => 2,
         "CFwMD" => 3,
+        "CFwMD particles" => 4,
         "CFwMD2" => 5,
         _ => otherwise.max(4),
     }
