@@ -101,15 +101,19 @@ fn parse(output: &str) -> Vec<Vec<Measured>> {
         let tree: usize = line.chars().take_while(|c| "│├╰─ ".contains(*c)).count();
         let rest: String = line.chars().skip(tree).collect();
         let cells: Vec<&str> = rest.split('│').map(str::trim).collect();
-        let Some(name) = cells[0].split_whitespace().next() else {
+        // The first cell holds the name, which may have blanks, and the fastest time.
+        let words: Vec<&str> = cells[0].split_whitespace().collect();
+        let timed = words.len() > 2 && nanoseconds(&words[words.len() - 2..].join(" ")).is_some();
+        let name = words[..words.len() - if timed { 2 } else { 0 }].join(" ");
+        if name.is_empty() {
             continue;
-        };
+        }
         if !line.starts_with(['├', '╰', '│', ' ']) {
             continue;
         }
         let depth = (tree / 3).max(1);
         path.truncate(depth - 1);
-        path.push(name.to_owned());
+        path.push(name);
         // Columns: name and fastest, slowest, median, mean, samples, iterations.
         let median = cells.get(2).and_then(|cell| nanoseconds(cell));
         if let (Some(median_ns), Some(group)) = (median, groups.last_mut()) {
@@ -164,11 +168,18 @@ Timer precision: 20 ns
 filter             fastest       │ slowest       │ median        │ mean          │ samples │ iters
 ├─ standard_normal  4.5 ns        │ 9 ns          │ 5 ns          │ 5.1 ns        │ 100     │ 6400
 ╰─ step                           │               │               │               │         │
-   ├─ 100           1 µs          │ 2 µs          │ 1.5 µs        │ 1.6 µs        │ 100     │ 100
+   ├─ (1.0, 2.5)    1 µs          │ 2 µs          │ 1.5 µs        │ 1.6 µs        │ 100     │ 100
    ╰─ 1000          1 ms          │ 2 ms          │ 1.25 ms       │ 1.6 ms        │ 100     │ 100
 ";
         let groups = parse(output);
         let names: Vec<_> = groups[0].iter().map(|m| (m.name.as_str(), m.median_ns)).collect();
-        assert_eq!(names, [("standard_normal", 5.0), ("step/100", 1500.0), ("step/1000", 1.25e6)]);
+        assert_eq!(
+            names,
+            [
+                ("standard_normal", 5.0),
+                ("step/(1.0, 2.5)", 1500.0),
+                ("step/1000", 1.25e6)
+            ]
+        );
     }
 }
