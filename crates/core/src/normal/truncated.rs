@@ -34,18 +34,26 @@ pub fn truncated_moments(lower: f64, upper: f64) -> Result<TruncatedMoments, Arg
     if !ordered || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
         return Err(ArgumentError::new("cell", format!("[{lower}, {upper})"), "lower < upper"));
     }
-    if lower >= 0.0 {
-        Ok(right_moments(lower, upper))
-    } else if upper <= 0.0 {
-        let mirrored = right_moments(-upper, -lower);
+    // Only cells that lean to the right are computed, so that mirrored cells have mirrored moments to the last bit.
+    if lower + upper < 0.0 {
+        let mirrored = leaning_right(-upper, -lower);
         Ok(TruncatedMoments {
             mean: -mirrored.mean,
             variance: mirrored.variance,
         })
-    } else if upper - lower > CLOSED_FORM_WIDTH {
-        Ok(closed_form(lower, upper))
     } else {
-        Ok(by_quadrature(lower, upper - lower))
+        Ok(leaning_right(lower, upper))
+    }
+}
+
+/// Cells whose middle is at zero or right of it.
+fn leaning_right(lower: f64, upper: f64) -> TruncatedMoments {
+    if lower >= 0.0 {
+        right_moments(lower, upper)
+    } else if upper - lower > CLOSED_FORM_WIDTH {
+        closed_form(lower, upper)
+    } else {
+        by_quadrature(lower, upper - lower)
     }
 }
 

@@ -155,6 +155,14 @@ proptest! {
     }
 
     #[test]
+    fn cells_around_zero_have_mirrored_moments(a in -3.0..-1e-9_f64, b in 1e-9..3.0_f64, narrow in 0.01..1.0_f64) {
+        prop_assume!(a != -b);
+        let (a, b) = (a * narrow, b * narrow);
+        let (m, mirrored) = (truncated_moments(a, b).unwrap(), truncated_moments(-b, -a).unwrap());
+        prop_assert_eq!((mirrored.mean, mirrored.variance), (-m.mean, m.variance));
+    }
+
+    #[test]
     fn truncated_moments_stay_in_their_cell(a in -200.0..200.0_f64, width in 1e-9..50.0_f64) {
         let b = a + width;
         prop_assume!(a < b);
