@@ -2,10 +2,11 @@
 //! nothing but the likelihood. They must agree as far as each is exact.
 
 use fewbits::core::likelihood::{Heard, ScalarLikelihood};
-use fewbits::core::{Cell, Dynamics, Encoder, Gaussian, Likelihood, Message, Observation, Stream};
+use fewbits::core::{Cell, Dynamics, Encoder, Gaussian, Likelihood, Message, Observation};
 use fewbits::densities::Particles;
 use fewbits::dymbo::{DymboFilter, MultibitFilter, OneBitSensor, ScalarPlant, StepInfo};
 use fewbits::filters::{Grid, ParticleFilter, PointMass, PointMassFilter, Workspace};
+use fewbits::monte_carlo::Stream;
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
 
@@ -67,7 +68,7 @@ fn listen(
 }
 
 fn normal<R: Rng>(rng: &mut R) -> f64 {
-    fewbits::core::normal::quantile(rng.random::<f64>().clamp(1e-12, 1.0 - 1e-12))
+    fewbits::numerics::normal::quantile(rng.random::<f64>().clamp(1e-12, 1.0 - 1e-12))
 }
 
 impl Agreement {

@@ -16,10 +16,11 @@ use crate::Error;
 use crate::ellipsoid::EllipsoidMoments;
 use crate::rule::CensoringRule;
 use crate::silence::{SilentFactor, check_loss};
-use fewbits_core::error::finite;
-use fewbits_core::linalg::symmetrised;
-use fewbits_core::{Gaussian, normal};
+use fewbits_core::Gaussian;
 use fewbits_models::LinearSensor;
+use fewbits_numerics::error::finite;
+use fewbits_numerics::linalg::symmetrised;
+use fewbits_numerics::normal;
 use nalgebra::{Cholesky, SMatrix, SVector};
 
 /// Moments of a scalar after silence.
@@ -58,7 +59,7 @@ impl ScalarSilence {
     /// Arguments out of range; [`Error::ImpossibleSilence`] for an empty interval without loss.
     pub fn moments(&self, mean: f64, variance: f64) -> Result<ScalarMoments, Error> {
         finite("mean", mean)?;
-        fewbits_core::error::non_negative("variance", variance)?;
+        fewbits_numerics::error::non_negative("variance", variance)?;
         finite("centre", self.centre)?;
         let factor = SilentFactor::new(self.half_width, self.noise_variance, self.loss)?;
         let prior = ScalarMoments {

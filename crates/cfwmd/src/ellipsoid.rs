@@ -1,10 +1,10 @@
 //! What the silence of a vector sensor says: a Gaussian inside an ellipsoid.
 
-use fewbits_core::ArgumentError;
-use fewbits_core::error::{all_finite, non_negative};
-use fewbits_core::linalg::symmetrised;
-use fewbits_core::normal;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, non_negative};
+use fewbits_numerics::linalg::symmetrised;
+use fewbits_numerics::normal;
+use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use std::f64::consts::FRAC_PI_2;
 

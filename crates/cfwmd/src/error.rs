@@ -1,6 +1,6 @@
 //! Errors of this crate.
 
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 use thiserror::Error;
 
 /// What a censoring sensor or its fusion centre refuses, or finds impossible.

@@ -12,8 +12,8 @@
 //! divergence weighs the innovation by `S^-1 (S - R) R^-1`.
 
 use crate::Error;
-use fewbits_core::error::{finite, positive};
-use fewbits_core::normal;
+use fewbits_numerics::error::{finite, positive};
+use fewbits_numerics::normal;
 use serde::{Deserialize, Serialize};
 
 /// Which divergence between the beliefs before and after an update.
@@ -91,7 +91,7 @@ pub fn equivalent_threshold(
 /// A half-width that is negative, a noise variance that is not positive, an offset that is not finite.
 pub fn fisher_information(mu: f64, half_width: f64, noise_variance: f64) -> Result<f64, Error> {
     finite("mu", mu)?;
-    fewbits_core::error::non_negative("half_width", half_width)?;
+    fewbits_numerics::error::non_negative("half_width", half_width)?;
     let deviation = positive("noise_variance", noise_variance)?.sqrt();
     if half_width == 0.0 {
         return Ok(1.0 / noise_variance);
@@ -106,9 +106,10 @@ pub fn fisher_information(mu: f64, half_width: f64, noise_variance: f64) -> Resu
 #[cfg(test)]
 mod tests {
     use super::{Direction, divergence, equivalent_threshold, fisher_information};
-    use fewbits_core::{Gaussian, normal};
+    use fewbits_core::Gaussian;
     use fewbits_filters::kalman;
     use fewbits_models::LinearSensor;
+    use fewbits_numerics::normal;
     use nalgebra::{Matrix3, SVector, Vector3};
 
     #[test]

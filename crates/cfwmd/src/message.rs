@@ -1,8 +1,9 @@
 //! What a censoring sensor says.
 
 use crate::Error;
-use fewbits_core::error::{finite, within};
-use fewbits_core::{ArgumentError, BitReader, BitWriter, CodecError, Message, Observation};
+use fewbits_core::{BitReader, BitWriter, CodecError, Message, Observation};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{finite, within};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -178,7 +179,7 @@ pub fn gather<const M: usize>(
             return Err(Error::HeardTwice { sensor });
         }
         if let Report::Value(value) = &report {
-            fewbits_core::error::all_finite("measurement", value.as_slice())?;
+            fewbits_numerics::error::all_finite("measurement", value.as_slice())?;
         }
         *slot = Some(report.heard());
     }

@@ -5,10 +5,11 @@ use crate::assumed_density::{ScalarSilence, hear_scalar_silence, hear_silence};
 use crate::message::{Format, Report};
 use crate::rule::CensoringRule;
 use crate::silence::check_loss;
-use fewbits_core::error::{all_finite, at_least_one};
-use fewbits_core::{ArgumentError, Encoder, Gaussian, Observation};
+use fewbits_core::{Encoder, Gaussian, Observation};
 use fewbits_filters::kalman;
 use fewbits_models::LinearSensor;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, at_least_one};
 use nalgebra::{SMatrix, SVector};
 
 /// What the fusion centre knows of the network: the sensors, the threshold `eta` of all, and the loss rate of the links.
@@ -66,7 +67,7 @@ impl<const D: usize, const M: usize> Network<D, M> {
     /// Arguments out of range.
     pub fn new(sensors: Vec<LinearSensor<D, M>>, threshold: f64, loss: f64) -> Result<Self, Error> {
         at_least_one("sensors", sensors.len())?;
-        fewbits_core::error::non_negative("threshold", threshold)?;
+        fewbits_numerics::error::non_negative("threshold", threshold)?;
         check_loss(loss)?;
         let twin = (0..sensors.len())
             .map(|i| sensors.iter().position(|s| *s == sensors[i]).unwrap_or(i))
@@ -119,7 +120,7 @@ impl<const D: usize, const M: usize> Network<D, M> {
             sensors: self.len(),
         })?;
         let innovation = sensor.matrix() * predicted * sensor.matrix().transpose() + sensor.noise_covariance();
-        CensoringRule::new(&fewbits_core::linalg::symmetrised(&innovation), self.threshold)
+        CensoringRule::new(&fewbits_numerics::linalg::symmetrised(&innovation), self.threshold)
     }
 
     /// Checks that what was heard can have come from this network under these rules and this broadcast.

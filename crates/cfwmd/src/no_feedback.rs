@@ -13,12 +13,12 @@ use crate::message::{Format, Report};
 use crate::network::{FusionInfo, Network};
 use crate::no_feedback_particle::ImputingFilter;
 use crate::rule::{CensoringRule, OwnRecursion, OwnStep};
-use fewbits_core::error::all_finite;
-use fewbits_core::linalg::symmetrised;
-use fewbits_core::normal::LN_SQRT_2PI;
 use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics, Observation};
 use fewbits_filters::kalman;
 use fewbits_models::LinearSensor;
+use fewbits_numerics::error::all_finite;
+use fewbits_numerics::linalg::symmetrised;
+use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -55,7 +55,7 @@ impl<const D: usize, const M: usize> LocalSensor<D, M> {
     /// # Errors
     /// A threshold that is negative.
     pub fn new(sensor: LinearSensor<D, M>, threshold: f64, format: Format, start: &Gaussian<D>) -> Result<Self, Error> {
-        fewbits_core::error::non_negative("threshold", threshold)?;
+        fewbits_numerics::error::non_negative("threshold", threshold)?;
         Ok(Self {
             sensor,
             threshold,
@@ -161,7 +161,7 @@ impl<const D: usize, const M: usize> NoFeedbackCentre<D, M> {
     /// # Errors
     /// No particle; a rate outside `(0, 1]`.
     pub fn new(network: Network<D, M>, start: &Gaussian<D>, method: NoFeedback, rate: f64) -> Result<Self, Error> {
-        fewbits_core::error::within("rate", rate, f64::MIN_POSITIVE, 1.0)?;
+        fewbits_numerics::error::within("rate", rate, f64::MIN_POSITIVE, 1.0)?;
         let estimator = match method {
             NoFeedback::Ignore => Estimator::Deaf(*start, 0.0),
             NoFeedback::Literal => Estimator::Deaf(*start, (-rate).ln_1p()),

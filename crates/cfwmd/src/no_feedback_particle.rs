@@ -3,11 +3,11 @@
 use crate::Error;
 use crate::network::{FusionInfo, Network};
 use crate::no_feedback::OwnFilters;
-use fewbits_core::linalg::symmetrised;
-use fewbits_core::normal::{self, LN_SQRT_2PI};
 use fewbits_core::{ColumnsMut, Gaussian, GaussianDynamics, LinearDynamics, Observation};
 use fewbits_densities::Particles;
 use fewbits_filters::{Resampling, Schedule};
+use fewbits_numerics::linalg::symmetrised;
+use fewbits_numerics::normal::{self, LN_SQRT_2PI};
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;

@@ -5,10 +5,10 @@ use crate::ellipsoid::GaussianInEllipsoid;
 use crate::network::Network;
 use crate::rule::CensoringRule;
 use crate::silence::{SilentFactor, SilentTable, check_loss};
-use fewbits_core::error::finite;
-use fewbits_core::normal::LN_SQRT_2PI;
 use fewbits_core::{Columns, Likelihood, Observation};
 use fewbits_models::ScalarSensing;
+use fewbits_numerics::error::finite;
+use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
 
 /// Everything heard in one step from scalar sensors, linear or not: `ln p(values and silences | x)`.

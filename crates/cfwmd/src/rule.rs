@@ -2,9 +2,9 @@
 
 use crate::Error;
 use crate::ellipsoid::Ellipsoid;
-use fewbits_core::error::positive;
 use fewbits_core::{Gaussian, GaussianDynamics, Sensing};
 use fewbits_filters::extended_kalman;
+use fewbits_numerics::error::positive;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 

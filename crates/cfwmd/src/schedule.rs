@@ -3,9 +3,9 @@
 use crate::Error;
 use crate::message::Format;
 use crate::network::{CensoringSensor, Network};
-use fewbits_core::error::at_least_one;
 use fewbits_core::{Dynamics, Encoder, Gaussian, LinearDynamics, Sensing};
 use fewbits_filters::kalman;
+use fewbits_numerics::error::at_least_one;
 use nalgebra::SMatrix;
 use rand::{Rng, RngExt};
 

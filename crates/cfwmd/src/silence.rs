@@ -1,9 +1,9 @@
 //! What the silence of a scalar sensor says.
 
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::{non_negative, positive};
-use fewbits_core::normal;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{non_negative, positive};
+use fewbits_numerics::normal;
 
 /// `ln p(nothing arrived | h(x) = prediction + mu)` of a censoring sensor with scalar measurements.
 ///

@@ -1,9 +1,9 @@
 //! From a message budget to a censoring threshold.
 
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::at_least_one;
-use fewbits_core::normal;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::normal;
 use statrs::function::gamma::{checked_gamma_ur, ln_gamma};
 
 /// How often the network may speak: `messages` a step on average, from `sensors` sensors (the paper's `l` of `N`).

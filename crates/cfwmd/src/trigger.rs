@@ -1,9 +1,9 @@
 //! A random trigger that keeps the belief Gaussian.
 
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::positive;
 use fewbits_models::{LinearSensor, ScalarSensor};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::positive;
 use rand::{Rng, RngExt};
 
 /// Sends with probability `1 - exp(-nu^2 Y/2)` (Han and others 2015).
@@ -67,8 +67,8 @@ impl StochasticTrigger {
 #[cfg(test)]
 mod tests {
     use super::StochasticTrigger;
-    use fewbits_core::normal::log_pdf_with;
-    use fewbits_core::quadrature::gauss_legendre;
+    use fewbits_numerics::normal::log_pdf_with;
+    use fewbits_numerics::quadrature::gauss_legendre;
 
     #[test]
     fn the_rate_is_met() {

@@ -1,8 +1,8 @@
 //! The Gaussian belief.
 
-use crate::error::{self, ArgumentError};
-use crate::linalg::{semidefinite_factor, symmetrised};
-use crate::normal::LN_SQRT_2PI;
+use fewbits_numerics::error::{self, ArgumentError};
+use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
+use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 /// let belief = Gaussian::new(SVector::from([1.0, -2.0]), SMatrix::from_diagonal(&SVector::from([4.0, 0.25])))?;
 /// assert_eq!(belief.standard_deviations(), SVector::from([2.0, 0.5]));
 /// assert!(Gaussian::scalar(0.0, -1.0).is_err());
-/// # Ok::<(), fewbits_core::ArgumentError>(())
+/// # Ok::<(), fewbits_numerics::ArgumentError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Gaussian<const D: usize> {
@@ -98,6 +98,14 @@ impl<const D: usize> Gaussian<D> {
     pub fn mahalanobis_squared(&self, x: &SVector<f64, D>) -> Result<f64, ArgumentError> {
         let deviation = x - self.mean;
         Ok(deviation.dot(&self.cholesky()?.solve(&deviation)))
+    }
+
+    /// Normalised estimation error squared, `(x - mean)' P^-1 (x - mean) / D`: expectation 1 for a consistent belief.
+    ///
+    /// # Errors
+    /// If the covariance is singular.
+    pub fn normalised_error_squared(&self, truth: &SVector<f64, D>) -> Result<f64, ArgumentError> {
+        Ok(self.mahalanobis_squared(truth)? / D as f64)
     }
 
     /// A draw from the belief; singular covariances are fine.

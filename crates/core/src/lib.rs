@@ -7,13 +7,9 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`normal`] | the standard normal distribution, exact in its tails and in narrow cells |
-//! | [`quadrature`] | Gauss-Legendre rules |
-//! | [`gaussian`], [`linalg`] | the [`Gaussian`] belief; square roots of singular covariances |
+//! | [`gaussian`] | the [`Gaussian`] belief |
 //! | [`message`], [`bits`] | messages, what is heard of them, and their real bits |
 //! | [`state_space`], [`likelihood`] | traits for dynamics, sensing and likelihoods; the likelihoods of scalar sensors |
-//! | [`stream`], [`monte_carlo`], [`statistics`] | random streams, the Monte-Carlo engine, summaries with standard errors |
-//! | [`error`] | the argument error all constructors share, and the checks that raise it |
 //!
 //! The central choice: **probabilities of intervals live in the log domain, and nowhere else is one formed.** It costs an
 //! `erfcx` and an `exp` where `1 - cdf` would do in the middle of the bell, and it is why no filter in this workspace divides
@@ -40,25 +36,15 @@
 //! Not here: any particular model, filter or experiment.
 
 pub mod bits;
-pub mod error;
 pub mod gaussian;
 pub mod likelihood;
-pub mod linalg;
 pub mod message;
-pub mod monte_carlo;
-pub mod normal;
-pub mod quadrature;
 pub mod state_space;
-pub mod statistics;
-pub mod stream;
 
 pub use bits::{BitReader, BitString, BitWriter, CodecError};
-pub use error::ArgumentError;
+pub use fewbits_numerics::ArgumentError;
 pub use gaussian::Gaussian;
 pub use message::{Cell, Encoder, Message, Observation, Sign};
-pub use monte_carlo::{MonteCarlo, MonteCarloError, Trial};
 pub use state_space::{
     Columns, ColumnsMut, Dynamics, GaussianDynamics, Likelihood, LinearDynamics, LinearSensing, Sensing,
 };
-pub use statistics::{Estimate, Moments};
-pub use stream::Stream;

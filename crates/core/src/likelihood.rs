@@ -3,10 +3,10 @@
 //! One exact `ln p(heard | x)` for each way of saying little: the value itself, a sign bit through a noisy link, a quantizer
 //! cell, silence of a censoring sensor, loss. Any filter can hear them.
 
-use crate::error::{self, ArgumentError};
 use crate::message::{Cell, Sign};
-use crate::normal;
 use crate::state_space::{Columns, Likelihood};
+use fewbits_numerics::error::{self, ArgumentError};
+use fewbits_numerics::normal;
 use nalgebra::SVector;
 
 /// What was heard of one scalar measurement.
@@ -47,7 +47,7 @@ pub enum Heard {
 /// let bit = Heard::Bit { sign: Sign::Above, threshold: 0.0, crossover: 0.0 };
 /// let heard = ScalarLikelihood::new(SVector::from([1.0]), 1.0, bit)?;
 /// assert!((heard.log_likelihood(&SVector::from([0.0])) - 0.5_f64.ln()).abs() < 1e-15);
-/// # Ok::<(), fewbits_core::ArgumentError>(())
+/// # Ok::<(), fewbits_numerics::ArgumentError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScalarLikelihood<const D: usize> {

@@ -1,8 +1,8 @@
 //! What a sensor says, and what the other end hears.
 
 use crate::bits::{BitReader, BitString, BitWriter, CodecError};
-use crate::error::ArgumentError;
-use crate::normal;
+use fewbits_numerics::error::ArgumentError;
+use fewbits_numerics::normal;
 use serde::{Deserialize, Serialize};
 
 /// Something a sensor can say, with a real bit encoding.
@@ -175,7 +175,7 @@ impl Cell {
     /// # Errors
     /// If the threshold is not finite.
     pub fn of_sign(sign: Sign, threshold: f64) -> Result<Self, ArgumentError> {
-        crate::error::finite("threshold", threshold)?;
+        fewbits_numerics::error::finite("threshold", threshold)?;
         match sign {
             Sign::Above => Self::new(threshold, f64::INFINITY),
             Sign::Below => Self::new(f64::NEG_INFINITY, threshold),

@@ -1,6 +1,6 @@
 //! Errors of this crate.
 
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 use thiserror::Error;
 
 /// What a density refuses.

@@ -18,9 +18,7 @@
 //! Not here: dynamics, measurements and resampling, which belong to filters.
 
 mod error;
-mod exponential;
 mod particles;
-pub mod sums;
 
 pub use error::Error;
 pub use particles::Particles;

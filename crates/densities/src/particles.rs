@@ -1,10 +1,11 @@
 //! Weighted particles in structure-of-arrays form.
 
 use crate::Error;
-use crate::exponential::exp_minus;
-use crate::sums::{dot, lanes, largest, sum};
-use fewbits_core::error::{all_finite, at_least_one};
-use fewbits_core::{ArgumentError, Columns, ColumnsMut};
+use fewbits_core::{Columns, ColumnsMut};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, at_least_one};
+use fewbits_numerics::exponential::exp_minus;
+use fewbits_numerics::sums::{dot, lanes, largest, sum};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 

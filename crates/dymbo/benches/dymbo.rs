@@ -3,10 +3,11 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{AllocProfiler, Bencher, black_box};
-use fewbits_core::{Cell, Encoder, Gaussian, Observation, Sign, Stream};
+use fewbits_core::{Cell, Encoder, Gaussian, Observation, Sign};
 use fewbits_dymbo::vector::{SignFilter, sign_update};
 use fewbits_dymbo::{CellIndex, DymboFilter, MultibitFilter, OneBitSensor, ScalarPlant, bit_update, cell_update};
 use fewbits_models::{ScalarSensor, constant_velocity_2d};
+use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix4, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;

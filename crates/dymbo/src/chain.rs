@@ -22,9 +22,9 @@
 
 use crate::parallel::count_probability;
 use crate::{Error, MultibitFilter, ParallelFilter, ScalarPlant, steady};
-use fewbits_core::error::{ArgumentError, positive, within};
-use fewbits_core::normal::{self, INV_SQRT_2PI, SQRT_2_OVER_PI};
 use fewbits_filters::Grid;
+use fewbits_numerics::error::{ArgumentError, positive, within};
+use fewbits_numerics::normal::{self, INV_SQRT_2PI, SQRT_2_OVER_PI};
 use std::f64::consts::FRAC_2_PI;
 
 /// What is sent for each prediction error, and how the filter corrects: the messages of one slot at one predicted variance.
@@ -473,7 +473,7 @@ pub fn first_message_transient(
     initial_variance: f64,
     steps: usize,
 ) -> Result<Vec<TransientStep>, Error> {
-    fewbits_core::error::non_negative("initial_variance", initial_variance)?;
+    fewbits_numerics::error::non_negative("initial_variance", initial_variance)?;
     let mut chain = ErrorChain::from_first_message(plant, resolution)?;
     let mut filtered_variance = initial_variance;
     let mut transient = vec![TransientStep {

@@ -3,9 +3,9 @@
 use crate::plant::scalar;
 use crate::update::{UpdateInfo, bit_update};
 use crate::{Error, Initialisation, ScalarPlant};
-use fewbits_core::error::within;
-use fewbits_core::normal::SQRT_2_OVER_PI;
 use fewbits_core::{Gaussian, Observation, Sign};
+use fewbits_numerics::error::within;
+use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use std::f64::consts::{FRAC_2_PI, LN_2};
 
 /// Where the sensor's threshold stands.

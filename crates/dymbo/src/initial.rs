@@ -5,8 +5,8 @@ use crate::sensor::{FineMessage, FineSensor};
 use crate::update::cell_update;
 use crate::{Error, ScalarPlant};
 use fewbits_core::Gaussian;
-use fewbits_core::error::finite;
-use fewbits_core::normal;
+use fewbits_numerics::error::finite;
+use fewbits_numerics::normal;
 use serde::{Deserialize, Serialize};
 
 /// The three ways to start.
@@ -82,9 +82,12 @@ pub fn first_message_value(
     let (r, tau) = (plant.measurement_variance(), sensor.resolution());
     let reach = REACH * (prior.covariance()[0] + r).sqrt() + tau;
     if reach / tau > MOST_CELLS {
-        return Err(
-            fewbits_core::ArgumentError::new("resolution", tau, "at most a million cells within the prior").into()
-        );
+        return Err(fewbits_numerics::ArgumentError::new(
+            "resolution",
+            tau,
+            "at most a million cells within the prior",
+        )
+        .into());
     }
     let multiple = |x: f64| (x / tau).round() as i64;
     let mut value = FirstMessageValue {
@@ -146,8 +149,8 @@ mod tests {
     use super::{Initialisation, first_message_mse, first_message_value};
     use crate::{FineMessage, FineSensor, ScalarPlant};
     use fewbits_core::Gaussian;
-    use fewbits_core::normal;
-    use fewbits_core::quadrature::gauss_legendre;
+    use fewbits_numerics::normal;
+    use fewbits_numerics::quadrature::gauss_legendre;
 
     #[test]
     fn mse_is_the_sum_over_cells_on_both_branches() {

@@ -6,8 +6,8 @@
 //! at least use the exact means ([`exact_tree_information`]).
 
 use crate::Error;
-use fewbits_core::error::ArgumentError;
-use fewbits_core::normal::{interval, truncated_moments};
+use fewbits_numerics::error::ArgumentError;
+use fewbits_numerics::normal::{interval, truncated_moments};
 use std::f64::consts::FRAC_2_PI;
 
 /// Most bits about one sample; the words double with each.

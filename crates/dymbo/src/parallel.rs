@@ -8,10 +8,10 @@ use crate::filter::StepInfo;
 use crate::plant::scalar;
 use crate::update::UpdateInfo;
 use crate::{Error, ScalarPlant};
-use fewbits_core::error::{ArgumentError, at_least_one, within};
-use fewbits_core::normal::{self, SQRT_2_OVER_PI};
-use fewbits_core::quadrature::gauss_legendre;
 use fewbits_core::{Gaussian, Observation};
+use fewbits_numerics::error::{ArgumentError, at_least_one, within};
+use fewbits_numerics::normal::{self, SQRT_2_OVER_PI};
+use fewbits_numerics::quadrature::gauss_legendre;
 use std::f64::consts::FRAC_2_PI;
 
 /// How the count of `+1` bits moves the estimate.

@@ -1,8 +1,8 @@
 //! The sensor's half: compare, quantize, speak. No model, no memory, no allocation.
 
 use crate::Error;
-use fewbits_core::error::{ArgumentError, positive};
 use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Encoder, Message, Sign};
+use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};
 
 /// A sensor that says whether its sample reached the broadcast threshold: one bit.

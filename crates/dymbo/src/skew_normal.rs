@@ -1,9 +1,9 @@
 //! How far the posterior of one bit is from the normal density of the same moments.
 
 use crate::{Error, bit_update};
-use fewbits_core::error::positive;
-use fewbits_core::normal::{self, log_pdf_with};
 use fewbits_core::{Gaussian, Sign};
+use fewbits_numerics::error::positive;
+use fewbits_numerics::normal::{self, log_pdf_with};
 
 /// Density at `theta` of the exact posterior after a bit at the prior mean: skew-normal,
 /// `p(theta | b) = (2/s) phi((theta - mu)/s) Phi(b (theta - mu)/sigma)` with prior `N(mu, s^2)`.
@@ -52,8 +52,8 @@ pub fn distance_from_normal(prior_variance: f64, measurement_variance: f64) -> R
 mod tests {
     use super::{distance_from_normal, posterior_density};
     use crate::bit_update;
-    use fewbits_core::quadrature::gauss_legendre;
     use fewbits_core::{Gaussian, Sign};
+    use fewbits_numerics::quadrature::gauss_legendre;
 
     #[test]
     fn the_density_has_the_moments_of_the_update() {

@@ -1,8 +1,8 @@
 //! Where the filters settle, and what the missing bits cost: closed forms and contours.
 
 use crate::{Error, ScalarPlant};
-use fewbits_core::error::{ArgumentError, finite, within};
 use fewbits_filters::ScalarSteadyState;
+use fewbits_numerics::error::{ArgumentError, finite, within};
 use std::f64::consts::FRAC_2_PI;
 
 /// Information coefficient of a sign bit at the prediction through a link of known crossover: `(2/pi)(1 - 2 eps)^2`.

@@ -7,10 +7,10 @@
 
 use crate::plant::scalar;
 use crate::{DymboFilter, Error, ScalarPlant};
-use fewbits_core::error::{ArgumentError, positive};
-use fewbits_core::normal::{log_cdf, log_interval};
 use fewbits_core::{Gaussian, Sign};
 use fewbits_filters::{Grid, PointMass, PointMassFilter};
+use fewbits_numerics::error::{ArgumentError, positive};
+use fewbits_numerics::normal::{log_cdf, log_interval};
 
 /// Averages over all bit strings of one length.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

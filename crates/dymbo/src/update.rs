@@ -2,9 +2,9 @@
 
 use crate::Error;
 use crate::plant::scalar;
-use fewbits_core::error::{finite, positive, within};
-use fewbits_core::normal;
 use fewbits_core::{Cell, Gaussian, Sign};
+use fewbits_numerics::error::{finite, positive, within};
+use fewbits_numerics::normal;
 
 /// What an update reveals besides the new belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,9 +129,9 @@ pub fn expected_bit_information(offset: f64, crossover: f64) -> Result<f64, Erro
 #[cfg(test)]
 mod tests {
     use super::{bit_update, cell_update, expected_bit_information};
-    use fewbits_core::normal::log_cdf;
     use fewbits_core::{Cell, Gaussian, Sign};
     use fewbits_filters::{Grid, PointMass};
+    use fewbits_numerics::normal::log_cdf;
     use proptest::prelude::*;
 
     /// Bayes' rule on a fine grid.

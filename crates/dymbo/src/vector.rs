@@ -6,12 +6,12 @@
 
 use crate::update::UpdateInfo;
 use crate::{Error, bit_update};
-use fewbits_core::error::finite;
-use fewbits_core::linalg::symmetrised;
-use fewbits_core::normal::SQRT_2_OVER_PI;
 use fewbits_core::{Gaussian, LinearDynamics, Sign};
 use fewbits_filters::{SteadyState, kalman};
 use fewbits_models::ScalarSensor;
+use fewbits_numerics::error::finite;
+use fewbits_numerics::linalg::symmetrised;
+use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use std::f64::consts::FRAC_2_PI;
 

@@ -36,7 +36,7 @@ pub enum Error {
     Cancelled,
     /// An argument was refused further down.
     #[error(transparent)]
-    Argument(#[from] fewbits_core::ArgumentError),
+    Argument(#[from] fewbits_numerics::ArgumentError),
     /// A crate below failed.
     #[error("{0}")]
     Failed(#[source] Box<dyn std::error::Error + Send + Sync>),
@@ -49,10 +49,10 @@ impl Error {
     }
 }
 
-impl<E: std::error::Error + Send + Sync + 'static> From<fewbits_core::MonteCarloError<E>> for Error {
-    fn from(error: fewbits_core::MonteCarloError<E>) -> Self {
+impl<E: std::error::Error + Send + Sync + 'static> From<fewbits_monte_carlo::MonteCarloError<E>> for Error {
+    fn from(error: fewbits_monte_carlo::MonteCarloError<E>) -> Self {
         match error {
-            fewbits_core::MonteCarloError::Cancelled => Self::Cancelled,
+            fewbits_monte_carlo::MonteCarloError::Cancelled => Self::Cancelled,
             other => Self::failed(other),
         }
     }

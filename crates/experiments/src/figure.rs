@@ -4,7 +4,7 @@ use crate::claim::Claim;
 use crate::error::Error;
 use crate::plot::Plot;
 use crate::table::Tables;
-use fewbits_core::{MonteCarlo, Stream};
+use fewbits_monte_carlo::{MonteCarlo, Stream};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value as Json};
 use std::sync::atomic::AtomicBool;

@@ -5,13 +5,16 @@
 //!
 //! | module | feature | what it is for |
 //! |---|---|---|
-//! | [`core`] | always | normal numerics, messages and their bits, likelihoods, random streams, Monte Carlo |
+//! | [`core`] | always | messages and their bits, factors and likelihoods, beliefs |
+//! | [`numerics`], [`monte_carlo`] | always | normal-distribution numerics; random streams, Monte Carlo |
 //! | `dymbo` | `dymbo` | Kalman-like filters fed with one sign bit a sample |
 //! | `cfwmd` | `cfwmd` | sensors that censor dull measurements, and fusion that hears their silence |
 //! | `quantizers` | `quantizers` | design and decoding of distributed scalar and binary quantizers |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
 
 pub use fewbits_core as core;
+pub use fewbits_monte_carlo as monte_carlo;
+pub use fewbits_numerics as numerics;
 
 #[cfg(feature = "cfwmd")]
 pub use fewbits_cfwmd as cfwmd;

@@ -3,9 +3,10 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{AllocProfiler, Bencher, black_box};
-use fewbits_core::{Gaussian, Stream};
+use fewbits_core::Gaussian;
 use fewbits_filters::{FixedLagSmoother, Grid, PointMass, PointMassFilter, kalman};
 use fewbits_models::{Ar1, LinearSensor, ScalarSensor, constant_velocity_1d, constant_velocity_2d};
+use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector1, Vector2, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;

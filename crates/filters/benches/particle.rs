@@ -7,10 +7,11 @@
 
 use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_core::likelihood::{Heard, ScalarLikelihood};
-use fewbits_core::{Dynamics, Gaussian, Likelihood, Stream};
+use fewbits_core::{Dynamics, Gaussian, Likelihood};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
 use fewbits_models::{Ar1, LinearGaussian, constant_velocity_2d};
+use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix4, SVector, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;

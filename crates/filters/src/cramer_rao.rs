@@ -6,8 +6,9 @@
 //! inverse of the process noise, which may then be singular ([`covariance_step`]).
 
 use crate::Error;
-use fewbits_core::linalg::{semidefinite_factor, symmetrised};
-use fewbits_core::{ArgumentError, LinearDynamics};
+use fewbits_core::LinearDynamics;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use nalgebra::{Cholesky, SMatrix};
 
 /// One step of the bound: `P = F P F' + Q`, then `P - P L (1 + L' P L)^-1 L' P` with `L L' = information`.

@@ -1,6 +1,6 @@
 //! What a filter refuses, and what can go wrong with a belief.
 
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 
 /// Errors of this crate. A failed step leaves the old belief as it was.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

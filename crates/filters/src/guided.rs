@@ -2,9 +2,9 @@
 
 use crate::Error;
 use crate::particle::Proposal;
-use fewbits_core::linalg::{semidefinite_factor, symmetrised};
-use fewbits_core::normal::LN_SQRT_2PI;
 use fewbits_core::{GaussianDynamics, LinearSensing};
+use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
+use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -34,11 +34,15 @@ impl<'a, Dyn: GaussianDynamics<D>, const D: usize, const M: usize> OptimalPropos
         sensing: &impl LinearSensing<D, M>,
         measurement: SVector<f64, M>,
     ) -> Result<Self, Error> {
-        fewbits_core::error::all_finite("measurement", measurement.as_slice())?;
+        fewbits_numerics::error::all_finite("measurement", measurement.as_slice())?;
         let (q, h) = (dynamics.noise_covariance(), sensing.matrix());
         let innovation = symmetrised(&(h * q * h.transpose() + sensing.noise_covariance()));
         let innovation_factor = Cholesky::new(innovation).ok_or_else(|| {
-            fewbits_core::ArgumentError::new("sensing", "a singular innovation covariance", "a positive definite one")
+            fewbits_numerics::ArgumentError::new(
+                "sensing",
+                "a singular innovation covariance",
+                "a positive definite one",
+            )
         })?;
         let gain = innovation_factor.solve(&(h * q)).transpose();
         let left = symmetrised(&(q - gain * h * q));

@@ -1,9 +1,9 @@
 //! The Kalman filter.
 
 use crate::Error;
-use fewbits_core::error::all_finite;
-use fewbits_core::normal::LN_SQRT_2PI;
 use fewbits_core::{Gaussian, LinearDynamics, LinearSensing};
+use fewbits_numerics::error::all_finite;
+use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
 
 /// What an update reveals besides the new belief.

@@ -1,9 +1,9 @@
 //! The exact scalar filter on a grid: the referee of every approximate one.
 
 use crate::Error;
-use fewbits_core::error::{ArgumentError, finite, positive};
-use fewbits_core::normal::{INV_SQRT_2PI, log_pdf_with};
 use fewbits_models::Ar1;
+use fewbits_numerics::error::{ArgumentError, finite, positive};
+use fewbits_numerics::normal::{INV_SQRT_2PI, log_pdf_with};
 
 /// Uniform nodes of a trapezoid rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -208,7 +208,7 @@ const COARSEST: f64 = 1.0;
 /// ```
 ///
 /// ```
-/// use fewbits_core::normal::log_cdf;
+/// use fewbits_numerics::normal::log_cdf;
 /// use fewbits_filters::{Grid, PointMass, PointMassFilter};
 /// use fewbits_models::Ar1;
 /// let filter = PointMassFilter::new(&Ar1::new(0.9, 0.5)?, Grid::symmetric(14.0, 0.25)?)?;
@@ -345,8 +345,8 @@ mod tests {
     use super::{Grid, PointMass, PointMassFilter};
     use crate::{Error, kalman, smoother};
     use fewbits_core::Gaussian;
-    use fewbits_core::normal::log_pdf_with;
     use fewbits_models::{Ar1, LinearSensor};
+    use fewbits_numerics::normal::log_pdf_with;
     use nalgebra::Vector1;
 
     /// With Gaussian measurements the Kalman filter and smoother are exact, so the grid must agree with them.

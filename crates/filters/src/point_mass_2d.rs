@@ -1,8 +1,9 @@
 //! The exact filter of a two-dimensional linear state, on a lattice that follows the belief.
 
 use crate::Error;
-use fewbits_core::error::{all_finite, within};
-use fewbits_core::{ArgumentError, LinearDynamics};
+use fewbits_core::LinearDynamics;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, within};
 use nalgebra::{Cholesky, Matrix2, Vector2};
 
 /// Deviations of the belief that the lattice covers.
@@ -232,8 +233,8 @@ mod tests {
     use super::PlaneFilter;
     use crate::{Error, kalman};
     use fewbits_core::Gaussian;
-    use fewbits_core::normal::log_pdf_with;
     use fewbits_models::{LinearGaussian, ScalarSensor, constant_velocity_1d};
+    use fewbits_numerics::normal::log_pdf_with;
     use nalgebra::{Matrix2, Vector1, Vector2};
 
     /// With Gaussian measurements the Kalman filter is exact.

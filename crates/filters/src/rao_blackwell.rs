@@ -4,9 +4,10 @@ use crate::particle::{ParticleFilter, ParticleInfo, Workspace};
 use crate::{Error, kalman};
 use fewbits_core::likelihood::Heard;
 use fewbits_core::message::Sign;
-use fewbits_core::{Gaussian, LinearDynamics, normal};
+use fewbits_core::{Gaussian, LinearDynamics};
 use fewbits_densities::Particles;
 use fewbits_models::LinearSensor;
+use fewbits_numerics::normal;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 
@@ -104,7 +105,7 @@ impl<const D: usize> RaoBlackwellised<D> {
         let (pieces, count) = match *heard {
             Heard::Lost => return Ok(self.info(0.0)),
             Heard::Value(value) => {
-                fewbits_core::error::finite("value", value)?;
+                fewbits_numerics::error::finite("value", value)?;
                 let log_likelihood =
                     self.reweigh(&row, |predicted| normal::log_pdf((value - predicted) / deviation) - deviation.ln())?;
                 self.absorb(&row, &gain, |_| value);

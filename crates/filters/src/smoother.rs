@@ -4,9 +4,9 @@
 //! beliefs, whatever its messages were.
 
 use crate::{Error, kalman};
-use fewbits_core::error::at_least_one;
-use fewbits_core::linalg::semidefinite_factor;
 use fewbits_core::{Gaussian, LinearDynamics};
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::linalg::semidefinite_factor;
 use nalgebra::{Cholesky, SMatrix};
 use std::collections::VecDeque;
 

@@ -1,9 +1,9 @@
 //! Where the Riccati recursion settles: closed form for a scalar, doubling for a vector.
 
 use crate::Error;
-use fewbits_core::error::{finite, non_negative, positive, within};
-use fewbits_core::linalg::symmetrised;
 use fewbits_core::{LinearDynamics, LinearSensing};
+use fewbits_numerics::error::{finite, non_negative, positive, within};
+use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{Cholesky, Const, DimMin, SMatrix};
 
 /// Steady variances of a scalar filter, in state units squared.

@@ -1,8 +1,8 @@
 //! The first-order autoregression.
 
 use crate::{Error, LinearGaussian};
-use fewbits_core::error::{finite, non_negative};
 use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics};
+use fewbits_numerics::error::{finite, non_negative};
 use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};

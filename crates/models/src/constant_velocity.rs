@@ -1,7 +1,7 @@
 //! Constant velocity, disturbed by white-noise acceleration.
 
 use crate::{Error, LinearGaussian};
-use fewbits_core::error::{non_negative, positive};
+use fewbits_numerics::error::{non_negative, positive};
 use nalgebra::{Matrix2, Matrix4, Matrix4x2, SVector, Vector2};
 
 /// A target on a line: state `[position, velocity]`, `F = [[1, T], [0, 1]]`, `G = [T^2/2, T]'`, one acceleration of

@@ -1,6 +1,6 @@
 //! What a model refuses.
 
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 
 /// Errors of this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

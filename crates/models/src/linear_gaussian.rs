@@ -1,9 +1,9 @@
 //! Linear dynamics driven by Gaussian noise.
 
 use crate::Error;
-use fewbits_core::error::{all_finite, non_negative};
-use fewbits_core::linalg::semidefinite_factor;
 use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
+use fewbits_numerics::error::{all_finite, non_negative};
+use fewbits_numerics::linalg::semidefinite_factor;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,9 +1,9 @@
 //! Linear sensing with Gaussian noise.
 
 use crate::Error;
-use fewbits_core::error::{ArgumentError, all_finite, positive};
-use fewbits_core::linalg::SYMMETRY_TOLERANCE;
 use fewbits_core::{LinearSensing, Sensing};
+use fewbits_numerics::error::{ArgumentError, all_finite, positive};
+use fewbits_numerics::linalg::SYMMETRY_TOLERANCE;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};

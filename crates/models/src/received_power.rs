@@ -1,8 +1,9 @@
 //! Sensing of a source's received amplitude, which falls with distance.
 
 use crate::Error;
-use fewbits_core::error::{finite, positive};
-use fewbits_core::{ArgumentError, Columns, Sensing};
+use fewbits_core::{Columns, Sensing};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{finite, positive};
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -24,9 +24,9 @@ pub const CEO_MAX_SENSORS: usize = 12;
 /// # Errors
 /// If a variance is not positive or `bits` is negative or not finite.
 pub fn remote_distortion_rate(prior_variance: f64, noise_variance: f64, bits: f64) -> Result<f64, Error> {
-    let sx2 = fewbits_core::error::positive("prior_variance", prior_variance)?;
-    let s2 = fewbits_core::error::positive("noise_variance", noise_variance)?;
-    let bits = fewbits_core::error::non_negative("bits", bits)?;
+    let sx2 = fewbits_numerics::error::positive("prior_variance", prior_variance)?;
+    let s2 = fewbits_numerics::error::positive("noise_variance", noise_variance)?;
+    let bits = fewbits_numerics::error::non_negative("bits", bits)?;
     let told = -(-2.0 * std::f64::consts::LN_2 * bits).exp_m1();
     Ok(sx2 - sx2 * sx2 / (sx2 + s2) * told)
 }
@@ -102,12 +102,12 @@ pub fn van_trees(system: &System) -> Result<f64, Error> {
 /// If the lengths differ, there are none or more than 12 sensors, a variance is not positive or a rate is negative;
 /// [`Error::NotConverged`] if the barrier method stalls.
 pub fn ceo(prior_variance: f64, noise_variances: &[f64], bits: &[f64]) -> Result<f64, Error> {
-    fewbits_core::error::positive("prior_variance", prior_variance)?;
+    fewbits_numerics::error::positive("prior_variance", prior_variance)?;
     for s2 in noise_variances {
-        fewbits_core::error::positive("noise_variance", *s2)?;
+        fewbits_numerics::error::positive("noise_variance", *s2)?;
     }
     for r in bits {
-        fewbits_core::error::non_negative("bits", *r)?;
+        fewbits_numerics::error::non_negative("bits", *r)?;
     }
     let n = noise_variances.len();
     if n == 0 || n > CEO_MAX_SENSORS || bits.len() != n {

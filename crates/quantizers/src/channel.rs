@@ -2,7 +2,7 @@
 
 use crate::error::{Error, refuse};
 use crate::labelling::Labelling;
-use fewbits_core::normal;
+use fewbits_numerics::normal;
 
 /// Columns may miss one by this much; they are not renormalised.
 const SUM_TOLERANCE: f64 = 1e-9;
@@ -87,7 +87,7 @@ impl Channel {
     /// # Errors
     /// If `crossover` is not in `[0, 1]`.
     pub fn binary_symmetric_with_gaps(labelling: &Labelling, crossover: f64) -> Result<Self, Error> {
-        let eps = fewbits_core::error::within("crossover", crossover, 0.0, 1.0)?;
+        let eps = fewbits_numerics::error::within("crossover", crossover, 0.0, 1.0)?;
         let bits = labelling.bits();
         Self::from_fn(labelling.levels(), labelling.symbols(), |t, z| {
             let distance = match (labelling.word(t), labelling.word(z)) {
@@ -103,7 +103,7 @@ impl Channel {
     /// # Errors
     /// If `levels < 2` or `erasure` is not in `[0, 1]`.
     pub fn symbol_erasure(levels: usize, erasure: f64) -> Result<Self, Error> {
-        fewbits_core::error::within("erasure", erasure, 0.0, 1.0)?;
+        fewbits_numerics::error::within("erasure", erasure, 0.0, 1.0)?;
         Self::from_fn(levels, levels + 1, |t, z| match t {
             t if t == levels => erasure,
             t if t == z => 1.0 - erasure,
@@ -116,7 +116,7 @@ impl Channel {
     /// # Errors
     /// If `levels < 2` or `error` is not in `[0, 1]`.
     pub fn symmetric(levels: usize, error: f64) -> Result<Self, Error> {
-        fewbits_core::error::within("error", error, 0.0, 1.0)?;
+        fewbits_numerics::error::within("error", error, 0.0, 1.0)?;
         Self::from_fn(levels, levels, |t, z| {
             if t == z {
                 1.0 - error
@@ -134,7 +134,7 @@ impl Channel {
     /// # Errors
     /// If `levels < 2` or `snr` is not a positive number.
     pub fn pulse_amplitude(levels: usize, snr: f64) -> Result<Self, Error> {
-        fewbits_core::error::positive("snr", snr)?;
+        fewbits_numerics::error::positive("snr", snr)?;
         let half = (3.0 * snr / ((levels * levels) as f64 - 1.0)).sqrt();
         Self::from_fn(levels, levels, |t, z| {
             let offset = 2.0 * (t as f64 - z as f64);

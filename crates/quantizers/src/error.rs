@@ -1,6 +1,6 @@
 //! The error of this crate.
 
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 
 /// Why a quantizer, channel, design, decoder or bound was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -4,7 +4,7 @@ use crate::compositions::Compositions;
 use crate::error::Error;
 use crate::moments::Table;
 use crate::system::{Group, System};
-use fewbits_core::normal;
+use fewbits_numerics::normal;
 
 /// A group whose breakpoints may move.
 #[derive(Debug, Clone)]

@@ -26,8 +26,8 @@
 //! ```
 
 use crate::error::{Error, refuse};
-use fewbits_core::normal;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::normal;
+use fewbits_numerics::quadrature::gauss_legendre;
 use std::sync::OnceLock;
 
 /// Largest number of levels: beyond it a linear quantizer with dither serves as well.
@@ -73,8 +73,8 @@ impl Gaussian {
     /// If `mean` is not finite or `sd` is not a positive number.
     pub fn new(mean: f64, sd: f64) -> Result<Self, Error> {
         Ok(Self {
-            mean: fewbits_core::error::finite("mean", mean)?,
-            sd: fewbits_core::error::positive("sd", sd)?,
+            mean: fewbits_numerics::error::finite("mean", mean)?,
+            sd: fewbits_numerics::error::positive("sd", sd)?,
         })
     }
 
@@ -129,8 +129,8 @@ impl Uniform {
     /// # Errors
     /// If an end is not finite or `low >= high`.
     pub fn new(low: f64, high: f64) -> Result<Self, Error> {
-        fewbits_core::error::finite("low", low)?;
-        fewbits_core::error::finite("high", high)?;
+        fewbits_numerics::error::finite("low", low)?;
+        fewbits_numerics::error::finite("high", high)?;
         if low >= high {
             return refuse("high", high, format!("a number above low = {low}"));
         }

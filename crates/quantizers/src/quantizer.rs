@@ -40,7 +40,7 @@ impl Quantizer {
         if breakpoints.is_empty() {
             return refuse("breakpoints", "empty", "at least one breakpoint (two levels)");
         }
-        fewbits_core::error::all_finite("breakpoints", &breakpoints)?;
+        fewbits_numerics::error::all_finite("breakpoints", &breakpoints)?;
         if let Some(at) = breakpoints.windows(2).position(|w| w[0] >= w[1]) {
             let pair = format!("{}, {} at index {at}", breakpoints[at], breakpoints[at + 1]);
             return refuse("breakpoints", pair, "strictly increasing numbers");
@@ -67,7 +67,7 @@ impl Quantizer {
     /// # Errors
     /// If `outer` is not a positive number.
     pub fn symmetric(outer: f64) -> Result<Self, Error> {
-        fewbits_core::error::positive("outer", outer)?;
+        fewbits_numerics::error::positive("outer", outer)?;
         Self::new(vec![-outer, 0.0, outer])
     }
 
@@ -134,8 +134,8 @@ impl Quantizer {
     /// # Errors
     /// If `mean` is not finite or `scale` is not a positive number.
     pub fn affine(&self, mean: f64, scale: f64) -> Result<Self, Error> {
-        fewbits_core::error::finite("mean", mean)?;
-        fewbits_core::error::positive("scale", scale)?;
+        fewbits_numerics::error::finite("mean", mean)?;
+        fewbits_numerics::error::positive("scale", scale)?;
         self.with_breakpoints(self.breakpoints.iter().map(|b| mean + scale * b).collect())
     }
 }

@@ -9,7 +9,7 @@
 //! rule, and so is any other density given by the nodes and weights of a quadrature rule.
 
 use crate::error::{Error, refuse};
-use fewbits_core::normal;
+use fewbits_numerics::normal;
 use nalgebra::DMatrix;
 
 /// Half-width of the Gaussian prior's rule, in standard deviations.
@@ -54,7 +54,7 @@ impl Prior {
     /// If `sd` is not a positive number.
     pub fn gaussian(sd: f64) -> Result<Self, Error> {
         Ok(Self::Gaussian {
-            sd: fewbits_core::error::positive("sd", sd)?,
+            sd: fewbits_numerics::error::positive("sd", sd)?,
         })
     }
 
@@ -63,8 +63,8 @@ impl Prior {
     /// # Errors
     /// If the lengths differ, a value is not finite, or the probabilities are negative or do not sum to 1 within 1e-9.
     pub fn discrete(values: Vec<f64>, probabilities: Vec<f64>) -> Result<Self, Error> {
-        fewbits_core::error::all_finite("values", &values)?;
-        fewbits_core::error::probabilities("probabilities", &probabilities)?;
+        fewbits_numerics::error::all_finite("values", &values)?;
+        fewbits_numerics::error::probabilities("probabilities", &probabilities)?;
         if values.len() != probabilities.len() {
             return refuse("values", format!("{} values", values.len()), format!("{} values", probabilities.len()));
         }
@@ -76,7 +76,7 @@ impl Prior {
     /// # Errors
     /// If `signal` is not finite or `probability` not in `[0, 1]`.
     pub fn binary(signal: f64, probability: f64) -> Result<Self, Error> {
-        fewbits_core::error::within("probability", probability, 0.0, 1.0)?;
+        fewbits_numerics::error::within("probability", probability, 0.0, 1.0)?;
         Self::discrete(vec![0.0, signal], vec![1.0 - probability, probability])
     }
 
@@ -135,10 +135,10 @@ impl Noise {
     /// # Errors
     /// If there is no sensor, the lengths differ, a loading is not finite or a residual is not a positive number.
     pub fn one_factor(loadings: &[f64], residuals: &[f64]) -> Result<Self, Error> {
-        fewbits_core::error::at_least_one("sensors", residuals.len())?;
-        fewbits_core::error::all_finite("loadings", loadings)?;
+        fewbits_numerics::error::at_least_one("sensors", residuals.len())?;
+        fewbits_numerics::error::all_finite("loadings", loadings)?;
         for s in residuals {
-            fewbits_core::error::positive("noise standard deviation", *s)?;
+            fewbits_numerics::error::positive("noise standard deviation", *s)?;
         }
         if loadings.len() != residuals.len() {
             return refuse("loadings", format!("{} loadings", loadings.len()), format!("{}", residuals.len()));
@@ -159,9 +159,9 @@ impl Noise {
         if n == 0 || matrix.ncols() != n {
             return refuse("covariance", format!("{n} by {}", matrix.ncols()), "a square matrix");
         }
-        fewbits_core::error::all_finite("covariance", matrix.as_slice())?;
+        fewbits_numerics::error::all_finite("covariance", matrix.as_slice())?;
         for i in 0..n {
-            fewbits_core::error::positive("variance", matrix[(i, i)])?;
+            fewbits_numerics::error::positive("variance", matrix[(i, i)])?;
         }
         let tolerance = COVARIANCE_TOLERANCE * matrix.amax();
         let sds: Vec<f64> = (0..n).map(|i| matrix[(i, i)].sqrt()).collect();

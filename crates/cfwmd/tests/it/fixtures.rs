@@ -7,9 +7,10 @@ use fewbits_cfwmd::rule::{OwnRecursion, OwnStep, cross_covariance_step};
 use fewbits_cfwmd::silence::SilentFactor;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_cfwmd::trigger::StochasticTrigger;
-use fewbits_core::{Gaussian, normal};
+use fewbits_core::Gaussian;
 use fewbits_filters::kalman;
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d};
+use fewbits_numerics::normal;
 use nalgebra::{Matrix2, SVector, Vector2};
 use serde_json::Value;
 

@@ -8,10 +8,11 @@ use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::likelihood::{Heard, ScalarLikelihood};
 use fewbits_core::message::Cell;
-use fewbits_core::{Gaussian, Likelihood, Moments, Observation, Stream};
+use fewbits_core::{Gaussian, Likelihood, Observation};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
+use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix2, Matrix4, SVector, Vector1, Vector2, Vector4};
 
 fn prior() -> Gaussian<2> {

@@ -5,8 +5,9 @@ use fewbits_cfwmd::message::Format;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{LocalSensor, NoFeedback, NoFeedbackCentre};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Gaussian, Observation, Stream};
+use fewbits_core::{Gaussian, Observation};
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
+use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2};
 
 fn scalar(loss: f64) -> Network<2, 1> {

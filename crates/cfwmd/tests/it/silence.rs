@@ -2,7 +2,7 @@
 
 use fewbits_cfwmd::assumed_density::ScalarSilence;
 use fewbits_cfwmd::silence::SilentFactor;
-use fewbits_core::normal::log_pdf_with;
+use fewbits_numerics::normal::log_pdf_with;
 use proptest::prelude::*;
 
 /// Mass, mean and variance by a fine trapezoid over everything that matters.

@@ -1,9 +1,10 @@
 //! The Gaussian belief, square roots of singular covariances, and likelihoods.
 
 use fewbits_core::likelihood::{Heard, ScalarLikelihood};
-use fewbits_core::linalg::semidefinite_factor;
 use fewbits_core::message::{Cell, Sign};
-use fewbits_core::{Gaussian, Likelihood, Moments, Stream};
+use fewbits_core::{Gaussian, Likelihood};
+use fewbits_monte_carlo::{Moments, Stream};
+use fewbits_numerics::linalg::semidefinite_factor;
 use nalgebra::{Matrix2, Matrix3, SVector, Vector2, Vector3};
 use proptest::prelude::*;
 
@@ -140,4 +141,10 @@ fn what_can_be_heard_has_probability_one() {
     ] {
         assert!(ScalarLikelihood::new(SVector::from([1.0]), sd, heard).is_err());
     }
+}
+
+#[test]
+fn normalised_error_of_a_diagonal_belief() {
+    let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(4.0, 0.0, 0.0, 1.0)).unwrap();
+    assert!((belief.normalised_error_squared(&Vector2::new(2.0, 3.0)).unwrap() - 5.0).abs() < 1e-15);
 }

@@ -4,6 +4,3 @@
 
 mod belief;
 mod codec;
-mod engine;
-mod normal;
-mod random;

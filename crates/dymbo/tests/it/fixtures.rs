@@ -356,7 +356,8 @@ fn regress_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         means.push(belief.mean()[0]);
         if part.starts_with("exact") {
             density = exact.predict(&density).unwrap();
-            let log_likelihood = |theta: f64| fewbits_core::normal::log_cdf(bit.value() * (theta - threshold) / sigma);
+            let log_likelihood =
+                |theta: f64| fewbits_numerics::normal::log_cdf(bit.value() * (theta - threshold) / sigma);
             density.update(log_likelihood).unwrap();
             exact_moments.push((density.mean(), density.variance()));
         }

@@ -3,7 +3,7 @@
 use crate::claim::{largest, not_decreasing, not_increasing};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_core::{Moments, Stream};
+use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_quantizers::assignment::{
     CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
     variances_with_moments,

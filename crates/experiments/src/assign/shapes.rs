@@ -161,7 +161,7 @@ impl Figure for BitErrors {
     }
 
     fn check(&self, p: &ErrorParameters) -> Result<(), Error> {
-        fewbits_core::error::positive("variance", p.variance)?;
+        fewbits_numerics::error::positive("variance", p.variance)?;
         check_step("assign-figC-1", p.step)
     }
 

@@ -442,7 +442,7 @@ impl Figure for Response {
 
     fn run(&self, p: &ResponseParameters, _: &Context<'_>) -> Result<Tables, Error> {
         let quantizer = BinaryQuantizer::new(p.thresholds.clone()).map_err(Error::failed)?;
-        let noise = fewbits_core::error::positive("noise_std", p.noise_std)?;
+        let noise = fewbits_numerics::error::positive("noise_std", p.noise_std)?;
         // Only checks that the source the axis stands for exists.
         Source::uniform(1.0).map_err(Error::failed)?;
         let mut table = Table::new([

@@ -4,8 +4,8 @@ use crate::claim::Claim;
 use crate::error::Error;
 use crate::row;
 use crate::table::{Table, column};
-use fewbits_core::statistics::paired_difference;
-use fewbits_core::{Estimate, Moments};
+use fewbits_monte_carlo::statistics::paired_difference;
+use fewbits_monte_carlo::{Estimate, Moments};
 
 /// One trial of one scheme, one entry a step.
 #[derive(Debug, Clone, Default)]

@@ -12,11 +12,12 @@ use fewbits_cfwmd::particle::{HeardScalars, HeardVectors};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep, Weighing};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::linalg::semidefinite_factor;
-use fewbits_core::{Dynamics, Gaussian, Observation, Sensing, Stream};
+use fewbits_core::{Dynamics, Gaussian, Observation, Sensing};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
+use fewbits_monte_carlo::Stream;
+use fewbits_numerics::linalg::semidefinite_factor;
 use nalgebra::{SMatrix, SVector, Vector2};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -214,7 +215,7 @@ where
         let sensors = setting.sensors as usize;
         let budget = Budget::new(messages, sensors).map_err(failed)?;
         let threshold = budget.threshold(M).map_err(failed)?;
-        fewbits_core::error::non_negative("initial_variance", setting.initial_variance)?;
+        fewbits_numerics::error::non_negative("initial_variance", setting.initial_variance)?;
         let start = Gaussian::new(Vector2::new(0.0, 10.0), SMatrix::identity() * setting.initial_variance)?;
         let steps = setting.steps as usize;
         let mut recursion = OwnRecursion::new(&start);
@@ -508,7 +509,7 @@ impl Dimension<2> for Measured {
     fn sensor(variances: &[f64]) -> Result<LinearSensor<2, 2>, Error> {
         if variances.len() != 2 {
             let got = format!("{} numbers", variances.len());
-            return Err(fewbits_core::ArgumentError::new("noise_variances", got, "2 variances").into());
+            return Err(fewbits_numerics::ArgumentError::new("noise_variances", got, "2 variances").into());
         }
         let covariance = SMatrix::<f64, 2, 2>::from_diagonal(&Vector2::from_column_slice(variances));
         LinearSensor::new(SMatrix::identity(), covariance).map_err(failed)

@@ -8,10 +8,11 @@ use crate::figure::Context;
 use fewbits_cfwmd::particle::HeardScalars;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Dynamics, Gaussian, Sensing, Stream};
+use fewbits_core::{Dynamics, Gaussian, Sensing};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
 use fewbits_models::{LinearGaussian, ReceivedPower, constant_velocity_2d};
+use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -105,7 +106,7 @@ fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
 impl World {
     fn new(field: &Field) -> Result<Self, Error> {
         let dynamics = constant_velocity_2d(0.5, field.acceleration_variance).map_err(failed)?;
-        let spacing = fewbits_core::error::positive("spacing_m", field.spacing_m)?;
+        let spacing = fewbits_numerics::error::positive("spacing_m", field.spacing_m)?;
         let sensors = (0..9)
             .map(|i| Vector2::new((f64::from(i % 3) - 1.0) * spacing, (f64::from(i / 3) - 1.0) * spacing))
             .map(|place| ReceivedPower::new(place, [0, 2], 1000.0, 1.0, 2.0, field.noise_variance))
@@ -117,7 +118,7 @@ impl World {
             sensors,
             start: Gaussian::new(mean, Matrix4::from_diagonal(&Vector4::new(9.0, 4.0, 9.0, 4.0)))?,
             steps: field.steps as usize,
-            particles: fewbits_core::error::at_least_one("particles", field.particles as usize)?,
+            particles: fewbits_numerics::error::at_least_one("particles", field.particles as usize)?,
             drawn_start: field.drawn_start,
         })
     }

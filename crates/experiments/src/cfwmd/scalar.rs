@@ -10,7 +10,7 @@ use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::row;
 use crate::table::{Table, Tables, column};
 use fewbits_cfwmd::rule::Weighing;
-use fewbits_core::Moments;
+use fewbits_monte_carlo::Moments;
 
 /// Slack for a particle filter judged by a Gaussian reference and the other way round.
 const OTHER_ESTIMATOR: f64 = 0.01;

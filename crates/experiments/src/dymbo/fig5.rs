@@ -4,10 +4,11 @@ use super::common::{LONGEST_RUN, bad, dymbo_steady, kalman_variance, nearest, no
 use crate::claim::largest;
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_core::{Dynamics, Encoder, Gaussian, Moments, Observation, Sensing, Stream};
+use fewbits_core::{Dynamics, Encoder, Gaussian, Observation, Sensing};
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{DymboFilter, FineSensor, Initialisation, OneBitSensor, ScalarPlant, first_message_value};
 use fewbits_filters::kalman;
+use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::Vector1;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;

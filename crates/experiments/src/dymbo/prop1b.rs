@@ -4,10 +4,10 @@ use super::common::{bad, not_empty};
 use crate::claim::not_decreasing;
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_core::normal::log_pdf_with;
 use fewbits_core::{Gaussian, Sign};
 use fewbits_dymbo::bit_update;
 use fewbits_dymbo::skew_normal::{distance_from_normal, posterior_density};
+use fewbits_numerics::normal::log_pdf_with;
 use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-prop1b";

@@ -1,8 +1,10 @@
 //! A filter beside the exact posterior of the same bits, on simulated runs.
 
-use fewbits_core::{Dynamics, Encoder, Gaussian, Moments, MonteCarlo, MonteCarloError, Observation, Sensing, normal};
+use fewbits_core::{Dynamics, Encoder, Gaussian, Observation, Sensing};
 use fewbits_dymbo::{DymboFilter, Error, MultibitFilter, OneBitSensor, ScalarPlant};
 use fewbits_filters::{Grid, PointMass, PointMassFilter};
+use fewbits_monte_carlo::{Moments, MonteCarlo, MonteCarloError};
+use fewbits_numerics::normal;
 use nalgebra::Vector1;
 use rand::{Rng, RngExt};
 use std::f64::consts::FRAC_2_PI;

@@ -5,9 +5,9 @@ use super::referee::{BURN, Scheme, Twin, exact_filter};
 use crate::claim::largest;
 use crate::plot::{Axis, Layer, Marker, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_core::{Moments, Stream};
 use fewbits_dymbo::ScalarPlant;
 use fewbits_filters::{PointMassFilter, scalar_fixed_lag_variance, smoother::smooth_step};
+use fewbits_monte_carlo::{Moments, Stream};
 use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-smoother";

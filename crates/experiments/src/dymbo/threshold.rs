@@ -3,8 +3,9 @@
 use super::common::{LONGEST_RUN, bad, pairs, stationary_plant};
 use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_core::{Dynamics, Encoder, Estimate, Gaussian, Moments, Observation, Sensing, Stream};
+use fewbits_core::{Dynamics, Encoder, Gaussian, Observation, Sensing};
 use fewbits_dymbo::{DymboFilter, FineSensor, Initialisation, OneBitSensor, ScalarPlant, ThresholdRule};
+use fewbits_monte_carlo::{Estimate, Moments, Stream};
 use nalgebra::Vector1;
 use serde::{Deserialize, Serialize};
 

@@ -3,11 +3,13 @@
 use super::common::{LONGEST_RUN, bad};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_core::{Dynamics, Encoder, Gaussian, Moments, Sensing, Sign, Stream, normal};
+use fewbits_core::{Dynamics, Encoder, Gaussian, Sensing, Sign};
 use fewbits_dymbo::OneBitSensor;
 use fewbits_dymbo::vector::SignFilter;
 use fewbits_filters::{PlaneFilter, SteadyState, steady_state};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
+use fewbits_monte_carlo::{Moments, Stream};
+use fewbits_numerics::normal;
 use nalgebra::{Matrix2, SMatrix, Vector2};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_1_SQRT_2;

@@ -2,12 +2,13 @@
 
 use fewbits_core::likelihood::{Heard, ScalarLikelihood};
 use fewbits_core::message::{Cell, Sign};
-use fewbits_core::{Dynamics, Gaussian, Likelihood, Moments, Stream};
+use fewbits_core::{Dynamics, Gaussian, Likelihood};
 use fewbits_densities::Particles;
 use fewbits_filters::{
     Error, Grid, OptimalProposal, ParticleFilter, PointMass, PointMassFilter, Resampling, Schedule, Workspace, kalman,
 };
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
+use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix2, SVector, Vector2};
 use rand_pcg::Pcg64Mcg;
 

@@ -2,11 +2,12 @@
 
 use fewbits_core::likelihood::{Heard, ScalarLikelihood};
 use fewbits_core::message::{Cell, Sign};
-use fewbits_core::{Gaussian, Likelihood, Moments, Stream};
+use fewbits_core::{Gaussian, Likelihood};
 use fewbits_filters::{
     Error, Grid, ParticleFilter, PointMass, PointMassFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman,
 };
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
+use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{SVector, Vector2};
 
 #[test]

@@ -1,7 +1,7 @@
 //! The laws of resampling, for every law.
 
-use fewbits_core::{Moments, Stream};
 use fewbits_filters::{Resampling, Schedule};
+use fewbits_monte_carlo::{Moments, Stream};
 use proptest::prelude::*;
 
 fn draw(law: Resampling, seed: u64, weights: &[f64], count: usize) -> Vec<u32> {

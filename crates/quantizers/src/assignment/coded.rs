@@ -2,9 +2,9 @@
 
 use crate::Error;
 use crate::binary::{Bank, BinaryQuantizer, Grid, IMPOSSIBLE, Nodes, Sensor, Source, gray_basis, linear_pattern};
-use fewbits_core::ArgumentError;
-use fewbits_core::error::positive;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::positive;
+use fewbits_numerics::quadrature::gauss_legendre;
 
 /// Most sensors: there are `2^N` cells.
 const MAX_SENSORS: usize = 16;

@@ -5,8 +5,8 @@ use super::linear::CostMatrix;
 use crate::Error;
 use crate::binary::BinaryQuantizer;
 use crate::binary::Grid;
-use fewbits_core::ArgumentError;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::quadrature::gauss_legendre;
 
 /// Where the centre decoder lands if Gray bit `bit` of the cell of `x` is flipped and all others are right.
 ///

@@ -3,7 +3,7 @@
 use super::CodedSensors;
 use crate::Error;
 use crate::binary::IMPOSSIBLE;
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 use nalgebra::DMatrix;
 
 /// Most sensors for enumeration: 10! is 3.6 million.

@@ -2,8 +2,8 @@
 
 use super::coded::check_permutation;
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::all_finite;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::all_finite;
 
 /// Relative slack of the certificate's inequalities, in units of the largest cost.
 const SLACK: f64 = 1e-12;

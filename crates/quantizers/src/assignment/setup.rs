@@ -1,8 +1,8 @@
 //! Test networks, and the two assignments that need no optimisation.
 
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::{all_finite, non_negative, positive};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, non_negative, positive};
 
 /// Smallest variance of a random network.
 const SMALLEST: f64 = 1e-4;

@@ -4,9 +4,9 @@ use super::BinaryQuantizer;
 use super::grid::noise_in_range;
 use super::source::{Blur, Nodes, Source};
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::at_least_one;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::quadrature::gauss_legendre;
 
 /// Most outcomes that may be enumerated.
 pub const MAX_OUTCOMES: u128 = 1 << 26;

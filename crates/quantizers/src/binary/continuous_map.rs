@@ -2,7 +2,7 @@
 
 use super::bank::Bank;
 use super::source::Kind;
-use fewbits_core::normal::log_pdf;
+use fewbits_numerics::normal::log_pdf;
 
 /// Fewest points of the scan.
 const POINTS: usize = 4001;

@@ -56,7 +56,7 @@ impl LookupTable {
     /// # Errors
     /// If `x` is not finite.
     pub fn conditional_error(&self, x: f64) -> Result<(f64, f64), Error> {
-        let x = fewbits_core::error::finite("x", x)?;
+        let x = fewbits_numerics::error::finite("x", x)?;
         let at = Nodes {
             x: vec![x],
             w: vec![1.0],

@@ -3,8 +3,8 @@
 use super::quantizer::{cell_of, increasing};
 use super::source::{Kind, Source};
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::finite;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::finite;
 
 /// Most bits a cell index may take.
 pub const MAX_BITS: usize = 16;
@@ -27,7 +27,7 @@ impl Grid {
     /// # Errors
     /// If `half_width` is not positive and finite or `bits` not in `1..=16`.
     pub fn uniform(half_width: f64, bits: usize) -> Result<Self, Error> {
-        let half_width = fewbits_core::error::positive("half_width", half_width)?;
+        let half_width = fewbits_numerics::error::positive("half_width", half_width)?;
         let cells = 1usize << bits_in_range(bits)?;
         // Symmetric by construction: the edge in the middle is exactly zero.
         let edges = (1..cells)
@@ -53,7 +53,7 @@ impl Grid {
     /// # Errors
     /// If `std` is not positive and finite or `bits` not in `1..=8`.
     pub fn lloyd_max(std: f64, bits: usize) -> Result<Self, Error> {
-        let std = fewbits_core::error::positive("std", std)?;
+        let std = fewbits_numerics::error::positive("std", std)?;
         let table = crate::lloyd_max::gaussian_table(bits_in_range(bits)?)?;
         Self::from_edges(table.breakpoints().iter().map(|t| t * std).collect())
     }
@@ -63,7 +63,7 @@ impl Grid {
     /// # Errors
     /// If `std` is not positive and finite.
     pub fn printed_gaussian(std: f64) -> Result<Self, Error> {
-        let std = fewbits_core::error::positive("std", std)?;
+        let std = fewbits_numerics::error::positive("std", std)?;
         Self::from_edges(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * std).collect())
     }
 
@@ -114,7 +114,7 @@ impl Grid {
 
     /// Mean squared error of the cell centroids when the measurement is exact; `Delta^2/12` for a uniform source on its grid.
     pub fn noiseless_mse(&self, source: &Source) -> f64 {
-        let rule = fewbits_core::quadrature::gauss_legendre::<24>();
+        let rule = fewbits_numerics::quadrature::gauss_legendre::<24>();
         (0..self.cells())
             .filter_map(|cell| self.support(cell, source))
             .map(|(low, high)| {
@@ -146,7 +146,7 @@ pub(crate) fn bits_in_range(bits: usize) -> Result<usize, Error> {
 /// Noise standard deviations are checked once, here.
 pub(crate) fn noise_in_range(noise_std: f64) -> Result<f64, Error> {
     finite("noise_std", noise_std)?;
-    Ok(fewbits_core::error::positive("noise_std", noise_std)?)
+    Ok(fewbits_numerics::error::positive("noise_std", noise_std)?)
 }
 
 #[cfg(test)]

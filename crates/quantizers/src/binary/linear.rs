@@ -3,7 +3,7 @@
 use super::grid::bits_in_range;
 use super::{Grid, Pattern};
 use crate::Error;
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 
 /// Selects which natural patterns are XORed: the most significant of the `bits` binary digits selects pattern 1.
 ///

@@ -35,7 +35,7 @@ impl<'a, const D: usize> HeardBit<'a, D> {
     /// # Errors
     /// If the row is not finite.
     pub fn new(sensor: &'a Sensor, row: SVector<f64, D>, bit: Bit) -> Result<Self, crate::Error> {
-        fewbits_core::error::all_finite("row", row.as_slice())?;
+        fewbits_numerics::error::all_finite("row", row.as_slice())?;
         Ok(Self { sensor, row, bit })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{BinaryQuantizer, Grid};
 use crate::Error;
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 use std::fmt;
 use std::str::FromStr;
 

@@ -1,9 +1,9 @@
 //! The sensor's half: thresholds that turn a measurement into one bit.
 
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::all_finite;
-use fewbits_core::normal::{interval, log_interval, pdf};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::all_finite;
+use fewbits_numerics::normal::{interval, log_interval, pdf};
 
 /// Beyond this many standard deviations a normal tail is below the smallest double.
 const VANISHED: f64 = 39.0;

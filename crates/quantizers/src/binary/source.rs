@@ -1,10 +1,10 @@
 //! The scalar under observation.
 
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::{finite, positive};
-use fewbits_core::normal::pdf;
-use fewbits_core::quadrature::Rule;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{finite, positive};
+use fewbits_numerics::normal::pdf;
+use fewbits_numerics::quadrature::Rule;
 
 /// A Gaussian source is integrated over this many standard deviations to either side; the rest is below `1e-18`.
 const GAUSSIAN_REACH: f64 = 9.0;
@@ -190,8 +190,8 @@ impl Nodes {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
-    use fewbits_core::normal::cdf;
-    use fewbits_core::quadrature::gauss_legendre;
+    use fewbits_numerics::normal::cdf;
+    use fewbits_numerics::quadrature::gauss_legendre;
 
     #[test]
     fn nodes_carry_mass_and_variance() {

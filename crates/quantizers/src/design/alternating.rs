@@ -23,7 +23,7 @@ use crate::moments::{Table, dot};
 use crate::problem::Problem;
 use crate::quantizer::Quantizer;
 use crate::system::System;
-use fewbits_core::normal;
+use fewbits_numerics::normal;
 
 /// Scan of the sample axis: this many standard deviations either side, in this many steps.
 const REACH: f64 = 7.0;

@@ -6,8 +6,8 @@ use crate::newton::{Newton, SADDLE, climb};
 use crate::problem::Problem;
 use crate::quantizer::Quantizer;
 use crate::system::System;
-use fewbits_core::Stream;
-use fewbits_core::normal;
+use fewbits_monte_carlo::Stream;
+use fewbits_numerics::normal;
 use rand::RngExt;
 
 /// A design whose rarest cell is rarer than this has lost a level.

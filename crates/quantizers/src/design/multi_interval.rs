@@ -22,7 +22,8 @@ use crate::moments::{Table, dot};
 use crate::newton::Newton;
 use crate::quantizer::Quantizer;
 use crate::system::System;
-use fewbits_core::{Stream, normal};
+use fewbits_monte_carlo::Stream;
+use fewbits_numerics::normal;
 use rand::RngExt;
 
 /// Half-width of the grid, in standard deviations of a sample.

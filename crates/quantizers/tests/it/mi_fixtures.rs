@@ -369,7 +369,7 @@ fn detection(entry: &Entry) {
         None => (rest, false),
     };
     if kind == "unquantized" {
-        let q = fewbits_core::normal::cdf(-theta * number(&entry.inputs["N"]).sqrt() / 2.0);
+        let q = fewbits_numerics::normal::cdf(-theta * number(&entry.inputs["N"]).sqrt() / 2.0);
         return close(entry, "Q", q, number(&entry.value));
     }
     if kind == "np" {

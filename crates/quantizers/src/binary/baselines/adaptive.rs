@@ -7,10 +7,10 @@ use crate::binary::continuous_map::golden;
 use crate::binary::decoder::{moments, squared_error};
 use crate::binary::grid::noise_in_range;
 use crate::binary::source::Nodes;
-use fewbits_core::ArgumentError;
-use fewbits_core::error::{all_finite, at_least_one, positive};
-use fewbits_core::normal::{cdf, inverse_mills, log_cdf, log_pdf};
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, at_least_one, positive};
+use fewbits_numerics::normal::{cdf, inverse_mills, log_cdf, log_pdf};
+use fewbits_numerics::quadrature::gauss_legendre;
 
 /// Most sensors: the bit tree has `2^N` leaves.
 const MAX_SENSORS: usize = 20;

@@ -5,8 +5,8 @@ use crate::binary::bank::CountTable;
 use crate::binary::grid::{bits_in_range, noise_in_range};
 use crate::binary::source::{Blur, Kind, Nodes};
 use crate::binary::{Bank, BinaryQuantizer, Decoder, Grid, Sensor, Source, linear_pattern, natural_basis};
-use fewbits_core::ArgumentError;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::quadrature::gauss_legendre;
 
 /// The allocation of sensors to natural bits, for a uniform source.
 #[derive(Debug, Clone, PartialEq)]

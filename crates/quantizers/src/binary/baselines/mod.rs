@@ -10,7 +10,7 @@ pub use multi_threshold::{MultiThreshold, multi_threshold_bound};
 
 use super::{Bank, BinaryQuantizer, Source};
 use crate::Error;
-use fewbits_core::error::at_least_one;
+use fewbits_numerics::error::at_least_one;
 
 /// `sensors` sensors that all send the sign of their measurement.
 ///

@@ -3,9 +3,9 @@
 use crate::Error;
 use crate::binary::Source;
 use crate::binary::source::Nodes;
-use fewbits_core::error::at_least_one;
-use fewbits_core::normal::log_cdf;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::normal::log_cdf;
+use fewbits_numerics::quadrature::gauss_legendre;
 use std::f64::consts::TAU;
 
 /// Thresholds of the grid.

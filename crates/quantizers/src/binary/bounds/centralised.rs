@@ -5,7 +5,7 @@ use crate::Error;
 use crate::binary::Source;
 use crate::binary::grid::noise_in_range;
 use crate::lloyd_max::{self, Density};
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 
 /// Most sensors: the quantizer of the estimate has `2^N` levels.
 const MAX_SENSORS: usize = 12;

@@ -19,8 +19,8 @@ pub use van_trees::van_trees;
 use super::Bank;
 use super::source::{Kind, Nodes};
 use crate::Error;
-use fewbits_core::ArgumentError;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::quadrature::gauss_legendre;
 
 /// Panel width in noise standard deviations; the quotient is less smooth than the probabilities.
 const INFORMATION_PANEL: f64 = 0.5;

@@ -4,9 +4,9 @@ use crate::Error;
 use crate::binary::Source;
 use crate::binary::grid::noise_in_range;
 use crate::binary::source::Kind;
-use fewbits_core::error::{at_least_one, non_negative};
-use fewbits_core::normal::{interval, pdf, truncated_moments};
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::error::{at_least_one, non_negative};
+use fewbits_numerics::normal::{interval, pdf, truncated_moments};
+use fewbits_numerics::quadrature::gauss_legendre;
 use std::f64::consts::{E, PI};
 
 /// Noise standard deviations beyond the support at which the measurement's density ends for all purposes.

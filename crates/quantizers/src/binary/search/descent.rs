@@ -6,9 +6,9 @@ use crate::binary::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::binary::grid::noise_in_range;
 use crate::binary::source::{Blur, Nodes};
 use crate::binary::{Bank, BinaryQuantizer, Sensor, Source};
-use fewbits_core::ArgumentError;
-use fewbits_core::error::at_least_one;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::DMatrix;
 
 /// Relative improvement that counts as one.

@@ -8,8 +8,8 @@ use crate::binary::grid::noise_in_range;
 use crate::binary::linear::{Span, check_mask, flips_under_reflection, grid_bits};
 use crate::binary::source::{Blur, Nodes};
 use crate::binary::{Bank, Grid, Mask, Sensor, Source, linear_pattern};
-use fewbits_core::error::at_least_one;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 

@@ -7,10 +7,10 @@ use crate::binary::bank::IMPOSSIBLE;
 use crate::binary::decoder::moments;
 use crate::binary::source::Nodes;
 use crate::binary::{Bank, BinaryQuantizer, Sensor, Source};
-use fewbits_core::ArgumentError;
-use fewbits_core::error::{at_least_one, non_negative};
-use fewbits_core::normal::pdf;
-use fewbits_core::quadrature::gauss_legendre;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{at_least_one, non_negative};
+use fewbits_numerics::normal::pdf;
+use fewbits_numerics::quadrature::gauss_legendre;
 
 /// Most sensors: the outcome tree of distinct sensors has `2^N` leaves.
 const MAX_SENSORS: usize = 16;

@@ -5,7 +5,7 @@ use crate::binary::bounds::mean_information;
 use crate::binary::linear::grid_bits;
 use crate::binary::{Bank, Grid, Sensor, linear_pattern};
 use crate::binary::{Mask, Source};
-use fewbits_core::ArgumentError;
+use fewbits_numerics::ArgumentError;
 
 /// Strategy 2: repeats the masks of a smaller optimum until there are `sensors` of them, in increasing order.
 ///

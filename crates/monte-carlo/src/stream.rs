@@ -6,7 +6,7 @@
 //! draws stay apart (another purpose).
 //!
 //! ```
-//! use fewbits_core::Stream;
+//! use fewbits_monte_carlo::Stream;
 //! use rand::RngExt;
 //! let trial = Stream::new(1).named("dymbo-fig5").indexed(7);
 //! let truth: f64 = trial.named("truth").rng().random();

@@ -1,14 +1,12 @@
 //! Summary statistics with standard errors.
 
-use crate::error::ArgumentError;
-use crate::gaussian::Gaussian;
-use nalgebra::SVector;
+use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
 /// Running count, mean and variance (Welford's recursion; merging is Chan's).
 ///
 /// ```
-/// use fewbits_core::Moments;
+/// use fewbits_monte_carlo::Moments;
 /// let m: Moments = [1.0, 2.0, 3.0, 4.0].into_iter().collect();
 /// assert_eq!((m.count(), m.mean()), (4, 2.5));
 /// assert!((m.variance() - 5.0 / 3.0).abs() < 1e-15);
@@ -134,21 +132,4 @@ pub fn paired_difference(a: &[f64], b: &[f64]) -> Result<Moments, ArgumentError>
         ));
     }
     Ok(a.iter().zip(b).map(|(x, y)| x - y).collect())
-}
-
-/// Normalised estimation error squared, `(x - mean)' P^-1 (x - mean) / D`: expectation 1 for a consistent belief.
-///
-/// # Errors
-/// If the belief's covariance is singular.
-pub fn nees<const D: usize>(belief: &Gaussian<D>, truth: &SVector<f64, D>) -> Result<f64, ArgumentError> {
-    Ok(belief.mahalanobis_squared(truth)? / D as f64)
-}
-
-/// Normalised innovation squared, `nu' S^-1 nu / M`: expectation 1 for a consistent filter. `innovation` is a Gaussian with
-/// the predicted measurement as mean and the innovation covariance `S`.
-///
-/// # Errors
-/// If `S` is singular.
-pub fn nis<const M: usize>(predicted: &Gaussian<M>, measurement: &SVector<f64, M>) -> Result<f64, ArgumentError> {
-    nees(predicted, measurement)
 }

@@ -15,7 +15,7 @@
 //! | `P(a < (X, Y) < b)` | [`bivariate_rectangle`] | every correlation, far rectangles |
 //!
 //! ```
-//! use fewbits_core::normal;
+//! use fewbits_numerics::normal;
 //! // Forty standard deviations out the probability underflows; its logarithm does not.
 //! assert_eq!(normal::cdf(-40.0), 0.0);
 //! assert!((normal::log_cdf(-40.0) + 804.608_442_013_754).abs() < 1e-9);

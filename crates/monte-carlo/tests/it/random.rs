@@ -1,6 +1,6 @@
 //! Random streams: stable, and different wherever their paths differ.
 
-use fewbits_core::Stream;
+use fewbits_monte_carlo::Stream;
 use proptest::prelude::*;
 use rand::RngExt;
 use std::collections::HashSet;

@@ -43,7 +43,7 @@ pub enum MonteCarloError<E> {
 /// A number of independent trials on the streams of one experiment.
 ///
 /// ```
-/// use fewbits_core::{MonteCarlo, Moments, Stream};
+/// use fewbits_monte_carlo::{MonteCarlo, Moments, Stream};
 /// use rand::RngExt;
 /// let run = MonteCarlo::new(Stream::new(1).named("mean of a uniform"), 10_000);
 /// let moments = run.fold(
@@ -52,7 +52,7 @@ pub enum MonteCarloError<E> {
 ///     |total, chunk| total.merge(&chunk),
 /// )?;
 /// assert!(moments.estimate().z_score(0.5).abs() < 4.0);
-/// # Ok::<(), fewbits_core::monte_carlo::MonteCarloError<std::convert::Infallible>>(())
+/// # Ok::<(), fewbits_monte_carlo::engine::MonteCarloError<std::convert::Infallible>>(())
 /// ```
 #[derive(Clone, Copy)]
 pub struct MonteCarlo<'a> {

@@ -1,7 +1,8 @@
 //! Normal-distribution numerics against high-precision values and against each other.
 
-use fewbits_core::normal;
-use fewbits_core::{Stream, normal::truncated_moments};
+use fewbits_monte_carlo::Stream;
+use fewbits_numerics::normal;
+use fewbits_numerics::normal::truncated_moments;
 use proptest::prelude::*;
 use serde::Deserialize;
 
@@ -111,7 +112,7 @@ fn draws_from_a_cell_have_its_moments() {
     for (i, (lower, upper)) in cells.into_iter().enumerate() {
         let mut rng = Stream::new(3).named("cells").indexed(i as u64).rng();
         let draws = 20_000;
-        let mut sum = fewbits_core::Moments::default();
+        let mut sum = fewbits_monte_carlo::Moments::default();
         for _ in 0..draws {
             let x = normal::sample_truncated(&mut rng, lower, upper);
             assert!((lower..=upper).contains(&x));

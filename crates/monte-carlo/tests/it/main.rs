@@ -1,0 +1,6 @@
+//! The engine, streams and statistics.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
+
+mod engine;
+mod random;

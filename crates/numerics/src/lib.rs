@@ -1,0 +1,29 @@
+//! Numerics that every estimator here stands on, free of any probability model.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`normal`] | the standard normal distribution, exact in its tails and in narrow cells |
+//! | [`quadrature`] | Gauss-Legendre rules |
+//! | [`linalg`] | square roots of singular covariances |
+//! | [`sums`], [`exponential`] | sums in a fixed order, exponentials of a whole column |
+//! | [`error`] | the argument error all constructors share, and the checks that raise it |
+//!
+//! The central choice: **probabilities of intervals live in the log domain, and nowhere else is one formed.** It costs an
+//! `erfcx` and an `exp` where `1 - cdf` would do in the middle of the bell, and it is why no filter in this workspace divides
+//! by zero when a bit is surprising.
+//!
+//! ```
+//! use fewbits_numerics::normal;
+//! // Forty standard deviations out the probability underflows; its logarithm does not.
+//! assert_eq!(normal::cdf(-40.0), 0.0);
+//! assert!((normal::log_cdf(-40.0) + 804.608_442_013_754).abs() < 1e-9);
+//! ```
+
+pub mod error;
+pub mod exponential;
+pub mod linalg;
+pub mod normal;
+pub mod quadrature;
+pub mod sums;
+
+pub use error::ArgumentError;

@@ -1,0 +1,5 @@
+//! Numerics against high-precision values, closed forms and laws.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
+
+mod normal;
