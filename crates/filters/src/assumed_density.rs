@@ -39,11 +39,7 @@ pub fn update<const D: usize, const M: usize>(
     let prior = Gaussian::from_trusted_parts(matrix * belief.mean(), matrix * cross);
     let tilted = factor.tilted(&prior)?;
     let correction = tilted.mean - prior.mean();
-    let gain = match Cholesky::new(*prior.covariance()) {
-        Some(factor) => factor.solve(&cross.transpose()).transpose(),
-        // A measurement that is known beforehand teaches nothing.
-        None => SMatrix::zeros(),
-    };
+    let gain = regression(&cross, prior.covariance());
     let keep = SMatrix::<f64, D, D>::identity() - gain * matrix;
     let covariance = keep * belief.covariance() * keep.transpose() + gain * tilted.covariance * gain.transpose();
     let info = UpdateInfo {
@@ -52,4 +48,24 @@ pub fn update<const D: usize, const M: usize>(
         gain,
     };
     Ok((Gaussian::from_trusted_parts(belief.mean() + gain * correction, covariance), info))
+}
+
+/// `G = P H' V^-1`. Where `V` is singular (a known start, rank-one process noise) a share of 1e-13 of its diagonal is added,
+/// which changes nothing in the directions in which the measurement varies; one that is known beforehand teaches nothing.
+fn regression<const D: usize, const M: usize>(
+    cross: &SMatrix<f64, D, M>,
+    covariance: &SMatrix<f64, M, M>,
+) -> SMatrix<f64, D, M> {
+    const SHARE: f64 = 1e-13;
+    let regular = |v: &SMatrix<f64, M, M>| {
+        let factor = Cholesky::new(*v)?;
+        let pivots = factor.l_dirty().diagonal();
+        (0..M).all(|i| pivots[i] * pivots[i] > 0.5 * SHARE * v[(i, i)]).then_some(factor)
+    };
+    let factor = regular(covariance).or_else(|| {
+        let largest = covariance.diagonal().max();
+        let ridge = covariance.diagonal().map(|v| if v > 0.0 { SHARE * v } else { largest });
+        regular(&(covariance + SMatrix::from_diagonal(&ridge)))
+    });
+    factor.map_or_else(SMatrix::zeros, |factor| factor.solve(&cross.transpose()).transpose())
 }
