@@ -123,8 +123,9 @@ impl<const D: usize> RaoBlackwellised<D> {
             let mass = log_shares(pieces, predicted, deviation);
             let chosen = choose(rng, &mass[..count]);
             let (lower, upper, _) = pieces[chosen];
-            let z = normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation);
-            predicted + deviation * z
+            // A piece of positive mass holds numbers: it is never refused.
+            normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation)
+                .map_or(predicted, |z| predicted + deviation * z)
         });
         self.covariance = *updated.covariance();
         Ok(self.info(log_likelihood))
