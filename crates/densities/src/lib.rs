@@ -7,6 +7,11 @@
 //!   is that a single particle is scattered over `D + 1` slices, which suits filters (they sweep over all particles) and not
 //!   programs that move one particle at a time.
 //!
+//! - [`Cells`]: equal small cells, refined until the moments have settled: the exact belief in few dimensions.
+//! - [`Lpg`]: a linear combination of products of Hermite polynomials and Gaussians, squared, so that it is nowhere negative.
+//! - [`Clumps`]: any cloud of weighted points summed up by a few hundred parts, to which [`Mixture`]s are fitted.
+//! - [`laplace`]: Gaussians from the peak of a density and from its cumulants.
+//!
 //! ```
 //! use fewbits_densities::Particles;
 //! let belief = Particles::uniform([vec![1.0, 2.0, 3.0], vec![0.0, 1.0, 2.0]])?;
@@ -17,8 +22,19 @@
 //!
 //! Not here: dynamics, measurements and resampling, which belong to filters.
 
+pub mod cells;
+pub mod clumps;
 mod error;
+pub mod hermite;
+pub mod laplace;
+pub mod lpg;
+mod matrix;
+mod mixture;
 mod particles;
 
+pub use cells::{CellOptions, CellTarget, Cells};
+pub use clumps::{Clump, Clumps, MixtureFit};
 pub use error::Error;
+pub use lpg::Lpg;
+pub use mixture::{Component, Mixture};
 pub use particles::Particles;
