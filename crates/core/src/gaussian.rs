@@ -1,10 +1,10 @@
 //! The Gaussian belief.
 
+use crate::belief::{Belief, Density};
+use crate::columns::{Columns, ColumnsMut, count, set_state, state_at};
 use fewbits_numerics::error::{self, ArgumentError};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
-use crate::belief::{Belief, Density};
-use crate::columns::{Columns, ColumnsMut, count, set_state, state_at};
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;

@@ -72,4 +72,3 @@ pub trait Encoder {
     /// Turns a measurement into a message.
     fn encode(&self, measurement: &Self::Measurement, feedback: &Self::Feedback) -> Self::Message;
 }
-

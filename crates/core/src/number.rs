@@ -94,7 +94,11 @@ impl Levels {
         let half = 0.5 * (self.upper - self.lower) / self.top();
         let centre = self.level(index);
         let lower = if index == 0 { f64::NEG_INFINITY } else { centre - half };
-        let upper = if index as f64 == self.top() { f64::INFINITY } else { centre + half };
+        let upper = if index as f64 == self.top() {
+            f64::INFINITY
+        } else {
+            centre + half
+        };
         Cell::new(lower, upper)
     }
 }

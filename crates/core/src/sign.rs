@@ -32,7 +32,11 @@ impl Sign {
     pub fn of(measurement: f64, threshold: f64) -> Result<Self, ArgumentError> {
         finite("measurement", measurement)?;
         finite("threshold", threshold)?;
-        Ok(if measurement >= threshold { Self::Above } else { Self::Below })
+        Ok(if measurement >= threshold {
+            Self::Above
+        } else {
+            Self::Below
+        })
     }
 
     /// The other sign.

@@ -9,6 +9,9 @@ pub enum Error {
     /// An argument out of range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
+    /// What a word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
+    #[error(transparent)]
+    Core(#[from] fewbits_core::Error),
     /// A model refused its parameters.
     #[error(transparent)]
     Model(#[from] fewbits_models::Error),

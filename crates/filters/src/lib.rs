@@ -28,6 +28,7 @@
 //!
 //! Not here: the schemes of any one paper, and time-varying models (pass another model at each step).
 
+pub mod assumed_density;
 pub mod cramer_rao;
 mod error;
 pub mod extended_kalman;

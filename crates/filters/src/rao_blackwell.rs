@@ -2,8 +2,7 @@
 
 use crate::particle::{ParticleFilter, ParticleInfo, Workspace};
 use crate::{Error, kalman};
-use fewbits_core::likelihood::Heard;
-use fewbits_core::message::Sign;
+use fewbits_core::factor::Scalar;
 use fewbits_core::{Gaussian, LinearDynamics};
 use fewbits_densities::Particles;
 use fewbits_models::LinearSensor;
@@ -33,7 +32,7 @@ pub struct RaoBlackwellised<const D: usize> {
 }
 
 /// A part of the line with the probability that what was heard follows from a measurement there.
-type Piece = (f64, f64, f64);
+type Piece = (fewbits_core::Cell, f64);
 
 impl<const D: usize> RaoBlackwellised<D> {
     /// `count` particles that agree on a Gaussian belief.
@@ -96,33 +95,26 @@ impl<const D: usize> RaoBlackwellised<D> {
         &mut self,
         rng: &mut R,
         sensor: &LinearSensor<D, 1>,
-        heard: &Heard,
+        observed: &Scalar,
     ) -> Result<ParticleInfo, Error> {
         let row = fewbits_core::LinearSensing::matrix(sensor).transpose();
         let shared = Gaussian::from_trusted_parts(SVector::zeros(), self.covariance);
         let (updated, info) = kalman::update(sensor, &shared, &SVector::zeros())?;
         let (gain, deviation) = (info.gain.column(0).into_owned(), info.innovation_covariance[(0, 0)].sqrt());
-        let (pieces, count) = match *heard {
-            Heard::Lost => return Ok(self.info(0.0)),
-            Heard::Value(value) => {
-                fewbits_numerics::error::finite("value", value)?;
+        let pieces = match observed {
+            Scalar::Value(value) => {
+                let value = value.value()[0];
                 let log_likelihood =
                     self.reweigh(&row, |predicted| normal::log_pdf((value - predicted) / deviation) - deviation.ln())?;
                 self.absorb(&row, &gain, |_| value);
                 self.covariance = *updated.covariance();
                 return Ok(self.info(log_likelihood));
             }
-            ref other => pieces(other)?,
+            other => other.pieces(),
         };
-        let pieces = &pieces[..count];
-        let log_likelihood = self.reweigh(&row, |predicted| {
-            let mass = log_shares(pieces, predicted, deviation);
-            log_sum(&mass[..count])
-        })?;
+        let log_likelihood = self.reweigh(&row, |predicted| log_sum(log_shares(&pieces, predicted, deviation)))?;
         self.absorb(&row, &gain, |predicted| {
-            let mass = log_shares(pieces, predicted, deviation);
-            let chosen = choose(rng, &mass[..count]);
-            let (lower, upper, _) = pieces[chosen];
+            let (lower, upper) = choose(rng, &pieces, predicted, deviation);
             let z = normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation);
             predicted + deviation * z
         });
@@ -158,74 +150,41 @@ impl<const D: usize> RaoBlackwellised<D> {
     }
 }
 
-/// `p(heard | z)` as a function of the measurement, in at most three pieces.
-fn pieces(heard: &Heard) -> Result<([Piece; 3], usize), Error> {
-    const UP: f64 = f64::INFINITY;
-    const DOWN: f64 = f64::NEG_INFINITY;
-    let none = (0.0, 0.0, 0.0);
-    // The public fields of `Heard` are checked where a likelihood is made of them.
-    let row = SVector::from([1.0]);
-    fewbits_core::likelihood::ScalarLikelihood::<1>::new(row, 1.0, *heard)?;
-    Ok(match *heard {
-        Heard::Bit {
-            sign,
-            threshold,
-            crossover,
-        } => {
-            let (above, below) = match sign {
-                Sign::Above => (1.0 - crossover, crossover),
-                Sign::Below => (crossover, 1.0 - crossover),
-            };
-            ([(DOWN, threshold, below), (threshold, UP, above), none], 2)
-        }
-        Heard::Cell(cell) => ([(cell.lower(), cell.upper(), 1.0), none, none], 1),
-        Heard::Silence { cell, loss } => (
-            [
-                (cell.lower(), cell.upper(), 1.0),
-                (DOWN, cell.lower(), loss),
-                (cell.upper(), UP, loss),
-            ],
-            if loss > 0.0 { 3 } else { 1 },
-        ),
-        _ => ([(DOWN, UP, 1.0), none, none], 1),
-    })
-}
-
 /// `ln(share P(z in piece))` of each piece.
 #[inline]
-fn log_shares(pieces: &[Piece], predicted: f64, deviation: f64) -> [f64; 3] {
-    let mut mass = [f64::NEG_INFINITY; 3];
-    for (mass, (lower, upper, share)) in mass.iter_mut().zip(pieces) {
-        *mass = normal::log_interval((lower - predicted) / deviation, (upper - predicted) / deviation) + share.ln();
-    }
-    mass
+fn log_shares(pieces: &[Piece], predicted: f64, deviation: f64) -> impl Iterator<Item = f64> + Clone + '_ {
+    pieces.iter().map(move |(cell, share)| {
+        normal::log_interval((cell.lower() - predicted) / deviation, (cell.upper() - predicted) / deviation)
+            + share.ln()
+    })
 }
 
 /// `ln sum exp`.
 #[inline]
-fn log_sum(terms: &[f64]) -> f64 {
-    match terms {
-        [only] => *only,
-        _ => {
-            let largest = terms.iter().fold(f64::NEG_INFINITY, |m, t| m.max(*t));
-            if largest == f64::NEG_INFINITY {
-                return largest;
-            }
-            largest + terms.iter().map(|t| (t - largest).exp()).sum::<f64>().ln()
-        }
+fn log_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = terms.clone().fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        return largest;
     }
+    largest + terms.map(|t| (t - largest).exp()).sum::<f64>().ln()
 }
 
-/// An index drawn in proportion to `exp(terms)`; no uniform is spent where there is no choice.
+/// Ends of a piece drawn in proportion to its share; no uniform is spent where there is no choice.
 #[inline]
-fn choose<R: Rng + ?Sized>(rng: &mut R, terms: &[f64]) -> usize {
-    if terms.len() == 1 {
-        return 0;
+fn choose<R: Rng + ?Sized>(rng: &mut R, pieces: &[Piece], predicted: f64, deviation: f64) -> (f64, f64) {
+    let ends = |i: usize| {
+        pieces
+            .get(i)
+            .map_or((f64::NEG_INFINITY, f64::INFINITY), |p| (p.0.lower(), p.0.upper()))
+    };
+    if pieces.len() == 1 {
+        return ends(0);
     }
-    let total = log_sum(terms);
+    let terms = log_shares(pieces, predicted, deviation);
+    let total = log_sum(terms.clone());
     let mut left = rng.random::<f64>();
     let mut chosen = 0;
-    for (i, term) in terms.iter().enumerate() {
+    for (i, term) in terms.enumerate() {
         let share = (term - total).exp();
         if share > 0.0 {
             chosen = i;
@@ -235,5 +194,5 @@ fn choose<R: Rng + ?Sized>(rng: &mut R, terms: &[f64]) -> usize {
             left -= share;
         }
     }
-    chosen
+    ends(chosen)
 }

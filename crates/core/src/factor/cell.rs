@@ -193,7 +193,11 @@ impl Factor<1> for InCell {
         let (log_inside, inside_mean, inside_variance) =
             Self::standard((self.cell.lower() - mean) / s, (self.cell.upper() - mean) / s).or_else(|error| {
                 // A cell out of reach of the numbers can still be blamed on the floor.
-                if self.floor > 0.0 { Ok((f64::NEG_INFINITY, 0.0, 1.0)) } else { Err(error) }
+                if self.floor > 0.0 {
+                    Ok((f64::NEG_INFINITY, 0.0, 1.0))
+                } else {
+                    Err(error)
+                }
             })?;
         let log_evidence = self.mixed(log_inside);
         let gain = v / total;

@@ -135,7 +135,11 @@ impl<'a, F: Fn(f64) -> f64> Integrator<'a, F> {
             };
             let here = self.log(probe);
             if here > value {
-                if probe > best { left = best } else { right = best }
+                if probe > best {
+                    left = best
+                } else {
+                    right = best
+                }
                 (best, value) = (probe, here);
             } else if probe > best {
                 right = probe;
@@ -159,7 +163,11 @@ impl<'a, F: Fn(f64) -> f64> Integrator<'a, F> {
         }
         for _ in 0..6 {
             let middle = 0.5 * (inside + outside);
-            if self.log(middle) > floor { inside = middle } else { outside = middle }
+            if self.log(middle) > floor {
+                inside = middle
+            } else {
+                outside = middle
+            }
         }
         outside
     }
@@ -192,7 +200,11 @@ impl<'a, F: Fn(f64) -> f64> Integrator<'a, F> {
                 panels.push((middle, b, right, error));
             }
         }
-        if total[0] > 0.0 { Ok(total) } else { Err(Error::Impossible) }
+        if total[0] > 0.0 {
+            Ok(total)
+        } else {
+            Err(Error::Impossible)
+        }
     }
 
     fn panel(&mut self, a: f64, b: f64, mode: f64, peak: f64) -> [f64; 3] {

@@ -107,7 +107,11 @@ impl Partition {
                     next += 1;
                 }
                 if p > 0.0 {
-                    let lower = if first == 0 { f64::NEG_INFINITY } else { self.edges[first - 1] };
+                    let lower = if first == 0 {
+                        f64::NEG_INFINITY
+                    } else {
+                        self.edges[first - 1]
+                    };
                     return Some((lower, self.edges.get(next - 1).copied().unwrap_or(f64::INFINITY), p));
                 }
             }

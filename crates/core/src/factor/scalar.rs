@@ -2,6 +2,7 @@
 
 use super::moments::Feature;
 use super::{Factor, InCell, Partition, Tilted, Value};
+use crate::cell::Cell;
 use crate::columns::Columns;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
@@ -60,6 +61,33 @@ pub enum Scalar {
 }
 
 impl Scalar {
+    /// `p(observation | measurement)` as a function of the noisy measurement, piecewise constant: cells with their
+    /// probabilities, zeros left out. Empty for a value, which is a point.
+    pub fn pieces(&self) -> Vec<(Cell, f64)> {
+        let whole = (f64::NEG_INFINITY, f64::INFINITY);
+        let (edges, shares) = match self {
+            Self::Value(_) => return Vec::new(),
+            Self::Constant(factor) => (vec![whole.0, whole.1], vec![factor.probability]),
+            Self::InCell(factor) => (
+                vec![whole.0, factor.cell().lower(), factor.cell().upper(), whole.1],
+                vec![factor.floor(), factor.floor() + factor.share(), factor.floor()],
+            ),
+            Self::Partition(factor) => (
+                [whole.0]
+                    .into_iter()
+                    .chain(factor.edges().iter().copied())
+                    .chain([whole.1])
+                    .collect(),
+                factor.given_cell().to_vec(),
+            ),
+        };
+        let ends = edges.windows(2).map(|pair| Cell::new(pair[0], pair[1]));
+        ends.zip(shares)
+            .filter_map(|(cell, p)| Some((cell.ok()?, p)))
+            .filter(|(_, p)| *p > 0.0)
+            .collect()
+    }
+
     /// Where the likelihood changes, and over which distance.
     pub(crate) fn features(&self) -> Vec<Feature> {
         match self {

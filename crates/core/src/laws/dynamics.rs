@@ -19,9 +19,7 @@ pub fn draws_have_the_law<const D: usize, R: Rng + ?Sized>(
     let (mean, covariance) = (dynamics.mean(state), dynamics.noise_covariance_at(state));
     let mut columns: [Vec<f64>; D] = std::array::from_fn(|d| vec![state[d]; draws]);
     dynamics.propagate_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
-    let swept: Vec<SVector<f64, D>> = (0..draws)
-        .map(|i| SVector::from_fn(|d, _| columns[d][i]))
-        .collect();
+    let swept: Vec<SVector<f64, D>> = (0..draws).map(|i| SVector::from_fn(|d, _| columns[d][i])).collect();
     let single: Vec<SVector<f64, D>> = (0..draws).map(|_| dynamics.propagate(rng, state)).collect();
     for points in [single, swept] {
         for i in 0..D {
@@ -31,7 +29,9 @@ pub fn draws_have_the_law<const D: usize, R: Rng + ?Sized>(
             average.check("draws have the mean of the dynamics", format!("coordinate {i}"), mean[i], 1e-12 * scale)?;
             for j in 0..=i {
                 let mut product = Average::new();
-                points.iter().for_each(|x| product.add((x[i] - mean[i]) * (x[j] - mean[j])));
+                points
+                    .iter()
+                    .for_each(|x| product.add((x[i] - mean[i]) * (x[j] - mean[j])));
                 let slack = 1e-12 * (covariance[(i, i)] * covariance[(j, j)]).sqrt() + f64::MIN_POSITIVE;
                 let at = format!("entry ({i}, {j})");
                 product.check("draws have the noise of the dynamics", at, covariance[(i, j)], slack)?;

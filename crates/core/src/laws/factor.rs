@@ -10,10 +10,7 @@ use nalgebra::SVector;
 ///
 /// # Errors
 /// The first measurement at which the law fails.
-pub fn is_a_number<const M: usize>(
-    factor: &impl Factor<M>,
-    measurements: &[SVector<f64, M>],
-) -> Result<(), Violation> {
+pub fn is_a_number<const M: usize>(factor: &impl Factor<M>, measurements: &[SVector<f64, M>]) -> Result<(), Violation> {
     for m in measurements {
         let value = factor.log_likelihood(m);
         if value.is_nan() || value == f64::INFINITY {
@@ -68,7 +65,11 @@ pub fn tilted_is_quadrature(
     let weights: Vec<f64> = logs.iter().map(|l| (l - peak).exp()).collect();
     let total: f64 = weights.iter().sum();
     let first = nodes().zip(&weights).map(|(t, w)| t * w).sum::<f64>() / total;
-    let second = nodes().zip(&weights).map(|(t, w)| w * (t - first) * (t - first)).sum::<f64>() / total;
+    let second = nodes()
+        .zip(&weights)
+        .map(|(t, w)| w * (t - first) * (t - first))
+        .sum::<f64>()
+        / total;
     let evidence = peak + (total * step).ln() - LN_SQRT_2PI - 0.5 * variance.ln();
     agree(LAW, "the evidence", log_evidence, evidence, tolerance, 1.0)?;
     agree(LAW, "the mean", (mean[0] - centre) / second.sqrt(), first / second.sqrt(), tolerance, 1.0)?;

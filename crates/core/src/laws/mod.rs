@@ -51,7 +51,11 @@ fn agree(
     scale: f64,
 ) -> Result<(), Violation> {
     let same = found == expected || (found - expected).abs() <= tolerance * expected.abs().max(scale);
-    if same { Ok(()) } else { Err(Violation::new(law, format!("{found} at {at}"), expected)) }
+    if same {
+        Ok(())
+    } else {
+        Err(Violation::new(law, format!("{found} at {at}"), expected))
+    }
 }
 
 /// Mean and standard error of draws.

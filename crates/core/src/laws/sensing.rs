@@ -45,7 +45,9 @@ pub fn draws_have_the_law<const D: usize, const M: usize, R: Rng + ?Sized>(
         average.check("measurements have their mean", format!("component {i}"), mean[i], 1e-12 * mean[i].abs())?;
         for j in 0..=i {
             let mut product = Average::new();
-            points.iter().for_each(|z| product.add((z[i] - mean[i]) * (z[j] - mean[j])));
+            points
+                .iter()
+                .for_each(|z| product.add((z[i] - mean[i]) * (z[j] - mean[j])));
             product.check("measurements have their noise", format!("entry ({i}, {j})"), covariance[(i, j)], 0.0)?;
         }
     }

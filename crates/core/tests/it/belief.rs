@@ -100,7 +100,10 @@ fn gaussians_obey_the_laws_of_beliefs() {
     laws::belief::samples_have_the_moments(&belief, &mut rng, 20_000).unwrap();
     let factored = belief.factored().unwrap();
     laws::belief::samples_have_the_moments(&factored, &mut rng, 20_000).unwrap();
-    let wide = Gaussian::new(*belief.mean(), belief.covariance() * 1.5).unwrap().factored().unwrap();
+    let wide = Gaussian::new(*belief.mean(), belief.covariance() * 1.5)
+        .unwrap()
+        .factored()
+        .unwrap();
     laws::belief::density_integrates_to_one(&factored, &wide, &mut rng, 20_000).unwrap();
     let known = Gaussian::known(Vector2::new(3.0, 1.0)).unwrap();
     laws::belief::samples_have_the_moments(&known, &mut rng, 100).unwrap();

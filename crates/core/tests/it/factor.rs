@@ -21,13 +21,17 @@ fn kinds() -> Vec<Scalar> {
         InCell::certain(Cell::new(-0.2, 0.9).unwrap(), 0.5).unwrap().into(),
         silence(0.8, 0.5, 0.25).into(),
         silence(0.8, 0.5, 0.0).into(),
-        Partition::new(vec![-1.0, 0.3, 1.2], vec![0.1, 0.7, 0.0, 0.7], 0.4).unwrap().into(),
+        Partition::new(vec![-1.0, 0.3, 1.2], vec![0.1, 0.7, 0.0, 0.7], 0.4)
+            .unwrap()
+            .into(),
         Constant::new(0.3).unwrap().into(),
     ]
 }
 
 fn points() -> Vec<Vector1<f64>> {
-    [-1e200, -60.0, -3.0, -0.2, 0.0, 0.3, 1.0, 40.0, 1e9].map(Vector1::new).to_vec()
+    [-1e200, -60.0, -3.0, -0.2, 0.0, 0.3, 1.0, 40.0, 1e9]
+        .map(Vector1::new)
+        .to_vec()
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_quantizers::assignment::{CodedSensors, bit_error, flipped_estimate};
+use fewbits_sensor_assignment::{CodedSensors, bit_error, flipped_estimate};
 use serde::{Deserialize, Serialize};
 
 const BITS: usize = 4;

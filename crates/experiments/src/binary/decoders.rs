@@ -3,10 +3,10 @@
 use super::{Scene, check_sweep, each, sweep};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_quantizers::binary::bounds::{
+use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, printed_crlb, remote_distortion, van_trees,
 };
-use fewbits_quantizers::binary::{Decoder, gray_basis};
+use fewbits_binary_patterns::{Decoder, gray_basis};
 use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-8`.

@@ -3,7 +3,7 @@
 use super::{Scene, pattern, pattern_panel};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_quantizers::binary::{
+use fewbits_binary_patterns::{
     BinaryQuantizer, Grid, Mask, Pattern, Source, check_separation, generator_matrix, gray_basis, natural_basis,
 };
 use rayon::prelude::*;

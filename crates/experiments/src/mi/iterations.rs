@@ -3,7 +3,7 @@
 use super::common::{MI, MSE, bsc, exact, lloyd_system, scene};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, claim, column, row};
-use fewbits_quantizers::{System, design};
+use fewbits_quantizer_design::{System, design};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::LN_2;
 

@@ -4,7 +4,7 @@ use super::common::{MI, MSE, cell, design_table, exact, lloyd_system, name, odd,
 use super::plots::error_bars;
 use crate::plot::Plot;
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, Value, column, row};
-use fewbits_quantizers::{Newton, System, bounds, design};
+use fewbits_quantizer_design::{Newton, System, bounds, design};
 use serde::{Deserialize, Serialize};
 
 /// Settings of Table 4.1.

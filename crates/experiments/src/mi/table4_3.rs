@@ -3,7 +3,7 @@
 use super::common::{MI, MSE, cell, exact, lloyd, scene};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
 use crate::{About, Claim, Context, Error, Figure, Table, Tables, claim, column, row};
-use fewbits_quantizers::{Newton, Quantizer, System, bounds, design};
+use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design};
 use serde::{Deserialize, Serialize};
 
 /// Settings of Table 4.3.
