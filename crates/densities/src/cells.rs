@@ -1,6 +1,7 @@
 //! Equal cells that cover where a density is: the exact belief in few dimensions.
 
 use crate::Error;
+use crate::matrix::eigen;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, positive};
@@ -120,8 +121,8 @@ impl<const D: usize> Cells<D> {
                 let total = sum(&weights);
                 let log_evidence = best + total.ln() + D as f64 * width.ln();
                 let (mean, covariance) = moments(&centres, &weights, total);
-                let determinant = covariance.determinant();
-                let narrowest = covariance.symmetric_eigenvalues().min().max(0.0).sqrt();
+                let variances = eigen(&covariance).0;
+                let (determinant, narrowest) = (variances.product(), variances.min().max(0.0).sqrt());
                 let settled = before.is_some_and(|(evidence, size)| {
                     (log_evidence - evidence).abs() < options.evidence_tolerance
                         && (determinant / size - 1.0).abs() < options.determinant_tolerance

@@ -1,5 +1,6 @@
 //! Errors of this crate.
 
+use fewbits_core::CodecError;
 use fewbits_numerics::ArgumentError;
 use thiserror::Error;
 
@@ -10,6 +11,9 @@ pub enum Error {
     /// An argument outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
+    /// A belief that does not fit its wire format, or bits that are no belief.
+    #[error(transparent)]
+    Codec(#[from] CodecError),
     /// No particle has any weight left, or a weight is not a number.
     #[error("degenerate particles: the largest log weight is {largest}, expected a finite number")]
     Degenerate {

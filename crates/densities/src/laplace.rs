@@ -1,6 +1,7 @@
 //! Gaussians from the peak of a density: mode and Hessian, Tierney and Kadane's ratios, and cumulants.
 
 use crate::Error;
+use crate::matrix::eigen;
 use fewbits_core::Gaussian;
 use fewbits_numerics::error::{all_finite, positive};
 use nalgebra::{SMatrix, SVector};
@@ -220,11 +221,11 @@ fn ascent<const D: usize>(
     // Scaled by the extent, so that coordinates of different units are treated alike.
     let scale = SMatrix::from_diagonal(extent);
     let (g, h) = (extent.component_mul(gradient), scale * hessian * scale);
-    let eigen = (-h).symmetric_eigen();
-    let largest = eigen.eigenvalues.amax().max(f64::MIN_POSITIVE);
-    let definite = eigen.eigenvalues.iter().all(|v| *v > 1e-9 * largest);
-    let curvatures = eigen.eigenvalues.map(|v| v.abs().max(1e-9 * largest));
-    let mut step = eigen.eigenvectors * (eigen.eigenvectors.tr_mul(&g)).component_div(&curvatures);
+    let (values, vectors) = eigen(&-h);
+    let largest = values.amax().max(f64::MIN_POSITIVE);
+    let definite = values.iter().all(|v| *v > 1e-9 * largest);
+    let curvatures = values.map(|v| v.abs().max(1e-9 * largest));
+    let mut step = vectors * vectors.tr_mul(&g).component_div(&curvatures);
     let length = step.norm();
     if length > 4.0 {
         step *= 4.0 / length;
