@@ -10,10 +10,12 @@ pub enum Error {
     /// An argument outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
-    /// No particle has any weight left, or a weight is not a number.
-    #[error("degenerate particles: the largest log weight is {largest}, expected a finite number")]
-    Degenerate {
-        /// The largest log weight found.
-        largest: f64,
-    },
+    /// What a word of the core refused; [`fewbits_core::Error::Impossible`] where no probability is left.
+    #[error(transparent)]
+    Core(#[from] fewbits_core::Error),
+}
+
+impl Error {
+    /// No probability is left.
+    pub(crate) const IMPOSSIBLE: Self = Self::Core(fewbits_core::Error::Impossible);
 }
