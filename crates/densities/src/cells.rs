@@ -5,8 +5,8 @@ use crate::matrix::eigen;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, positive};
-use fewbits_numerics::exponential::exp_minus;
-use fewbits_numerics::sums::{largest, sum};
+use fewbits_numerics::kernels::exp_minus;
+use fewbits_numerics::kernels::{largest, sum};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use std::collections::HashMap;
@@ -81,7 +81,7 @@ impl<const D: usize> Cells<D> {
     /// Covers the box between two corners with `per_axis` cells along its longest side, and refines.
     ///
     /// # Errors
-    /// If the box is empty or `per_axis` is zero; [`Error::BeliefMiss`] if the density is zero at every centre or a value is NaN;
+    /// If the box is empty or `per_axis` is zero; [`fewbits_core::Error::Impossible`] if the density is zero at every centre or a value is NaN;
     /// [`Error::Unresolved`] if the density needs more cells than allowed.
     pub fn cover(
         target: &impl CellTarget<D>,
@@ -112,7 +112,7 @@ impl<const D: usize> Cells<D> {
             evaluations += count;
             let (best, best_score) = (largest(&logs), largest(&scores));
             if !best_score.is_finite() || logs.iter().chain(&scores).any(|x| x.is_nan()) {
-                return Err(Error::BeliefMiss { largest: best_score });
+                return Err(Error::IMPOSSIBLE);
             }
             if best.is_finite() {
                 weights.clear();
@@ -311,12 +311,12 @@ fn moments<const D: usize>(
     weights: &[f64],
     total: f64,
 ) -> (SVector<f64, D>, SMatrix<f64, D, D>) {
-    let mean = SVector::from_fn(|d, _| fewbits_numerics::sums::dot(&centres[d], weights) / total);
+    let mean = SVector::from_fn(|d, _| fewbits_numerics::kernels::dot(&centres[d], weights) / total);
     let mut covariance = SMatrix::zeros();
     for i in 0..D {
         for j in 0..=i {
             let (a, b) = (&centres[i], &centres[j]);
-            let entry = fewbits_numerics::sums::lanes(weights.len(), |k| weights[k] * (a[k] - mean[i]) * (b[k] - mean[j])) / total;
+            let entry = fewbits_numerics::kernels::weighted_covariance(weights, (a, mean[i]), (b, mean[j])) / total;
             covariance[(i, j)] = entry;
             covariance[(j, i)] = entry;
         }
@@ -363,7 +363,7 @@ mod tests {
     #[test]
     fn misses_are_errors() {
         let cover = |lower, upper, n| Cells::cover(&Nowhere, lower, upper, n, &CellOptions::default());
-        assert!(matches!(cover([0.0; 2], [1.0; 2], 8), Err(Error::BeliefMiss { .. })));
+        assert!(matches!(cover([0.0; 2], [1.0; 2], 8), Err(Error::Core(fewbits_core::Error::Impossible))));
         assert!(cover([0.0; 2], [0.0; 2], 8).is_err() && cover([0.0; 2], [1.0; 2], 0).is_err());
         assert!(cover([0.0; 2], [1.0; 2], 1 << 20).is_err());
     }

@@ -87,7 +87,7 @@ impl<const D: usize> Clumps<D> {
             }
         }
         if order.is_empty() {
-            return Err(Error::Degenerate { largest: f64::NEG_INFINITY });
+            return Err(Error::IMPOSSIBLE);
         }
         let cloud = Cloud { columns, spread, weights, total };
         let mut parts = vec![cloud.part(&order, 0, order.len())];

@@ -4,9 +4,9 @@ use crate::matrix::Factored;
 use crate::{Bandwidth, Component, Error, Mixture, Particles};
 use fewbits_core::Columns;
 use fewbits_numerics::error::at_least_one;
-use fewbits_numerics::exponential::exp_minus;
+use fewbits_numerics::kernels::exp_minus;
 use fewbits_numerics::normal::LN_SQRT_2PI;
-use fewbits_numerics::sums::{dot, lanes};
+use fewbits_numerics::kernels::{dot, sum};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -123,7 +123,7 @@ impl<const D: usize> KernelEstimate<D> {
         for (p, out) in out.iter_mut().enumerate() {
             let z: [f64; D] = std::array::from_fn(|d| points[d][p]);
             half_squares(&self.white, &z, 0, &mut logs);
-            let nearest = fewbits_numerics::sums::largest(&logs);
+            let nearest = fewbits_numerics::kernels::largest(&logs);
             if nearest == f64::NEG_INFINITY {
                 *out = f64::NEG_INFINITY;
                 continue;
@@ -184,7 +184,7 @@ impl<const D: usize> KernelEstimate<D> {
 /// Indices of `count` systematic draws from `weights`: index `i` comes up `count w_i` times, rounded up or down.
 pub(crate) fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<usize> {
     let offset: f64 = rng.random();
-    let total: f64 = lanes(weights.len(), |i| weights[i]);
+    let total = sum(weights);
     let mut i = 0;
     let mut cumulative = weights.first().copied().unwrap_or(0.0);
     (0..count)

@@ -45,7 +45,7 @@ impl<const D: usize> Peak<D> {
         let mut x = *start;
         let mut height = log_density(&x);
         if !height.is_finite() {
-            return Err(Error::BeliefMiss { largest: height });
+            return Err(Error::IMPOSSIBLE);
         }
         let mut extent = *scale;
         for _ in 0..STEPS {

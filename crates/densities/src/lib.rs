@@ -15,6 +15,8 @@
 //! - [`Lpg`]: a linear combination of products of Hermite polynomials and Gaussians, squared, so that it is nowhere negative.
 //! - [`Clumps`]: any cloud of weighted points summed up by a few hundred parts, to which [`Mixture`]s are fitted.
 //! - [`laplace`]: Gaussians from the peak of a density and from its cumulants.
+//! - [`GaussianCloud`]: weighted Gaussians that share one covariance, the belief of a Rao-Blackwellised filter.
+//! - [`PointMass`] on a [`Grid`], [`PlaneMass`] on a lattice: densities of one and two dimensions by their values at nodes.
 //!
 //! ```
 //! use fewbits_densities::Particles;
@@ -49,6 +51,11 @@ mod reduce;
 mod refine;
 pub mod tree;
 pub mod wire;
+mod gaussian_cloud;
+mod grid;
+mod plane;
+mod point_mass;
+mod stored;
 
 pub use bandwidth::{Bandwidth, Rule, SampleSize, Shape};
 pub use cells::{CellOptions, CellTarget, Cells};
@@ -66,3 +73,8 @@ pub use plug_in::{Cubature, PlugIn};
 pub use reduce::{PaperReductions, Reduction};
 pub use refine::refine;
 pub use tree::{Split, Tree};
+pub use gaussian_cloud::GaussianCloud;
+pub use grid::Grid;
+pub use plane::PlaneMass;
+pub use point_mass::PointMass;
+pub use {nalgebra, rand};

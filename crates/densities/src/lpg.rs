@@ -68,7 +68,7 @@ impl<const D: usize> Lpg<D> {
         let c = belief.stacked();
         let norm = c.dot(&(&gram * &c)).sqrt();
         if !(norm > 0.0 && norm.is_finite()) {
-            return Err(Error::Degenerate { largest: norm });
+            return Err(Error::IMPOSSIBLE);
         }
         belief.scale(norm.recip());
         belief.settle()?;
@@ -109,7 +109,7 @@ impl<const D: usize> Lpg<D> {
         let c = factor.solve(&b);
         let norm = c.dot(&(&gram * &c)).sqrt();
         if !(norm > 0.0 && norm.is_finite()) {
-            return Err(Error::BeliefMiss { largest: norm });
+            return Err(Error::IMPOSSIBLE);
         }
         for (l, term) in belief.terms.iter_mut().enumerate() {
             term.coefficients = c.rows(l * size, size).iter().map(|c| c / norm).collect();
@@ -301,7 +301,7 @@ impl<const D: usize> Lpg<D> {
             second += d * d.transpose() * w;
         })?;
         if !(mass > 0.0 && mass.is_finite()) {
-            return Err(Error::Degenerate { largest: mass });
+            return Err(Error::IMPOSSIBLE);
         }
         self.scale(mass.sqrt().recip());
         let mean = first / mass;

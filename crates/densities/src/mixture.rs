@@ -5,7 +5,7 @@ use crate::{Error, Particles};
 use fewbits_core::{Columns, Gaussian};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, non_negative};
-use fewbits_numerics::exponential::exp_minus;
+use fewbits_numerics::kernels::exp_minus;
 use fewbits_numerics::normal::{self, LN_SQRT_2PI};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -231,7 +231,7 @@ impl<const D: usize> Mixture<D> {
     /// Posterior probabilities of the components at `x`; `None` where the density underflows for every component.
     pub fn responsibilities(&self, x: &SVector<f64, D>) -> Option<Vec<f64>> {
         let logs: Vec<f64> = self.components.iter().map(|c| c.weight.ln() + c.log_pdf(x)).collect();
-        let largest = fewbits_numerics::sums::largest(&logs);
+        let largest = fewbits_numerics::kernels::largest(&logs);
         if !largest.is_finite() {
             return None;
         }

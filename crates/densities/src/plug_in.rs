@@ -3,7 +3,7 @@
 use crate::matrix::Factored;
 use crate::kernel::half_squares;
 use crate::{Error, KernelEstimate, Mixture, Tree};
-use fewbits_numerics::exponential::exp_minus;
+use fewbits_numerics::kernels::exp_minus;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -165,7 +165,7 @@ pub fn node_errors<const D: usize>(estimate: &KernelEstimate<D>, tree: &Tree<D>)
             let z: [f64; D] = std::array::from_fn(|d| white[d][i]);
             half_squares(&white, &z, middle, &mut logs[..width]);
             exp_minus(&logs[..width], 0.0, &mut kernels[..width]);
-            sums[i] += fewbits_numerics::sums::dot(&weight[middle..node.range.end], &kernels[..width]);
+            sums[i] += fewbits_numerics::kernels::dot(&weight[middle..node.range.end], &kernels[..width]);
             let w = weight[i];
             let across = &mut sums[middle..node.range.end];
             across.iter_mut().zip(&kernels).for_each(|(sum, k)| *sum += w * k);

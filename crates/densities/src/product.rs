@@ -67,7 +67,7 @@ fn check<const D: usize>(factors: &[&Mixture<D>]) -> Result<SVector<f64, D>, Err
 ///
 /// # Errors
 /// If there is no factor, there are more than [`MOST_TERMS`] choices, or every weight underflows
-/// ([`Error::Degenerate`]: factors that contradict each other astronomically).
+/// ([`fewbits_core::Error::Impossible`]: factors that contradict each other astronomically).
 pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<Mixture<D>>, Error> {
     let origin = check(factors)?;
     let terms = factors.iter().try_fold(1_usize, |n, f| n.checked_mul(f.len()).filter(|n| *n <= MOST_TERMS));
@@ -103,7 +103,7 @@ pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<Mixture<
     }
     let largest = gaussians.iter().fold(f64::NEG_INFINITY, |m, g| m.max(g.0));
     if !largest.is_finite() {
-        return Err(Error::Degenerate { largest });
+        return Err(Error::IMPOSSIBLE);
     }
     let total: f64 = gaussians.iter().map(|g| (g.0 - largest).exp()).sum();
     let components = gaussians.into_iter().map(|(log, mean, covariance)| {
@@ -193,7 +193,7 @@ fn draw_label<const D: usize, R: Rng + ?Sized>(
         previous = Some((*c.covariance(), factor));
         logs.push(c.weight().ln() - 0.5 * factor.squared(&(c.mean() - origin - mean)) - factor.half_log_det);
     }
-    let largest = fewbits_numerics::sums::largest(logs);
+    let largest = fewbits_numerics::kernels::largest(logs);
     Ok(pick(rng, logs.iter().map(|x| (x - largest).exp())))
 }
 
@@ -218,7 +218,7 @@ fn pick<R: Rng + ?Sized>(rng: &mut R, weights: impl Iterator<Item = f64> + Clone
 /// that factor is as concentrated as the product, as a prediction is; its weights tell when it is not.
 ///
 /// # Errors
-/// If there is no factor, no draw, no such factor, or no weight is left ([`Error::Degenerate`]).
+/// If there is no factor, no draw, no such factor, or no weight is left ([`fewbits_core::Error::Impossible`]).
 pub fn importance<const D: usize, R: Rng + ?Sized>(
     rng: &mut R,
     factors: &[&Mixture<D>],

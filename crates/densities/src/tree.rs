@@ -93,12 +93,12 @@ impl<const D: usize> Tree<D> {
     /// Builds the tree. Kernels of weight zero are left out.
     ///
     /// # Errors
-    /// Never for a valid estimate; [`Error::Degenerate`] if every weight is zero.
+    /// Never for a valid estimate; [`fewbits_core::Error::Impossible`] if every weight is zero.
     pub fn new(estimate: &KernelEstimate<D>, split: Split) -> Result<Self, Error> {
         let weights = estimate.particles().weights();
         let order: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
         if order.is_empty() {
-            return Err(Error::Degenerate { largest: 0.0 });
+            return Err(Error::IMPOSSIBLE);
         }
         let mut tree = Self {
             nodes: Vec::with_capacity(2 * order.len()),

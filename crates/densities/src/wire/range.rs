@@ -221,7 +221,8 @@ mod tests {
             let mut information = 0.0;
             for _ in 0..rng.random_range(1..30) {
                 let law = if rng.random() {
-                    Law::Uniform { count: rng.random_range(1..1 << rng.random_range(1..40)) }
+                    let bits = rng.random_range(1..40);
+                    Law::Uniform { count: rng.random_range(1..1 << bits) }
                 } else {
                     let scale = 10.0_f64.powf(rng.random_range(-2.0..6.0));
                     Law::Logistic { location: rng.random_range(-3.0..3.0) * scale, scale }
