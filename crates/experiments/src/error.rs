@@ -99,6 +99,33 @@ impl From<fewbits_quantizers::Error> for Error {
     }
 }
 
+impl From<fewbits_quantizer_design::Error> for Error {
+    fn from(error: fewbits_quantizer_design::Error) -> Self {
+        match error {
+            fewbits_quantizer_design::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
+impl From<fewbits_binary_patterns::Error> for Error {
+    fn from(error: fewbits_binary_patterns::Error) -> Self {
+        match error {
+            fewbits_binary_patterns::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
+impl From<fewbits_sensor_assignment::Error> for Error {
+    fn from(error: fewbits_sensor_assignment::Error) -> Self {
+        match error {
+            fewbits_sensor_assignment::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
 impl From<fewbits_dymbo::Error> for Error {
     fn from(error: fewbits_dymbo::Error) -> Self {
         Self::failed(error)

@@ -15,8 +15,8 @@ mod table5_2;
 use crate::legacy::Old;
 use crate::plot::{Axis, Layer, Legend, Panel};
 use crate::{AnyFigure, Error};
-use fewbits_quantizers::binary::search::LinearSearch;
-use fewbits_quantizers::binary::{Bank, Grid, Mask, Pattern, Source, linear_pattern};
+use fewbits_binary_patterns::search::LinearSearch;
+use fewbits_binary_patterns::{Bank, Grid, Mask, Pattern, Source, linear_pattern};
 use rayon::prelude::*;
 
 /// The figures of this system, in the order of the publication.

@@ -1,8 +1,8 @@
 //! What the tables of this system share: scenes, starting quantizers, rows of designs, and looking values up again.
 
 use crate::legacy::{Claim, Column, Error, Table, Value, column};
-use fewbits_quantizers::design::Design;
-use fewbits_quantizers::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max};
+use fewbits_quantizer_design::design::Design;
+use fewbits_quantizer_design::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max};
 use schemars::JsonSchema;
 use serde::Serialize;
 

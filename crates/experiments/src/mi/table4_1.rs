@@ -4,7 +4,7 @@ use super::common::{MI, MSE, Pair, lloyd_system, name, odd, scene};
 use super::plots::errors;
 use crate::plot::Plot;
 use crate::{About, Claims, Context, Error, Figure, reference};
-use fewbits_quantizers::{Newton, System, bounds, design};
+use fewbits_quantizer_design::{Newton, System, bounds, design};
 use garde::Validate;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

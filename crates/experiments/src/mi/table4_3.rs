@@ -3,7 +3,7 @@
 use super::common::{MI, MSE, lloyd, scene};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, reference};
-use fewbits_quantizers::{Newton, Quantizer, System, bounds, design};
+use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design};
 use garde::Validate;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -4,9 +4,9 @@ use super::common::{MI, cell, exact};
 use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, Value, column, row};
 use crate::plot::{Axis, Layer, Panel, Plot};
 use fewbits_numerics::normal;
-use fewbits_quantizers::decoder::NeymanPearson;
-use fewbits_quantizers::design::{self, Separation};
-use fewbits_quantizers::{Channel, Criterion, JointTable, Newton, Noise, Prior, Quantizer, Scene, System};
+use fewbits_quantizer_design::decoder::NeymanPearson;
+use fewbits_quantizer_design::design::{self, Separation};
+use fewbits_quantizer_design::{Channel, Criterion, JointTable, Newton, Noise, Prior, Quantizer, Scene, System};
 use serde::{Deserialize, Serialize};
 
 const PE: Criterion = Criterion::BayesError;
