@@ -2,8 +2,8 @@
 
 use super::feedback::descend;
 use super::{Scene, pattern};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use fewbits_binary_patterns::baselines::{AdaptiveRule, adaptive};
 use fewbits_binary_patterns::search::{Descent, free_thresholds};
 use fewbits_binary_patterns::{BinaryQuantizer, Grid, Mask, Pattern, Sensor, Source, gray_basis};

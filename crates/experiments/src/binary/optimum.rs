@@ -2,8 +2,8 @@
 
 use super::{Scene, check_sweep, crossing, each, mask_text, pattern, sweep};
 use crate::legacy::claim::largest;
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use fewbits_binary_patterns::baselines::Luo;
 use fewbits_binary_patterns::search::{Descent, by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis, rank};

@@ -1,8 +1,8 @@
 //! `binary-fig5-2` to `binary-fig5-5` and `binary-figB-1`: the grid, its patterns, and what noise makes of one.
 
 use super::{Scene, pattern, pattern_panel};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use fewbits_binary_patterns::{
     BinaryQuantizer, Grid, Mask, Pattern, Source, check_separation, generator_matrix, gray_basis, natural_basis,
 };
@@ -103,7 +103,10 @@ impl Figure for Clipping {
             .par_iter()
             .map(|set| swapped_mse(&set.masks))
             .collect::<Result<Vec<_>, _>>()?;
-        errors.push(row!["sides swapped, best masks for that", crate::legacy::claim::smallest(best)])?;
+        errors.push(row![
+            "sides swapped, best masks for that",
+            crate::legacy::claim::smallest(best)
+        ])?;
         Ok(Tables::from(table).with("errors", errors))
     }
 
