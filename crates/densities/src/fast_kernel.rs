@@ -5,10 +5,10 @@ use fewbits_core::Columns;
 use fewbits_numerics::ArgumentError;
 use nalgebra::SVector;
 
-/// A kernel estimate in the plane, tabulated on a grid of a sixth of the kernel's width.
+/// A kernel estimate in the plane, tabulated on a grid of an eighth of the kernel's width.
 ///
 /// Particles are spread linearly over the four nodes around them, the grid is smoothed along each axis, and densities are read
-/// off by cubic interpolation. The largest error is about 0.4% of the density near the mode; in the tails, where the
+/// off by cubic interpolation. The largest error is about 0.3% of the density; in the tails, where the
 /// density is below `1e-6` of its peak, use [`KernelEstimate::log_pdf_columns`]. For pictures and averages, not for suprema.
 ///
 /// Linear binning widens the kernel by `step^2/6`; the filter is made narrower by as much.
@@ -23,7 +23,7 @@ pub struct TabulatedEstimate {
 }
 
 /// Nodes per kernel standard deviation.
-const FINENESS: f64 = 6.0;
+const FINENESS: f64 = 8.0;
 /// The kernel is cut off here, in its standard deviations.
 const REACH: f64 = 7.0;
 /// The most nodes of a table.

@@ -23,6 +23,7 @@
 //! Not here: dynamics, measurements and resampling, which belong to filters.
 
 mod bandwidth;
+mod beliefs;
 mod credible;
 pub mod cut;
 pub mod divergence;

@@ -2,6 +2,7 @@
 
 use super::table::Table;
 use constriction::UnwrapInfallible;
+use constriction::stream::model::EncoderModel;
 use constriction::stream::queue::{EncoderSituation, RangeDecoder, RangeEncoder};
 use constriction::stream::{Decode, Encode};
 use fewbits_core::{BitReader, BitWriter, CodecError};
@@ -150,6 +151,9 @@ fn digits(count: u64) -> (u32, u32) {
 /// Reads integers back.
 pub(super) struct Reader {
     decoder: RangeDecoder<u32, u64, constriction::backends::Cursor<u32, Vec<u32>>>,
+    available: usize,
+    /// Bits that the symbols so far took at least.
+    spent: usize,
 }
 
 impl Reader {
@@ -164,11 +168,21 @@ impl Reader {
         }
         Ok(Self {
             decoder: RangeDecoder::from_compressed(words).unwrap_infallible(),
+            available: bits,
+            spent: 0,
         })
     }
 
     fn get(&mut self, table: Table) -> Result<u32, CodecError> {
-        self.decoder.decode_symbol(table).map_err(|_| out_of_range("code word", "past the last symbol"))
+        let index = self.decoder.decode_symbol(table).map_err(|_| out_of_range("code word", "past the last symbol"))?;
+        // A symbol of frequency 2^k to 2^(k+1) takes over 15 - k bits. Beyond the end there is nothing left to decode.
+        let (_, frequency) = table.left_cumulative_and_probability(index).ok_or_else(|| out_of_range("symbol", index))?;
+        self.spent += 15_usize.saturating_sub(frequency.ilog2() as usize);
+        if self.spent > self.available {
+            let requested = (self.spent - self.available) as u32;
+            return Err(CodecError::EndOfMessage { requested, available: 0 });
+        }
+        Ok(index)
     }
 
     fn uniform(&mut self, bits: u32) -> Result<u64, CodecError> {
@@ -221,7 +235,8 @@ mod tests {
             let mut information = 0.0;
             for _ in 0..rng.random_range(1..30) {
                 let law = if rng.random() {
-                    Law::Uniform { count: rng.random_range(1..1 << rng.random_range(1..40)) }
+                    let width = rng.random_range(1..40);
+                    Law::Uniform { count: rng.random_range(1..1 << width) }
                 } else {
                     let scale = 10.0_f64.powf(rng.random_range(-2.0..6.0));
                     Law::Logistic { location: rng.random_range(-3.0..3.0) * scale, scale }
