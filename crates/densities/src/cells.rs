@@ -128,7 +128,13 @@ impl<const D: usize> Cells<D> {
                         && (determinant / size - 1.0).abs() < options.determinant_tolerance
                 });
                 if settled && width < options.width * narrowest {
-                    return Ok(Self::finished(centres, weights, total, (width, log_evidence, evaluations), (mean, covariance)));
+                    return Ok(Self::finished(
+                        centres,
+                        weights,
+                        total,
+                        (width, log_evidence, evaluations),
+                        (mean, covariance),
+                    ));
                 }
                 before = Some((log_evidence, determinant));
             }
@@ -140,7 +146,9 @@ impl<const D: usize> Cells<D> {
             centres = split(&centres, &scores, threshold, 0.25 * width, kept);
             width *= 0.5;
         }
-        Err(Error::Unresolved { cells: centres[0].len() })
+        Err(Error::Unresolved {
+            cells: centres[0].len(),
+        })
     }
 
     fn finished(
@@ -152,7 +160,10 @@ impl<const D: usize> Cells<D> {
     ) -> Self {
         let keep = |values: &[f64], scale: f64| -> Vec<f64> {
             let paired = values.iter().zip(&weights);
-            paired.filter(|(_, w)| **w > NEGLIGIBLE).map(|(v, _)| v * scale).collect()
+            paired
+                .filter(|(_, w)| **w > NEGLIGIBLE)
+                .map(|(v, _)| v * scale)
+                .collect()
         };
         let columns = centres.each_ref().map(|column| keep(column, 1.0));
         let weights = keep(&weights, total.recip());
@@ -261,7 +272,9 @@ impl<const D: usize> Belief<D> for Cells<D> {
 impl<const D: usize> Density<D> for Cells<D> {
     fn log_density(&self, state: &SVector<f64, D>) -> f64 {
         let places = self.places.get_or_init(|| {
-            (0..self.len()).map(|i| (self.place(|d| self.columns[d][i]), i)).collect()
+            (0..self.len())
+                .map(|i| (self.place(|d| self.columns[d][i]), i))
+                .collect()
         });
         match places.get(&self.place(|d| state[d])) {
             Some(i) => self.log_weights[*i] - D as f64 * self.width.ln(),
@@ -277,7 +290,9 @@ fn lattice<const D: usize>(
     most: usize,
 ) -> Result<[Vec<f64>; D], Error> {
     let counts: [usize; D] = std::array::from_fn(|d| (((upper[d] - lower[d]) / width - 1e-9).ceil() as usize).max(1));
-    let total = counts.iter().try_fold(1_usize, |product, count| product.checked_mul(*count));
+    let total = counts
+        .iter()
+        .try_fold(1_usize, |product, count| product.checked_mul(*count));
     let Some(total) = total.filter(|total| *total <= most) else {
         return Err(ArgumentError::new("per_axis", format!("{counts:?} cells"), format!("at most {most} cells")).into());
     };
@@ -294,7 +309,13 @@ fn lattice<const D: usize>(
     Ok(columns)
 }
 
-fn split<const D: usize>(centres: &[Vec<f64>; D], scores: &[f64], threshold: f64, step: f64, kept: usize) -> [Vec<f64>; D] {
+fn split<const D: usize>(
+    centres: &[Vec<f64>; D],
+    scores: &[f64],
+    threshold: f64,
+    step: f64,
+    kept: usize,
+) -> [Vec<f64>; D] {
     std::array::from_fn(|d| {
         let mut column = Vec::with_capacity(kept << D);
         for (x, score) in centres[d].iter().zip(scores) {

@@ -43,7 +43,10 @@ impl<const D: usize> Information<D> {
         Self {
             precision,
             shift: precision * mean,
-            log_weight: c.weight().ln() - 0.5 * c.factor().squared(&mean) - c.factor().half_log_det - D as f64 * LN_SQRT_2PI,
+            log_weight: c.weight().ln()
+                - 0.5 * c.factor().squared(&mean)
+                - c.factor().half_log_det
+                - D as f64 * LN_SQRT_2PI,
         }
     }
 }
@@ -70,10 +73,17 @@ fn check<const D: usize>(factors: &[&Mixture<D>]) -> Result<SVector<f64, D>, Err
 /// ([`fewbits_core::Error::Impossible`]: factors that contradict each other astronomically).
 pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<Mixture<D>>, Error> {
     let origin = check(factors)?;
-    let terms = factors.iter().try_fold(1_usize, |n, f| n.checked_mul(f.len()).filter(|n| *n <= MOST_TERMS));
+    let terms = factors
+        .iter()
+        .try_fold(1_usize, |n, f| n.checked_mul(f.len()).filter(|n| *n <= MOST_TERMS));
     if terms.is_none() {
         let sizes: Vec<usize> = factors.iter().map(|f| f.len()).collect();
-        return Err(ArgumentError::new("factors", format!("mixtures of {sizes:?} components"), format!("at most {MOST_TERMS} choices of labels")).into());
+        return Err(ArgumentError::new(
+            "factors",
+            format!("mixtures of {sizes:?} components"),
+            format!("at most {MOST_TERMS} choices of labels"),
+        )
+        .into());
     }
     let zero = Information {
         precision: SMatrix::zeros(),
@@ -82,7 +92,12 @@ pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<Mixture<
     };
     let mut products = vec![zero];
     for factor in factors {
-        let parts: Vec<Information<D>> = factor.components().iter().filter(|c| c.weight() > 0.0).map(|c| Information::of(c, &origin)).collect();
+        let parts: Vec<Information<D>> = factor
+            .components()
+            .iter()
+            .filter(|c| c.weight() > 0.0)
+            .map(|c| Information::of(c, &origin))
+            .collect();
         products = products
             .iter()
             .flat_map(|a| {
@@ -137,8 +152,10 @@ pub fn gibbs<const D: usize, R: Rng + ?Sized>(
 ) -> Result<Particles<D>, Error> {
     let origin = check(factors)?;
     at_least_one("count", count)?;
-    let parts: Vec<Vec<Information<D>>> =
-        factors.iter().map(|f| f.components().iter().map(|c| Information::of(c, &origin)).collect()).collect();
+    let parts: Vec<Vec<Information<D>>> = factors
+        .iter()
+        .map(|f| f.components().iter().map(|c| Information::of(c, &origin)).collect())
+        .collect();
     let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| Vec::with_capacity(count));
     let mut labels = vec![0; factors.len()];
     let mut logs = Vec::new();
@@ -161,7 +178,10 @@ pub fn gibbs<const D: usize, R: Rng + ?Sized>(
         let (mean, _, factor) = gaussian(&precision, &shift)?;
         let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
         let draw = origin + mean + factor.whitener.transpose() * z;
-        columns.iter_mut().zip(draw.iter()).for_each(|(column, x)| column.push(*x));
+        columns
+            .iter_mut()
+            .zip(draw.iter())
+            .for_each(|(column, x)| column.push(*x));
     }
     Particles::uniform(columns)
 }

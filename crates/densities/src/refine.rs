@@ -64,9 +64,15 @@ impl<const D: usize> Points<D> {
         let offsets = rule.points::<D>();
         let white = estimate.white();
         let columns = std::array::from_fn(|d| {
-            offsets.iter().flat_map(|(z, _)| kept.iter().map(move |i| white[d][*i] + z[d])).collect()
+            offsets
+                .iter()
+                .flat_map(|(z, _)| kept.iter().map(move |i| white[d][*i] + z[d]))
+                .collect()
         });
-        let weights = offsets.iter().flat_map(|(_, share)| kept.iter().map(move |i| weights[*i] * share)).collect();
+        let weights = offsets
+            .iter()
+            .flat_map(|(_, share)| kept.iter().map(move |i| weights[*i] * share))
+            .collect();
         Self { columns, weights }
     }
 
@@ -127,7 +133,10 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Part<D>>, shares: &m
         for (row, shares) in logs.chunks_mut(BLOCK).zip(shares.chunks_mut(n)) {
             row[..m].iter_mut().zip(&largest).for_each(|(x, l)| *x -= l);
             exp_minus(&row[..m], 0.0, &mut shares[from..from + m]);
-            total[..m].iter_mut().zip(&shares[from..from + m]).for_each(|(t, s)| *t += s);
+            total[..m]
+                .iter_mut()
+                .zip(&shares[from..from + m])
+                .for_each(|(t, s)| *t += s);
         }
         for (total, weight) in total[..m].iter_mut().zip(&points.weights[from..]) {
             *total = weight / *total;
