@@ -1,7 +1,7 @@
 //! The exact posterior of one update, over cells.
 
 use crate::rate::{RateModel, RateRange, cut_normal, log_inside};
-use crate::{Error, Record, SourceLikelihood};
+use crate::{Error, SourceLikelihood};
 use fewbits_core::{Belief, Columns, Density, Gaussian};
 use fewbits_densities::{CellOptions, CellTarget, Cells, Clumps, Lpg, Mixture};
 use nalgebra::{Matrix2, Vector2};
