@@ -212,7 +212,7 @@ pub fn series_moments<const D: usize>(
     };
     let mass = expectation(&[])?;
     if !(mass > 0.0 && mass.is_finite()) {
-        return Err(Error::Degenerate { largest: mass });
+        return Err(Error::IMPOSSIBLE);
     }
     let mut first = SVector::<f64, D>::zeros();
     let mut second = SMatrix::<f64, D, D>::zeros();
