@@ -6,9 +6,9 @@ use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
-use fewbits_core::{Belief, Cell, Dynamics, Factor, Gaussian, Likelihood, Link, Observation, Sensing};
-use fewbits_densities::Particles;
-use fewbits_filters::{ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
+use fewbits_core::{Belief, Cell, Dynamics, Factor, Gaussian, Likelihood, Link, Observation, Observed, Sensing};
+use fewbits_densities::{GaussianCloud, Particles};
+use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix2, Matrix4, SVector, Vector1, Vector2, Vector4};
@@ -35,7 +35,7 @@ fn referee(belief: &Gaussian<2>, likelihood: &impl Likelihood<2>) -> (Particles<
     let mut rng = Stream::new(77).fast_rng();
     let mut cloud = Particles::from_draws(200_000, || belief.sample(&mut rng)).unwrap();
     let log_likelihood = ParticleFilter::default()
-        .update(likelihood, &mut cloud)
+        .update(&mut cloud, likelihood)
         .unwrap()
         .log_likelihood;
     (cloud, log_likelihood)
@@ -156,7 +156,8 @@ fn the_three_centres_agree_over_a_run() {
     let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5));
     let mut workspace = Workspace::default();
     let mut cloud = Particles::from_draws(30_000, || *start.mean()).unwrap();
-    let mut rao = RaoBlackwellised::new(&start, 3_000).unwrap();
+    let (mixture, mut clouds) = (RaoBlackwellised::new(filter), CloudWorkspace::default());
+    let mut rao = GaussianCloud::agreed(&start, 3_000).unwrap();
     let (mut squares, mut lowest) = ([0.0; 2], f64::INFINITY);
     for _ in 0..20 {
         truth = dynamics.propagate(&mut truth_rng, &truth);
@@ -170,10 +171,10 @@ fn the_three_centres_agree_over_a_run() {
 
         let likelihood = network.likelihood(&rules, &broadcast, &observations).unwrap();
         filter
-            .step_in_place(&mut rng, &dynamics, &likelihood, &mut cloud, &mut workspace)
+            .step_in_place(&mut rng, &dynamics, &mut cloud, &likelihood, &mut workspace)
             .unwrap();
 
-        rao.predict(&mut rng, &filter, &dynamics, &mut workspace).unwrap();
+        mixture.predict(&mut rng, &dynamics, &mut rao, &mut clouds).unwrap();
         let c = rules[0].half_width();
         let cell = Cell::new(broadcast[0] - c, broadcast[0] + c).unwrap();
         for observation in &observations {
@@ -181,7 +182,7 @@ fn the_three_centres_agree_over_a_run() {
                 Observation::Received(z) => Value::scalar(z[0], 1.0).unwrap().into(),
                 _ => InCell::certain(cell, 1.0).unwrap().into(),
             };
-            rao.update(&mut rng, &sensor, &what).unwrap();
+            mixture.update(&mut rng, &mut rao, &Observed::new(sensor, what), &mut clouds).unwrap();
         }
         let exact = rao.gaussian();
         let scale = exact.standard_deviations();
