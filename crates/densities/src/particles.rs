@@ -5,8 +5,7 @@ use crate::stored::StoredParticles;
 use fewbits_core::{Belief, Columns, ColumnsMut};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one};
-use fewbits_numerics::exponential::exp_minus;
-use fewbits_numerics::sums::{dot, lanes, largest, sum};
+use fewbits_numerics::kernels::{dot, exp_minus, largest, sum, weighted_covariance};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -196,9 +195,9 @@ impl<const D: usize> Particles<D> {
         self.scratch.clear();
         self.scratch.extend_from_slice(&self.log_weights);
         change(self.columns.each_ref().map(Vec::as_slice), &mut self.scratch);
-        let log_sum = normalise(&mut self.scratch, &mut self.weights)?;
+        let (log_sum, effective_sample_size) = normalise(&mut self.scratch, &mut self.weights)?;
         std::mem::swap(&mut self.log_weights, &mut self.scratch);
-        self.effective_sample_size = 1.0 / dot(&self.weights, &self.weights);
+        self.effective_sample_size = effective_sample_size;
         Ok(log_sum)
     }
 
@@ -294,9 +293,7 @@ impl<const D: usize> Particles<D> {
         let mut covariance = SMatrix::zeros();
         for i in 0..D {
             for j in 0..=i {
-                let (a, b) = (&self.columns[i][..w.len()], &self.columns[j][..w.len()]);
-                let (ma, mb) = (mean[i], mean[j]);
-                let entry = lanes(w.len(), |k| w[k] * (a[k] - ma) * (b[k] - mb));
+                let entry = weighted_covariance(w, (&self.columns[i], mean[i]), (&self.columns[j], mean[j]));
                 covariance[(i, j)] = entry;
                 covariance[(j, i)] = entry;
             }
@@ -397,20 +394,20 @@ fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut Vec<f64>) {
     }
 }
 
-/// Normalises log weights and writes their exponentials; returns `ln sum exp`. On failure `weights` is as it was.
-fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<f64, Error> {
+/// Normalises log weights and writes their exponentials; returns `ln sum exp` and the effective
+/// sample size. On failure `weights` is as it was.
+fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error> {
     let largest = largest(logs);
     // Without `+inf`, which `largest` would show, the sum is NaN if and only if a weight is.
     if !largest.is_finite() || sum(logs).is_nan() {
         return Err(Error::IMPOSSIBLE);
     }
-    exp_minus(logs, largest, weights);
-    let total = sum(weights);
-    let log_sum = largest + total.ln();
-    let scale = 1.0 / total;
+    let sums = exp_minus(logs, largest, weights);
+    let log_sum = largest + sums.sum.ln();
+    let scale = 1.0 / sums.sum;
     weights.iter_mut().for_each(|w| *w *= scale);
     logs.iter_mut().for_each(|w| *w -= log_sum);
-    Ok(log_sum)
+    Ok((log_sum, sums.sum * sums.sum / sums.sum_of_squares))
 }
 
 impl<const D: usize> From<Particles<D>> for StoredParticles {

@@ -201,8 +201,9 @@ impl Imputation {
                     return (predicted, total);
                 }
                 let (lower, upper) = choose(rng, pieces, predicted, deviation, total);
-                let z = normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation);
-                (predicted + deviation * z, total)
+                // A piece of positive mass holds numbers: it is never refused.
+                normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation)
+                    .map_or((predicted, total), |z| (predicted + deviation * z, total))
             }
         }
     }

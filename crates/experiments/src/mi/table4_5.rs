@@ -1,10 +1,10 @@
 //! Table 4.5: words over a binary symmetric channel, and what a wrong assumption about it costs.
 
 use super::common::{MI, MSE, bsc, cell, design_table, exact, lloyd_system, odd, push_design, push_joint, scene};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, Value, claim, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, Value, claim, column, row};
-use fewbits_quantizers::design::Design;
-use fewbits_quantizers::{Newton, System, design};
+use fewbits_quantizer_design::design::Design;
+use fewbits_quantizer_design::{Newton, System, design};
 use serde::{Deserialize, Serialize};
 
 const LABELLINGS: [(&str, [u32; 4]); 3] = [
@@ -50,7 +50,7 @@ fn joint(
     p: &Parameters,
     words: &[u32],
     crossover: f64,
-    criterion: fewbits_quantizers::Criterion,
+    criterion: fewbits_quantizer_design::Criterion,
 ) -> Result<Design, Error> {
     Ok(design::joint(&start(p, words, crossover)?, criterion, &Newton::default())?)
 }
