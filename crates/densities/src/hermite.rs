@@ -79,7 +79,10 @@ impl<const D: usize> Polynomial<D> {
         let mut terms: Vec<_> = self.terms.iter().collect();
         // The order of a hash map is not the same in every run.
         terms.sort_by(|a, b| a.0.cmp(b.0));
-        terms.iter().map(|(index, c)| **c * (0..D).map(|d| z[d].powi(index[d] as i32)).product::<f64>()).sum()
+        terms
+            .iter()
+            .map(|(index, c)| **c * (0..D).map(|d| z[d].powi(index[d] as i32)).product::<f64>())
+            .sum()
     }
 }
 
@@ -93,7 +96,9 @@ fn polynomial_of<const D: usize>(nu: [usize; D], w: &SMatrix<f64, D, D>) -> Poly
             return polynomial.clone();
         }
         let Some(i) = nu.iter().position(|n| *n > 0) else {
-            return Polynomial { terms: [([0; D], 1.0)].into() };
+            return Polynomial {
+                terms: [([0; D], 1.0)].into(),
+            };
         };
         let mut below = nu;
         below[i] -= 1;
@@ -135,7 +140,9 @@ pub fn gaussian_moment<const D: usize>(
         covariance: &SMatrix<f64, D, D>,
         known: &mut HashMap<[usize; D], f64>,
     ) -> f64 {
-        let Some(i) = nu.iter().position(|n| *n > 0) else { return 1.0 };
+        let Some(i) = nu.iter().position(|n| *n > 0) else {
+            return 1.0;
+        };
         if let Some(value) = known.get(&nu) {
             return *value;
         }
@@ -205,7 +212,7 @@ pub fn series_moments<const D: usize>(
     };
     let mass = expectation(&[])?;
     if !(mass > 0.0 && mass.is_finite()) {
-        return Err(Error::Degenerate { largest: mass });
+        return Err(Error::IMPOSSIBLE);
     }
     let mut first = SVector::<f64, D>::zeros();
     let mut second = SMatrix::<f64, D, D>::zeros();

@@ -4,9 +4,9 @@ use crate::matrix::Factored;
 use crate::{Bandwidth, Component, Error, Mixture, Particles};
 use fewbits_core::Columns;
 use fewbits_numerics::error::at_least_one;
-use fewbits_numerics::exponential::exp_minus;
+use fewbits_numerics::kernels::exp_minus;
+use fewbits_numerics::kernels::{dot, sum};
 use fewbits_numerics::normal::LN_SQRT_2PI;
-use fewbits_numerics::sums::{dot, lanes};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -123,7 +123,7 @@ impl<const D: usize> KernelEstimate<D> {
         for (p, out) in out.iter_mut().enumerate() {
             let z: [f64; D] = std::array::from_fn(|d| points[d][p]);
             half_squares(&self.white, &z, 0, &mut logs);
-            let nearest = fewbits_numerics::sums::largest(&logs);
+            let nearest = fewbits_numerics::kernels::largest(&logs);
             if nearest == f64::NEG_INFINITY {
                 *out = f64::NEG_INFINITY;
                 continue;
@@ -146,7 +146,10 @@ impl<const D: usize> KernelEstimate<D> {
             exp_minus(&logs[..rest], 0.0, &mut kernels[..rest]);
             sums[i] += dot(&weights[i + 1..], &kernels[..rest]);
             let w = weights[i];
-            sums[i + 1..].iter_mut().zip(&kernels).for_each(|(sum, k)| *sum += w * k);
+            sums[i + 1..]
+                .iter_mut()
+                .zip(&kernels)
+                .for_each(|(sum, k)| *sum += w * k);
         }
         let offset = self.factor.half_log_det + D as f64 * LN_SQRT_2PI;
         sums.iter().map(|s| s.ln() - offset).collect()
@@ -184,7 +187,7 @@ impl<const D: usize> KernelEstimate<D> {
 /// Indices of `count` systematic draws from `weights`: index `i` comes up `count w_i` times, rounded up or down.
 pub(crate) fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<usize> {
     let offset: f64 = rng.random();
-    let total: f64 = lanes(weights.len(), |i| weights[i]);
+    let total = sum(weights);
     let mut i = 0;
     let mut cumulative = weights.first().copied().unwrap_or(0.0);
     (0..count)
@@ -209,7 +212,11 @@ pub(crate) fn whitened<const D: usize>(
     std::array::from_fn(|i| {
         range
             .clone()
-            .map(|k| (0..=i).map(|j| factor.whitener[(i, j)] * (columns[j][k] - origin[j])).sum())
+            .map(|k| {
+                (0..=i)
+                    .map(|j| factor.whitener[(i, j)] * (columns[j][k] - origin[j]))
+                    .sum()
+            })
             .collect()
     })
 }
@@ -240,7 +247,9 @@ struct Stored<const D: usize> {
 impl<const D: usize> From<KernelEstimate<D>> for Stored<D> {
     fn from(estimate: KernelEstimate<D>) -> Self {
         Self {
-            kernel: (0..D).map(|i| estimate.kernel.row(i).iter().copied().collect()).collect(),
+            kernel: (0..D)
+                .map(|i| estimate.kernel.row(i).iter().copied().collect())
+                .collect(),
             particles: estimate.particles,
         }
     }
@@ -251,7 +260,12 @@ impl<const D: usize> TryFrom<Stored<D>> for KernelEstimate<D> {
 
     fn try_from(stored: Stored<D>) -> Result<Self, Error> {
         if stored.kernel.len() != D || stored.kernel.iter().any(|row| row.len() != D) {
-            return Err(fewbits_numerics::ArgumentError::new("kernel", "of another shape", format!("{D} by {D} numbers")).into());
+            return Err(fewbits_numerics::ArgumentError::new(
+                "kernel",
+                "of another shape",
+                format!("{D} by {D} numbers"),
+            )
+            .into());
         }
         let kernel = SMatrix::from_fn(|i, j| stored.kernel[i][j]);
         Self::new(stored.particles, kernel)

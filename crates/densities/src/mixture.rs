@@ -5,7 +5,7 @@ use crate::{Error, Particles};
 use fewbits_core::{Columns, Gaussian};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, non_negative};
-use fewbits_numerics::exponential::exp_minus;
+use fewbits_numerics::kernels::exp_minus;
 use fewbits_numerics::normal::{self, LN_SQRT_2PI};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -180,7 +180,11 @@ impl<const D: usize> Mixture<D> {
                 sum += (term - largest).exp();
             }
         }
-        if largest == f64::NEG_INFINITY { largest } else { largest + sum.ln() }
+        if largest == f64::NEG_INFINITY {
+            largest
+        } else {
+            largest + sum.ln()
+        }
     }
 
     /// Writes `ln p` of every point of `columns` to `out`; points beyond the end of `out` are passed over.
@@ -215,7 +219,11 @@ impl<const D: usize> Mixture<D> {
             for row in terms.chunks_mut(BLOCK) {
                 for k in 0..n {
                     // A point beyond every component leaves `-inf` in all rows.
-                    row[k] = if largest[k] == f64::NEG_INFINITY { f64::NEG_INFINITY } else { row[k] - largest[k] };
+                    row[k] = if largest[k] == f64::NEG_INFINITY {
+                        f64::NEG_INFINITY
+                    } else {
+                        row[k] - largest[k]
+                    };
                 }
                 exp_minus(&row[..n], 0.0, &mut exponentials[..n]);
                 for k in 0..n {
@@ -231,7 +239,7 @@ impl<const D: usize> Mixture<D> {
     /// Posterior probabilities of the components at `x`; `None` where the density underflows for every component.
     pub fn responsibilities(&self, x: &SVector<f64, D>) -> Option<Vec<f64>> {
         let logs: Vec<f64> = self.components.iter().map(|c| c.weight.ln() + c.log_pdf(x)).collect();
-        let largest = fewbits_numerics::sums::largest(&logs);
+        let largest = fewbits_numerics::kernels::largest(&logs);
         if !largest.is_finite() {
             return None;
         }
@@ -299,10 +307,15 @@ impl<const D: usize> Mixture<D> {
     ///
     /// # Errors
     /// If the image of a component is singular or not finite.
-    pub fn affine<const K: usize>(&self, matrix: &SMatrix<f64, K, D>, shift: &SVector<f64, K>) -> Result<Mixture<K>, Error> {
-        let components = self.components.iter().map(|c| {
-            Component::new(c.weight, matrix * c.mean + shift, matrix * c.covariance * matrix.transpose())
-        });
+    pub fn affine<const K: usize>(
+        &self,
+        matrix: &SMatrix<f64, K, D>,
+        shift: &SVector<f64, K>,
+    ) -> Result<Mixture<K>, Error> {
+        let components = self
+            .components
+            .iter()
+            .map(|c| Component::new(c.weight, matrix * c.mean + shift, matrix * c.covariance * matrix.transpose()));
         Mixture::new(components.collect::<Result<_, _>>()?)
     }
 }

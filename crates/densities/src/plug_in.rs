@@ -1,9 +1,9 @@
 //! Errors of a kernel estimate's approximations, estimated at its centres or around them.
 
-use crate::matrix::Factored;
 use crate::kernel::half_squares;
+use crate::matrix::Factored;
 use crate::{Error, KernelEstimate, Mixture, Tree};
-use fewbits_numerics::exponential::exp_minus;
+use fewbits_numerics::kernels::exp_minus;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -48,7 +48,9 @@ pub fn plug_in<const D: usize>(p: &KernelEstimate<D>, q: &Mixture<D>) -> PlugIn 
     let mut other = vec![0.0; p.len()];
     q.log_pdf_columns(p.particles().columns(), &mut other);
     let weights = p.particles().weights();
-    let ratios = (0..p.len()).filter(|i| weights[*i] > 0.0).map(|i| (weights[i], own[i] - other[i]));
+    let ratios = (0..p.len())
+        .filter(|i| weights[*i] > 0.0)
+        .map(|i| (weights[i], own[i] - other[i]));
     PlugIn::of(ratios)
 }
 
@@ -165,7 +167,7 @@ pub fn node_errors<const D: usize>(estimate: &KernelEstimate<D>, tree: &Tree<D>)
             let z: [f64; D] = std::array::from_fn(|d| white[d][i]);
             half_squares(&white, &z, middle, &mut logs[..width]);
             exp_minus(&logs[..width], 0.0, &mut kernels[..width]);
-            sums[i] += fewbits_numerics::sums::dot(&weight[middle..node.range.end], &kernels[..width]);
+            sums[i] += fewbits_numerics::kernels::dot(&weight[middle..node.range.end], &kernels[..width]);
             let w = weight[i];
             let across = &mut sums[middle..node.range.end];
             across.iter_mut().zip(&kernels).for_each(|(sum, k)| *sum += w * k);

@@ -2,8 +2,8 @@
 
 use crate::matrix::{Factored, eigen};
 use crate::{Component, Cubature, Error, KernelEstimate, Mixture};
-use fewbits_numerics::exponential::exp_minus;
-use fewbits_numerics::sums::sum;
+use fewbits_numerics::kernels::exp_minus;
+use fewbits_numerics::kernels::sum;
 use nalgebra::{SMatrix, SVector};
 
 /// Improves a mixture as an approximation of a kernel estimate by `iterations` steps of expectation-maximisation over the
@@ -64,9 +64,15 @@ impl<const D: usize> Points<D> {
         let offsets = rule.points::<D>();
         let white = estimate.white();
         let columns = std::array::from_fn(|d| {
-            offsets.iter().flat_map(|(z, _)| kept.iter().map(move |i| white[d][*i] + z[d])).collect()
+            offsets
+                .iter()
+                .flat_map(|(z, _)| kept.iter().map(move |i| white[d][*i] + z[d]))
+                .collect()
         });
-        let weights = offsets.iter().flat_map(|(_, share)| kept.iter().map(move |i| weights[*i] * share)).collect();
+        let weights = offsets
+            .iter()
+            .flat_map(|(_, share)| kept.iter().map(move |i| weights[*i] * share))
+            .collect();
         Self { columns, weights }
     }
 
@@ -127,7 +133,10 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Part<D>>, shares: &m
         for (row, shares) in logs.chunks_mut(BLOCK).zip(shares.chunks_mut(n)) {
             row[..m].iter_mut().zip(&largest).for_each(|(x, l)| *x -= l);
             exp_minus(&row[..m], 0.0, &mut shares[from..from + m]);
-            total[..m].iter_mut().zip(&shares[from..from + m]).for_each(|(t, s)| *t += s);
+            total[..m]
+                .iter_mut()
+                .zip(&shares[from..from + m])
+                .for_each(|(t, s)| *t += s);
         }
         for (total, weight) in total[..m].iter_mut().zip(&points.weights[from..]) {
             *total = weight / *total;
@@ -149,12 +158,12 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Part<D>>, shares: &m
 
 /// Moments of the points under the given shares, with the eigenvalue floor.
 fn moments<const D: usize>(points: &Points<D>, share: &[f64], weight: f64) -> Result<Part<D>, Error> {
-    let mean = SVector::<f64, D>::from_fn(|d, _| fewbits_numerics::sums::dot(share, &points.columns[d]) / weight);
+    let mean = SVector::<f64, D>::from_fn(|d, _| fewbits_numerics::kernels::dot(share, &points.columns[d]) / weight);
     let mut covariance = SMatrix::<f64, D, D>::zeros();
     for a in 0..D {
         for b in 0..=a {
             let (x, y) = (&points.columns[a][..share.len()], &points.columns[b][..share.len()]);
-            let entry = fewbits_numerics::sums::lanes(share.len(), |p| share[p] * (x[p] - mean[a]) * (y[p] - mean[b]));
+            let entry = fewbits_numerics::kernels::weighted_covariance(share, (x, mean[a]), (y, mean[b]));
             covariance[(a, b)] = entry / weight;
             covariance[(b, a)] = entry / weight;
         }

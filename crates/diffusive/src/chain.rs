@@ -300,7 +300,7 @@ fn visited_ids(steps: &[Step]) -> Vec<usize> {
 /// Failures of a belief that end a search; others are errors.
 fn failure(error: &Error) -> Option<Status> {
     match error {
-        Error::Density(fewbits_densities::Error::BeliefMiss { .. } | fewbits_densities::Error::Degenerate { .. }) => {
+        Error::Density(fewbits_densities::Error::Core(fewbits_core::Error::Impossible)) => {
             Some(Status::BeliefMiss)
         }
         Error::Density(fewbits_densities::Error::Unresolved { .. }) => Some(Status::Unresolved),

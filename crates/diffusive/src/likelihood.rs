@@ -39,7 +39,9 @@ impl SourceLikelihood {
     /// Sums over all records with the source at `position`.
     #[inline]
     pub fn sums(&self, position: &Vector2<f64>) -> RateSums {
-        self.records.iter().fold(RateSums::default(), |sum, record| sum.plus(&record.sums(position)))
+        self.records
+            .iter()
+            .fold(RateSums::default(), |sum, record| sum.plus(&record.sums(position)))
     }
 
     /// The log likelihood blurred over a cell of the given half width, and the log likelihood itself where the first exceeds
@@ -89,9 +91,11 @@ impl Likelihood<2> for SourceLikelihood {
             RateModel::Known(rate) => self.sums(position).log_given_rate(*rate),
             RateModel::Joint(range) => self.sums(position).log_marginal(range),
             RateModel::NodeWise(range) => self.records.iter().map(|r| r.sums(position).log_marginal(range)).sum(),
-            RateModel::SampleWise(range) => {
-                self.records.iter().map(|r| r.log_sample_wise(position, range, 1.0)).sum()
-            }
+            RateModel::SampleWise(range) => self
+                .records
+                .iter()
+                .map(|r| r.log_sample_wise(position, range, 1.0))
+                .sum(),
         }
     }
 }
@@ -112,6 +116,9 @@ impl RateLikelihood {
 impl Likelihood<3> for RateLikelihood {
     fn log_likelihood(&self, state: &SVector<f64, 3>) -> f64 {
         let position = Vector2::new(state[0], state[1]);
-        self.records.iter().map(|record| record.sums(&position).log_given_rate(state[2])).sum()
+        self.records
+            .iter()
+            .map(|record| record.sums(&position).log_given_rate(state[2]))
+            .sum()
     }
 }

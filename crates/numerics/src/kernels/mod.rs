@@ -43,7 +43,7 @@ pub(crate) mod tail;
 
 pub use reduce::{ExpSums, dot, exp_minus, largest, log_sum_exp, sum, weighted_covariance};
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::Arch;
 
 /// The functions of the slices one element at a time: no branches, no calls, always inlined. For loops under [`vectorised`];
 /// elsewhere [`normal`](crate::normal) has the same functions under the same names.
@@ -57,7 +57,7 @@ pub mod scalar {
 ///
 /// `work` is a loop over slices that calls [`scalar`] functions; give the closure `#[inline(always)]`.
 #[inline(always)]
-pub fn vectorised<W: NullaryFnOnce>(work: W) -> W::Output {
+pub fn vectorised<R>(work: impl FnOnce() -> R) -> R {
     Arch::new().dispatch(work)
 }
 
