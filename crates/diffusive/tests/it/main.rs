@@ -1,3 +1,4 @@
 //! Tests of the search for a diffusive source.
 
 mod fixtures;
+mod scratch;
