@@ -5,7 +5,9 @@
 use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
-use fewbits_dymbo::{CellIndex, CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, SignFilter};
+use fewbits_dymbo::{
+    CellIndex, CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, SignFilter,
+};
 use fewbits_models::{ScalarSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix4, Vector4};
@@ -61,7 +63,11 @@ fn bit_update_any_threshold(bencher: Bencher, threshold: f64) {
 fn bit_update_noisy_link(bencher: Bencher) {
     let prior = scalar().1;
     let link = Link::flipping(0.1).unwrap();
-    bencher.bench(|| InCell::sign(Sign::Above, black_box(1.6), 1.0, &link).unwrap().tilted(black_box(&prior)));
+    bencher.bench(|| {
+        InCell::sign(Sign::Above, black_box(1.6), 1.0, &link)
+            .unwrap()
+            .tilted(black_box(&prior))
+    });
 }
 
 /// A wide cell around the mean, by closed form, and a far one, by quadrature.
@@ -69,7 +75,11 @@ fn bit_update_noisy_link(bencher: Bencher) {
 fn cell_update_unit_cell(bencher: Bencher, lower: f64) {
     let prior = scalar().1;
     let cell = Cell::new(lower, lower + 1.0).unwrap();
-    bencher.bench(|| InCell::certain(*black_box(&cell), 1.0).unwrap().tilted(black_box(&prior)));
+    bencher.bench(|| {
+        InCell::certain(*black_box(&cell), 1.0)
+            .unwrap()
+            .tilted(black_box(&prior))
+    });
 }
 
 /// A target in the plane and a sensor of its position along one axis.
@@ -90,7 +100,9 @@ fn vector_bit_4d(bencher: Bencher) {
 fn vector_predict_and_bit_4d(bencher: Bencher) {
     let (belief, sensor) = plane();
     let filter = SignFilter::new(constant_velocity_2d(1.0, 0.1).unwrap(), [sensor]);
-    bencher.bench(|| filter.update(&filter.predict(black_box(&belief)), 0, &Observation::Received(black_box(Sign::Above))));
+    bencher.bench(|| {
+        filter.update(&filter.predict(black_box(&belief)), 0, &Observation::Received(black_box(Sign::Above)))
+    });
 }
 
 #[divan::bench]
@@ -107,6 +119,8 @@ fn vector_three_bits_at_once_4d(bencher: Bencher) {
 fn exact_fusion_at_once(bencher: Bencher, sensors: usize) {
     let filter = ParallelFilter::new(*ScalarFilter::plant(&scalar().0), sensors, CountFusion::Exact).unwrap();
     let belief = Gaussian::scalar(0.3, 1e4).unwrap();
-    let bits: Vec<_> = (0..sensors).map(|i| Observation::Received(if i % 2 == 0 { Sign::Above } else { Sign::Below })).collect();
+    let bits: Vec<_> = (0..sensors)
+        .map(|i| Observation::Received(if i % 2 == 0 { Sign::Above } else { Sign::Below }))
+        .collect();
     bencher.bench_local(|| filter.step(black_box(&belief), black_box(&bits)));
 }

@@ -34,6 +34,9 @@ pub enum Error {
     /// No quantizer table.
     #[error(transparent)]
     Quantizer(#[from] fewbits_quantizers::Error),
+    /// No root of a steady-state equation.
+    #[error(transparent)]
+    Root(#[from] fewbits_numerics::roots::RootError),
     /// An iteration did not settle.
     #[error("{what} did not settle within {iterations} iterations")]
     NotConverged {

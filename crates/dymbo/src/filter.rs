@@ -321,7 +321,8 @@ mod tests {
         let known = Gaussian::scalar(2.0, 0.0).unwrap();
         assert_eq!(still.step(&known, &above).unwrap().0, known);
         // Half of all bits inverted: the same.
-        let useless = DymboFilter::new(ScalarPlant::new(0.5, 1.0, 1.0).unwrap()).with_link(Link::flipping(0.5).unwrap());
+        let useless =
+            DymboFilter::new(ScalarPlant::new(0.5, 1.0, 1.0).unwrap()).with_link(Link::flipping(0.5).unwrap());
         let belief = Gaussian::scalar(2.0, 1.0).unwrap();
         assert_eq!(useless.step(&belief, &above).unwrap().0, useless.predict(&belief));
         let huge = Gaussian::scalar(f64::MAX, f64::MAX).unwrap();

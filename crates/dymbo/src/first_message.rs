@@ -149,7 +149,11 @@ impl RoundedSample {
             return Err(ArgumentError::new("multiple", multiple.0, format!("a number from {least} to {most}")));
         }
         let edge = |offset: f64| self.resolution * (multiple.0 as f64 + offset);
-        let lower = if multiple.0 == least { f64::NEG_INFINITY } else { edge(-0.5) };
+        let lower = if multiple.0 == least {
+            f64::NEG_INFINITY
+        } else {
+            edge(-0.5)
+        };
         let upper = if multiple.0 == most { f64::INFINITY } else { edge(0.5) };
         Cell::new(lower, upper)
     }
@@ -180,12 +184,7 @@ impl Scheme<1> for RoundedSample {
     }
 
     /// Over a link that inverts bits, words of up to 12 bits.
-    fn factor(
-        &self,
-        (): &(),
-        observation: &Observation<Multiple>,
-        link: &Link,
-    ) -> Result<Scalar, fewbits_core::Error> {
+    fn factor(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
         let Observation::Received(multiple) = observation else {
             return Ok(Constant::new(missing_probability(observation, link).unwrap_or(1.0))?.into());
         };
@@ -392,10 +391,7 @@ mod tests {
                 })
                 .sum();
             let known = Gaussian::scalar(theta, 0.0).unwrap();
-            assert!(
-                (first_message_mse(&scheme, &known) - direct).abs() < 1e-11 * direct,
-                "{sigma} {tau} {theta}"
-            );
+            assert!((first_message_mse(&scheme, &known) - direct).abs() < 1e-11 * direct, "{sigma} {tau} {theta}");
             let spread = Gaussian::scalar(theta, 0.7).unwrap();
             let averaged = gauss_legendre::<64>().composite(theta - 7.0, theta + 7.0, 8, |t| {
                 let here = Gaussian::scalar(t, 0.0).unwrap();

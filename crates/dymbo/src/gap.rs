@@ -180,7 +180,11 @@ mod tests {
                 let mut sum = 0.0;
                 for n in 0..60 {
                     twin.step(&mut rng).unwrap();
-                    sum += if n < 20 { 0.0 } else { twin.density().variance() + twin.excess() };
+                    sum += if n < 20 {
+                        0.0
+                    } else {
+                        twin.density().variance() + twin.excess()
+                    };
                 }
                 sum / 40.0
             })

@@ -124,7 +124,10 @@ impl InnovationWord {
     pub fn word(&self, measurement: f64, prediction: &Prediction) -> Result<CellIndex, ArgumentError> {
         let scale = positive("deviation", prediction.deviation)?;
         let offset = finite("measurement", measurement)? - finite("prediction", prediction.mean)?;
-        let below = self.quantizer.breakpoints().partition_point(|edge| *edge <= offset / scale);
+        let below = self
+            .quantizer
+            .breakpoints()
+            .partition_point(|edge| *edge <= offset / scale);
         Ok(CellIndex(below as u16))
     }
 

@@ -182,7 +182,9 @@ mod tests {
             let dymbo = DymboFilter::new(plant()).with_link(link);
             assert!((multibit.information() - dymbo.information()).abs() < 1e-15);
             for (index, sign) in [(0, Sign::Below), (1, Sign::Above)] {
-                let (a, word) = multibit.step(&belief, &Observation::Received(CellIndex(index))).unwrap();
+                let (a, word) = multibit
+                    .step(&belief, &Observation::Received(CellIndex(index)))
+                    .unwrap();
                 let (b, bit) = dymbo.step(&belief, &Observation::Received(sign)).unwrap();
                 assert!((a.mean()[0] - b.mean()[0]).abs() < 1e-14);
                 assert!((a.covariance()[0] - b.covariance()[0]).abs() < 1e-14);
@@ -201,7 +203,10 @@ mod tests {
             let (mut mass, mut variance) = (0.0, 0.0);
             for word in (0..8).map(|i| Observation::Received(CellIndex(i))) {
                 let (posterior, info) = filter.step(&belief, &word).unwrap();
-                let factor = filter.scheme().factor(&filter.broadcast(&belief), &word, &link).unwrap();
+                let factor = filter
+                    .scheme()
+                    .factor(&filter.broadcast(&belief), &word, &link)
+                    .unwrap();
                 let (exact, seen) = assumed_density::update(&predicted, &Matrix1::identity(), &factor).unwrap();
                 assert!((posterior.mean()[0] - exact.mean()[0]).abs() < 1e-12);
                 assert!((info.log_likelihood - seen.log_likelihood).abs() < 1e-12);

@@ -10,6 +10,7 @@ use crate::sign_bit::SignBit;
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::Product;
 use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme, Sign};
+use fewbits_numerics::binomial::log_row;
 use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::normal::{self, SQRT_2_OVER_PI};
 use fewbits_numerics::quadrature::gauss_legendre;
@@ -176,7 +177,11 @@ impl ParallelFilter {
         let report = Report {
             correction,
             variance,
-            information: if p > 0.0 { (p - variance) / p * ((p + r) / p) } else { 0.0 },
+            information: if p > 0.0 {
+                (p - variance) / p * ((p + r) / p)
+            } else {
+                0.0
+            },
             log_likelihood: posterior.log_evidence,
             bits: bits as u32,
         };
@@ -210,11 +215,14 @@ fn count_moments(k: usize, p: f64, r: f64, link: &Link) -> Vec<(f64, f64)> {
     }
     let terms: Vec<_> = nodes
         .into_iter()
-        .map(|(e, w)| (e, (w / deviation).ln() + normal::log_pdf(e / deviation), log_bit(e / sigma), log_bit(-e / sigma)))
+        .map(|(e, w)| {
+            (e, (w / deviation).ln() + normal::log_pdf(e / deviation), log_bit(e / sigma), log_bit(-e / sigma))
+        })
         .collect();
-    let mut log_choose = 0.0;
-    (0..=k)
-        .map(|up| {
+    log_row(k)
+        .into_iter()
+        .enumerate()
+        .map(|(up, log_choose)| {
             let (u, d) = (up as f64, (k - up) as f64);
             let (mut mass, mut first) = (0.0, 0.0);
             for (e, log_weight, log_up, log_down) in &terms {
@@ -222,7 +230,6 @@ fn count_moments(k: usize, p: f64, r: f64, link: &Link) -> Vec<(f64, f64)> {
                 mass += density;
                 first += density * e;
             }
-            log_choose += (d / (u + 1.0)).ln();
             (mass, if mass > 0.0 { first / mass } else { 0.0 })
         })
         .collect()
@@ -240,7 +247,9 @@ mod tests {
 
     /// `up` bits of `+1` among `k`.
     fn count(k: usize, up: usize) -> Vec<Observation<Sign>> {
-        (0..k).map(|i| Observation::Received(if i < up { Sign::Above } else { Sign::Below })).collect()
+        (0..k)
+            .map(|i| Observation::Received(if i < up { Sign::Above } else { Sign::Below }))
+            .collect()
     }
 
     #[test]
@@ -265,7 +274,11 @@ mod tests {
 
     #[test]
     fn counts_are_a_distribution_and_the_table_beats_the_line() {
-        for (k, link) in [(2, Link::PERFECT), (5, Link::flipping(0.1).unwrap()), (40, Link::PERFECT)] {
+        for (k, link) in [
+            (2, Link::PERFECT),
+            (5, Link::flipping(0.1).unwrap()),
+            (40, Link::PERFECT),
+        ] {
             let moments = count_moments(k, 1.1, 1.0, &link);
             assert!((moments.iter().map(|m| m.0).sum::<f64>() - 1.0).abs() < 1e-12);
             let filter = |fusion| ParallelFilter::new(plant(), k, fusion).unwrap().with_link(link);
@@ -274,7 +287,11 @@ mod tests {
             assert!(exact.1 <= linear.1 + if k > 2 { 0.0 } else { 1e-14 });
             assert!(exact.0.windows(2).all(|pair| pair[0] < pair[1]));
             // The linear variance is what its corrections truly leave: E (e - d)^2.
-            let left: f64 = moments.iter().zip(&linear.0).map(|((p, m), d)| p * (d * d - 2.0 * m * d)).sum();
+            let left: f64 = moments
+                .iter()
+                .zip(&linear.0)
+                .map(|((p, m), d)| p * (d * d - 2.0 * m * d))
+                .sum();
             assert!((1.1 + left - linear.1).abs() < 1e-11);
         }
     }
@@ -302,7 +319,10 @@ mod tests {
 
     #[test]
     fn linear_fusion_saturates() {
-        let many = ParallelFilter::new(plant(), 1000, CountFusion::Linear).unwrap().table(1.0).1;
+        let many = ParallelFilter::new(plant(), 1000, CountFusion::Linear)
+            .unwrap()
+            .table(1.0)
+            .1;
         assert!((many - (1.0 - 0.5 / 0.5_f64.asin())).abs() < 2e-3);
         assert!(ParallelFilter::new(plant(), 0, CountFusion::Linear).is_err());
         assert!(ParallelFilter::new(plant(), 1001, CountFusion::Linear).is_err());

@@ -178,7 +178,11 @@ mod tests {
     fn refuses_what_is_no_number() {
         assert!(SignBit::new(0.0).is_err() && expected_information(f64::NAN, &Link::PERFECT).is_err());
         let scheme = SignBit::new(1.0).unwrap();
-        for observation in [Observation::Received(Sign::Above), Observation::Nothing, Observation::Erased] {
+        for observation in [
+            Observation::Received(Sign::Above),
+            Observation::Nothing,
+            Observation::Erased,
+        ] {
             assert!(scheme.factor(&f64::NAN, &observation, &Link::PERFECT).is_err());
         }
         assert!(serde_json::from_str::<SignBit>(r#"{"noise_variance":-1.0}"#).is_err());

@@ -63,7 +63,10 @@ mod tests {
             let moment = |k: i32| {
                 gauss_legendre::<64>().composite(-12.0, 13.0, 4, |t| t.powi(k) * posterior_density(t, &prior, 0.3, bit))
             };
-            let posterior = InCell::sign(bit, 0.5, 0.3, &Link::PERFECT).unwrap().tilted(&prior).unwrap();
+            let posterior = InCell::sign(bit, 0.5, 0.3, &Link::PERFECT)
+                .unwrap()
+                .tilted(&prior)
+                .unwrap();
             assert!((moment(0) - 1.0).abs() < 1e-12);
             assert!((moment(1) - posterior.mean[0]).abs() < 1e-12);
             assert!((moment(2) - moment(1).powi(2) - posterior.covariance[0]).abs() < 1e-12);

@@ -178,7 +178,11 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
             (self.sensors[i].direction().dot(&crosses[i]) + self.sensors[i].noise_variance()).sqrt()
         });
         let with_state = SMatrix::<f64, D, M>::from_fn(|d, i| {
-            if received(i) { crosses[i][d] * (information.sqrt() / deviations[i]) } else { 0.0 }
+            if received(i) {
+                crosses[i][d] * (information.sqrt() / deviations[i])
+            } else {
+                0.0
+            }
         });
         let bits = SMatrix::<f64, M, M>::from_fn(|i, j| {
             if i == j {
@@ -298,7 +302,10 @@ mod tests {
         let plant = ScalarPlant::new(0.9, 0.5, 1.2).unwrap();
         let predicted = Gaussian::scalar(0.7, 1.4).unwrap();
         for link in [Link::PERFECT, Link::new(0.2, 0.1).unwrap()] {
-            let (scalar, one) = DymboFilter::new(plant).with_link(link).update(&predicted, &BELOW).unwrap();
+            let (scalar, one) = DymboFilter::new(plant)
+                .with_link(link)
+                .update(&predicted, &BELOW)
+                .unwrap();
             let filter = SignFilter::new(*plant.dynamics(), [*plant.sensor()]).with_link(link);
             let (vector, same) = filter.update(&predicted, 0, &BELOW).unwrap();
             assert!((scalar.mean() - vector.mean()).amax() < 1e-14);
@@ -355,7 +362,9 @@ mod tests {
         let plant = ScalarPlant::new(0.9, 0.5, 1.0).unwrap();
         let link = Link::flipping(0.05).unwrap();
         let filter = SignFilter::new(Ar1::new(0.9, 0.5).unwrap(), [*plant.sensor(); 3]).with_link(link);
-        let count = ParallelFilter::new(plant, 3, CountFusion::Linear).unwrap().with_link(link);
+        let count = ParallelFilter::new(plant, 3, CountFusion::Linear)
+            .unwrap()
+            .with_link(link);
         let predicted = Gaussian::scalar(0.0, 1.1).unwrap();
         let (both, _) = filter.update_parallel(&predicted, &[ABOVE, ABOVE, BELOW]).unwrap();
         let (corrections, variance) = count.table(1.1);

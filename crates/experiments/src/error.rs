@@ -81,8 +81,8 @@ impl Error {
     }
 }
 
-impl<E: std::error::Error + Send + Sync + 'static> From<fewbits_monte_carlo::MonteCarloError<E>> for Error {
-    fn from(error: fewbits_monte_carlo::MonteCarloError<E>) -> Self {
+impl From<fewbits_monte_carlo::MonteCarloError> for Error {
+    fn from(error: fewbits_monte_carlo::MonteCarloError) -> Self {
         match error {
             fewbits_monte_carlo::MonteCarloError::Cancelled => Self::Cancelled,
             other => Self::failed(other),

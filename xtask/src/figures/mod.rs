@@ -5,7 +5,6 @@ mod draw;
 mod gallery;
 mod progress;
 mod record;
-mod scale;
 mod select;
 mod summary;
 mod write;
@@ -13,7 +12,7 @@ mod write;
 pub use draw::to_svg;
 
 use clap::{Args, Subcommand};
-use fewbits_experiments::{AnyFigure, Context, Outcome};
+use fewbits_experiments::{Context, Outcome};
 use record::Record;
 use std::any::Any;
 use std::collections::BTreeSet;
@@ -361,7 +360,7 @@ fn side_by_side<T: Send>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fewbits_experiments::{About, Fields, Parameter};
+    use fewbits_experiments::{About, AnyFigure, Fields, Parameter};
     use serde_json::{Map, Value as Json};
 
     struct Panics;

@@ -5,6 +5,7 @@ use crate::sign_bit::SignBit;
 use crate::{CellIndex, DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
 use fewbits_core::factor::{Factor, Product};
 use fewbits_core::{Link, Observation, Scheme, Sign};
+use fewbits_numerics::binomial::log_row;
 use fewbits_numerics::error::within;
 use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use std::f64::consts::FRAC_2_PI;
@@ -57,7 +58,8 @@ impl MessageLaw {
         let mut law = Self::empty();
         for observation in reports.iter().map(|report| Observation::Received(*report)) {
             let factor = scheme.factor(&feedback, &observation, &arriving)?;
-            law.corrections.push(filter.update(predicted, &observation)?.1.correction);
+            law.corrections
+                .push(filter.update(predicted, &observation)?.1.correction);
             law.factors.push((0.0, Product::from_iter([factor])));
         }
         Ok(law)
@@ -74,11 +76,9 @@ impl MessageLaw {
         let (above, below) = (factor(Sign::Above)?, factor(Sign::Below)?);
         let mut law = Self::empty();
         law.corrections = filter.table(predicted_variance).0;
-        let mut log_choose = 0.0;
-        for up in 0..=sensors {
+        for (up, log_choose) in log_row(sensors).into_iter().enumerate() {
             let bits = (0..sensors).map(|i| if i < up { above.clone() } else { below.clone() });
             law.factors.push((log_choose, bits.collect()));
-            log_choose += ((sensors - up) as f64 / (up + 1) as f64).ln();
         }
         Ok(law)
     }
@@ -125,7 +125,10 @@ impl MessageLaw {
     /// Probability and correction of every message when the prediction error is `error`.
     pub fn messages(&self, error: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let probability = move |(log, factor): &(f64, Product)| (log + factor.log_likelihood(&[error].into())).exp();
-        self.factors.iter().map(probability).zip(self.corrections.iter().copied())
+        self.factors
+            .iter()
+            .map(probability)
+            .zip(self.corrections.iter().copied())
     }
 }
 
@@ -147,7 +150,9 @@ mod tests {
     #[test]
     fn messages_are_a_distribution() {
         let flipping = Link::flipping(0.2).unwrap();
-        let counts = ParallelFilter::new(plant(), 4, CountFusion::Exact).unwrap().with_link(flipping);
+        let counts = ParallelFilter::new(plant(), 4, CountFusion::Exact)
+            .unwrap()
+            .with_link(flipping);
         let words = MultibitFilter::new(plant(), 3).unwrap();
         let laws = [
             MessageLaw::bit(&DymboFilter::new(plant()), 1.1, &flipping).unwrap(),
@@ -184,7 +189,12 @@ mod tests {
             close(&probabilities(&MessageLaw::count(&count, 1.1).unwrap(), e), &expected);
             let gain = (2.0 / std::f64::consts::PI).sqrt() * 1.1 / 2.1_f64.sqrt();
             let (down, up) = (e + gain, e - gain);
-            let expected = [cdf(-e) * cdf(-down), cdf(-e) * cdf(down), cdf(e) * cdf(-up), cdf(e) * cdf(up)];
+            let expected = [
+                cdf(-e) * cdf(-down),
+                cdf(-e) * cdf(down),
+                cdf(e) * cdf(-up),
+                cdf(e) * cdf(up),
+            ];
             close(&probabilities(&MessageLaw::sequence(&plant(), 1.1, 2).unwrap(), e), &expected);
         }
     }

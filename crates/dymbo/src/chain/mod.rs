@@ -146,7 +146,12 @@ impl ErrorChain {
             .grid
             .nodes()
             .zip(&self.density)
-            .map(|(e, p)| p * law.messages(e).map(|(probability, d)| probability * (e - d).powi(power)).sum::<f64>())
+            .map(|(e, p)| {
+                p * law
+                    .messages(e)
+                    .map(|(probability, d)| probability * (e - d).powi(power))
+                    .sum::<f64>()
+            })
             .sum();
         sum * self.grid.spacing()
     }

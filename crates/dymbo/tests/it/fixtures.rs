@@ -7,11 +7,13 @@ use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::chain::{self, TransientStep};
 use fewbits_dymbo::{
-    CountFusion, DymboFilter, Initialisation, Multiple, MultibitFilter, ParallelFilter, RoundedSample, ScalarFilter,
-    ScalarPlant, SignFilter, filtered_variance, first_message_mse, first_message_value, iterated, sign_bit, skew_normal,
-    steady, tree,
+    CountFusion, DymboFilter, Initialisation, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter,
+    ScalarPlant, SignFilter, filtered_variance, first_message_mse, first_message_value, iterated, sign_bit,
+    skew_normal, steady, tree,
 };
-use fewbits_filters::{Grid, PointMass, PointMassFilter, assumed_density, kalman, scalar_fixed_lag_variance, steady_state};
+use fewbits_filters::{
+    Grid, PointMass, PointMassFilter, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,
+};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
 use fewbits_quantizers::lloyd_max::gaussian_table;
 use nalgebra::{Matrix2, Vector2};
@@ -338,12 +340,18 @@ fn regress_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
     let scheme = RoundedSample::new(r, entry.number("tau")).unwrap();
     let message = scheme.round(x[0]).unwrap();
     let mut belief = Initialisation::Fine { scheme, message }.belief().unwrap();
-    let first = scheme.factor(&(), &Observation::Received(message), &Link::PERFECT).unwrap();
+    let first = scheme
+        .factor(&(), &Observation::Received(message), &Link::PERFECT)
+        .unwrap();
     let exact = PointMassFilter::new(plant.dynamics(), Grid::symmetric(16.0, 0.05).unwrap()).unwrap();
     let mut density = PointMass::new(*exact.grid(), |theta| first.log_likelihood(&[theta].into())).unwrap();
     let (mut bits, mut means, mut exact_moments) = (vec![], vec![belief.mean()[0]], vec![]);
     for sample in &x[1..] {
-        let threshold = if printed { belief.mean()[0] } else { filter.threshold(&belief) };
+        let threshold = if printed {
+            belief.mean()[0]
+        } else {
+            filter.threshold(&belief)
+        };
         let bit = Sign::of(*sample, threshold).unwrap();
         let factor = InCell::sign(bit, threshold, r, &Link::PERFECT).unwrap();
         belief = if printed {

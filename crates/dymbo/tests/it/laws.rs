@@ -24,7 +24,9 @@ where
     ] {
         scheme::total_probability(scheme_, feedback, &link, reports.to_vec(), &points).unwrap();
         for report in reports {
-            let seen = scheme_.factor(feedback, &Observation::Received(*report), &link).unwrap();
+            let seen = scheme_
+                .factor(feedback, &Observation::Received(*report), &link)
+                .unwrap();
             factor::is_a_number(&seen, &points).unwrap();
             factor::sweep_is_scalar(&seen, &points).unwrap();
             factor::tilted_is_quadrature(&seen, &prior, 14.0 * unit, 4001, 1e-7).unwrap();
@@ -43,7 +45,11 @@ where
     }
     let mut rng = Stream::new(1).rng();
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        assert!(scheme_.encode(&mut rng, &mut scheme_.start(), &Vector1::new(bad), feedback).is_err());
+        assert!(
+            scheme_
+                .encode(&mut rng, &mut scheme_.start(), &Vector1::new(bad), feedback)
+                .is_err()
+        );
     }
 }
 
@@ -78,7 +84,10 @@ fn innovation_words_obey() {
 #[test]
 fn rounded_samples_obey() {
     for unit in [1.0, 1e-4, 1e4] {
-        let rounded = RoundedSample::new(0.6 * unit * unit, 0.9 * unit).unwrap().with_bits(3).unwrap();
+        let rounded = RoundedSample::new(0.6 * unit * unit, 0.9 * unit)
+            .unwrap()
+            .with_bits(3)
+            .unwrap();
         let reports: Vec<Multiple> = (-4..4).map(Multiple).collect();
         obeys(&rounded, &(), 0.6 * unit * unit, unit, &reports);
     }

@@ -1,9 +1,10 @@
 //! The exact fusion centre without feedback: withheld measurements are imputed, the rest is Gaussian.
 
+use super::{advance, check};
 use crate::Error;
 use crate::network::{FusionInfo, Network};
-use crate::no_feedback::OwnFilters;
-use fewbits_core::{ColumnsMut, Gaussian, GaussianDynamics, LinearDynamics, Observation};
+use crate::rule::{CensoringRule, OwnRecursion, OwnStep};
+use fewbits_core::{ColumnsMut, Gaussian, LinearDynamics, LinearSensing, Observation};
 use fewbits_densities::Particles;
 use fewbits_filters::{Resampling, Schedule};
 use fewbits_numerics::linalg::symmetrised;
@@ -13,7 +14,7 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
 /// Log weight of a particle for which a sensor sent what it should have withheld: finite, so that the filter survives a
-/// message that contradicts all of them.
+/// report that contradicts all of them.
 const VIOLATION: f64 = -1e5;
 
 /// Given every measurement, sent or not, the central Kalman filter and each sensor's own are deterministic. A particle is the
@@ -28,10 +29,10 @@ const VIOLATION: f64 = -1e5;
 /// Scalar measurements are drawn from their conditional law; vector ones uniformly in the ellipsoid and weighted. With loss the
 /// silent law is `N(z) (loss + (1 - loss) 1{inside})`.
 #[derive(Debug, Clone)]
-pub(crate) struct ImputingFilter<const D: usize, const M: usize> {
-    now: Cloud<D, M>,
+pub struct ImputingFilter<const D: usize> {
+    now: Cloud<D>,
     /// The step under construction: it becomes `now` when it has succeeded.
-    next: Cloud<D, M>,
+    next: Cloud<D>,
     increments: Vec<f64>,
     ancestors: Vec<u32>,
     column: Vec<f64>,
@@ -39,10 +40,10 @@ pub(crate) struct ImputingFilter<const D: usize, const M: usize> {
 }
 
 #[derive(Debug, Clone)]
-struct Cloud<const D: usize, const M: usize> {
-    own: OwnFilters<D, M>,
+struct Cloud<const D: usize> {
+    own: Vec<OwnRecursion<D>>,
     central: Particles<D>,
-    /// Columns of the sensors' estimates, `D` a sensor.
+    /// Columns of the sensors' estimates, `D` per sensor.
     local: Vec<Vec<f64>>,
     covariance: SMatrix<f64, D, D>,
 }
@@ -53,15 +54,19 @@ struct Turn<'a, const D: usize, const M: usize> {
     factor: Cholesky<f64, Const<M>>,
     gain: SMatrix<f64, D, M>,
     own_gain: SMatrix<f64, D, M>,
-    rule: &'a crate::rule::CensoringRule<M>,
+    rule: &'a CensoringRule<M>,
     log_normaliser: f64,
     loss: f64,
 }
 
-impl<const D: usize, const M: usize> ImputingFilter<D, M> {
-    pub(crate) fn new(start: &Gaussian<D>, sensors: usize, particles: usize) -> Result<Self, Error> {
+impl<const D: usize> ImputingFilter<D> {
+    /// A filter of `particles` particles that starts from the belief all `sensors` start from.
+    ///
+    /// # Errors
+    /// If there is no particle.
+    pub fn new(start: &Gaussian<D>, sensors: usize, particles: usize) -> Result<Self, Error> {
         let now = Cloud {
-            own: OwnFilters::new(start, sensors),
+            own: vec![OwnRecursion::new(start); sensors],
             central: Particles::from_draws(particles, || *start.mean())?,
             local: (0..sensors * D).map(|c| vec![start.mean()[c % D]; particles]).collect(),
             covariance: *start.covariance(),
@@ -76,53 +81,68 @@ impl<const D: usize, const M: usize> ImputingFilter<D, M> {
         })
     }
 
-    pub(crate) fn belief(&self) -> Gaussian<D> {
+    /// Mean and covariance of the state.
+    pub fn state(&self) -> Gaussian<D> {
         let mean = self.now.central.mean();
         Gaussian::from_trusted_parts(mean, self.now.covariance + self.now.central.covariance_about(&mean))
     }
 
-    pub(crate) fn violations(&self) -> usize {
+    /// The particles: central means, with their weights.
+    pub fn means(&self) -> &Particles<D> {
+        &self.now.central
+    }
+
+    /// Number of received values so far that the rule would have withheld under every particle.
+    pub fn violations(&self) -> usize {
         self.violations
     }
 
-    pub(crate) fn step<R: Rng + ?Sized>(
+    /// One step: predict, then one observation per sensor.
+    ///
+    /// # Errors
+    /// [`Error::ObservationCount`]; if a value is not finite; [`fewbits_core::Error::Impossible`]. The belief is then as it
+    /// was.
+    pub fn step_in_place<S, R, const M: usize>(
         &mut self,
         rng: &mut R,
-        network: &Network<D, M>,
-        dynamics: &(impl LinearDynamics<D> + GaussianDynamics<D>),
-        heard: &[Observation<SVector<f64, M>>],
-    ) -> Result<FusionInfo, Error> {
-        self.resample(rng)?;
+        network: &Network<S, D, M>,
+        dynamics: &impl LinearDynamics<D>,
+        observations: &[Observation<SVector<f64, M>>],
+    ) -> Result<FusionInfo, Error>
+    where
+        S: LinearSensing<D, M> + Clone + PartialEq,
+        R: Rng + ?Sized,
+    {
+        check(network, observations)?;
         self.next.copy_from(&self.now);
+        self.resample(rng)?;
         self.next.predict(dynamics);
-        self.next.own.advance(network, dynamics)?;
+        let steps = advance(&mut self.next.own, network, dynamics)?;
         self.increments.fill(0.0);
-        let (mut received, mut violations) = (0, 0);
-        for spoken in [true, false] {
-            for (i, observation) in heard.iter().enumerate() {
-                if matches!(observation, Observation::Received(_)) == spoken {
-                    received += usize::from(spoken);
-                    let clash = self.next.hear(rng, network, i, observation, &mut self.increments)?;
+        let (mut info, mut violations) = (FusionInfo::default(), 0);
+        for received in [true, false] {
+            for (i, observation) in observations.iter().enumerate() {
+                if observation.received().is_some() == received {
+                    info.received += usize::from(received);
+                    let clash = self.next.update(rng, network, &steps[i], i, observation, &mut self.increments)?;
                     violations += usize::from(clash);
                 }
             }
         }
+        let arrival = info.received as f64 * (-network.link().loss()).ln_1p();
         let increments = &self.increments;
-        let log_likelihood = self.next.central.reweigh(|_, log_weights| {
+        info.log_likelihood = self.next.central.reweigh(|_, log_weights| {
             for (log_weight, increment) in log_weights.iter_mut().zip(increments) {
                 *log_weight += increment;
             }
-        })?;
+        })? + arrival;
         std::mem::swap(&mut self.now, &mut self.next);
         self.violations += violations;
-        Ok(FusionInfo {
-            log_likelihood,
-            received,
-        })
+        Ok(info)
     }
 
     fn resample<R: Rng + ?Sized>(&mut self, rng: &mut R) -> Result<(), Error> {
-        let cloud = &mut self.now;
+        let cloud = &mut self.next;
         if !Schedule::Below(0.5).is_due(cloud.central.effective_sample_size(), cloud.central.len()) {
             return Ok(());
         }
@@ -138,7 +158,7 @@ impl<const D: usize, const M: usize> ImputingFilter<D, M> {
     }
 }
 
-impl<const D: usize, const M: usize> Cloud<D, M> {
+impl<const D: usize> Cloud<D> {
     fn copy_from(&mut self, other: &Self) {
         self.own.clone_from(&other.own);
         self.central.clone_from(&other.central);
@@ -158,29 +178,33 @@ impl<const D: usize, const M: usize> Cloud<D, M> {
         }
     }
 
-    /// Hears one sensor; tells whether it contradicted every particle.
-    fn hear<R: Rng + ?Sized>(
+    /// Takes in one sensor; tells whether its report contradicts every particle.
+    fn update<S, R, const M: usize>(
         &mut self,
         rng: &mut R,
-        network: &Network<D, M>,
+        network: &Network<S, D, M>,
+        (step, rule): &(OwnStep<D, M>, CensoringRule<M>),
         i: usize,
         observation: &Observation<SVector<f64, M>>,
         increments: &mut [f64],
-    ) -> Result<bool, Error> {
+    ) -> Result<bool, Error>
+    where
+        S: LinearSensing<D, M> + Clone + PartialEq,
+        R: Rng + ?Sized,
+    {
         let sensor = &network.sensors()[i];
         let h = *sensor.matrix();
         let cross = self.covariance * h.transpose();
         let innovation = symmetrised(&(h * cross + sensor.noise_covariance()));
-        let factor = Cholesky::new(innovation).ok_or(fewbits_filters::Error::SingularInnovation)?;
+        let factor = Cholesky::new(innovation).ok_or(Error::IMPOSSIBLE)?;
         let gain = factor.solve(&cross.transpose()).transpose();
         let log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
-        let (step, rule) = &self.own.steps[i];
         let turn = Turn {
             gain,
             own_gain: step.gain,
             rule,
             log_normaliser: -log_determinant - M as f64 * LN_SQRT_2PI,
-            loss: network.loss(),
+            loss: network.link().loss(),
             factor,
         };
         let local = &mut self.local[i * D..(i + 1) * D];
@@ -195,8 +219,8 @@ impl<const D: usize, const M: usize> Cloud<D, M> {
                     contradicted += usize::from(clash);
                     (*z, turn.log_density(&(z - central)) + if clash { VIOLATION } else { 0.0 })
                 }
-                Observation::Silent => turn.impute(rng, &central, &own),
-                Observation::Lost => (central + turn.noise(rng), 0.0),
+                Observation::Nothing => turn.impute(rng, &central, &own),
+                Observation::Erased => (central + turn.noise(rng), 0.0),
             };
             *total += increment;
             let (shift, own_shift) = (turn.gain * (z - central), turn.own_gain * (z - own));
@@ -205,7 +229,9 @@ impl<const D: usize, const M: usize> Cloud<D, M> {
                 local[d][p] += own_shift[d];
             }
         }
-        self.covariance = symmetrised(&(self.covariance - gain * innovation * gain.transpose()));
+        let keep = SMatrix::<f64, D, D>::identity() - gain * h;
+        self.covariance =
+            symmetrised(&(keep * self.covariance * keep.transpose() + gain * sensor.noise_covariance() * gain.transpose()));
         Ok(contradicted == increments.len())
     }
 }
@@ -249,7 +275,7 @@ impl<const D: usize, const M: usize> Turn<'_, D, M> {
         let log_density = self.log_density(&(z - central));
         let inside = region.statistic(&(z - own)) < region.threshold();
         let log_uniform = if inside {
-            -region.log_scale() - log_ball_volume(M)
+            -region.log_volume()
         } else {
             f64::NEG_INFINITY
         };
@@ -268,9 +294,12 @@ impl<const D: usize, const M: usize> Turn<'_, D, M> {
 
     fn impute_scalar<R: Rng + ?Sized>(&self, rng: &mut R, central: f64, own: f64) -> (SVector<f64, M>, f64) {
         let deviation = self.factor.l_dirty()[(0, 0)];
-        let c = self.rule.first_half_width();
-        let (low, high) = ((own - c - central) / deviation, (own + c - central) / deviation);
+        let (low, high) = self.rule.interval(own);
+        let (low, high) = ((low - central) / deviation, (high - central) / deviation);
         let inside = normal::log_interval(low, high);
+        if inside == f64::NEG_INFINITY && self.loss == 0.0 {
+            return (SVector::repeat(central), inside);
+        }
         let (log_weight, x) = if self.loss == 0.0 {
             (inside, normal::sample_truncated(rng, low, high))
         } else {
@@ -303,10 +332,4 @@ fn in_unit_ball<const M: usize, R: Rng + ?Sized>(rng: &mut R) -> SVector<f64, M>
             return direction * (rng.random::<f64>().powf(1.0 / M as f64) / length);
         }
     }
-}
-
-/// `ln(pi^(M/2) / Gamma(M/2 + 1))`.
-fn log_ball_volume(dimension: usize) -> f64 {
-    let half = 0.5 * dimension as f64;
-    half * std::f64::consts::PI.ln() - statrs::function::gamma::ln_gamma(half + 1.0)
 }
