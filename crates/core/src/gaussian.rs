@@ -1,11 +1,14 @@
 //! The Gaussian belief.
 
+use crate::belief::{Belief, Density};
+use crate::columns::{Columns, ColumnsMut, count, set_state, state_at};
 use fewbits_numerics::error::{self, ArgumentError};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// A normal distribution over a state of `D` coordinates: the belief of every Kalman-like estimator.
@@ -21,7 +24,9 @@ use serde::{Deserialize, Serialize};
 /// assert!(Gaussian::scalar(0.0, -1.0).is_err());
 /// # Ok::<(), fewbits_numerics::ArgumentError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Moments<D>"))]
 pub struct Gaussian<const D: usize> {
     mean: SVector<f64, D>,
     covariance: SMatrix<f64, D, D>,
@@ -78,16 +83,26 @@ impl<const D: usize> Gaussian<D> {
             .ok_or_else(|| ArgumentError::new("covariance", "singular", "a positive definite matrix"))
     }
 
-    /// `ln N(x; mean, covariance)`.
+    /// The same belief with its covariance factored once, for repeated densities and draws.
+    ///
+    /// # Errors
+    /// If the covariance is singular.
+    pub fn factored(&self) -> Result<FactoredGaussian<D>, ArgumentError> {
+        let lower = self.cholesky()?.unpack();
+        let log_determinant: f64 = lower.diagonal().iter().map(|d| d.ln()).sum();
+        Ok(FactoredGaussian {
+            gaussian: *self,
+            lower,
+            log_peak: -log_determinant - D as f64 * LN_SQRT_2PI,
+        })
+    }
+
+    /// `ln N(x; mean, covariance)`. See [`Gaussian::factored`] for many.
     ///
     /// # Errors
     /// If the covariance is singular.
     pub fn log_pdf(&self, x: &SVector<f64, D>) -> Result<f64, ArgumentError> {
-        let factor = self.cholesky()?;
-        let log_determinant: f64 = factor.l().diagonal().iter().map(|d| d.ln()).sum();
-        let deviation = x - self.mean;
-        let squared = deviation.dot(&factor.solve(&deviation));
-        Ok(-0.5 * squared - log_determinant - D as f64 * LN_SQRT_2PI)
+        Ok(self.factored()?.log_pdf(x))
     }
 
     /// Squared Mahalanobis distance `(x - mean)' P^-1 (x - mean)`: the normalised estimation error squared (NEES) if `x` is
@@ -106,16 +121,6 @@ impl<const D: usize> Gaussian<D> {
     /// If the covariance is singular.
     pub fn normalised_error_squared(&self, truth: &SVector<f64, D>) -> Result<f64, ArgumentError> {
         Ok(self.mahalanobis_squared(truth)? / D as f64)
-    }
-
-    /// A draw from the belief; singular covariances are fine.
-    ///
-    /// # Errors
-    /// Never for a belief from [`Gaussian::new`].
-    pub fn sample<R: Rng + ?Sized>(&self, rng: &mut R) -> Result<SVector<f64, D>, ArgumentError> {
-        let factor = semidefinite_factor("covariance", &self.covariance)?;
-        let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
-        Ok(self.mean + factor * z)
     }
 
     /// Kullback-Leibler divergence `KL(self || other)` in nats.
@@ -146,5 +151,132 @@ impl Gaussian<1> {
         error::finite("mean", mean)?;
         error::non_negative("variance", variance)?;
         Ok(Self::from_trusted_parts(SVector::from([mean]), SMatrix::from([[variance]])))
+    }
+}
+
+/// The stored form, checked when it is read.
+#[cfg(feature = "serde")]
+#[derive(Deserialize)]
+#[serde(rename = "Gaussian", deny_unknown_fields)]
+struct Moments<const D: usize> {
+    mean: SVector<f64, D>,
+    covariance: SMatrix<f64, D, D>,
+}
+
+#[cfg(feature = "serde")]
+impl<const D: usize> TryFrom<Moments<D>> for Gaussian<D> {
+    type Error = ArgumentError;
+
+    fn try_from(moments: Moments<D>) -> Result<Self, ArgumentError> {
+        Self::new(moments.mean, moments.covariance)
+    }
+}
+
+impl<const D: usize> Belief<D> for Gaussian<D> {
+    fn mean(&self) -> SVector<f64, D> {
+        self.mean
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.covariance
+    }
+
+    /// Singular covariances are fine. One that is no covariance (only [`Gaussian::from_trusted_parts`] can hold it) is replaced by
+    /// its diagonal.
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+        let factor = semidefinite_factor("covariance", &self.covariance)
+            .unwrap_or_else(|_| SMatrix::from_diagonal(&self.standard_deviations()));
+        sample_normals(rng, &self.mean, &factor, states);
+    }
+}
+
+/// Fills the columns with `mean + factor * standard normals`.
+fn sample_normals<const D: usize, R: Rng + ?Sized>(
+    rng: &mut R,
+    mean: &SVector<f64, D>,
+    factor: &SMatrix<f64, D, D>,
+    mut states: ColumnsMut<'_, D>,
+) {
+    for i in 0..count(&states) {
+        let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
+        set_state(&mut states, i, &(mean + factor * z));
+    }
+}
+
+/// A [`Gaussian`] of positive definite covariance with its Cholesky factor, for repeated densities and draws.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FactoredGaussian<const D: usize> {
+    gaussian: Gaussian<D>,
+    /// `L` with `P = L L'`.
+    lower: SMatrix<f64, D, D>,
+    log_peak: f64,
+}
+
+impl<const D: usize> FactoredGaussian<D> {
+    /// The plain belief.
+    pub fn gaussian(&self) -> &Gaussian<D> {
+        &self.gaussian
+    }
+
+    /// Mean.
+    pub fn mean(&self) -> &SVector<f64, D> {
+        self.gaussian.mean()
+    }
+
+    /// Lower Cholesky factor of the covariance.
+    pub fn lower(&self) -> &SMatrix<f64, D, D> {
+        &self.lower
+    }
+
+    /// `ln` of the density at the mean.
+    pub fn log_peak(&self) -> f64 {
+        self.log_peak
+    }
+
+    /// Squared Mahalanobis distance of `x` from the mean.
+    #[inline]
+    pub fn squared_distance(&self, x: &SVector<f64, D>) -> f64 {
+        let mut white = x - self.gaussian.mean;
+        let mut sum = 0.0;
+        for i in 0..D {
+            for j in 0..i {
+                white[i] -= self.lower[(i, j)] * white[j];
+            }
+            white[i] /= self.lower[(i, i)];
+            sum += white[i] * white[i];
+        }
+        sum
+    }
+
+    /// `ln N(x; mean, covariance)`.
+    #[inline]
+    pub fn log_pdf(&self, x: &SVector<f64, D>) -> f64 {
+        self.log_peak - 0.5 * self.squared_distance(x)
+    }
+}
+
+impl<const D: usize> Belief<D> for FactoredGaussian<D> {
+    fn mean(&self) -> SVector<f64, D> {
+        self.gaussian.mean
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.gaussian.covariance
+    }
+
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+        sample_normals(rng, &self.gaussian.mean, &self.lower, states);
+    }
+}
+
+impl<const D: usize> Density<D> for FactoredGaussian<D> {
+    fn log_density(&self, state: &SVector<f64, D>) -> f64 {
+        self.log_pdf(state)
+    }
+
+    fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
+        for (i, log) in logs.iter_mut().enumerate() {
+            *log += self.log_pdf(&state_at(states, i));
+        }
     }
 }

@@ -1,50 +1,76 @@
-//! What every fewbits crate stands on.
+//! The words of estimation under communication constraints, and the laws that their implementations obey.
 //!
-//! fewbits estimates the state of the world from sensors that may hardly speak. Each scheme has three parts: the sensor's
-//! half turns a measurement into a [`Message`] of few bits (silence is one of zero bits); a link delivers
-//! it, or loses it; and whoever hears it knows how likely it was under each state, a [`Likelihood`], and updates a belief.
-//! This crate holds the words of that sentence and the numerics they need:
+//! > The **world** moves (dynamics) and is **sensed** (sensing). A sensor **reports** little (scheme: report, perhaps silence).
+//! > The report crosses a **link** at a price in bits. Whoever receives it knows how likely that observation was for each
+//! > noise-free measurement (**factor**) and updates a **belief**, which may itself travel on as a message.
 //!
-//! | module | what it holds |
+//! | word | item |
 //! |---|---|
-//! | [`gaussian`] | the [`Gaussian`] belief |
-//! | [`message`], [`bits`] | messages, what is heard of them, and their real bits |
-//! | [`state_space`], [`likelihood`] | traits for dynamics, sensing and likelihoods; the likelihoods of scalar sensors |
+//! | how the world moves | [`Dynamics`], [`GaussianDynamics`], [`LinearDynamics`] |
+//! | how it is sensed | [`Sensing`], [`LinearSensing`] |
+//! | what travels, as real bits | [`Message`], [`bits`], [`NumberFormat`](number::NumberFormat) |
+//! | the sensor's half, and what its reports mean | [`Scheme`] |
+//! | what is observed, and through what | [`Observation`], [`Link`] |
+//! | `p(observation | noise-free measurement)` | [`Factor`](factor::Factor) and its kinds |
+//! | `p(observed | state)` | [`Likelihood`], [`Observed`] |
+//! | what is known | [`Belief`], [`Density`], [`Gaussian`] |
+//! | what implementations must obey | [`laws`] |
 //!
-//! The central choice: **probabilities of intervals live in the log domain, and nowhere else is one formed.** It costs an
-//! `erfcx` and an `exp` where `1 - cdf` would do in the middle of the bell, and it is why no filter in this workspace divides
-//! by zero when a bit is surprising.
+//! The central choice is the [`Factor`](factor::Factor): one small type for each kind of observation, with its logarithm for
+//! particle and grid filters and its posterior moments for Gaussian ones. A new scheme writes its factor once and has every
+//! filter. The price is that a factor knows the noise-free measurement only; what depends on more of the state (a nuisance that
+//! must be integrated out) implements [`Likelihood`] itself.
 //!
 //! ```
-//! use fewbits_core::likelihood::{Heard, ScalarLikelihood};
-//! use fewbits_core::message::{Message, Sign};
-//! use fewbits_core::Likelihood;
-//! use nalgebra::SVector;
+//! use fewbits_core::factor::{Factor, InCell};
+//! use fewbits_core::{Gaussian, Link, Message, Sign};
 //!
-//! // The sensor compares its sample with the broadcast prediction and sends one bit.
-//! let (prediction, sample) = (0.3, 1.1);
-//! let bit = Sign::of(sample, prediction);
+//! // The sensor compares its sample with the broadcast prediction and reports one bit.
+//! let (prediction, sample, noise_variance) = (0.3, 1.1, 0.25);
+//! let bit = Sign::of(sample, prediction)?;
 //! assert_eq!(bit.to_bits(&())?.bits(), 1);
 //!
-//! // The listener weighs every state by how likely that bit was under it.
-//! let heard = Heard::Bit { sign: bit, threshold: prediction, crossover: 0.0 };
-//! let likelihood = ScalarLikelihood::new(SVector::from([1.0]), 0.5, heard)?;
-//! assert!(likelihood.log_likelihood(&SVector::from([1.0])) > likelihood.log_likelihood(&SVector::from([0.0])));
+//! // One bit in twenty arrives inverted. The factor says what the bit means; the posterior follows.
+//! let factor = InCell::sign(bit, prediction, noise_variance, &Link::flipping(0.05)?)?;
+//! let posterior = factor.tilted(&Gaussian::scalar(prediction, 1.0)?)?;
+//! assert!((posterior.log_evidence - 0.5_f64.ln()).abs() < 1e-12);
+//! assert!(posterior.mean[0] > prediction && posterior.covariance[0] < 1.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! Not here: any particular model, filter or experiment.
 
+pub mod belief;
 pub mod bits;
+pub mod cell;
+pub mod columns;
+pub mod dynamics;
+pub mod error;
+pub mod factor;
 pub mod gaussian;
+pub mod laws;
 pub mod likelihood;
 pub mod message;
-pub mod state_space;
+pub mod number;
+pub mod observation;
+pub mod scheme;
+pub mod sensing;
+pub mod sign;
 
+pub use belief::{Belief, Density};
 pub use bits::{BitReader, BitString, BitWriter, CodecError};
+pub use cell::Cell;
+pub use columns::{Columns, ColumnsMut};
+pub use dynamics::{Dynamics, GaussianDynamics, LinearDynamics};
+pub use error::Error;
+pub use factor::{Factor, Tilted};
 pub use fewbits_numerics::ArgumentError;
-pub use gaussian::Gaussian;
-pub use message::{Cell, Encoder, Message, Observation, Sign};
-pub use state_space::{
-    Columns, ColumnsMut, Dynamics, GaussianDynamics, Likelihood, LinearDynamics, LinearSensing, Sensing,
-};
+pub use gaussian::{FactoredGaussian, Gaussian};
+pub use likelihood::{Likelihood, Observed};
+pub use message::{Encoder, Message};
+pub use number::NumberFormat;
+pub use observation::{Link, Observation};
+pub use scheme::Scheme;
+pub use sensing::{LinearSensing, Sensing};
+pub use sign::Sign;
+pub use {nalgebra, rand};

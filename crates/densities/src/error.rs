@@ -1,5 +1,6 @@
 //! Errors of this crate.
 
+use fewbits_core::CodecError;
 use fewbits_numerics::ArgumentError;
 use thiserror::Error;
 
@@ -10,10 +11,27 @@ pub enum Error {
     /// An argument outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
-    /// No particle has any weight left, or a weight is not a number.
-    #[error("degenerate particles: the largest log weight is {largest}, expected a finite number")]
-    Degenerate {
-        /// The largest log weight found.
-        largest: f64,
+    /// What a word of the core refused; [`fewbits_core::Error::Impossible`] where no probability is left.
+    #[error(transparent)]
+    Core(#[from] fewbits_core::Error),
+    /// A belief that does not fit its wire format, or bits that are no belief.
+    #[error(transparent)]
+    Codec(#[from] CodecError),
+    /// A density is too thin for the cells allowed.
+    #[error("the density needs {cells} cells or more: expected a density that fewer resolve")]
+    Unresolved {
+        /// Cells that the next refinement would take.
+        cells: usize,
     },
+    /// A density has no peak of the shape that an approximation needs.
+    #[error("no Gaussian peak: {reason}")]
+    NoPeak {
+        /// What is wrong with the place where the search ended.
+        reason: &'static str,
+    },
+}
+
+impl Error {
+    /// No probability is left.
+    pub(crate) const IMPOSSIBLE: Self = Self::Core(fewbits_core::Error::Impossible);
 }

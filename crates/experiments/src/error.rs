@@ -28,7 +28,39 @@ pub enum Error {
         /// What would have been accepted.
         expected: String,
     },
-    /// A table was built or read wrongly.
+    /// A parameter of the wrong type or out of range.
+    #[error("parameter `{name}` of figure `{figure}` is `{value}`: {reason}")]
+    Refused {
+        /// Id of the figure.
+        figure: &'static str,
+        /// The parameter, or the entry of it, such as `a[0]`.
+        name: String,
+        /// The refused value.
+        value: String,
+        /// Why.
+        reason: String,
+    },
+    /// A parameter that changes nothing beside the others' values.
+    #[error("parameter `{name}` of figure `{figure}` is without effect at these settings; see `describe {figure}`")]
+    Idle {
+        /// Id of the figure.
+        figure: &'static str,
+        /// The parameter.
+        name: String,
+    },
+    /// A run that would take too long or too much memory.
+    #[error("figure `{figure}` would need about {need:.1e} {unit} at these settings, beyond {limit:.1e}")]
+    TooLarge {
+        /// Id of the figure.
+        figure: &'static str,
+        /// The estimate.
+        need: f64,
+        /// The most that is accepted.
+        limit: f64,
+        /// Of what.
+        unit: &'static str,
+    },
+    /// A table was built or read wrongly, or holds a number that is not finite.
     #[error("table: {0}")]
     Table(String),
     /// The run was cancelled.
@@ -49,8 +81,8 @@ impl Error {
     }
 }
 
-impl<E: std::error::Error + Send + Sync + 'static> From<fewbits_monte_carlo::MonteCarloError<E>> for Error {
-    fn from(error: fewbits_monte_carlo::MonteCarloError<E>) -> Self {
+impl From<fewbits_monte_carlo::MonteCarloError> for Error {
+    fn from(error: fewbits_monte_carlo::MonteCarloError) -> Self {
         match error {
             fewbits_monte_carlo::MonteCarloError::Cancelled => Self::Cancelled,
             other => Self::failed(other),
@@ -62,6 +94,33 @@ impl From<fewbits_quantizers::Error> for Error {
     fn from(error: fewbits_quantizers::Error) -> Self {
         match error {
             fewbits_quantizers::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
+impl From<fewbits_quantizer_design::Error> for Error {
+    fn from(error: fewbits_quantizer_design::Error) -> Self {
+        match error {
+            fewbits_quantizer_design::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
+impl From<fewbits_binary_patterns::Error> for Error {
+    fn from(error: fewbits_binary_patterns::Error) -> Self {
+        match error {
+            fewbits_binary_patterns::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
+impl From<fewbits_sensor_assignment::Error> for Error {
+    fn from(error: fewbits_sensor_assignment::Error) -> Self {
+        match error {
+            fewbits_sensor_assignment::Error::Argument(argument) => Self::Argument(argument),
             other => Self::failed(other),
         }
     }

@@ -9,13 +9,18 @@
 //! | [`numerics`], [`monte_carlo`] | always | normal-distribution numerics; random streams, Monte Carlo |
 //! | `dymbo` | `dymbo` | Kalman-like filters fed with one sign bit a sample |
 //! | `cfwmd` | `cfwmd` | sensors that censor dull measurements, and fusion that hears their silence |
-//! | `quantizers` | `quantizers` | design and decoding of distributed scalar and binary quantizers |
+//! | `quantizers` | `quantizers` | the quantizer a sensor holds, its words, Lloyd-Max tables |
+//! | `quantizer_design` | `quantizer-design` | joint design and decoding of distributed scalar quantizers |
+//! | `binary_patterns` | `binary-patterns` | one-bit quantizers with patterned cells |
+//! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
 
 pub use fewbits_core as core;
 pub use fewbits_monte_carlo as monte_carlo;
 pub use fewbits_numerics as numerics;
 
+#[cfg(feature = "binary-patterns")]
+pub use fewbits_binary_patterns as binary_patterns;
 #[cfg(feature = "cfwmd")]
 pub use fewbits_cfwmd as cfwmd;
 #[cfg(feature = "filters")]
@@ -26,8 +31,12 @@ pub use fewbits_dymbo as dymbo;
 pub use fewbits_filters as filters;
 #[cfg(feature = "filters")]
 pub use fewbits_models as models;
+#[cfg(feature = "quantizer-design")]
+pub use fewbits_quantizer_design as quantizer_design;
 #[cfg(feature = "quantizers")]
 pub use fewbits_quantizers as quantizers;
+#[cfg(feature = "sensor-assignment")]
+pub use fewbits_sensor_assignment as sensor_assignment;
 
 /// The programs of the README and of the pages in `docs`, kept running.
 #[cfg(doctest)]

@@ -2,14 +2,15 @@
 
 use crate::Error;
 use crate::kalman::{self, KalmanInfo};
-use fewbits_core::{Gaussian, GaussianDynamics, LinearSensing, Sensing};
+use fewbits_core::{Belief, Gaussian, GaussianDynamics, LinearSensing, Sensing};
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 
 /// Time update about the mean: `f(m)`, `F P F' + Q` with `F` the Jacobian at `m`.
 pub fn predict<const D: usize>(dynamics: &impl GaussianDynamics<D>, belief: &Gaussian<D>) -> Gaussian<D> {
     let jacobian = dynamics.jacobian(belief.mean());
-    let covariance = jacobian * belief.covariance() * jacobian.transpose() + dynamics.noise_covariance();
+    let covariance =
+        jacobian * belief.covariance() * jacobian.transpose() + dynamics.noise_covariance_at(belief.mean());
     Gaussian::from_trusted_parts(dynamics.mean(belief.mean()), covariance)
 }
 
@@ -53,7 +54,7 @@ impl<const D: usize, const M: usize> Tangent<D, M> {
     pub fn at(sensing: &impl Sensing<D, M>, state: &SVector<f64, D>) -> Self {
         Self {
             matrix: sensing.jacobian(state),
-            noise_covariance: *sensing.noise_covariance(),
+            noise_covariance: sensing.noise_covariance_at(state),
         }
     }
 }
@@ -67,19 +68,21 @@ impl<const D: usize, const M: usize> Sensing<D, M> for Tangent<D, M> {
         self.matrix
     }
 
-    fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
-        &self.noise_covariance
+    fn noise_covariance_at(&self, _: &SVector<f64, D>) -> SMatrix<f64, M, M> {
+        self.noise_covariance
     }
 
     fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M> {
-        Gaussian::from_trusted_parts(self.matrix * state, self.noise_covariance)
-            .sample(rng)
-            .unwrap_or_else(|_| self.matrix * state)
+        Gaussian::from_trusted_parts(self.matrix * state, self.noise_covariance).sample(rng)
     }
 }
 
 impl<const D: usize, const M: usize> LinearSensing<D, M> for Tangent<D, M> {
     fn matrix(&self) -> &SMatrix<f64, M, D> {
         &self.matrix
+    }
+
+    fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
+        &self.noise_covariance
     }
 }

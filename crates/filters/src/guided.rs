@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::particle::Proposal;
-use fewbits_core::{GaussianDynamics, LinearSensing};
+use fewbits_core::{LinearDynamics, LinearSensing};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
@@ -24,7 +24,7 @@ pub struct OptimalProposal<'a, Dyn, const D: usize, const M: usize> {
     log_normaliser: f64,
 }
 
-impl<'a, Dyn: GaussianDynamics<D>, const D: usize, const M: usize> OptimalProposal<'a, Dyn, D, M> {
+impl<'a, Dyn: LinearDynamics<D>, const D: usize, const M: usize> OptimalProposal<'a, Dyn, D, M> {
     /// The proposal for one measurement.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl<'a, Dyn: GaussianDynamics<D>, const D: usize, const M: usize> OptimalPropos
     }
 }
 
-impl<Dyn: GaussianDynamics<D>, const D: usize, const M: usize> Proposal<D> for OptimalProposal<'_, Dyn, D, M> {
+impl<Dyn: LinearDynamics<D>, const D: usize, const M: usize> Proposal<D> for OptimalProposal<'_, Dyn, D, M> {
     fn propose<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> (SVector<f64, D>, f64) {
         let mean = self.dynamics.mean(state);
         let innovation = self.measurement - self.matrix * mean;

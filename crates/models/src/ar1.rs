@@ -88,8 +88,8 @@ impl GaussianDynamics<1> for Ar1 {
         self.transition
     }
 
-    fn noise_covariance(&self) -> &Matrix1<f64> {
-        &self.noise_covariance
+    fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+        self.noise_covariance
     }
 }
 

@@ -3,7 +3,7 @@
 //! A model here is a checked, immutable value: the matrices of a state equation or of a sensing equation, nothing else. It
 //! can predict, draw and describe its noise; what to do with a measurement is the business of the crates above.
 //!
-//! All implement the traits of [`fewbits_core::state_space`], so any filter takes them.
+//! All implement the traits of [`fewbits_core`], so any filter takes them.
 //!
 //! The central choice is that process noise is stored as it is caused, `Q = G diag(q) G'` with a few independent causes `q`
 //! and their effect `G`, never as a bare `Q`. A constant-velocity target is pushed by one acceleration per axis, so its `Q`
@@ -17,6 +17,7 @@
 //! | white-noise acceleration on a line, in a plane | [`constant_velocity_1d`], [`constant_velocity_2d`] |
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
 //! | received amplitude that falls with distance | [`ReceivedPower`] |
+//! | a substance that diffuses through air, ground, vessels | [`diffusion`] |
 //!
 //! ```
 //! use fewbits_models::{constant_velocity_1d, Ar1};
@@ -35,11 +36,11 @@
 
 mod ar1;
 mod constant_velocity;
+pub mod diffusion;
 mod error;
 mod linear_gaussian;
 mod linear_sensor;
 mod received_power;
-mod scalar_sensing;
 
 pub use ar1::Ar1;
 pub use constant_velocity::{constant_velocity_1d, constant_velocity_2d};
@@ -47,4 +48,3 @@ pub use error::Error;
 pub use linear_gaussian::LinearGaussian;
 pub use linear_sensor::{LinearSensor, ScalarSensor};
 pub use received_power::ReceivedPower;
-pub use scalar_sensing::ScalarSensing;

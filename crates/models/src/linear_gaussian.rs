@@ -178,8 +178,8 @@ impl<const D: usize, const U: usize> GaussianDynamics<D> for LinearGaussian<D, U
         self.transition
     }
 
-    fn noise_covariance(&self) -> &SMatrix<f64, D, D> {
-        &self.noise_covariance
+    fn noise_covariance_at(&self, _: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        self.noise_covariance
     }
 }
 

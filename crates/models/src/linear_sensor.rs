@@ -1,7 +1,7 @@
 //! Linear sensing with Gaussian noise.
 
 use crate::Error;
-use fewbits_core::{LinearSensing, Sensing};
+use fewbits_core::{Columns, ColumnsMut, LinearSensing, Sensing};
 use fewbits_numerics::error::{ArgumentError, all_finite, positive};
 use fewbits_numerics::linalg::SYMMETRY_TOLERANCE;
 use nalgebra::{Cholesky, SMatrix, SVector};
@@ -100,19 +100,36 @@ impl<const D: usize, const M: usize> Sensing<D, M> for LinearSensor<D, M> {
         self.matrix
     }
 
-    fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
-        &self.noise_covariance
+    fn noise_covariance_at(&self, _: &SVector<f64, D>) -> SMatrix<f64, M, M> {
+        self.noise_covariance
     }
 
     #[inline]
     fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M> {
         self.matrix * state + self.noise_factor * SVector::<f64, M>::from_fn(|_, _| StandardNormal.sample(rng))
     }
+
+    fn mean_columns(&self, states: &Columns<'_, D>, means: ColumnsMut<'_, M>) {
+        for (k, means) in means.into_iter().enumerate() {
+            means.fill(0.0);
+            for (entry, column) in self.matrix.row(k).iter().zip(states) {
+                if *entry != 0.0 {
+                    for (mean, x) in means.iter_mut().zip(*column) {
+                        *mean += entry * x;
+                    }
+                }
+            }
+        }
+    }
 }
 
 impl<const D: usize, const M: usize> LinearSensing<D, M> for LinearSensor<D, M> {
     fn matrix(&self) -> &SMatrix<f64, M, D> {
         &self.matrix
+    }
+
+    fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
+        &self.noise_covariance
     }
 }
 

@@ -1,7 +1,7 @@
 //! Sensing of a source's received amplitude, which falls with distance.
 
 use crate::Error;
-use fewbits_core::{Columns, Sensing};
+use fewbits_core::{Columns, ColumnsMut, Sensing};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
@@ -129,13 +129,17 @@ impl<const D: usize> Sensing<D, 1> for ReceivedPower<D> {
         row
     }
 
-    fn noise_covariance(&self) -> &Matrix1<f64> {
-        &self.noise_covariance
+    fn noise_covariance_at(&self, _: &SVector<f64, D>) -> Matrix1<f64> {
+        self.noise_covariance
     }
 
     fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> Vector1<f64> {
         let normal: f64 = StandardNormal.sample(rng);
         self.mean(state) + Vector1::new(self.noise_variance().sqrt() * normal)
+    }
+
+    fn mean_columns(&self, states: &Columns<'_, D>, [means]: ColumnsMut<'_, 1>) {
+        self.amplitudes(states, means);
     }
 }
 

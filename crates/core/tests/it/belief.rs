@@ -1,11 +1,9 @@
-//! The Gaussian belief, square roots of singular covariances, and likelihoods.
+//! The Gaussian belief, square roots of singular covariances.
 
-use fewbits_core::likelihood::{Heard, ScalarLikelihood};
-use fewbits_core::message::{Cell, Sign};
-use fewbits_core::{Gaussian, Likelihood};
+use fewbits_core::{Belief, Gaussian, laws};
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_numerics::linalg::semidefinite_factor;
-use nalgebra::{Matrix2, Matrix3, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use proptest::prelude::*;
 
 #[test]
@@ -38,7 +36,7 @@ fn a_singular_belief_is_a_belief_without_density() {
     let rank_one = Vector2::new(0.5, 1.0) * Vector2::new(0.5, 1.0).transpose();
     let belief = Gaussian::new(Vector2::zeros(), rank_one).unwrap();
     assert!(belief.log_pdf(&Vector2::zeros()).is_err());
-    let draw = belief.sample(&mut Stream::new(1).rng()).unwrap();
+    let draw = belief.sample(&mut Stream::new(1).rng());
     assert!((draw[1] - 2.0 * draw[0]).abs() < 1e-12);
     assert!(Gaussian::known(Vector2::new(1.0, 2.0)).is_ok());
 }
@@ -60,7 +58,7 @@ fn densities_and_divergences_match_closed_forms() {
     let mut rng = Stream::new(5).rng();
     let ratios: Moments = (0..40_000)
         .map(|_| {
-            let x = belief.sample(&mut rng).unwrap();
+            let x = belief.sample(&mut rng);
             density(&belief, &x) - density(&other, &x)
         })
         .collect();
@@ -87,64 +85,26 @@ proptest! {
         let p = q * Matrix3::from_diagonal(&Vector3::new(2.0, -negative, 1.0)) * q.transpose();
         prop_assert!(semidefinite_factor("p", &p).is_err());
     }
-
-    #[test]
-    fn batch_and_single_log_likelihoods_agree(x in prop::array::uniform4(-40.0..40.0_f64), which in 0_usize..5) {
-        let heard = [
-            Heard::Value(0.4),
-            Heard::Bit { sign: Sign::Below, threshold: 0.2, crossover: 0.1 },
-            Heard::Cell(Cell::new(-0.5, 0.25).unwrap()),
-            Heard::Silence { cell: Cell::new(-1.0, 1.0).unwrap(), loss: 0.2 },
-            Heard::Lost,
-        ][which];
-        let likelihood = ScalarLikelihood::new(SVector::from([1.0, -0.5]), 0.7, heard).unwrap();
-        let mut sums = [0.25, -0.5];
-        likelihood.add_log_likelihoods([&x[..2], &x[2..]], &mut sums);
-        for i in 0..2 {
-            let alone = likelihood.log_likelihood(&SVector::from([x[i], x[2 + i]]));
-            prop_assert!(!alone.is_nan());
-            prop_assert!((sums[i] - [0.25, -0.5][i] - alone).abs() <= 1e-12 * (1.0 + alone.abs()));
-        }
-    }
-}
-
-#[test]
-fn what_can_be_heard_has_probability_one() {
-    // Both bits, all cells of a partition, speaking or silent: probabilities of exhaustive messages add up to 1.
-    let given = |heard| {
-        ScalarLikelihood::new(SVector::from([1.0]), 0.7, heard)
-            .unwrap()
-            .given_mean(0.3)
-            .exp()
-    };
-    let bit = |sign| {
-        given(Heard::Bit {
-            sign,
-            threshold: -0.2,
-            crossover: 0.15,
-        })
-    };
-    assert!((bit(Sign::Above) + bit(Sign::Below) - 1.0).abs() < 1e-15);
-    let edges = [f64::NEG_INFINITY, -1.0, 0.1, 2.0, f64::INFINITY];
-    let cells: f64 = edges
-        .windows(2)
-        .map(|e| given(Heard::Cell(Cell::new(e[0], e[1]).unwrap())))
-        .sum();
-    assert!((cells - 1.0).abs() < 1e-15);
-    let cell = Cell::new(-0.4, 0.9).unwrap();
-    let silent = given(Heard::Silence { cell, loss: 0.3 });
-    assert!((silent - (0.3 + 0.7 * given(Heard::Cell(cell)))).abs() < 1e-15);
-    for (sd, heard) in [
-        (0.0, Heard::Lost),
-        (1.0, Heard::Value(f64::NAN)),
-        (1.0, Heard::Silence { cell, loss: 1.0 }),
-    ] {
-        assert!(ScalarLikelihood::new(SVector::from([1.0]), sd, heard).is_err());
-    }
 }
 
 #[test]
 fn normalised_error_of_a_diagonal_belief() {
     let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(4.0, 0.0, 0.0, 1.0)).unwrap();
     assert!((belief.normalised_error_squared(&Vector2::new(2.0, 3.0)).unwrap() - 5.0).abs() < 1e-15);
+}
+
+#[test]
+fn gaussians_obey_the_laws_of_beliefs() {
+    let mut rng = Stream::new(4).rng();
+    let belief = Gaussian::new(Vector2::new(1.0, -1e3), Matrix2::new(2.0, 0.6, 0.6, 1.0)).unwrap();
+    laws::belief::samples_have_the_moments(&belief, &mut rng, 20_000).unwrap();
+    let factored = belief.factored().unwrap();
+    laws::belief::samples_have_the_moments(&factored, &mut rng, 20_000).unwrap();
+    let wide = Gaussian::new(*belief.mean(), belief.covariance() * 1.5)
+        .unwrap()
+        .factored()
+        .unwrap();
+    laws::belief::density_integrates_to_one(&factored, &wide, &mut rng, 20_000).unwrap();
+    let known = Gaussian::known(Vector2::new(3.0, 1.0)).unwrap();
+    laws::belief::samples_have_the_moments(&known, &mut rng, 100).unwrap();
 }

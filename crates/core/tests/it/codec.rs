@@ -1,7 +1,8 @@
 //! Bits: what is written is read back, and arbitrary bits never panic.
 
 use fewbits_core::bits::{BitReader, BitString, BitWriter, CodecError};
-use fewbits_core::message::{Cell, Observation, Sign, laws};
+use fewbits_core::laws::message as laws;
+use fewbits_core::{Cell, Link, Observation, Sign};
 use proptest::prelude::*;
 
 proptest! {
@@ -45,7 +46,8 @@ fn a_sign_is_one_bit() {
         assert_eq!(laws::round_trip(&sign, &()).unwrap(), 1);
         assert_eq!(Sign::try_from(sign.value() as i32).unwrap(), sign);
     }
-    assert_eq!(Sign::of(1.0, 1.0), Sign::Above);
+    assert_eq!(Sign::of(1.0, 1.0), Ok(Sign::Above));
+    assert!(Sign::of(f64::NAN, 1.0).is_err() && Sign::of(0.0, f64::INFINITY).is_err());
     assert!(Sign::try_from(0).is_err());
 }
 
@@ -65,10 +67,33 @@ fn misuse_is_refused_and_writes_nothing() {
 }
 
 #[test]
-fn silence_is_not_loss() {
-    assert_ne!(Observation::<Sign>::Silent, Observation::Lost);
+fn nothing_is_not_erased() {
+    assert_ne!(Observation::<Sign>::Nothing, Observation::Erased);
     assert_eq!(Observation::Received(Sign::Above).received(), Some(&Sign::Above));
     assert!(Cell::new(1.0, 1.0).is_err() && Cell::new(f64::NAN, 1.0).is_err());
     let above = Cell::of_sign(Sign::Above, 0.5).unwrap();
     assert!(above.contains(0.5) && !above.contains(0.4));
+}
+
+/// Frequencies of what a link delivers are those it promises.
+#[test]
+fn a_link_loses_and_inverts_as_it_says() {
+    let link = Link::new(0.25, 0.1).unwrap();
+    let mut rng = fewbits_monte_carlo::Stream::new(3).rng();
+    let n = 40_000;
+    let (mut nothing, mut inverted) = (0, 0);
+    for _ in 0..n {
+        match link.transmit(&mut rng, Some(&Sign::Above), &()).unwrap() {
+            Observation::Nothing => nothing += 1,
+            Observation::Received(Sign::Below) => inverted += 1,
+            _ => {}
+        }
+    }
+    for (count, p) in [(nothing, 0.25), (inverted, 0.075)] {
+        let error = (p * (1.0 - p) / f64::from(n)).sqrt();
+        assert!((f64::from(count) / f64::from(n) - p).abs() < 4.0 * error);
+    }
+    let words: f64 = (0..8).map(|received| link.word_probability(5, received, 3)).sum();
+    assert!((words - 1.0).abs() < 1e-15);
+    assert_eq!(link.transmit::<Sign, _>(&mut rng, None, &()).unwrap(), Observation::Nothing);
 }

@@ -4,3 +4,4 @@
 
 mod belief;
 mod codec;
+mod factor;

@@ -1,95 +1,13 @@
-//! Particles against sums written out by hand.
+//! Tests of the public interface.
 
 // Helpers fail loudly, as tests do.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use fewbits_densities::{Error, Particles};
-use proptest::prelude::*;
-
-fn weighted() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Vec<f64>)> {
-    (1..40usize).prop_flat_map(|n| {
-        let column = prop::collection::vec(-100.0..100.0f64, n);
-        let log_weight = prop_oneof![4 => -30.0..30.0f64, 1 => Just(f64::NEG_INFINITY)];
-        (column.clone(), column, prop::collection::vec(log_weight, n))
-    })
-}
-
-proptest! {
-    #[test]
-    fn moments_are_the_weighted_sums((x, y, logs) in weighted()) {
-        let total: f64 = logs.iter().map(|l| l.exp()).sum();
-        let belief = Particles::new([x.clone(), y.clone()], &logs);
-        if total == 0.0 {
-            prop_assert!(matches!(belief, Err(Error::Degenerate { .. })), "{belief:?}");
-            return Ok(());
-        }
-        let mut belief = belief.unwrap();
-        let w: Vec<f64> = logs.iter().map(|l| l.exp() / total).collect();
-        let mean = |c: &[f64]| w.iter().zip(c).map(|(w, x)| w * x).sum::<f64>();
-        let (mx, my) = (mean(&x), mean(&y));
-        let cov: f64 = (0..w.len()).map(|i| w[i] * (x[i] - mx) * (y[i] - my)).sum();
-        let ess = 1.0 / w.iter().map(|w| w * w).sum::<f64>();
-        prop_assert!((belief.mean()[0] - mx).abs() < 1e-9);
-        prop_assert!((belief.covariance()[(1, 0)] - cov).abs() < 1e-9);
-        prop_assert!((belief.effective_sample_size() - ess).abs() < 1e-9 * ess);
-        prop_assert!(belief.weights().iter().zip(&w).all(|(a, b)| (a - b).abs() < 1e-12));
-        let log_sum = belief.reweigh(|_, log_weights| log_weights.copy_from_slice(&logs)).unwrap();
-        prop_assert!((log_sum - total.ln()).abs() < 1e-9);
-        prop_assert!((belief.log_weights().iter().map(|l| l.exp()).sum::<f64>() - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn selection_copies_and_equalises((x, y, _) in weighted(), picks in prop::collection::vec(0..40u32, 1..60)) {
-        let mut belief = Particles::uniform([x.clone(), y.clone()]).unwrap();
-        let picks: Vec<u32> = picks.iter().map(|p| p % x.len() as u32).collect();
-        belief.select(&picks).unwrap();
-        prop_assert_eq!(belief.len(), picks.len());
-        prop_assert!((belief.effective_sample_size() - picks.len() as f64).abs() < 1e-9);
-        for (i, p) in picks.iter().enumerate() {
-            let point = belief.point(i).unwrap();
-            prop_assert_eq!((point[0], point[1]), (x[*p as usize], y[*p as usize]));
-        }
-        let before = belief.clone();
-        prop_assert!(belief.select(&[belief.len() as u32]).is_err());
-        prop_assert_eq!(belief, before);
-    }
-}
-
-#[test]
-fn a_failed_reweighing_keeps_the_belief() {
-    let mut belief = Particles::new([vec![0.0, 1.0]], &[0.0, 3.0_f64.ln()]).unwrap();
-    let before = belief.clone();
-    for bad in [[f64::NEG_INFINITY; 2], [f64::NAN, 0.0], [f64::INFINITY, 0.0]] {
-        let result = belief.reweigh(|_, log_weights| log_weights.copy_from_slice(&bad));
-        assert!(matches!(result, Err(Error::Degenerate { .. })));
-        assert_eq!(belief, before);
-        assert!((belief.weights()[1] - 0.75).abs() < 1e-15);
-        assert!((belief.effective_sample_size() - 1.6).abs() < 1e-14);
-    }
-}
-
-#[test]
-fn log_weights_far_below_underflow_still_count() {
-    let belief = Particles::new([vec![0.0, 4.0]], &[-1e6, -1e6]).unwrap();
-    assert_eq!(belief.mean()[0], 2.0);
-}
-
-#[test]
-fn bad_particles_are_refused() {
-    let refused = |columns: [Vec<f64>; 1], logs: Vec<f64>| Particles::new(columns, &logs).unwrap_err().to_string();
-    assert!(refused([vec![]], vec![]).contains("at least 1"));
-    assert!(refused([vec![1.0]], vec![0.0, 0.0]).contains("one a particle"));
-    assert!(refused([vec![f64::NAN]], vec![0.0]).contains("columns"));
-    assert!(refused([vec![1.0]], vec![f64::NAN]).contains("log_weights"));
-    assert!(refused([vec![1.0]], vec![f64::INFINITY]).contains("log_weights"));
-    assert!(refused([vec![1.0]], vec![f64::NEG_INFINITY]).contains("degenerate"));
-}
-
-#[test]
-fn storage_round_trips_and_checks() {
-    let belief = Particles::uniform([vec![1.0, 2.0], vec![3.0, -1.0]]).unwrap();
-    let text = serde_json::to_string(&belief).unwrap();
-    assert_eq!(serde_json::from_str::<Particles<2>>(&text).unwrap(), belief);
-    assert!(serde_json::from_str::<Particles<3>>(&text).is_err());
-    assert!(serde_json::from_str::<Particles<1>>(r#"{"columns":[[1.0]],"weights":[0.5,0.5]}"#).is_err());
-}
+mod beliefs;
+mod bounds;
+mod common;
+mod fixtures;
+mod particles;
+mod products;
+mod reduction;
+mod wire;

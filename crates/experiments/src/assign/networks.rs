@@ -1,10 +1,10 @@
 //! `assign-fig6-3` and `assign-fig6-4`: random networks of given mean and spread of their noise variances.
 
-use crate::claim::{largest, not_decreasing, not_increasing};
+use crate::legacy::claim::{largest, not_decreasing, not_increasing};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_monte_carlo::{Moments, Stream};
-use fewbits_quantizers::assignment::{
+use fewbits_sensor_assignment::{
     CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
     variances_with_moments,
 };
@@ -54,7 +54,7 @@ fn draw(stream: Stream, sensors: usize, mean: f64, std: f64) -> Result<Vec<f64>,
     Err(Error::Table(format!("no network of mean {mean} and deviation {std} in {MAX_DRAWS} draws")))
 }
 
-fn evaluate(variances: &[f64]) -> Result<Errors, fewbits_quantizers::Error> {
+fn evaluate(variances: &[f64]) -> Result<Errors, fewbits_sensor_assignment::Error> {
     let sensors = CodedSensors::new(1.0, variances)?;
     let linear = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
     let second = by_precision(variances);

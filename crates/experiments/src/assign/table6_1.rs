@@ -1,8 +1,8 @@
 //! `assign-table6-1`: eight sensors, three assignments.
 
+use crate::legacy::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
-use fewbits_quantizers::assignment::{
+use fewbits_sensor_assignment::{
     CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, pair_costs,
     quantization_error,
 };
@@ -89,7 +89,7 @@ impl Figure for Table {
             let costs = pair_costs(sensors)?;
             let best = JonkerVolgenant.solve(&costs)?;
             let proof = costs.certificate(&best)?;
-            Ok::<_, fewbits_quantizers::Error>((best, proof))
+            Ok::<_, fewbits_sensor_assignment::Error>((best, proof))
         };
         let mut table = Rows::new(columns());
         let sensors = CodedSensors::new(1.0, &p.variances).map_err(Error::failed)?;

@@ -1,12 +1,12 @@
 //! `binary-fig5-8`: decoders and bounds for three Gray bits.
 
 use super::{Scene, check_sweep, each, sweep};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_quantizers::binary::bounds::{
+use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, printed_crlb, remote_distortion, van_trees,
 };
-use fewbits_quantizers::binary::{Decoder, gray_basis};
+use fewbits_binary_patterns::{Decoder, gray_basis};
 use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-8`.

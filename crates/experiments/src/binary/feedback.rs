@@ -1,12 +1,12 @@
 //! `binary-fig5-10`: ten sensors, with and without feedback.
 
 use super::{Scene, check_sweep, each, mask_text, pattern, sweep};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use fewbits_quantizers::binary::baselines::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
-use fewbits_quantizers::binary::bounds::ConditionalMean;
-use fewbits_quantizers::binary::search::Descent;
-use fewbits_quantizers::binary::{Mask, gray_basis, rank};
+use fewbits_binary_patterns::baselines::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
+use fewbits_binary_patterns::bounds::ConditionalMean;
+use fewbits_binary_patterns::search::Descent;
+use fewbits_binary_patterns::{Mask, gray_basis, rank};
 use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-10`.

@@ -1,11 +1,11 @@
 //! `binary-table5-1`: eight patterns of three bits at 18.2 dB.
 
 use super::{Scene, mask_text, pattern, pattern_panel};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use crate::plot::Plot;
-use crate::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
-use fewbits_quantizers::binary::bounds::{printed_crlb, van_trees};
-use fewbits_quantizers::binary::search::MaskSet;
-use fewbits_quantizers::binary::{Decoder, Mask, count};
+use fewbits_binary_patterns::bounds::{printed_crlb, van_trees};
+use fewbits_binary_patterns::search::MaskSet;
+use fewbits_binary_patterns::{Decoder, Mask, count};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -72,7 +72,7 @@ impl Figure for Table {
                     mse: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
                 })
             })
-            .collect::<Result<_, fewbits_quantizers::Error>>()
+            .collect::<Result<_, fewbits_binary_patterns::Error>>()
             .map_err(Error::failed)?;
         by_map.sort_by(|a, b| a.mse.total_cmp(&b.mse).then_with(|| a.masks.cmp(&b.masks)));
         let mut table = Rows::new([

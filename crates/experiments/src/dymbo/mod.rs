@@ -10,7 +10,6 @@ mod fig5;
 mod gap;
 mod prop1b;
 mod prop2;
-mod referee;
 mod sensors;
 mod smoother;
 mod threshold;

@@ -1,10 +1,10 @@
 //! Beyond the publication: folded cells, broken symmetry, words, bounds, effort.
 
 use super::common::{MI, MSE, breakpoints, bsc, cell, exact, lloyd, lloyd_system, name, scene};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, Value, claim, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, Value, claim, column, row};
-use fewbits_quantizers::design::{self, Discovery};
-use fewbits_quantizers::{Channel, Criterion, Group, Newton, Quantizer, System, bounds};
+use fewbits_quantizer_design::design::{self, Discovery};
+use fewbits_quantizer_design::{Channel, Criterion, Group, Newton, Quantizer, System, bounds};
 use serde::{Deserialize, Serialize};
 
 /// Settings of the searches.
@@ -77,9 +77,9 @@ const THRESHOLDS: [(&str, Criterion, f64); 4] = [
     ("rho", MSE, 0.378_315_47),
 ];
 
-fn signs(noise_sd: f64, rho: f64) -> Result<System, fewbits_quantizers::Error> {
-    let noise = fewbits_quantizers::Noise::equicorrelated(&[noise_sd; 2], rho)?;
-    let scene = fewbits_quantizers::Scene::new(fewbits_quantizers::Prior::gaussian(1.0)?, noise)?;
+fn signs(noise_sd: f64, rho: f64) -> Result<System, fewbits_quantizer_design::Error> {
+    let noise = fewbits_quantizer_design::Noise::equicorrelated(&[noise_sd; 2], rho)?;
+    let scene = fewbits_quantizer_design::Scene::new(fewbits_quantizer_design::Prior::gaussian(1.0)?, noise)?;
     System::ideal(scene, vec![Quantizer::new(vec![0.0])?; 2])
 }
 

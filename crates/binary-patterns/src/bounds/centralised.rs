@@ -1,0 +1,144 @@
+//! The best that `N` bits can do if one place sees all measurements.
+
+use super::rate_distortion::ConditionalMean;
+use crate::Error;
+use crate::Source;
+use crate::grid::noise_in_range;
+use fewbits_numerics::ArgumentError;
+use fewbits_quantizers::lloyd_max::{self, Density};
+
+/// Most sensors: the quantizer of the estimate has `2^N` levels.
+const MAX_SENSORS: usize = 12;
+/// Points of the table that starts the inversion of the conditional mean.
+const TABLE: usize = 2000;
+/// Newton steps of the inversion.
+const STEPS: usize = 60;
+
+/// Exact least mean squared error of any scheme in which `sensors` measurements of equal noise are described by as many bits.
+///
+/// `E Var[X|Ybar] + ` the Lloyd-Max distortion of `E[X|Ybar]` with `2^N` levels, where `Ybar`, the average, has noise
+/// `s^2/N`. A strict bound: a distributed scheme is a special case of a central one.
+///
+/// # Errors
+/// If `noise_std` is not positive and finite, `sensors` not in `1..=12`, or the quantizer's iteration fails.
+pub fn centralised_bound(source: &Source, noise_std: f64, sensors: usize) -> Result<f64, Error> {
+    if !(1..=MAX_SENSORS).contains(&sensors) {
+        return Err(ArgumentError::new("sensors", sensors, "a number of sensors in 1..=12").into());
+    }
+    let measurement = ConditionalMean::new(*source, noise_in_range(noise_std)? / (sensors as f64).sqrt())?;
+    let estimate = EstimateDensity::new(measurement);
+    let quantizer = lloyd_max::design(&estimate, 1 << sensors)?;
+    Ok(measurement.estimation_error() + quantizer.mean_squared_error())
+}
+
+/// Distribution of `E[X|Y]`, integrated over the measurement `y`, where everything is smooth.
+struct EstimateDensity {
+    measurement: ConditionalMean,
+    /// `E[X|y]` on an even grid of `y`, increasing.
+    table: Vec<f64>,
+}
+
+impl EstimateDensity {
+    fn new(measurement: ConditionalMean) -> Self {
+        let reach = measurement.measurement_reach();
+        let table = (0..=TABLE)
+            .map(|i| measurement.moments(reach * (2.0 * i as f64 / TABLE as f64 - 1.0)).0)
+            .collect();
+        Self { measurement, table }
+    }
+
+    /// The measurement whose estimate is `v`: Newton's method within the bracket that the table gives.
+    fn measurement_of(&self, v: f64) -> f64 {
+        let reach = self.measurement.measurement_reach();
+        let at = self.table.partition_point(|&t| t < v);
+        if at == 0 {
+            return -reach;
+        }
+        if at > TABLE {
+            return reach;
+        }
+        let y_at = |i: usize| reach * (2.0 * i as f64 / TABLE as f64 - 1.0);
+        let (mut low, mut high) = (y_at(at - 1), y_at(at));
+        let noise = self.measurement.noise_std();
+        let mut y = 0.5 * (low + high);
+        for _ in 0..STEPS {
+            let (mean, variance) = self.measurement.moments(y);
+            if mean < v {
+                low = y;
+            } else {
+                high = y;
+            }
+            let newton = y - (mean - v) * noise * noise / variance;
+            let next = if newton > low && newton < high {
+                newton
+            } else {
+                0.5 * (low + high)
+            };
+            if (next - y).abs() <= 1e-14 * reach {
+                return next;
+            }
+            y = next;
+        }
+        y
+    }
+
+    fn integral(&self, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
+        let (from, to) = (self.measurement_of(a), self.measurement_of(b));
+        if from >= to {
+            return 0.0;
+        }
+        self.measurement.integrate(from, to, |_, mean, _| f(mean))
+    }
+}
+
+impl Density for EstimateDensity {
+    fn pdf(&self, v: f64) -> f64 {
+        let y = self.measurement_of(v);
+        let noise = self.measurement.noise_std();
+        let variance = self.measurement.moments(y).1;
+        if variance > 0.0 {
+            self.measurement.measurement_density(y) * noise * noise / variance
+        } else {
+            0.0
+        }
+    }
+
+    fn mass(&self, a: f64, b: f64) -> f64 {
+        self.integral(a, b, |_| 1.0)
+    }
+
+    fn first_moment(&self, a: f64, b: f64) -> f64 {
+        self.integral(a, b, |v| v)
+    }
+
+    fn second_moment(&self) -> f64 {
+        self.measurement.source().variance() - self.measurement.estimation_error()
+    }
+
+    fn extent(&self) -> (f64, f64) {
+        (self.table[0], self.table[TABLE])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn a_gaussian_source_needs_only_the_normal_table() {
+        let source = Source::gaussian(0.5).unwrap();
+        let bound = centralised_bound(&source, 0.4, 3).unwrap();
+        let gain = 0.25 / (0.25 + 0.16 / 3.0);
+        let table = lloyd_max::gaussian_table(3).unwrap().mean_squared_error();
+        assert_relative_eq!(bound, gain * 0.16 / 3.0 + gain * 0.25 * table, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn the_number_of_levels_is_limited() {
+        let source = Source::uniform(1.0).unwrap();
+        assert!(centralised_bound(&source, 0.4, 0).is_err());
+        assert!(centralised_bound(&source, 0.4, 13).is_err());
+        assert!(centralised_bound(&source, f64::NAN, 3).is_err());
+    }
+}

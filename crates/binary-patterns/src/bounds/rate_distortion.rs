@@ -1,0 +1,192 @@
+//! Remote rate-distortion: the source is seen in noise, and a limited number of bits describes what was seen.
+
+use crate::Error;
+use crate::Source;
+use crate::grid::noise_in_range;
+use crate::source::Kind;
+use fewbits_numerics::error::{at_least_one, non_negative};
+use fewbits_numerics::normal::{interval, pdf, truncated_moments};
+use fewbits_numerics::quadrature::gauss_legendre;
+use std::f64::consts::{E, PI};
+
+/// Noise standard deviations beyond the support at which the measurement's density ends for all purposes.
+const REACH: f64 = 9.0;
+
+/// The measurement `Y = X + N(0, s^2)` and the conditional mean `E[X|Y]`, which is all that any fusion centre could use.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConditionalMean {
+    source: Source,
+    noise_std: f64,
+}
+
+impl ConditionalMean {
+    /// From the source and the noise of the (only, or averaged) measurement.
+    ///
+    /// # Errors
+    /// If `noise_std` is not positive and finite.
+    pub fn new(source: Source, noise_std: f64) -> Result<Self, Error> {
+        let noise_std = noise_in_range(noise_std)?;
+        Ok(Self { source, noise_std })
+    }
+
+    pub(super) fn source(&self) -> &Source {
+        &self.source
+    }
+
+    pub(super) fn noise_std(&self) -> f64 {
+        self.noise_std
+    }
+
+    /// Density of the measurement.
+    pub fn measurement_density(&self, y: f64) -> f64 {
+        match self.source.kind() {
+            Kind::Uniform { half_width: v } => {
+                interval((-v - y) / self.noise_std, (v - y) / self.noise_std) / (2.0 * v)
+            }
+            Kind::Gaussian { std } => {
+                let total = std.hypot(self.noise_std);
+                pdf(y / total) / total
+            }
+        }
+    }
+
+    /// `(E[X|y], Var[X|y])`: for a uniform source the moments of a normal truncated to `[-V, V]`.
+    pub fn moments(&self, y: f64) -> (f64, f64) {
+        let s = self.noise_std;
+        match self.source.kind() {
+            Kind::Uniform { half_width: v } => match truncated_moments((-v - y) / s, (v - y) / s) {
+                Ok(cell) => (y + s * cell.mean, s * s * cell.variance),
+                // Unreachable for positive V and finite y; the nearest point of the support is the limit.
+                Err(_) => (y.clamp(-v, v), 0.0),
+            },
+            Kind::Gaussian { std } => {
+                let gain = std * std / (std * std + s * s);
+                (gain * y, gain * s * s)
+            }
+        }
+    }
+
+    /// Half the width of the interval that carries the measurement.
+    pub(super) fn measurement_reach(&self) -> f64 {
+        match self.source.kind() {
+            Kind::Uniform { half_width } => half_width + REACH * self.noise_std,
+            Kind::Gaussian { std } => REACH * std.hypot(self.noise_std),
+        }
+    }
+
+    /// `int_{from}^{to} p_Y(y) f(y, E[X|y], Var[X|y]) dy`.
+    pub(super) fn integrate(&self, from: f64, to: f64, mut f: impl FnMut(f64, f64, f64) -> f64) -> f64 {
+        let width = match self.source.kind() {
+            Kind::Uniform { half_width } => self.noise_std.min(0.5 * half_width),
+            Kind::Gaussian { std } => std.hypot(self.noise_std),
+        };
+        let panels = ((to - from) / width).ceil().clamp(1.0, 1e5) as usize;
+        let mut sum = 0.0;
+        for (y, w) in gauss_legendre::<12>().panels(from, to, panels) {
+            let (mean, variance) = self.moments(y);
+            sum += w * self.measurement_density(y) * f(y, mean, variance);
+        }
+        sum
+    }
+
+    /// `E Var[X|Y]`: what the noise alone costs.
+    pub fn estimation_error(&self) -> f64 {
+        let reach = self.measurement_reach();
+        self.integrate(-reach, reach, |_, _, variance| variance)
+    }
+}
+
+/// Shannon's lower bound on the distortion at rate `R`: `D1 + Q1 2^(-2R)` (appendix B.1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RemoteDistortion {
+    /// `D1 = E Var[X|Y]`.
+    pub estimation_error: f64,
+    /// `Q1 = 2^(2h) / (2 pi e)`, entropy power of `E[X|Y]`, with `h` its differential entropy in bits.
+    pub entropy_power: f64,
+}
+
+impl RemoteDistortion {
+    /// The bound at `rate` bits a source sample.
+    ///
+    /// # Errors
+    /// If the rate is negative or not finite.
+    pub fn at(&self, rate: f64) -> Result<f64, Error> {
+        let rate = non_negative("rate", rate)?;
+        Ok(self.estimation_error + self.entropy_power * (-2.0 * rate).exp2())
+    }
+}
+
+/// The remote rate-distortion bound for one measurement with noise `noise_std`.
+///
+/// The estimate splits the distortion exactly into `E Var[X|Y]` and the distortion of describing `E[X|Y]`: the cross term is
+/// zero by orthogonality, whatever the quantizer (erratum `binary-9`). The entropy needs no inverse function:
+/// `h(E[X|Y]) = h(Y) + E log2 f'(Y)` with `f'(y) = Var[X|y]/s^2`. For a Gaussian source this is equation 5.12,
+/// `D(R) = sx^2 - sx^4/(sx^2 + s^2) (1 - 2^(-2R))`.
+///
+/// # Errors
+/// If `noise_std` is not positive and finite.
+pub fn remote_distortion(source: &Source, noise_std: f64) -> Result<RemoteDistortion, Error> {
+    let measurement = ConditionalMean::new(*source, noise_std)?;
+    if let Kind::Gaussian { std } = source.kind() {
+        let gain = std * std / (std * std + noise_std * noise_std);
+        return Ok(RemoteDistortion {
+            estimation_error: gain * noise_std * noise_std,
+            entropy_power: gain * std * std,
+        });
+    }
+    let reach = measurement.measurement_reach();
+    let log2_variance_scale = 2.0 * noise_std.log2();
+    let entropy = measurement.integrate(-reach, reach, |y, _, variance| {
+        variance.log2() - log2_variance_scale - measurement.measurement_density(y).log2()
+    });
+    Ok(RemoteDistortion {
+        estimation_error: measurement.estimation_error(),
+        entropy_power: (2.0 * entropy).exp2() / (2.0 * PI * E),
+    })
+}
+
+/// The bound for `sensors` measurements of equal noise and one bit each: noise `s^2/N` and rate `N`.
+///
+/// The thesis uses `s^2` with `N` bits (erratum `binary-6`), which schemes with several sensors beat: three sign bits of a
+/// Gaussian source at -5 dB reach 0.0649 where it forbids less than 0.0764; the value here is 0.0521.
+///
+/// # Errors
+/// If `noise_std` is not positive and finite or there is no sensor.
+pub fn network_rate_distortion(source: &Source, noise_std: f64, sensors: usize) -> Result<f64, Error> {
+    let sensors = at_least_one("sensors", sensors)? as f64;
+    remote_distortion(source, noise_in_range(noise_std)? / sensors.sqrt())?.at(sensors)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn gaussian_is_equation_5_12() {
+        let source = Source::gaussian(0.1f64.sqrt()).unwrap();
+        let s = source.noise_std(-5.0).unwrap();
+        assert_relative_eq!(remote_distortion(&source, s).unwrap().at(3.0).unwrap(), 0.076350, max_relative = 1e-5);
+        assert_relative_eq!(network_rate_distortion(&source, s, 3).unwrap(), 0.052077, max_relative = 1e-5);
+    }
+
+    #[test]
+    fn variance_splits_into_estimation_error_and_estimate() {
+        let source = Source::uniform(1.0).unwrap();
+        for noise in [0.02, 0.3, 4.0] {
+            let y = ConditionalMean::new(source, noise).unwrap();
+            let reach = y.measurement_reach();
+            let explained = y.integrate(-reach, reach, |_, mean, _| mean * mean);
+            assert_relative_eq!(explained + y.estimation_error(), source.variance(), max_relative = 1e-11);
+        }
+    }
+
+    #[test]
+    fn bad_rates_are_refused() {
+        let bound = remote_distortion(&Source::uniform(1.0).unwrap(), 0.3).unwrap();
+        assert!(bound.at(-1.0).is_err());
+        assert!(bound.at(f64::NAN).is_err());
+        assert!(network_rate_distortion(&Source::uniform(1.0).unwrap(), 0.3, 0).is_err());
+        assert!(remote_distortion(&Source::uniform(1.0).unwrap(), 0.0).is_err());
+    }
+}

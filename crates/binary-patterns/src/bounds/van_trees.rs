@@ -1,0 +1,236 @@
+//! The Bayesian Cramer-Rao bound with the best weight function.
+
+use crate::Bank;
+use crate::source::{Blur, Kind};
+use std::f64::consts::PI;
+
+/// Intervals of the coarsest grid, and more for each threshold.
+const COARSEST: usize = 512;
+const PER_THRESHOLD: usize = 64;
+/// Grids, each of twice the intervals of the one before.
+const LEVELS: usize = 8;
+/// Most intervals of a grid.
+const FINEST: usize = 1 << 17;
+/// Relative change between extrapolated values at which the doubling stops.
+const TOLERANCE: f64 = 1e-11;
+/// Half width, in noise standard deviations, of the region around a threshold that gets its share of the nodes.
+const FOCUS: f64 = 4.0;
+
+/// The largest van Trees bound over all weight functions, for the sensors of `bank`.
+///
+/// For a weight `q(x)` that vanishes where the density does not, `MSE >= E[q]^2 / E[q^2 J + q'^2]`-type bounds hold; the
+/// best weight solves a linear boundary-value problem, and its mean is the bound:
+///
+/// ```text
+/// J(x)  = sum_n P1n'(x)^2 / (P0n(x) P1n(x))
+/// uniform:   -q'' + J q = 1,                                  q(-V) = q(V) = 0
+/// Gaussian:  -q'' + (x / sx^2) q' + (J + 1/sx^2) q = 1,       natural ends
+/// bound = E[q(X)]
+/// ```
+///
+/// Both are `-(p q')' + p r q = p` with the density `p` as weight, solved by finite volumes (tridiagonal) on grids of
+/// doubling fineness with Romberg extrapolation. The grids are even in a smooth coordinate that gives every threshold its share
+/// of nodes, so that the walls of information are resolved however small the noise is. Without information the bound is `Var X`; as the noise vanishes the
+/// information makes walls at the thresholds and the bound tends to `Delta^2/12`.
+pub fn van_trees(bank: &Bank) -> f64 {
+    let source = bank.source();
+    let (prior, clamped) = match source.kind() {
+        Kind::Uniform { .. } => (0.0, true),
+        Kind::Gaussian { std } => (1.0 / (std * std), false),
+    };
+    let mesh = Mesh::new(source.reach(), &bank.blurs());
+    let mut intervals = COARSEST + PER_THRESHOLD * mesh.focus.len();
+    let rate = |x: f64| bank.fisher_information(x) + prior;
+    // Nodes and the middles between them alternate.
+    let mut points = mesh.points(2 * intervals);
+    let mut rates: Vec<f64> = points.iter().step_by(2).map(|&x| rate(x)).collect();
+    let mut extrapolated: Vec<f64> = Vec::with_capacity(LEVELS);
+    for level in 0..LEVELS {
+        if level > 0 {
+            if 2 * intervals > FINEST {
+                break;
+            }
+            // The old middles become nodes.
+            intervals *= 2;
+            rates = (0..=intervals)
+                .map(|i| if i % 2 == 0 { rates[i / 2] } else { rate(points[i]) })
+                .collect();
+            points = mesh.points(2 * intervals);
+        }
+        let last = extrapolated.last().copied();
+        let mut value = weighted_mean(&mesh, &points, &rates, clamped, |x| source.density(x));
+        // One row of the Romberg table, in place.
+        let mut power = 1.0;
+        for entry in &mut extrapolated {
+            power *= 4.0;
+            let next = value + (value - *entry) / (power - 1.0);
+            *entry = value;
+            value = next;
+        }
+        extrapolated.push(value);
+        if let Some(last) = last
+            && level > 1
+            && (value - last).abs() <= TOLERANCE * value
+        {
+            break;
+        }
+    }
+    extrapolated.last().copied().unwrap_or(source.variance())
+}
+
+/// The coordinate `xi(x)`: half of it even in `x`, half shared among the thresholds.
+struct Mesh {
+    reach: f64,
+    /// Thresholds inside the support and the half widths of their regions.
+    focus: Vec<Blur>,
+    /// Total of the coordinate over the support.
+    total: f64,
+}
+
+impl Mesh {
+    fn new(reach: f64, blurs: &[Blur]) -> Self {
+        let mut focus: Vec<Blur> = blurs
+            .iter()
+            .filter(|b| b.0.abs() < reach)
+            .map(|b| (b.0, FOCUS * b.1))
+            .collect();
+        focus.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        focus.dedup();
+        let mut mesh = Self {
+            reach,
+            focus,
+            total: 0.0,
+        };
+        mesh.total = mesh.coordinate(reach) - mesh.coordinate(-reach);
+        mesh
+    }
+
+    fn share(&self) -> f64 {
+        1.0 / self.focus.len().max(1) as f64
+    }
+
+    fn coordinate(&self, x: f64) -> f64 {
+        let focused: f64 = self.focus.iter().map(|&(t, width)| ((x - t) / width).atan()).sum();
+        0.5 * x / self.reach + self.share() * focused / PI
+    }
+
+    /// `dx/dxi`, with the coordinate scaled to run from 0 to 1.
+    fn stretch(&self, x: f64) -> f64 {
+        let focused: f64 = self
+            .focus
+            .iter()
+            .map(|&(t, width)| width / ((x - t) * (x - t) + width * width))
+            .sum();
+        self.total / (0.5 / self.reach + self.share() * focused / PI)
+    }
+
+    /// `x` at `intervals + 1` even steps of the coordinate, by safeguarded Newton.
+    fn points(&self, intervals: usize) -> Vec<f64> {
+        let start = self.coordinate(-self.reach);
+        let mut points = Vec::with_capacity(intervals + 1);
+        points.push(-self.reach);
+        let mut x = -self.reach;
+        for i in 1..intervals {
+            let target = start + self.total * i as f64 / intervals as f64;
+            let (mut low, mut high) = (x, self.reach);
+            x += self.stretch(x) / intervals as f64;
+            for _ in 0..100 {
+                let off = self.coordinate(x) - target;
+                if off < 0.0 {
+                    low = low.max(x);
+                } else {
+                    high = high.min(x);
+                }
+                let newton = x - off * self.stretch(x) / self.total;
+                let next = if newton > low && newton < high {
+                    newton
+                } else {
+                    0.5 * (low + high)
+                };
+                let done = (next - x).abs() <= 1e-14 * self.reach;
+                x = next;
+                if done {
+                    break;
+                }
+            }
+            points.push(x);
+        }
+        points.push(self.reach);
+        points
+    }
+}
+
+/// `E[q]` for `-(p q')' + p r q = p` by elimination; even entries of `points` are nodes, odd ones the middles between them.
+fn weighted_mean(mesh: &Mesh, points: &[f64], rates: &[f64], clamped: bool, density: impl Fn(f64) -> f64) -> f64 {
+    let n = rates.len() - 1;
+    let h = 1.0 / n as f64;
+    // Flux coefficient between node i and i + 1, and mass of node i.
+    let flux: Vec<f64> = points
+        .iter()
+        .skip(1)
+        .step_by(2)
+        .map(|&x| density(x) / (mesh.stretch(x) * h))
+        .collect();
+    let mass: Vec<f64> = points
+        .iter()
+        .step_by(2)
+        .enumerate()
+        .map(|(i, &x)| density(x) * mesh.stretch(x) * if i == 0 || i == n { 0.5 * h } else { h })
+        .collect();
+    let mut ratio = vec![0.0; n + 1];
+    let mut value = vec![0.0; n + 1];
+    let (first, last) = if clamped { (1, n - 1) } else { (0, n) };
+    for i in first..=last {
+        let left = if i > 0 { flux[i - 1] } else { 0.0 };
+        let right = if i < n { flux[i] } else { 0.0 };
+        let (above_ratio, above_value) = if i > first {
+            (ratio[i - 1], value[i - 1])
+        } else {
+            (0.0, 0.0)
+        };
+        let pivot = right + mass[i] * rates[i] + left * (1.0 - above_ratio);
+        ratio[i] = right / pivot;
+        value[i] = (mass[i] + left * above_value) / pivot;
+    }
+    let (mut q, mut mean) = (0.0, 0.0);
+    for i in (first..=last).rev() {
+        q = value[i] + ratio[i] * q;
+        mean += q * mass[i];
+    }
+    mean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BinaryQuantizer, Source};
+    use approx::assert_relative_eq;
+
+    fn bank(source: Source, noise: f64) -> Bank {
+        Bank::homogeneous(source, vec![BinaryQuantizer::new(vec![0.0]).unwrap()], noise).unwrap()
+    }
+
+    #[test]
+    fn without_information_the_bound_is_the_variance() {
+        for source in [Source::uniform(2.0).unwrap(), Source::gaussian(0.3).unwrap()] {
+            let bound = van_trees(&bank(source, 1e6));
+            assert_relative_eq!(bound, source.variance(), max_relative = 1e-9);
+        }
+    }
+
+    #[test]
+    fn without_noise_the_walls_leave_cells() {
+        let bound = van_trees(&bank(Source::uniform(1.0).unwrap(), 1e-4));
+        assert!(bound <= 1.0 / 12.0);
+        assert_relative_eq!(bound, 1.0 / 12.0, max_relative = 2e-3);
+    }
+
+    #[test]
+    fn constant_information_has_a_closed_form() {
+        // -q'' + a^2 q = 1 with q(+-1) = 0 has mean (1 - tanh(a)/a) / a^2.
+        let mesh = Mesh::new(1.0, &[(0.3, 0.05), (-0.4, 0.002)]);
+        let value = weighted_mean(&mesh, &mesh.points(2 * 4096), &vec![9.0; 4097], true, |_| 0.5);
+        let exact = (1.0 - 3f64.tanh() / 3.0) / 9.0;
+        assert_relative_eq!(value, exact, max_relative = 1e-5);
+    }
+}

@@ -1,0 +1,297 @@
+//! Thresholds that are free of any grid, by descent along the exact gradient.
+
+use super::lbfgs::{Stop, minimise};
+use super::{SEARCH_PANEL, scattered};
+use crate::Error;
+use crate::bank::IMPOSSIBLE;
+use crate::decoder::moments;
+use crate::source::Nodes;
+use crate::{Bank, BinaryQuantizer, Sensor, Source};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{at_least_one, non_negative};
+use fewbits_numerics::normal::pdf;
+use fewbits_numerics::quadrature::gauss_legendre;
+
+/// Most sensors: the outcome tree of distinct sensors has `2^N` leaves.
+const MAX_SENSORS: usize = 16;
+const STOP: Stop = Stop {
+    iterations: 400,
+    decrease: 1e-11,
+};
+
+/// The result of [`free_thresholds`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeDesign {
+    /// The sensors with their new thresholds.
+    pub sensors: Vec<Sensor>,
+    /// Exact mean squared error of the posterior mean.
+    pub mse: f64,
+}
+
+/// Moves all thresholds of all sensors to a local minimum of the posterior mean's error.
+///
+/// The gradient is exact. For `E = sum_z M1^2/M0` and `xhat = M1/M0`, `dE = sum_z int (2 xhat x - xhat^2) dW_z`, so one walk
+/// through the outcome tree, back-propagating these leaf weights, gives the derivative in every sensor's probabilities;
+/// thresholds enter through `dP1/dt = -+phi((t - x)/s)/s`. The variables are each sensor's first threshold and the logarithms
+/// of the gaps, which keeps the order; L-BFGS minimises.
+///
+/// Sensors with equal thresholds stay equal under the gradient. `starts` runs, all but the first with every threshold moved by
+/// up to `jitter` (in units of the source), break that symmetry; the best run is returned.
+///
+/// # Errors
+/// If there is no sensor or more than 16, a noise is below `1e-4` of the source's reach, `starts` is 0, or `jitter` is
+/// negative or not finite.
+pub fn free_thresholds(source: &Source, sensors: &[Sensor], jitter: f64, starts: usize) -> Result<FreeDesign, Error> {
+    at_least_one("sensors", sensors.len())?;
+    at_least_one("starts", starts)?;
+    non_negative("jitter", jitter)?;
+    if sensors.len() > MAX_SENSORS {
+        return Err(ArgumentError::new("sensors", sensors.len(), "at most 16 sensors").into());
+    }
+    for sensor in sensors {
+        // The thresholds move, so the nodes must be dense everywhere.
+        source.resolvable(sensor.noise_std())?;
+    }
+    let mut tree = OutcomeTree::new(source, sensors);
+    let mut best = FreeDesign {
+        sensors: sensors.to_vec(),
+        mse: Bank::new(*source, sensors.to_vec())?.mmse()?,
+    };
+    let mut index = 0;
+    for start in 0..starts {
+        let from: Vec<Vec<f64>> = sensors
+            .iter()
+            .map(|sensor| {
+                let mut moved: Vec<f64> = sensor
+                    .quantizer()
+                    .thresholds()
+                    .iter()
+                    .map(|t| {
+                        index += 1;
+                        if start == 0 {
+                            *t
+                        } else {
+                            t + jitter * (2.0 * scattered(index) - 1.0)
+                        }
+                    })
+                    .collect();
+                moved.sort_by(f64::total_cmp);
+                // Gaps must be positive for their logarithms.
+                for j in 1..moved.len() {
+                    moved[j] = moved[j].max(moved[j - 1] + 1e-9);
+                }
+                moved
+            })
+            .collect();
+        let (variables, _) = minimise(|v, g| tree.value(v, g), encode(&from), STOP);
+        let found = decode(&variables, &tree.lengths)
+            .into_iter()
+            .zip(sensors)
+            .map(|(thresholds, sensor)| Sensor::new(BinaryQuantizer::new(thresholds)?, sensor.noise_std()))
+            .collect::<Result<Vec<_>, _>>();
+        // A run that drives two thresholds into one has left the domain; the others stand.
+        let Ok(found) = found else { continue };
+        let mse = Bank::new(*source, found.clone())?.mmse()?;
+        if mse < best.mse {
+            best = FreeDesign { sensors: found, mse };
+        }
+    }
+    Ok(best)
+}
+
+/// First threshold and logarithms of the gaps, sensor after sensor.
+fn encode(thresholds: &[Vec<f64>]) -> Vec<f64> {
+    thresholds
+        .iter()
+        .flat_map(|t| std::iter::once(t[0]).chain(t.windows(2).map(|w| (w[1] - w[0]).ln())))
+        .collect()
+}
+
+fn decode(variables: &[f64], lengths: &[usize]) -> Vec<Vec<f64>> {
+    let mut rest = variables;
+    lengths
+        .iter()
+        .map(|&length| {
+            let (own, after) = rest.split_at(length);
+            rest = after;
+            let mut sum = 0.0;
+            own.iter()
+                .enumerate()
+                .map(|(j, v)| {
+                    sum += if j == 0 { *v } else { v.exp() };
+                    sum
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// Value and gradient of the error in the thresholds of distinct sensors.
+struct OutcomeTree {
+    nodes: Nodes,
+    noise: Vec<f64>,
+    lengths: Vec<usize>,
+    variance: f64,
+    /// `P(bit|x)` of each sensor.
+    p: Vec<[Vec<f64>; 2]>,
+    /// Derivative of what is explained in `p`.
+    slope: Vec<[Vec<f64>; 2]>,
+    /// `w p(x) P(bits so far|x)` at each depth.
+    weight: Vec<Vec<f64>>,
+    /// Expected leaf value `2 xhat x - xhat^2` below each depth.
+    value: Vec<Vec<f64>>,
+}
+
+impl OutcomeTree {
+    fn new(source: &Source, sensors: &[Sensor]) -> Self {
+        let finest = sensors.iter().map(Sensor::noise_std).fold(f64::INFINITY, f64::min);
+        let nodes = source.nodes(SEARCH_PANEL * finest, gauss_legendre::<8>());
+        let row = || vec![0.0; nodes.len()];
+        let pairs = || sensors.iter().map(|_| [row(), row()]).collect();
+        let rows = || (0..=sensors.len()).map(|_| row()).collect();
+        let mut weight: Vec<Vec<f64>> = rows();
+        weight[0].copy_from_slice(&nodes.w);
+        Self {
+            noise: sensors.iter().map(Sensor::noise_std).collect(),
+            lengths: sensors.iter().map(|s| s.quantizer().thresholds().len()).collect(),
+            variance: source.variance(),
+            p: pairs(),
+            slope: pairs(),
+            weight,
+            value: rows(),
+            nodes,
+        }
+    }
+
+    fn value(&mut self, variables: &[f64], gradient: &mut [f64]) -> f64 {
+        let all = decode(variables, &self.lengths);
+        for (n, thresholds) in all.iter().enumerate() {
+            let Ok(quantizer) = BinaryQuantizer::new(thresholds.clone()) else {
+                // Overflowing or merged thresholds: infinitely bad, so that the line search turns back.
+                gradient.fill(0.0);
+                return f64::INFINITY;
+            };
+            for (i, &x) in self.nodes.x.iter().enumerate() {
+                let [p0, p1] = quantizer.probabilities(x, self.noise[n]);
+                self.p[n][0][i] = p0;
+                self.p[n][1][i] = p1;
+            }
+            self.slope[n].iter_mut().for_each(|row| row.fill(0.0));
+        }
+        let explained = self.walk(0);
+        let mut at = 0;
+        for (n, thresholds) in all.iter().enumerate() {
+            let slopes = self.threshold_slopes(n, thresholds);
+            // Moving the first threshold moves all; widening a gap moves those above it.
+            let mut above = 0.0;
+            for j in (0..slopes.len()).rev() {
+                above += slopes[j];
+                gradient[at + j] = if j == 0 { above } else { above * variables[at + j].exp() };
+            }
+            at += slopes.len();
+        }
+        self.variance - explained
+    }
+
+    fn threshold_slopes(&self, n: usize, thresholds: &[f64]) -> Vec<f64> {
+        let s = self.noise[n];
+        let [zero, one] = &self.slope[n];
+        let mut sign = 1.0;
+        thresholds
+            .iter()
+            .map(|t| {
+                let sum: f64 = self
+                    .nodes
+                    .x
+                    .iter()
+                    .zip(zero.iter().zip(one))
+                    .map(|(x, (zero, one))| pdf((t - x) / s) / s * (one - zero))
+                    .sum();
+                let slope = sign * sum;
+                sign = -sign;
+                slope
+            })
+            .collect()
+    }
+
+    /// Fills `value[depth]` and adds to `slope`; returns what the leaves below explain.
+    fn walk(&mut self, depth: usize) -> f64 {
+        if depth == self.p.len() {
+            let (mass, first) = moments(&self.weight[depth], &self.nodes.x);
+            if mass <= IMPOSSIBLE {
+                self.value[depth].fill(0.0);
+                return 0.0;
+            }
+            let estimate = first / mass;
+            for (v, x) in self.value[depth].iter_mut().zip(&self.nodes.x) {
+                *v = estimate * (2.0 * x - estimate);
+            }
+            return first * estimate;
+        }
+        let mut explained = 0.0;
+        for bit in 0..2 {
+            let (above, below) = self.weight.split_at_mut(depth + 1);
+            for ((child, w), p) in below[0].iter_mut().zip(&above[depth]).zip(&self.p[depth][bit]) {
+                *child = w * p;
+            }
+            explained += self.walk(depth + 1);
+            let (own, child) = self.value.split_at_mut(depth + 1);
+            if bit == 0 {
+                own[depth].fill(0.0);
+            }
+            let p = &self.p[depth][bit];
+            let slope = &mut self.slope[depth][bit];
+            for i in 0..p.len() {
+                own[depth][i] += p[i] * child[0][i];
+                slope[i] += self.weight[depth][i] * child[0][i];
+            }
+        }
+        explained
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn sensors() -> Vec<Sensor> {
+        [(vec![0.1], 0.3), (vec![-0.4, 0.5], 0.2), (vec![-0.7, -0.1, 0.6], 0.25)]
+            .into_iter()
+            .map(|(t, s)| Sensor::new(BinaryQuantizer::new(t).unwrap(), s).unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn the_gradient_is_the_derivative() {
+        let source = Source::uniform(1.0).unwrap();
+        let sensors = sensors();
+        let mut tree = OutcomeTree::new(&source, &sensors);
+        let thresholds: Vec<Vec<f64>> = sensors.iter().map(|s| s.quantizer().thresholds().to_vec()).collect();
+        let variables = encode(&thresholds);
+        let mut gradient = vec![0.0; variables.len()];
+        let mut ignored = gradient.clone();
+        let value = tree.value(&variables, &mut gradient);
+        assert_relative_eq!(value, Bank::new(source, sensors).unwrap().mmse().unwrap(), max_relative = 1e-9);
+        let h = 1e-5;
+        for j in 0..variables.len() {
+            let mut shifted = variables.clone();
+            shifted[j] += h;
+            let up = tree.value(&shifted, &mut ignored);
+            shifted[j] -= 2.0 * h;
+            let down = tree.value(&shifted, &mut ignored);
+            assert_relative_eq!(gradient[j], (up - down) / (2.0 * h), epsilon = 1e-8);
+        }
+    }
+
+    #[test]
+    fn descent_never_ends_above_its_start() {
+        let source = Source::gaussian(0.5).unwrap();
+        let before = Bank::new(source, sensors()).unwrap().mmse().unwrap();
+        let found = free_thresholds(&source, &sensors(), 0.05, 2).unwrap();
+        assert!(found.mse < before);
+        assert!(free_thresholds(&source, &sensors(), -1.0, 2).is_err());
+        assert!(free_thresholds(&source, &sensors(), 0.1, 0).is_err());
+        assert!(free_thresholds(&source, &[], 0.1, 1).is_err());
+    }
+}

@@ -1,0 +1,240 @@
+//! The scalar under observation.
+
+use crate::Error;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{finite, positive};
+use fewbits_numerics::normal::pdf;
+use fewbits_numerics::quadrature::Rule;
+
+/// A Gaussian source is integrated over this many standard deviations to either side; the rest is below `1e-18`.
+const GAUSSIAN_REACH: f64 = 9.0;
+
+/// A zero-mean scalar source `X`, symmetric about zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Source {
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Kind {
+    Uniform { half_width: f64 },
+    Gaussian { std: f64 },
+}
+
+impl Source {
+    /// Uniform on `[-half_width, half_width]`.
+    ///
+    /// # Errors
+    /// If `half_width` is not a finite number above zero.
+    pub fn uniform(half_width: f64) -> Result<Self, Error> {
+        let half_width = positive("half_width", half_width)?;
+        Ok(Self {
+            kind: Kind::Uniform { half_width },
+        })
+    }
+
+    /// `N(0, std^2)`.
+    ///
+    /// # Errors
+    /// If `std` is not a finite number above zero.
+    pub fn gaussian(std: f64) -> Result<Self, Error> {
+        let std = positive("std", std)?;
+        Ok(Self {
+            kind: Kind::Gaussian { std },
+        })
+    }
+
+    pub(crate) fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Variance: `V^2/3` for the uniform source.
+    pub fn variance(&self) -> f64 {
+        match self.kind {
+            Kind::Uniform { half_width } => half_width * half_width / 3.0,
+            Kind::Gaussian { std } => std * std,
+        }
+    }
+
+    /// Density at `x`.
+    pub fn density(&self, x: f64) -> f64 {
+        match self.kind {
+            Kind::Uniform { half_width } if x.abs() <= half_width => 0.5 / half_width,
+            Kind::Uniform { .. } => 0.0,
+            Kind::Gaussian { std } => pdf(x / std) / std,
+        }
+    }
+
+    /// Half the width of the interval that carries the source: `V`, or nine standard deviations.
+    pub fn reach(&self) -> f64 {
+        match self.kind {
+            Kind::Uniform { half_width } => half_width,
+            Kind::Gaussian { std } => GAUSSIAN_REACH * std,
+        }
+    }
+
+    /// Standard deviation of the sensor noise at a signal-to-noise ratio `10 log10(Var X / noise variance)` in dB.
+    ///
+    /// # Errors
+    /// If `snr_db` is not finite or so extreme that the result is not a positive finite number.
+    pub fn noise_std(&self, snr_db: f64) -> Result<f64, Error> {
+        let snr_db = finite("snr_db", snr_db)?;
+        Ok(positive("noise_std", (self.variance() / 10f64.powf(snr_db / 10.0)).sqrt())?)
+    }
+
+    /// Panels no wider than `width`, half of `V`, or one and a half standard deviations of the source.
+    fn panels(&self, from: f64, to: f64, width: f64) -> usize {
+        let widest = match self.kind {
+            Kind::Uniform { half_width } => 0.5 * half_width,
+            Kind::Gaussian { std } => 1.5 * std,
+        };
+        // A noise far below the resolution of any grid must not ask for unbounded memory.
+        (((to - from) / width.min(widest)).ceil() as usize).clamp(1, MAX_PANELS)
+    }
+
+    /// Composite Gauss-Legendre nodes over `[from, to]`, weighted by the density.
+    pub(crate) fn nodes_between(&self, from: f64, to: f64, width: f64, rule: &Rule) -> Nodes {
+        let mut nodes = Nodes::default();
+        nodes.extend(self, from, to, width, rule);
+        nodes
+    }
+
+    /// The same over the whole support, for noise that blurs all of it.
+    pub(crate) fn nodes(&self, width: f64, rule: &Rule) -> Nodes {
+        self.nodes_between(-self.reach(), self.reach(), width, rule)
+    }
+
+    /// Refuses noise too small for an even grid of nodes to resolve.
+    pub(crate) fn resolvable(&self, noise_std: f64) -> Result<f64, Error> {
+        let noise_std = super::grid::noise_in_range(noise_std)?;
+        let least = FINEST * self.reach();
+        if noise_std >= least {
+            return Ok(noise_std);
+        }
+        Err(ArgumentError::new("noise_std", noise_std, format!("at least {least}, 1e-4 of the source's reach")).into())
+    }
+}
+
+/// Enough for 75 dB where all of the support has to be resolved.
+const MAX_PANELS: usize = 20_000;
+/// The smallest noise, as a share of the support, that an even grid of so many panels resolves.
+const FINEST: f64 = 1e-4;
+/// Beyond this many noise standard deviations from a threshold its bit is certain to `1e-50`.
+const ZONE: f64 = 15.0;
+
+/// A threshold and the noise that blurs it: the integrands vary there, and nowhere else.
+pub type Blur = (f64, f64);
+
+/// Quadrature nodes `x` and weights `w` with the source density inside: `E[f(X)] = sum w f(x)`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Nodes {
+    /// Where the integrand is evaluated, increasing.
+    pub x: Vec<f64>,
+    /// Weights, the source's density included.
+    pub w: Vec<f64>,
+}
+
+impl Nodes {
+    /// Appends a part of the support.
+    pub(crate) fn extend(&mut self, source: &Source, from: f64, to: f64, width: f64, rule: &Rule) {
+        for (x, w) in rule.panels(from, to, source.panels(from, to, width)) {
+            self.x.push(x);
+            self.w.push(w * source.density(x));
+        }
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    /// Whether there is no node.
+    pub fn is_empty(&self) -> bool {
+        self.x.is_empty()
+    }
+
+    /// Nodes on `[from, to]` that are dense where a threshold is blurred and sparse where all bits are certain.
+    ///
+    /// Panels within reach of a threshold are `share` of its noise wide. The number of nodes so depends on the number of
+    /// thresholds and not on how small the noise is.
+    pub fn adapted(source: &Source, from: f64, to: f64, blurs: &[Blur], share: f64, rule: &Rule) -> Self {
+        let mut nodes = Self::default();
+        let widest = match source.kind() {
+            Kind::Uniform { half_width } => 0.5 * half_width,
+            Kind::Gaussian { std } => 1.5 * std,
+        };
+        let mut x = from;
+        while x < to {
+            let mut step = widest.min(to - x);
+            for &(threshold, noise) in blurs {
+                let ahead = threshold - ZONE * noise - x;
+                if ahead > 0.0 {
+                    // A panel fine enough for the zone need not stop at its edge.
+                    step = step.min(ahead.max(share * noise));
+                } else if x < threshold + ZONE * noise {
+                    step = step.min(share * noise);
+                }
+            }
+            // Rounding must neither stop the march nor leave a sliver.
+            let end = if x + step >= to - 1e-12 * widest {
+                to
+            } else {
+                (x + step).max(x + 1e-13 * widest)
+            };
+            nodes.x.extend(rule.on(x, end).map(|(x, _)| x));
+            nodes.w.extend(rule.on(x, end).map(|(x, w)| w * source.density(x)));
+            x = end;
+        }
+        nodes
+    }
+
+    /// `sum w f(x)`.
+    pub fn expectation(&self, f: impl Fn(f64) -> f64) -> f64 {
+        self.x.iter().zip(&self.w).map(|(&x, &w)| w * f(x)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use fewbits_numerics::normal::cdf;
+    use fewbits_numerics::quadrature::gauss_legendre;
+
+    #[test]
+    fn nodes_carry_mass_and_variance() {
+        for source in [Source::uniform(1.3).unwrap(), Source::gaussian(0.4).unwrap()] {
+            let nodes = source.nodes(0.2, gauss_legendre::<12>());
+            assert_relative_eq!(nodes.expectation(|_| 1.0), 1.0, max_relative = 1e-14);
+            assert_relative_eq!(nodes.expectation(|x| x * x), source.variance(), max_relative = 1e-14);
+        }
+    }
+
+    #[test]
+    fn adapted_nodes_do_not_grow_as_the_noise_vanishes() {
+        let source = Source::uniform(1.0).unwrap();
+        let mut last = 0;
+        for noise in [0.3, 1e-3, 1e-6, 1e-9] {
+            let nodes =
+                Nodes::adapted(&source, -1.0, 1.0, &[(-0.5, noise), (0.25, noise)], 2.0, gauss_legendre::<12>());
+            assert_relative_eq!(nodes.expectation(|x| x * x), source.variance(), max_relative = 1e-13);
+            let p = nodes.expectation(|x| cdf((x - 0.25) / noise));
+            let integral = |u: f64| u * cdf(u) + pdf(u);
+            let exact = 0.5 * noise * (integral(0.75 / noise) - integral(-1.25 / noise));
+            assert_relative_eq!(p, exact, max_relative = 1e-12);
+            last = nodes.len();
+        }
+        assert!(last < 600, "{last}");
+    }
+
+    #[test]
+    fn scales_are_checked() {
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Source::uniform(bad).is_err());
+            assert!(Source::gaussian(bad).is_err());
+        }
+        let source = Source::uniform(1.0).unwrap();
+        assert!(source.noise_std(f64::NAN).is_err());
+        assert!(source.noise_std(1e6).is_err());
+    }
+}

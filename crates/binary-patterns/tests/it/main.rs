@@ -1,0 +1,5 @@
+//! Integration tests of the binary-patterns crate.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod bounds;
+mod fixtures;

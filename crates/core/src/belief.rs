@@ -1,0 +1,41 @@
+//! What is known about the state at one moment.
+
+use crate::columns::{Columns, ColumnsMut, state_at};
+use nalgebra::{SMatrix, SVector};
+use rand::Rng;
+
+/// A belief over a state of `D` coordinates: a value that can be stored, sent, compared and replayed.
+///
+/// Laws ([`crate::laws::belief`]): samples have the belief's mean and covariance.
+pub trait Belief<const D: usize> {
+    /// Mean.
+    fn mean(&self) -> SVector<f64, D>;
+
+    /// Covariance.
+    fn covariance(&self) -> SMatrix<f64, D, D>;
+
+    /// Fills the columns with independent draws.
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>);
+
+    /// One draw.
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R) -> SVector<f64, D> {
+        let mut point = [[0.0]; D];
+        self.sample_columns(rng, point.each_mut().map(|x| x.as_mut_slice()));
+        SVector::from_fn(|d, _| point[d][0])
+    }
+}
+
+/// A belief with a density.
+///
+/// Laws ([`crate::laws::belief`]): the density integrates to one; `add_log_densities` adds what `log_density` returns.
+pub trait Density<const D: usize>: Belief<D> {
+    /// `ln p(state)`: finite or `-inf`, never NaN for a finite state.
+    fn log_density(&self, state: &SVector<f64, D>) -> f64;
+
+    /// Adds the log density of every state to `logs`. Override where a sweep is faster.
+    fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
+        for (i, log) in logs.iter_mut().enumerate() {
+            *log += self.log_density(&state_at(states, i));
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Intervals of measurements.
+
+use crate::sign::Sign;
+use fewbits_numerics::error::{self, ArgumentError};
+use fewbits_numerics::normal;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// A half-open interval `[lower, upper)` that is known to hold a measurement; either end may be infinite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Ends", into = "Ends"))]
+pub struct Cell {
+    lower: f64,
+    upper: f64,
+}
+
+impl Cell {
+    /// The cell `[lower, upper)`.
+    ///
+    /// # Errors
+    /// If `lower < upper` does not hold (NaN included).
+    pub fn new(lower: f64, upper: f64) -> Result<Self, ArgumentError> {
+        if lower < upper {
+            Ok(Self { lower, upper })
+        } else {
+            Err(ArgumentError::new("cell", format!("[{lower}, {upper})"), "lower < upper"))
+        }
+    }
+
+    /// The half-line that a sign bit at `threshold` announces.
+    ///
+    /// # Errors
+    /// If the threshold is not finite.
+    pub fn of_sign(sign: Sign, threshold: f64) -> Result<Self, ArgumentError> {
+        error::finite("threshold", threshold)?;
+        match sign {
+            Sign::Above => Self::new(threshold, f64::INFINITY),
+            Sign::Below => Self::new(f64::NEG_INFINITY, threshold),
+        }
+    }
+
+    /// Lower end, included.
+    pub fn lower(&self) -> f64 {
+        self.lower
+    }
+
+    /// Upper end, excluded.
+    pub fn upper(&self) -> f64 {
+        self.upper
+    }
+
+    /// Whether the cell holds `value`.
+    pub fn contains(&self, value: f64) -> bool {
+        self.lower <= value && value < self.upper
+    }
+
+    /// `ln P(mean + noise in cell)` for zero-mean normal noise of the given standard deviation.
+    #[inline]
+    pub fn log_probability(&self, mean: f64, standard_deviation: f64) -> f64 {
+        normal::log_interval((self.lower - mean) / standard_deviation, (self.upper - mean) / standard_deviation)
+    }
+}
+
+/// The stored form: an end that is left out is infinite, since JSON has no infinity.
+#[cfg(feature = "serde")]
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Ends {
+    lower: Option<f64>,
+    upper: Option<f64>,
+}
+
+#[cfg(feature = "serde")]
+impl From<Cell> for Ends {
+    fn from(cell: Cell) -> Self {
+        let end = |x: f64| x.is_finite().then_some(x);
+        Self {
+            lower: end(cell.lower),
+            upper: end(cell.upper),
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Ends> for Cell {
+    type Error = ArgumentError;
+
+    fn try_from(ends: Ends) -> Result<Self, ArgumentError> {
+        Self::new(ends.lower.unwrap_or(f64::NEG_INFINITY), ends.upper.unwrap_or(f64::INFINITY))
+    }
+}

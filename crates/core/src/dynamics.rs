@@ -1,0 +1,63 @@
+//! How the world moves.
+//!
+//! Three traits, each a refinement of the one before: anything that can be drawn from, Gaussian noise about a smooth mean,
+//! and linear Gaussian. An estimator asks for the least that it needs.
+
+use crate::columns::{ColumnsMut, count, set_state};
+use crate::error::Error;
+use crate::gaussian::Gaussian;
+use nalgebra::{SMatrix, SVector};
+use rand::Rng;
+
+/// Markov dynamics `x_k ~ p(x_k | x_{k-1})`, over one step of fixed length.
+///
+/// Laws ([`crate::laws::dynamics`]): `propagate` has conditional mean [`Dynamics::mean`], and `propagate_columns` the same
+/// law as `propagate`.
+pub trait Dynamics<const D: usize> {
+    /// Conditional mean `E[x_k | x_{k-1}]`.
+    fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, D>;
+
+    /// Draws `x_k` given `x_{k-1}`.
+    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, D>;
+
+    /// Propagates a whole cloud in place. Override where a loop over columns is faster.
+    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        for i in 0..count(&states) {
+            let next = self.propagate(rng, &SVector::from_fn(|d, _| states[d][i]));
+            set_state(&mut states, i, &next);
+        }
+    }
+}
+
+/// Dynamics with Gaussian noise about a smooth mean: `x_k ~ N(f(x_{k-1}), Q(x_{k-1}))`.
+pub trait GaussianDynamics<const D: usize>: Dynamics<D> {
+    /// Jacobian of [`Dynamics::mean`] at `state`.
+    fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, D, D>;
+
+    /// Covariance of the process noise out of `state`, possibly singular.
+    fn noise_covariance_at(&self, state: &SVector<f64, D>) -> SMatrix<f64, D, D>;
+
+    /// `p(x_k | x_{k-1} = state)` as a belief.
+    fn transition_from(&self, state: &SVector<f64, D>) -> Gaussian<D> {
+        Gaussian::from_trusted_parts(self.mean(state), self.noise_covariance_at(state))
+    }
+
+    /// `ln p(next | state)`.
+    ///
+    /// # Errors
+    /// If the noise out of `state` is singular: the transition has no density.
+    fn log_transition(&self, next: &SVector<f64, D>, state: &SVector<f64, D>) -> Result<f64, Error> {
+        Ok(self.transition_from(state).log_pdf(next)?)
+    }
+}
+
+/// Linear Gaussian dynamics `x_k = F x_{k-1} + u_k`, `u ~ N(0, Q)`: what a Kalman filter needs.
+///
+/// Law: `mean(x) = F x`, `jacobian(x) = F` and `noise_covariance_at(x) = Q` for every `x`.
+pub trait LinearDynamics<const D: usize>: GaussianDynamics<D> {
+    /// Transition matrix `F`.
+    fn transition(&self) -> &SMatrix<f64, D, D>;
+
+    /// Process-noise covariance `Q`, possibly singular.
+    fn noise_covariance(&self) -> &SMatrix<f64, D, D>;
+}

@@ -1,0 +1,221 @@
+//! A measurement known to lie in a cell, over a link that may lose or invert what says so.
+
+use super::{Factor, Tilted};
+use crate::cell::Cell;
+use crate::columns::Columns;
+use crate::error::Error;
+use crate::gaussian::Gaussian;
+use crate::observation::Link;
+use crate::sign::Sign;
+use fewbits_numerics::error::{ArgumentError, positive};
+use fewbits_numerics::normal;
+use nalgebra::SVector;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// `p(observation | m) = floor + share P(m + n in cell)`, `n ~ N(0, r)`.
+///
+/// | observation | cell | floor | share |
+/// |---|---|---|---|
+/// | sign bit over a link with loss `l` and crossover `e` | a half-line | `(1 - l) e` | `(1 - l)(1 - 2 e)` |
+/// | cell of a quantizer, perfect link | the cell | 0 | 1 |
+/// | nothing from a censoring sensor, loss `l` | region of silence | `l` | `1 - l` |
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Numbers", into = "Numbers"))]
+pub struct InCell {
+    cell: Cell,
+    variance: f64,
+    deviation: f64,
+    floor: f64,
+    share: f64,
+    log_share: f64,
+}
+
+#[cfg(feature = "serde")]
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    cell: Cell,
+    noise_variance: f64,
+    floor: f64,
+    share: f64,
+}
+
+#[cfg(feature = "serde")]
+impl From<InCell> for Numbers {
+    fn from(factor: InCell) -> Self {
+        Self {
+            cell: factor.cell,
+            noise_variance: factor.variance,
+            floor: factor.floor,
+            share: factor.share,
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Numbers> for InCell {
+    type Error = ArgumentError;
+
+    fn try_from(numbers: Numbers) -> Result<Self, ArgumentError> {
+        Self::new(numbers.cell, numbers.noise_variance, numbers.floor, numbers.share)
+    }
+}
+
+impl InCell {
+    /// `floor + share P(m + n in cell)` with noise variance `r`.
+    ///
+    /// # Errors
+    /// If `r` is not positive, `floor` or `share` is negative, their sum exceeds one, or both are zero.
+    pub fn new(cell: Cell, noise_variance: f64, floor: f64, share: f64) -> Result<Self, ArgumentError> {
+        positive("noise_variance", noise_variance)?;
+        fewbits_numerics::error::within("floor", floor, 0.0, 1.0)?;
+        // Rounding of `loss + (1 - loss)` and its like is forgiven.
+        fewbits_numerics::error::within("floor + share", floor + share, f64::MIN_POSITIVE, 1.0 + 1e-12)?;
+        fewbits_numerics::error::within("share", share, 0.0, 1.0)?;
+        Ok(Self {
+            cell,
+            variance: noise_variance,
+            deviation: noise_variance.sqrt(),
+            floor,
+            share,
+            log_share: share.ln(),
+        })
+    }
+
+    /// The measurement lies in `cell`, for sure.
+    ///
+    /// # Errors
+    /// If `r` is not positive.
+    pub fn certain(cell: Cell, noise_variance: f64) -> Result<Self, ArgumentError> {
+        Self::new(cell, noise_variance, 0.0, 1.0)
+    }
+
+    /// A sign bit at `threshold`, received over `link`.
+    ///
+    /// # Errors
+    /// If `threshold` is not finite or `r` not positive.
+    pub fn sign(sign: Sign, threshold: f64, noise_variance: f64, link: &Link) -> Result<Self, ArgumentError> {
+        let (arrives, crossover) = (1.0 - link.loss(), link.crossover());
+        let cell = Cell::of_sign(sign, threshold)?;
+        Self::new(cell, noise_variance, arrives * crossover, arrives * (1.0 - 2.0 * crossover))
+    }
+
+    /// Nothing from a sensor that is silent if and only if its measurement lies in `cell`, over `link`.
+    ///
+    /// # Errors
+    /// If `r` is not positive.
+    pub fn silence(cell: Cell, noise_variance: f64, link: &Link) -> Result<Self, ArgumentError> {
+        Self::new(cell, noise_variance, link.loss(), 1.0 - link.loss())
+    }
+
+    /// The cell.
+    pub fn cell(&self) -> &Cell {
+        &self.cell
+    }
+
+    /// `r`.
+    pub fn noise_variance(&self) -> f64 {
+        self.variance
+    }
+
+    /// Probability of the observation where the cell is out of reach.
+    pub fn floor(&self) -> f64 {
+        self.floor
+    }
+
+    /// What the cell adds to the floor where it is certain.
+    pub fn share(&self) -> f64 {
+        self.share
+    }
+
+    /// `ln p(observation | m)`.
+    #[inline]
+    pub fn log_probability(&self, m: f64) -> f64 {
+        self.mixed(self.log_inside(m))
+    }
+
+    /// `ln P(m + n in cell)`.
+    #[inline]
+    fn log_inside(&self, m: f64) -> f64 {
+        let (lower, upper) = (self.cell.lower(), self.cell.upper());
+        if upper == f64::INFINITY {
+            normal::log_cdf((m - lower) / self.deviation)
+        } else if lower == f64::NEG_INFINITY {
+            normal::log_cdf((upper - m) / self.deviation)
+        } else {
+            normal::log_interval((lower - m) / self.deviation, (upper - m) / self.deviation)
+        }
+    }
+
+    /// `ln(floor + share exp(log_inside))`.
+    #[inline]
+    fn mixed(&self, log_inside: f64) -> f64 {
+        if self.floor == 0.0 {
+            self.log_share + log_inside
+        } else {
+            (self.floor + self.share * log_inside.exp()).ln()
+        }
+    }
+
+    /// `ln P`, mean and variance of a standard normal variable in `[a, b)`.
+    fn standard(a: f64, b: f64) -> Result<(f64, f64, f64), Error> {
+        if b == f64::INFINITY && a == f64::NEG_INFINITY {
+            return Ok((0.0, 0.0, 1.0));
+        }
+        if b == f64::INFINITY {
+            let above = normal::one_sided(-a);
+            return Ok((above.log_probability, above.mean, above.variance));
+        }
+        if a == f64::NEG_INFINITY {
+            let below = normal::one_sided(b);
+            return Ok((below.log_probability, -below.mean, below.variance));
+        }
+        let inside = normal::truncated_moments(a, b).map_err(|_| Error::Impossible)?;
+        Ok((normal::log_interval(a, b), inside.mean, inside.variance))
+    }
+}
+
+impl Factor<1> for InCell {
+    #[inline]
+    fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
+        self.log_probability(m[0])
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        for (log_weight, m) in log_weights.iter_mut().zip(means[0]) {
+            *log_weight += self.log_probability(*m);
+        }
+    }
+
+    /// The measurement `m + n ~ N(mu, s^2)`, `s^2 = v + r`, is truncated to the cell; `m` follows it with gain `v / s^2` and is
+    /// mixed with the prior where the floor may have caused the observation.
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
+        let (mean, v) = (prior.mean()[0], prior.covariance()[0]);
+        let total = v + self.variance;
+        let s = total.sqrt();
+        let (log_inside, inside_mean, inside_variance) =
+            Self::standard((self.cell.lower() - mean) / s, (self.cell.upper() - mean) / s).or_else(|error| {
+                // A cell out of reach of the numbers can still be blamed on the floor.
+                if self.floor > 0.0 {
+                    Ok((f64::NEG_INFINITY, 0.0, 1.0))
+                } else {
+                    Err(error)
+                }
+            })?;
+        let log_evidence = self.mixed(log_inside);
+        let gain = v / total;
+        let shift = gain * s * inside_mean;
+        let inside = gain * (self.variance + v * inside_variance);
+        if self.floor == 0.0 {
+            return Tilted::scalar(log_evidence, mean + shift, inside);
+        }
+        let blame = (self.log_share + log_inside - log_evidence).exp().min(1.0);
+        if blame == 0.0 {
+            return Tilted::scalar(log_evidence, mean, v);
+        }
+        let variance = (1.0 - blame) * v + blame * inside + blame * (1.0 - blame) * shift * shift;
+        Tilted::scalar(log_evidence, mean + blame * shift, variance)
+    }
+}

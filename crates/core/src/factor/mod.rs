@@ -1,0 +1,111 @@
+//! How likely what was observed is, for each noise-free measurement: the hinge of the library.
+//!
+//! A [`Factor`] is `p(observation | h(x) = m)` as a function of `m`. A value, a sign bit through a noisy link, a quantizer cell,
+//! the silence of a censoring sensor: each is one small type that implements it, and every filter follows. Particle and grid
+//! filters weigh by [`Factor::log_likelihood`]; the assumed-density filter asks for the moments of the posterior,
+//! [`Factor::tilted`].
+//!
+//! | factor | type |
+//! |---|---|
+//! | a value in Gaussian noise | [`Value`] |
+//! | a measurement known to lie in a cell, mixed with a constant: sign bits, quantizer cells, silence, over lossy and flipping links | [`InCell`] |
+//! | a symbol through any discrete channel: a probability for each cell of a partition | [`Partition`] |
+//! | nothing that depends on `m` | [`Constant`] |
+//! | any of these | [`Scalar`] |
+//! | several observations of one `m` | [`Product`], [`Repeated`] |
+
+mod cell;
+mod moments;
+mod partition;
+mod product;
+mod scalar;
+mod value;
+
+pub use cell::InCell;
+pub use moments::{Feature, tilted_by_quadrature};
+pub use partition::Partition;
+pub use product::{Product, Repeated};
+pub use scalar::{Constant, Scalar};
+pub use value::Value;
+
+use crate::columns::{Columns, count, state_at};
+use crate::error::Error;
+use crate::gaussian::Gaussian;
+use nalgebra::{SMatrix, SVector};
+
+/// `p(observation | h(x) = m)` for the `M` components of a noise-free measurement `m`.
+///
+/// Laws ([`crate::laws::factor`]):
+/// 1. `log_likelihood` is finite or `-inf` for every finite `m`, never NaN;
+/// 2. `add_log_likelihoods` adds what `log_likelihood` returns, to rounding;
+/// 3. `tilted` agrees with quadrature of `log_likelihood` against the prior.
+pub trait Factor<const M: usize> {
+    /// `ln p(observation | h(x) = m)`.
+    fn log_likelihood(&self, m: &SVector<f64, M>) -> f64;
+
+    /// Adds the log likelihood of every column of `means` to `log_weights`. Override where a sweep is faster.
+    fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        for i in 0..count(means).min(log_weights.len()) {
+            log_weights[i] += self.log_likelihood(&state_at(means, i));
+        }
+    }
+
+    /// Evidence and moments of the posterior of `m ~ prior`.
+    ///
+    /// # Errors
+    /// [`Error::Impossible`] if the observation has probability zero under the prior; [`Error::NotConverged`].
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error>;
+}
+
+/// The posterior of a noise-free measurement: `N(m; prior) p(observation | m) / evidence`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tilted<const M: usize> {
+    /// `ln` of the evidence, `ln integral N(m; prior) p(observation | m) dm`.
+    pub log_evidence: f64,
+    /// Mean of the posterior.
+    pub mean: SVector<f64, M>,
+    /// Covariance of the posterior.
+    pub covariance: SMatrix<f64, M, M>,
+}
+
+impl<const M: usize> Tilted<M> {
+    /// The prior itself: an observation that says nothing, of probability `exp(log_evidence)`.
+    pub fn unchanged(prior: &Gaussian<M>, log_evidence: f64) -> Result<Self, Error> {
+        if log_evidence == f64::NEG_INFINITY {
+            return Err(Error::Impossible);
+        }
+        Ok(Self {
+            log_evidence,
+            mean: *prior.mean(),
+            covariance: *prior.covariance(),
+        })
+    }
+}
+
+impl Tilted<1> {
+    /// A scalar posterior, if its numbers are numbers.
+    pub(crate) fn scalar(log_evidence: f64, mean: f64, variance: f64) -> Result<Self, Error> {
+        if !(log_evidence.is_finite() && mean.is_finite() && variance.is_finite()) {
+            return Err(Error::Impossible);
+        }
+        Ok(Self {
+            log_evidence,
+            mean: [mean].into(),
+            covariance: [[variance.max(0.0)]].into(),
+        })
+    }
+}
+
+impl<const M: usize, F: Factor<M> + ?Sized> Factor<M> for &F {
+    fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
+        (**self).log_likelihood(m)
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        (**self).add_log_likelihoods(means, log_weights);
+    }
+
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
+        (**self).tilted(prior)
+    }
+}

@@ -1,0 +1,202 @@
+//! A probability for each cell of a partition of the measurement axis.
+
+use super::moments::Feature;
+use super::{Factor, Tilted};
+use crate::columns::Columns;
+use crate::error::Error;
+use crate::gaussian::Gaussian;
+use fewbits_numerics::error::{ArgumentError, all_finite, positive};
+use fewbits_numerics::normal;
+use nalgebra::SVector;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// `p(observation | m) = sum_i p_i P(m + n in cell i)`, `n ~ N(0, r)`: a symbol through any discrete channel, a bit of a binary
+/// pattern, a two-sided bit.
+///
+/// The cells are `[e_{i-1}, e_i)` between increasing edges, the first and the last unbounded; `p_i` is the probability of the
+/// observation given that the measurement lies in cell `i`.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Numbers", into = "Numbers"))]
+pub struct Partition {
+    edges: Vec<f64>,
+    given_cell: Vec<f64>,
+    deviation: f64,
+    variance: f64,
+}
+
+#[cfg(feature = "serde")]
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    edges: Vec<f64>,
+    given_cell: Vec<f64>,
+    noise_variance: f64,
+}
+
+#[cfg(feature = "serde")]
+impl From<Partition> for Numbers {
+    fn from(factor: Partition) -> Self {
+        Self {
+            edges: factor.edges,
+            given_cell: factor.given_cell,
+            noise_variance: factor.variance,
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Numbers> for Partition {
+    type Error = ArgumentError;
+
+    fn try_from(numbers: Numbers) -> Result<Self, ArgumentError> {
+        Self::new(numbers.edges, numbers.given_cell, numbers.noise_variance)
+    }
+}
+
+impl Partition {
+    /// The factor with `edges` (measurement units, strictly increasing) and one probability for each of the
+    /// `edges.len() + 1` cells.
+    ///
+    /// # Errors
+    /// If an edge is not finite or not above the one before, the number of probabilities is wrong, one is outside `[0, 1]`,
+    /// all are zero, or `r` is not positive.
+    pub fn new(edges: Vec<f64>, given_cell: Vec<f64>, noise_variance: f64) -> Result<Self, ArgumentError> {
+        all_finite("edges", &edges)?;
+        if let Some(pair) = edges.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return Err(ArgumentError::new("edges", format!("{} before {}", pair[0], pair[1]), "increasing edges"));
+        }
+        if given_cell.len() != edges.len() + 1 {
+            let text = format!("{} probabilities", given_cell.len());
+            return Err(ArgumentError::new("given_cell", text, format!("{}, one per cell", edges.len() + 1)));
+        }
+        if let Some(bad) = given_cell.iter().find(|p| !(0.0..=1.0).contains(*p)) {
+            return Err(ArgumentError::new("given_cell", bad, "probabilities in [0, 1]"));
+        }
+        if given_cell.iter().all(|p| *p == 0.0) {
+            return Err(ArgumentError::new("given_cell", "all zero", "an observation that some cell can cause"));
+        }
+        Ok(Self {
+            edges,
+            given_cell,
+            deviation: positive("noise_variance", noise_variance)?.sqrt(),
+            variance: noise_variance,
+        })
+    }
+
+    /// The increasing edges between the cells.
+    pub fn edges(&self) -> &[f64] {
+        &self.edges
+    }
+
+    /// `p(observation | measurement in cell i)`.
+    pub fn given_cell(&self) -> &[f64] {
+        &self.given_cell
+    }
+
+    /// `r`.
+    pub fn noise_variance(&self) -> f64 {
+        self.variance
+    }
+
+    /// Lower end, upper end and probability of each cell that can cause the observation; neighbours of equal probability
+    /// count as one cell.
+    fn parts(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
+        let mut next = 0;
+        std::iter::from_fn(move || {
+            while next < self.given_cell.len() {
+                let first = next;
+                let p = self.given_cell[first];
+                while next < self.given_cell.len() && self.given_cell[next] == p {
+                    next += 1;
+                }
+                if p > 0.0 {
+                    let lower = if first == 0 {
+                        f64::NEG_INFINITY
+                    } else {
+                        self.edges[first - 1]
+                    };
+                    return Some((lower, self.edges.get(next - 1).copied().unwrap_or(f64::INFINITY), p));
+                }
+            }
+            None
+        })
+    }
+
+    /// `ln p(observation | m)`.
+    pub fn log_probability(&self, m: f64) -> f64 {
+        let standard = |edge: f64| (edge - m) / self.deviation;
+        let p: f64 = self
+            .parts()
+            .map(|(lower, upper, p)| p * normal::interval(standard(lower), standard(upper)))
+            .sum();
+        if p > 1e-280 {
+            return p.min(1.0).ln();
+        }
+        // All cells that matter are far away: only logarithms have digits left.
+        let logs: Vec<f64> = self
+            .parts()
+            .map(|(lower, upper, p)| p.ln() + normal::log_interval(standard(lower), standard(upper)))
+            .collect();
+        let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if largest == f64::NEG_INFINITY {
+            return largest;
+        }
+        largest + logs.iter().map(|l| (l - largest).exp()).sum::<f64>().ln()
+    }
+}
+
+impl Factor<1> for Partition {
+    fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
+        self.log_probability(m[0])
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        for (log_weight, m) in log_weights.iter_mut().zip(means[0]) {
+            *log_weight += self.log_probability(*m);
+        }
+    }
+
+    /// A mixture of truncated normals, by the closed form of each cell.
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
+        let mut cells = Vec::with_capacity(self.given_cell.len());
+        for (lower, upper, p) in self.parts() {
+            let cell = crate::cell::Cell::new(lower, upper)?;
+            match super::InCell::new(cell, self.variance, 0.0, p)?.tilted(prior) {
+                Ok(part) => cells.push(part),
+                Err(Error::Impossible) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        mixture(&cells, prior)
+    }
+}
+
+/// The mixture of scalar posteriors in proportion to their evidence.
+fn mixture(parts: &[Tilted<1>], prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
+    let largest = parts.iter().map(|t| t.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        return Err(Error::Impossible);
+    }
+    let weight = |t: &Tilted<1>| (t.log_evidence - largest).exp();
+    let total: f64 = parts.iter().map(weight).sum();
+    let origin = prior.mean()[0];
+    let shift = parts.iter().map(|t| weight(t) * (t.mean[0] - origin)).sum::<f64>() / total;
+    let spread = |t: &Tilted<1>| {
+        let d = t.mean[0] - origin - shift;
+        weight(t) * (t.covariance[0] + d * d)
+    };
+    let variance = parts.iter().map(spread).sum::<f64>() / total;
+    Tilted::scalar(largest + total.ln(), origin + shift, variance)
+}
+
+impl Partition {
+    /// Where the likelihood changes: its edges, each as wide as the noise.
+    pub(crate) fn features(&self) -> impl Iterator<Item = Feature> + '_ {
+        self.edges.iter().map(|edge| Feature {
+            location: *edge,
+            width: self.deviation,
+        })
+    }
+}

@@ -1,0 +1,117 @@
+//! Several observations of one measurement.
+
+use super::moments::{Feature, tilted_by_quadrature};
+use super::{Factor, Scalar, Tilted};
+use crate::columns::Columns;
+use crate::error::Error;
+use crate::gaussian::Gaussian;
+use fewbits_numerics::error::{ArgumentError, at_least_one};
+use nalgebra::SVector;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// The same observation `count` times, by sensors that share the noise-free measurement: `p(observation | m)^count`. Silences
+/// and sign bits of identical sensors are fused exactly and together, at a cost that does not grow with their number.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Repeated {
+    factor: Scalar,
+    count: usize,
+}
+
+impl Repeated {
+    /// `factor` to the power `count`.
+    ///
+    /// # Errors
+    /// If `count` is zero.
+    pub fn new(factor: Scalar, count: usize) -> Result<Self, ArgumentError> {
+        at_least_one("count", count)?;
+        Ok(Self { factor, count })
+    }
+
+    /// One of the observations.
+    pub fn factor(&self) -> &Scalar {
+        &self.factor
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+}
+
+impl Factor<1> for Repeated {
+    fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
+        self.count as f64 * self.factor.log_likelihood(m)
+    }
+
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
+        if self.count == 1 {
+            return self.factor.tilted(prior);
+        }
+        let log_likelihood = |m: f64| self.log_likelihood(&[m].into());
+        tilted_by_quadrature(prior, self.factor.features(), log_likelihood)
+    }
+}
+
+/// Independent observations of one measurement: log likelihoods add.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+pub struct Product {
+    factors: Vec<Repeated>,
+}
+
+impl Product {
+    /// No observation yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds an observation; one that is there already is counted again.
+    pub fn push(&mut self, factor: Scalar) {
+        match self.factors.iter_mut().find(|known| known.factor == factor) {
+            Some(known) => known.count += 1,
+            None => self.factors.push(Repeated { factor, count: 1 }),
+        }
+    }
+
+    /// The distinct observations with their numbers.
+    pub fn factors(&self) -> &[Repeated] {
+        &self.factors
+    }
+
+    /// Where the likelihood changes.
+    fn features(&self) -> impl Iterator<Item = Feature> + '_ {
+        self.factors.iter().flat_map(|f| f.factor.features())
+    }
+}
+
+impl FromIterator<Scalar> for Product {
+    fn from_iter<I: IntoIterator<Item = Scalar>>(factors: I) -> Self {
+        let mut product = Self::new();
+        factors.into_iter().for_each(|factor| product.push(factor));
+        product
+    }
+}
+
+impl Factor<1> for Product {
+    fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
+        self.factors.iter().map(|factor| factor.log_likelihood(m)).sum()
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        for factor in &self.factors {
+            factor.add_log_likelihoods(means, log_weights);
+        }
+    }
+
+    /// One factor by its closed form, several by quadrature.
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
+        match self.factors.as_slice() {
+            [] => Tilted::unchanged(prior, 0.0),
+            [factor] => factor.tilted(prior),
+            _ => tilted_by_quadrature(prior, self.features(), |m| self.log_likelihood(&[m].into())),
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! What can be observed of a scalar measurement.
+
+use super::moments::Feature;
+use super::{Factor, InCell, Partition, Tilted, Value};
+use crate::cell::Cell;
+use crate::columns::Columns;
+use crate::error::Error;
+use crate::gaussian::Gaussian;
+use nalgebra::SVector;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// An observation of the same probability under every measurement: a loss, a random silence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(transparent))]
+pub struct Constant {
+    probability: f64,
+}
+
+impl Constant {
+    /// An observation that says nothing.
+    pub const ONE: Self = Self { probability: 1.0 };
+
+    /// An observation of the given probability under every measurement. Zero makes it impossible.
+    ///
+    /// # Errors
+    /// If `probability` is outside `[0, 1]`.
+    pub fn new(probability: f64) -> Result<Self, fewbits_numerics::ArgumentError> {
+        fewbits_numerics::error::within("probability", probability, 0.0, 1.0)?;
+        Ok(Self { probability })
+    }
+
+    /// Its probability.
+    pub fn probability(&self) -> f64 {
+        self.probability
+    }
+}
+
+impl<const M: usize> Factor<M> for Constant {
+    fn log_likelihood(&self, _: &SVector<f64, M>) -> f64 {
+        self.probability.ln()
+    }
+
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
+        Tilted::unchanged(prior, self.probability.ln())
+    }
+}
+
+/// Any factor of a scalar measurement in Gaussian noise.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Scalar {
+    /// The measurement itself.
+    Value(Value<1>),
+    /// A cell that holds it.
+    InCell(InCell),
+    /// A probability for each cell.
+    Partition(Partition),
+    /// Nothing about it.
+    Constant(Constant),
+}
+
+impl Scalar {
+    /// `p(observation | measurement)` as a function of the noisy measurement, piecewise constant: cells with their
+    /// probabilities, zeros left out. Empty for a value, which is a point.
+    pub fn pieces(&self) -> Vec<(Cell, f64)> {
+        let whole = (f64::NEG_INFINITY, f64::INFINITY);
+        let (edges, shares) = match self {
+            Self::Value(_) => return Vec::new(),
+            Self::Constant(factor) => (vec![whole.0, whole.1], vec![factor.probability]),
+            Self::InCell(factor) => (
+                vec![whole.0, factor.cell().lower(), factor.cell().upper(), whole.1],
+                vec![factor.floor(), factor.floor() + factor.share(), factor.floor()],
+            ),
+            Self::Partition(factor) => (
+                [whole.0]
+                    .into_iter()
+                    .chain(factor.edges().iter().copied())
+                    .chain([whole.1])
+                    .collect(),
+                factor.given_cell().to_vec(),
+            ),
+        };
+        let ends = edges.windows(2).map(|pair| Cell::new(pair[0], pair[1]));
+        ends.zip(shares)
+            .filter_map(|(cell, p)| Some((cell.ok()?, p)))
+            .filter(|(_, p)| *p > 0.0)
+            .collect()
+    }
+
+    /// Where the likelihood changes, and over which distance.
+    pub(crate) fn features(&self) -> Vec<Feature> {
+        match self {
+            Self::Value(value) => vec![Feature {
+                location: value.value()[0],
+                width: value.noise_covariance()[0].sqrt(),
+            }],
+            Self::InCell(factor) => [factor.cell().lower(), factor.cell().upper()]
+                .into_iter()
+                .filter(|edge| edge.is_finite())
+                .map(|location| Feature {
+                    location,
+                    width: factor.noise_variance().sqrt(),
+                })
+                .collect(),
+            Self::Partition(factor) => factor.features().collect(),
+            Self::Constant(_) => Vec::new(),
+        }
+    }
+}
+
+macro_rules! delegate {
+    ($self:expr, $factor:ident => $call:expr) => {
+        match $self {
+            Scalar::Value($factor) => $call,
+            Scalar::InCell($factor) => $call,
+            Scalar::Partition($factor) => $call,
+            Scalar::Constant($factor) => $call,
+        }
+    };
+}
+
+impl Factor<1> for Scalar {
+    #[inline]
+    fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
+        delegate!(self, factor => factor.log_likelihood(m))
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        delegate!(self, factor => factor.add_log_likelihoods(means, log_weights));
+    }
+
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
+        delegate!(self, factor => factor.tilted(prior))
+    }
+}
+
+impl From<Value<1>> for Scalar {
+    fn from(factor: Value<1>) -> Self {
+        Self::Value(factor)
+    }
+}
+
+impl From<InCell> for Scalar {
+    fn from(factor: InCell) -> Self {
+        Self::InCell(factor)
+    }
+}
+
+impl From<Partition> for Scalar {
+    fn from(factor: Partition) -> Self {
+        Self::Partition(factor)
+    }
+}
+
+impl From<Constant> for Scalar {
+    fn from(factor: Constant) -> Self {
+        Self::Constant(factor)
+    }
+}

@@ -1,0 +1,114 @@
+//! A value in Gaussian noise.
+
+use super::{Factor, Tilted};
+use crate::columns::{Columns, state_at};
+use crate::error::Error;
+use crate::gaussian::{FactoredGaussian, Gaussian};
+use fewbits_numerics::error::{ArgumentError, all_finite};
+use nalgebra::{Cholesky, SMatrix, SVector};
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// The measurement itself, `z ~ N(m, R)`. With it, the assumed-density update is the Kalman filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Gaussian<M>", into = "Gaussian<M>"))]
+pub struct Value<const M: usize> {
+    noise: FactoredGaussian<M>,
+}
+
+impl<const M: usize> Value<M> {
+    /// The value `z` in noise of covariance `R`.
+    ///
+    /// # Errors
+    /// If an entry is not finite or `R` is not symmetric positive definite.
+    pub fn new(value: SVector<f64, M>, noise_covariance: SMatrix<f64, M, M>) -> Result<Self, ArgumentError> {
+        all_finite("value", value.as_slice())?;
+        let noise = Gaussian::new(value, noise_covariance)
+            .and_then(|noise| noise.factored())
+            .map_err(|error| ArgumentError {
+                name: "noise_covariance",
+                ..error
+            })?;
+        Ok(Self { noise })
+    }
+
+    /// `z`.
+    pub fn value(&self) -> &SVector<f64, M> {
+        self.noise.mean()
+    }
+
+    /// `R`.
+    pub fn noise_covariance(&self) -> &SMatrix<f64, M, M> {
+        self.noise.gaussian().covariance()
+    }
+}
+
+impl Value<1> {
+    /// A scalar value in noise of the given variance.
+    ///
+    /// # Errors
+    /// If a number is not finite or the variance not positive.
+    pub fn scalar(value: f64, noise_variance: f64) -> Result<Self, ArgumentError> {
+        fewbits_numerics::error::positive("noise_variance", noise_variance)?;
+        Self::new([value].into(), [[noise_variance]].into())
+    }
+}
+
+impl<const M: usize> From<Value<M>> for Gaussian<M> {
+    fn from(value: Value<M>) -> Self {
+        *value.noise.gaussian()
+    }
+}
+
+impl<const M: usize> TryFrom<Gaussian<M>> for Value<M> {
+    type Error = ArgumentError;
+
+    fn try_from(noise: Gaussian<M>) -> Result<Self, ArgumentError> {
+        Self::new(*noise.mean(), *noise.covariance())
+    }
+}
+
+impl<const M: usize> Factor<M> for Value<M> {
+    #[inline]
+    fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
+        self.noise.log_pdf(m)
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        if M == 1 {
+            // A plain quadratic: kept free of branches so that it vectorises.
+            let value = self.value()[0];
+            let (half_precision, constant) = (0.5 / self.noise_covariance()[0], self.noise.log_peak());
+            for (log_weight, m) in log_weights.iter_mut().zip(means[0]) {
+                *log_weight += constant - half_precision * (value - m) * (value - m);
+            }
+        } else {
+            for (i, log_weight) in log_weights.iter_mut().enumerate() {
+                *log_weight += self.noise.log_pdf(&state_at(means, i));
+            }
+        }
+    }
+
+    /// `S = V + R`, gain `K = V S^-1`: mean `mu + K (z - mu)`, covariance `(I - K) V (I - K)' + K R K'`, evidence
+    /// `N(z; mu, S)`.
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
+        let (spread, noise) = (prior.covariance(), self.noise_covariance());
+        let factor = Cholesky::new(spread + noise).ok_or(Error::Impossible)?;
+        let gain = factor.solve(spread).transpose();
+        let keep = SMatrix::<f64, M, M>::identity() - gain;
+        let innovation = self.value() - prior.mean();
+        let log_root_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        let squared = innovation.dot(&factor.solve(&innovation));
+        let log_evidence = -0.5 * squared - log_root_determinant - M as f64 * fewbits_numerics::normal::LN_SQRT_2PI;
+        let mean = prior.mean() + gain * innovation;
+        if !(log_evidence.is_finite() && mean.iter().all(|x| x.is_finite())) {
+            return Err(Error::Impossible);
+        }
+        Ok(Tilted {
+            log_evidence,
+            mean,
+            covariance: keep * spread * keep.transpose() + gain * noise * gain.transpose(),
+        })
+    }
+}

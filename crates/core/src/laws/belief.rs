@@ -1,0 +1,62 @@
+//! The laws of [`Belief`] and [`Density`].
+
+use super::{Average, Violation, agree};
+use crate::belief::{Belief, Density};
+use crate::gaussian::FactoredGaussian;
+use nalgebra::SVector;
+use rand::Rng;
+
+/// Draws have the belief's mean and covariance, entry by entry within four standard errors.
+///
+/// # Errors
+/// The entry that disagrees.
+pub fn samples_have_the_moments<const D: usize, R: Rng + ?Sized>(
+    belief: &impl Belief<D>,
+    rng: &mut R,
+    draws: usize,
+) -> Result<(), Violation> {
+    let (mean, covariance) = (belief.mean(), belief.covariance());
+    let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| vec![0.0; draws]);
+    belief.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
+    for i in 0..D {
+        let slack = 1e-12 * (mean[i].abs() + covariance[(i, i)].sqrt());
+        let mut average = Average::new();
+        columns[i].iter().for_each(|x| average.add(*x));
+        average.check("samples have the mean of their belief", format!("coordinate {i}"), mean[i], slack)?;
+        for j in 0..=i {
+            let mut product = Average::new();
+            for (a, b) in columns[i].iter().zip(&columns[j]) {
+                product.add((a - mean[i]) * (b - mean[j]));
+            }
+            let slack = 1e-12 * (covariance[(i, i)] * covariance[(j, j)]).sqrt() + f64::MIN_POSITIVE;
+            let at = format!("entry ({i}, {j})");
+            product.check("samples have the covariance of their belief", at, covariance[(i, j)], slack)?;
+        }
+    }
+    Ok(())
+}
+
+/// The density integrates to one, by importance sampling from `proposal` (which should be wider than the belief), within four
+/// standard errors; and the sweep adds what the scalar function returns.
+///
+/// # Errors
+/// The integral found, or the state at which the sweep disagrees.
+pub fn density_integrates_to_one<const D: usize, R: Rng + ?Sized>(
+    belief: &impl Density<D>,
+    proposal: &FactoredGaussian<D>,
+    rng: &mut R,
+    draws: usize,
+) -> Result<(), Violation> {
+    let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| vec![0.0; draws]);
+    proposal.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
+    let mut logs = vec![0.25; draws];
+    belief.add_log_densities(&columns.each_ref().map(Vec::as_slice), &mut logs);
+    let mut total = Average::new();
+    for i in 0..draws {
+        let x = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
+        let alone = belief.log_density(&x);
+        agree("a sweep is the scalar", format!("{x:?}"), logs[i], 0.25 + alone, 1e-12, 1.0)?;
+        total.add((alone - proposal.log_pdf(&x)).exp());
+    }
+    total.check("a density integrates to one", "the whole space", 1.0, 1e-12)
+}

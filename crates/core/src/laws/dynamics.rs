@@ -1,0 +1,77 @@
+//! The laws of [`Dynamics`] and its refinements.
+
+use super::{Average, Violation, agree};
+use crate::dynamics::{Dynamics, GaussianDynamics, LinearDynamics};
+use nalgebra::SVector;
+use rand::Rng;
+
+/// `propagate` and `propagate_columns` have the conditional mean [`Dynamics::mean`] and, for Gaussian dynamics, the covariance
+/// `noise_covariance_at`, entry by entry within four standard errors of `draws` draws.
+///
+/// # Errors
+/// The entry that disagrees.
+pub fn draws_have_the_law<const D: usize, R: Rng + ?Sized>(
+    dynamics: &impl GaussianDynamics<D>,
+    rng: &mut R,
+    state: &SVector<f64, D>,
+    draws: usize,
+) -> Result<(), Violation> {
+    let (mean, covariance) = (dynamics.mean(state), dynamics.noise_covariance_at(state));
+    let mut columns: [Vec<f64>; D] = std::array::from_fn(|d| vec![state[d]; draws]);
+    dynamics.propagate_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
+    let swept: Vec<SVector<f64, D>> = (0..draws).map(|i| SVector::from_fn(|d, _| columns[d][i])).collect();
+    let single: Vec<SVector<f64, D>> = (0..draws).map(|_| dynamics.propagate(rng, state)).collect();
+    for points in [single, swept] {
+        for i in 0..D {
+            let scale = mean[i].abs() + covariance[(i, i)].sqrt();
+            let mut average = Average::new();
+            points.iter().for_each(|x| average.add(x[i]));
+            average.check("draws have the mean of the dynamics", format!("coordinate {i}"), mean[i], 1e-12 * scale)?;
+            for j in 0..=i {
+                let mut product = Average::new();
+                points
+                    .iter()
+                    .for_each(|x| product.add((x[i] - mean[i]) * (x[j] - mean[j])));
+                let slack = 1e-12 * (covariance[(i, i)] * covariance[(j, j)]).sqrt() + f64::MIN_POSITIVE;
+                let at = format!("entry ({i}, {j})");
+                product.check("draws have the noise of the dynamics", at, covariance[(i, j)], slack)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The Jacobian is the derivative of the mean, by central differences of relative step `1e-5`.
+///
+/// # Errors
+/// The entry that disagrees by more than `1e-6` of the largest.
+pub fn jacobian_is_the_derivative<const D: usize>(
+    dynamics: &impl GaussianDynamics<D>,
+    state: &SVector<f64, D>,
+) -> Result<(), Violation> {
+    super::sensing::derivative(state, |x| dynamics.mean(x), &dynamics.jacobian(state))
+}
+
+/// Linear dynamics have the mean `F x`, the Jacobian `F` and the noise `Q` at every state.
+///
+/// # Errors
+/// The entry that disagrees.
+pub fn is_linear<const D: usize>(
+    dynamics: &impl LinearDynamics<D>,
+    states: &[SVector<f64, D>],
+) -> Result<(), Violation> {
+    const LAW: &str = "linear dynamics are the same at every state";
+    for state in states {
+        let (mean, linear) = (Dynamics::mean(dynamics, state), dynamics.transition() * state);
+        for i in 0..D {
+            agree(LAW, format!("the mean of {state:?}"), mean[i], linear[i], 1e-13, linear.amax())?;
+            for j in 0..D {
+                let (found, expected) = (dynamics.jacobian(state)[(i, j)], dynamics.transition()[(i, j)]);
+                agree(LAW, "the Jacobian", found, expected, 0.0, 0.0)?;
+                let found = dynamics.noise_covariance_at(state)[(i, j)];
+                agree(LAW, "the noise", found, dynamics.noise_covariance()[(i, j)], 0.0, 0.0)?;
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,77 @@
+//! The laws of [`Factor`].
+
+use super::{Violation, agree, failed};
+use crate::factor::{Factor, Tilted};
+use crate::gaussian::Gaussian;
+use fewbits_numerics::normal::LN_SQRT_2PI;
+use nalgebra::SVector;
+
+/// Law 1: finite or `-inf`, never NaN or `+inf`, at every finite measurement.
+///
+/// # Errors
+/// The first measurement at which the law fails.
+pub fn is_a_number<const M: usize>(factor: &impl Factor<M>, measurements: &[SVector<f64, M>]) -> Result<(), Violation> {
+    for m in measurements {
+        let value = factor.log_likelihood(m);
+        if value.is_nan() || value == f64::INFINITY {
+            return Err(Violation::new("a log likelihood is a number", format!("{value} at {m:?}"), "finite or -inf"));
+        }
+    }
+    Ok(())
+}
+
+/// Law 2: the sweep adds what the scalar function returns.
+///
+/// # Errors
+/// The first measurement at which the law fails.
+pub fn sweep_is_scalar<const M: usize>(
+    factor: &impl Factor<M>,
+    measurements: &[SVector<f64, M>],
+) -> Result<(), Violation> {
+    let columns: [Vec<f64>; M] = std::array::from_fn(|k| measurements.iter().map(|m| m[k]).collect());
+    let mut sums = vec![0.25; measurements.len()];
+    factor.add_log_likelihoods(&columns.each_ref().map(Vec::as_slice), &mut sums);
+    for (m, sum) in measurements.iter().zip(&sums) {
+        agree("a sweep is the scalar", format!("{m:?}"), *sum, 0.25 + factor.log_likelihood(m), 1e-12, 1.0)?;
+    }
+    Ok(())
+}
+
+/// Law 3: `tilted` agrees with the trapezoid rule over `prior mean +- reach` with `points` nodes, which the caller chooses
+/// wide and dense enough for the posterior: evidence, mean and variance to `tolerance`, relative to the posterior's own
+/// spread.
+///
+/// # Errors
+/// If `tilted` fails, or the moment that disagrees.
+pub fn tilted_is_quadrature(
+    factor: &impl Factor<1>,
+    prior: &Gaussian<1>,
+    reach: f64,
+    points: usize,
+    tolerance: f64,
+) -> Result<(), Violation> {
+    const LAW: &str = "tilted moments are those of the likelihood";
+    let Tilted {
+        log_evidence,
+        mean,
+        covariance,
+    } = failed(LAW, factor.tilted(prior))?;
+    let (centre, variance) = (prior.mean()[0], prior.covariance()[0]);
+    let step = 2.0 * reach / (points - 1) as f64;
+    let nodes = || (0..points).map(|i| -reach + step * i as f64);
+    let log = |t: f64| factor.log_likelihood(&[centre + t].into()) - 0.5 * t * t / variance;
+    let logs: Vec<f64> = nodes().map(log).collect();
+    let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = logs.iter().map(|l| (l - peak).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    let first = nodes().zip(&weights).map(|(t, w)| t * w).sum::<f64>() / total;
+    let second = nodes()
+        .zip(&weights)
+        .map(|(t, w)| w * (t - first) * (t - first))
+        .sum::<f64>()
+        / total;
+    let evidence = peak + (total * step).ln() - LN_SQRT_2PI - 0.5 * variance.ln();
+    agree(LAW, "the evidence", log_evidence, evidence, tolerance, 1.0)?;
+    agree(LAW, "the mean", (mean[0] - centre) / second.sqrt(), first / second.sqrt(), tolerance, 1.0)?;
+    agree(LAW, "the variance", covariance[0], second, tolerance, 0.0)
+}

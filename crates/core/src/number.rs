@@ -1,0 +1,241 @@
+//! Numbers as messages: how many bits a value costs, and which value arrives.
+
+use crate::bits::{BitReader, BitWriter, CodecError};
+use crate::cell::Cell;
+use crate::message::Message;
+use fewbits_numerics::error::{ArgumentError, finite, within};
+use nalgebra::SVector;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// How a number travels. Both ends know it; it costs no bits itself.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+pub enum NumberFormat {
+    /// 64-bit floating point.
+    #[default]
+    Double,
+    /// 32-bit floating point.
+    Single,
+    /// One of evenly spaced levels.
+    Fixed(Levels),
+}
+
+/// `2^bits` evenly spaced levels from `lower` to `upper`, ends included. A value takes the nearest; beyond the ends it
+/// saturates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Numbers"))]
+pub struct Levels {
+    lower: f64,
+    upper: f64,
+    bits: u32,
+}
+
+#[cfg(feature = "serde")]
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    lower: f64,
+    upper: f64,
+    bits: u32,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Numbers> for Levels {
+    type Error = ArgumentError;
+
+    fn try_from(numbers: Numbers) -> Result<Self, ArgumentError> {
+        Self::new(numbers.lower, numbers.upper, numbers.bits)
+    }
+}
+
+impl Levels {
+    /// The levels from `lower` to `upper` (measurement units), `bits` of 1 to 32.
+    ///
+    /// # Errors
+    /// Ends that are not finite or not increasing, bits outside 1 to 32.
+    pub fn new(lower: f64, upper: f64, bits: u32) -> Result<Self, ArgumentError> {
+        finite("lower", lower)?;
+        finite("upper", upper)?;
+        within("bits", f64::from(bits), 1.0, 32.0)?;
+        finite("upper - lower", upper - lower)?;
+        if lower < upper {
+            Ok(Self { lower, upper, bits })
+        } else {
+            Err(ArgumentError::new("lower", lower, format!("a number below `upper` = {upper}")))
+        }
+    }
+
+    /// Bits of a level's index.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// Largest index.
+    fn top(&self) -> f64 {
+        ((1_u64 << self.bits) - 1) as f64
+    }
+
+    /// Index of the level nearest to `value`.
+    fn nearest(&self, value: f64) -> u64 {
+        let share = (value - self.lower) / (self.upper - self.lower);
+        (share * self.top()).round().clamp(0.0, self.top()) as u64
+    }
+
+    /// The level of an index.
+    fn level(&self, index: u64) -> f64 {
+        let share = index as f64 / self.top();
+        self.lower * (1.0 - share) + self.upper * share
+    }
+
+    /// The values that are sent as `level`: half a step to either side, unbounded at the ends.
+    ///
+    /// # Errors
+    /// If `level` is NaN.
+    pub fn cell(&self, level: f64) -> Result<Cell, ArgumentError> {
+        let index = self.nearest(finite("level", level)?);
+        let half = 0.5 * (self.upper - self.lower) / self.top();
+        let centre = self.level(index);
+        let lower = if index == 0 { f64::NEG_INFINITY } else { centre - half };
+        let upper = if index as f64 == self.top() {
+            f64::INFINITY
+        } else {
+            centre + half
+        };
+        Cell::new(lower, upper)
+    }
+}
+
+impl NumberFormat {
+    /// `2^bits` evenly spaced levels.
+    ///
+    /// # Errors
+    /// As [`Levels::new`].
+    pub fn fixed(lower: f64, upper: f64, bits: u32) -> Result<Self, ArgumentError> {
+        Ok(Self::Fixed(Levels::new(lower, upper, bits)?))
+    }
+
+    /// Bits of one number.
+    pub fn bits(&self) -> u32 {
+        match self {
+            Self::Double => 64,
+            Self::Single => 32,
+            Self::Fixed(levels) => levels.bits,
+        }
+    }
+
+    /// The number that arrives when `value` is sent.
+    ///
+    /// # Errors
+    /// If `value` is not finite, or rounds to infinity in single precision.
+    pub fn rounded(&self, value: f64) -> Result<f64, ArgumentError> {
+        finite("value", value)?;
+        match self {
+            Self::Double => Ok(value),
+            Self::Single => finite("value", f64::from(value as f32))
+                .map_err(|_| ArgumentError::new("value", value, "a number within the range of single precision")),
+            Self::Fixed(levels) => Ok(levels.level(levels.nearest(value))),
+        }
+    }
+
+    /// Appends `value`.
+    ///
+    /// # Errors
+    /// If the format does not hold `value` exactly; see [`NumberFormat::rounded`].
+    pub fn write(&self, value: f64, writer: &mut BitWriter) -> Result<(), CodecError> {
+        if self.rounded(value) != Ok(value) {
+            return Err(invalid(value, "a finite number that the format holds exactly"));
+        }
+        match self {
+            Self::Double => writer.write(value.to_bits(), 64),
+            Self::Single => writer.write(u64::from((value as f32).to_bits()), 32),
+            Self::Fixed(levels) => writer.write(levels.nearest(value), levels.bits),
+        }
+    }
+
+    /// Reads a number.
+    ///
+    /// # Errors
+    /// If bits are missing or are those of an infinity or NaN.
+    pub fn read(&self, reader: &mut BitReader<'_>) -> Result<f64, CodecError> {
+        let word = reader.read(self.bits())?;
+        let value = match self {
+            Self::Double => f64::from_bits(word),
+            Self::Single => f64::from(f32::from_bits(word as u32)),
+            Self::Fixed(levels) => levels.level(word),
+        };
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(invalid(value, "a finite number"))
+        }
+    }
+}
+
+fn invalid(value: f64, expected: &'static str) -> CodecError {
+    CodecError::Invalid {
+        what: "number",
+        value: value.to_string(),
+        expected,
+    }
+}
+
+impl Message for f64 {
+    type Format = NumberFormat;
+
+    fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
+        format.write(*self, writer)
+    }
+
+    fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        format.read(reader)
+    }
+}
+
+impl<const M: usize> Message for SVector<f64, M> {
+    type Format = NumberFormat;
+
+    fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
+        self.iter().try_for_each(|value| format.write(*value, writer))
+    }
+
+    fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        let mut vector = Self::zeros();
+        for value in vector.iter_mut() {
+            *value = format.read(reader)?;
+        }
+        Ok(vector)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Levels, NumberFormat};
+    use crate::laws::message::round_trip;
+    use nalgebra::Vector2;
+
+    #[test]
+    fn what_a_format_holds_comes_back_to_the_last_bit() {
+        let fixed = NumberFormat::fixed(-1.0, 1.0, 3).unwrap();
+        for (format, bits) in [(NumberFormat::Double, 128), (NumberFormat::Single, 64), (fixed, 6)] {
+            let value = Vector2::new(0.3, -0.9).map(|x| format.rounded(x).unwrap());
+            assert_eq!(round_trip(&value, &format).unwrap(), bits);
+        }
+        assert!(fixed.rounded(f64::NAN).is_err() && NumberFormat::Single.rounded(1e300).is_err());
+    }
+
+    #[test]
+    fn cells_of_levels_partition_the_line() {
+        let levels = Levels::new(-2.0, 5.0, 2).unwrap();
+        let cells: Vec<_> = (0..4).map(|i| levels.cell(levels.level(i)).unwrap()).collect();
+        assert_eq!((cells[0].lower(), cells[3].upper()), (f64::NEG_INFINITY, f64::INFINITY));
+        for pair in cells.windows(2) {
+            assert!((pair[0].upper() - pair[1].lower()).abs() < 1e-15);
+        }
+        assert!(Levels::new(0.0, 1.0, 0).is_err() && Levels::new(0.0, 1.0, 64).is_err());
+        assert!(Levels::new(1.0, 1.0, 4).is_err() && Levels::new(-1e308, 1e308, 4).is_err());
+        assert!(serde_json::from_str::<Levels>(r#"{"lower":1,"upper":0,"bits":4}"#).is_err());
+    }
+}

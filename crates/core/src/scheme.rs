@@ -1,0 +1,65 @@
+//! A way of reporting little: the sensor's half and what its reports mean, in one place.
+
+use crate::error::Error;
+use crate::factor::Factor;
+use crate::message::Message;
+use crate::observation::{Link, Observation};
+use nalgebra::SVector;
+use rand::Rng;
+
+/// A scheme by which sensors with `M`-dimensional measurements report, and what their reports mean.
+///
+/// Whatever both ends know is the scheme itself or its `Feedback`: the feedback is broadcast and costs its bits; what both
+/// compute without data (a schedule of thresholds, an innovation covariance) goes into the scheme, one value a slot. What
+/// only the sensor knows is its `State`.
+///
+/// The noise of the measurement belongs to the scheme, since what a report says about the noise-free measurement depends on
+/// it; a scheme whose noise depends on the measurement knows how.
+///
+/// Laws ([`crate::laws::scheme`]):
+/// 1. total probability: for every noise-free measurement, feedback and link, the probabilities of all observations but
+///    [`Observation::Erased`] sum (integrate) to one;
+/// 2. honesty: what `encode` reports of `m + noise`, sent through [`Link::transmit`], has the frequencies that `factor` says;
+/// 3. an erased report has the factor 1.
+pub trait Scheme<const M: usize> {
+    /// What the sensor remembers from slot to slot; `()` for most.
+    type State;
+    /// What the sensor is told before it measures; `()` without feedback.
+    type Feedback: Message;
+    /// What the sensor may report.
+    type Report: Message;
+    /// What an observation says about the noise-free measurement.
+    type Factor: Factor<M>;
+
+    /// The sensor's memory before its first measurement.
+    fn start(&self) -> Self::State;
+
+    /// How a feedback travels.
+    fn feedback_format(&self) -> <Self::Feedback as Message>::Format;
+
+    /// How a report travels.
+    fn report_format(&self) -> <Self::Report as Message>::Format;
+
+    /// The sensor's half. `None` is silence: zero bits on air.
+    ///
+    /// # Errors
+    /// If the measurement or the feedback is not finite; the state is then as it was.
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        state: &mut Self::State,
+        measurement: &SVector<f64, M>,
+        feedback: &Self::Feedback,
+    ) -> Result<Option<Self::Report>, Error>;
+
+    /// The receiver's half: `p(observation | h(x) = m)`.
+    ///
+    /// # Errors
+    /// If the feedback is not finite, or the report is none that the scheme can send.
+    fn factor(
+        &self,
+        feedback: &Self::Feedback,
+        observation: &Observation<Self::Report>,
+        link: &Link,
+    ) -> Result<Self::Factor, Error>;
+}

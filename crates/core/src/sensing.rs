@@ -1,0 +1,41 @@
+//! How the world is sensed.
+
+use crate::columns::{Columns, ColumnsMut, count, set_state, state_at};
+use nalgebra::{SMatrix, SVector};
+use rand::Rng;
+
+/// Sensing with Gaussian noise, `z ~ N(h(x), R(x))`, `z` of `M` components.
+///
+/// Laws ([`crate::laws::sensing`]): `jacobian` is the derivative of `mean`, `mean_columns` writes what `mean` returns, and
+/// `sample` has mean `h(x)` and covariance `R(x)`.
+pub trait Sensing<const D: usize, const M: usize> {
+    /// Noise-free measurement `m = h(x)`.
+    fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, M>;
+
+    /// Jacobian of [`Sensing::mean`] at `state`.
+    fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, M, D>;
+
+    /// Noise covariance `R(x)`, positive definite.
+    fn noise_covariance_at(&self, state: &SVector<f64, D>) -> SMatrix<f64, M, M>;
+
+    /// Draws a measurement of `state`.
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M>;
+
+    /// Writes the noise-free measurement of every state to `means`. Override where a loop over columns is faster.
+    fn mean_columns(&self, states: &Columns<'_, D>, mut means: ColumnsMut<'_, M>) {
+        for i in 0..count(&means) {
+            set_state(&mut means, i, &self.mean(&state_at(states, i)));
+        }
+    }
+}
+
+/// Linear sensing `z = H x + n`, `n ~ N(0, R)`.
+///
+/// Law: `mean(x) = H x`, `jacobian(x) = H` and `noise_covariance_at(x) = R` for every `x`.
+pub trait LinearSensing<const D: usize, const M: usize>: Sensing<D, M> {
+    /// Measurement matrix `H`.
+    fn matrix(&self) -> &SMatrix<f64, M, D>;
+
+    /// Noise covariance `R`.
+    fn noise_covariance(&self) -> &SMatrix<f64, M, M>;
+}

@@ -1,0 +1,191 @@
+//! The laws of factors, on every one, and what was once wrong.
+
+use fewbits_core::factor::{Constant, Factor, InCell, Partition, Product, Repeated, Scalar, Value};
+use fewbits_core::laws::{factor, likelihood};
+use fewbits_core::{Cell, Error, Gaussian, Link, Observed, Sensing, Sign};
+use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
+use proptest::prelude::*;
+use rand::Rng;
+
+fn silence(half_width: f64, noise: f64, loss: f64) -> InCell {
+    InCell::silence(Cell::new(-half_width, half_width).unwrap(), noise, &Link::lossy(loss).unwrap()).unwrap()
+}
+
+/// One of each kind, at unit scale.
+fn kinds() -> Vec<Scalar> {
+    let link = Link::new(0.2, 0.1).unwrap();
+    vec![
+        Value::scalar(0.4, 0.7).unwrap().into(),
+        InCell::sign(Sign::Above, 0.3, 0.5, &Link::PERFECT).unwrap().into(),
+        InCell::sign(Sign::Below, 0.3, 0.5, &link).unwrap().into(),
+        InCell::certain(Cell::new(-0.2, 0.9).unwrap(), 0.5).unwrap().into(),
+        silence(0.8, 0.5, 0.25).into(),
+        silence(0.8, 0.5, 0.0).into(),
+        Partition::new(vec![-1.0, 0.3, 1.2], vec![0.1, 0.7, 0.0, 0.7], 0.4)
+            .unwrap()
+            .into(),
+        Constant::new(0.3).unwrap().into(),
+    ]
+}
+
+fn points() -> Vec<Vector1<f64>> {
+    [-1e200, -60.0, -3.0, -0.2, 0.0, 0.3, 1.0, 40.0, 1e9]
+        .map(Vector1::new)
+        .to_vec()
+}
+
+#[test]
+fn every_factor_obeys_its_laws() {
+    let prior = Gaussian::scalar(0.6, 0.9).unwrap();
+    for scalar in kinds() {
+        factor::is_a_number(&scalar, &points()).unwrap();
+        factor::sweep_is_scalar(&scalar, &points()).unwrap();
+        factor::tilted_is_quadrature(&scalar, &prior, 12.0, 20_001, 1e-10).unwrap();
+        let twice = Repeated::new(scalar.clone(), 2).unwrap();
+        factor::sweep_is_scalar(&twice, &points()).unwrap();
+        factor::tilted_is_quadrature(&twice, &prior, 12.0, 20_001, 1e-10).unwrap();
+        let product: Product = kinds().into_iter().chain([scalar]).collect();
+        factor::sweep_is_scalar(&product, &points()).unwrap();
+        factor::tilted_is_quadrature(&product, &prior, 12.0, 20_001, 1e-10).unwrap();
+    }
+}
+
+#[test]
+fn a_value_is_the_kalman_update_in_two_dimensions() {
+    let prior = Gaussian::new(Vector2::new(1.0, -1.0), SMatrix::<f64, 2, 2>::new(2.0, 0.3, 0.3, 1.0)).unwrap();
+    let noise = SMatrix::<f64, 2, 2>::new(0.7, -0.2, -0.2, 0.4);
+    let z = Vector2::new(0.2, 0.1);
+    let tilted = Value::new(z, noise).unwrap().tilted(&prior).unwrap();
+    let total = Gaussian::new(*prior.mean(), prior.covariance() + noise).unwrap();
+    let information = prior.covariance().try_inverse().unwrap() + noise.try_inverse().unwrap();
+    let covariance = information.try_inverse().unwrap();
+    assert!((tilted.log_evidence - total.log_pdf(&z).unwrap()).abs() < 1e-14);
+    assert!((tilted.covariance - covariance).amax() < 1e-14);
+}
+
+/// Reference values by 50-digit quadrature of the integrand.
+#[test]
+fn fifteen_lossy_silences_far_from_the_prior() {
+    let fifteen = Repeated::new(silence(1.414, 1.0, 0.3).into(), 15).unwrap();
+    let tilted = fifteen.tilted(&Gaussian::scalar(4.0, 0.01).unwrap()).unwrap();
+    assert!((tilted.mean[0] - 3.9949).abs() < 5e-5, "{tilted:?}");
+    assert!((tilted.covariance[0] - 0.01013).abs() < 5e-6, "{tilted:?}");
+    let nine = Repeated::new(silence(10.0, 30.0, 0.0).into(), 9).unwrap();
+    let tilted = nine.tilted(&Gaussian::scalar(24.0, 0.1).unwrap()).unwrap();
+    assert!((tilted.mean[0] - 23.54).abs() < 5e-3, "{tilted:?}");
+    assert!((tilted.covariance[0] - 0.0973).abs() < 5e-5, "{tilted:?}");
+}
+
+#[test]
+fn what_is_out_of_reach_of_the_numbers_is_impossible_and_not_nan() {
+    let two = Repeated::new(silence(1.0, 1.0, 0.0).into(), 2).unwrap();
+    assert_eq!(two.tilted(&Gaussian::scalar(1e200, 1.0).unwrap()), Err(Error::Impossible));
+    let lossy = Repeated::new(silence(1.0, 1.0, 0.3).into(), 2).unwrap();
+    let kept = lossy.tilted(&Gaussian::scalar(1e200, 1.0).unwrap()).unwrap();
+    assert!((kept.log_evidence - 2.0 * 0.3_f64.ln()).abs() < 1e-12 && kept.mean[0] == 1e200);
+    let nothing: Scalar = Constant::new(0.0).unwrap().into();
+    assert_eq!(nothing.tilted(&Gaussian::scalar(0.0, 1.0).unwrap()), Err(Error::Impossible));
+    let known = Gaussian::scalar(0.4, 0.0).unwrap();
+    for scalar in kinds() {
+        let twice = Repeated::new(scalar, 2).unwrap();
+        let tilted = twice.tilted(&known).unwrap();
+        assert!((tilted.log_evidence - twice.log_likelihood(&Vector1::new(0.4))).abs() < 1e-14);
+        assert!((tilted.mean[0] - 0.4).abs() < 1e-15 && tilted.covariance[0] == 0.0);
+    }
+}
+
+#[test]
+fn bad_numbers_are_refused_by_name() {
+    let cell = Cell::new(-1.0, 1.0).unwrap();
+    assert_eq!(InCell::certain(cell, 0.0).unwrap_err().name, "noise_variance");
+    assert_eq!(InCell::new(cell, 1.0, -0.1, 0.5).unwrap_err().name, "floor");
+    assert_eq!(InCell::new(cell, 1.0, 0.6, 0.6).unwrap_err().name, "floor + share");
+    assert_eq!(Value::scalar(f64::NAN, 1.0).unwrap_err().name, "value");
+    assert_eq!(Value::scalar(0.0, -1.0).unwrap_err().name, "noise_variance");
+    assert!(Partition::new(vec![0.0, 0.0], vec![1.0, 0.0, 0.0], 1.0).is_err());
+    assert!(Partition::new(vec![0.0], vec![1.0], 1.0).is_err());
+    assert!(Partition::new(vec![], vec![0.0], 1.0).is_err());
+    assert!(Link::new(1.0, 0.0).is_err() && Link::new(0.0, 0.6).is_err() && Link::new(f64::NAN, 0.0).is_err());
+    assert!(serde_json::from_str::<Link>(r#"{"loss":2,"crossover":0}"#).is_err());
+    assert!(serde_json::from_str::<Cell>(r#"{"lower":3,"upper":1}"#).is_err());
+    assert!(serde_json::from_str::<Gaussian<1>>(r#"{"mean":[0],"covariance":[-1]}"#).is_err());
+}
+
+#[test]
+fn factors_are_stored_and_restored_equal() {
+    for scalar in kinds() {
+        let json = serde_json::to_string(&scalar).unwrap();
+        assert_eq!(serde_json::from_str::<Scalar>(&json).unwrap(), scalar, "{json}");
+    }
+    let half_line = Cell::of_sign(Sign::Above, 0.5).unwrap();
+    let json = serde_json::to_string(&half_line).unwrap();
+    assert_eq!(serde_json::from_str::<Cell>(&json).unwrap(), half_line);
+}
+
+/// A line through the plane, seen as one number.
+struct Line;
+
+impl Sensing<2, 1> for Line {
+    fn mean(&self, x: &Vector2<f64>) -> Vector1<f64> {
+        Vector1::new(x[0] - 0.5 * x[1])
+    }
+    fn jacobian(&self, _: &Vector2<f64>) -> SMatrix<f64, 1, 2> {
+        [[1.0], [-0.5]].into()
+    }
+    fn noise_covariance_at(&self, _: &Vector2<f64>) -> Matrix1<f64> {
+        Matrix1::new(0.49)
+    }
+    fn sample<R: Rng + ?Sized>(&self, _: &mut R, x: &Vector2<f64>) -> Vector1<f64> {
+        self.mean(x)
+    }
+}
+
+#[test]
+fn a_factor_seen_through_a_sensor_is_a_likelihood() {
+    let states: Vec<SVector<f64, 2>> = (0..600)
+        .map(|i| Vector2::new(0.1 * f64::from(i) - 30.0, (f64::from(i) * 0.7).sin()))
+        .collect();
+    for scalar in kinds() {
+        likelihood::sweep_is_scalar(&vec![Observed::new(Line, scalar.clone()), Observed::new(Line, scalar)], &states)
+            .unwrap();
+    }
+}
+
+proptest! {
+    /// Scaled input gives scaled output, for one observation in closed form and for several by quadrature.
+    #[test]
+    fn nothing_depends_on_the_unit(
+        mean in -8.0..8.0_f64, ln_variance in -8.0..5.0_f64, half in 0.1..3.0_f64, loss in 0.0..0.9_f64,
+        count in 1_usize..40, scale in prop::sample::select(vec![1e-4, 1e4]),
+    ) {
+        let variance = ln_variance.exp();
+        let tilt = |s: f64| {
+            let cell = Cell::new(-half * s, half * s).unwrap();
+            let factor = InCell::silence(cell, s * s, &Link::lossy(loss).unwrap()).unwrap();
+            Repeated::new(factor.into(), count).unwrap().tilted(&Gaussian::scalar(mean * s, variance * s * s).unwrap()).unwrap()
+        };
+        let (one, other) = (tilt(1.0), tilt(scale));
+        let deviation = one.covariance[0].sqrt();
+        prop_assert!((one.log_evidence - other.log_evidence).abs() < 1e-10 * (1.0 + one.log_evidence.abs()));
+        prop_assert!((one.mean[0] - other.mean[0] / scale).abs() < 1e-9 * deviation);
+        prop_assert!((other.covariance[0] / (scale * scale) / one.covariance[0] - 1.0).abs() < 1e-9);
+        prop_assert!(one.covariance[0] > 0.0);
+    }
+
+    /// Quadrature agrees with the closed form that one observation has, wherever the posterior lies.
+    #[test]
+    fn quadrature_finds_the_posterior_anywhere(
+        mean in -300.0..300.0_f64, ln_variance in -12.0..12.0_f64, threshold in -30.0..30.0_f64, ln_noise in -6.0..6.0_f64,
+    ) {
+        let prior = Gaussian::scalar(mean, ln_variance.exp()).unwrap();
+        let bit = InCell::sign(Sign::Above, threshold, ln_noise.exp(), &Link::PERFECT).unwrap();
+        let closed = bit.tilted(&prior).unwrap();
+        // A constant beside it forces quadrature.
+        let product: Product = [bit.into(), Constant::ONE.into()].into_iter().collect();
+        let numeric = product.tilted(&prior).unwrap();
+        let deviation = closed.covariance[0].sqrt();
+        prop_assert!((numeric.log_evidence - closed.log_evidence).abs() < 1e-9 * (1.0 + closed.log_evidence.abs()));
+        prop_assert!((numeric.mean[0] - closed.mean[0]).abs() < 1e-8 * deviation, "{numeric:?} {closed:?}");
+        prop_assert!((numeric.covariance[0] / closed.covariance[0] - 1.0).abs() < 1e-7, "{numeric:?} {closed:?}");
+    }
+}

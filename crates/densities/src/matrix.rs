@@ -1,0 +1,203 @@
+//! Small symmetric positive definite matrices: factors, determinants, eigenvectors.
+
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::all_finite;
+use nalgebra::{SMatrix, SVector};
+
+/// A squared pivot of the correlation matrix below this counts as singular.
+const SINGULAR: f64 = 1e-14;
+/// Asymmetry, relative to the standard deviations of row and column, that is refused.
+const ASYMMETRIC: f64 = 1e-9;
+
+/// A covariance as its lower Cholesky factor `L`, the inverse `W = L^-1` of the factor (which whitens), and `ln det L`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Factored<const D: usize> {
+    pub(crate) lower: SMatrix<f64, D, D>,
+    pub(crate) whitener: SMatrix<f64, D, D>,
+    pub(crate) half_log_det: f64,
+}
+
+impl<const D: usize> Factored<D> {
+    /// Factors the covariance with its diagonal scaled to one, so that rows of very different units are judged alike.
+    pub(crate) fn new(name: &'static str, covariance: &SMatrix<f64, D, D>) -> Result<Self, ArgumentError> {
+        all_finite(name, covariance.as_slice())?;
+        let refuse = |expected| ArgumentError::new(name, format!("{covariance:?}"), expected);
+        if covariance.diagonal().iter().any(|v| *v <= 0.0) {
+            return Err(refuse("a positive definite matrix"));
+        }
+        let scale = covariance.diagonal().map(f64::sqrt);
+        for i in 0..D {
+            for j in 0..i {
+                let gap = (covariance[(i, j)] - covariance[(j, i)]).abs();
+                if gap > ASYMMETRIC * scale[i] * scale[j] {
+                    return Err(refuse("a symmetric matrix"));
+                }
+            }
+        }
+        Self::scaled(covariance, &scale).ok_or_else(|| refuse("a positive definite matrix"))
+    }
+
+    fn scaled(covariance: &SMatrix<f64, D, D>, scale: &SVector<f64, D>) -> Option<Self> {
+        let mut lower = SMatrix::<f64, D, D>::zeros();
+        for j in 0..D {
+            let mut pivot = 1.0;
+            for k in 0..j {
+                pivot -= lower[(j, k)] * lower[(j, k)];
+            }
+            // Written so that NaN is refused too.
+            if !matches!(pivot.partial_cmp(&SINGULAR), Some(std::cmp::Ordering::Greater)) {
+                return None;
+            }
+            let root = pivot.sqrt();
+            lower[(j, j)] = root;
+            for i in j + 1..D {
+                let mut entry =
+                    0.5 * (covariance[(i, j)] / scale[i] / scale[j] + covariance[(j, i)] / scale[i] / scale[j]);
+                for k in 0..j {
+                    entry -= lower[(i, k)] * lower[(j, k)];
+                }
+                lower[(i, j)] = entry / root;
+            }
+        }
+        for i in 0..D {
+            for j in 0..=i {
+                lower[(i, j)] *= scale[i];
+            }
+        }
+        Some(Self::from_lower(lower))
+    }
+
+    /// From a lower triangular factor with a positive diagonal.
+    pub(crate) fn from_lower(lower: SMatrix<f64, D, D>) -> Self {
+        let mut whitener = SMatrix::<f64, D, D>::zeros();
+        let mut half_log_det = 0.0;
+        for j in 0..D {
+            half_log_det += lower[(j, j)].ln();
+            whitener[(j, j)] = 1.0 / lower[(j, j)];
+            for i in j + 1..D {
+                let mut sum = 0.0;
+                for k in j..i {
+                    sum += lower[(i, k)] * whitener[(k, j)];
+                }
+                whitener[(i, j)] = -sum / lower[(i, i)];
+            }
+        }
+        Self {
+            lower,
+            whitener,
+            half_log_det,
+        }
+    }
+
+    /// `x' C^-1 x`.
+    #[inline]
+    pub(crate) fn squared(&self, x: &SVector<f64, D>) -> f64 {
+        let mut total = 0.0;
+        for i in 0..D {
+            let mut z = 0.0;
+            for j in 0..=i {
+                z += self.whitener[(i, j)] * x[j];
+            }
+            total += z * z;
+        }
+        total
+    }
+}
+
+/// `ln det C / 2` of a positive definite matrix; `-inf` if it is not positive definite to working precision.
+pub(crate) fn half_log_det<const D: usize>(covariance: &SMatrix<f64, D, D>) -> f64 {
+    let scale = covariance.diagonal().map(f64::sqrt);
+    if scale.iter().any(|s| s.is_nan() || *s <= 0.0) {
+        return f64::NEG_INFINITY;
+    }
+    Factored::scaled(covariance, &scale).map_or(f64::NEG_INFINITY, |f| f.half_log_det)
+}
+
+/// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi rotations, in no particular order.
+///
+/// nalgebra's decomposition asks callers for trait bounds on `D - 1`; for the few rows here a sweep is as fast.
+pub(crate) fn eigen<const D: usize>(m: &SMatrix<f64, D, D>) -> (SVector<f64, D>, SMatrix<f64, D, D>) {
+    let mut a = *m;
+    let mut vectors = SMatrix::<f64, D, D>::identity();
+    for _ in 0..60 {
+        let mut off = 0.0;
+        for i in 0..D {
+            for j in 0..i {
+                off += a[(i, j)] * a[(i, j)];
+            }
+        }
+        if off <= 1e-32 * a.norm_squared() {
+            break;
+        }
+        for p in 0..D {
+            for q in p + 1..D {
+                rotate(&mut a, &mut vectors, p, q);
+            }
+        }
+    }
+    (a.diagonal(), vectors)
+}
+
+/// One Jacobi rotation that clears entry `(p, q)`.
+fn rotate<const D: usize>(a: &mut SMatrix<f64, D, D>, vectors: &mut SMatrix<f64, D, D>, p: usize, q: usize) {
+    let apq = a[(p, q)];
+    if apq == 0.0 {
+        return;
+    }
+    let theta = (a[(q, q)] - a[(p, p)]) / (2.0 * apq);
+    let t = theta.signum() / (theta.abs() + (1.0 + theta * theta).sqrt());
+    let t = if theta == 0.0 { 1.0 } else { t };
+    let c = 1.0 / (1.0 + t * t).sqrt();
+    let s = t * c;
+    for k in 0..D {
+        let (kp, kq) = (a[(k, p)], a[(k, q)]);
+        a[(k, p)] = c * kp - s * kq;
+        a[(k, q)] = s * kp + c * kq;
+    }
+    for k in 0..D {
+        let (pk, qk) = (a[(p, k)], a[(q, k)]);
+        a[(p, k)] = c * pk - s * qk;
+        a[(q, k)] = s * pk + c * qk;
+        let (vp, vq) = (vectors[(k, p)], vectors[(k, q)]);
+        vectors[(k, p)] = c * vp - s * vq;
+        vectors[(k, q)] = s * vp + c * vq;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use nalgebra::{Matrix2, Matrix3};
+
+    #[test]
+    fn units_may_differ_by_eighteen_orders() {
+        let c = Matrix2::new(1e12, 0.9e0 * 1e6 * 1e-6, 0.9, 1e-12);
+        let f = Factored::new("c", &c).unwrap();
+        let rebuilt = f.lower * f.lower.transpose();
+        assert!((rebuilt[(0, 0)] / 1e12 - 1.0).abs() < 1e-12 && (rebuilt[(1, 1)] / 1e-12 - 1.0).abs() < 1e-12);
+        assert!((f.lower * f.whitener - Matrix2::identity()).amax() < 1e-9);
+        assert!((f.half_log_det - 0.5 * (1.0_f64 - 0.81).ln()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn indefinite_asymmetric_and_infinite_are_refused() {
+        for c in [
+            Matrix2::new(1.0, 2.0, 2.0, 1.0),
+            Matrix2::new(1.0, 0.5, 0.1, 1.0),
+            Matrix2::new(0.0, 0.0, 0.0, 1.0),
+            Matrix2::new(1.0, f64::NAN, f64::NAN, 1.0),
+            Matrix2::new(1.0, 1.0, 1.0, 1.0),
+        ] {
+            assert!(Factored::new("c", &c).is_err(), "{c:?}");
+        }
+    }
+
+    #[test]
+    fn eigenvectors_rebuild_the_matrix() {
+        let m = Matrix3::new(4.0, 1.0, -0.5, 1.0, 3.0, 0.2, -0.5, 0.2, 1e-6);
+        let (values, vectors) = eigen(&m);
+        assert!((vectors * Matrix3::from_diagonal(&values) * vectors.transpose() - m).amax() < 1e-13);
+        assert!((vectors.transpose() * vectors - Matrix3::identity()).amax() < 1e-14);
+    }
+}

@@ -1,0 +1,195 @@
+//! The laws of beliefs, on every density of this crate; marginals; credible regions; tabulated estimates.
+
+use crate::common::{crescent, d1, random_mixture};
+use fewbits_core::{Density, Gaussian, laws};
+use fewbits_densities::{Component, HighestDensity, KernelEstimate, Mixture, TabulatedEstimate, ellipse};
+use fewbits_monte_carlo::Stream;
+use nalgebra::{Matrix1, SVector, Vector1};
+
+fn obeys_the_laws<const D: usize>(belief: &impl Density<D>, seed: u64) {
+    let mut rng = Stream::new(seed).rng();
+    laws::belief::samples_have_the_moments(belief, &mut rng, 100_000).unwrap();
+    let wide = Gaussian::new(belief.mean(), belief.covariance() * 2.5)
+        .unwrap()
+        .factored()
+        .unwrap();
+    laws::belief::density_integrates_to_one(belief, &wide, &mut rng, 20_000).unwrap();
+}
+
+#[test]
+fn mixtures_and_estimates_are_beliefs() {
+    let mut rng = Stream::new(5).rng();
+    obeys_the_laws(&random_mixture::<1, _>(&mut rng, 4, 1.0), 1);
+    obeys_the_laws(&random_mixture::<2, _>(&mut rng, 7, 1e4), 2);
+    obeys_the_laws(&random_mixture::<3, _>(&mut rng, 3, 1e-4), 3);
+    obeys_the_laws(&random_mixture::<4, _>(&mut rng, 1, 1.0), 4);
+    obeys_the_laws(&d1(), 5);
+    obeys_the_laws(&crescent(1, 100, 1e-4), 6);
+    laws::belief::samples_have_the_moments(crescent(1, 100, 1.0).particles(), &mut rng, 100_000).unwrap();
+}
+
+/// Largest gap between an empirical distribution and a distribution function, times the square root of the sample's size.
+fn kolmogorov(mut sample: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
+    sample.sort_by(f64::total_cmp);
+    let n = sample.len() as f64;
+    let gap = |(i, x): (usize, &f64)| {
+        let p = cdf(*x);
+        (p - i as f64 / n).abs().max(((i + 1) as f64 / n - p).abs())
+    };
+    n.sqrt() * sample.iter().enumerate().map(gap).fold(0.0, f64::max)
+}
+
+#[test]
+fn samples_pass_kolmogorovs_test_in_every_marginal() {
+    let mut rng = Stream::new(8).rng();
+    let belief = random_mixture::<3, _>(&mut rng, 5, 1.0);
+    let draws: Vec<SVector<f64, 3>> = (0..20_000).map(|_| belief.sample(&mut rng)).collect();
+    for axis in 0..3 {
+        let marginal = belief.marginal([axis]).unwrap();
+        let statistic = kolmogorov(draws.iter().map(|x| x[axis]).collect(), |x| marginal.cdf(x));
+        // Exceeded with probability 1e-4.
+        assert!(statistic < 2.23, "axis {axis}: {statistic}");
+    }
+    let estimate = crescent(3, 60, 1.0);
+    let mixture = estimate.to_mixture().unwrap().marginal([1]).unwrap();
+    let sample = estimate.sample_systematic(&mut rng, 20_000).unwrap();
+    assert!(kolmogorov(sample.columns()[1].to_vec(), |x| mixture.cdf(x)) < 2.23);
+}
+
+#[test]
+fn an_estimate_is_its_mixture() {
+    let estimate = crescent(2, 80, 1.0);
+    let mixture = estimate.to_mixture().unwrap();
+    assert!((estimate.mean() - mixture.mean()).amax() < 1e-13);
+    assert!((estimate.covariance() - mixture.covariance()).amax() < 1e-13);
+    let points = [vec![0.3, -5.0, 100.0, 1e6], vec![1.2, 4.0, -70.0, 1e6]];
+    let columns = [points[0].as_slice(), points[1].as_slice()];
+    let (mut a, mut b) = ([0.0; 4], [0.0; 4]);
+    estimate.log_pdf_columns(columns, &mut a);
+    mixture.log_pdf_columns(columns, &mut b);
+    for k in 0..4 {
+        assert!((a[k] - b[k]).abs() < 1e-10 * a[k].abs().max(1.0), "{} {}", a[k], b[k]);
+        let x = SVector::from([points[0][k], points[1][k]]);
+        assert!((mixture.log_pdf(&x) - b[k]).abs() < 1e-12 * b[k].abs().max(1.0));
+    }
+    let at_centres = estimate.log_pdf_at_centres();
+    let mut direct = vec![0.0; estimate.len()];
+    estimate.log_pdf_columns(estimate.particles().columns(), &mut direct);
+    assert!(at_centres.iter().zip(&direct).all(|(a, b)| (a - b).abs() < 1e-12));
+}
+
+#[test]
+fn densities_stay_numbers_everywhere() {
+    let mixture = d1().to_mixture().unwrap();
+    let far = [
+        vec![0.0, 1e160, 1e300, -1e200, f64::MAX],
+        vec![0.0, 1e160, 0.0, 1e300, f64::MAX],
+    ];
+    let columns = [far[0].as_slice(), far[1].as_slice()];
+    let mut logs = [0.0; 5];
+    mixture.log_pdf_columns(columns, &mut logs);
+    assert!(logs.iter().all(|l| !l.is_nan()) && logs[0].is_finite(), "{logs:?}");
+    d1().log_pdf_columns(columns, &mut logs);
+    assert!(logs.iter().all(|l| !l.is_nan()) && logs[0].is_finite(), "{logs:?}");
+    for k in 0..5 {
+        assert!(!mixture.log_pdf(&SVector::from([far[0][k], far[1][k]])).is_nan());
+    }
+}
+
+#[test]
+fn marginals_and_affine_images_have_the_moments_they_must() {
+    let mut rng = Stream::new(9).rng();
+    let belief = random_mixture::<4, _>(&mut rng, 3, 1.0);
+    let marginal = belief.marginal([2, 0]).unwrap();
+    assert!((marginal.mean()[0] - belief.mean()[2]).abs() < 1e-14);
+    assert!((marginal.covariance()[(0, 1)] - belief.covariance()[(2, 0)]).abs() < 1e-13);
+    assert!(belief.marginal([4]).is_err() && belief.marginal([1, 1]).is_err());
+    let image = belief
+        .affine(&nalgebra::SMatrix::<f64, 1, 4>::from([[1.0], [2.0], [0.0], [-1.0]]), &Vector1::new(3.0))
+        .unwrap();
+    let m = belief.mean();
+    assert!((image.mean()[0] - (m[0] + 2.0 * m[1] - m[3] + 3.0)).abs() < 1e-13);
+}
+
+#[test]
+fn quantiles_invert_the_distribution_function() {
+    let mut rng = Stream::new(10).rng();
+    for unit in [1e-4, 1.0, 1e4] {
+        let belief = random_mixture::<1, _>(&mut rng, 3, unit);
+        for level in [1e-10, 0.05, 0.5, 0.9, 1.0 - 1e-10] {
+            let x = belief.quantile(level).unwrap();
+            assert!((belief.cdf(x) - level).abs() < 1e-13);
+        }
+        let (low, high) = belief.central_interval(0.9).unwrap();
+        assert!((belief.cdf(high) - belief.cdf(low) - 0.9).abs() < 1e-12);
+        assert!(belief.quantile(0.0).is_err() && belief.quantile(f64::NAN).is_err());
+    }
+}
+
+#[test]
+fn a_region_of_highest_density_covers_what_it_says() {
+    let mut rng = Stream::new(11).rng();
+    let belief = random_mixture::<2, _>(&mut rng, 4, 1.0);
+    let region = HighestDensity::new(&mut rng, &belief, 0.8, 20_000).unwrap();
+    let n = 20_000;
+    let inside = (0..n).filter(|_| region.contains(&belief.sample(&mut rng))).count();
+    assert!((inside as f64 / n as f64 - 0.8).abs() < 4.0 * (2.0 * 0.16 / n as f64).sqrt());
+    // Of a Gaussian it is the ellipse of the same probability.
+    let gaussian = *d1().to_mixture().unwrap().moment_matched().mean();
+    let normal = Gaussian::new(gaussian, d1().covariance()).unwrap();
+    for x in ellipse(&normal, 0.5, 16).unwrap() {
+        let distance = normal.mahalanobis_squared(&SVector::from(x)).unwrap();
+        assert!((distance - 2.0 * 2.0_f64.ln()).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn tabulated_estimates_are_close_everywhere_that_matters() {
+    for (n, unit) in [(500, 1.0), (2000, 1e4), (60, 1e-4)] {
+        let estimate = crescent(4, n, unit);
+        let table = TabulatedEstimate::new(&estimate).unwrap();
+        let mut rng = Stream::new(12).rng();
+        let sample = estimate.sample_systematic(&mut rng, 2000).unwrap();
+        let (mut exact, mut fast) = (vec![0.0; 2000], vec![0.0; 2000]);
+        estimate.log_pdf_columns(sample.columns(), &mut exact);
+        table.pdf_columns(sample.columns(), &mut fast);
+        let peak = exact.iter().map(|l| l.exp()).fold(0.0, f64::max);
+        for (l, f) in exact.iter().zip(&fast) {
+            assert!((f - l.exp()).abs() < 0.004 * l.exp() + 1e-6 * peak, "{f} {}", l.exp());
+        }
+        let mut outside = [1.0];
+        table.pdf_columns([&[1e9 * unit], &[0.0]], &mut outside);
+        assert_eq!(outside[0], 0.0);
+    }
+}
+
+#[test]
+fn storage_keeps_every_bit_and_checks() {
+    let mut rng = Stream::new(13).rng();
+    let belief = random_mixture::<2, _>(&mut rng, 3, 1.0);
+    let text = serde_json::to_string(&belief).unwrap();
+    assert_eq!(serde_json::from_str::<Mixture<2>>(&text).unwrap(), belief);
+    assert!(serde_json::from_str::<Mixture<3>>(&text).is_err());
+    assert!(
+        serde_json::from_str::<Mixture<1>>(r#"{"weights":[-1.0],"means":[[0.0]],"covariances":[[[1.0]]]}"#).is_err()
+    );
+    let estimate = d1();
+    let text = serde_json::to_string(&estimate).unwrap();
+    let restored: KernelEstimate<2> = serde_json::from_str(&text).unwrap();
+    assert!((restored.mean() - estimate.mean()).amax() < 1e-14 && restored.kernel() == estimate.kernel());
+}
+
+#[test]
+fn bad_mixtures_are_refused_by_name() {
+    let new = |w, m, v| {
+        Component::new(w, Vector1::new(m), Matrix1::new(v))
+            .map(|_| ())
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(new(-1.0, 0.0, 1.0).contains("weight"));
+    assert!(new(1.0, f64::INFINITY, 1.0).contains("mean"));
+    assert!(new(1.0, 0.0, 0.0).contains("covariance"));
+    let zero = Component::new(0.0, Vector1::new(0.0), Matrix1::new(1.0)).unwrap();
+    assert!(Mixture::new(vec![zero]).is_err() && Mixture::<1>::new(vec![]).is_err());
+}

@@ -1,0 +1,4 @@
+//! Tests of the search for a diffusive source.
+
+mod fixtures;
+mod scratch;

@@ -1,0 +1,244 @@
+//! All breakpoints at once, or one sensor after the other, by Newton's method.
+
+use crate::criterion::Criterion;
+use crate::error::{Error, refuse};
+use crate::newton::{Newton, SADDLE, climb};
+use crate::problem::Problem;
+use crate::system::System;
+use fewbits_monte_carlo::Stream;
+use fewbits_numerics::normal;
+use fewbits_quantizers::Quantizer;
+use rand::RngExt;
+
+/// A design whose rarest cell is rarer than this has lost a level.
+const VANISHED: f64 = 1e-12;
+
+/// A stationary point of a criterion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Design {
+    /// The system with its designed quantizers.
+    pub system: System,
+    /// Value of the criterion: nats, squared units, or a probability.
+    pub value: f64,
+    /// Largest eigenvalue of the Hessian of the criterion, signed so that a local optimum has none above 0.
+    pub largest_curvature: f64,
+    /// Newton iterations.
+    pub iterations: usize,
+    /// Evaluations of the criterion, with or without derivatives.
+    pub evaluations: usize,
+}
+
+impl Design {
+    /// The designed quantizers, group after group.
+    pub fn quantizers(&self) -> Vec<Quantizer> {
+        self.system.quantizers()
+    }
+
+    /// Whether the point is a saddle: some change of the breakpoints improves it to second order.
+    pub fn is_saddle(&self) -> bool {
+        self.largest_curvature > SADDLE
+    }
+}
+
+/// The stationary point of `criterion` over the breakpoints of all groups (4.2), started from the system's own quantizers.
+///
+/// Newton's method finds a *local* optimum; the joint criterion may have several, and from a symmetric start the symmetric one
+/// may be a saddle. See [`Newton::escape_saddles`] and [`multi_start`].
+///
+/// # Errors
+/// [`Error::NotConverged`]; [`Error::VanishingCell`] if a level is squeezed out, as happens behind poor channels;
+/// [`Error::TooLarge`] and [`Error::Argument`] as [`System::value`].
+pub fn joint(system: &System, criterion: Criterion, newton: &Newton) -> Result<Design, Error> {
+    let all: Vec<usize> = (0..system.groups().len()).collect();
+    optimise_groups(system, &all, criterion, newton)
+}
+
+/// As [`joint`], over the breakpoints of the groups `active` with all others fixed.
+///
+/// # Errors
+/// As [`joint`]; also if `active` is empty or names a group that is not there.
+pub fn optimise_groups(
+    system: &System,
+    active: &[usize],
+    criterion: Criterion,
+    newton: &Newton,
+) -> Result<Design, Error> {
+    if active.is_empty() {
+        return refuse("active", "empty", "at least one group");
+    }
+    for g in active {
+        system.group(*g)?;
+    }
+    let problem = Problem::new(system, criterion, active)?;
+    let scale = active
+        .iter()
+        .map(|g| system.scene().sample_sd(system.groups()[*g].sensors()[0]))
+        .fold(f64::INFINITY, f64::min);
+    let found = climb(&problem, &problem.start(), scale, newton)?;
+    if let Some((quantizer, cell, probability)) = problem.rarest_cell(&found.point)
+        && probability < VANISHED
+    {
+        return Err(Error::VanishingCell {
+            quantizer,
+            cell,
+            probability,
+        });
+    }
+    Ok(Design {
+        system: problem.system_at(&found.point)?,
+        value: found.value * criterion.sense(),
+        largest_curvature: found.largest_curvature,
+        iterations: found.iterations,
+        evaluations: found.evaluations,
+    })
+}
+
+/// The greedy chain (4.4): sensor by sensor in the given order, each designed for the criterion of the sensors so far.
+///
+/// Returns one design a stage; stage `n` is a system of `n + 1` sensors. The first sensor's quantizer depends neither on how
+/// many follow nor on their noise.
+///
+/// # Errors
+/// As [`joint`]; also unless every group of `system` is a single sensor and `order` names groups at most once.
+pub fn greedy(system: &System, order: &[usize], criterion: Criterion, newton: &Newton) -> Result<Vec<Design>, Error> {
+    if order.is_empty() {
+        return refuse("order", "empty", "at least one group");
+    }
+    let mut stages: Vec<Design> = Vec::with_capacity(order.len());
+    for n in 0..order.len() {
+        let chain = &order[..=n];
+        let mut sensors = Vec::with_capacity(chain.len());
+        let (mut quantizers, mut channels) = (Vec::new(), Vec::new());
+        for (stage, g) in chain.iter().enumerate() {
+            let group = system.group(*g)?;
+            if group.sensors().len() != 1 {
+                return refuse("system", format!("{} sensors in group {g}", group.sensors().len()), "single sensors");
+            }
+            sensors.push(group.sensors()[0]);
+            let designed = stages.last().and_then(|d| d.system.groups().get(stage));
+            quantizers.push(designed.unwrap_or(group).quantizer().clone());
+            channels.push(group.channel().clone());
+        }
+        let scene = system.scene().subset(&sensors)?;
+        let partial = System::distinct(scene, quantizers, channels)?.with_outcome_limit(system.outcome_limit());
+        stages.push(optimise_groups(&partial, &[n], criterion, newton)?);
+    }
+    Ok(stages)
+}
+
+/// The best of [`joint`] from the system's own quantizers and from `starts` random ones, labels and channels kept.
+///
+/// Start `i` draws the breakpoints of each group as ordered standard normal samples, scaled by 1.3 standard deviations of the
+/// group's sample, from the fixed stream (`seed`, `i`). Starts that fail to converge are passed over.
+///
+/// # Errors
+/// The error of the first start if none converged.
+pub fn multi_start(
+    system: &System,
+    criterion: Criterion,
+    starts: usize,
+    seed: u64,
+    newton: &Newton,
+) -> Result<Design, Error> {
+    let mut best = joint(system, criterion, newton);
+    for start in random_starts(system, starts, seed) {
+        let Ok(candidate) = joint(&start, criterion, newton) else {
+            continue;
+        };
+        let better = match &best {
+            Ok(design) => {
+                let saddle = (design.is_saddle(), candidate.is_saddle());
+                criterion.sense() * (candidate.value - design.value) > 0.0 && saddle != (false, true)
+                    || saddle == (true, false)
+            }
+            Err(_) => true,
+        };
+        if better {
+            best = Ok(candidate);
+        }
+    }
+    best
+}
+
+/// The starts of [`multi_start`]; one whose breakpoints coincide is left out.
+pub fn random_starts(system: &System, starts: usize, seed: u64) -> Vec<System> {
+    (0..starts)
+        .filter_map(|i| random_system(system, Stream::new(seed).named("quantizer-starts").indexed(i as u64)).ok())
+        .collect()
+}
+
+/// The system with random ordered breakpoints.
+fn random_system(system: &System, stream: Stream) -> Result<System, Error> {
+    let mut rng = stream.rng();
+    let mean = system.scene().sample_mean();
+    let quantizers = system
+        .groups()
+        .iter()
+        .map(|group| {
+            let spread = 1.3 * system.scene().sample_sd(group.sensors()[0]);
+            let mut b: Vec<f64> = group
+                .quantizer()
+                .breakpoints()
+                .iter()
+                .map(|_| mean + spread * normal::quantile(rng.random_range(0.02..0.98)))
+                .collect();
+            b.sort_by(f64::total_cmp);
+            group.quantizer().with_breakpoints(b)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    system.with_quantizers(quantizers)
+}
+
+/// Cyclic maximisation (4.2): group after group, each to its optimum given the others, until a sweep gains less than
+/// `tolerance`. A coordinate-wise optimum, which where noise is correlated is often short of the joint one.
+///
+/// With `candidates` each sensor is first set to its global optimum among contiguous quantizers on that grid
+/// ([`best_contiguous`](super::best_contiguous)) where that is better than what it has.
+///
+/// # Errors
+/// As [`joint`]; [`Error::NotConverged`] after 500 sweeps.
+pub fn cyclic(
+    system: &System,
+    criterion: Criterion,
+    candidates: Option<&[f64]>,
+    tolerance: f64,
+    newton: &Newton,
+) -> Result<Design, Error> {
+    const SWEEPS: usize = 500;
+    let mut current = system.clone();
+    let mut value = criterion.sense() * current.value(criterion)?;
+    let (mut iterations, mut evaluations, mut gain) = (0, 1, f64::INFINITY);
+    for _ in 0..SWEEPS {
+        let before = value;
+        for group in 0..current.groups().len() {
+            if let Some(candidates) = candidates {
+                let (quantizer, found) = super::best_contiguous(&current, group, criterion, candidates)?;
+                if criterion.sense() * found > value {
+                    current = current.with_quantizer(group, quantizer)?;
+                }
+            }
+            let design = optimise_groups(&current, &[group], criterion, newton)?;
+            iterations += design.iterations;
+            evaluations += design.evaluations;
+            value = criterion.sense() * design.value;
+            current = design.system;
+        }
+        gain = value - before;
+        if gain <= tolerance {
+            let found = current.derivatives(criterion)?;
+            let eigen = nalgebra::SymmetricEigen::new(found.hessian * criterion.sense());
+            return Ok(Design {
+                system: current,
+                value: found.value,
+                largest_curvature: eigen.eigenvalues.max(),
+                iterations,
+                evaluations,
+            });
+        }
+    }
+    Err(Error::NotConverged {
+        algorithm: "cyclic maximisation",
+        iterations: SWEEPS,
+        change: gain,
+    })
+}

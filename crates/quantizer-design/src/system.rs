@@ -1,0 +1,327 @@
+//! Several sensors with their quantizers and channels, seen by one fusion centre.
+
+use crate::compositions::count;
+use crate::criterion::Criterion;
+use crate::error::{Error, refuse};
+use crate::scene::Scene;
+use fewbits_quantizers::Channel;
+use fewbits_quantizers::Quantizer;
+
+/// Most joint outcomes a computation may enumerate unless told otherwise.
+pub const OUTCOME_LIMIT: u64 = 1 << 20;
+
+/// Sensors of one law that share a quantizer design and a channel law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    quantizer: Quantizer,
+    channel: Channel,
+    sensors: Vec<usize>,
+}
+
+impl Group {
+    /// The sensors with the given numbers, each with this quantizer, each behind its own copy of the channel.
+    ///
+    /// # Errors
+    /// If the channel's inputs are not the quantizer's levels, or there is no sensor.
+    pub fn new(quantizer: Quantizer, channel: Channel, sensors: Vec<usize>) -> Result<Self, Error> {
+        if channel.inputs() != quantizer.levels() {
+            let levels = quantizer.levels();
+            return refuse("channel", format!("{} inputs", channel.inputs()), format!("one input a level, {levels}"));
+        }
+        if sensors.is_empty() {
+            return refuse("sensors", "empty", "at least one sensor a group");
+        }
+        Ok(Self {
+            quantizer,
+            channel,
+            sensors,
+        })
+    }
+
+    /// The quantizer.
+    pub fn quantizer(&self) -> &Quantizer {
+        &self.quantizer
+    }
+
+    /// The channel behind each sensor.
+    pub fn channel(&self) -> &Channel {
+        &self.channel
+    }
+
+    /// Numbers of the sensors in the scene.
+    pub fn sensors(&self) -> &[usize] {
+        &self.sensors
+    }
+
+    /// `P(received = t | sample in cell i)`.
+    pub(crate) fn cell_transition(&self, t: usize, cell: usize) -> f64 {
+        self.channel.probability(t, self.quantizer.labels()[cell])
+    }
+
+    /// Different joint reports of the group, up to who said what.
+    pub(crate) fn outcomes(&self) -> u64 {
+        count(self.sensors.len(), self.channel.outputs())
+    }
+}
+
+/// A scene and, for each of its sensors, a quantizer and a channel.
+///
+/// ```
+/// use fewbits_quantizer_design::{Criterion, Quantizer, Scene, System};
+/// let scene = Scene::gaussian(1.0, &[1.0, 1.0])?;
+/// let system = System::identical(scene, Quantizer::symmetric(1.37)?)?;
+/// assert!((system.value(Criterion::MeanSquaredError)? - 0.388_458_855_09).abs() < 1e-9);
+/// # Ok::<(), fewbits_quantizer_design::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct System {
+    scene: Scene,
+    groups: Vec<Group>,
+    outcome_limit: u64,
+}
+
+impl System {
+    /// A system of groups.
+    ///
+    /// # Errors
+    /// Unless every sensor of the scene is in exactly one group and the sensors of a group have the same noise.
+    pub fn new(scene: Scene, groups: Vec<Group>) -> Result<Self, Error> {
+        let mut seen = vec![false; scene.sensors()];
+        for group in &groups {
+            for n in &group.sensors {
+                match seen.get_mut(*n) {
+                    None => return refuse("sensor", n, format!("a number below {}", scene.sensors())),
+                    Some(true) => return refuse("sensor", format!("{n} twice"), "each sensor in one group"),
+                    Some(slot) => *slot = true,
+                }
+                if !scene.interchangeable(group.sensors[0], *n) {
+                    return refuse("group", format!("sensors {} and {n}", group.sensors[0]), "sensors of equal noise");
+                }
+            }
+        }
+        if let Some(n) = seen.iter().position(|s| !s) {
+            return refuse("groups", format!("without sensor {n}"), "each sensor in one group");
+        }
+        Ok(Self {
+            scene,
+            groups,
+            outcome_limit: OUTCOME_LIMIT,
+        })
+    }
+
+    /// A quantizer and a channel for each sensor.
+    ///
+    /// # Errors
+    /// If the numbers of sensors, quantizers and channels differ, or a channel does not fit its quantizer.
+    pub fn distinct(scene: Scene, quantizers: Vec<Quantizer>, channels: Vec<Channel>) -> Result<Self, Error> {
+        if quantizers.len() != channels.len() || quantizers.len() != scene.sensors() {
+            let given = format!("{} quantizers, {} channels", quantizers.len(), channels.len());
+            return refuse("quantizers", given, format!("{} of each", scene.sensors()));
+        }
+        let pairs = quantizers.into_iter().zip(channels).enumerate();
+        let groups = pairs
+            .map(|(n, (q, c))| Group::new(q, c, vec![n]))
+            .collect::<Result<_, _>>()?;
+        Self::new(scene, groups)
+    }
+
+    /// A quantizer for each sensor, received as sent.
+    ///
+    /// # Errors
+    /// As [`System::distinct`].
+    pub fn ideal(scene: Scene, quantizers: Vec<Quantizer>) -> Result<Self, Error> {
+        let channels = quantizers
+            .iter()
+            .map(|q| Channel::ideal(q.levels()))
+            .collect::<Result<_, _>>()?;
+        Self::distinct(scene, quantizers, channels)
+    }
+
+    /// One quantizer for all sensors, which must have the same noise, received as sent: outcomes are counts.
+    ///
+    /// # Errors
+    /// If the sensors differ.
+    pub fn identical(scene: Scene, quantizer: Quantizer) -> Result<Self, Error> {
+        let sensors = (0..scene.sensors()).collect();
+        let channel = Channel::ideal(quantizer.levels())?;
+        Self::new(scene, vec![Group::new(quantizer, channel, sensors)?])
+    }
+
+    /// Allows at most `limit` joint outcomes in any computation (default [`OUTCOME_LIMIT`]).
+    pub fn with_outcome_limit(mut self, limit: u64) -> Self {
+        self.outcome_limit = limit;
+        self
+    }
+
+    /// Prior and noise.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The groups.
+    pub fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    /// Quantizer of each group.
+    pub fn quantizers(&self) -> Vec<Quantizer> {
+        self.groups.iter().map(|g| g.quantizer.clone()).collect()
+    }
+
+    /// Joint outcomes up to permutations within groups.
+    pub fn outcomes(&self) -> u64 {
+        self.groups.iter().fold(1, |n: u64, g| n.saturating_mul(g.outcomes()))
+    }
+
+    /// Most joint outcomes a computation may enumerate.
+    pub fn outcome_limit(&self) -> u64 {
+        self.outcome_limit
+    }
+
+    /// Refuses tables of more outcomes than allowed.
+    pub(crate) fn check_outcomes(&self) -> Result<(), Error> {
+        let (needed, limit) = (self.outcomes(), self.outcome_limit);
+        if needed > limit {
+            return Err(Error::TooLarge {
+                table: "joint outcome table",
+                needed,
+                limit,
+            });
+        }
+        // Counts of fewer reports are tabulated on the way.
+        for group in &self.groups {
+            let needed = count(group.sensors.len(), group.channel.outputs() + 1);
+            if needed > limit {
+                return Err(Error::TooLarge {
+                    table: "table of counts",
+                    needed,
+                    limit,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The same system with another quantizer in group `group`.
+    ///
+    /// # Errors
+    /// If there is no such group or the quantizer has another number of levels than the channel takes.
+    pub fn with_quantizer(&self, group: usize, quantizer: Quantizer) -> Result<Self, Error> {
+        let mut system = self.clone();
+        let old = self.group(group)?;
+        system.groups[group] = Group::new(quantizer, old.channel.clone(), old.sensors.clone())?;
+        Ok(system)
+    }
+
+    /// The same system with another quantizer in each group.
+    ///
+    /// # Errors
+    /// As [`System::with_quantizer`], or if the number of quantizers is not the number of groups.
+    pub fn with_quantizers(&self, quantizers: Vec<Quantizer>) -> Result<Self, Error> {
+        if quantizers.len() != self.groups.len() {
+            return refuse("quantizers", quantizers.len(), format!("{} quantizers", self.groups.len()));
+        }
+        quantizers
+            .into_iter()
+            .enumerate()
+            .try_fold(self.clone(), |system, (g, q)| system.with_quantizer(g, q))
+    }
+
+    /// The same quantizers behind other channels.
+    ///
+    /// # Errors
+    /// If a channel does not fit its quantizer or their number differs from the groups'.
+    pub fn with_channels(&self, channels: Vec<Channel>) -> Result<Self, Error> {
+        if channels.len() != self.groups.len() {
+            return refuse("channels", channels.len(), format!("{} channels", self.groups.len()));
+        }
+        let groups = self.groups.iter().zip(channels);
+        let groups = groups.map(|(g, c)| Group::new(g.quantizer.clone(), c, g.sensors.clone()));
+        let rebuilt = Self::new(self.scene.clone(), groups.collect::<Result<_, _>>()?)?;
+        Ok(rebuilt.with_outcome_limit(self.outcome_limit))
+    }
+
+    pub(crate) fn group(&self, group: usize) -> Result<&Group, Error> {
+        match self.groups.get(group) {
+            Some(g) => Ok(g),
+            None => refuse("group", group, format!("a number below {}", self.groups.len())),
+        }
+    }
+
+    /// Value of a criterion: nats, squared units of the unknown, or a probability. Exact up to quadrature (1e-12).
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] beyond the outcome limit; [`Error::Argument`] for a Bayes error under a continuous prior.
+    pub fn value(&self, criterion: Criterion) -> Result<f64, Error> {
+        let problem = crate::problem::Problem::new(self, criterion, &[])?;
+        Ok(problem.value(&[]) * criterion.sense())
+    }
+
+    /// Value, gradient and Hessian of a criterion with respect to all breakpoints, group after group.
+    ///
+    /// The Bayes error is smooth between the breakpoints at which a decision changes; its derivatives hold inside such a piece.
+    ///
+    /// # Errors
+    /// As [`System::value`].
+    pub fn derivatives(&self, criterion: Criterion) -> Result<Derivatives, Error> {
+        let all: Vec<usize> = (0..self.groups.len()).collect();
+        let problem = crate::problem::Problem::new(self, criterion, &all)?;
+        let sense = criterion.sense();
+        let found = problem.derivatives(&problem.start());
+        Ok(Derivatives {
+            value: found.value * sense,
+            gradient: found.gradient * sense,
+            hessian: found.hessian * sense,
+        })
+    }
+}
+
+/// A value with its first and second derivatives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Derivatives {
+    /// The value.
+    pub value: f64,
+    /// First derivatives.
+    pub gradient: nalgebra::DVector<f64>,
+    /// Second derivatives.
+    pub hessian: nalgebra::DMatrix<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn systems_that_do_not_fit_are_refused() {
+        let scene = Scene::gaussian(1.0, &[1.0, 0.5]).unwrap();
+        let q = Quantizer::symmetric(1.0).unwrap();
+        assert!(
+            System::identical(scene.clone(), q.clone())
+                .unwrap_err()
+                .to_string()
+                .contains("equal noise")
+        );
+        assert!(System::ideal(scene.clone(), vec![q.clone()]).is_err());
+        let two = Channel::ideal(2).unwrap();
+        assert!(System::distinct(scene.clone(), vec![q.clone(); 2], vec![two.clone(), two]).is_err());
+        let system = System::ideal(scene, vec![q.clone(); 2]).unwrap();
+        assert!(
+            system
+                .value(Criterion::BayesError)
+                .unwrap_err()
+                .to_string()
+                .contains("prior")
+        );
+        let small = system.clone().with_outcome_limit(15);
+        let error = small.value(Criterion::MutualInformation).unwrap_err();
+        assert_eq!(
+            error,
+            Error::TooLarge {
+                table: "joint outcome table",
+                needed: 16,
+                limit: 15
+            }
+        );
+        assert!(system.with_quantizer(2, q).is_err());
+    }
+}

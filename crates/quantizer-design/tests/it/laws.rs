@@ -1,0 +1,381 @@
+//! Laws that hold for every system of quantizers.
+
+use fewbits_core::bits::BitString;
+use fewbits_core::message::laws;
+use fewbits_quantizer_design::decoder::MmseDecoder;
+use fewbits_quantizer_design::design::{self, Discovery, Separation};
+use fewbits_quantizer_design::system::Group;
+use fewbits_quantizer_design::{
+    Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, Prior, Quantizer, Scene, Symbol, System, bounds,
+    lloyd_max,
+};
+use proptest::prelude::*;
+
+const MI: Criterion = Criterion::MutualInformation;
+const MSE: Criterion = Criterion::MeanSquaredError;
+
+fn breakpoints(count: usize) -> impl Strategy<Value = Vec<f64>> {
+    prop::collection::vec(0.15..1.2f64, count + 1).prop_map(|gaps| {
+        let middle: f64 = gaps.iter().sum::<f64>() * 0.5;
+        let mut at = -middle;
+        gaps[..gaps.len() - 1]
+            .iter()
+            .map(|g| {
+                at += g;
+                at
+            })
+            .collect()
+    })
+}
+
+/// Two sensors, any correlation, any crossover, the second quantizer with a repeated label.
+fn pair() -> impl Strategy<Value = System> {
+    (breakpoints(3), breakpoints(4), 0.4..2.0f64, 0.4..2.0f64, -0.9..0.9f64, 0.0..0.2f64, any::<bool>()).prop_map(
+        |(a, b, s1, s2, rho, eps, equal)| {
+            let sds = if equal { [s1, s1] } else { [s1, s2] };
+            let rho = if rho.abs() < 0.2 { 0.0 } else { rho };
+            let scene = Scene::new(Prior::gaussian(1.0).unwrap(), Noise::equicorrelated(&sds, rho).unwrap()).unwrap();
+            let channel = Channel::binary_symmetric(&Labelling::natural(4).unwrap(), eps).unwrap();
+            let quantizers = vec![
+                Quantizer::new(a).unwrap(),
+                Quantizer::with_labels(b, vec![0, 1, 2, 3, 0]).unwrap(),
+            ];
+            System::distinct(scene, quantizers, vec![channel.clone(), channel]).unwrap()
+        },
+    )
+}
+
+/// Three identical sensors and a fourth, with a finite or Gaussian prior.
+fn grouped() -> impl Strategy<Value = System> {
+    (breakpoints(2), breakpoints(1), 0.5..1.5f64, 0.0..0.2f64, 0..3usize).prop_map(|(a, b, sd, loss, kind)| {
+        let prior = if kind == 2 {
+            Prior::discrete(vec![-1.0, 0.2, 1.5], vec![0.3, 0.5, 0.2]).unwrap()
+        } else {
+            Prior::gaussian(1.0).unwrap()
+        };
+        let noise = if kind == 1 {
+            Noise::equicorrelated(&[sd; 4], 0.3)
+        } else {
+            Noise::independent(&[sd, sd, sd, 0.8])
+        };
+        let scene = Scene::new(prior, noise.unwrap()).unwrap();
+        let three = Group::new(Quantizer::new(a).unwrap(), Channel::symbol_erasure(3, loss).unwrap(), vec![0, 1, 2]);
+        let one = Group::new(Quantizer::new(b).unwrap(), Channel::ideal(2).unwrap(), vec![3]);
+        System::new(scene, vec![three.unwrap(), one.unwrap()]).unwrap()
+    })
+}
+
+fn moved(system: &System, at: usize, by: f64) -> System {
+    let mut left = at;
+    let mut quantizers = system.quantizers();
+    for q in &mut quantizers {
+        let mut b = q.breakpoints().to_vec();
+        if left < b.len() {
+            b[left] += by;
+            *q = q.with_breakpoints(b).unwrap();
+            break;
+        }
+        left -= b.len();
+    }
+    system.with_quantizers(quantizers).unwrap()
+}
+
+/// Fourth-order central difference of `f` along breakpoint `i`.
+fn difference<T>(system: &System, i: usize, f: impl Fn(&System) -> T) -> T
+where
+    T: std::ops::Sub<T, Output = T> + std::ops::Mul<f64, Output = T>,
+{
+    let h = 3e-4;
+    let at = |steps: f64| f(&moved(system, i, steps * h));
+    (at(1.0) - at(-1.0)) * (2.0 / (3.0 * h)) - (at(2.0) - at(-2.0)) * (1.0 / (12.0 * h))
+}
+
+fn agree_with_differences(system: &System, criterion: Criterion) {
+    let found = system.derivatives(criterion).unwrap();
+    assert!((found.value - system.value(criterion).unwrap()).abs() < 1e-13);
+    for i in 0..found.gradient.len() {
+        let slope = difference(system, i, |s| s.value(criterion).unwrap());
+        assert!((slope - found.gradient[i]).abs() < 1e-8, "{criterion:?} {i}: {slope} {}", found.gradient[i]);
+        let column = difference(system, i, |s| s.derivatives(criterion).unwrap().gradient);
+        for j in 0..column.len() {
+            let entry = found.hessian[(j, i)];
+            assert!((column[j] - entry).abs() < 1e-7, "{criterion:?} {i} {j}: {} {entry}", column[j]);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    #[test]
+    fn derivatives_of_pairs_agree_with_central_differences(system in pair()) {
+        agree_with_differences(&system, Criterion::MutualInformation);
+        agree_with_differences(&system, Criterion::MeanSquaredError);
+    }
+
+    #[test]
+    fn derivatives_of_groups_agree_with_central_differences(system in grouped()) {
+        agree_with_differences(&system, Criterion::MutualInformation);
+        agree_with_differences(&system, Criterion::MeanSquaredError);
+    }
+
+    #[test]
+    fn information_and_error_obey_their_bounds(system in pair()) {
+        let mi = system.value(MI).unwrap();
+        let mse = system.value(MSE).unwrap();
+        prop_assert!(mse >= system.scene().prior_variance() * (-2.0 * mi).exp());
+        let clear = system.with_channels(vec![Channel::ideal(4).unwrap(), Channel::ideal(4).unwrap()]).unwrap();
+        prop_assert!(mi <= clear.value(MI).unwrap() + 1e-13);
+        prop_assert!(mse >= clear.value(MSE).unwrap() - 1e-13);
+        prop_assert!(mi >= -1e-15 && mse <= system.scene().prior_variance() + 1e-12);
+    }
+
+    #[test]
+    fn mirrors_and_swaps_change_nothing(system in pair()) {
+        let mirror = system.quantizers().iter().map(Quantizer::mirrored).collect();
+        let mirrored_words = Labelling::new(vec![3, 2, 1, 0]).unwrap();
+        let [a, b] = [0, 1].map(|g| system.groups()[g].channel().clone());
+        // Natural words in reverse order are their complements: the same binary channel.
+        prop_assert!((mirrored_words.word(0), mirrored_words.word(3)) == (Some(3), Some(0)));
+        let mirrored = system.with_quantizers(mirror).unwrap();
+        let swapped = System::distinct(
+            system.scene().subset(&[1, 0]).unwrap(),
+            system.quantizers().into_iter().rev().collect(),
+            vec![b, a],
+        ).unwrap();
+        for criterion in [MI, MSE] {
+            let value = system.value(criterion).unwrap();
+            prop_assert!((mirrored.value(criterion).unwrap() - value).abs() < 1e-12);
+            prop_assert!((swapped.value(criterion).unwrap() - value).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn counting_agrees_with_telling_apart(system in grouped()) {
+        let apart = System::new(
+            system.scene().clone(),
+            system
+                .groups()
+                .iter()
+                .flat_map(|g| g.sensors().iter().map(move |n| Group::new(g.quantizer().clone(), g.channel().clone(), vec![*n])))
+                .collect::<Result<_, _>>()
+                .unwrap(),
+        ).unwrap();
+        for criterion in [MI, MSE] {
+            prop_assert!((system.value(criterion).unwrap() - apart.value(criterion).unwrap()).abs() < 1e-12);
+        }
+        let decoders = [&system, &apart].map(|s| MmseDecoder::new(s, 10_000).unwrap());
+        let [few, many] = decoders.map(|d| d.decode(&[2, 0, 1, 1]).unwrap());
+        prop_assert!((few.mean - many.mean).abs() < 1e-12 && (few.variance - many.variance).abs() < 1e-12);
+    }
+
+    #[test]
+    fn erasures_scale_the_information_of_one_sensor(b in breakpoints(3), loss in 0.0..1.0f64, sd in 0.3..2.0f64) {
+        let one = |channel: Channel| {
+            let scene = Scene::gaussian(1.0, &[sd]).unwrap();
+            let q = Quantizer::new(b.clone()).unwrap();
+            System::distinct(scene, vec![q], vec![channel]).unwrap().value(MI).unwrap()
+        };
+        let clear = one(Channel::ideal(4).unwrap());
+        prop_assert!((one(Channel::symbol_erasure(4, loss).unwrap()) - (1.0 - loss) * clear).abs() < 1e-13);
+    }
+
+    #[test]
+    fn quantized_sensors_respect_van_trees_and_the_ceo(b in breakpoints(3), sd in 0.3..2.0f64, other in 0.3..2.0f64) {
+        let q = Quantizer::new(b).unwrap();
+        let system = System::ideal(Scene::gaussian(1.0, &[sd, other]).unwrap(), vec![q.clone(), q]).unwrap();
+        let mse = system.value(MSE).unwrap();
+        prop_assert!(mse > bounds::van_trees(&system).unwrap());
+        prop_assert!(mse > bounds::ceo(1.0, &[sd * sd, other * other], &[2.0, 2.0]).unwrap());
+    }
+
+    #[test]
+    fn derivatives_of_bayes_errors_agree_with_differences(b in breakpoints(3), theta in 0.5..3.0f64, prior in 0.2..0.8f64) {
+        let noise = Noise::independent(&[1.0, 1.0, 0.7]).unwrap();
+        let scene = Scene::new(Prior::binary(theta, prior).unwrap(), noise).unwrap();
+        let q = Quantizer::new(b).unwrap();
+        let ideal = Channel::ideal(4).unwrap();
+        let pair = Group::new(q.clone(), ideal.clone(), vec![0, 1]).unwrap();
+        let system = System::new(scene, vec![pair, Group::new(q, ideal, vec![2]).unwrap()]).unwrap();
+        let decisions = |s: &System| {
+            let table = JointTable::new(s).unwrap();
+            (0..table.outcomes()).map(|t| table.decide(t)).collect::<Vec<_>>()
+        };
+        // Only inside one smooth piece: no decision may change within the reach of the differences.
+        let here = decisions(&system);
+        prop_assume!((0..6).all(|i| [-6e-4, 6e-4].iter().all(|h| decisions(&moved(&system, i, *h)) == here)));
+        agree_with_differences(&system, Criterion::BayesError);
+    }
+
+    #[test]
+    fn the_dynamic_programme_equals_brute_force(sd in 0.3..1.5f64, rho in -0.8..0.8f64, kind in 0..3usize) {
+        let prior = if kind == 2 { Prior::binary(1.5, 0.4) } else { Prior::gaussian(1.0) }.unwrap();
+        let scene = Scene::new(prior, Noise::equicorrelated(&[sd, sd], rho).unwrap()).unwrap();
+        let q = |b: [f64; 2]| Quantizer::new(b.to_vec()).unwrap();
+        let system = System::ideal(scene, vec![q([-0.7, 0.9]), q([-0.5, 0.4])]).unwrap();
+        let criterion = [MI, MSE, Criterion::BayesError][kind];
+        let grid: Vec<f64> = (-4..=5).map(|i| f64::from(i) * 0.55).collect();
+        let (best, value) = design::best_contiguous(&system, 1, criterion, &grid).unwrap();
+        let mut brute = f64::NEG_INFINITY;
+        for i in 0..grid.len() {
+            for j in i + 1..grid.len() {
+                let tried = system.with_quantizer(1, q([grid[i], grid[j]])).unwrap().value(criterion).unwrap();
+                brute = brute.max(criterion.sense() * tried);
+            }
+        }
+        prop_assert!((criterion.sense() * value - brute).abs() < 1e-12, "{value} {brute}");
+        let met = system.with_quantizer(1, best).unwrap().value(criterion).unwrap();
+        prop_assert!((met - value).abs() < 1e-12);
+    }
+
+    #[test]
+    fn any_bits_decode_and_any_sample_encodes(bytes in prop::collection::vec(any::<u8>(), 0..3), y in any::<f64>()) {
+        let q = Quantizer::new(vec![-1.0, 0.0, 1.0, 2.0]).unwrap();
+        let labelling = Labelling::gray(5).unwrap();
+        prop_assert!(q.encode(y) < 5);
+        let sent = Symbol(q.encode(y));
+        prop_assert_eq!(laws::round_trip(&sent, &labelling), Ok(3));
+        let bits = bytes.len() * 8;
+        prop_assert!(laws::decoding_is_total::<Symbol>(&BitString::from_bytes(bytes, bits).unwrap(), &labelling));
+    }
+}
+
+#[test]
+fn a_useless_channel_says_nothing_and_a_clean_one_changes_no_bit() {
+    let words = Labelling::natural(4).unwrap();
+    let q = Quantizer::symmetric(1.2).unwrap();
+    let scene = Scene::gaussian(2.0, &[1.0, 1.0]).unwrap();
+    let ideal = System::ideal(scene, vec![q.clone(), q]).unwrap();
+    let over = |eps| {
+        ideal
+            .with_channels(vec![Channel::binary_symmetric(&words, eps).unwrap(); 2])
+            .unwrap()
+    };
+    assert!(over(0.5).value(MI).unwrap().abs() < 1e-14);
+    assert!((over(0.5).value(MSE).unwrap() - 4.0).abs() < 1e-12);
+    for criterion in [MI, MSE] {
+        assert_eq!(over(0.0).value(criterion).unwrap().to_bits(), ideal.value(criterion).unwrap().to_bits());
+        // Above one half the received bits are complements of a channel below it.
+        let (low, high) = (over(0.2).value(criterion).unwrap(), over(0.8).value(criterion).unwrap());
+        assert!((low - high).abs() < 1e-13);
+    }
+}
+
+#[test]
+fn empty_far_and_useless_cells_are_finite() {
+    let far = Quantizer::new(vec![-30.0, 0.0, 30.0, 60.0, 61.0]).unwrap();
+    let near = Quantizer::new(vec![-1e-9, 1e-9]).unwrap();
+    for rho in [0.0, 0.6] {
+        let scene = Scene::new(Prior::gaussian(1.0).unwrap(), Noise::equicorrelated(&[1.0; 2], rho).unwrap()).unwrap();
+        let system = System::ideal(scene.clone(), vec![far.clone(), near.clone()]).unwrap();
+        for criterion in [MI, MSE] {
+            let found = system.derivatives(criterion).unwrap();
+            assert!(
+                found.value.is_finite() && found.gradient.iter().chain(found.hessian.iter()).all(|v| v.is_finite())
+            );
+        }
+        // Cells that are never met change nothing.
+        let plain = System::ideal(scene, vec![Quantizer::new(vec![0.0]).unwrap(), near.clone()]).unwrap();
+        assert!((plain.value(MI).unwrap() - system.value(MI).unwrap()).abs() < 1e-12);
+        let decoder = MmseDecoder::new(&system, 18).unwrap();
+        assert!(matches!(decoder.decode(&[4, 0]), Err(Error::ImpossibleOutcome)));
+        assert!(decoder.decode(&[0, 2]).unwrap().mean.is_finite());
+    }
+}
+
+#[test]
+fn a_signal_of_zero_cannot_be_detected() {
+    let scene = Scene::new(Prior::binary(0.0, 0.3).unwrap(), Noise::independent(&[1.0; 4]).unwrap()).unwrap();
+    let system = System::identical(scene, Quantizer::symmetric(1.0).unwrap()).unwrap();
+    assert!((system.value(Criterion::BayesError).unwrap() - 0.3).abs() < 1e-15);
+    assert!(system.value(MI).unwrap().abs() < 1e-14);
+}
+
+#[test]
+fn small_equivocations_keep_their_digits() {
+    let scene = Scene::new(Prior::binary(4.0, 0.5).unwrap(), Noise::independent(&[1.0; 5]).unwrap()).unwrap();
+    let system = System::identical(scene, Quantizer::new(vec![0.960_430_8, 2.0, 3.039_569_2]).unwrap()).unwrap();
+    let left = JointTable::new(&system).unwrap().equivocation().unwrap();
+    // ln 2 - 0.693108122 leaves four digits; the table keeps all of them.
+    assert!((left - (std::f64::consts::LN_2 - system.value(MI).unwrap())).abs() < 1e-14);
+    assert!((left - 3.9e-5).abs() < 1e-6);
+}
+
+#[test]
+fn searches_find_what_local_steps_miss() {
+    let scene = Scene::new(Prior::gaussian(1.0).unwrap(), Noise::equicorrelated(&[1.0; 2], 0.85).unwrap()).unwrap();
+    let q = Quantizer::new(vec![0.0]).unwrap();
+    let start = System::ideal(scene, vec![q.clone(), q]).unwrap();
+    let saddle = design::joint(&start, MSE, &Newton::to_nearest_stationary_point()).unwrap();
+    let escaped = design::joint(&start, MSE, &Newton::default()).unwrap();
+    assert!(saddle.is_saddle() && !escaped.is_saddle());
+    assert!((escaped.value - 0.595_035_725_000_632_5).abs() < 1e-9);
+    let grid: Vec<f64> = (-40..=40).map(|i| f64::from(i) * 0.1).collect();
+    let cyclic = design::cyclic(&start, MSE, Some(&grid), 1e-12, &Newton::to_nearest_stationary_point()).unwrap();
+    assert!(cyclic.value >= escaped.value - 1e-9);
+    let settings = Discovery {
+        starts: 8,
+        polished: 3,
+        ..Discovery::default()
+    };
+    let folded = design::discover(&start, MSE, &settings).unwrap();
+    assert!((folded.value - 0.559_245_993_323_162_8).abs() < 1e-8, "{}", folded.value);
+    assert!(folded.quantizers().iter().any(|q| !q.is_contiguous()));
+}
+
+#[test]
+fn joint_newton_is_cheap() {
+    let scene = Scene::gaussian(1.0, &[1.0, 1.0]).unwrap();
+    let eight = Quantizer::from(&lloyd_max::gaussian(8).unwrap());
+    let start = System::ideal(scene, vec![eight.clone(), eight]).unwrap();
+    for criterion in [MI, MSE] {
+        let design = design::joint(&start, criterion, &Newton::default()).unwrap();
+        assert!(design.evaluations <= 200 && design.iterations <= 12, "{} {}", design.evaluations, design.iterations);
+    }
+}
+
+#[test]
+fn impossible_requests_are_named() {
+    let scene = Scene::gaussian(1.0, &[1.0, 1.0]).unwrap();
+    let q = Quantizer::symmetric(1.0).unwrap();
+    let ideal = System::ideal(scene.clone(), vec![q.clone(), q.clone()]).unwrap();
+    let noisy = ideal
+        .with_channels(vec![Channel::symbol_erasure(4, 0.1).unwrap(); 2])
+        .unwrap();
+    let grid = [-1.0, 0.0, 1.0];
+    assert!(
+        design::best_contiguous(&noisy, 0, MI, &grid)
+            .unwrap_err()
+            .to_string()
+            .contains("ideal")
+    );
+    assert!(design::best_contiguous(&ideal, 0, MI, &grid[..2]).is_err());
+    assert!(design::best_contiguous(&ideal, 2, MI, &grid).is_err());
+    let counted = System::identical(scene.clone(), q.clone()).unwrap();
+    assert!(
+        design::best_contiguous(&counted, 0, MI, &grid)
+            .unwrap_err()
+            .to_string()
+            .contains("single sensor")
+    );
+    assert!(design::greedy(&counted, &[0], MI, &Newton::default()).is_err());
+    assert!(design::optimise_groups(&ideal, &[], MI, &Newton::default()).is_err());
+    assert!(design::alternating_step(&counted, 0, MI).is_err());
+    assert!(design::discover(&counted, MI, &Discovery::default()).is_err());
+    let many = System::ideal(Scene::gaussian(1.0, &[1.0; 11]).unwrap(), vec![q.clone(); 11]).unwrap();
+    assert!(matches!(many.value(MI), Err(Error::TooLarge { .. })));
+    let crowd = System::identical(Scene::gaussian(1.0, &vec![1.0; 400]).unwrap(), q.clone()).unwrap();
+    assert!(matches!(crowd.value(MI), Err(Error::TooLarge { .. })));
+    let separate = |signal, sd| {
+        design::separate(Separation::Matusita, signal, sd, &q, &Channel::ideal(4).unwrap(), &Newton::default())
+    };
+    assert!(separate(0.0, 1.0).is_err() && separate(1.0, 0.0).is_err() && separate(f64::NAN, 1.0).is_err());
+    // Four words over a poor channel: a cell is squeezed out, and the error says so or does not converge.
+    let words = Labelling::natural(4).unwrap();
+    let poor = ideal
+        .with_channels(vec![Channel::binary_symmetric(&words, 0.25).unwrap(); 2])
+        .unwrap();
+    if let Ok(design) = design::joint(&poor, MSE, &Newton::default()) {
+        assert!(design.value.is_finite());
+    }
+}

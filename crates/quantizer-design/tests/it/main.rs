@@ -1,0 +1,5 @@
+//! Integration tests of the quantizer-design crate.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod laws;
+mod mi_fixtures;

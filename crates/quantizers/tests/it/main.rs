@@ -1,8 +1,0 @@
-//! Integration tests of the quantizers crate.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-mod assignment;
-mod binary;
-mod bounds;
-mod laws;
-mod mi_fixtures;

@@ -1,0 +1,293 @@
+//! Sensors of unequal noise, one for each bit of a Gray code, and the exact errors of their assignments.
+
+use crate::Error;
+use fewbits_binary_patterns::{
+    Bank, BinaryQuantizer, Grid, IMPOSSIBLE, Nodes, Sensor, Source, gray_basis, linear_pattern,
+};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::positive;
+use fewbits_numerics::quadrature::gauss_legendre;
+
+/// Most sensors: there are `2^N` cells.
+const MAX_SENSORS: usize = 16;
+/// Panel width in noise standard deviations.
+const PANEL: f64 = 2.0;
+
+/// `N` sensors that share the `N` Gray bits of `2^N` cells over `[-V, V]`.
+///
+/// Construction tabulates every bit's probabilities at every sensor's noise, so that errors of assignments are cheap.
+#[derive(Debug, Clone)]
+pub struct CodedSensors {
+    source: Source,
+    half_width: f64,
+    noise_stds: Vec<f64>,
+    quantizers: Vec<BinaryQuantizer>,
+    /// Nodes on `[0, V]`: the code is symmetric up to its first bit.
+    nodes: Nodes,
+    /// `P(bit = 0|x) - P(bit = 1|x)` at the nodes, `[bit][sensor]`.
+    contrast: Vec<Vec<Vec<f64>>>,
+    /// `[P0, P1]` at the nodes, `[bit][sensor][value]`.
+    probability: Vec<Vec<[Vec<f64>; 2]>>,
+}
+
+impl CodedSensors {
+    /// From the half width of the uniform source and each sensor's noise VARIANCE.
+    ///
+    /// # Errors
+    /// If the half width or a variance is not positive and finite, or the number of sensors is not in `1..=16`.
+    pub fn new(half_width: f64, variances: &[f64]) -> Result<Self, Error> {
+        let sensors = variances.len();
+        if !(1..=MAX_SENSORS).contains(&sensors) {
+            return Err(ArgumentError::new("variances", format!("{sensors} entries"), "1 to 16 entries").into());
+        }
+        let noise_stds = variances
+            .iter()
+            .map(|&v| positive("variance", v).map(f64::sqrt))
+            .collect::<Result<Vec<_>, _>>()?;
+        let source = Source::uniform(half_width)?;
+        let grid = Grid::uniform(half_width, sensors)?;
+        let quantizers = gray_basis(sensors)?
+            .into_iter()
+            .map(|mask| linear_pattern(mask, sensors)?.on(&grid))
+            .collect::<Result<Vec<_>, _>>()?;
+        let blurs: Vec<(f64, f64)> = noise_stds
+            .iter()
+            .flat_map(|&noise| grid.edges().iter().map(move |&t| (t, noise)))
+            .collect();
+        let mut nodes = Nodes::adapted(&source, 0.0, half_width, &blurs, PANEL, gauss_legendre::<12>());
+        nodes.w.iter_mut().for_each(|w| *w *= 2.0);
+        let probability: Vec<Vec<[Vec<f64>; 2]>> = quantizers
+            .iter()
+            .map(|quantizer| {
+                noise_stds
+                    .iter()
+                    .map(|&noise| {
+                        let p: Vec<[f64; 2]> = nodes.x.iter().map(|&x| quantizer.probabilities(x, noise)).collect();
+                        [p.iter().map(|p| p[0]).collect(), p.iter().map(|p| p[1]).collect()]
+                    })
+                    .collect()
+            })
+            .collect();
+        let contrast = probability
+            .iter()
+            .map(|row| {
+                row.iter()
+                    .map(|[p0, p1]| p0.iter().zip(p1).map(|(p0, p1)| p0 - p1).collect())
+                    .collect()
+            })
+            .collect();
+        Ok(Self {
+            source,
+            half_width,
+            noise_stds,
+            quantizers,
+            nodes,
+            contrast,
+            probability,
+        })
+    }
+
+    /// Number of sensors, and of bits.
+    pub fn sensors(&self) -> usize {
+        self.noise_stds.len()
+    }
+
+    /// Half width `V` of the source.
+    pub fn half_width(&self) -> f64 {
+        self.half_width
+    }
+
+    /// Noise standard deviation of each sensor.
+    pub fn noise_stds(&self) -> &[f64] {
+        &self.noise_stds
+    }
+
+    /// The quantizer of each Gray bit, the coarsest first.
+    pub fn quantizers(&self) -> &[BinaryQuantizer] {
+        &self.quantizers
+    }
+
+    pub(crate) fn nodes(&self) -> &Nodes {
+        &self.nodes
+    }
+
+    pub(crate) fn contrast(&self, bit: usize, sensor: usize) -> &[f64] {
+        &self.contrast[bit][sensor]
+    }
+
+    pub(crate) fn probability(&self, bit: usize, sensor: usize) -> &[Vec<f64>; 2] {
+        &self.probability[bit][sensor]
+    }
+
+    /// Accepts permutations of the sensors only.
+    pub(crate) fn check(&self, assignment: &[usize]) -> Result<(), Error> {
+        check_permutation(assignment, self.sensors())
+    }
+
+    /// The sensors as a bank, bit by bit.
+    ///
+    /// # Errors
+    /// If the assignment is not a permutation.
+    pub fn bank(&self, assignment: &[usize]) -> Result<Bank, Error> {
+        self.check(assignment)?;
+        let sensors = assignment
+            .iter()
+            .zip(&self.quantizers)
+            .map(|(&n, quantizer)| Sensor::new(quantizer.clone(), self.noise_stds[n]))
+            .collect::<Result<_, _>>()?;
+        Ok(Bank::new(self.source, sensors)?)
+    }
+
+    /// Exact error of the posterior mean, `2^N` outcomes a node.
+    ///
+    /// # Errors
+    /// If the assignment is not a permutation.
+    pub fn mmse(&self, assignment: &[usize]) -> Result<f64, Error> {
+        self.check(assignment)?;
+        let mut levels = vec![self.nodes.w.clone(); self.sensors()];
+        // The nodes cover one side; both sides share the weight.
+        levels[0].iter_mut().for_each(|w| *w *= 0.5);
+        Ok(self.source.variance() - self.explained(assignment, 1, &mut levels))
+    }
+
+    /// `sum M1^2/M0` over the outcomes of the bits from `bit` on, given `w p(x) P(bits 1, ..., bit - 1|x)`; bit 0 comes last.
+    ///
+    /// Reflecting `x` flips bit 0 and no other, so its two values are mirror images and one side has all it takes.
+    fn explained(&self, assignment: &[usize], bit: usize, levels: &mut [Vec<f64>]) -> f64 {
+        let (own, below) = levels.split_at_mut(1);
+        if bit == assignment.len() {
+            let [zero, one] = self.probability(0, assignment[0]);
+            let (mut mass, mut moment) = (0.0, 0.0);
+            for (((w, x), zero), one) in own[0].iter().zip(&self.nodes.x).zip(zero).zip(one) {
+                mass += w * (zero + one);
+                moment += w * x * (zero - one);
+            }
+            return if mass > IMPOSSIBLE {
+                2.0 * moment * moment / mass
+            } else {
+                0.0
+            };
+        }
+        let mut explained = 0.0;
+        for p in self.probability(bit, assignment[bit]) {
+            for ((child, w), p) in below[0].iter_mut().zip(&own[0]).zip(p) {
+                *child = w * p;
+            }
+            explained += self.explained(assignment, bit + 1, below);
+        }
+        explained
+    }
+
+    /// Exact error of the decoder that reads the Gray bits as a cell and answers its centre, `O(N)` a node.
+    ///
+    /// With `t_k = E[(-1)^(z_k)|x]` the centre is `-V u_1`, `u_k = (-1)^(z_k) (1/2 + u_{k+1}/2)`, so that the first two moments of
+    /// `u` follow backwards from the finest bit:
+    ///
+    /// ```text
+    /// m1, m2 <- 0, 0
+    /// for k = N, ..., 1:   m1, m2 <- t_k (1/2 + m1/2),  1/4 + m1/2 + m2/4
+    /// MSE = E[x^2 + 2 V x m1 + V^2 m2]
+    /// ```
+    ///
+    /// # Errors
+    /// If the assignment is not a permutation.
+    pub fn centre_mse(&self, assignment: &[usize]) -> Result<f64, Error> {
+        self.check(assignment)?;
+        let mut m1 = vec![0.0; self.nodes.len()];
+        let mut m2 = m1.clone();
+        for (bit, &sensor) in assignment.iter().enumerate().rev() {
+            self.push_bit(bit, sensor, &mut m1, &mut m2);
+        }
+        Ok(self.centre_error(&m1, &m2))
+    }
+
+    /// One step of the recursion.
+    #[inline]
+    fn push_bit(&self, bit: usize, sensor: usize, m1: &mut [f64], m2: &mut [f64]) {
+        for ((m1, m2), t) in m1.iter_mut().zip(m2).zip(self.contrast(bit, sensor)) {
+            *m2 = 0.25 + 0.5 * *m1 + 0.25 * *m2;
+            *m1 = t * (0.5 + 0.5 * *m1);
+        }
+    }
+
+    fn centre_error(&self, m1: &[f64], m2: &[f64]) -> f64 {
+        let v = self.half_width;
+        let mut sum = 0.0;
+        for (((m1, m2), x), w) in m1.iter().zip(m2).zip(&self.nodes.x).zip(&self.nodes.w) {
+            sum += w * (x * (x + 2.0 * v * m1) + v * v * m2);
+        }
+        sum
+    }
+}
+
+/// Accepts permutations of `0..size` only.
+pub(crate) fn check_permutation(assignment: &[usize], size: usize) -> Result<(), Error> {
+    let mut seen = vec![false; size];
+    let valid = assignment.len() == size
+        && assignment
+            .iter()
+            .all(|&n| n < size && !std::mem::replace(&mut seen[n], true));
+    if valid {
+        Ok(())
+    } else {
+        Err(Error::NotAPermutation {
+            given: assignment.to_vec(),
+            size,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn the_recursion_agrees_with_all_outcomes() {
+        let sensors = CodedSensors::new(1.3, &[0.04, 0.2, 0.01, 0.08]).unwrap();
+        let assignment = [2, 0, 3, 1];
+        let bank = sensors.bank(&assignment).unwrap();
+        let grid = Grid::uniform(1.3, 4).unwrap();
+        // The centre decoder as a table over outcomes.
+        let mut exact = 0.0;
+        let nodes = bank.fine_nodes();
+        bank.for_outcomes(&nodes, |index, w| {
+            let mut value = 0usize;
+            let mut previous = 0;
+            for at in (0..4).rev() {
+                previous ^= index >> at & 1;
+                value = 2 * value + previous;
+            }
+            let left = if value == 0 { -1.3 } else { grid.edges()[value - 1] };
+            let centre = left + 1.3 / 16.0;
+            exact += w
+                .iter()
+                .zip(&nodes.x)
+                .map(|(w, x)| w * (x - centre) * (x - centre))
+                .sum::<f64>();
+        });
+        assert_relative_eq!(sensors.centre_mse(&assignment).unwrap(), exact, max_relative = 1e-11);
+        let mmse = sensors.mmse(&assignment).unwrap();
+        assert!(mmse < exact);
+        assert_relative_eq!(mmse, bank.mmse().unwrap(), max_relative = 1e-11);
+    }
+
+    #[test]
+    fn one_bit_without_noise_leaves_half_a_cell() {
+        let sensors = CodedSensors::new(1.0, &[1e-8]).unwrap();
+        assert_relative_eq!(sensors.centre_mse(&[0]).unwrap(), 1.0 / 12.0, max_relative = 1e-3);
+    }
+
+    #[test]
+    fn bad_input_is_refused() {
+        assert!(CodedSensors::new(0.0, &[0.1]).is_err());
+        assert!(CodedSensors::new(1.0, &[]).is_err());
+        assert!(CodedSensors::new(1.0, &[0.1; 17]).is_err());
+        assert!(CodedSensors::new(1.0, &[0.1, 0.0]).is_err());
+        let sensors = CodedSensors::new(1.0, &[0.1, 0.2]).unwrap();
+        for bad in [vec![0], vec![0, 0], vec![0, 2]] {
+            assert!(matches!(sensors.centre_mse(&bad), Err(Error::NotAPermutation { .. })));
+            assert!(sensors.mmse(&bad).is_err());
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! The cost of giving one bit to one sensor, when no other bit is wrong.
+
+use super::CodedSensors;
+use super::linear::CostMatrix;
+use crate::Error;
+use fewbits_binary_patterns::BinaryQuantizer;
+use fewbits_binary_patterns::Grid;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::quadrature::gauss_legendre;
+
+/// Where the centre decoder lands if Gray bit `bit` of the cell of `x` is flipped and all others are right.
+///
+/// With the cell's centre `c` and the block of width `2 V / 2^(bit)` (bits from 0) that holds it, flipping mirrors `c` inside
+/// the block. An involution on the centres.
+///
+/// # Errors
+/// If `bit` is not below `bits`, `bits` is out of range, the half width is not positive, or `x` is NaN.
+pub fn flipped_estimate(x: f64, bit: usize, bits: usize, half_width: f64) -> Result<f64, Error> {
+    let grid = Grid::uniform(half_width, bits)?;
+    if bit >= bits {
+        return Err(ArgumentError::new("bit", bit, format!("a bit below {bits}")).into());
+    }
+    Ok(flipped_centre(grid.locate(x)?, bit, grid.cells(), half_width))
+}
+
+/// The same for the cell's index.
+fn flipped_centre(cell: usize, bit: usize, cells: usize, half_width: f64) -> f64 {
+    let block = cells >> bit;
+    let first = cell / block * block;
+    let mirrored = 2 * first + block - 1 - cell;
+    half_width * (2.0 * mirrored as f64 + 1.0 - cells as f64) / cells as f64
+}
+
+/// `P(bit wrong | x)`: the probability that the bit differs from the one of the cell that holds `x`.
+///
+/// # Errors
+/// If `x` is NaN.
+pub fn bit_error(quantizer: &BinaryQuantizer, x: f64, noise_std: f64) -> Result<f64, Error> {
+    let right = quantizer.encode(x)?;
+    Ok(quantizer.probabilities(x, noise_std)[usize::from(!right)])
+}
+
+/// Error of the cells' centres without noise, `V^2 / (3 4^N)`.
+pub fn quantization_error(half_width: f64, bits: usize) -> f64 {
+    half_width * half_width / 3.0 / 4f64.powi(bits as i32)
+}
+
+/// `Gamma_{b,n} = E[(X - f_b(X))^2 P(bit b of sensor n wrong | X)]`, for every bit and sensor (equation 6.5).
+///
+/// The sum of the costs of an assignment plus [`quantization_error`] approximates the error of the centre decoder
+/// (equation 6.6): it counts single wrong bits only. The integrand jumps where the cell changes, so every cell has its own
+/// panel; symmetry saves half of them.
+///
+/// # Errors
+/// If the cost matrix would not be finite; cannot happen for constructed sensors.
+pub fn pair_costs(sensors: &CodedSensors) -> Result<CostMatrix, Error> {
+    let bits = sensors.sensors();
+    let mut costs = Vec::with_capacity(bits * bits);
+    for bit in 0..bits {
+        for sensor in 0..bits {
+            costs.push(pair_cost(sensors, bit, sensor));
+        }
+    }
+    CostMatrix::new(bits, costs)
+}
+
+/// One entry of [`pair_costs`].
+pub fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
+    let (bits, v) = (sensors.sensors(), sensors.half_width());
+    let quantizer = &sensors.quantizers()[bit];
+    let noise = sensors.noise_stds()[sensor];
+    let cells = 1usize << bits;
+    let width = 2.0 * v / cells as f64;
+    // Where a cell is narrow against the noise, a few nodes integrate its polynomial-like contents exactly.
+    let panels = (width / noise).ceil().clamp(1.0, 1e4) as usize;
+    let rule = if width < 0.3 * noise {
+        gauss_legendre::<6>()
+    } else {
+        gauss_legendre::<12>()
+    };
+    let mut cost = 0.0;
+    // The code is symmetric up to its first bit, and so is the cost.
+    for cell in cells / 2..cells {
+        let landing = flipped_centre(cell, bit, cells, v);
+        let low = v * (2.0 * cell as f64 - cells as f64) / cells as f64;
+        let middle = low + 0.5 * width;
+        let right = quantizer.thresholds().partition_point(|&t| t <= middle) % 2;
+        cost += rule.composite(low, low + width, panels, |x| {
+            (x - landing) * (x - landing) * quantizer.probabilities(x, noise)[1 - right]
+        });
+    }
+    cost / v
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn flipping_twice_returns() {
+        for bit in 0..4 {
+            for cell in 0..16 {
+                let centre = -0.8 + 0.1 * (f64::from(cell) + 0.5);
+                let there = flipped_estimate(centre, bit, 4, 0.8).unwrap();
+                assert_relative_eq!(flipped_estimate(there, bit, 4, 0.8).unwrap(), centre, epsilon = 1e-14);
+                assert!((there - centre).abs() > 0.05);
+            }
+        }
+        assert!(flipped_estimate(0.0, 4, 4, 1.0).is_err());
+        assert!(flipped_estimate(f64::NAN, 0, 4, 1.0).is_err());
+    }
+
+    #[test]
+    fn the_finest_bit_moves_to_the_neighbour_of_its_pair() {
+        assert_relative_eq!(flipped_estimate(0.05, 2, 3, 1.0).unwrap(), 0.375);
+        assert_relative_eq!(flipped_estimate(0.3, 2, 3, 1.0).unwrap(), 0.125);
+        assert_relative_eq!(flipped_estimate(0.3, 0, 3, 1.0).unwrap(), -0.375);
+    }
+
+    #[test]
+    fn costs_agree_with_a_plain_midpoint_sum() {
+        let sensors = CodedSensors::new(1.3, &[0.04, 0.0009, 0.3]).unwrap();
+        let costs = pair_costs(&sensors).unwrap();
+        let points = 16_000;
+        for bit in 0..3 {
+            for (sensor, &noise) in sensors.noise_stds().iter().enumerate() {
+                let sum: f64 = (0..points)
+                    .map(|i| 1.3 * (2.0 * (f64::from(i) + 0.5) / f64::from(points) - 1.0))
+                    .map(|x| {
+                        let off = x - flipped_estimate(x, bit, 3, 1.3).unwrap();
+                        off * off * bit_error(&sensors.quantizers()[bit], x, noise).unwrap()
+                    })
+                    .sum();
+                assert_relative_eq!(costs.get(bit, sensor).unwrap(), sum / f64::from(points), max_relative = 1e-5);
+            }
+        }
+    }
+}

@@ -1,0 +1,315 @@
+//! All assignments, for small `N`, and local search for larger.
+
+use super::CodedSensors;
+use crate::Error;
+use fewbits_binary_patterns::IMPOSSIBLE;
+use fewbits_numerics::ArgumentError;
+use nalgebra::DMatrix;
+
+/// Most sensors for enumeration: 10! is 3.6 million.
+const MAX_ENUMERATED: usize = 10;
+/// Relative improvement that counts as one.
+const IMPROVEMENT: f64 = 1e-12;
+
+/// Which exact error is minimised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Criterion {
+    /// Of the decoder that answers the cell's centre.
+    Centre,
+    /// Of the posterior mean.
+    Mmse,
+}
+
+/// Errors of all assignments.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AllErrors {
+    /// The best assignment; the first in lexicographic order among equals.
+    pub best: Vec<usize>,
+    /// Its error.
+    pub least: f64,
+    /// Mean over all assignments: what assigning at random gives.
+    pub mean: f64,
+    /// Largest error.
+    pub largest: f64,
+}
+
+/// The outcome of [`exchange`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exchanged {
+    /// An assignment that no exchange of two sensors improves.
+    pub assignment: Vec<usize>,
+    /// Its exact error.
+    pub error: f64,
+    /// Number of errors evaluated.
+    pub evaluations: usize,
+}
+
+impl CodedSensors {
+    /// Exact error of an assignment under `criterion`.
+    ///
+    /// # Errors
+    /// If the assignment is not a permutation.
+    pub fn mse(&self, assignment: &[usize], criterion: Criterion) -> Result<f64, Error> {
+        match criterion {
+            Criterion::Centre => self.centre_mse(assignment),
+            Criterion::Mmse => self.mmse(assignment),
+        }
+    }
+}
+
+/// Exchanges pairs of sensors as long as the exact error falls, the best exchange first.
+///
+/// # Errors
+/// If the start is not a permutation.
+pub fn exchange(sensors: &CodedSensors, start: &[usize], criterion: Criterion) -> Result<Exchanged, Error> {
+    let mut assignment = start.to_vec();
+    let mut error = sensors.mse(&assignment, criterion)?;
+    let mut evaluations = 1;
+    loop {
+        let mut best = (error * (1.0 - IMPROVEMENT), None);
+        for i in 0..assignment.len() {
+            for j in i + 1..assignment.len() {
+                assignment.swap(i, j);
+                let trial = sensors.mse(&assignment, criterion)?;
+                evaluations += 1;
+                assignment.swap(i, j);
+                if trial < best.0 {
+                    best = (trial, Some((i, j)));
+                }
+            }
+        }
+        let Some((i, j)) = best.1 else {
+            return Ok(Exchanged {
+                assignment,
+                error,
+                evaluations,
+            });
+        };
+        assignment.swap(i, j);
+        error = best.0;
+    }
+}
+
+/// The best of all `N!` assignments.
+///
+/// # Errors
+/// As [`all_errors`].
+pub fn brute_force(sensors: &CodedSensors, criterion: Criterion) -> Result<(Vec<usize>, f64), Error> {
+    let all = all_errors(sensors, criterion)?;
+    Ok((all.best, all.least))
+}
+
+/// Exact errors of all `N!` assignments.
+///
+/// For the centre decoder the recursion runs from the finest bit, and assignments that agree on the finest bits share it. For
+/// the posterior mean the bits are cut into two halves: for every choice of the sensors of the coarse half, one matrix product
+/// combines all orders of the one with all orders of the other.
+///
+/// # Errors
+/// If there are more than ten sensors.
+pub fn all_errors(sensors: &CodedSensors, criterion: Criterion) -> Result<AllErrors, Error> {
+    let n = sensors.sensors();
+    if n > MAX_ENUMERATED {
+        return Err(ArgumentError::new("sensors", n, "at most 10 sensors").into());
+    }
+    let mut tally = Tally::default();
+    match criterion {
+        Criterion::Centre => {
+            let rows = sensors.nodes().len();
+            let mut moments = vec![(vec![0.0; rows], vec![0.0; rows]); n + 1];
+            centre_tree(sensors, n, &mut vec![0; n], 0, &mut moments, &mut tally);
+        }
+        Criterion::Mmse => mmse_halves(sensors, &mut tally),
+    }
+    Ok(AllErrors {
+        best: tally.best,
+        least: tally.least,
+        mean: tally.sum / tally.count as f64,
+        largest: tally.largest,
+    })
+}
+
+#[derive(Default)]
+struct Tally {
+    best: Vec<usize>,
+    least: f64,
+    largest: f64,
+    sum: f64,
+    count: usize,
+}
+
+impl Tally {
+    fn add(&mut self, assignment: &[usize], error: f64) {
+        let first = self.count == 0;
+        let better = error < self.least * (1.0 - IMPROVEMENT);
+        let tied = error <= self.least * (1.0 + IMPROVEMENT) && assignment < self.best.as_slice();
+        if first || better || tied {
+            self.best = assignment.to_vec();
+            self.least = if tied && !first { self.least.min(error) } else { error };
+        }
+        self.largest = self.largest.max(error);
+        self.sum += error;
+        self.count += 1;
+    }
+}
+
+/// Assigns bits `left - 1, ..., 0`; `moments[left]` holds the recursion after the finer bits.
+fn centre_tree(
+    sensors: &CodedSensors,
+    left: usize,
+    assignment: &mut Vec<usize>,
+    used: u32,
+    moments: &mut [(Vec<f64>, Vec<f64>)],
+    tally: &mut Tally,
+) {
+    let bit = left - 1;
+    for sensor in (0..assignment.len()).filter(|s| used >> s & 1 == 0) {
+        assignment[bit] = sensor;
+        let contrast = sensors.contrast(bit, sensor);
+        if bit == 0 {
+            let (m1, m2) = &moments[1];
+            let (nodes, v) = (sensors.nodes(), sensors.half_width());
+            let mut error = 0.0;
+            for i in 0..contrast.len() {
+                let last2 = 0.25 + 0.5 * m1[i] + 0.25 * m2[i];
+                let last1 = contrast[i] * (0.5 + 0.5 * m1[i]);
+                error += nodes.w[i] * (nodes.x[i] * (nodes.x[i] + 2.0 * v * last1) + v * v * last2);
+            }
+            tally.add(assignment, error);
+            continue;
+        }
+        let (below, above) = moments.split_at_mut(left);
+        let (next1, next2) = &mut below[bit];
+        let (m1, m2) = &above[0];
+        for i in 0..contrast.len() {
+            next2[i] = 0.25 + 0.5 * m1[i] + 0.25 * m2[i];
+            next1[i] = contrast[i] * (0.5 + 0.5 * m1[i]);
+        }
+        centre_tree(sensors, bit, assignment, used | 1 << sensor, moments, tally);
+    }
+}
+
+/// All orders of some sensors over consecutive bits.
+struct Half {
+    orders: Vec<Vec<usize>>,
+    /// `P(outcome|x)`: a row for each order and outcome, a column a node.
+    rows: DMatrix<f64>,
+}
+
+impl Half {
+    fn new(sensors: &CodedSensors, members: &[usize], first_bit: usize) -> Self {
+        let mut orders = Vec::new();
+        for_permutations(members.len(), |p| orders.push(p.iter().map(|&i| members[i]).collect::<Vec<_>>()));
+        let outcomes = 1usize << members.len();
+        let rows = DMatrix::from_fn(orders.len() * outcomes, sensors.nodes().len(), |row, node| {
+            let (order, outcome) = (&orders[row / outcomes], row % outcomes);
+            order
+                .iter()
+                .enumerate()
+                .map(|(at, &sensor)| sensors.probability(first_bit + at, sensor)[outcome >> at & 1][node])
+                .product()
+        });
+        Self { orders, rows }
+    }
+}
+
+fn mmse_halves(sensors: &CodedSensors, tally: &mut Tally) {
+    let n = sensors.sensors();
+    let coarse_bits = n.div_ceil(2);
+    let (coarse, fine) = (1usize << coarse_bits, 1usize << (n - coarse_bits));
+    let nodes = sensors.nodes();
+    let variance = sensors.half_width() * sensors.half_width() / 3.0;
+    for members in (0u32..1 << n).filter(|m| m.count_ones() as usize == coarse_bits) {
+        let (chosen, others): (Vec<usize>, Vec<usize>) = (0..n).partition(|s| members >> s & 1 == 1);
+        let first = Half::new(sensors, &chosen, 0);
+        let second = Half::new(sensors, &others, coarse_bits);
+        let mut weighted = second.rows.transpose();
+        for (mut row, w) in weighted.row_iter_mut().zip(&nodes.w) {
+            // The nodes cover one side; both sides share the weight.
+            row *= 0.5 * w;
+        }
+        let mass = &first.rows * &weighted;
+        for (mut row, x) in weighted.row_iter_mut().zip(&nodes.x) {
+            row *= *x;
+        }
+        let moment = &first.rows * &weighted;
+        for (i, head) in first.orders.iter().enumerate() {
+            for (j, tail) in second.orders.iter().enumerate() {
+                let mut explained = 0.0;
+                for a in (0..coarse).step_by(2) {
+                    for b in 0..fine {
+                        // Reflection flips the first bit only, so outcomes a and a + 1 are mirror images of each other.
+                        let (at, image) = (i * coarse + a, i * coarse + a + 1);
+                        let to = j * fine + b;
+                        let m0 = mass[(at, to)] + mass[(image, to)];
+                        let m1 = moment[(at, to)] - moment[(image, to)];
+                        if m0 > IMPOSSIBLE {
+                            explained += 2.0 * m1 * m1 / m0;
+                        }
+                    }
+                }
+                let assignment: Vec<usize> = head.iter().chain(tail).copied().collect();
+                tally.add(&assignment, variance - explained);
+            }
+        }
+    }
+}
+
+/// Visits all permutations of `0..n` in lexicographic order.
+pub(super) fn for_permutations(n: usize, mut visit: impl FnMut(&[usize])) {
+    let mut p: Vec<usize> = (0..n).collect();
+    loop {
+        visit(&p);
+        let Some(i) = (1..n).rev().find(|&i| p[i - 1] < p[i]) else {
+            return;
+        };
+        let Some(j) = (i..n).rev().find(|&j| p[j] > p[i - 1]) else {
+            return;
+        };
+        p.swap(i - 1, j);
+        p[i..].reverse();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn enumeration_agrees_with_single_evaluations() {
+        for variances in [
+            vec![0.02],
+            vec![0.05, 0.01],
+            vec![0.012, 0.021, 0.037, 0.05],
+            vec![0.01, 0.3, 0.02, 0.04, 0.1],
+        ] {
+            let sensors = CodedSensors::new(1.0, &variances).unwrap();
+            for criterion in [Criterion::Centre, Criterion::Mmse] {
+                let all = all_errors(&sensors, criterion).unwrap();
+                let (mut sum, mut count, mut least, mut largest) = (0.0, 0.0, f64::INFINITY, 0.0f64);
+                for_permutations(variances.len(), |p| {
+                    let error = sensors.mse(p, criterion).unwrap();
+                    sum += error;
+                    count += 1.0;
+                    least = least.min(error);
+                    largest = largest.max(error);
+                });
+                assert_relative_eq!(all.mean, sum / count, max_relative = 1e-10);
+                assert_relative_eq!(all.least, least, max_relative = 1e-9);
+                assert_relative_eq!(all.largest, largest, max_relative = 1e-9);
+                assert_relative_eq!(sensors.mse(&all.best, criterion).unwrap(), least, max_relative = 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn exchange_ends_at_or_below_its_start() {
+        let sensors = CodedSensors::new(1.0, &[0.004, 0.01, 0.02, 0.03, 0.05]).unwrap();
+        let found = exchange(&sensors, &[4, 3, 2, 1, 0], Criterion::Mmse).unwrap();
+        let (_, least) = brute_force(&sensors, Criterion::Mmse).unwrap();
+        assert_relative_eq!(found.error, least, max_relative = 1e-9);
+        assert!(exchange(&sensors, &[0, 0, 1, 2, 3], Criterion::Centre).is_err());
+        assert!(all_errors(&CodedSensors::new(1.0, &[0.01; 11]).unwrap(), Criterion::Centre).is_err());
+    }
+}

@@ -1,0 +1,74 @@
+//! Laws of assignments on random sensors.
+
+use fewbits_binary_patterns::bounds::van_trees;
+use fewbits_sensor_assignment::{
+    CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, exchange, pair_costs,
+    variances_with_moments,
+};
+use proptest::prelude::*;
+
+fn variances() -> impl Strategy<Value = Vec<f64>> {
+    prop::collection::vec((-7.0f64..-1.0).prop_map(f64::exp), 2..6)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn enumeration_bounds_every_assignment(variances in variances(), half_width in 0.5f64..2.0) {
+        let sensors = CodedSensors::new(half_width, &variances).unwrap();
+        let costs = pair_costs(&sensors).unwrap();
+        let found = JonkerVolgenant.solve(&costs).unwrap();
+        prop_assert!(costs.certificate(&found).unwrap().is_optimal());
+        for criterion in [Criterion::Centre, Criterion::Mmse] {
+            let all = all_errors(&sensors, criterion).unwrap();
+            let ours = sensors.mse(&found, criterion).unwrap();
+            let swapped = exchange(&sensors, &found, criterion).unwrap();
+            prop_assert!(all.least <= swapped.error * (1.0 + 1e-9));
+            prop_assert!(swapped.error <= ours * (1.0 + 1e-12));
+            prop_assert!(ours <= all.largest * (1.0 + 1e-9));
+        }
+        // The posterior mean beats the centre decoder and obeys the Bayesian bound.
+        let mmse = sensors.mmse(&found).unwrap();
+        prop_assert!(mmse <= sensors.centre_mse(&found).unwrap() * (1.0 + 1e-12));
+        prop_assert!(van_trees(&sensors.bank(&found).unwrap()) <= mmse * (1.0 + 1e-9));
+    }
+
+    #[test]
+    fn moments_are_met_or_refused(mean in 0.01f64..0.1, share in 0.0f64..2.0, direction in prop::collection::vec(-3.0f64..3.0, 4)) {
+        let std = share * mean;
+        match variances_with_moments(mean, std, &direction) {
+            Ok(Some(v)) => {
+                let m = v.iter().sum::<f64>() / 4.0;
+                let s = (v.iter().map(|v| (v - m) * (v - m)).sum::<f64>() / 4.0).sqrt();
+                prop_assert!((m - mean).abs() < 1e-12 && (s - std).abs() < 1e-12 && v.iter().all(|v| *v >= 1e-4));
+            }
+            Ok(None) => prop_assert!(std > 0.0),
+            Err(_) => prop_assert!(std > mean * 3f64.sqrt()),
+        }
+    }
+}
+
+/// Six sensors: the linear assignment is within a few per cent for the centre decoder, exchanges reach the optimum under the
+/// posterior mean.
+#[test]
+fn exchanges_close_the_gap_of_the_linear_assignment() {
+    let directions = [
+        [0.3, -1.1, 0.7, 1.9, -0.4, -1.3],
+        [1.0, 0.2, -0.6, -1.5, 0.9, 0.1],
+        [-0.8, 0.4, 0.4, -0.2, 2.1, -1.0],
+        [0.0, 0.5, -0.5, 1.0, -1.0, 0.2],
+    ];
+    for direction in directions {
+        let Some(v) = variances_with_moments(0.02, 0.01, &direction).unwrap() else {
+            panic!("a variance is too small");
+        };
+        let sensors = CodedSensors::new(1.0, &v).unwrap();
+        let found = JonkerVolgenant.solve(&pair_costs(&sensors).unwrap()).unwrap();
+        let centre = all_errors(&sensors, Criterion::Centre).unwrap();
+        assert!(sensors.centre_mse(&found).unwrap() <= 1.09 * centre.least);
+        let mmse = all_errors(&sensors, Criterion::Mmse).unwrap();
+        let swapped = exchange(&sensors, &found, Criterion::Mmse).unwrap();
+        assert!((swapped.error - mmse.least).abs() <= 1e-9 * mmse.least);
+    }
+}
