@@ -26,7 +26,10 @@ pub struct Clean {
 
 impl Default for Clean {
     fn default() -> Self {
-        Self { steps: 15, noise_sd: 1.0 }
+        Self {
+            steps: 15,
+            noise_sd: 1.0,
+        }
     }
 }
 
@@ -47,7 +50,11 @@ pub struct Channels {
 
 impl Default for Channels {
     fn default() -> Self {
-        Self { steps: 15, crossovers: vec![0.0, 0.001, 0.01, 0.05], noise_sd: 1.0 }
+        Self {
+            steps: 15,
+            crossovers: vec![0.0, 0.001, 0.01, 0.05],
+            noise_sd: 1.0,
+        }
     }
 }
 
@@ -115,7 +122,14 @@ fn first_alone(both: &System) -> Result<System, Error> {
 
 fn step(crossover: f64, [iteration, stage, iter_in_stage]: [usize; 3], both: &System) -> Result<Step, Error> {
     let (one, two) = (first_alone(both)?.value(MI)?, both.value(MI)?);
-    let outer = |g: usize| both.groups()[g].quantizer().breakpoints().last().copied().unwrap_or_default();
+    let outer = |g: usize| {
+        both.groups()[g]
+            .quantizer()
+            .breakpoints()
+            .last()
+            .copied()
+            .unwrap_or_default()
+    };
     Ok(Step {
         crossover,
         iteration,
@@ -196,14 +210,16 @@ pub static FIGURE45: Iterations<Channels> = Iterations {
 
 /// Neighbouring rows of one channel.
 fn neighbours(rows: &[Step]) -> impl Iterator<Item = (&Step, &Step)> {
-    rows.windows(2).map(|w| (&w[0], &w[1])).filter(|(a, b)| a.crossover == b.crossover)
+    rows.windows(2)
+        .map(|w| (&w[0], &w[1]))
+        .filter(|(a, b)| a.crossover == b.crossover)
 }
 
 /// Rows of the same step on two channels of which the first is the better.
 fn pairs(rows: &[Step]) -> impl Iterator<Item = (&Step, &Step)> {
-    rows.iter().flat_map(|a| rows.iter().map(move |b| (a, b))).filter(|(a, b)| {
-        a.iteration == b.iteration && a.crossover < b.crossover
-    })
+    rows.iter()
+        .flat_map(|a| rows.iter().map(move |b| (a, b)))
+        .filter(|(a, b)| a.iteration == b.iteration && a.crossover < b.crossover)
 }
 
 /// Rounding that does not count as a fall.
@@ -269,7 +285,9 @@ impl<S: Setting> Figure for Iterations<S> {
             }
             Shows::Error => {
                 let what = "the squared error never rises";
-                claims.all("error-falls", what, neighbours(&rows.chain), |(a, b)| b.mse <= a.mse + ROUNDING).at_defaults();
+                claims
+                    .all("error-falls", what, neighbours(&rows.chain), |(a, b)| b.mse <= a.mse + ROUNDING)
+                    .at_defaults();
             }
         }
         match self.about.id {
@@ -289,12 +307,16 @@ impl<S: Setting> Figure for Iterations<S> {
                 let fall = information(steps).zip(information(0)).map(|(end, start)| end - start);
                 claims.below("not-monotone", what, fall, 0.0).at_defaults();
                 let what = "what the greedy design gains on the Lloyd-Max start: it loses";
-                let gain = information(2 * steps).zip(information(0)).map(|(end, start)| end - start);
+                let gain = information(2 * steps)
+                    .zip(information(0))
+                    .map(|(end, start)| end - start);
                 claims.references("greedy-loss", what, [gain], |gain| ("0.05".to_owned(), gain));
             }
             _ => {
                 let what = "the smaller the crossover, the lower the error, at every step";
-                claims.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mse < b.mse).at_defaults();
+                claims
+                    .all("ordered", what, pairs(&rows.chain), |(a, b)| a.mse < b.mse)
+                    .at_defaults();
             }
         }
     }
@@ -320,13 +342,29 @@ impl<S: Setting> Figure for Iterations<S> {
             let edge = steps as f64;
             let divider = Layer::dashed("stage 2 begins", vec![(edge, low), (edge, high)]).coloured(6);
             let curves = drawn.into_iter().flat_map(|(label, curve, i)| {
-                [Layer::line("", curve.clone()).coloured(i), Layer::points(label, curve).coloured(i)]
+                [
+                    Layer::line("", curve.clone()).coloured(i),
+                    Layer::points(label, curve).coloured(i),
+                ]
             });
-            Panel::new(title, Axis::linear("iteration"), Axis::linear(axis)).with_all(curves).with(divider)
+            Panel::new(title, Axis::linear("iteration"), Axis::linear(axis))
+                .with_all(curves)
+                .with(divider)
         };
-        let label = |crossover: f64, name: &str| if several { format!("crossover {crossover}") } else { name.to_owned() };
-        let all = crossovers.iter().flat_map(|c| columns.iter().map(move |(column, name)| (*c, *column, *name)));
-        let all = all.enumerate().map(|(i, (c, column, name))| (label(c, name), curve(c, column), i)).collect();
+        let label = |crossover: f64, name: &str| {
+            if several {
+                format!("crossover {crossover}")
+            } else {
+                name.to_owned()
+            }
+        };
+        let all = crossovers
+            .iter()
+            .flat_map(|c| columns.iter().map(move |(column, name)| (*c, *column, *name)));
+        let all = all
+            .enumerate()
+            .map(|(i, (c, column, name))| (label(c, name), curve(c, column), i))
+            .collect();
         let mut panels = vec![panel(self.about.title.to_owned(), all)];
         if let (Some(worst), true) = (crossovers.last(), several) {
             // On the common scale the worst channel's curve looks flat.

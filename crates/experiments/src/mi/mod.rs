@@ -19,21 +19,11 @@ pub use table4_4::Table44;
 pub use table4_5::{Mismatch, Table45};
 
 use crate::AnyFigure;
-use crate::legacy::Old;
 
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
-        &FIGURE42,
-        &FIGURE43,
-        &Table41,
-        &Table42,
-        &Table43,
-        &Table44,
-        &Table45,
-        &Mismatch,
-        &FIGURE44,
-        &FIGURE45,
-        &Old(Beyond),
+        &FIGURE42, &FIGURE43, &Table41, &Table42, &Table43, &Table44, &Table45, &Mismatch, &FIGURE44, &FIGURE45,
+        &Beyond,
     ]
 }
