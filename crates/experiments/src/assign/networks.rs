@@ -4,7 +4,7 @@ use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, Measured};
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_sensor_assignment::{
-    CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
+    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
     variances_with_moments,
 };
 use garde::Validate;
@@ -36,11 +36,11 @@ fn draw(stream: Stream, sensors: usize, mean: f64, std: f64) -> Result<Vec<f64>,
 
 /// The five errors of each decoder, and how far the linear assignment's exceeds the least, relative.
 fn evaluate(variances: &[f64]) -> Result<[[f64; 6]; 2], fewbits_sensor_assignment::Error> {
-    let sensors = CodedSensors::new(1.0, variances)?;
+    let sensors = CodedSensors::with_variances(1.0, variances)?;
     let linear = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
     let second = by_precision(variances);
     let mut errors = [[0.0; 6]; 2];
-    for (criterion, part) in [Criterion::Centre, Criterion::Mmse].into_iter().zip(&mut errors) {
+    for (criterion, part) in [Estimator::CellCentre, Estimator::PosteriorMean].into_iter().zip(&mut errors) {
         let all = all_errors(&sensors, criterion)?;
         part[ALG] = sensors.mse(&linear, criterion)?;
         // The enumeration and single evaluations round differently.

@@ -192,7 +192,7 @@ impl Figure for BitErrors {
     }
 
     fn run(&self, p: &ErrorParameters, _: &Context<'_>) -> Result<Vec<Wrong>, Error> {
-        let sensors = CodedSensors::new(1.0, &[p.variance; BITS]).map_err(Error::failed)?;
+        let sensors = CodedSensors::with_variances(1.0, &[p.variance; BITS]).map_err(Error::failed)?;
         let at = |x: f64| {
             let wrong = |bit: usize| bit_error(&sensors.quantizers()[bit], x, p.variance.sqrt()).map_err(Error::failed);
             Ok(Wrong {

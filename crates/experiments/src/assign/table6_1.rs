@@ -3,7 +3,7 @@
 use crate::plot::{Axis, Layer, Marker, Panel, Plot};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_sensor_assignment::{
-    CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, pair_costs,
+    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, pair_costs,
     quantization_error,
 };
 use garde::Validate;
@@ -104,16 +104,16 @@ fn three(sensors: &CodedSensors, variances: &[f64]) -> Result<Vec<Row>, Failure>
 }
 
 fn tables(variances: &[f64]) -> Result<Rows, Failure> {
-    let sensors = CodedSensors::new(1.0, variances)?;
+    let sensors = CodedSensors::with_variances(1.0, variances)?;
     let mut assignments = three(&sensors, variances)?;
     for (name, criterion) in [
-        ("best, centre", Criterion::Centre),
-        ("best, posterior mean", Criterion::Mmse),
+        ("best, centre", Estimator::CellCentre),
+        ("best, posterior mean", Estimator::PosteriorMean),
     ] {
         assignments.push(row(name, &sensors, &all_errors(&sensors, criterion)?.best)?);
     }
     let squares: Vec<f64> = variances.iter().map(|v| v * v).collect();
-    let as_deviations = three(&CodedSensors::new(1.0, &squares)?, variances)?;
+    let as_deviations = three(&CodedSensors::with_variances(1.0, &squares)?, variances)?;
     let matrix = pair_costs(&sensors)?;
     let proof = matrix.certificate(&JonkerVolgenant.solve(&matrix)?)?;
     let cells = (0..matrix.size()).flat_map(|bit| (0..matrix.size()).map(move |sensor| (bit, sensor)));

@@ -4,7 +4,7 @@ use super::common::{MI, MSE, breakpoints, bsc, lloyd, lloyd_system, name, scene}
 use crate::plot::{Axis, Layer, Marker, Panel, Plot};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_quantizer_design::design::{self, Discovery};
-use fewbits_quantizer_design::{Channel, Criterion, Group, Newton, Quantizer, System, bounds};
+use fewbits_quantizer_design::{Channel, Criterion, Newton, Quantizer, SensorGroup, System, bounds};
 use garde::Validate;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -259,7 +259,7 @@ fn words(p: &Parameters, context: &Context<'_>) -> Result<Vec<Words>, Error> {
                 &[("same", false)]
             };
             for &(sensors, mixed) in kinds {
-                let found = design::assign_words(&scene, 2, crossover, 2..=4, criterion, mixed)?;
+                let found = design::assign_words(&scene, 2, crossover, 2..=4, criterion, if mixed { design::Words::PerSensor } else { design::Words::Shared })?;
                 for (rank, assignment) in found.iter().enumerate().take(if mixed { 5 } else { usize::MAX }) {
                     rows.push(Words {
                         crossover,
@@ -318,7 +318,7 @@ fn limits() -> Result<Vec<Limit>, Error> {
         };
         let bits = (levels as f64).log2() * (1.0 - flips);
         let words: Vec<u32> = (0..levels as u32).collect();
-        let group = Group::new(lloyd(levels, scene.sample_sd(0))?, bsc(&words, crossover)?, (0..sensors).collect())?;
+        let group = SensorGroup::new(lloyd(levels, scene.sample_sd(0))?, bsc(&words, crossover)?, (0..sensors).collect())?;
         let best = design::joint(&System::new(scene, vec![group])?, MSE, &Newton::default())?;
         rows.push(Limit {
             sensors,
@@ -326,7 +326,7 @@ fn limits() -> Result<Vec<Limit>, Error> {
             crossover,
             ceo_bound: bounds::ceo(1.0, &vec![1.0; sensors], &vec![bits; sensors])?,
             van_trees: if crossover == 0.0 {
-                Some(bounds::van_trees(&best.system)?)
+                Some(bounds::bayesian_cramer_rao(&best.system)?)
             } else {
                 None
             },
@@ -388,7 +388,7 @@ fn grouping() -> Result<Vec<Grouping>, Error> {
                 // Pushed apart at the start: groups shifted and stretched differently.
                 let shift = 0.5 * (g as f64 / (sizes.len() - 1) as f64 - 0.5);
                 let quantizer = same.affine(shift, 1.0 + 0.4 * shift)?;
-                groups.push(Group::new(quantizer, Channel::ideal(levels)?, (first..first + size).collect())?);
+                groups.push(SensorGroup::new(quantizer, Channel::ideal(levels)?, (first..first + size).collect())?);
                 first += size;
             }
             let end = design::joint(&System::new(scene.clone(), groups)?, criterion, &Newton::default())?;
