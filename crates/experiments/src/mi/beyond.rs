@@ -208,7 +208,7 @@ fn searches(p: &Parameters, context: &Context<'_>) -> Result<Vec<Search>, Error>
             };
             let folded = design::discover(&contiguous.system, criterion, &settings)?;
             let bits = (levels as f64).log2();
-            let bound = bounds::ceo(1.0, &[noise_sd * noise_sd; 2], &[bits; 2])?;
+            let bound = bounds::ceo(1.0, &[noise_sd * noise_sd; 2], &[bits; 2])?.distortion;
             for (cells, design) in [("contiguous", contiguous), ("any", folded)] {
                 let q = design.quantizers();
                 rows.push(Search {
@@ -324,7 +324,7 @@ fn limits() -> Result<Vec<Limit>, Error> {
             sensors,
             levels,
             crossover,
-            ceo_bound: bounds::ceo(1.0, &vec![1.0; sensors], &vec![bits; sensors])?,
+            ceo_bound: bounds::ceo(1.0, &vec![1.0; sensors], &vec![bits; sensors])?.distortion,
             van_trees: if crossover == 0.0 {
                 Some(bounds::bayesian_cramer_rao(&best.system)?)
             } else {
