@@ -5,7 +5,7 @@ use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column,
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_sensor_assignment::{
-    CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
+    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
     variances_with_moments,
 };
 use rand_distr::{Distribution, StandardNormal};
@@ -55,11 +55,11 @@ fn draw(stream: Stream, sensors: usize, mean: f64, std: f64) -> Result<Vec<f64>,
 }
 
 fn evaluate(variances: &[f64]) -> Result<Errors, fewbits_sensor_assignment::Error> {
-    let sensors = CodedSensors::new(1.0, variances)?;
+    let sensors = CodedSensors::with_variances(1.0, variances)?;
     let linear = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
     let second = by_precision(variances);
     let mut errors = [0.0; 10];
-    for (criterion, part) in [Criterion::Centre, Criterion::Mmse]
+    for (criterion, part) in [Estimator::CellCentre, Estimator::PosteriorMean]
         .into_iter()
         .zip(errors.chunks_mut(5))
     {

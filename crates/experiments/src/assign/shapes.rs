@@ -166,7 +166,7 @@ impl Figure for BitErrors {
     }
 
     fn run(&self, p: &ErrorParameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let sensors = CodedSensors::new(1.0, &[p.variance; BITS]).map_err(Error::failed)?;
+        let sensors = CodedSensors::with_variances(1.0, &[p.variance; BITS]).map_err(Error::failed)?;
         let mut columns = vec![column("x", "V", "source")];
         columns.extend(
             ERRORS

@@ -3,7 +3,7 @@
 use crate::legacy::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
 use fewbits_sensor_assignment::{
-    CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, pair_costs,
+    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, pair_costs,
     quantization_error,
 };
 use serde::{Deserialize, Serialize};
@@ -92,21 +92,21 @@ impl Figure for Table {
             Ok::<_, fewbits_sensor_assignment::Error>((best, proof))
         };
         let mut table = Rows::new(columns());
-        let sensors = CodedSensors::new(1.0, &p.variances).map_err(Error::failed)?;
+        let sensors = CodedSensors::with_variances(1.0, &p.variances).map_err(Error::failed)?;
         let (best, proof) = solve(&sensors).map_err(Error::failed)?;
         push(&mut table, "I", &sensors, &(0..p.variances.len()).collect::<Vec<_>>())?;
         push(&mut table, "II", &sensors, &by_precision(&p.variances))?;
         push(&mut table, "optimal", &sensors, &best)?;
         for (name, criterion) in [
-            ("best, centre", Criterion::Centre),
-            ("best, posterior mean", Criterion::Mmse),
+            ("best, centre", Estimator::CellCentre),
+            ("best, posterior mean", Estimator::PosteriorMean),
         ] {
             let all = all_errors(&sensors, criterion).map_err(Error::failed)?;
             push(&mut table, name, &sensors, &all.best)?;
         }
         let mut deviations = Rows::new(columns());
         let squares: Vec<f64> = p.variances.iter().map(|v| v * v).collect();
-        let other = CodedSensors::new(1.0, &squares).map_err(Error::failed)?;
+        let other = CodedSensors::with_variances(1.0, &squares).map_err(Error::failed)?;
         let (other_best, _) = solve(&other).map_err(Error::failed)?;
         push(&mut deviations, "I", &other, &(0..p.variances.len()).collect::<Vec<_>>())?;
         push(&mut deviations, "II", &other, &by_precision(&p.variances))?;

@@ -4,7 +4,7 @@ use super::common::{MI, MSE, breakpoints, bsc, cell, exact, lloyd, lloyd_system,
 use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, Value, claim, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
 use fewbits_quantizer_design::design::{self, Discovery};
-use fewbits_quantizer_design::{Channel, Criterion, Group, Newton, Quantizer, System, bounds};
+use fewbits_quantizer_design::{Channel, Criterion, SensorGroup, Newton, Quantizer, System, bounds};
 use serde::{Deserialize, Serialize};
 
 /// Settings of the searches.
@@ -120,7 +120,7 @@ fn searches(p: &Parameters) -> Result<Table, Error> {
         let bits = (s.levels as f64).log2();
         let variance = s.noise_sd * s.noise_sd;
         let bound = if s.rho == 0.0 {
-            Some(bounds::ceo(1.0, &[variance; 2], &[bits; 2])?)
+            Some(bounds::ceo(1.0, &[variance; 2], &[bits; 2])?.distortion)
         } else {
             None
         };
@@ -179,7 +179,8 @@ fn words(p: &Parameters) -> Result<Table, Error> {
                 kinds.push(("mixed", true));
             }
             for (kind, mixed) in kinds {
-                let found = design::assign_words(&scene, 2, crossover, 2..=4, criterion, mixed)?;
+                let words = if mixed { design::Words::PerSensor } else { design::Words::Shared };
+                let found = design::assign_words(&scene, 2, crossover, 2..=4, criterion, words)?;
                 for (rank, assignment) in found.iter().enumerate().take(if mixed { 5 } else { usize::MAX }) {
                     let text = |w: &Vec<u32>| w.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
                     let text = assignment.words.iter().map(text).collect::<Vec<_>>().join(" | ");
@@ -248,14 +249,14 @@ fn limits() -> Result<Table, Error> {
         };
         let bits = (levels as f64).log2() * (1.0 - flips);
         let words: Vec<u32> = (0..levels as u32).collect();
-        let group = Group::new(lloyd(levels, scene.sample_sd(0))?, bsc(&words, crossover)?, (0..sensors).collect())?;
+        let group = SensorGroup::new(lloyd(levels, scene.sample_sd(0))?, bsc(&words, crossover)?, (0..sensors).collect())?;
         let best = design::joint(&System::new(scene, vec![group])?, MSE, &Newton::default())?;
         let trees = if crossover == 0.0 {
-            Some(bounds::van_trees(&best.system)?)
+            Some(bounds::bayesian_cramer_rao(&best.system)?)
         } else {
             None
         };
-        let bound = bounds::ceo(1.0, &vec![1.0; sensors], &vec![bits; sensors])?;
+        let bound = bounds::ceo(1.0, &vec![1.0; sensors], &vec![bits; sensors])?.distortion;
         table.push(row![
             sensors,
             levels,
@@ -331,7 +332,7 @@ fn grouping() -> Result<Table, Error> {
                 // Pushed apart at the start: groups shifted and stretched differently.
                 let shift = 0.5 * (g as f64 / (sizes.len() - 1) as f64 - 0.5);
                 let quantizer = same.affine(shift, 1.0 + 0.4 * shift)?;
-                groups.push(Group::new(quantizer, Channel::ideal(levels)?, (first..first + size).collect())?);
+                groups.push(SensorGroup::new(quantizer, Channel::ideal(levels)?, (first..first + size).collect())?);
                 first += size;
             }
             let end = design::joint(&System::new(scene.clone(), groups)?, criterion, &Newton::default())?;
