@@ -24,9 +24,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         bits += info.bits;
         squared_error += (belief.mean()[0] - state[0]).powi(2);
         if n % 200 == 0 {
-            println!("{n:4}  truth {:6.2}  estimate {:6.2} +- {:.2}", state[0], belief.mean()[0], belief.covariance()[0].sqrt());
+            println!(
+                "{n:4}  truth {:6.2}  estimate {:6.2} +- {:.2}",
+                state[0],
+                belief.mean()[0],
+                belief.covariance()[0].sqrt()
+            );
         }
     }
-    println!("{bits} bits received, mean squared error {:.3} (Kalman filter {:.3})", squared_error / 1000.0, plant.steady_state(1.0)?.filtered_variance);
+    println!(
+        "{bits} bits received, mean squared error {:.3} (Kalman filter {:.3})",
+        squared_error / 1000.0,
+        plant.steady_state(1.0)?.filtered_variance
+    );
     Ok(())
 }

@@ -124,11 +124,19 @@ pub fn fit(samples: &[f64]) -> Result<Fit, Box<dyn Error>> {
         }
     }
     let names = [
-        ["a = 0: the samples look independent", "a = 1 - 1e-6: the signal wanders or drifts; take differences"],
-        ["gamma = 1e-6: the signal hardly moves", "gamma = 1e4: a smooth record shows no sensing noise"],
+        [
+            "a = 0: the samples look independent",
+            "a = 1 - 1e-6: the signal wanders or drifts; take differences",
+        ],
+        [
+            "gamma = 1e-6: the signal hardly moves",
+            "gamma = 1e4: a smooth record shows no sensing noise",
+        ],
     ];
     let ends = (0..2).flat_map(|axis| [(axis, 0, bounds[axis].0), (axis, 1, bounds[axis].1)]);
-    let on_bounds = ends.filter(|(axis, _, end)| best[*axis] == *end).map(|(axis, side, _)| names[axis][side]);
+    let on_bounds = ends
+        .filter(|(axis, _, end)| best[*axis] == *end)
+        .map(|(axis, side, _)| names[axis][side]);
     let on_bounds = on_bounds.collect();
     let (a, gamma) = plant_at(best);
     let (log_likelihood, variance) = profile(&signal, a, gamma)?;
@@ -242,10 +250,17 @@ impl std::fmt::Display for Report {
             writeln!(f, "warning: the fit ended on the bound {bound}")?;
         }
         writeln!(f, "root mean square error of one-step predictions in the second half:")?;
-        for (who, error) in ["Kalman filter", "last sample", "mean"].into_iter().zip(self.reference_errors) {
+        for (who, error) in ["Kalman filter", "last sample", "mean"]
+            .into_iter()
+            .zip(self.reference_errors)
+        {
             writeln!(f, "{who:>14} {error:>12.5}")?;
         }
-        writeln!(f, "{:>14} {:>12} {:>28} {:>12}", "bits/sample", "prediction", "rms deviation from Kalman", "bits spent")?;
+        writeln!(
+            f,
+            "{:>14} {:>12} {:>28} {:>12}",
+            "bits/sample", "prediction", "rms deviation from Kalman", "bits spent"
+        )?;
         for (bits, deviation, held_out, spent) in &self.rows {
             writeln!(f, "{bits:>14} {held_out:>12.5} {deviation:>28.5} {spent:>12}")?;
         }
