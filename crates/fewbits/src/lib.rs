@@ -43,6 +43,8 @@ pub use fewbits_sensor_assignment as sensor_assignment;
 mod pages {
     #[doc = include_str!("../../../README.md")]
     struct Readme;
+    #[doc = include_str!("../../../docs/own-scheme.md")]
+    struct OwnScheme;
     #[doc = include_str!("../../../docs/dymbo.md")]
     struct Dymbo;
     #[doc = include_str!("../../../docs/quantizers.md")]

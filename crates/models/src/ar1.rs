@@ -7,12 +7,39 @@ use fewbits_numerics::kernels::StandardNormals;
 use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
 
 /// `x(n) = a x(n-1) + u(n)`, `u ~ N(0, q)`: a scalar that decays towards zero and is pushed by white noise.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Parameters", into = "Parameters")]
 pub struct Ar1 {
     transition: Matrix1<f64>,
     noise_covariance: Matrix1<f64>,
+}
+
+/// The stored form, checked when it is read.
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Ar1", deny_unknown_fields)]
+struct Parameters {
+    coefficient: f64,
+    noise_variance: f64,
+}
+
+impl From<Ar1> for Parameters {
+    fn from(model: Ar1) -> Self {
+        Self {
+            coefficient: model.coefficient(),
+            noise_variance: model.noise_variance(),
+        }
+    }
+}
+
+impl TryFrom<Parameters> for Ar1 {
+    type Error = Error;
+
+    fn try_from(stored: Parameters) -> Result<Self, Error> {
+        Self::new_unstable(stored.coefficient, stored.noise_variance)
+    }
 }
 
 impl Ar1 {
@@ -29,7 +56,7 @@ impl Ar1 {
     }
 
     /// The same for any finite coefficient. The name is the opt-in: a state that grows without bound is beyond most
-    /// estimators that hear only a few bits.
+    /// estimators that receive only a few bits.
     ///
     /// # Errors
     /// A coefficient that is not finite, a negative variance.
