@@ -302,7 +302,7 @@ impl Case for Fig10 {
         About {
             id: "cfwmd-fig10",
             title: "Received power, state against covariance feedback",
-            caption: "Feeding the particles' covariance back (CFwMD2, dashed) pays at four and six messages a step, more as time goes on; at two it gains nothing measurable in position.",
+            caption: "Feeding the particles' covariance back (CFwMD2, dashed) pays at four and six messages per step, more as time goes on; at two it gains .073 m^2 in squared position error, which 200 trials do not tell from nothing (3000 do).",
             source: "CFwMD paper, figure 10",
         }
     }
@@ -335,9 +335,11 @@ impl Case for Fig10 {
                 continue;
             }
             let rows = paired.only("l", l)?;
-            let z = rows.numbers("pos_mse_difference_m2")?[0] / rows.numbers("pos_se")?[0];
-            let statement = "at l = 2 covariance feedback gains nothing measurable in position (paired difference in standard errors)";
-            claims.push(Claim::near("no-gain-l2", statement, z, 0.0, 3.5).at_defaults());
+            // 3 x 1000 trials at 10^4 particles: -.073 +- .015 m^2.
+            let (difference, error) = (rows.numbers("pos_mse_difference_m2")?[0], rows.numbers("pos_se")?[0]);
+            let z = (difference + 0.073) / error.hypot(0.015);
+            let statement = "at l = 2 the gain of covariance feedback agrees with .073(15) m^2 (difference in standard errors)";
+            claims.push(Claim::near("gain-l2", statement, z, 0.0, 3.5).at_defaults());
         }
         Ok(claims)
     }
