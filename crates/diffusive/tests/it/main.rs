@@ -1,4 +1,3 @@
 //! Tests of the search for a diffusive source.
 
 mod fixtures;
-mod scratch;

@@ -408,14 +408,13 @@ impl Figure for Divergences {
         claims.decreasing("more-is-closer", what, ["gaussian", "gmm-2", "gmm-4", "gmm-8"].map(|rep| find(3, rep))).at_full_trials();
     }
 
-    fn plot(&self, p: &KlParameters, rows: &Vec<KlRow>) -> Plot {
+    fn plot(&self, _: &KlParameters, rows: &Vec<KlRow>) -> Plot {
         let mut panel = Panel::new("Divergence per number", Axis::linear("nodes"), Axis::log("median KL (nats)")).legend(Legend::Outside);
         for (i, (rep, _)) in FORMS.iter().enumerate() {
             let of = || rows.iter().filter(|r| r.rep == *rep);
             let scalars = of().next().map_or(0, |r| r.scalars);
             panel = panel.with(Layer::line(format!("{rep} ({scalars})"), points(of(), |r| (r.nodes as f64, r.kl_median))).coloured(i));
         }
-        let _ = p;
         Plot::of(panel)
     }
 }

@@ -170,7 +170,7 @@ impl Figure for Table1 {
         let names = rows.means.iter().enumerate().map(|(i, m)| (i as f64, format!("{}{}", m.nu1, m.nu2)));
         Plot::of(
             Panel::new("Mean under the Gaussian", Axis::linear("index nu").named(names), Axis::linear("mean"))
-                .with(Layer::bars("as printed", bars(|m| m.printed)).coloured(1))
+                .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))
                 .with(Layer::points("by the recursion", bars(|m| Some(m.mean))).coloured(0)),
         )
     }
