@@ -262,10 +262,12 @@ impl<const D: usize> Particles<D> {
     fn check(&self, ancestors: &[u32]) -> Result<(), Error> {
         at_least_one("ancestors", ancestors.len())?;
         let count = self.len();
-        match ancestors.iter().find(|a| **a as usize >= count) {
-            Some(bad) => Err(ArgumentError::new("ancestors", bad, format!("indices below {count}")).into()),
-            None => Ok(()),
+        // A maximum runs in vector registers, a search does not.
+        let largest = ancestors.iter().fold(0, |largest: u32, a| largest.max(*a));
+        if largest as usize >= count {
+            return Err(ArgumentError::new("ancestors", largest, format!("indices below {count}")).into());
         }
+        Ok(())
     }
 
     /// Gives all particles the same weight.
@@ -405,8 +407,10 @@ fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error>
     let sums = exp_minus(logs, largest, weights);
     let log_sum = largest + sums.sum.ln();
     let scale = 1.0 / sums.sum;
-    weights.iter_mut().for_each(|w| *w *= scale);
-    logs.iter_mut().for_each(|w| *w -= log_sum);
+    for (weight, log) in weights.iter_mut().zip(logs) {
+        *weight *= scale;
+        *log -= log_sum;
+    }
     Ok((log_sum, sums.sum * sums.sum / sums.sum_of_squares))
 }
 

@@ -60,6 +60,13 @@ impl Resampling {
         Ok(())
     }
 
+    /// The same for the weights of [`Particles`](fewbits_densities::Particles), which are checked and normalised already.
+    pub(crate) fn ancestors_of_normalised<R: Rng + ?Sized>(self, rng: &mut R, weights: &[f64], ancestors: &mut [u32]) {
+        if let Some(last) = weights.iter().rposition(|w| *w > 0.0) {
+            self.ancestors_unchecked(rng, weights, sum(weights), last, ancestors);
+        }
+    }
+
     /// The same for weights known to be non-negative with the sum `total`, the last positive one at `last`.
     fn ancestors_unchecked<R: Rng + ?Sized>(
         self,

@@ -1,8 +1,9 @@
 //! The first-order autoregression.
 
 use crate::{Error, LinearGaussian};
-use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics};
+use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::error::{finite, non_negative};
+use fewbits_numerics::kernels::StandardNormals;
 use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -80,6 +81,18 @@ impl Dynamics<1> for Ar1 {
     fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector1<f64>) -> Vector1<f64> {
         let normal: f64 = StandardNormal.sample(rng);
         Vector1::new(self.coefficient() * state[0] + self.noise_variance().sqrt() * normal)
+    }
+
+    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, [states]: ColumnsMut<'_, 1>) {
+        const BLOCK: usize = 128;
+        let (mut normals, mut draws) = (StandardNormals::new(rng), [0.0; BLOCK]);
+        let (coefficient, deviation) = (self.coefficient(), self.noise_variance().sqrt());
+        for states in states.chunks_mut(BLOCK) {
+            normals.fill(&mut draws[..states.len()]);
+            for (x, z) in states.iter_mut().zip(&draws) {
+                *x = coefficient * *x + deviation * z;
+            }
+        }
     }
 }
 

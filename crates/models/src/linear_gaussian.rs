@@ -3,6 +3,7 @@
 use crate::Error;
 use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::error::{all_finite, non_negative};
+use fewbits_numerics::kernels::{StandardNormals, vectorised};
 use fewbits_numerics::linalg::semidefinite_factor;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
@@ -143,29 +144,28 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
 
     /// Blocks of particles: first their normal draws, then one sweep a coordinate, which vectorises.
     fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        const BLOCK: usize = 64;
+        const BLOCK: usize = 128;
+        let mut normals = StandardNormals::new(rng);
         let mut draws = [[0.0; BLOCK]; U];
         let mut next = [[0.0; BLOCK]; D];
         let count = states.first().map_or(0, |column| column.len());
         for start in (0..count).step_by(BLOCK) {
             let length = BLOCK.min(count - start);
-            for i in 0..length {
-                for draw in &mut draws {
-                    draw[i] = StandardNormal.sample(rng);
-                }
+            for draw in &mut draws {
+                normals.fill(&mut draw[..length]);
             }
-            for (d, next) in next.iter_mut().enumerate() {
-                let noise = &self.noise_factor;
-                for i in 0..BLOCK {
-                    next[i] = (0..U).map(|u| noise[(d, u)] * draws[u][i]).sum();
-                }
-                for (c, column) in states.iter().enumerate() {
-                    let entry = self.transition[(d, c)];
-                    for (next, x) in next.iter_mut().zip(&column[start..start + length]) {
-                        *next += entry * x;
+            vectorised(#[inline(always)] || {
+                for (d, next) in next.iter_mut().enumerate() {
+                    let next = &mut next[..length];
+                    next.fill(0.0);
+                    for (u, draw) in draws.iter().enumerate() {
+                        add_multiple(next, self.noise_factor[(d, u)], &draw[..length]);
+                    }
+                    for (c, column) in states.iter().enumerate() {
+                        add_multiple(next, self.transition[(d, c)], &column[start..start + length]);
                     }
                 }
-            }
+            });
             for (column, next) in states.iter_mut().zip(&next) {
                 column[start..start + length].copy_from_slice(&next[..length]);
             }
@@ -190,6 +190,16 @@ impl<const D: usize, const U: usize> LinearDynamics<D> for LinearGaussian<D, U> 
 
     fn noise_covariance(&self) -> &SMatrix<f64, D, D> {
         &self.noise_covariance
+    }
+}
+
+/// `sum += factor x`; nothing to do for the zeros that most transitions are made of.
+#[inline(always)]
+fn add_multiple(sum: &mut [f64], factor: f64, x: &[f64]) {
+    if factor != 0.0 {
+        for (sum, x) in sum.iter_mut().zip(x) {
+            *sum += factor * x;
+        }
     }
 }
 
