@@ -1,7 +1,7 @@
 //! One step of fusion, Gaussian against particles, and the silent factors, against a standard normal draw.
 //!
 //! Read the medians: `particles_1000 / gaussian`, averaged over what is observed (none silent in a quarter of the steps, one in
-//! half, two in a quarter), is at least 15. 
+//! half, two in a quarter), is at least 15.
 
 #![allow(clippy::unwrap_used)]
 
@@ -59,7 +59,9 @@ fn gaussian(bencher: Bencher<'_, '_>, silent: usize) {
     let observations = observed(silent);
     bencher.bench_local(|| {
         let predicted = kalman::predict(&dynamics, black_box(&belief));
-        network.fuse(&predicted, &rules, &Vector2::zeros(), &observations).unwrap()
+        network
+            .fuse(&predicted, &rules, &Vector2::zeros(), &observations)
+            .unwrap()
     });
 }
 

@@ -119,7 +119,9 @@ where
         }
     }
     let increment = next.cloud.means_mut().reweigh(|_, logs| {
-        logs.iter_mut().zip(&log_weights).for_each(|(log, increment)| *log += increment);
+        logs.iter_mut()
+            .zip(&log_weights)
+            .for_each(|(log, increment)| *log += increment);
     })?;
     info.log_likelihood = increment + info.received as f64 * (-loss).ln_1p();
     Ok((next, info))
@@ -164,7 +166,14 @@ fn impute<const M: usize, R: Rng + ?Sized>(
             largest + ((normal_part - largest).exp() + (uniform_part - largest).exp()).ln()
         }
     };
-    (z, if log_target == f64::NEG_INFINITY { log_target } else { log_target - log_proposal })
+    (
+        z,
+        if log_target == f64::NEG_INFINITY {
+            log_target
+        } else {
+            log_target - log_proposal
+        },
+    )
 }
 
 /// From the conditional law itself: truncated to the interval, or outside it and lost.
@@ -190,7 +199,8 @@ fn impute_scalar<R: Rng + ?Sized>(
         (high, f64::INFINITY)
     };
     // Only an interval of no width is refused: nothing can lie in it.
-    normal::sample_truncated(rng, from, to).map_or((central, f64::NEG_INFINITY), |x| (central + deviation * x, log_weight))
+    normal::sample_truncated(rng, from, to)
+        .map_or((central, f64::NEG_INFINITY), |x| (central + deviation * x, log_weight))
 }
 
 /// A point uniform in the unit ball: a random direction at radius `U^(1/M)`.

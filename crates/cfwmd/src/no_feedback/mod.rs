@@ -81,7 +81,8 @@ impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> Scheme<M> f
         observation: &Observation<SVector<f64, M>>,
         link: &Link,
     ) -> Result<Censored<M>, fewbits_core::Error> {
-        self.scheme.factor(&(self.transition * self.supposed), observation, link)
+        self.scheme
+            .factor(&(self.transition * self.supposed), observation, link)
     }
 }
 

@@ -27,7 +27,8 @@ fn scalar_network(loss: f64, count: usize) -> Sensors<1> {
 
 fn vector_network(loss: f64) -> Sensors<2> {
     let sensor = LinearSensor::new(Matrix2::identity(), Matrix2::new(2.0, 0.0, 0.0, 4.0)).unwrap();
-    Network::new(vec![sensor; 2], Budget::new(1.0, 2).unwrap().threshold(2).unwrap(), Link::lossy(loss).unwrap()).unwrap()
+    Network::new(vec![sensor; 2], Budget::new(1.0, 2).unwrap().threshold(2).unwrap(), Link::lossy(loss).unwrap())
+        .unwrap()
 }
 
 /// Exact posterior moments by weighting a huge fixed cloud: the law of large numbers as the referee.
@@ -123,7 +124,12 @@ fn the_joint_likelihood_is_the_product_of_the_single_ones() {
 #[test]
 fn a_cloud_is_weighed_as_single_states_are() {
     let sensor = |x, y| ReceivedPower::<4>::new(Vector2::new(x, y), [0, 2], 1000.0, 1.0, 2.0, 1.0).unwrap();
-    let sensors = vec![sensor(-10.0, -10.0), sensor(0.0, 0.0), sensor(10.0, 0.0), sensor(0.0, 0.0)];
+    let sensors = vec![
+        sensor(-10.0, -10.0),
+        sensor(0.0, 0.0),
+        sensor(10.0, 0.0),
+        sensor(0.0, 0.0),
+    ];
     let network = Network::new(sensors, 0.8, Link::lossy(0.2).unwrap()).unwrap();
     let mut rng = Stream::new(3).fast_rng();
     let belief = Gaussian::new(Vector4::new(-8.0, 2.0, -8.0, 2.0), Matrix4::identity() * 4.0).unwrap();
@@ -182,7 +188,9 @@ fn the_three_centres_agree_over_a_run() {
                 Observation::Received(z) => Value::scalar(z[0], 1.0).unwrap().into(),
                 _ => InCell::certain(cell, 1.0).unwrap().into(),
             };
-            mixture.update(&mut rng, &mut rao, &Observed::new(sensor, what), &mut clouds).unwrap();
+            mixture
+                .update(&mut rng, &mut rao, &Observed::new(sensor, what), &mut clouds)
+                .unwrap();
         }
         let exact = rao.gaussian();
         let scale = exact.standard_deviations();
@@ -203,7 +211,8 @@ fn the_three_centres_agree_over_a_run() {
 fn all_send_is_the_kalman_filter() {
     let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
     let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
-    let network = Network::new(vec![sensor; 2], Budget::new(2.0, 2).unwrap().threshold(1).unwrap(), Link::PERFECT).unwrap();
+    let network =
+        Network::new(vec![sensor; 2], Budget::new(2.0, 2).unwrap().threshold(1).unwrap(), Link::PERFECT).unwrap();
     let mut ours = Gaussian::known(Vector2::new(0.0, 10.0)).unwrap();
     let mut exact = ours;
     for k in 0..20 {
@@ -211,7 +220,10 @@ fn all_send_is_the_kalman_filter() {
         let predicted = kalman::predict(&dynamics, &ours);
         let rules = network.rules_under(&predicted).unwrap();
         let observations = z.map(|z| Observation::Received(Vector1::new(z)));
-        ours = network.fuse(&predicted, &rules, predicted.mean(), &observations).unwrap().0;
+        ours = network
+            .fuse(&predicted, &rules, predicted.mean(), &observations)
+            .unwrap()
+            .0;
         exact = kalman::predict(&dynamics, &exact);
         for z in z {
             exact = kalman::update(&sensor, &exact, &Vector1::new(z)).unwrap().0;
@@ -239,9 +251,16 @@ fn bad_steps_are_typed_errors_and_leave_the_belief() {
     let network = scalar_network(0.0, 2);
     let belief = prior();
     let rules = network.rules_under(&belief).unwrap();
-    let fuse = |observations: &[Observation<SVector<f64, 1>>]| network.fuse(&belief, &rules, belief.mean(), observations);
+    let fuse =
+        |observations: &[Observation<SVector<f64, 1>>]| network.fuse(&belief, &rules, belief.mean(), observations);
     let value = |z: f64| Observation::Received(Vector1::new(z));
-    assert_eq!(fuse(&[Observation::Nothing]).unwrap_err(), Error::ObservationCount { observations: 1, sensors: 2 });
+    assert_eq!(
+        fuse(&[Observation::Nothing]).unwrap_err(),
+        Error::ObservationCount {
+            observations: 1,
+            sensors: 2
+        }
+    );
     assert!(matches!(fuse(&[value(1.1), value(9.0)]).unwrap_err(), Error::ProtocolViolation { sensor: 0, .. }));
     assert!(matches!(fuse(&[value(9.0), value(f64::NAN)]).unwrap_err(), Error::Core(_)));
     assert!(fuse(&[Observation::Nothing, Observation::Nothing]).is_ok());

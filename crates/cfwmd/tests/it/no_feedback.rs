@@ -59,7 +59,10 @@ fn simulate<const M: usize>(
                 .map(|(half, sensor)| {
                     let z = sensor.sample(&mut rng, &truth);
                     let report = half.step(&mut rng, dynamics, &z).unwrap();
-                    network.link().transmit(&mut rng, report.as_ref(), &NumberFormat::Double).unwrap()
+                    network
+                        .link()
+                        .transmit(&mut rng, report.as_ref(), &NumberFormat::Double)
+                        .unwrap()
                 })
                 .collect();
             (truth, observations)
@@ -85,7 +88,9 @@ fn track<const M: usize>(
         .map(|(_, observations)| {
             let info = match method {
                 Method::Ignore => {
-                    let (next, info) = network.fuse_received(&kalman::predict(&dynamics, &belief), observations).unwrap();
+                    let (next, info) = network
+                        .fuse_received(&kalman::predict(&dynamics, &belief), observations)
+                        .unwrap();
                     belief = next;
                     info
                 }
@@ -145,11 +150,7 @@ fn fusing_silence_pays() {
     let network = scalar(0.0);
     let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
     let mut errors = [0.0; 3];
-    let methods = [
-        Method::Ignore,
-        Method::Joint,
-        Method::Imputing(60),
-    ];
+    let methods = [Method::Ignore, Method::Joint, Method::Imputing(60)];
     for seed in 0..120 {
         let run = simulate(&network, &dynamics, &known(), 1000 + seed);
         for (error, method) in errors.iter_mut().zip(methods) {
@@ -188,7 +189,9 @@ fn bad_steps_are_typed_errors() {
     let run = simulate(&network, &dynamics, &known(), 3);
     let mut imputed = ImputedBelief::new(&known(), 2, 50).unwrap();
     for (_, observations) in &run[..6] {
-        imputed = imputing::step(&mut rng, &network, &dynamics, &imputed, observations).unwrap().0;
+        imputed = imputing::step(&mut rng, &network, &dynamics, &imputed, observations)
+            .unwrap()
+            .0;
     }
     // A network that always reports, seen by the same filters: silence is impossible.
     let always = Network::new(network.sensors().to_vec(), 0.0, Link::PERFECT).unwrap();

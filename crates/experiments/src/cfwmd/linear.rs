@@ -329,7 +329,9 @@ where
             Scheme::Lossy { loss, modelled } => {
                 self.gaussian(&mut track, Weighing::OwnFilter, loss, if modelled { loss } else { 0.0 })?;
             }
-            Scheme::NoFeedback(method) => self.no_feedback(&mut track, method, &self.network(0.0)?).map_err(failed)?,
+            Scheme::NoFeedback(method) => self
+                .no_feedback(&mut track, method, &self.network(0.0)?)
+                .map_err(failed)?,
             Scheme::Particles(count, weighing) => self.particles(&mut track, count, weighing)?,
             special => Measured::special(self, special, track)?,
         }

@@ -4,10 +4,10 @@ use crate::AnyFigure;
 use crate::legacy::Old;
 
 mod beyond;
-mod no_feedback;
 mod case;
 mod ensemble;
 mod linear;
+mod no_feedback;
 mod nonlinear;
 mod scalar;
 mod vector;

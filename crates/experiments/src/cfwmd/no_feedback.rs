@@ -1,7 +1,7 @@
 //! No feedback, scalar measurements: figure 3 and what the printed likelihood is worth.
 
 use super::case::Case;
-use super::ensemble::{Ensemble, Part, agrees, beats, ordered_at_every_step, value};
+use super::ensemble::{Ensemble, Part, agrees, beats, first, ordered_at_every_step, value};
 use super::linear::{Method, Scheme, Setting, run};
 use crate::error::Error;
 use crate::legacy::Tables;
@@ -157,7 +157,7 @@ impl Case for NoFeedbackFigure {
             claims.push(beats(paired, first, second, 1.0, Part::Position)?);
         }
         let literal = paired.only("first", "as printed")?;
-        let same = literal.numbers("pos_mse_difference_m2")?[0].abs() + literal.numbers("pos_se")?[0];
+        let same = first(literal.numbers("pos_mse_difference_m2")?)?.abs() + first(literal.numbers("pos_se")?)?;
         claims.push(Claim::near(
             "printed-is-deaf",
             "the printed likelihood gives the filter that ignores silence, exactly",
@@ -166,7 +166,7 @@ impl Case for NoFeedbackFigure {
             0.0,
         ));
         let gaussian = paired.only("first", "exact")?.only("second", "joint Gaussian")?;
-        let difference = gaussian.numbers("pos_mse_difference_m2")?[0];
+        let difference = first(gaussian.numbers("pos_mse_difference_m2")?)?;
         claims.push(
             Claim::near(
                 "joint-is-exact",

@@ -8,7 +8,9 @@ use fewbits_cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_core::factor::{InCell, Scalar, Value};
 use fewbits_core::{Cell, Dynamics, Link, Observation, Observed, Scheme};
 use fewbits_densities::GaussianCloud;
-use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule, assumed_density, kalman};
+use fewbits_filters::{
+    CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule, assumed_density, kalman,
+};
 use nalgebra::{Matrix1, SMatrix, Vector1, Vector2};
 
 impl Linear<1> {
@@ -64,7 +66,9 @@ impl Linear<1> {
                 let sends = track.draws.coins[k][i] < trigger.probability(z[0] - prediction[0]);
                 sent += usize::from(sends);
                 let observation = sends.then_some(z[0]).into();
-                let factor = scheme.factor(&broadcast, &observation, &Link::PERFECT).map_err(failed)?;
+                let factor = scheme
+                    .factor(&broadcast, &observation, &Link::PERFECT)
+                    .map_err(failed)?;
                 belief = assumed_density::update(&belief, self.sensor.matrix(), &factor)
                     .map_err(failed)?
                     .0;
