@@ -42,9 +42,7 @@ fn stable(transition: &[f64], _: &()) -> garde::Result {
     let stable = LinearGaussian::with_covariance(matrix, Matrix2::identity())
         .and_then(|dynamics| dynamics.stationary_covariance())
         .is_ok();
-    stable
-        .then_some(())
-        .ok_or_else(|| garde::Error::new("not a stable matrix"))
+    stable.then_some(()).ok_or_else(|| garde::Error::new("not a stable matrix"))
 }
 
 impl Default for Parameters {
@@ -156,8 +154,7 @@ fn one_run<const M: usize>(
         }
         exact.update(&mut density, |x| {
             let seen = filter.sensors().iter().zip(&factors);
-            seen.map(|(sensor, factor)| factor.log_likelihood(&sensor.mean(x)))
-                .sum()
+            seen.map(|(sensor, factor)| factor.log_likelihood(&sensor.mean(x))).sum()
         })?;
         if n >= BURN {
             let (mean, covariance) = exact.moments(&density);
@@ -215,18 +212,13 @@ impl Row {
     ) -> Result<Self, Error> {
         let exact = PlaneFilter::new(filter.dynamics(), SPACING)?;
         let stream = context.stream(ID).named(scheme);
-        let sums = context.tally(
-            stream,
-            p.trials,
-            || [Moments::default(); 3],
-            |sums, trial| {
-                let run = one_run(filter, order, &exact, p.steps, trial.stream)?;
-                sums[0].add(run.trace);
-                sums[1].add(run.excess);
-                sums[2].add(run.nees);
-                Ok::<_, fewbits_dymbo::Error>(())
-            },
-        )?;
+        let sums = context.tally(stream, p.trials, || [Moments::default(); 3], |sums, trial| {
+            let run = one_run(filter, order, &exact, p.steps, trial.stream)?;
+            sums[0].add(run.trace);
+            sums[1].add(run.excess);
+            sums[2].add(run.nees);
+            Ok::<_, fewbits_dymbo::Error>(())
+        })?;
         let steady = order.steady(filter)?.filtered_covariance;
         Ok(Self {
             scheme,
@@ -293,14 +285,8 @@ impl Figure for VectorState {
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         let names = rows.iter().enumerate().map(|(i, r)| (i as f64, r.scheme.to_owned()));
         let x = Axis::linear("").named(names).between(-0.6, 2.6);
-        let marks = |of: fn(&Row) -> f64, shift: f64| {
-            rows.iter()
-                .enumerate()
-                .map(|(i, r)| (i as f64 + shift, of(r)))
-                .collect()
-        };
-        let exact =
-            Layer::measured("exact minimum given the bits", rows.iter().enumerate(), |(i, r)| (i as f64, r.mmse_trace));
+        let marks = |of: fn(&Row) -> f64, shift: f64| rows.iter().enumerate().map(|(i, r)| (i as f64 + shift, of(r))).collect();
+        let exact = Layer::measured("exact minimum given the bits", rows.iter().enumerate(), |(i, r)| (i as f64, r.mmse_trace));
         let y = Axis::linear("trace of the covariance").between(0.0, 2.2);
         Plot::of(
             Panel::new("Steady error of a two-dimensional state", x, y)
