@@ -2,5 +2,4 @@
 
 mod diffusion_fixtures;
 mod diffusion_laws;
-#[cfg(feature = "finite-volume")]
 mod finite_volume;
