@@ -34,6 +34,8 @@ struct Term<const D: usize> {
     gaussian: Component<D>,
     inverse: SMatrix<f64, D, D>,
     half_log_peak: f64,
+    /// Norm of the whitener.
+    steepness: f64,
     coefficients: Vec<f64>,
 }
 
@@ -155,6 +157,7 @@ impl<const D: usize> Lpg<D> {
                 gaussian: *gaussian,
                 inverse,
                 half_log_peak: -0.25 * gaussian.log_determinant() - 0.5 * D as f64 * LN_SQRT_2PI,
+                steepness: inverse.norm(),
                 coefficients: vec![0.0; indices.len()],
             });
         }
@@ -187,24 +190,48 @@ impl<const D: usize> Lpg<D> {
         self.terms.len() * (D + D * (D + 1) / 2 + self.indices.len()) - 1
     }
 
-    /// Logarithm of a bound of the density anywhere within `half_width` of `x` in every coordinate: Gaussians widened by the cell
-    /// and polynomials by their absolute values.
-    pub fn log_bound(&self, x: &SVector<f64, D>, half_width: f64) -> f64 {
-        let mut values = vec![0.0; self.indices.len()];
-        let mut total = f64::NEG_INFINITY;
+    /// The log density at `x`, and the logarithm of a bound of it anywhere within `half_width` of `x` in every coordinate:
+    /// Gaussians widened by the cell and polynomials by their absolute values. `scratch` is room for the polynomials.
+    pub fn log_density_and_bound(&self, x: &SVector<f64, D>, half_width: f64, scratch: &mut Vec<f64>) -> (f64, f64) {
+        scratch.resize(self.indices.len(), 0.0);
+        let mut bound = f64::NEG_INFINITY;
+        let (mut largest, mut sum) = (f64::NEG_INFINITY, 0.0);
         for term in &self.terms {
             let u = term.whitened(x);
             // How far a corner of the cell is in whitened coordinates.
-            let reach = half_width * (D as f64).sqrt() * term.inverse.norm();
-            let near = u * (1.0 - reach / u.norm().max(reach));
-            polynomials(&self.indices, self.degree, &u, &mut values);
-            let size: f64 = values.iter().zip(&term.coefficients).map(|(v, c)| (v * c).abs()).sum();
-            let at_zero: f64 = term.coefficients.iter().map(|c| c.abs()).sum();
-            let log = term.half_log_peak - 0.25 * near.norm_squared()
-                + size.max(if reach > 0.5 { at_zero } else { 0.0 }).ln();
-            total = log_add(total, log);
+            let reach = half_width * (D as f64).sqrt() * term.steepness;
+            let length = u.norm();
+            let near = (length - reach).max(0.0);
+            let peak = term.half_log_peak - 0.25 * near * near;
+            let log = term.half_log_peak - 0.25 * length * length;
+            if peak < bound - 60.0 {
+                continue;
+            }
+            polynomials(&self.indices, self.degree, &u, scratch);
+            let (mut size, mut value) = (0.0, 0.0);
+            for (polynomial, c) in scratch.iter().zip(&term.coefficients) {
+                value += polynomial * c;
+                size += (polynomial * c).abs();
+            }
+            let size: f64 = if reach > 0.5 {
+                size.max(term.coefficients.iter().map(|c| c.abs()).sum())
+            } else {
+                size
+            };
+            bound = log_add(bound, peak + size.ln());
+            if log > largest {
+                sum *= (largest - log).exp();
+                largest = log;
+            }
+            sum += value * (log - largest).exp();
         }
-        2.0 * total
+        let size: f64 = sum.abs();
+        let density = if size > 0.0 && size.is_finite() {
+            2.0 * (largest + size.ln())
+        } else {
+            f64::NEG_INFINITY
+        };
+        (density, 2.0 * bound)
     }
 
     fn stacked(&self) -> DVector<f64> {

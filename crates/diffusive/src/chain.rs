@@ -229,11 +229,19 @@ impl Search {
             }
             let (candidates, distance) = graph.nearest(node, |other| !visited[other])?;
             if candidates.is_empty() {
-                outcome.status = if leaning { Status::OutsideField } else { Status::Exhausted };
+                outcome.status = if leaning {
+                    Status::OutsideField
+                } else {
+                    Status::Exhausted
+                };
                 outcome.posterior = Some(updated);
                 return Ok(outcome);
             }
-            let rule = if self.stalled(&outcome.steps) { Rule::MutualInformation } else { self.rule };
+            let rule = if self.stalled(&outcome.steps) {
+                Rule::MutualInformation
+            } else {
+                self.rule
+            };
             let selector = Selector::new(rule, &updated, &estimate, &self.rate)?;
             let places: Vec<_> = candidates.iter().map(|c| (*c, deployment.positions()[*c])).collect();
             let next = selector.best(sensor, &places).unwrap_or(candidates[0]);
@@ -251,11 +259,16 @@ impl Search {
         let last = &outcome.records[outcome.records.len() - 1..];
         let (prior, records, near) = match (belief, carried) {
             (None, _) => {
-                let near = outcome.posterior.as_ref().map(|posterior| posterior.around(&self.search));
+                let near = outcome
+                    .posterior
+                    .as_ref()
+                    .map(|posterior| posterior.around(&self.search));
                 (Prior::Exact(self.prior), outcome.records.as_slice(), near)
             }
             (Some(Travelling::WithRate(mixture)), Some(range)) => (Prior::WithRate(mixture.clone(), range), last, None),
-            (Some(Travelling::WithRate(mixture)), None) => (Prior::Position(crate::PositionBelief::Mixture(mixture.marginal([0, 1])?)), last, None),
+            (Some(Travelling::WithRate(mixture)), None) => {
+                (Prior::Position(crate::PositionBelief::Mixture(mixture.marginal([0, 1])?)), last, None)
+            }
             (Some(Travelling::Position(position)), _) => (Prior::Position(position.clone()), last, None),
         };
         let likelihood = SourceLikelihood::new(records.to_vec(), self.rate)?;
@@ -270,13 +283,21 @@ impl Search {
         outcome: &Outcome,
         before: Option<&Travelling>,
     ) -> Result<Travelling, Error> {
-        let (Form::Laplace, Travelling::Position(_)) = (self.form, &moments) else { return Ok(moments) };
+        let (Form::Laplace, Travelling::Position(_)) = (self.form, &moments) else {
+            return Ok(moments);
+        };
         let last = &outcome.records[outcome.records.len() - 1..];
         let likelihood = SourceLikelihood::new(last.to_vec(), self.rate)?;
         let prior = before.map_or(self.prior, Travelling::gaussian).factored()?;
         let log = |x: &Vector2<f64>| prior.log_pdf(x) + fewbits_core::Likelihood::log_likelihood(&likelihood, x);
         // The mode among the cells.
-        let best = posterior.cells.weights().iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(i, _)| i);
+        let best = posterior
+            .cells
+            .weights()
+            .iter()
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .map_or(0, |(i, _)| i);
         let [x, y] = posterior.cells.columns();
         let scale = Vector2::repeat(posterior.cells.width());
         match Peak::climb(&log, &Vector2::new(x[best], y[best]), &scale) {
@@ -287,7 +308,9 @@ impl Search {
 
     fn stalled(&self, steps: &[Step]) -> bool {
         let Some(patience) = self.stall else { return false };
-        let Some(past) = steps.len().checked_sub(patience + 1) else { return false };
+        let Some(past) = steps.len().checked_sub(patience + 1) else {
+            return false;
+        };
         let now = steps.last().map_or(0.0, |step| step.log10_determinant);
         now > steps[past].log10_determinant - 0.3
     }
@@ -300,9 +323,7 @@ fn visited_ids(steps: &[Step]) -> Vec<usize> {
 /// Failures of a belief that end a search; others are errors.
 fn failure(error: &Error) -> Option<Status> {
     match error {
-        Error::Density(fewbits_densities::Error::Core(fewbits_core::Error::Impossible)) => {
-            Some(Status::BeliefMiss)
-        }
+        Error::Density(fewbits_densities::Error::Core(fewbits_core::Error::Impossible)) => Some(Status::BeliefMiss),
         Error::Density(fewbits_densities::Error::Unresolved { .. }) => Some(Status::Unresolved),
         Error::Density(fewbits_densities::Error::Argument(_)) => Some(Status::BeliefMiss),
         _ => None,

@@ -9,7 +9,7 @@ use fewbits_numerics::normal::interval;
 use nalgebra::{Vector2, Vector3};
 
 /// Cells that stand for the posterior; more add nothing to quantiles.
-const MOST: usize = 4000;
+const MOST: usize = 1500;
 /// Bisections of a quantile.
 const BISECTIONS: usize = 60;
 
@@ -31,7 +31,12 @@ struct Point {
 enum Rate {
     Known(f64),
     /// Normal of this mean and deviation, cut to an interval.
-    Cut { mean: f64, deviation: f64, low: f64, high: f64 },
+    Cut {
+        mean: f64,
+        deviation: f64,
+        low: f64,
+        high: f64,
+    },
 }
 
 impl Rate {
@@ -41,11 +46,20 @@ impl Rate {
             Self::Known(rate) => f64::from(u8::from(rate > level)),
             Self::Cut { low, .. } if level <= low => 1.0,
             Self::Cut { high, .. } if level >= high => 0.0,
-            Self::Cut { mean, deviation, low, high } => {
+            Self::Cut {
+                mean,
+                deviation,
+                low,
+                high,
+            } => {
                 let z = |x: f64| (x - mean) / deviation;
                 let (above, below) = (interval(z(level), z(high)), interval(z(low), z(level)));
                 let total = above + below;
-                if total > 0.0 { above / total } else { f64::from(u8::from(mean > level)) }
+                if total > 0.0 {
+                    above / total
+                } else {
+                    f64::from(u8::from(mean > level))
+                }
             }
         }
     }
@@ -64,13 +78,18 @@ impl Envelope {
         let air = Air::new(sensor.air().diffusivity(), *sensor.air().wind(), Ground::Impermeable)?;
         let [x, y] = posterior.cells.columns();
         let weights = posterior.cells.weights();
-        let mut order: Vec<usize> = (0..weights.len()).collect();
-        if order.len() > MOST {
-            order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]));
-            order.truncate(MOST);
+        // Cells at equal steps of the cumulative weight, along the order in which the cells were split: near ones stand together.
+        let total: f64 = weights.iter().sum();
+        let count = weights.len().min(MOST);
+        let (mut order, mut cumulative) = (Vec::with_capacity(count), 0.0);
+        for (i, weight) in weights.iter().enumerate() {
+            cumulative += weight / total;
+            while order.len() < count && (order.len() as f64 + 0.5) / count as f64 <= cumulative {
+                order.push(i);
+            }
         }
-        let total: f64 = order.iter().map(|i| weights[*i]).sum();
         let mut points = Vec::with_capacity(order.len());
+        let share = 1.0 / order.len().max(1) as f64;
         for i in order {
             let position = Vector2::new(x[i], y[i]);
             let rate = match likelihood.rate() {
@@ -80,7 +99,11 @@ impl Envelope {
                     // No response at all leaves the uniform prior: a normal far wider than the range.
                     let a = sums.response.max(1e-12 / (range.high() * range.high()));
                     Rate::Cut {
-                        mean: if sums.response > 0.0 { sums.correlation / a } else { range.middle() },
+                        mean: if sums.response > 0.0 {
+                            sums.correlation / a
+                        } else {
+                            range.middle()
+                        },
                         deviation: a.sqrt().recip(),
                         low: range.low(),
                         high: range.high(),
@@ -92,7 +115,7 @@ impl Envelope {
             };
             points.push(Point {
                 position,
-                weight: weights[i] / total,
+                weight: share,
                 rate,
             });
         }
@@ -108,8 +131,15 @@ impl Envelope {
         positive("threshold", threshold)?;
         let field = Vector3::new(place.x, place.y, 0.0);
         let at = |p: &Point| {
-            let response = self.air.concentration(&field, &Vector3::new(p.position.x, p.position.y, 0.0), age);
-            p.weight * if response > 0.0 { p.rate.exceeds(threshold / response) } else { 0.0 }
+            let response = self
+                .air
+                .concentration(&field, &Vector3::new(p.position.x, p.position.y, 0.0), age);
+            p.weight
+                * if response > 0.0 {
+                    p.rate.exceeds(threshold / response)
+                } else {
+                    0.0
+                }
         };
         Ok(self.points.iter().map(at).sum())
     }
@@ -132,8 +162,15 @@ impl Envelope {
                 if radius <= 0.0 {
                     return p.weight;
                 }
-                let response = self.air.concentration(&Vector3::new(ray.x * radius, ray.y * radius, 0.0), &start, age);
-                p.weight * if response > 0.0 { p.rate.exceeds(threshold / response) } else { 0.0 }
+                let response = self
+                    .air
+                    .concentration(&Vector3::new(ray.x * radius, ray.y * radius, 0.0), &start, age);
+                p.weight
+                    * if response > 0.0 {
+                        p.rate.exceeds(threshold / response)
+                    } else {
+                        0.0
+                    }
             };
             self.points.iter().map(at).sum()
         };
@@ -148,8 +185,12 @@ impl Envelope {
         let mut high = farthest + widest;
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
-            if beyond(middle) > 1.0 - level { low = middle } else { high = middle }
-            if high - low < 1e-9 * widest {
+            if beyond(middle) > 1.0 - level {
+                low = middle
+            } else {
+                high = middle
+            }
+            if high - low < 1e-7 * widest {
                 break;
             }
         }

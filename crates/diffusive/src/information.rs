@@ -98,7 +98,9 @@ impl Predictions {
         order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
         let axis = |k: usize| eigen.eigenvectors.column(order[k]);
         let points: Vec<Vector2<f64>> = (0..self.means.nrows())
-            .map(|i| Vector2::new(self.means.row(i).transpose().dot(&axis(0)), self.means.row(i).transpose().dot(&axis(1))))
+            .map(|i| {
+                Vector2::new(self.means.row(i).transpose().dot(&axis(0)), self.means.row(i).transpose().dot(&axis(1)))
+            })
             .collect();
         let steps = (REACH / SPACING) as i32;
         let mut total = 0.0;
@@ -114,7 +116,10 @@ impl Predictions {
                 for j in -steps..=steps {
                     let y = Vector2::new(f64::from(i), f64::from(j)) * SPACING;
                     let density = (-0.5 * y.norm_squared()).exp() / std::f64::consts::TAU;
-                    let ratio: f64 = near.iter().map(|(p, w)| w * (p.dot(&y) - 0.5 * p.norm_squared()).exp()).sum();
+                    let ratio: f64 = near
+                        .iter()
+                        .map(|(p, w)| w * (p.dot(&y) - 0.5 * p.norm_squared()).exp())
+                        .sum();
                     expectation -= density * SPACING * SPACING * ratio.ln();
                 }
             }
@@ -198,7 +203,12 @@ pub fn fisher_information_of(
     use fewbits_models::diffusion::{Air, Ground, ImpulseResponse};
     let step = 1e-5;
     let diffusivity = sensor.air().diffusivity();
-    let shortest = sensor.instants().iter().map(|t| t - sensor.start()).filter(|age| *age > 0.0).fold(f64::INFINITY, f64::min);
+    let shortest = sensor
+        .instants()
+        .iter()
+        .map(|t| t - sensor.start())
+        .filter(|age| *age > 0.0)
+        .fold(f64::INFINITY, f64::min);
     let with_diffusivity = |k: f64| -> Result<SourceSensor, Error> {
         let air = Air::new(k, *sensor.air().wind(), Ground::Impermeable)?;
         Ok(SourceSensor::new(air, sensor.instants().to_vec(), sensor.noise())?.with_start(sensor.start())?)

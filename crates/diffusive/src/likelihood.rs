@@ -51,8 +51,7 @@ impl SourceLikelihood {
         let (mut all, mut blurred) = (RateSums::default(), RateSums::default());
         let (mut log, mut blurred_log) = (0.0, 0.0);
         for record in &self.records {
-            let sums = record.sums(position);
-            let share = record.discount(position, half_width);
+            let (sums, share) = record.blurred_sums(position, half_width);
             // The normalisation of the noise is not discounted: it would favour cells where the response is steep.
             let less = sums.discounted(share);
             match &self.rate {

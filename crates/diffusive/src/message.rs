@@ -69,7 +69,11 @@ impl Wire {
     pub fn quantised(&self, record: Record) -> Result<Record, Error> {
         let Some(code) = self.samples else { return Ok(record) };
         let format = self.sample_format(record.noise())?;
-        let samples = record.samples().iter().map(|y| format.rounded(*y)).collect::<Result<Vec<_>, _>>()?;
+        let samples = record
+            .samples()
+            .iter()
+            .map(|y| format.rounded(*y))
+            .collect::<Result<Vec<_>, _>>()?;
         let noise = record.noise() * (1.0 + code.step * code.step / 12.0).sqrt();
         Record::new(record.sensor(), record.node(), samples, noise)
     }
@@ -108,18 +112,17 @@ impl Packet {
     ///
     /// # Errors
     /// If a number does not fit the format.
-    pub fn new(
-        belief: Option<&Travelling>,
-        records: &[Record],
-        nodes: &[usize],
-        wire: &Wire,
-    ) -> Result<Self, Error> {
+    pub fn new(belief: Option<&Travelling>, records: &[Record], nodes: &[usize], wire: &Wire) -> Result<Self, Error> {
         let round = |numbers: Vec<f64>| -> Result<Vec<f64>, ArgumentError> {
             numbers.into_iter().map(|x| wire.numbers.rounded(x)).collect()
         };
         Ok(match belief {
             None => Self::Raw {
-                records: nodes.iter().zip(records).map(|(node, r)| (*node, r.samples().to_vec())).collect(),
+                records: nodes
+                    .iter()
+                    .zip(records)
+                    .map(|(node, r)| (*node, r.samples().to_vec()))
+                    .collect(),
                 noise: records.first().map_or(1.0, |r| r.sensor().noise()),
             },
             Some(Travelling::WithRate(mixture)) => Self::Belief {
@@ -153,7 +156,15 @@ impl Packet {
     /// # Errors
     /// If the numbers are no belief.
     pub fn belief(&self) -> Result<Option<Travelling>, Error> {
-        let Self::Belief { components, degree, with_rate, numbers } = self else { return Ok(None) };
+        let Self::Belief {
+            components,
+            degree,
+            with_rate,
+            numbers,
+        } = self
+        else {
+            return Ok(None);
+        };
         let count = *components;
         if *with_rate {
             return Ok(Some(Travelling::WithRate(mixture_of::<3>(count, numbers)?)));
@@ -167,8 +178,12 @@ impl Packet {
                     .map(|chunk| read_gaussian::<2>(1.0, chunk))
                     .collect::<Result<_, _>>()?;
                 let size = (degree + 1) * (degree + 2) / 2;
-                let lists: Vec<Vec<f64>> =
-                    numbers.get(5 * count..).unwrap_or_default().chunks(size).map(<[f64]>::to_vec).collect();
+                let lists: Vec<Vec<f64>> = numbers
+                    .get(5 * count..)
+                    .unwrap_or_default()
+                    .chunks(size)
+                    .map(<[f64]>::to_vec)
+                    .collect();
                 PositionBelief::Lpg(Lpg::new(&gaussians, *degree, &lists)?)
             }
         };
@@ -180,7 +195,13 @@ impl Packet {
     /// # Errors
     /// If it cannot be encoded.
     pub fn bits(&self, wire: &Wire) -> Result<usize, Error> {
-        Ok(self.to_bits(&Contract { wire: *wire, noise: self.noise(), samples: self.samples() })?.bits())
+        Ok(self
+            .to_bits(&Contract {
+                wire: *wire,
+                noise: self.noise(),
+                samples: self.samples(),
+            })?
+            .bits())
     }
 
     fn noise(&self) -> f64 {
@@ -227,7 +248,12 @@ impl Message for Packet {
                     }
                 }
             }
-            Self::Belief { components, degree, with_rate, numbers } => {
+            Self::Belief {
+                components,
+                degree,
+                with_rate,
+                numbers,
+            } => {
                 writer.write_bit(true);
                 writer.write(*components as u64, COUNT_BITS)?;
                 writer.write(degree.map_or(31, |d| d as u64), COUNT_BITS)?;
@@ -247,10 +273,15 @@ impl Message for Packet {
             let mut records = Vec::new();
             for _ in 0..count {
                 let node = reader.read(format.wire.index_bits)? as usize;
-                let samples = (0..format.samples).map(|_| code.read(reader)).collect::<Result<_, _>>()?;
+                let samples = (0..format.samples)
+                    .map(|_| code.read(reader))
+                    .collect::<Result<_, _>>()?;
                 records.push((node, samples));
             }
-            return Ok(Self::Raw { records, noise: format.noise });
+            return Ok(Self::Raw {
+                records,
+                noise: format.noise,
+            });
         }
         let components = reader.read(COUNT_BITS)? as usize;
         let degree = Some(reader.read(COUNT_BITS)? as usize).filter(|d| *d != 31);
@@ -260,8 +291,15 @@ impl Message for Packet {
             (None, true) => (components * 10).saturating_sub(1),
             (None, false) => (components * 6).saturating_sub(1),
         };
-        let numbers = (0..count).map(|_| format.wire.numbers.read(reader)).collect::<Result<_, _>>()?;
-        Ok(Self::Belief { components, degree, with_rate, numbers })
+        let numbers = (0..count)
+            .map(|_| format.wire.numbers.read(reader))
+            .collect::<Result<_, _>>()?;
+        Ok(Self::Belief {
+            components,
+            degree,
+            with_rate,
+            numbers,
+        })
     }
 }
 
@@ -309,6 +347,9 @@ fn mixture_of<const D: usize>(count: usize, numbers: &[f64]) -> Result<Mixture<D
     let (weights, gaussians) = numbers.split_at(count.saturating_sub(1).min(numbers.len()));
     let first = 1.0 - weights.iter().sum::<f64>();
     let all = std::iter::once(first.max(0.0)).chain(weights.iter().copied());
-    let parts = all.take(count).zip(gaussians.chunks(size)).map(|(w, chunk)| read_gaussian::<D>(w, chunk));
+    let parts = all
+        .take(count)
+        .zip(gaussians.chunks(size))
+        .map(|(w, chunk)| read_gaussian::<D>(w, chunk));
     Ok(Mixture::new(parts.collect::<Result<_, _>>()?)?)
 }

@@ -352,17 +352,21 @@ fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3], range: &R
 impl CellTarget<2> for Target<'_> {
     fn evaluate(&self, centres: &Columns<'_, 2>, half_width: f64, logs: &mut [f64], scores: &mut [f64]) {
         let extra = half_width * half_width;
-        let precisions: Vec<[[f64; 3]; 2]> = self.lobes.iter().map(|l| [l.precision(0.0), l.precision(extra)]).collect();
+        let precisions: Vec<[[f64; 3]; 2]> = self
+            .lobes
+            .iter()
+            .map(|l| [l.precision(0.0), l.precision(extra)])
+            .collect();
         // Cells that score far below the best so far will be dropped: their log density need not be exact.
         let mut floor = f64::NEG_INFINITY;
+        let mut scratch = Vec::new();
         for i in 0..logs.len() {
             let at = Vector2::new(centres[0][i], centres[1][i]);
             (logs[i], scores[i]) = match self.prior {
                 Prior::Position(PositionBelief::Lpg(lpg)) => {
-                    let bound = lpg.log_bound(&at, half_width);
+                    let (own, bound) = lpg.log_density_and_bound(&at, half_width, &mut scratch);
                     let (log, blurred) = self.likelihood.blurred(&at, half_width, floor - bound);
-                    let score = blurred + bound;
-                    (if score > floor { log + lpg.log_density(&at) } else { score }, score)
+                    (log + own, blurred + bound)
                 }
                 Prior::WithRate(_, range) => self.with_rate(&at, half_width, &precisions, range, floor),
                 _ => {
@@ -377,7 +381,7 @@ impl CellTarget<2> for Target<'_> {
 }
 
 /// Cells this far below the best, in nats, are dropped by any cover; their mass is nothing.
-const DROPPED: f64 = 40.0;
+const DROPPED: f64 = 26.0;
 
 impl Target<'_> {
     #[inline]
@@ -391,8 +395,7 @@ impl Target<'_> {
     ) -> (f64, f64) {
         let (mut plain, mut blurred, mut log_noise) = ([0.0; 3], [0.0; 3], 0.0);
         for record in self.likelihood.records() {
-            let sums = record.sums(at);
-            let share = record.discount(at, half);
+            let (sums, share) = record.blurred_sums(at, half);
             for (k, value) in [sums.response, sums.correlation, sums.energy].into_iter().enumerate() {
                 plain[k] += value;
                 blurred[k] += share * value;

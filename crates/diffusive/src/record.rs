@@ -27,6 +27,8 @@ pub struct Record {
     table: Option<Profile<2>>,
     /// Largest `|y|` (at least the noise), and largest `|y| 2 / (4 kappa t)`, both over the noise: how fast the response changes.
     steepness: [f64; 2],
+    /// Wind speed over diffusivity, 1/m.
+    drift: f64,
 }
 
 impl Record {
@@ -55,6 +57,7 @@ impl Record {
             noise,
             table: None,
             steepness,
+            drift: sensor.air().wind().norm() / sensor.air().diffusivity(),
         };
         record.table = record.tabulate()?;
         Ok(record)
@@ -144,16 +147,24 @@ impl Record {
         }
     }
 
-    /// By which share the information of the samples is discounted over a cell of the given half width: the noise variance is
-    /// raised by the square of the change of the response across the cell.
+    /// The sums, and by which share the information of the samples is discounted over a cell of the given half width: the noise
+    /// variance is raised by the square of the change of the response across the cell.
     #[inline]
-    pub(crate) fn discount(&self, position: &Vector2<f64>, half_width: f64) -> f64 {
+    pub(crate) fn blurred_sums(&self, position: &Vector2<f64>, half_width: f64) -> (RateSums, f64) {
         let air = self.sensor.air();
-        let rho = (self.node - position).norm().hypot(self.sensor.drop());
+        let offset = self.node - position;
+        let drop = self.sensor.drop();
+        let rho = (offset.norm_squared() + drop * drop).sqrt();
         let near = (rho - 1.4 * half_width).max(0.6 * half_width).max(air.closest());
-        let drift = air.wind().norm() / air.diffusivity();
-        let change = half_width * (self.steepness[0] * (near.recip() + drift) + self.steepness[1] * rho);
-        (1.0 + change * change).recip()
+        let change = half_width * (self.steepness[0] * (near.recip() + self.drift) + self.steepness[1] * rho);
+        let [response, correlation] = self.response_sums(&offset);
+        let sums = RateSums {
+            response,
+            correlation,
+            energy: self.energy,
+            log_noise: self.log_noise,
+        };
+        (sums, (1.0 + change * change).recip())
     }
 
     /// The log likelihood with a new rate for every sample.

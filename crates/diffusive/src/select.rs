@@ -93,7 +93,10 @@ impl Selector {
     fn predicted(&self, sensor: &SourceSensor, node: &Vector2<f64>, clump: &Clump<3>) -> DVector<f64> {
         let offset = node - Vector2::new(clump.mean[0], clump.mean[1]);
         let noise = sensor.noise();
-        DVector::from_iterator(sensor.instants().len(), (0..sensor.instants().len()).map(|j| sensor.response(j, &offset) / noise))
+        DVector::from_iterator(
+            sensor.instants().len(),
+            (0..sensor.instants().len()).map(|j| sensor.response(j, &offset) / noise),
+        )
     }
 
     fn cramer_rao(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
@@ -104,13 +107,17 @@ impl Selector {
         }
         let covariance = self.clumps.covariance();
         if covariance[(2, 2)] > 0.0 {
-            let Some(prior) = covariance.cholesky() else { return f64::NEG_INFINITY };
+            let Some(prior) = covariance.cholesky() else {
+                return f64::NEG_INFINITY;
+            };
             let total = prior.inverse() + information;
             let cross = Vector2::new(total[(0, 2)], total[(1, 2)]);
             let position = total.fixed_view::<2, 2>(0, 0) - cross * cross.transpose() / total[(2, 2)];
             position.determinant().ln()
         } else {
-            (self.precision + information.fixed_view::<2, 2>(0, 0)).determinant().ln()
+            (self.precision + information.fixed_view::<2, 2>(0, 0))
+                .determinant()
+                .ln()
         }
     }
 
@@ -119,7 +126,8 @@ impl Selector {
         let samples = sensor.instants().len();
         let offset = node - self.estimate.mean();
         let rate = self.clumps.mean()[2];
-        let predicted = DVector::from_iterator(samples, (0..samples).map(|j| rate * sensor.response(j, &offset) / sensor.noise()));
+        let predicted =
+            DVector::from_iterator(samples, (0..samples).map(|j| rate * sensor.response(j, &offset) / sensor.noise()));
         let mut logs = Vec::with_capacity(self.clumps.clumps().len());
         for clump in self.clumps.clumps() {
             let a = self.predicted(sensor, node, clump);

@@ -9,6 +9,7 @@
 //! | [`numerics`], [`monte_carlo`] | always | normal-distribution numerics; random streams, Monte Carlo |
 //! | `dymbo` | `dymbo` | Kalman-like filters fed with one sign bit a sample |
 //! | `cfwmd` | `cfwmd` | sensors that censor dull measurements, and fusion that hears their silence |
+//! | `diffusive`, `topology` | `diffusive` | a diffusive source, found by a belief that walks the network |
 //! | `quantizers` | `quantizers` | the quantizer a sensor holds, its words, Lloyd-Max tables |
 //! | `quantizer_design` | `quantizer-design` | joint design and decoding of distributed scalar quantizers |
 //! | `binary_patterns` | `binary-patterns` | one-bit quantizers with patterned cells |
@@ -25,6 +26,8 @@ pub use fewbits_binary_patterns as binary_patterns;
 pub use fewbits_cfwmd as cfwmd;
 #[cfg(feature = "filters")]
 pub use fewbits_densities as densities;
+#[cfg(feature = "diffusive")]
+pub use fewbits_diffusive as diffusive;
 #[cfg(feature = "dymbo")]
 pub use fewbits_dymbo as dymbo;
 #[cfg(feature = "filters")]
@@ -37,6 +40,8 @@ pub use fewbits_quantizer_design as quantizer_design;
 pub use fewbits_quantizers as quantizers;
 #[cfg(feature = "sensor-assignment")]
 pub use fewbits_sensor_assignment as sensor_assignment;
+#[cfg(feature = "diffusive")]
+pub use fewbits_topology as topology;
 
 /// The programs of the README and of the pages in `docs`, kept running.
 #[cfg(doctest)]
@@ -53,4 +58,6 @@ mod pages {
     struct Binary;
     #[doc = include_str!("../../../docs/cfwmd.md")]
     struct Cfwmd;
+    #[doc = include_str!("../../../docs/diffusive.md")]
+    struct Diffusive;
 }

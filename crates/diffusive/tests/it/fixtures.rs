@@ -1,9 +1,9 @@
 //! Reference values, computed by an independent program.
 
 use fewbits_core::{Belief, Gaussian, Likelihood};
+use fewbits_densities::CellOptions;
 use fewbits_densities::hermite::{gaussian_moment, hermite, multi_indices};
 use fewbits_densities::laplace::{Peak, cumulant_laplace};
-use fewbits_densities::CellOptions;
 use fewbits_diffusive::information::{Predictions, fisher_information};
 use fewbits_diffusive::{
     Posterior, Prior, RateModel, RateRange, RateSums, SearchBox, SourceLikelihood, SourceSensor, log_sample_marginal,
@@ -14,13 +14,18 @@ use serde_json::Value;
 
 fn entries(prefix: &str) -> Vec<Value> {
     let all: Vec<Value> = serde_json::from_str(include_str!("../fixtures/diffusive.json")).unwrap();
-    let chosen: Vec<Value> = all.into_iter().filter(|e| e["id"].as_str().unwrap().starts_with(prefix)).collect();
+    let chosen: Vec<Value> = all
+        .into_iter()
+        .filter(|e| e["id"].as_str().unwrap().starts_with(prefix))
+        .collect();
     assert!(!chosen.is_empty(), "no fixture begins with {prefix}");
     chosen
 }
 
 fn number(e: &Value, name: &str) -> f64 {
-    e["inputs"][name].as_f64().unwrap_or_else(|| panic!("{name} of {}", e["id"]))
+    e["inputs"][name]
+        .as_f64()
+        .unwrap_or_else(|| panic!("{name} of {}", e["id"]))
 }
 
 fn list(value: &Value) -> Vec<f64> {
@@ -32,7 +37,11 @@ fn point(value: &Value) -> Vector2<f64> {
 }
 
 fn check(e: &Value, got: &[f64]) {
-    let want = if e["value"].is_array() { list(&e["value"]) } else { vec![e["value"].as_f64().unwrap()] };
+    let want = if e["value"].is_array() {
+        list(&e["value"])
+    } else {
+        vec![e["value"].as_f64().unwrap()]
+    };
     let tolerance = e["tolerance"].as_f64().unwrap();
     let largest = want.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let allowed = match e["tolerance_kind"].as_str().unwrap() {
@@ -54,7 +63,15 @@ fn range(e: &Value) -> RateRange {
 #[test]
 fn likelihoods() {
     for e in entries("loglik_sample") {
-        check(&e, &[log_sample_marginal(number(&e, "ytilde"), number(&e, "a"), number(&e, "sigma"), &range(&e))]);
+        check(
+            &e,
+            &[log_sample_marginal(
+                number(&e, "ytilde"),
+                number(&e, "a"),
+                number(&e, "sigma"),
+                &range(&e),
+            )],
+        );
     }
     for e in entries("loglik_joint") {
         let sums = RateSums::of(&list(&e["inputs"]["ytilde"]), &list(&e["inputs"]["a"]), number(&e, "sigma")).unwrap();
@@ -65,19 +82,28 @@ fn likelihoods() {
 #[test]
 fn hermite_polynomials_and_moments() {
     for e in entries("hermite_") {
-        let nu = [e["inputs"]["nu"][0].as_u64().unwrap() as usize, e["inputs"]["nu"][1].as_u64().unwrap() as usize];
+        let nu = [
+            e["inputs"]["nu"][0].as_u64().unwrap() as usize,
+            e["inputs"]["nu"][1].as_u64().unwrap() as usize,
+        ];
         let w = Matrix2::new(number(&e, "w11"), number(&e, "w12"), number(&e, "w12"), number(&e, "w22"));
         check(&e, &[hermite(nu, &point(&e["inputs"]["z"]), &w).unwrap()]);
     }
     for e in entries("moment_") {
-        let nu = [e["inputs"]["nu"][0].as_u64().unwrap() as usize, e["inputs"]["nu"][1].as_u64().unwrap() as usize];
+        let nu = [
+            e["inputs"]["nu"][0].as_u64().unwrap() as usize,
+            e["inputs"]["nu"][1].as_u64().unwrap() as usize,
+        ];
         check(&e, &[gaussian_moment(nu, &point(&e["inputs"]["mu"]), &matrix(&e["inputs"]["Sigma"])).unwrap()]);
     }
     for e in entries("lpg_moments") {
         let (mean, sigma) = (point(&e["inputs"]["mu"]), matrix(&e["inputs"]["Sigma"]));
-        let terms: Vec<([usize; 2], f64)> = e["inputs"]["C"].as_array().unwrap().iter().map(|t| {
-            ([t[0][0].as_u64().unwrap() as usize, t[0][1].as_u64().unwrap() as usize], t[1].as_f64().unwrap())
-        }).collect();
+        let terms: Vec<([usize; 2], f64)> = e["inputs"]["C"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|t| ([t[0][0].as_u64().unwrap() as usize, t[0][1].as_u64().unwrap() as usize], t[1].as_f64().unwrap()))
+            .collect();
         let m = fewbits_densities::hermite::series_moments(&mean, &sigma, &terms).unwrap();
         let c = m.covariance;
         check(&e, &[m.mass, m.mean[0], m.mean[1], c[(0, 0)], c[(0, 1)], c[(1, 0)], c[(1, 1)]]);
@@ -100,7 +126,11 @@ fn posterior_case(e: &Value) -> Case {
     let source = point(&e["inputs"]["source"]);
     let records = e["inputs"]["nodes"].as_array().unwrap().iter().map(|node| {
         let node = point(node);
-        let clean: Vec<f64> = sensor.responses(&node, &source).iter().map(|a| a * number(e, "mu_true")).collect();
+        let clean: Vec<f64> = sensor
+            .responses(&node, &source)
+            .iter()
+            .map(|a| a * number(e, "mu_true"))
+            .collect();
         sensor.record(&node, &clean).unwrap()
     });
     let sd = number(e, "prior_sd");
@@ -112,11 +142,15 @@ fn posterior_case(e: &Value) -> Case {
 
 #[test]
 fn posteriors() {
-    let search = SearchBox { lower: [-20.0; 2], upper: [120.0; 2] };
+    let search = SearchBox {
+        lower: [-20.0; 2],
+        upper: [120.0; 2],
+    };
     for e in entries("post_") {
         let case = posterior_case(&e);
         let posterior =
-            Posterior::new(&Prior::Exact(case.prior), &case.likelihood, &search, None, &CellOptions::default()).unwrap();
+            Posterior::new(&Prior::Exact(case.prior), &case.likelihood, &search, None, &CellOptions::default())
+                .unwrap();
         let id = e["id"].as_str().unwrap();
         if id.starts_with("post_mean") {
             check(&e, posterior.cells.mean().as_slice());
@@ -126,7 +160,13 @@ fn posteriors() {
             let prior = case.prior.factored().unwrap();
             let log = |x: &Vector2<f64>| prior.log_pdf(x) + case.likelihood.log_likelihood(x);
             let scale = posterior.cells.covariance().diagonal().map(f64::sqrt);
-            check(&e, Peak::climb(&log, &posterior.cells.mean(), &scale).unwrap().mode.as_slice());
+            check(
+                &e,
+                Peak::climb(&log, &posterior.cells.mean(), &scale)
+                    .unwrap()
+                    .mode
+                    .as_slice(),
+            );
         }
     }
 }
@@ -148,10 +188,18 @@ fn mutual_information() {
         let means: Vec<Vec<f64>> = list(&e["inputs"]["means"]).into_iter().map(|m| vec![m]).collect();
         Predictions::new(&means, &list(&e["inputs"]["weights"]), number(e, "sigma")).unwrap()
     };
-    entries("mi_1d").iter().for_each(|e| check(e, &[predictions(e).exact()]));
-    entries("mi_kt_lower").iter().for_each(|e| check(e, &[predictions(e).pairwise_bounds().lower]));
-    entries("mi_kt_upper").iter().for_each(|e| check(e, &[predictions(e).pairwise_bounds().upper]));
-    entries("mi_gauss_upper").iter().for_each(|e| check(e, &[predictions(e).gaussian_bound()]));
+    entries("mi_1d")
+        .iter()
+        .for_each(|e| check(e, &[predictions(e).exact()]));
+    entries("mi_kt_lower")
+        .iter()
+        .for_each(|e| check(e, &[predictions(e).pairwise_bounds().lower]));
+    entries("mi_kt_upper")
+        .iter()
+        .for_each(|e| check(e, &[predictions(e).pairwise_bounds().upper]));
+    entries("mi_gauss_upper")
+        .iter()
+        .for_each(|e| check(e, &[predictions(e).gaussian_bound()]));
 }
 
 #[test]
@@ -159,7 +207,8 @@ fn fisher() {
     for e in entries("fim") {
         let air = Air::new(number(&e, "kappa"), Vector3::zeros(), Ground::Impermeable).unwrap();
         let sensor = SourceSensor::new(air, list(&e["inputs"]["t"]), number(&e, "sigma")).unwrap();
-        let got = fisher_information(&sensor, &point(&e["inputs"]["node"]), &point(&e["inputs"]["source"]), number(&e, "mu"));
+        let got =
+            fisher_information(&sensor, &point(&e["inputs"]["node"]), &point(&e["inputs"]["source"]), number(&e, "mu"));
         check(&e, got.as_slice());
     }
 }

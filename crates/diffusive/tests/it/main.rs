@@ -1,3 +1,40 @@
 //! Tests of the search for a diffusive source.
 
+mod attacks;
 mod fixtures;
+mod laws;
+mod messages;
+mod searches;
+
+use fewbits_diffusive::{RateModel, RateRange, SearchBox, SourceSensor};
+use fewbits_models::diffusion::{Air, Ground};
+use nalgebra::Vector3;
+
+/// Example B of the paper, in other units of length if asked for.
+fn sensor(unit: f64, windy: bool) -> SourceSensor {
+    let wind = if windy {
+        Vector3::new(-20.0 * unit, -10.0 * unit, 0.0)
+    } else {
+        Vector3::zeros()
+    };
+    let air = Air::new(40.0 * unit * unit, wind, Ground::Impermeable)
+        .unwrap()
+        .with_closest(1e-3 * unit)
+        .unwrap();
+    let noise = 8e-6 / unit.powi(3);
+    SourceSensor::new(air, vec![5.0, 10.0, 15.0, 20.0, 25.0], noise)
+        .unwrap()
+        .with_reach(250.0 * unit)
+        .unwrap()
+}
+
+fn joint() -> RateModel {
+    RateModel::Joint(RateRange::new(0.5, 1.5).unwrap())
+}
+
+fn field(unit: f64) -> SearchBox {
+    SearchBox {
+        lower: [-20.0 * unit; 2],
+        upper: [120.0 * unit; 2],
+    }
+}

@@ -1,11 +1,11 @@
 //! Figures 5 and 6, and the divergence of what travels from the exact belief.
 
-use super::common::{A, B, Scheme, Settings, quantile, trials};
+use super::common::{B, Scheme, Settings, quantile, trials};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
 use crate::{About, Claims, Context, Cost, Error, Figure};
 use fewbits_core::{Belief, Density};
 use fewbits_densities::{Clumps, Mixture, MixtureFit};
-use fewbits_diffusive::{Form, PositionBelief, Posterior, Travelling, project};
+use fewbits_diffusive::{Form, PositionBelief, Posterior, RateModel, Travelling, project};
 use fewbits_monte_carlo::Trial;
 use garde::Validate;
 use nalgebra::Vector2;
@@ -17,16 +17,22 @@ const LPG: Form = Form::Lpg {
     degree: 5,
 };
 
-/// The exact posterior after so many nodes of example B, the rate known.
-fn exact(settings: &Settings, trial: Trial, nodes: usize) -> Result<(Option<Posterior>, Scheme), Error> {
-    let scheme = Scheme::new("exact known rate", B).known().up_to(nodes);
-    Ok((scheme.run(settings, trial)?.posterior, scheme))
+/// Only the position is approximated here.
+const POSITION_ONLY: RateModel = RateModel::Known(1.0);
+
+/// The exact posterior of the position after so many nodes of example B, the rate integrated out.
+fn exact(settings: &Settings, trial: Trial, nodes: usize) -> Result<Option<Posterior>, Error> {
+    // The threshold must not end the search early.
+    let endless = super::common::Example { threshold: 1e-300, ..B };
+    Ok(Scheme::new("exact", endless)
+        .up_to(nodes)
+        .run(settings, trial)?
+        .posterior)
 }
 
 /// `KL(exact || form)`, nats.
-fn divergence(posterior: &Posterior, form: Form, scheme: &Scheme, settings: &Settings) -> Result<f64, Error> {
-    let rate = scheme.search(settings)?.rate;
-    let Some(Travelling::Position(belief)) = project(posterior, form, &rate).map_err(Error::failed)? else {
+fn divergence(posterior: &Posterior, form: Form) -> Result<f64, Error> {
+    let Some(Travelling::Position(belief)) = project(posterior, form, &POSITION_ONLY).map_err(Error::failed)? else {
         return Ok(0.0);
     };
     let kl = match &belief {
@@ -68,7 +74,9 @@ impl Density<2> for Dense<'_> {
 fn lobes(posterior: &Posterior) -> Result<f64, Error> {
     let cells = &posterior.cells;
     let clumps = Clumps::new(&cells.columns(), &[&[], &[]], cells.weights(), 200).map_err(Error::failed)?;
-    let options = MixtureFit::new(2).and_then(|fit| fit.with_least_weight(0.05)).map_err(Error::failed)?;
+    let options = MixtureFit::new(2)
+        .and_then(|fit| fit.with_least_weight(0.05))
+        .map_err(Error::failed)?;
     let fit = clumps.fit(&options).map_err(Error::failed)?;
     let [a, b] = fit.components() else { return Ok(0.0) };
     let line = a.mean() - b.mean();
@@ -149,21 +157,22 @@ fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fi
     let mut shown = None;
     for deployment in p.deployment..p.deployment + 100 {
         context.check()?;
-        let (Some(posterior), scheme) = exact(&settings, run.trial(deployment), p.nodes)? else { continue };
+        let Some(posterior) = exact(&settings, run.trial(deployment), p.nodes)? else {
+            continue;
+        };
         let apart = lobes(&posterior)?;
-        let better = shown.as_ref().is_none_or(|(_, _, _, most)| apart > *most);
+        let better = shown.as_ref().is_none_or(|(_, _, most)| apart > *most);
         if better {
-            shown = Some((deployment, posterior, scheme, apart));
+            shown = Some((deployment, posterior, apart));
         }
         if apart > 4.0 {
             break;
         }
     }
-    let Some((deployment, posterior, scheme, apart)) = shown else {
+    let Some((deployment, posterior, apart)) = shown else {
         return Err(Error::Table("no search gave a belief".to_owned()));
     };
-    let rate = scheme.search(&settings)?.rate;
-    let belief = project(&posterior, LPG, &rate).map_err(Error::failed)?;
+    let belief = project(&posterior, LPG, &POSITION_ONLY).map_err(Error::failed)?;
     let (lower, upper) = posterior.cells.bounds();
     let at = |d: usize, i: usize| {
         let (low, high) = (lower[d] - 0.05 * (upper[d] - lower[d]), upper[d] + 0.05 * (upper[d] - lower[d]));
@@ -176,16 +185,24 @@ fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fi
     let places = (0..p.grid).flat_map(|j| (0..p.grid).map(move |i| (i, j)));
     let field = places.map(|(i, j)| {
         let x = Vector2::new(at(0, i), at(1, j));
-        Point { x: x.x, y: x.y, p: density(&x) }
+        Point {
+            x: x.x,
+            y: x.y,
+            p: density(&x),
+        }
     });
     let field = field.collect();
     let mut divergences = Vec::new();
-    for (name, form) in [("gaussian", Form::Gaussian), ("gmm-2", Form::Mixture(2)), ("lpg-2x5", LPG)] {
+    for (name, form) in [
+        ("gaussian", Form::Gaussian),
+        ("gmm-2", Form::Mixture(2)),
+        ("lpg-2x5", LPG),
+    ] {
         divergences.push(Divergence {
             deployment,
             form: name.to_owned(),
-            scalars: form.scalars(&rate).unwrap_or(0),
-            kl: divergence(&posterior, form, &scheme, &settings)?,
+            scalars: form.scalars(&POSITION_ONLY).unwrap_or(0),
+            kl: divergence(&posterior, form)?,
             lobes: apart,
         });
     }
@@ -195,11 +212,15 @@ fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fi
 fn field_claims(rows: &Fields, claims: &mut Claims) {
     let kl = |form: &str| rows.divergences.iter().find(|d| d.form == form).map(|d| d.kl);
     let apart = rows.divergences.first().map(|d| d.lobes);
-    claims.above("two-lobes", "the belief after three nodes has two lobes", apart, 4.0).at_defaults();
+    claims
+        .above("two-lobes", "the belief after three nodes has two lobes", apart, 4.0)
+        .at_defaults();
     let what = "polynomial Gaussians are within 0.3 nats of it";
     claims.below("lpg-is-close", what, kl("lpg-2x5"), 0.3).at_defaults();
     let ratio = kl("gaussian").zip(kl("lpg-2x5")).map(|(g, l)| g / l);
-    claims.above("gaussian-is-not", "one Gaussian is at least five times as far", ratio, 5.0).at_defaults();
+    claims
+        .above("gaussian-is-not", "one Gaussian is at least five times as far", ratio, 5.0)
+        .at_defaults();
     let what = "two Gaussians show both lobes, too: the paper's claim that a Gaussian sum cannot is overstated (errata diffusive-9)";
     let ratio = kl("gaussian").zip(kl("gmm-2")).map(|(g, m)| g / m);
     claims.above("gaussian-sums-can", what, ratio, 2.0).at_defaults();
@@ -208,10 +229,19 @@ fn field_claims(rows: &Fields, claims: &mut Claims) {
 fn field_plot(title: &str, rows: &Fields) -> Plot {
     let mut x: Vec<f64> = rows.field.iter().map(|p| p.x).collect();
     x.dedup();
-    let side = rows.field.iter().take_while(|p| Some(p.y) == rows.field.first().map(|f| f.y)).count().max(1);
+    let side = rows
+        .field
+        .iter()
+        .take_while(|p| Some(p.y) == rows.field.first().map(|f| f.y))
+        .count()
+        .max(1);
     let x = x.into_iter().take(side).collect();
     let y: Vec<f64> = rows.field.iter().step_by(side).map(|p| p.y).collect();
-    let values = rows.field.chunks(side).map(|row| row.iter().map(|p| p.p).collect()).collect();
+    let values = rows
+        .field
+        .chunks(side)
+        .map(|row| row.iter().map(|p| p.p).collect())
+        .collect();
     Plot::of(
         Panel::new(title, Axis::linear("x (m)"), Axis::linear("y (m)"))
             .with(Layer::heat("density (1/m^2)", x, y, values))
@@ -227,7 +257,7 @@ impl Figure for True {
         About {
             id: "diffusive-fig5",
             title: "The belief after three nodes",
-            caption: "Exact density of the source's position after three nodes of example B, rate known, in the first random \
+            caption: "Exact density of the source's position after three nodes of example B, rate unknown, in the first random \
                       deployment whose belief has two clear lobes.",
             source: "Zhao and Nehorai 2007, Fig. 5",
         }
@@ -323,8 +353,20 @@ const FORMS: [(&str, Form); 8] = [
     ("gmm-2", Form::Mixture(2)),
     ("gmm-4", Form::Mixture(4)),
     ("gmm-8", Form::Mixture(8)),
-    ("lpg-1x5", Form::Lpg { components: 1, degree: 5 }),
-    ("lpg-2x3", Form::Lpg { components: 2, degree: 3 }),
+    (
+        "lpg-1x5",
+        Form::Lpg {
+            components: 1,
+            degree: 5,
+        },
+    ),
+    (
+        "lpg-2x3",
+        Form::Lpg {
+            components: 2,
+            degree: 3,
+        },
+    ),
     ("lpg-2x5", LPG),
     ("particles-25", Form::Particles(25)),
 ];
@@ -340,7 +382,7 @@ impl Figure for Divergences {
         About {
             id: "diffusive-kl",
             title: "What a number buys",
-            caption: "Kullback-Leibler divergence of the exact belief (example B, rate known) from what would travel, against \
+            caption: "Kullback-Leibler divergence of the exact belief (example B, rate integrated out) from what would travel, against \
                       the numbers in a message, after one to four nodes.",
             source: "",
         }
@@ -363,25 +405,26 @@ impl Figure for Divergences {
             p.nodes
                 .iter()
                 .map(|nodes| {
-                    // The threshold must not end the search early.
-                    let scheme = Scheme::new("exact known rate", super::common::Example { threshold: 1e-300, ..B });
-                    let scheme = scheme.known().up_to(*nodes);
-                    let Some(posterior) = scheme.run(&settings, trial)?.posterior else { return Ok(None) };
-                    FORMS.iter().map(|(_, form)| divergence(&posterior, *form, &scheme, &settings)).collect::<Result<Vec<_>, _>>().map(Some)
+                    let Some(posterior) = exact(&settings, trial, *nodes)? else {
+                        return Ok(None);
+                    };
+                    let kls = FORMS.iter().map(|(_, form)| divergence(&posterior, *form));
+                    kls.collect::<Result<Vec<_>, _>>().map(Some)
                 })
                 .collect::<Result<Vec<_>, Error>>()
         })?;
-        let rate = Scheme::new("", A).known().search(&settings)?.rate;
         let mut rows = Vec::new();
         for (n, nodes) in p.nodes.iter().enumerate() {
             for (f, (rep, form)) in FORMS.iter().enumerate() {
                 let kls = || all.iter().filter_map(|trial| Some(trial[n].as_ref()?[f]));
                 let count = kls().count();
-                let (Some(kl_median), Some(kl_q90)) = (quantile(kls(), 0.5), quantile(kls(), 0.9)) else { continue };
+                let (Some(kl_median), Some(kl_q90)) = (quantile(kls(), 0.5), quantile(kls(), 0.9)) else {
+                    continue;
+                };
                 rows.push(KlRow {
                     nodes: *nodes,
                     rep,
-                    scalars: form.scalars(&rate).unwrap_or(0),
+                    scalars: form.scalars(&POSITION_ONLY).unwrap_or(0),
                     kl_median,
                     kl_q90,
                     kl_mean: kls().sum::<f64>() / count as f64,
@@ -394,7 +437,11 @@ impl Figure for Divergences {
     }
 
     fn claims(&self, _: &KlParameters, rows: &Vec<KlRow>, claims: &mut Claims) {
-        let find = |nodes: usize, rep: &str| rows.iter().find(|r| r.nodes == nodes && r.rep == rep).map(|r| r.kl_median);
+        let find = |nodes: usize, rep: &str| {
+            rows.iter()
+                .find(|r| r.nodes == nodes && r.rep == rep)
+                .map(|r| r.kl_median)
+        };
         claims.references("kl_median", "median divergence", rows, |r| (format!("{} {}", r.nodes, r.rep), r.kl_median));
         let what = "after the first ring eight Gaussians are closer than two polynomial Gaussians";
         let gap = find(1, "gmm-8").zip(find(1, "lpg-2x5")).map(|(m, l)| m - l);
@@ -402,18 +449,25 @@ impl Figure for Divergences {
         for nodes in [2, 3] {
             let what = "polynomial Gaussians are far closer than one Gaussian";
             let ratio = find(nodes, "gaussian").zip(find(nodes, "lpg-2x5")).map(|(g, l)| g / l);
-            claims.above(format!("lpg-beats-gaussian/{nodes}"), what, ratio, 5.0).at_full_trials();
+            claims
+                .above(format!("lpg-beats-gaussian/{nodes}"), what, ratio, 5.0)
+                .at_full_trials();
         }
         let what = "more components bring a mixture closer";
-        claims.decreasing("more-is-closer", what, ["gaussian", "gmm-2", "gmm-4", "gmm-8"].map(|rep| find(3, rep))).at_full_trials();
+        claims
+            .decreasing("more-is-closer", what, ["gaussian", "gmm-2", "gmm-4", "gmm-8"].map(|rep| find(3, rep)))
+            .at_full_trials();
     }
 
     fn plot(&self, _: &KlParameters, rows: &Vec<KlRow>) -> Plot {
-        let mut panel = Panel::new("Divergence per number", Axis::linear("nodes"), Axis::log("median KL (nats)")).legend(Legend::Outside);
+        let mut panel = Panel::new("Divergence per number", Axis::linear("nodes"), Axis::log("median KL (nats)"))
+            .legend(Legend::Outside);
         for (i, (rep, _)) in FORMS.iter().enumerate() {
             let of = || rows.iter().filter(|r| r.rep == *rep);
             let scalars = of().next().map_or(0, |r| r.scalars);
-            panel = panel.with(Layer::line(format!("{rep} ({scalars})"), points(of(), |r| (r.nodes as f64, r.kl_median))).coloured(i));
+            panel = panel.with(
+                Layer::line(format!("{rep} ({scalars})"), points(of(), |r| (r.nodes as f64, r.kl_median))).coloured(i),
+            );
         }
         Plot::of(panel)
     }

@@ -46,7 +46,12 @@ fn schemes() -> Vec<Scheme> {
         Scheme::new("gaussian-9", B).of(Form::Gaussian),
         Scheme::new("gaussian known rate", B).of(Form::Gaussian).known(),
         Scheme::new("gmm-4 known rate", B).of(Form::Mixture(4)).known(),
-        Scheme::new("lpg-2x5 known rate", B).of(Form::Lpg { components: 2, degree: 5 }).known(),
+        Scheme::new("lpg-2x5 known rate", B)
+            .of(Form::Lpg {
+                components: 2,
+                degree: 5,
+            })
+            .known(),
     ]
 }
 
@@ -102,26 +107,42 @@ impl Figure for Bytes {
     }
 
     fn claims(&self, _: &Settings, rows: &Vec<Row>, claims: &mut Claims) {
-        let none = Measured { value: f64::NAN, standard_error: None };
-        claims.references("nodes_median", "median nodes to the threshold", rows, |r| (r.scheme.to_owned(), r.nodes_median.unwrap_or(none)));
+        let none = Measured {
+            value: f64::NAN,
+            standard_error: None,
+        };
+        claims.references("nodes_median", "median nodes to the threshold", rows, |r| {
+            (r.scheme.to_owned(), r.nodes_median.unwrap_or(none))
+        });
         claims.references("reach", "share that reaches the threshold", rows, |r| (r.scheme.to_owned(), r.reach));
         let find = |name: &str| rows.iter().find(|r| r.scheme == name);
         let bytes = |name: &str| find(name).and_then(|r| r.bytes_median).map(|m| m.value);
         for other in ["gmm-4", "gaussian-9", "lpg-2x5 known rate"] {
             let ratio = bytes("raw-9-bit").zip(bytes(other)).map(|(raw, other)| raw / other);
             let what = format!("samples of nine bits cost less than a third of {other}");
-            claims.below(format!("raw-is-cheapest/{}", other.replace(' ', "-")), what, ratio, 1.0 / 3.0).at_full_trials();
+            claims
+                .below(format!("raw-is-cheapest/{}", other.replace(' ', "-")), what, ratio, 1.0 / 3.0)
+                .at_full_trials();
         }
         let nodes = |name: &str| find(name).and_then(|r| r.nodes_median).map(|m| m.value);
         let more = nodes("raw-9-bit").zip(nodes("raw-64-bit")).map(|(a, b)| a - b);
-        claims.at_most("quantising-is-free", "nine bits a sample need no more nodes than exact samples", more, 0.0).at_full_trials();
+        claims
+            .at_most("quantising-is-free", "nine bits a sample need no more nodes than exact samples", more, 0.0)
+            .at_full_trials();
     }
 
     fn plot(&self, _: &Settings, rows: &Vec<Row>) -> Plot {
-        let mut panel = Panel::new("Cost and accuracy", Axis::log("bytes of all messages (median)"), Axis::log("error at the end (m, median)"))
-            .legend(Legend::Outside);
+        let mut panel = Panel::new(
+            "Cost and accuracy",
+            Axis::log("bytes of all messages (median)"),
+            Axis::log("error at the end (m, median)"),
+        )
+        .legend(Legend::Outside);
         for row in rows {
-            let place = row.bytes_median.zip(row.final_err_median).map(|(b, e)| (b.value, e.value));
+            let place = row
+                .bytes_median
+                .zip(row.final_err_median)
+                .map(|(b, e)| (b.value, e.value));
             panel = panel.with(Layer::points(row.scheme, place.into_iter().collect()));
         }
         Plot::of(panel)

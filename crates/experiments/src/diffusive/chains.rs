@@ -102,7 +102,10 @@ fn schemes_a_few() -> Vec<Scheme> {
             [
                 Scheme::new("exact", A).at(range).up_to(30),
                 Scheme::new("gmm-4", A).at(range).of(Form::Mixture(4)),
-                Scheme::new("gaussian known rate", A).at(range).of(Form::Gaussian).known(),
+                Scheme::new("gaussian known rate", A)
+                    .at(range)
+                    .of(Form::Gaussian)
+                    .known(),
             ]
         })
         .collect()
@@ -132,17 +135,36 @@ fn schemes_b() -> Vec<Scheme> {
         Scheme::new("gmm-4", B).of(Form::Mixture(4)),
         Scheme::new("exact known rate", B).known().up_to(30),
         Scheme::new("gmm-4 known rate", B).of(Form::Mixture(4)).known(),
-        Scheme::new("lpg-1x5 known rate", B).of(Form::Lpg { components: 1, degree: 5 }).known(),
-        Scheme::new("particles-25 known rate", B).of(Form::Particles(25)).known(),
-        Scheme::new("mode and curvature known rate", B).of(Form::Laplace).known(),
+        Scheme::new("lpg-1x5 known rate", B)
+            .of(Form::Lpg {
+                components: 1,
+                degree: 5,
+            })
+            .known(),
+        Scheme::new("particles-25 known rate", B)
+            .of(Form::Particles(25))
+            .known(),
+        Scheme::new("mode and curvature known rate", B)
+            .of(Form::Laplace)
+            .known(),
     ]);
     all
 }
 
 fn windy(example: super::common::Example) -> Vec<Scheme> {
-    [("covariance", Rule::Covariance), ("information", Rule::MutualInformation), ("mahalanobis", Rule::Mahalanobis)]
-        .map(|(name, rule)| Scheme::new(name, example).of(Form::Mixture(4)).by(rule).in_wind().up_to(14))
-        .to_vec()
+    [
+        ("covariance", Rule::Covariance),
+        ("information", Rule::MutualInformation),
+        ("mahalanobis", Rule::Mahalanobis),
+    ]
+    .map(|(name, rule)| {
+        Scheme::new(name, example)
+            .of(Form::Mixture(4))
+            .by(rule)
+            .in_wind()
+            .up_to(14)
+    })
+    .to_vec()
 }
 
 fn find<'a>(rows: &'a Rows, key: &str) -> Option<&'a Summary> {
@@ -156,8 +178,15 @@ fn nodes(rows: &Rows, key: &str) -> Option<f64> {
 fn references(rows: &Rows, claims: &mut Claims) {
     let summary = || rows.summary.iter();
     claims.references("reach", "share that reaches the threshold", summary(), |r| (r.key(), r.reach));
-    let measured = |m: Option<Measured>| m.unwrap_or(Measured { value: f64::NAN, standard_error: None });
-    claims.references("nodes_median", "median nodes to the threshold", summary(), |r| (r.key(), measured(r.nodes_median)));
+    let measured = |m: Option<Measured>| {
+        m.unwrap_or(Measured {
+            value: f64::NAN,
+            standard_error: None,
+        })
+    };
+    claims.references("nodes_median", "median nodes to the threshold", summary(), |r| {
+        (r.key(), measured(r.nodes_median))
+    });
     claims.references("final_err_median", "median error at the end", summary(), |r| {
         (r.key(), measured(r.final_err_median))
     });
@@ -175,21 +204,34 @@ fn claims_fig3(rows: &Rows, claims: &mut Claims) {
     for key in ["exact 15", "exact 10", "gmm-4 15", "gmm-4 10"] {
         let end = find(rows, key).and_then(|s| s.final_err_median).map(|m| m.value);
         let what = format!("the search ends at the source: {key}");
-        claims.below(format!("arrives/{}", key.replace(' ', "-")), what, end, 0.1).at_full_trials();
+        claims
+            .below(format!("arrives/{}", key.replace(' ', "-")), what, end, 0.1)
+            .at_full_trials();
     }
     let at = |scheme: &str, range: f64, step: usize| {
-        rows.curves.iter().find(|c| (c.scheme, c.range, c.step) == (scheme, range, step)).map(|c| c.err_med)
+        rows.curves
+            .iter()
+            .find(|c| (c.scheme, c.range, c.step) == (scheme, range, step))
+            .map(|c| c.err_med)
     };
     for range in [15.0, 10.0] {
         let errors = [1, 3, 6].map(|step| at("exact", range, step));
-        claims.decreasing(format!("falls/{range}"), "the error falls as nodes are added", errors).at_full_trials();
+        claims
+            .decreasing(format!("falls/{range}"), "the error falls as nodes are added", errors)
+            .at_full_trials();
     }
-    let shorter = at("exact", 15.0, 6).zip(at("exact", 10.0, 6)).map(|(wide, narrow)| wide - narrow);
-    claims.below("range", "after six nodes 15 m of range are ahead of 10 m", shorter, 0.0).at_full_trials();
+    let shorter = at("exact", 15.0, 6)
+        .zip(at("exact", 10.0, 6))
+        .map(|(wide, narrow)| wide - narrow);
+    claims
+        .below("range", "after six nodes 15 m of range are ahead of 10 m", shorter, 0.0)
+        .at_full_trials();
     calibrated(rows, claims, "exact 15");
     let wrong = find(rows, "gaussian known rate 15").map(|s| s.wrong.value);
     let what = "one Gaussian stops more than a metre off in a good part of the searches; the paper shows none (errata diffusive-12)";
-    claims.at_least("gaussian-is-often-wrong", what, wrong, 0.1).at_full_trials();
+    claims
+        .at_least("gaussian-is-often-wrong", what, wrong, 0.1)
+        .at_full_trials();
 }
 
 fn claims_fig4(rows: &Rows, claims: &mut Claims) {
@@ -198,26 +240,43 @@ fn claims_fig4(rows: &Rows, claims: &mut Claims) {
         let (wide, narrow) = (nodes(rows, &format!("{scheme} 15")), nodes(rows, &format!("{scheme} 10")));
         let id = format!("range/{}", scheme.replace(' ', "-"));
         let what = format!("15 m of range need fewer nodes than 10 m: {scheme}");
-        claims.below(id, what, wide.zip(narrow).map(|(w, n)| w - n), 0.0).at_full_trials();
+        claims
+            .below(id, what, wide.zip(narrow).map(|(w, n)| w - n), 0.0)
+            .at_full_trials();
     }
     let what = "the printed 14 nodes are below almost every single-Gaussian search (errata diffusive-12)";
     let lowest = find(rows, "gaussian known rate 15").and_then(|s| s.nodes_q10);
-    claims.above("printed-14", what, lowest, 14.0).at_defaults().at_full_trials();
+    claims
+        .above("printed-14", what, lowest, 14.0)
+        .at_defaults()
+        .at_full_trials();
     calibrated(rows, claims, "exact 15");
 }
 
 fn claims_fig7(rows: &Rows, claims: &mut Claims) {
     let at = |scheme: &str, step: usize| rows.curves.iter().find(|c| c.scheme == scheme && c.step == step);
-    let difference = |step| at("lpg-2x5 known rate", step).zip(at("gaussian known rate", step)).map(|(l, g)| l.err_med - g.err_med);
+    let difference = |step| {
+        at("lpg-2x5 known rate", step)
+            .zip(at("gaussian known rate", step))
+            .map(|(l, g)| l.err_med - g.err_med)
+    };
     for step in [4, 6, 8] {
         let what = format!("polynomial Gaussians are nearer than one Gaussian after {step} nodes");
-        claims.below(format!("lpg-ahead/{step}"), what, difference(step), 0.0).at_full_trials();
+        claims
+            .below(format!("lpg-ahead/{step}"), what, difference(step), 0.0)
+            .at_full_trials();
     }
     let determinant = |scheme| at(scheme, 5).map(|c| c.log10det_med);
     let what = "log10 det after five nodes, polynomial Gaussians";
-    claims.near("det5/lpg", what, determinant("lpg-2x5 known rate"), -3.8, 1.0).at_defaults().at_full_trials();
+    claims
+        .near("det5/lpg", what, determinant("lpg-2x5 known rate"), -3.8, 1.0)
+        .at_defaults()
+        .at_full_trials();
     let what = "log10 det after five nodes, one Gaussian";
-    claims.near("det5/gaussian", what, determinant("gaussian known rate"), 3.6, 1.0).at_defaults().at_full_trials();
+    claims
+        .near("det5/gaussian", what, determinant("gaussian known rate"), 3.6, 1.0)
+        .at_defaults()
+        .at_full_trials();
     calibrated(rows, claims, "exact 15");
 }
 
@@ -225,14 +284,26 @@ fn claims_fig8(rows: &Rows, claims: &mut Claims) {
     references(rows, claims);
     let median = |key: &str| nodes(rows, &format!("{key} 15"));
     let what = "polynomial Gaussians reach the threshold with about the printed 7 nodes";
-    claims.near("printed-7", what, median("lpg-2x5 known rate"), 7.0, 1.0).at_full_trials();
+    claims
+        .near("printed-7", what, median("lpg-2x5 known rate"), 7.0, 1.0)
+        .at_full_trials();
     let what = "one Gaussian with the rate carried takes about the printed 20";
-    claims.near("printed-20", what, median("gaussian-9"), 20.0, 4.0).at_full_trials();
+    claims
+        .near("printed-20", what, median("gaussian-9"), 20.0, 4.0)
+        .at_full_trials();
     let gap = |other: &str| median("lpg-2x5 known rate").zip(median(other)).map(|(l, g)| l - g);
-    claims.below("lpg-first", "polynomial Gaussians need fewer nodes than one Gaussian", gap("gaussian known rate"), 0.0)
+    claims
+        .below(
+            "lpg-first",
+            "polynomial Gaussians need fewer nodes than one Gaussian",
+            gap("gaussian known rate"),
+            0.0,
+        )
         .at_full_trials();
     let what = "a mixture of 23 numbers is as good as 51 of polynomial Gaussians (errata diffusive-9)";
-    let difference = median("gmm-4 known rate").zip(median("lpg-2x5 known rate")).map(|(m, l)| m - l);
+    let difference = median("gmm-4 known rate")
+        .zip(median("lpg-2x5 known rate"))
+        .map(|(m, l)| m - l);
     claims.at_most("mixtures-do", what, difference, 0.0).at_full_trials();
     let wrong = find(rows, "mode and curvature known rate 15").map(|s| s.wrong.value);
     let what = "mode and curvature report convergence in the wrong place in most searches: never trust a determinant from them";
@@ -243,7 +314,10 @@ fn claims_fig8(rows: &Rows, claims: &mut Claims) {
 fn claims_wind(rows: &Rows, claims: &mut Claims) {
     references(rows, claims);
     let reach = |key: &str| find(rows, key).map(|s| s.reach.value);
-    for (rule, id) in [("covariance 15", "covariance-first"), ("information 15", "information-first")] {
+    for (rule, id) in [
+        ("covariance 15", "covariance-first"),
+        ("information 15", "information-first"),
+    ] {
         let gap = reach(rule).zip(reach("mahalanobis 15")).map(|(a, b)| a - b);
         let what = format!("in wind the rule reaches the threshold more often than Mahalanobis: {rule}");
         claims.above(id, what, gap, 0.1).at_full_trials();
@@ -375,7 +449,13 @@ impl Figure for Chains {
     fn plot(&self, _: &Settings, rows: &Rows) -> Plot {
         let schemes = (self.schemes)();
         let several = schemes.iter().any(|s| s.range != schemes[0].range);
-        let label = |s: &Scheme| if several { format!("{}, {} m", s.name, s.range) } else { s.name.to_owned() };
+        let label = |s: &Scheme| {
+            if several {
+                format!("{}, {} m", s.name, s.range)
+            } else {
+                s.name.to_owned()
+            }
+        };
         let of = |s: &Scheme| {
             let (name, range) = (s.name, s.range);
             rows.curves.iter().filter(move |c| c.scheme == name && c.range == range)
@@ -387,13 +467,15 @@ impl Figure for Chains {
         );
         let threshold = schemes[0].example.threshold.log10();
         let last = rows.curves.iter().map(|c| c.step).max().unwrap_or(1) as f64;
-        determinants = determinants.with(Layer::dashed("threshold", vec![(1.0, threshold), (last, threshold)]).coloured(7));
+        determinants =
+            determinants.with(Layer::dashed("threshold", vec![(1.0, threshold), (last, threshold)]).coloured(7));
         for (i, scheme) in schemes.iter().enumerate() {
             if i == 0 {
                 let band = of(scheme).map(|c| (c.step as f64, c.err_q10, c.err_q90)).collect();
                 errors = errors.with(Layer::band("", band).coloured(i));
             }
-            errors = errors.with(Layer::line(label(scheme), points(of(scheme), |c| (c.step as f64, c.err_med))).coloured(i));
+            errors =
+                errors.with(Layer::line(label(scheme), points(of(scheme), |c| (c.step as f64, c.err_med))).coloured(i));
             determinants = determinants
                 .with(Layer::line(label(scheme), points(of(scheme), |c| (c.step as f64, c.log10det_med))).coloured(i));
         }
@@ -426,7 +508,10 @@ fn summarise(scheme: &Scheme, settings: &Settings, tracks: &[&Track]) -> Result<
     let reached: Vec<&&Track> = tracks.iter().filter(|t| t.converged()).collect();
     let counts: Vec<f64> = reached.iter().map(|t| t.nodes() as f64).collect();
     let finals: Vec<f64> = tracks.iter().map(|t| t.final_error()).collect();
-    let third: Vec<f64> = tracks.iter().filter_map(|t| t.errors.get(2).or(t.errors.last()).copied()).collect();
+    let third: Vec<f64> = tracks
+        .iter()
+        .filter_map(|t| t.errors.get(2).or(t.errors.last()).copied())
+        .collect();
     let wrong = |t: &Track| t.final_error() > 1.0;
     let rate = scheme.search(settings)?.rate;
     Ok(Summary {

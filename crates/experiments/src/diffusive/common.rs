@@ -93,7 +93,11 @@ impl Example {
     }
 
     pub fn sensor(&self, windy: bool) -> Result<SourceSensor, Error> {
-        let wind = if windy { Vector3::new(WIND[0], WIND[1], 0.0) } else { Vector3::zeros() };
+        let wind = if windy {
+            Vector3::new(WIND[0], WIND[1], 0.0)
+        } else {
+            Vector3::zeros()
+        };
         let air = Air::new(DIFFUSIVITY, wind, Ground::Impermeable).map_err(Error::failed)?;
         let instants = (1..=self.samples).map(|j| 5.0 * j as f64).collect();
         let sensor = SourceSensor::new(air, instants, self.noise).map_err(Error::failed)?;
@@ -195,7 +199,11 @@ impl Scheme {
 
     /// The search of this scheme from the alarm node.
     pub fn search(&self, settings: &Settings) -> Result<Search, Error> {
-        let rate = if self.known_rate { RateModel::Known(RATE) } else { settings.joint()? };
+        let rate = if self.known_rate {
+            RateModel::Known(RATE)
+        } else {
+            settings.joint()?
+        };
         let alarm = Vector2::from(ALARM);
         let mut search = Search::new(&alarm, settings.prior_sd, search_box(), rate, self.example.threshold)
             .map_err(Error::failed)?;
@@ -203,6 +211,11 @@ impl Scheme {
         search.rule = self.rule;
         search.most_nodes = self.most_nodes;
         search.wire = self.wire;
+        if self.form != Form::Raw {
+            // What is projected need not be exact to seven digits.
+            search.cells.keep = 14.0;
+            search.cells.width = 1.0;
+        }
         Ok(search)
     }
 
@@ -244,7 +257,10 @@ impl Track {
             status: outcome.status,
             errors,
             log10_determinants: steps.iter().map(|s| s.log10_determinant).collect(),
-            nees: steps.iter().filter_map(|s| s.estimate.mahalanobis_squared(source).ok()).collect(),
+            nees: steps
+                .iter()
+                .filter_map(|s| s.estimate.mahalanobis_squared(source).ok())
+                .collect(),
             bits: outcome.bits(),
         }
     }
@@ -293,7 +309,11 @@ pub(super) fn quantile(values: impl IntoIterator<Item = f64>, at: f64) -> Option
     let position = at * (sorted.len().checked_sub(1)? as f64);
     let (low, share) = (position.floor() as usize, position.fract());
     let high = (low + 1).min(sorted.len() - 1);
-    Some(if share == 0.0 { sorted[low] } else { sorted[low] + share * (sorted[high] - sorted[low]) })
+    Some(if share == 0.0 {
+        sorted[low]
+    } else {
+        sorted[low] + share * (sorted[high] - sorted[low])
+    })
 }
 
 /// The median with a standard error from the spread of the middle half, as of a normal sample: `1.2533 sd / sqrt n`.

@@ -109,7 +109,9 @@ impl Parameters {
         let settings = Settings::default();
         let endless = super::common::Example { threshold: 1e-300, ..B };
         let outcome = Scheme::new("exact", endless).up_to(self.nodes).run(&settings, trial)?;
-        let Some(posterior) = outcome.posterior else { return Ok(None) };
+        let Some(posterior) = outcome.posterior else {
+            return Ok(None);
+        };
         let likelihood = SourceLikelihood::new(outcome.records, settings.joint()?).map_err(Error::failed)?;
         Area::new(&posterior, &likelihood).map(Some).map_err(Error::failed)
     }
@@ -149,15 +151,22 @@ impl Figure for Envelope {
         let edges = [("east", 0.0), ("north", 90.0_f64)];
         let all = trials(context, "diffusive-chains", p.trials, |trial| {
             let Some(area) = p.area(trial)? else { return Ok(None) };
-            let quantile = |angle: f64, level| area.reach(&Vector2::zeros(), angle.to_radians(), p.time, p.threshold, level);
+            let quantile =
+                |angle: f64, level| area.reach(&Vector2::zeros(), angle.to_radians(), p.time, p.threshold, level);
             let bands = edges.map(|(_, angle)| Ok((quantile(angle, 0.05)?, quantile(angle, 0.95)?)));
-            let bands = bands.into_iter().collect::<Result<Vec<_>, fewbits_diffusive::Error>>().map_err(Error::failed)?;
+            let bands = bands
+                .into_iter()
+                .collect::<Result<Vec<_>, fewbits_diffusive::Error>>()
+                .map_err(Error::failed)?;
             Ok(Some(bands))
         })?;
         let known: Vec<&Vec<(f64, f64)>> = all.iter().flatten().collect();
         let coverage = edges.iter().enumerate().filter_map(|(i, (edge, angle))| {
             let truth = radius + source.x * angle.to_radians().cos() + source.y * angle.to_radians().sin();
-            let hits = known.iter().filter(|bands| (bands[i].0..=bands[i].1).contains(&truth)).count();
+            let hits = known
+                .iter()
+                .filter(|bands| (bands[i].0..=bands[i].1).contains(&truth))
+                .count();
             let widths: Vec<f64> = known.iter().map(|bands| bands[i].1 - bands[i].0).collect();
             Some(Coverage {
                 edge,
@@ -174,7 +183,10 @@ impl Figure for Envelope {
             for direction in (0..360).step_by(15) {
                 context.check()?;
                 let angle = f64::from(direction).to_radians();
-                let at = |level| area.reach(&origin, angle, p.time, p.threshold, level).map_err(Error::failed);
+                let at = |level| {
+                    area.reach(&origin, angle, p.time, p.threshold, level)
+                        .map_err(Error::failed)
+                };
                 band.push(Band {
                     t: p.time,
                     c_star: p.threshold,
@@ -189,44 +201,72 @@ impl Figure for Envelope {
                 for i in 0..GRID {
                     let place = Vector2::new(i as f64 + 0.5, j as f64 + 0.5) * (100.0 / GRID as f64);
                     let p_exceed = area.exceedance(&place, p.time, p.threshold).map_err(Error::failed)?;
-                    exceedance.push(Exceedance { x: place.x, y: place.y, p_exceed });
+                    exceedance.push(Exceedance {
+                        x: place.x,
+                        y: place.y,
+                        p_exceed,
+                    });
                 }
             }
         }
-        Ok(Rows { band, coverage, exceedance })
+        Ok(Rows {
+            band,
+            coverage,
+            exceedance,
+        })
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims.references("coverage", "coverage of the 90 per cent band", rows.coverage.iter(), |c| (c.edge.to_owned(), c.coverage));
+        claims.references("coverage", "coverage of the 90 per cent band", rows.coverage.iter(), |c| {
+            (c.edge.to_owned(), c.coverage)
+        });
         claims.references("radius", "true radius", rows.coverage.iter(), |c| (c.edge.to_owned(), c.radius));
-        claims.references("width", "median width of the band", rows.coverage.iter(), |c| (c.edge.to_owned(), c.width_median));
+        claims.references("width", "median width of the band", rows.coverage.iter(), |c| {
+            (c.edge.to_owned(), c.width_median)
+        });
         claims.all("ordered", "quantiles are ordered", &rows.band, |b| b.r05 <= b.r50 && b.r50 <= b.r95);
-        claims.all("probabilities", "exceedances are probabilities", &rows.exceedance, |e| (0.0..=1.0 + 1e-9).contains(&e.p_exceed));
+        claims.all("probabilities", "exceedances are probabilities", &rows.exceedance, |e| {
+            (0.0..=1.0 + 1e-9).contains(&e.p_exceed)
+        });
         for c in &rows.coverage {
             let what = format!("nine bands in ten hold the true edge: {}", c.edge);
-            claims.within(format!("calibrated/{}", c.edge), what, c.coverage, 0.9, 4.0).at_full_trials();
+            claims
+                .within(format!("calibrated/{}", c.edge), what, c.coverage, 0.9, 4.0)
+                .at_full_trials();
         }
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let at = |i: usize| (i as f64 + 0.5) * (100.0 / GRID as f64);
         let centres: Vec<f64> = (0..GRID).map(at).collect();
-        let values = rows.exceedance.chunks(GRID).map(|row| row.iter().map(|e| e.p_exceed).collect()).collect();
+        let values = rows
+            .exceedance
+            .chunks(GRID)
+            .map(|row| row.iter().map(|e| e.p_exceed).collect())
+            .collect();
         let radius = rows.coverage.first().map_or(0.0, |c| c.radius);
         let circle = (0..=72).map(|i| {
             let angle = f64::from(i * 5).to_radians();
             (B.source[0] + radius * angle.cos(), B.source[1] + radius * angle.sin())
         });
-        let map = Panel::new("Probability of exceedance", Axis::linear("x (m)").between(0.0, 100.0), Axis::linear("y (m)").between(0.0, 100.0))
-            .with(Layer::heat("P(c > threshold)", centres.clone(), centres, values))
-            .with(Layer::dashed("true edge", circle.collect()).coloured(3))
-            .legend(Legend::Outside);
+        let map = Panel::new(
+            "Probability of exceedance",
+            Axis::linear("x (m)").between(0.0, 100.0),
+            Axis::linear("y (m)").between(0.0, 100.0),
+        )
+        .with(Layer::heat("P(c > threshold)", centres.clone(), centres, values))
+        .with(Layer::dashed("true edge", circle.collect()).coloured(3))
+        .legend(Legend::Outside);
         let of = |f: fn(&Band) -> f64| rows.band.iter().map(|b| (b.direction_deg, f(b))).collect::<Vec<_>>();
         let limits = rows.band.iter().map(|b| (b.direction_deg, b.r05, b.r95)).collect();
-        let band = Panel::new(format!("Reach from the alarm node after {} s", p.time), Axis::linear("direction (deg)"), Axis::linear("reach (m)"))
-            .with(Layer::band("90 % band", limits).coloured(0))
-            .with(Layer::line("median", of(|b| b.r50)).coloured(0))
-            .with(Layer::dashed("truth", of(|b| b.truth)).coloured(3));
+        let band = Panel::new(
+            format!("Reach from the alarm node after {} s", p.time),
+            Axis::linear("direction (deg)"),
+            Axis::linear("reach (m)"),
+        )
+        .with(Layer::band("90 % band", limits).coloured(0))
+        .with(Layer::line("median", of(|b| b.r50)).coloured(0))
+        .with(Layer::dashed("truth", of(|b| b.truth)).coloured(3));
         Plot::grid(2, vec![map, band])
     }
 }

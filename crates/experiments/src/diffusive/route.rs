@@ -44,7 +44,9 @@ impl Parameters {
     }
 
     fn trial(&self, context: &Context<'_>) -> Trial {
-        context.monte_carlo(context.stream("diffusive-chains"), 1).trial(self.deployment)
+        context
+            .monte_carlo(context.stream("diffusive-chains"), 1)
+            .trial(self.deployment)
     }
 
     fn search(&self, scheme: &Scheme, context: &Context<'_>) -> Result<Outcome, Error> {
@@ -109,7 +111,10 @@ impl Figure for Trace {
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<TraceRow>, Error> {
-        let scheme = Scheme::new("gmm-4", A).at(p.range).of(Form::Mixture(4)).by(Rule::MutualInformation);
+        let scheme = Scheme::new("gmm-4", A)
+            .at(p.range)
+            .of(Form::Mixture(4))
+            .by(Rule::MutualInformation);
         let outcome = p.search(&scheme, context)?;
         let mut rows = Vec::new();
         for (i, step) in outcome.steps.iter().enumerate() {
@@ -145,11 +150,16 @@ impl Figure for Trace {
         claims.near("delivered", "what is sent is received", balance, 0.0, 0.0);
         claims.near("one-end", "the search ends once", count(Event::Stop) as f64, 1.0, 0.0);
         let last = rows.iter().filter_map(|r| r.log10_determinant).next_back();
-        claims.below("sharp", "the last determinant is below the threshold", last, A.threshold.log10()).at_defaults();
+        claims
+            .below("sharp", "the last determinant is below the threshold", last, A.threshold.log10())
+            .at_defaults();
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<TraceRow>) -> Plot {
-        let tests = rows.iter().filter_map(|r| Some((r.step as f64, r.log10_determinant?))).collect();
+        let tests = rows
+            .iter()
+            .filter_map(|r| Some((r.step as f64, r.log10_determinant?)))
+            .collect();
         let mut total = 0.0;
         let bytes = rows
             .iter()
@@ -268,9 +278,16 @@ impl Figure for Route {
 
     fn claims(&self, p: &Parameters, rows: &RouteRows, claims: &mut Claims) {
         let last = rows.route.last().map(|r| (r.x - A.source[0]).hypot(r.y - A.source[1]));
-        claims.at_most("ends-near", "the route ends within 15 m of the source", last, 15.0).at_defaults();
-        let error = rows.route.last().map(|r| (r.estimate_x - A.source[0]).hypot(r.estimate_y - A.source[1]));
-        claims.at_most("estimate", "the estimate is within 0.2 m of the source", error, 0.2).at_defaults();
+        claims
+            .at_most("ends-near", "the route ends within 15 m of the source", last, 15.0)
+            .at_defaults();
+        let error = rows
+            .route
+            .last()
+            .map(|r| (r.estimate_x - A.source[0]).hypot(r.estimate_y - A.source[1]));
+        claims
+            .at_most("estimate", "the estimate is within 0.2 m of the source", error, 0.2)
+            .at_defaults();
         let first = rows.route.first().map(|r| (r.x - ALARM[0]).hypot(r.y - ALARM[1]));
         claims.near("starts", "the route starts at the alarm node", first, 0.0, 1e-9);
         claims.all("in-range", "no hop is longer than the range", rows.route.windows(2), |pair| {
@@ -296,7 +313,11 @@ impl Figure for Route {
         panel = panel
             .with(Layer::line("", route.clone()).coloured(0))
             .with(Layer::points("visited", route).coloured(0).marked(Marker::Square))
-            .with(Layer::points("source", vec![A.source.into()]).coloured(3).marked(Marker::Triangle));
+            .with(
+                Layer::points("source", vec![A.source.into()])
+                    .coloured(3)
+                    .marked(Marker::Triangle),
+            );
         Plot::of(panel)
     }
 }

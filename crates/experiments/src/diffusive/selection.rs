@@ -1,6 +1,6 @@
 //! Rules that choose the next node: how well they rank it, and what that saves.
 
-use super::common::{A, B, Scheme, Settings, Network, fraction, tracks, trials};
+use super::common::{A, B, Network, Scheme, Settings, fraction, tracks, trials};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_diffusive::information::Predictions;
@@ -92,7 +92,10 @@ const RULES: [&str; 7] = [
 fn schemes() -> Vec<(&'static str, &'static str, Scheme)> {
     let mut all = Vec::new();
     for (setting, example, range) in [("B15", B, 15.0), ("A15", A, 15.0), ("A10", A, 10.0)] {
-        for (name, rule) in [("information", Rule::MutualInformation), ("mahalanobis", Rule::Mahalanobis)] {
+        for (name, rule) in [
+            ("information", Rule::MutualInformation),
+            ("mahalanobis", Rule::Mahalanobis),
+        ] {
             all.push((setting, name, Scheme::new(name, example).at(range).by(rule).up_to(30)));
         }
     }
@@ -164,44 +167,93 @@ impl Figure for Selection {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims.references("nodes_mean", "mean nodes to the threshold", rows.searches.iter(), |s| (s.key(), s.nodes_mean));
+        claims
+            .references("nodes_mean", "mean nodes to the threshold", rows.searches.iter(), |s| (s.key(), s.nodes_mean));
         claims.references("reach", "share that reaches the threshold", rows.searches.iter(), |s| (s.key(), s.reach));
         let reach = |key: &str| rows.searches.iter().find(|s| s.key() == key).map(|s| s.reach.value);
         for setting in ["B15", "A15", "A10"] {
-            let gap = reach(&format!("{setting} information")).zip(reach(&format!("{setting} mahalanobis"))).map(|(a, b)| a - b);
+            let gap = reach(&format!("{setting} information"))
+                .zip(reach(&format!("{setting} mahalanobis")))
+                .map(|(a, b)| a - b);
             let what = format!("information reaches the threshold at least as often as Mahalanobis: {setting}");
-            claims.at_least(format!("no-stall/{setting}"), what, gap, 0.0).at_full_trials();
+            claims
+                .at_least(format!("no-stall/{setting}"), what, gap, 0.0)
+                .at_full_trials();
         }
-        let rank = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).map(|r| r.rank_correlation.value);
-        claims.at_least("bound-ranks", "the Gaussian bound ranks as the exact information does", rank("gaussian bound"), 0.98).at_full_trials();
+        let rank = |rule: &str| {
+            rows.rankings
+                .iter()
+                .find(|r| r.rule == rule)
+                .map(|r| r.rank_correlation.value)
+        };
+        claims
+            .at_least(
+                "bound-ranks",
+                "the Gaussian bound ranks as the exact information does",
+                rank("gaussian bound"),
+                0.98,
+            )
+            .at_full_trials();
         let gap = rank("gaussian bound").zip(rank("mahalanobis")).map(|(a, b)| a - b);
-        claims.above("mahalanobis-does-not", "Mahalanobis distance ranks far worse", gap, 0.2).at_full_trials();
+        claims
+            .above("mahalanobis-does-not", "Mahalanobis distance ranks far worse", gap, 0.2)
+            .at_full_trials();
         let bias = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).and_then(|r| r.bias);
-        claims.at_most("lower", "the lower bound is below the exact information on average", bias("pairwise lower"), 1e-6);
+        claims.at_most(
+            "lower",
+            "the lower bound is below the exact information on average",
+            bias("pairwise lower"),
+            1e-6,
+        );
         claims.at_least("upper", "the upper bound is above it on average", bias("pairwise upper"), -1e-6);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let names = rows.searches.iter().step_by(2).enumerate().map(|(i, s)| (i as f64, s.setting.to_owned()));
-        let mut nodes = Panel::new("Nodes to the threshold", Axis::linear("example and range (m)").named(names), Axis::linear("mean nodes"))
-            .legend(Legend::TopLeft);
+        let names = rows
+            .searches
+            .iter()
+            .step_by(2)
+            .enumerate()
+            .map(|(i, s)| (i as f64, s.setting.to_owned()));
+        let mut nodes = Panel::new(
+            "Nodes to the threshold",
+            Axis::linear("example and range (m)").named(names),
+            Axis::linear("mean nodes"),
+        )
+        .legend(Legend::TopLeft);
         for (c, rule) in ["information", "mahalanobis"].into_iter().enumerate() {
             let of = rows.searches.iter().filter(|s| s.rule == rule).enumerate();
-            nodes = nodes.with(Layer::measured(rule, of, |(i, s)| (i as f64 + 0.1 * (c as f64 - 0.5), s.nodes_mean)).coloured(c));
+            nodes = nodes.with(
+                Layer::measured(rule, of, |(i, s)| (i as f64 + 0.1 * (c as f64 - 0.5), s.nodes_mean)).coloured(c),
+            );
         }
-        let names = rows.rankings.iter().enumerate().map(|(i, r)| (i as f64, r.rule.to_owned()));
-        let ranks = Panel::new("Ranking", Axis::linear("rule").named(names), Axis::linear("rank correlation with exact information"))
-            .with(Layer::measured("", rows.rankings.iter().enumerate(), |(i, r)| (i as f64, r.rank_correlation)));
+        let names = rows
+            .rankings
+            .iter()
+            .enumerate()
+            .map(|(i, r)| (i as f64, r.rule.to_owned()));
+        let ranks = Panel::new(
+            "Ranking",
+            Axis::linear("rule").named(names),
+            Axis::linear("rank correlation with exact information"),
+        )
+        .with(Layer::measured("", rows.rankings.iter().enumerate(), |(i, r)| (i as f64, r.rank_correlation)));
         Plot::grid(2, vec![nodes, ranks])
     }
 }
 
 /// Of every rule: rank correlation, information lost, bias; none if the search had no candidates.
-fn rank(p: &Parameters, settings: &Settings, trial: fewbits_monte_carlo::Trial) -> Result<Option<Vec<[f64; 3]>>, Error> {
+fn rank(
+    p: &Parameters,
+    settings: &Settings,
+    trial: fewbits_monte_carlo::Trial,
+) -> Result<Option<Vec<[f64; 3]>>, Error> {
     let endless = super::common::Example { threshold: 1e-300, ..B };
     let scheme = Scheme::new("exact", endless).up_to(3);
     let outcome = scheme.run(settings, trial)?;
-    let (Some(posterior), Some(last)) = (&outcome.posterior, outcome.steps.last()) else { return Ok(None) };
+    let (Some(posterior), Some(last)) = (&outcome.posterior, outcome.steps.last()) else {
+        return Ok(None);
+    };
     let network = Network::draw(trial.stream, settings.nodes, scheme.range)?;
     let sensor = B.sensor(false)?;
     let rate = settings.joint()?;
@@ -223,12 +275,22 @@ fn rank(p: &Parameters, settings: &Settings, trial: fewbits_monte_carlo::Trial) 
     let mut exact = Vec::new();
     let mut scores: Vec<Vec<f64>> = vec![Vec::new(); RULES.len()];
     let selector = |rule| Selector::new(rule, posterior, &last.estimate, &rate).map_err(Error::failed);
-    let others = [selector(Rule::CramerRao)?, selector(Rule::Covariance)?, selector(Rule::Mahalanobis)?];
+    let others = [
+        selector(Rule::CramerRao)?,
+        selector(Rule::Covariance)?,
+        selector(Rule::Mahalanobis)?,
+    ];
     for place in &places {
         let means: Vec<Vec<f64>> = clumps
             .clumps()
             .iter()
-            .map(|c| sensor.responses(place, &Vector2::new(c.mean[0], c.mean[1])).iter().map(|a| a * c.mean[2]).collect())
+            .map(|c| {
+                sensor
+                    .responses(place, &Vector2::new(c.mean[0], c.mean[1]))
+                    .iter()
+                    .map(|a| a * c.mean[2])
+                    .collect()
+            })
             .collect();
         let predictions = Predictions::new(&means, &weights, sensor.noise())?;
         let bounds = predictions.pairwise_bounds();
@@ -246,7 +308,11 @@ fn rank(p: &Parameters, settings: &Settings, trial: fewbits_monte_carlo::Trial) 
         scores
             .iter()
             .map(|own| {
-                let chosen = own.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(i, _)| i);
+                let chosen = own
+                    .iter()
+                    .enumerate()
+                    .max_by(|a, b| a.1.total_cmp(b.1))
+                    .map_or(0, |(i, _)| i);
                 let bias = own.iter().zip(&exact).map(|(a, b)| a - b).sum::<f64>() / exact.len() as f64;
                 [correlation(&ranks(own), &ranks(&exact)), best - exact[chosen], bias]
             })
@@ -255,7 +321,9 @@ fn rank(p: &Parameters, settings: &Settings, trial: fewbits_monte_carlo::Trial) 
 }
 
 fn ranks(values: &[f64]) -> Vec<f64> {
-    let below = |x: f64| values.iter().filter(|v| **v < x).count() as f64 + 0.5 * values.iter().filter(|v| **v == x).count() as f64;
+    let below = |x: f64| {
+        values.iter().filter(|v| **v < x).count() as f64 + 0.5 * values.iter().filter(|v| **v == x).count() as f64
+    };
     values.iter().map(|x| below(*x)).collect()
 }
 

@@ -41,7 +41,9 @@ impl Parameters {
     fn precision(&self) -> Result<Matrix2<f64>, Error> {
         let cross = self.correlation * (self.variance1 * self.variance2).sqrt();
         let covariance = Matrix2::new(self.variance1, cross, cross, self.variance2);
-        covariance.try_inverse().ok_or(Error::Table("the covariance is singular".to_owned()))
+        covariance
+            .try_inverse()
+            .ok_or(Error::Table("the covariance is singular".to_owned()))
     }
 }
 
@@ -120,7 +122,9 @@ impl Figure for Table1 {
         let w = p.precision()?;
         let mean_of = |terms: &[([usize; 2], f64)]| -> Result<f64, Error> {
             let parts = terms.iter().map(|(power, c)| {
-                gaussian_moment(*power, &Vector2::zeros(), &w).map(|moment| c * moment).map_err(Error::failed)
+                gaussian_moment(*power, &Vector2::zeros(), &w)
+                    .map(|moment| c * moment)
+                    .map_err(Error::failed)
             });
             parts.sum()
         };
@@ -129,7 +133,13 @@ impl Figure for Table1 {
             let terms = hermite_terms(nu, &w).map_err(Error::failed)?;
             let misprint = printed(nu, &w);
             let mut powers: Vec<[usize; 2]> = terms.iter().map(|t| t.0).collect();
-            powers.extend(misprint.iter().flatten().map(|t| t.0).filter(|power| !terms.iter().any(|t| t.0 == *power)));
+            powers.extend(
+                misprint
+                    .iter()
+                    .flatten()
+                    .map(|t| t.0)
+                    .filter(|power| !terms.iter().any(|t| t.0 == *power)),
+            );
             let value = |list: &[([usize; 2], f64)], power| list.iter().find(|t| t.0 == power).map_or(0.0, |t| t.1);
             for power in powers {
                 monomials.push(Monomial {
@@ -153,21 +163,38 @@ impl Figure for Table1 {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let what = "every polynomial but the first has mean zero";
         claims.all("zero-mean", what, rows.means.iter().filter(|m| m.nu1 + m.nu2 > 0), |m| m.mean.abs() < 1e-10);
-        let misprint = |nu1, nu2| rows.means.iter().find(|m| (m.nu1, m.nu2) == (nu1, nu2)).and_then(|m| m.printed);
+        let misprint = |nu1, nu2| {
+            rows.means
+                .iter()
+                .find(|m| (m.nu1, m.nu2) == (nu1, nu2))
+                .and_then(|m| m.printed)
+        };
         for (nu, id, reference) in [((4, 0), "he40", MISPRINT_40), ((2, 2), "he22", MISPRINT_22)] {
             let what = "the printed entry has another mean and is a misprint (errata diffusive-3)";
             let value = misprint(nu.0, nu.1).map(f64::abs);
-            claims.near(format!("misprint/{id}"), what, value, reference, 0.01).at_defaults();
+            claims
+                .near(format!("misprint/{id}"), what, value, reference, 0.01)
+                .at_defaults();
         }
         let count = rows.means.len() as f64;
-        claims.near("complete", "fifteen polynomials up to degree four", count, 15.0, 0.0).at_defaults();
+        claims
+            .near("complete", "fifteen polynomials up to degree four", count, 15.0, 0.0)
+            .at_defaults();
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let bars = |value: fn(&Mean) -> Option<f64>| -> Vec<(f64, f64)> {
-            rows.means.iter().enumerate().filter_map(|(i, m)| Some((i as f64, value(m)?))).collect()
+            rows.means
+                .iter()
+                .enumerate()
+                .filter_map(|(i, m)| Some((i as f64, value(m)?)))
+                .collect()
         };
-        let names = rows.means.iter().enumerate().map(|(i, m)| (i as f64, format!("{}{}", m.nu1, m.nu2)));
+        let names = rows
+            .means
+            .iter()
+            .enumerate()
+            .map(|(i, m)| (i as f64, format!("{}{}", m.nu1, m.nu2)));
         Plot::of(
             Panel::new("Mean under the Gaussian", Axis::linear("index nu").named(names), Axis::linear("mean"))
                 .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))

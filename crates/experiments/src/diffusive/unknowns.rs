@@ -83,7 +83,14 @@ impl Model {
 }
 
 /// Six nodes about the source of example B.
-const NODES: [[f64; 2]; 6] = [[58.0, 55.0], [70.0, 52.0], [60.0, 42.0], [66.0, 46.0], [55.0, 48.0], [63.0, 58.0]];
+const NODES: [[f64; 2]; 6] = [
+    [58.0, 55.0],
+    [70.0, 52.0],
+    [60.0, 42.0],
+    [66.0, 46.0],
+    [55.0, 48.0],
+    [63.0, 58.0],
+];
 
 fn models() -> Result<[(&'static str, RateModel); 3], Error> {
     let range = RateRange::new(0.5, 1.5)?;
@@ -140,7 +147,9 @@ impl Figure for Unknowns {
             let information = fisher_information_of(&unknowns, &sensor, &nodes, &source, 1.0).map_err(Error::failed)?;
             // Rows of very different units: factor with the diagonal scaled to one.
             let scale = information.diagonal().map(|d| d.sqrt().recip());
-            let scaled = nalgebra::DMatrix::from_fn(unknowns.len(), unknowns.len(), |i, j| information[(i, j)] * scale[i] * scale[j]);
+            let scaled = nalgebra::DMatrix::from_fn(unknowns.len(), unknowns.len(), |i, j| {
+                information[(i, j)] * scale[i] * scale[j]
+            });
             let Some(factor) = scaled.cholesky() else {
                 return Err(Error::Table("the information is singular".to_owned()));
             };
@@ -160,7 +169,11 @@ impl Figure for Unknowns {
                     let angle = std::f64::consts::TAU * rng.random::<f64>();
                     let rho = p.radius * rng.random::<f64>().sqrt();
                     let node = source + Vector2::new(angle.cos(), angle.sin()) * rho.max(3.0);
-                    let clean: Vec<f64> = sensor.responses(&node, &source).iter().map(|a| a + sensor.bias()).collect();
+                    let clean: Vec<f64> = sensor
+                        .responses(&node, &source)
+                        .iter()
+                        .map(|a| a + sensor.bias())
+                        .collect();
                     sensor.record(&node, &clean).map_err(Error::failed)
                 };
                 let records = (0..*count).map(|_| draw()).collect::<Result<Vec<_>, _>>()?;
@@ -170,8 +183,9 @@ impl Figure for Unknowns {
                     .iter()
                     .map(|(_, model)| {
                         let likelihood = SourceLikelihood::new(records.clone(), *model).map_err(Error::failed)?;
-                        let posterior = Posterior::new(&prior, &likelihood, &search_box(), None, &CellOptions::default())
-                            .map_err(Error::failed)?;
+                        let posterior =
+                            Posterior::new(&prior, &likelihood, &search_box(), None, &CellOptions::default())
+                                .map_err(Error::failed)?;
                         let width = posterior.cells.covariance().determinant().powf(0.25);
                         Ok(((posterior.cells.mean() - source).norm(), width))
                     })
@@ -195,30 +209,75 @@ impl Figure for Unknowns {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims.increasing("more-unknowns", "every further unknown widens the bound", rows.bounds.iter().map(|b| b.sd_x));
+        claims.increasing(
+            "more-unknowns",
+            "every further unknown widens the bound",
+            rows.bounds.iter().map(|b| b.sd_x),
+        );
         let first = rows.bounds.first().map(|b| b.sd_x);
-        claims.near("position-only", "with the position alone unknown the bound of x is about 0.04 m", first, 0.041, 0.015).at_defaults();
+        claims
+            .near(
+                "position-only",
+                "with the position alone unknown the bound of x is about 0.04 m",
+                first,
+                0.041,
+                0.015,
+            )
+            .at_defaults();
         let bias = |key: &str| rows.models.iter().find(|m| m.key() == key);
         let what = "a rate for each sample is metres off without any noise (errata diffusive-2)";
-        claims.above("sample-wise-is-biased", what, bias("sample-wise 20").map(|m| m.bias.value), 1.0).at_defaults().at_full_trials();
+        claims
+            .above("sample-wise-is-biased", what, bias("sample-wise 20").map(|m| m.bias.value), 1.0)
+            .at_defaults()
+            .at_full_trials();
         let what = "and many widths off: it is inconsistent";
-        claims.above("sample-wise-is-inconsistent", what, bias("sample-wise 20").map(|m| m.bias_in_widths.value), 2.0).at_defaults().at_full_trials();
+        claims
+            .above("sample-wise-is-inconsistent", what, bias("sample-wise 20").map(|m| m.bias_in_widths.value), 2.0)
+            .at_defaults()
+            .at_full_trials();
         let what = "one joint rate is right";
-        claims.below("joint-is-right", what, bias("joint 20").map(|m| m.bias.value), 0.01).at_defaults().at_full_trials();
+        claims
+            .below("joint-is-right", what, bias("joint 20").map(|m| m.bias.value), 0.01)
+            .at_defaults()
+            .at_full_trials();
         let order = ["sample-wise 20", "node-wise 20", "joint 20"].map(|key| bias(key).map(|m| m.width.value));
-        claims.decreasing("sharper", "what is assumed shared sharpens the posterior", order).at_defaults().at_full_trials();
+        claims
+            .decreasing("sharper", "what is assumed shared sharpens the posterior", order)
+            .at_defaults()
+            .at_full_trials();
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let names = rows.bounds.iter().enumerate().map(|(i, b)| (i as f64, b.unknown.to_owned()));
-        let bound = Panel::new("Bound of x", Axis::linear("unknown besides the position").named(names), Axis::linear("standard deviation (m)"))
-            .with(Layer::bars("", rows.bounds.iter().enumerate().map(|(i, b)| (i as f64, b.sd_x)).collect(), 0.6));
-        let mut bias = Panel::new("Noise-free samples", Axis::linear("nodes"), Axis::log("median distance to the source (m)")).legend(Legend::Outside);
+        let names = rows
+            .bounds
+            .iter()
+            .enumerate()
+            .map(|(i, b)| (i as f64, b.unknown.to_owned()));
+        let bound = Panel::new(
+            "Bound of x",
+            Axis::linear("unknown besides the position").named(names),
+            Axis::linear("standard deviation (m)"),
+        )
+        .with(Layer::bars(
+            "",
+            rows.bounds
+                .iter()
+                .enumerate()
+                .map(|(i, b)| (i as f64, b.sd_x))
+                .collect(),
+            0.6,
+        ));
+        let mut bias =
+            Panel::new("Noise-free samples", Axis::linear("nodes"), Axis::log("median distance to the source (m)"))
+                .legend(Legend::Outside);
         for (c, model) in ["sample-wise", "node-wise", "joint"].into_iter().enumerate() {
             let of = || rows.models.iter().filter(|m| m.model == model);
             bias = bias
                 .with(Layer::points(model, of().map(|m| (m.nodes as f64, m.bias.value)).collect()).coloured(c))
-                .with(Layer::dashed(format!("{model}: width"), of().map(|m| (m.nodes as f64, m.width.value)).collect()).coloured(c));
+                .with(
+                    Layer::dashed(format!("{model}: width"), of().map(|m| (m.nodes as f64, m.width.value)).collect())
+                        .coloured(c),
+                );
         }
         Plot::grid(2, vec![bound, bias])
     }

@@ -14,7 +14,7 @@
 //! | a release that lasts, varies, moves, covers a disk | [`Release`], [`moving_source`], [`disk_source`] |
 //! | where the concentration exceeds a threshold | [`contour_radius`], [`contour`] |
 //! | the same response at many places | [`Profile`] |
-//! | layered media, and the referee of the tests | `finite_volume` (feature `finite-volume`) |
+//! | layered media, and the referee of the closed forms | [`Layered`] |
 //!
 //! The central choice is that a Green's function takes field **and** source, `green(field, source, age)`: the difference
 //! `field - source` is enough only far from every wall, although equation (10) of the paper is written with it. The age counts
@@ -37,8 +37,7 @@ mod bessel;
 mod contour;
 mod cylinder;
 mod extended;
-#[cfg(feature = "finite-volume")]
-pub mod finite_volume;
+mod finite_volume;
 mod half_space;
 mod integrate;
 mod profile;
@@ -53,6 +52,7 @@ pub use axis::Axis;
 pub use contour::{contour, contour_radius};
 pub use cylinder::Cylinder;
 pub use extended::{disk_source, moving_source};
+pub use finite_volume::Layered;
 pub use half_space::{Flux, Wall};
 pub use profile::Profile;
 pub use release::Release;

@@ -3,5 +3,4 @@
 mod diffusion_fixtures;
 mod diffusion_laws;
 mod laws;
-#[cfg(feature = "finite-volume")]
 mod finite_volume;

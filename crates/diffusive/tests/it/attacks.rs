@@ -1,0 +1,200 @@
+//! Arguments that make no sense, and data that do not fit.
+
+use super::{field, joint, sensor};
+use fewbits_core::Gaussian;
+use fewbits_densities::hermite::{hermite, multi_indices};
+use fewbits_densities::laplace::Peak;
+use fewbits_densities::{CellOptions, Cells, Clumps, Lpg, MixtureFit};
+use fewbits_diffusive::information::Predictions;
+use fewbits_diffusive::{
+    Form, Posterior, Prior, RateModel, RateRange, RateSums, Search, SearchBox, SourceLikelihood, SourceSensor,
+};
+use fewbits_models::diffusion::{Air, Ground};
+use fewbits_topology::{Deployment, Graph};
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+#[test]
+fn arguments_are_refused() {
+    let air = Air::new(40.0, Vector3::zeros(), Ground::Impermeable).unwrap();
+    for noise in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(SourceSensor::new(air, vec![1.0], noise).is_err());
+    }
+    assert!(SourceSensor::new(air, vec![], 1.0).is_err());
+    assert!(SourceSensor::new(air, vec![-1.0, 0.0], 1.0).is_err());
+    assert!(SourceSensor::new(air, vec![f64::NAN], 1.0).is_err());
+    let ok = sensor(1.0, false);
+    assert!(ok.clone().with_start(25.0).is_err() && ok.clone().with_start(24.0).is_ok());
+    assert!(
+        ok.clone().with_bias(f64::NAN).is_err()
+            && ok.clone().with_heights(-1.0, 0.0).is_err()
+            && ok.clone().with_reach(0.0).is_err()
+    );
+    let node = Vector2::zeros();
+    assert!(ok.record(&node, &[0.0; 4]).is_err());
+    assert!(ok.record(&node, &[0.0, 0.0, f64::NAN, 0.0, 0.0]).is_err());
+    assert!(ok.record(&Vector2::new(f64::INFINITY, 0.0), &[0.0; 5]).is_err());
+    for (low, high) in [
+        (1.0, 1.0),
+        (2.0, 1.0),
+        (-0.1, 1.0),
+        (0.0, f64::INFINITY),
+        (f64::NAN, 1.0),
+    ] {
+        assert!(RateRange::new(low, high).is_err());
+    }
+    assert!(RateSums::of(&[1.0], &[1.0, 2.0], 1.0).is_err() && RateSums::of(&[], &[], 1.0).is_err());
+    assert!(RateSums::of(&[1.0], &[1.0], 0.0).is_err() && RateSums::of(&[f64::NAN], &[1.0], 1.0).is_err());
+    assert!(SourceLikelihood::new(vec![], joint()).is_err());
+    let record = ok.record(&node, &[0.0; 5]).unwrap();
+    assert!(SourceLikelihood::new(vec![record], RateModel::Known(-1.0)).is_err());
+    assert!(Search::new(&node, 0.0, field(1.0), joint(), 1e-5).is_err());
+    assert!(Search::new(&node, 50.0, field(1.0), joint(), 0.0).is_err());
+    assert!(
+        Search::new(
+            &node,
+            50.0,
+            SearchBox {
+                lower: [0.0; 2],
+                upper: [0.0; 2]
+            },
+            joint(),
+            1e-5
+        )
+        .is_err()
+    );
+    assert!(hermite([21, 0], &Vector2::zeros(), &Matrix2::identity()).is_err() && multi_indices::<2>(21).is_err());
+    assert!(MixtureFit::new(0).is_err() && MixtureFit::new(2).unwrap().with_least_weight(2.0).is_err());
+    assert!(
+        Predictions::new(&[], &[], 1.0).is_err()
+            && Predictions::new(&[vec![1.0], vec![1.0, 2.0]], &[0.5, 0.5], 1.0).is_err()
+    );
+    assert!(Predictions::new(&[vec![1.0]], &[0.7], 1.0).is_err());
+}
+
+#[test]
+fn runs_refuse_what_they_cannot_do() {
+    let field_of = Deployment::given(vec![Vector2::zeros(), Vector2::x()]).unwrap();
+    let graph = Graph::within(field_of.positions(), 2.0).unwrap();
+    let sensor = sensor(1.0, false);
+    let search = |change: fn(&mut Search)| {
+        let mut search = Search::new(&Vector2::zeros(), 50.0, field(1.0), joint(), 1e-5).unwrap();
+        change(&mut search);
+        search
+    };
+    let run =
+        |search: Search, start, samples: Vec<f64>| search.run(&sensor, &field_of, &graph, start, |_| samples.clone());
+    assert!(run(search(|_| ()), 2, vec![0.0; 5]).is_err());
+    assert!(run(search(|_| ()), 0, vec![0.0; 3]).is_err());
+    assert!(run(search(|_| ()), 0, vec![f64::NAN; 5]).is_err());
+    assert!(run(search(|s| s.most_nodes = 0), 0, vec![0.0; 5]).is_err());
+    assert!(run(search(|s| s.form = Form::Mixture(0)), 0, vec![0.0; 5]).is_err());
+    assert!(
+        run(
+            search(|s| s.form = Form::Lpg {
+                components: 2,
+                degree: 5
+            }),
+            0,
+            vec![0.0; 5]
+        )
+        .is_err()
+    );
+    assert!(
+        run(
+            search(|s| {
+                s.form = Form::Lpg {
+                    components: 2,
+                    degree: 21,
+                };
+                s.rate = RateModel::Known(1.0)
+            }),
+            0,
+            vec![0.0; 5]
+        )
+        .is_err()
+    );
+    let other = Graph::within(&[Vector2::zeros()], 1.0).unwrap();
+    assert!(
+        search(|_| ())
+            .run(&sensor, &field_of, &other, 0, |_| vec![0.0; 5])
+            .is_err()
+    );
+}
+
+/// Samples that fit no source at all, or every source: a status or a belief, never a panic or NaN.
+#[test]
+fn absurd_samples() {
+    let field_of =
+        Deployment::uniform(&mut fewbits_monte_carlo::Stream::new(2).rng(), [0.0; 2], [100.0; 2], 60).unwrap();
+    let graph = Graph::within(field_of.positions(), 25.0).unwrap();
+    let sensor = sensor(1.0, false);
+    for form in [Form::Raw, Form::Mixture(4)] {
+        for level in [0.0, -1.0, 1e-9, 1e-3, 1.0, 1e6, 1e150] {
+            let mut search = Search::new(&Vector2::new(44.0, 52.0), 50.0, field(1.0), joint(), 1e-5).unwrap();
+            (search.form, search.most_nodes) = (form, 4);
+            let outcome = search.run(&sensor, &field_of, &graph, 0, |_| vec![level; 5]).unwrap();
+            for step in &outcome.steps {
+                assert!(step.estimate.mean().iter().all(|x| x.is_finite()), "{form:?} {level} {:?}", outcome.status);
+                assert!(step.log10_determinant.is_finite() && !step.log_evidence.is_nan());
+            }
+        }
+    }
+}
+
+#[test]
+fn two_densities_that_exclude_each_other() {
+    let sensor = sensor(1.0, false);
+    let node = Vector2::new(50.0, 54.0);
+    let record = sensor
+        .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)))
+        .unwrap();
+    let far = Gaussian::new(Vector2::new(1e6, 1e6), Matrix2::identity() * 1e-6).unwrap();
+    let result = Posterior::new(
+        &Prior::Exact(far),
+        &SourceLikelihood::new(vec![record], joint()).unwrap(),
+        &field(1.0),
+        None,
+        &CellOptions::default(),
+    );
+    // The prior decides among what is left; whatever comes out is finite or an error.
+    if let Ok(posterior) = result {
+        assert!(posterior.gaussian().mean().iter().all(|x| x.is_finite()));
+    }
+}
+
+/// A ring has no peak of Gaussian kind.
+#[test]
+fn a_ring_has_no_peak() {
+    let ring = |x: &Vector2<f64>| -0.5 * ((x.norm() - 10.0) / 0.3).powi(2);
+    assert!(Peak::climb(&ring, &Vector2::new(3.0, 4.0), &Vector2::repeat(1.0)).is_err());
+    assert!(Peak::climb(&|_: &Vector2<f64>| f64::NEG_INFINITY, &Vector2::zeros(), &Vector2::repeat(1.0)).is_err());
+    assert!(Peak::climb(&ring, &Vector2::zeros(), &Vector2::repeat(0.0)).is_err());
+}
+
+#[test]
+fn polynomial_gaussians_refuse_bad_parts() {
+    let sensor = sensor(1.0, false);
+    let node = Vector2::new(50.0, 54.0);
+    let record = sensor
+        .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)))
+        .unwrap();
+    let prior = Prior::Exact(Gaussian::new(node, Matrix2::identity() * 2500.0).unwrap());
+    let cells: Cells<2> = Posterior::new(
+        &prior,
+        &SourceLikelihood::new(vec![record], RateModel::Known(1.0)).unwrap(),
+        &field(1.0),
+        None,
+        &CellOptions::default(),
+    )
+    .unwrap()
+    .cells;
+    let fit = Clumps::new(&cells.columns(), &[&[], &[]], cells.weights(), 100)
+        .unwrap()
+        .fit(&MixtureFit::new(1).unwrap())
+        .unwrap();
+    let one = fit.components()[0];
+    assert!(Lpg::fit(&cells, &[], 3).is_err() && Lpg::fit(&cells, &[one], 21).is_err());
+    assert!(Lpg::fit(&cells, &[one, one], 3).is_err());
+    assert!(Lpg::new(&[one], 1, &[vec![0.0; 3]]).is_err() && Lpg::new(&[one], 1, &[vec![1.0; 2]]).is_err());
+    assert!(Lpg::new(&[one], 1, &[vec![1.0, f64::NAN, 0.0]]).is_err());
+}

@@ -1,0 +1,197 @@
+//! The laws of the library's words, on every implementation here.
+
+use super::{field, joint, sensor};
+use fewbits_core::laws::likelihood::sweep_is_scalar;
+use fewbits_core::{Belief, Gaussian, Likelihood, laws};
+use fewbits_densities::{CellOptions, Lpg};
+use fewbits_diffusive::{
+    Form, PositionBelief, Posterior, Prior, RateLikelihood, RateModel, RateRange, RateSums, SourceLikelihood,
+    Travelling, project,
+};
+use fewbits_numerics::quadrature::Rule;
+use nalgebra::{Matrix2, Vector2, Vector3};
+use proptest::prelude::*;
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::SeedableRng;
+
+const NODES: [[f64; 2]; 3] = [[50.0, 54.0], [52.0, 44.0], [58.0, 60.0]];
+
+fn likelihood(rate: RateModel, unit: f64, windy: bool, nodes: usize) -> SourceLikelihood {
+    let sensor = sensor(unit, windy);
+    let mut rng = Pcg64Mcg::seed_from_u64(5);
+    let source = Vector2::new(62.0, 50.0) * unit;
+    let records = NODES[..nodes].iter().map(|n| {
+        let node = Vector2::from(*n) * unit;
+        sensor
+            .record(&node, &sensor.sample(&mut rng, &node, &source, 1.0))
+            .unwrap()
+    });
+    SourceLikelihood::new(records.collect(), rate).unwrap()
+}
+
+fn models() -> [RateModel; 4] {
+    let range = RateRange::new(0.5, 1.5).unwrap();
+    [
+        RateModel::Known(1.0),
+        RateModel::Joint(range),
+        RateModel::NodeWise(range),
+        RateModel::SampleWise(range),
+    ]
+}
+
+fn posterior(rate: RateModel, nodes: usize) -> Posterior {
+    let prior = Gaussian::new(Vector2::from(NODES[0]), Matrix2::identity() * 2500.0).unwrap();
+    Posterior::new(
+        &Prior::Exact(prior),
+        &likelihood(rate, 1.0, false, nodes),
+        &field(1.0),
+        None,
+        &CellOptions::default(),
+    )
+    .unwrap()
+}
+
+#[test]
+fn likelihoods_are_numbers_everywhere() {
+    let places: Vec<f64> = vec![-1e8, -300.0, 0.0, 44.0, 50.0, 50.0 + 1e-9, 61.0, 120.0, 1e4, 1e12];
+    for windy in [false, true] {
+        for rate in models() {
+            let states: Vec<Vector2<f64>> = places
+                .iter()
+                .flat_map(|x| places.iter().map(|y| Vector2::new(*x, *y)))
+                .collect();
+            sweep_is_scalar(&likelihood(rate, 1.0, windy, 3), &states).unwrap();
+        }
+        let with_rate = RateLikelihood::new(likelihood(joint(), 1.0, windy, 3).records().to_vec());
+        let states: Vec<Vector3<f64>> = places
+            .iter()
+            .flat_map(|x| [0.0, 1.0, 1e6].map(|mu| Vector3::new(*x, 50.0, mu)))
+            .collect();
+        sweep_is_scalar(&with_rate, &states).unwrap();
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// The table is the closed form, sample by sample.
+    #[test]
+    fn tables_are_the_closed_form(x in -40.0..140.0f64, y in -40.0..140.0f64, windy: bool) {
+        let all = likelihood(RateModel::Known(1.0), 1.0, windy, 3);
+        let position = Vector2::new(x, y);
+        for record in all.records() {
+            let a = record.sensor().responses(record.node(), &position);
+            let direct = RateSums::of(record.samples(), &a, record.noise()).unwrap();
+            let table = record.sums(&position);
+            prop_assert!((table.response - direct.response).abs() <= 1e-9 * direct.response + 1e-12);
+            prop_assert!((table.correlation - direct.correlation).abs() <= 1e-9 * (direct.response * direct.energy).sqrt() + 1e-12);
+            prop_assert!((table.log_marginal(&RateRange::new(0.5, 1.5).unwrap()) - direct.log_marginal(&RateRange::new(0.5, 1.5).unwrap())).abs() < 1e-5);
+        }
+    }
+
+    /// The marginal over the rate is the integral of the likelihood given the rate.
+    #[test]
+    fn the_rate_is_integrated_out(a in -8.0..4.0f64, y in 0.0..30.0f64, low in 0.0..2.0f64, width in 0.01..5.0f64) {
+        let range = RateRange::new(low, low + width).unwrap();
+        let response = 10.0_f64.powf(a);
+        let sums = RateSums::of(&[y, 0.7 * y, 1.2 * y], &[response, 0.8 * response, response], 1.0).unwrap();
+        let best = (low..=low + width).contains(&(sums.correlation / sums.response));
+        let peak = sums.log_given_rate(if best { sums.correlation / sums.response } else if sums.correlation < low * sums.response { low } else { low + width });
+        let integral = Rule::gauss_legendre(30).composite(low, low + width, 400, |mu| (sums.log_given_rate(mu) - peak).exp());
+        let exact = peak + (integral / width).ln();
+        prop_assert!((sums.log_marginal(&range) - exact).abs() < 1e-7 * exact.abs().max(1.0), "{} {}", sums.log_marginal(&range), exact);
+    }
+
+    /// Scaled lengths give scaled posteriors.
+    #[test]
+    fn nothing_depends_on_the_unit(unit in prop::sample::select(vec![1e-4, 1e4])) {
+        let run = |unit: f64| {
+            let prior = Gaussian::new(Vector2::from(NODES[0]) * unit, Matrix2::identity() * 2500.0 * unit * unit).unwrap();
+            let cells = Posterior::new(&Prior::Exact(prior), &likelihood(joint(), unit, false, 3), &field(unit), None, &CellOptions::default()).unwrap().cells;
+            (cells.mean() / unit, cells.covariance() / (unit * unit))
+        };
+        let ((m, c), (m0, c0)) = (run(unit), run(1.0));
+        prop_assert!((m - m0).amax() < 1e-7 && (c - c0).amax() < 1e-6 * c0.amax(), "{m} {m0} {c} {c0}");
+    }
+}
+
+/// Densities integrate to one over the rate and any samples: total probability of one sample.
+#[test]
+fn total_probability_of_a_sample() {
+    let range = RateRange::new(0.5, 1.5).unwrap();
+    for a in [0.0, 1e-3, 0.4, 3.0, 200.0] {
+        let reach = 1.5 * a + 12.0;
+        let joint = Rule::gauss_legendre(30)
+            .composite(-12.0, reach, 400, |y| RateSums::of(&[y], &[a], 1.0).unwrap().log_marginal(&range).exp());
+        let sample = Rule::gauss_legendre(30)
+            .composite(-12.0, reach, 400, |y| fewbits_diffusive::log_sample_marginal(y, a, 1.0, &range).exp());
+        assert!((joint - 1.0).abs() < 1e-7 && (sample - 1.0).abs() < 1e-7, "{a}: {joint} {sample}");
+    }
+}
+
+#[test]
+fn cells_and_polynomial_gaussians_are_beliefs() {
+    let posterior = posterior(RateModel::Known(1.0), 2);
+    let mut rng = Pcg64Mcg::seed_from_u64(9);
+    laws::belief::samples_have_the_moments(&posterior.cells, &mut rng, 20_000).unwrap();
+    let Some(Travelling::Position(PositionBelief::Lpg(lpg))) = project(
+        &posterior,
+        Form::Lpg {
+            components: 2,
+            degree: 5,
+        },
+        &RateModel::Known(1.0),
+    )
+    .unwrap() else {
+        panic!("polynomial Gaussians were asked for");
+    };
+    laws::belief::samples_have_the_moments(&lpg, &mut rng, 20_000).unwrap();
+    let wide = Gaussian::new(lpg.mean(), lpg.covariance() * 4.0)
+        .unwrap()
+        .factored()
+        .unwrap();
+    laws::belief::density_integrates_to_one(&lpg, &wide, &mut rng, 40_000).unwrap();
+}
+
+/// Projections keep mean and covariance where they promise to, and a better form is closer.
+#[test]
+fn projections() {
+    let exact = posterior(joint(), 2);
+    for components in [1, 2, 4, 8] {
+        let sent = project(&exact, Form::Mixture(components), &joint())
+            .unwrap()
+            .unwrap()
+            .gaussian();
+        assert!((sent.mean() - exact.cells.mean()).amax() < 1e-6);
+        assert!((sent.covariance() - exact.cells.covariance()).amax() < 1e-5 * exact.cells.covariance().amax());
+    }
+    let known = posterior(RateModel::Known(1.0), 1);
+    let gaussians = known
+        .clumps(200)
+        .unwrap()
+        .fit(&fewbits_densities::MixtureFit::new(4).unwrap())
+        .unwrap();
+    let mut before = f64::INFINITY;
+    for degree in [0, 2, 4, 6] {
+        let fit = Lpg::fit(&known.cells, gaussians.components(), degree).unwrap();
+        let kl = known.cells.kl_to(&fit.belief);
+        assert!(kl > -1e-9 && 1.0 - fit.affinity < before, "{degree}: {kl} {}", fit.affinity);
+        before = 1.0 - fit.affinity;
+    }
+    assert!(before < 0.02, "{before}");
+}
+
+/// A belief that was sent on and updated agrees with the joint update where nothing was lost on the way: one tight Gaussian.
+#[test]
+fn one_update_after_another_is_both_at_once() {
+    let all = likelihood(joint(), 1.0, false, 3);
+    let at = |x: &Vector2<f64>| all.log_likelihood(x);
+    let parts: f64 = all
+        .records()
+        .iter()
+        .map(|r| r.sums(&Vector2::new(60.0, 48.0)).log_given_rate(1.1))
+        .sum();
+    let whole = all.sums(&Vector2::new(60.0, 48.0)).log_given_rate(1.1);
+    assert!((parts - whole).abs() < 1e-9 * whole.abs());
+    assert!(at(&Vector2::new(62.0, 50.0)) > at(&Vector2::new(70.0, 40.0)));
+}

@@ -1,0 +1,107 @@
+//! What travels, as bits.
+
+use super::{field, joint, sensor};
+use fewbits_core::laws::message::{decoding_is_total, round_trip};
+use fewbits_core::{BitString, Gaussian, NumberFormat};
+use fewbits_densities::CellOptions;
+use fewbits_diffusive::message::{Contract, Packet, SampleCode, Wire};
+use fewbits_diffusive::{Form, Posterior, Prior, RateModel, SourceLikelihood, project};
+use nalgebra::{Matrix2, Vector2};
+use proptest::prelude::*;
+
+fn contract(numbers: NumberFormat) -> Contract {
+    let wire = Wire {
+        numbers,
+        samples: Some(SampleCode { bits: 9, step: 1.0 }),
+        index_bits: 9,
+    };
+    Contract {
+        wire,
+        noise: 8e-6,
+        samples: 5,
+    }
+}
+
+fn posterior(rate: RateModel) -> (Posterior, SourceLikelihood) {
+    let sensor = sensor(1.0, false);
+    let record = |n: [f64; 2]| {
+        let node = Vector2::from(n);
+        sensor
+            .record(&node, &sensor.responses(&node, &Vector2::new(62.0, 50.0)))
+            .unwrap()
+    };
+    let likelihood = SourceLikelihood::new(vec![record([50.0, 54.0]), record([58.0, 60.0])], rate).unwrap();
+    let prior = Prior::Exact(Gaussian::new(Vector2::new(50.0, 54.0), Matrix2::identity() * 2500.0).unwrap());
+    (Posterior::new(&prior, &likelihood, &field(1.0), None, &CellOptions::default()).unwrap(), likelihood)
+}
+
+#[test]
+fn beliefs_arrive_as_they_were_sent() {
+    for numbers in [NumberFormat::Double, NumberFormat::Single] {
+        let format = contract(numbers);
+        for (form, rate) in [
+            (Form::Gaussian, joint()),
+            (Form::Mixture(4), joint()),
+            (Form::Mixture(3), RateModel::Known(1.0)),
+            (
+                Form::Lpg {
+                    components: 2,
+                    degree: 5,
+                },
+                RateModel::Known(1.0),
+            ),
+            (Form::Particles(25), RateModel::Known(1.0)),
+        ] {
+            let (posterior, likelihood) = posterior(rate);
+            let sent = project(&posterior, form, &rate).unwrap().unwrap();
+            let packet = Packet::new(Some(&sent), likelihood.records(), &[1, 2], &format.wire).unwrap();
+            let bits = round_trip(&packet, &format).unwrap();
+            assert_eq!(bits, packet.bits(&format.wire).unwrap());
+            let received = packet.belief().unwrap().unwrap().gaussian();
+            let tolerance = if numbers == NumberFormat::Double { 1e-9 } else { 1e-4 };
+            assert!((received.mean() - sent.gaussian().mean()).amax() < 100.0 * tolerance);
+            let off = (received.covariance() - sent.gaussian().covariance()).amax();
+            assert!(off < 10.0 * tolerance * sent.gaussian().covariance().amax(), "{form:?} {off}");
+            if form == Form::Gaussian {
+                // Kind, components, degree, rate: 12 bits before nine numbers.
+                assert_eq!(bits, 12 + 9 * numbers.bits() as usize);
+            }
+        }
+    }
+}
+
+#[test]
+fn raw_records_cost_what_they_should() {
+    let (_, likelihood) = posterior(joint());
+    let format = contract(NumberFormat::Single);
+    let quantised: Vec<_> = likelihood
+        .records()
+        .iter()
+        .map(|r| format.wire.quantised(r.clone()).unwrap())
+        .collect();
+    for (before, after) in likelihood.records().iter().zip(&quantised) {
+        assert!((after.noise() / before.noise() - (13.0_f64 / 12.0).sqrt()).abs() < 1e-12);
+        for (a, b) in before.samples().iter().zip(after.samples()) {
+            assert!((a - b).abs() <= 0.5 * 8e-6 + 1e-15);
+        }
+    }
+    let packet = Packet::new(None, &quantised, &[17, 301], &format.wire).unwrap();
+    // One bit, a count of ten bits, and 54 bits a node.
+    assert_eq!(round_trip(&packet, &format).unwrap(), 11 + 2 * 54);
+    assert_eq!(packet.belief().unwrap(), None);
+}
+
+proptest! {
+    #[test]
+    fn any_bits_are_a_message_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..200), cut in 0_usize..8) {
+        let bits = (bytes.len() * 8).saturating_sub(cut);
+        let string = BitString::from_bytes(bytes, bits).unwrap();
+        for numbers in [NumberFormat::Double, NumberFormat::Single] {
+            prop_assert!(decoding_is_total(&string, &contract(numbers)));
+            if let Ok(packet) = <Packet as fewbits_core::Message>::decode(&contract(numbers), &mut fewbits_core::BitReader::new(&string)) {
+                // A belief or an error, never a panic.
+                let _ = packet.belief();
+            }
+        }
+    }
+}
