@@ -38,7 +38,9 @@ fn receive<F: ScalarFilter>(filter: &F) -> Agreement {
         let sample = plant.sensor().sample(&mut world, &state);
         let feedback = filter.feedback(&filter.predict(&special));
         let report = scheme.encode(&mut world, &mut (), &sample, &feedback).unwrap();
-        let observation = link.transmit(&mut world, report.as_ref(), &scheme.report_format()).unwrap();
+        let observation = link
+            .transmit(&mut world, report.as_ref(), &scheme.report_format())
+            .unwrap();
         let observed = Observed::new(*plant.sensor(), scheme.factor(&feedback, &observation, link).unwrap());
 
         let (next, info) = filter.step(&special, &observation).unwrap();

@@ -1,6 +1,7 @@
 //! Finding a diffusive source by a belief that travels from sensor to sensor.
 
 mod chain;
+mod envelope;
 mod error;
 pub mod information;
 mod likelihood;
@@ -13,6 +14,7 @@ mod select;
 mod sensor;
 
 pub use chain::{Outcome, Search, Status, Step};
+pub use envelope::Envelope;
 pub use error::Error;
 pub use likelihood::{RateLikelihood, SourceLikelihood};
 pub use posterior::{PositionBelief, Posterior, Prior, SearchBox};

@@ -44,21 +44,17 @@ impl SourceLikelihood {
             .fold(RateSums::default(), |sum, record| sum.plus(&record.sums(position)))
     }
 
-    /// The log likelihood, and the same blurred over a cell of the given half width.
+    /// The log likelihood blurred over a cell of the given half width, and the log likelihood itself where the first exceeds
+    /// `floor`; elsewhere the blurred one stands for both.
     #[inline]
-    pub(crate) fn blurred(&self, position: &Vector2<f64>, half_width: f64) -> (f64, f64) {
+    pub(crate) fn blurred(&self, position: &Vector2<f64>, half_width: f64, floor: f64) -> (f64, f64) {
         let (mut all, mut blurred) = (RateSums::default(), RateSums::default());
         let (mut log, mut blurred_log) = (0.0, 0.0);
         for record in &self.records {
             let sums = record.sums(position);
             let share = record.discount(position, half_width);
             // The normalisation of the noise is not discounted: it would favour cells where the response is steep.
-            let less = RateSums {
-                response: share * sums.response,
-                correlation: share * sums.correlation,
-                energy: share * sums.energy,
-                log_noise: sums.log_noise,
-            };
+            let less = sums.discounted(share);
             match &self.rate {
                 RateModel::Known(rate) => {
                     log += sums.log_given_rate(*rate);
@@ -80,7 +76,10 @@ impl SourceLikelihood {
             }
         }
         match &self.rate {
-            RateModel::Joint(range) => (all.log_marginal(range), blurred.log_marginal(range)),
+            RateModel::Joint(range) => {
+                let score = blurred.log_marginal(range);
+                (if score > floor { all.log_marginal(range) } else { score }, score)
+            }
             _ => (log, blurred_log),
         }
     }

@@ -352,32 +352,43 @@ fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3], range: &R
 impl CellTarget<2> for Target<'_> {
     fn evaluate(&self, centres: &Columns<'_, 2>, half_width: f64, logs: &mut [f64], scores: &mut [f64]) {
         let extra = half_width * half_width;
-        let precisions: Vec<[[f64; 3]; 2]> = self
-            .lobes
-            .iter()
-            .map(|l| [l.precision(0.0), l.precision(extra)])
-            .collect();
+        let precisions: Vec<[[f64; 3]; 2]> = self.lobes.iter().map(|l| [l.precision(0.0), l.precision(extra)]).collect();
+        // Cells that score far below the best so far will be dropped: their log density need not be exact.
+        let mut floor = f64::NEG_INFINITY;
         for i in 0..logs.len() {
             let at = Vector2::new(centres[0][i], centres[1][i]);
             (logs[i], scores[i]) = match self.prior {
                 Prior::Position(PositionBelief::Lpg(lpg)) => {
-                    let (log, blurred) = self.likelihood.blurred(&at, half_width);
-                    (log + lpg.log_density(&at), blurred + lpg.log_bound(&at, half_width))
+                    let bound = lpg.log_bound(&at, half_width);
+                    let (log, blurred) = self.likelihood.blurred(&at, half_width, floor - bound);
+                    let score = blurred + bound;
+                    (if score > floor { log + lpg.log_density(&at) } else { score }, score)
                 }
-                Prior::WithRate(_, range) => self.with_rate(&at, half_width, &precisions, range),
+                Prior::WithRate(_, range) => self.with_rate(&at, half_width, &precisions, range, floor),
                 _ => {
-                    let (log, blurred) = self.likelihood.blurred(&at, half_width);
                     let [own, wide] = log_mixture(&self.lobes, &precisions, &at);
+                    let (log, blurred) = self.likelihood.blurred(&at, half_width, floor - wide);
                     (log + own, blurred + wide)
                 }
             };
+            floor = floor.max(scores[i] - DROPPED);
         }
     }
 }
 
+/// Cells this far below the best, in nats, are dropped by any cover; their mass is nothing.
+const DROPPED: f64 = 40.0;
+
 impl Target<'_> {
     #[inline]
-    fn with_rate(&self, at: &Vector2<f64>, half: f64, precisions: &[[[f64; 3]; 2]], range: &RateRange) -> (f64, f64) {
+    fn with_rate(
+        &self,
+        at: &Vector2<f64>,
+        half: f64,
+        precisions: &[[[f64; 3]; 2]],
+        range: &RateRange,
+        floor: f64,
+    ) -> (f64, f64) {
         let (mut plain, mut blurred, mut log_noise) = ([0.0; 3], [0.0; 3], 0.0);
         for record in self.likelihood.records() {
             let sums = record.sums(at);
@@ -388,20 +399,20 @@ impl Target<'_> {
             }
             log_noise += sums.log_noise;
         }
-        let mut results = [LogSum::default(), LogSum::default()];
-        for ((lobe, given), precision) in self.lobes.iter().zip(&self.conditionals).zip(precisions) {
-            let d = at - lobe.mean;
-            let own = lobe.log_scale - 0.5 * quadratic(&precision[0], &d);
-            // The evidence is at most zero: lobes that cannot matter are not evaluated.
-            if own > results[0].largest - 30.0 {
-                results[0].add(own + updated(given, &d, plain, range).0);
+        let sum = |which: usize, sums: [f64; 3]| {
+            let mut result = LogSum::default();
+            for ((lobe, given), precision) in self.lobes.iter().zip(&self.conditionals).zip(precisions) {
+                let d = at - lobe.mean;
+                let own = lobe.log_scale - 0.5 * quadratic(&precision[which], &d);
+                // The evidence is at most zero: lobes that cannot matter are not evaluated.
+                if own > result.largest - 30.0 {
+                    result.add(own + updated(given, &d, sums, range).0);
+                }
             }
-            let wide = lobe.log_scale - 0.5 * quadratic(&precision[1], &d);
-            if wide > results[1].largest - 30.0 {
-                results[1].add(wide + updated(given, &d, blurred, range).0);
-            }
-        }
-        (results[0].log() - log_noise, results[1].log() - log_noise)
+            result.log() - log_noise
+        };
+        let score = sum(1, blurred);
+        (if score > floor { sum(0, plain) } else { score }, score)
     }
 }
 

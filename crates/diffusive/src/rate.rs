@@ -145,6 +145,17 @@ impl RateSums {
         }
     }
 
+    /// The sums with a share of the information, and the full normalisation of the noise.
+    #[inline]
+    pub(crate) fn discounted(&self, share: f64) -> Self {
+        Self {
+            response: share * self.response,
+            correlation: share * self.correlation,
+            energy: share * self.energy,
+            log_noise: self.log_noise,
+        }
+    }
+
     /// `ln p(samples | position, rate)`.
     #[inline]
     pub fn log_given_rate(&self, rate: f64) -> f64 {

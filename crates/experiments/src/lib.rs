@@ -15,6 +15,7 @@ pub mod assign;
 pub mod binary;
 pub mod cfwmd;
 pub mod claim;
+pub mod diffusive;
 pub mod dymbo;
 mod error;
 mod figure;
@@ -44,6 +45,7 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         binary::figures(),
         assign::figures(),
         cfwmd::figures(),
+        diffusive::figures(),
     ]
     .concat()
 }

@@ -5,7 +5,6 @@ mod draw;
 mod gallery;
 mod progress;
 mod record;
-mod scale;
 mod select;
 mod summary;
 mod write;
@@ -13,7 +12,7 @@ mod write;
 pub use draw::to_svg;
 
 use clap::{Args, Subcommand};
-use fewbits_experiments::{AnyFigure, Context, Outcome};
+use fewbits_experiments::{Context, Outcome};
 use record::Record;
 use std::any::Any;
 use std::collections::BTreeSet;
@@ -58,6 +57,9 @@ pub struct Options {
     /// Fewer trials; claims that need the full count are skipped.
     #[arg(long)]
     pub quick: bool,
+    /// But none that match this id or glob. Repeatable.
+    #[arg(long, value_name = "ID")]
+    pub except: Vec<String>,
     /// Of these figures only those that failed in the output directory, or whose claims did.
     #[arg(long)]
     pub failed: bool,
@@ -185,6 +187,13 @@ pub fn run(options: &Options) -> Result<Ending, Error> {
         None => {}
     }
     let mut chosen = select::figures(&options.ids)?;
+    if !options.except.is_empty() {
+        let left_out: Vec<_> = select::figures(&options.except)?
+            .iter()
+            .map(|figure| figure.about().id)
+            .collect();
+        chosen.retain(|figure| !left_out.contains(&figure.about().id));
+    }
     if options.failed {
         let records = Record::read_all(&options.out)?;
         chosen.retain(|figure| records.get(figure.about().id).is_some_and(|r| !r.good()));
@@ -361,7 +370,7 @@ fn side_by_side<T: Send>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fewbits_experiments::{About, Fields, Parameter};
+    use fewbits_experiments::{About, AnyFigure, Fields, Parameter};
     use serde_json::{Map, Value as Json};
 
     struct Panics;

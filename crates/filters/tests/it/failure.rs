@@ -1,7 +1,7 @@
 //! Law of every filter: what is impossible is an error of one name, and leaves the belief as it was, to the last bit.
 
 use fewbits_core::factor::{Constant, InCell, Scalar};
-use fewbits_core::{Cell, Error as CoreError, Gaussian, Likelihood, LinearSensing, Observed};
+use fewbits_core::{Cell, Error as CoreError, Gaussian, Likelihood, Observed};
 use fewbits_filters::{
     CloudWorkspace, Error, GaussianCloud, Grid, ParticleFilter, Particles, PlaneFilter, PointMass, PointMassFilter,
     Proposal, RaoBlackwellised, Resampling, Schedule, Workspace, assumed_density,

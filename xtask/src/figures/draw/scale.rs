@@ -37,20 +37,8 @@ impl Scaled {
         value.is_finite() && (self.scale == Scale::Linear || value > 0.0)
     }
 
-    /// Lower limit.
-    pub(super) fn low(&self) -> f64 {
-        self.low
-    }
-
-    /// The value a given share of the way on paper from `a` to `b`.
-    pub(super) fn between(&self, a: f64, b: f64, share: f64) -> f64 {
-        match self.scale {
-            Scale::Linear => a + share * (b - a),
-            Scale::Log => a * (b / a).powf(share),
-        }
-    }
-
-    fn position(&self, value: f64) -> f64 {
+    /// Share of the way from the lower to the upper limit; beyond them outside `[0, 1]`.
+    pub(super) fn position(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
             Scale::Log => (value / self.low).ln() / (self.high / self.low).ln(),
@@ -155,10 +143,33 @@ impl ValueFormatter<f64> for Scaled {
             return "0".to_owned();
         }
         if !(1e-3..1e5).contains(&value.abs()) {
-            let text = format!("{value:.1e}");
-            return text.replace(".0e", "e");
+            return power(*value);
         }
         let text = format!("{value:.6}");
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    }
+}
+
+/// A number as digits times a power of ten: `2·10⁻⁴`.
+fn power(value: f64) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let text = format!("{value:.1e}");
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let raised = |c: char| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize]);
+    let exponent: String = exponent.chars().map(raised).collect();
+    match mantissa.trim_end_matches(".0") {
+        "1" => format!("10{exponent}"),
+        "-1" => format!("-10{exponent}"),
+        mantissa => format!("{mantissa}·10{exponent}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_are_raised() {
+        assert_eq!([1e-4, 2.5e-4, -1e6, 3e12].map(power), ["10⁻⁴", "2.5·10⁻⁴", "-10⁶", "3·10¹²"]);
     }
 }

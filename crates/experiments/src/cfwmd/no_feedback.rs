@@ -2,13 +2,12 @@
 
 use super::case::Case;
 use super::ensemble::{Ensemble, Part, agrees, beats, ordered_at_every_step, value};
-use super::linear::{Scheme, Setting, run};
+use super::linear::{Method, Scheme, Setting, run};
 use crate::error::Error;
 use crate::legacy::Tables;
 use crate::legacy::claim::Claim;
 use crate::legacy::{About, Context};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use fewbits_cfwmd::no_feedback::NoFeedback;
 
 /// Figure 3.
 pub(super) struct Fig3;
@@ -36,8 +35,8 @@ impl Case for Fig3 {
     fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         let schemes = [
             ("all", Scheme::All),
-            ("CFwMD", Scheme::Blind(NoFeedback::AssumedDensity)),
-            ("CFoMD", Scheme::Blind(NoFeedback::Ignore)),
+            ("CFwMD", Scheme::NoFeedback(Method::Joint)),
+            ("CFoMD", Scheme::NoFeedback(Method::Ignored)),
             ("random", Scheme::Random),
         ];
         let messages = setting.messages.iter();
@@ -105,11 +104,11 @@ impl Case for NoFeedbackFigure {
 
     fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         let schemes = [
-            ("exact", Scheme::Blind(NoFeedback::RaoBlackwell(setting.particles as usize))),
-            ("joint Gaussian", Scheme::Blind(NoFeedback::AssumedDensity)),
+            ("exact", Scheme::NoFeedback(Method::Imputed(setting.particles as usize))),
+            ("joint Gaussian", Scheme::NoFeedback(Method::Joint)),
             ("heuristic", Scheme::Centred),
-            ("ignored", Scheme::Blind(NoFeedback::Ignore)),
-            ("as printed", Scheme::Blind(NoFeedback::Literal)),
+            ("ignored", Scheme::NoFeedback(Method::Ignored)),
+            ("as printed", Scheme::NoFeedback(Method::Printed)),
             ("no history", Scheme::Unconditional),
         ];
         let messages = setting.messages.iter();
