@@ -40,7 +40,10 @@ fn evaluate(variances: &[f64]) -> Result<[[f64; 6]; 2], fewbits_sensor_assignmen
     let linear = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
     let second = by_precision(variances);
     let mut errors = [[0.0; 6]; 2];
-    for (criterion, part) in [Estimator::CellCentre, Estimator::PosteriorMean].into_iter().zip(&mut errors) {
+    for (criterion, part) in [Estimator::CellCentre, Estimator::PosteriorMean]
+        .into_iter()
+        .zip(&mut errors)
+    {
         let all = all_errors(&sensors, criterion)?;
         part[ALG] = sensors.mse(&linear, criterion)?;
         // The enumeration and single evaluations round differently.

@@ -250,7 +250,9 @@ fn decoder_of_table_6_1() -> Result<Case, Error> {
 
 fn joint_of_table_6_1() -> Result<Case, Error> {
     let sensors = CodedSensors::with_variances(1.0, &VARIANCES).map_err(Error::failed)?;
-    let before = brute_force(&sensors, Estimator::PosteriorMean).map_err(Error::failed)?.1;
+    let before = brute_force(&sensors, Estimator::PosteriorMean)
+        .map_err(Error::failed)?
+        .1;
     let grid = Grid::uniform(1.0, 4).map_err(Error::failed)?;
     let candidates = (1..16)
         .map(|mask| pattern(mask, 4)?.on(&grid).map_err(Error::failed))

@@ -4,7 +4,7 @@ use super::{Scene, check_sweep, crossing, each, mask_text, sweep};
 use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use fewbits_binary_patterns::Mask;
-use fewbits_binary_patterns::bounds::{network_rate_distortion, remote_distortion, optimal_weight_van_trees};
+use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
 use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-9`.

@@ -3,7 +3,7 @@
 use super::{Scene, mask_text, pattern, pattern_panel};
 use crate::legacy::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use crate::plot::Plot;
-use fewbits_binary_patterns::bounds::{printed_crlb, optimal_weight_van_trees};
+use fewbits_binary_patterns::bounds::{optimal_weight_van_trees, printed_crlb};
 use fewbits_binary_patterns::search::MaskSet;
 use fewbits_binary_patterns::{Decoder, Mask, count};
 use rayon::prelude::*;

@@ -97,7 +97,9 @@ impl Figure for PosteriorShape {
             })
         };
         let noise = p.sigma.iter().copied().fold(f64::INFINITY, f64::min).powi(2);
-        let after = InCell::sign(Sign::Above, 0.0, noise, &Link::PERFECT)?.tilted(&prior)?;
+        let after = InCell::sign(Sign::Above, 0.0, noise, &Link::PERFECT)?
+            .tilted(&prior)
+            .map_err(Error::failed)?;
         let density = |i: i32| {
             let theta = p.sigma_theta * f64::from(i) / 50.0;
             Density {

@@ -37,7 +37,7 @@ pub struct Parameters {
     trials: u64,
 }
 
-fn stable(transition: &[f64], _: &()) -> garde::Result {
+fn stable(transition: &[f64], (): &()) -> garde::Result {
     let matrix = Matrix2::from_row_slice(transition.get(..4).unwrap_or(&[0.0; 4]));
     let stable = LinearGaussian::with_covariance(matrix, Matrix2::identity())
         .and_then(|dynamics| dynamics.stationary_covariance())
@@ -65,11 +65,11 @@ const BURN: usize = 15;
 impl Parameters {
     fn dynamics(&self) -> Result<LinearGaussian<2, 2>, Error> {
         let noise = Matrix2::identity() * self.process_variance;
-        Ok(LinearGaussian::with_covariance(Matrix2::from_row_slice(&self.transition), noise)?)
+        LinearGaussian::with_covariance(Matrix2::from_row_slice(&self.transition), noise).map_err(Error::failed)
     }
 
     fn sensor(&self, direction: [f64; 2]) -> Result<ScalarSensor<2>, Error> {
-        Ok(ScalarSensor::scalar(Vector2::from(direction), self.measurement_variance)?)
+        ScalarSensor::scalar(Vector2::from(direction), self.measurement_variance).map_err(Error::failed)
     }
 
     fn one(&self) -> Result<Filter<1>, Error> {
@@ -110,7 +110,7 @@ fn kalman<const M: usize>(filter: &Filter<M>) -> Result<Matrix2<f64>, Error> {
     let rows = filter.sensors().map(|sensor| sensor.direction());
     let matrix = SMatrix::<f64, M, 2>::from_fn(|i, j| rows[i][j]);
     let noise = SMatrix::<f64, M, M>::from_diagonal_element(filter.sensors()[0].noise_variance());
-    let sensing = LinearSensor::new(matrix, noise)?;
+    let sensing = LinearSensor::new(matrix, noise).map_err(Error::failed)?;
     Ok(steady_state(filter.dynamics(), &sensing)?.filtered_covariance)
 }
 

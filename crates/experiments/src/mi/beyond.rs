@@ -259,7 +259,18 @@ fn words(p: &Parameters, context: &Context<'_>) -> Result<Vec<Words>, Error> {
                 &[("same", false)]
             };
             for &(sensors, mixed) in kinds {
-                let found = design::assign_words(&scene, 2, crossover, 2..=4, criterion, if mixed { design::Words::PerSensor } else { design::Words::Shared })?;
+                let found = design::assign_words(
+                    &scene,
+                    2,
+                    crossover,
+                    2..=4,
+                    criterion,
+                    if mixed {
+                        design::Words::PerSensor
+                    } else {
+                        design::Words::Shared
+                    },
+                )?;
                 for (rank, assignment) in found.iter().enumerate().take(if mixed { 5 } else { usize::MAX }) {
                     rows.push(Words {
                         crossover,
@@ -318,7 +329,8 @@ fn limits() -> Result<Vec<Limit>, Error> {
         };
         let bits = (levels as f64).log2() * (1.0 - flips);
         let words: Vec<u32> = (0..levels as u32).collect();
-        let group = SensorGroup::new(lloyd(levels, scene.sample_sd(0))?, bsc(&words, crossover)?, (0..sensors).collect())?;
+        let group =
+            SensorGroup::new(lloyd(levels, scene.sample_sd(0))?, bsc(&words, crossover)?, (0..sensors).collect())?;
         let best = design::joint(&System::new(scene, vec![group])?, MSE, &Newton::default())?;
         rows.push(Limit {
             sensors,
