@@ -1,1 +1,5 @@
-//! Nothing here: the tests that cross crates are in `it`.
+//! Nothing here: the tests that cross crates are in `it`, and the examples of `docs/architecture.md` are tests of this crate.
+
+#[cfg(doctest)]
+#[doc = include_str!("../docs/architecture.md")]
+struct Architecture;

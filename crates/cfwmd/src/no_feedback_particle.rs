@@ -289,7 +289,8 @@ impl<const D: usize, const M: usize> Turn<'_, D, M> {
             };
             (total.ln(), x)
         };
-        (SVector::repeat(central + deviation * x), log_weight)
+        // A part that was chosen by its mass holds numbers: it is never refused.
+        (SVector::repeat(x.map_or(central, |x| central + deviation * x)), log_weight)
     }
 }
 

@@ -20,4 +20,22 @@ pub enum Error {
         /// The largest log weight found.
         largest: f64,
     },
+    /// A density is zero wherever it was looked for: the observation and the belief exclude each other.
+    #[error("the density vanishes on all of its support: the largest log density is {largest}, expected a finite number")]
+    BeliefMiss {
+        /// The largest log density found.
+        largest: f64,
+    },
+    /// A density is too thin for the cells allowed.
+    #[error("the density needs {cells} cells or more: expected a density that fewer resolve")]
+    Unresolved {
+        /// Cells that the next refinement would take.
+        cells: usize,
+    },
+    /// A density has no peak of the shape that an approximation needs.
+    #[error("no Gaussian peak: {reason}")]
+    NoPeak {
+        /// What is wrong with the place where the search ended.
+        reason: &'static str,
+    },
 }

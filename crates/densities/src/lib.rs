@@ -11,6 +11,10 @@
 //! - [`divergence`], [`plug_in`], [`quadrature`]: how far two beliefs are apart, estimated, bounded and integrated.
 //! - [`product`]: several beliefs about one state, multiplied.
 //! - [`wire`]: a mixture in a few bytes.
+//! - [`Cells`]: equal small cells, refined until the moments have settled: the exact belief in few dimensions.
+//! - [`Lpg`]: a linear combination of products of Hermite polynomials and Gaussians, squared, so that it is nowhere negative.
+//! - [`Clumps`]: any cloud of weighted points summed up by a few hundred parts, to which [`Mixture`]s are fitted.
+//! - [`laplace`]: Gaussians from the peak of a density and from its cumulants.
 //!
 //! ```
 //! use fewbits_densities::Particles;
@@ -24,12 +28,17 @@
 
 mod bandwidth;
 mod beliefs;
+pub mod cells;
+pub mod clumps;
 mod credible;
 pub mod cut;
 pub mod divergence;
 mod error;
 mod fast_kernel;
+pub mod hermite;
 mod kernel;
+pub mod laplace;
+pub mod lpg;
 mod matrix;
 pub mod merge;
 mod mixture;
@@ -43,11 +52,14 @@ pub mod tree;
 pub mod wire;
 
 pub use bandwidth::{Bandwidth, Rule, SampleSize, Shape};
+pub use cells::{CellOptions, CellTarget, Cells};
+pub use clumps::{Clump, Clumps, MixtureFit};
 pub use credible::{HighestDensity, ellipse};
 pub use cut::{Criterion, Cut, NodeErrors};
 pub use error::Error;
 pub use fast_kernel::TabulatedEstimate;
 pub use kernel::KernelEstimate;
+pub use lpg::Lpg;
 pub use merge::MergeCost;
 pub use mixture::{Component, Mixture};
 pub use particles::Particles;

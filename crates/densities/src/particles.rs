@@ -4,8 +4,7 @@ use crate::Error;
 use fewbits_core::{Columns, ColumnsMut};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one};
-use fewbits_numerics::exponential::exp_minus;
-use fewbits_numerics::sums::{dot, lanes, largest, sum};
+use fewbits_numerics::kernels::{dot, exp_minus, largest, weighted_covariance};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -153,8 +152,8 @@ impl<const D: usize> Particles<D> {
         if !largest.is_finite() {
             return Err(Error::Degenerate { largest });
         }
-        exp_minus(&self.scratch, largest, &mut self.weights);
-        let total = sum(&self.weights);
+        let sums = exp_minus(&self.scratch, largest, &mut self.weights);
+        let total = sums.sum;
         if !total.is_finite() {
             exp_minus(&self.log_weights, 0.0, &mut self.weights);
             return Err(Error::Degenerate { largest: total });
@@ -164,7 +163,7 @@ impl<const D: usize> Particles<D> {
         self.weights.iter_mut().for_each(|w| *w *= scale);
         self.scratch.iter_mut().for_each(|w| *w -= log_sum);
         std::mem::swap(&mut self.log_weights, &mut self.scratch);
-        self.effective_sample_size = 1.0 / dot(&self.weights, &self.weights);
+        self.effective_sample_size = total * total / sums.sum_of_squares;
         Ok(log_sum)
     }
 
@@ -213,9 +212,7 @@ impl<const D: usize> Particles<D> {
         let mut covariance = SMatrix::zeros();
         for i in 0..D {
             for j in 0..=i {
-                let (a, b) = (&self.columns[i][..w.len()], &self.columns[j][..w.len()]);
-                let (ma, mb) = (mean[i], mean[j]);
-                let entry = lanes(w.len(), |k| w[k] * (a[k] - ma) * (b[k] - mb));
+                let entry = weighted_covariance(w, (&self.columns[i], mean[i]), (&self.columns[j], mean[j]));
                 covariance[(i, j)] = entry;
                 covariance[(j, i)] = entry;
             }

@@ -193,7 +193,7 @@ fn draw_label<const D: usize, R: Rng + ?Sized>(
         previous = Some((*c.covariance(), factor));
         logs.push(c.weight().ln() - 0.5 * factor.squared(&(c.mean() - origin - mean)) - factor.half_log_det);
     }
-    let largest = fewbits_numerics::sums::largest(logs);
+    let largest = fewbits_numerics::kernels::largest(logs);
     Ok(pick(rng, logs.iter().map(|x| (x - largest).exp())))
 }
 

@@ -1,9 +1,14 @@
-//! Claims: named predicates over the tables of a figure.
+//! Claims: named predicates over the rows of a figure.
 //!
 //! A figure is not reproduced because it was drawn; it is reproduced because what the paper says about it was checked. Each
 //! statement is a [`Claim`] with a measured value, what was expected of it, and the tolerance between. A claim of the paper
 //! that is false becomes a claim of ours with the right sign and a pointer into `docs/errata.md`.
+//!
+//! A claim about nothing does not hold: a row that is not there, an empty selection, a value that is not finite fail it. (After
+//! `--set` the rows of the paper's setting may rightly be absent: then the claim is skipped.)
 
+use crate::measured::Measured;
+use crate::reference;
 use crate::table::Value;
 use serde::Serialize;
 use std::fmt;
@@ -48,7 +53,7 @@ pub struct Claim {
     pub statement: String,
     /// Verdict.
     pub verdict: Verdict,
-    /// What was measured.
+    /// What was measured; `NaN` (in JSON: null) where the row it speaks of is absent.
     pub value: f64,
     /// What was expected of it.
     pub expected: Expected,
@@ -60,132 +65,481 @@ pub struct Claim {
     /// Can only be decided at the full trial count.
     #[serde(skip)]
     pub(crate) full_effort: bool,
+    /// What it speaks of was not there.
+    #[serde(skip)]
+    pub(crate) absent: bool,
 }
 
 impl Claim {
-    fn decided(
+    /// The claim is made for the figure's own parameters only; skipped after `--set`.
+    pub fn at_defaults(&mut self) -> &mut Self {
+        self.at_defaults = true;
+        self
+    }
+
+    /// The claim can only be decided at the full trial count; skipped with fewer trials.
+    pub fn at_full_trials(&mut self) -> &mut Self {
+        self.full_effort = true;
+        self
+    }
+}
+
+/// The claims of one figure as they are made. Every method adds one claim (or one for each reference) and returns it, so that
+/// it can be limited: `claims.near(...).at_defaults()`.
+#[derive(Debug, Clone)]
+pub struct Claims {
+    figure: &'static str,
+    made: Vec<Claim>,
+}
+
+impl Claims {
+    /// No claims yet about the figure of this id.
+    pub fn about(figure: &'static str) -> Self {
+        Self {
+            figure,
+            made: Vec::new(),
+        }
+    }
+
+    fn decide(
+        &mut self,
         id: impl Into<String>,
         statement: impl Into<String>,
-        value: f64,
+        value: Option<f64>,
         expected: Expected,
-        holds: bool,
-    ) -> Self {
-        Self {
+        holds: impl FnOnce(f64) -> bool,
+    ) -> &mut Claim {
+        let verdict = match value {
+            Some(value) if value.is_finite() && holds(value) => Verdict::Pass,
+            _ => Verdict::Fail,
+        };
+        self.made.push(Claim {
             id: id.into(),
             statement: statement.into(),
-            verdict: if holds { Verdict::Pass } else { Verdict::Fail },
-            value,
+            verdict,
+            value: value.unwrap_or(f64::NAN),
             expected,
             tolerance: None,
             at_defaults: false,
             full_effort: false,
+            absent: value.is_none(),
+        });
+        let last = self.made.len() - 1;
+        &mut self.made[last]
+    }
+
+    fn condition(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: Option<f64>,
+        condition: String,
+        holds: impl FnOnce(f64) -> bool,
+    ) -> &mut Claim {
+        self.decide(id, statement, value, Expected::Condition(condition), holds)
+    }
+
+    /// Every row satisfies `holds`; the value is the number of rows that do not. No rows: nothing was shown.
+    pub fn all<R>(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        rows: impl IntoIterator<Item = R>,
+        holds: impl Fn(R) -> bool,
+    ) -> &mut Claim {
+        let (mut rows, mut broken) = (rows.into_iter().peekable(), 0.0);
+        let any = rows.peek().is_some();
+        for row in rows {
+            broken += f64::from(u8::from(!holds(row)));
         }
+        self.condition(id, statement, any.then_some(broken), "0 violations".to_owned(), |v| v == 0.0)
     }
 
     /// `|value - expected| <= tolerance`.
     pub fn near(
+        &mut self,
         id: impl Into<String>,
         statement: impl Into<String>,
-        value: f64,
+        value: impl Into<Option<f64>>,
         expected: f64,
         tolerance: f64,
-    ) -> Self {
-        let holds = (value - expected).abs() <= tolerance;
-        Self {
-            tolerance: Some(tolerance),
-            ..Self::decided(id, statement, value, Expected::Number(expected), holds)
-        }
-    }
-
-    /// `|value / expected - 1| <= tolerance`.
-    pub fn near_relative(
-        id: impl Into<String>,
-        statement: impl Into<String>,
-        value: f64,
-        expected: f64,
-        tolerance: f64,
-    ) -> Self {
-        Self::near(id, statement, value, expected, tolerance * expected.abs())
+    ) -> &mut Claim {
+        let number = Expected::Number(expected);
+        let claim = self.decide(id, statement, value.into(), number, |v| (v - expected).abs() <= tolerance);
+        claim.tolerance = Some(tolerance);
+        claim
     }
 
     /// `value <= bound`.
-    pub fn at_most(id: impl Into<String>, statement: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self::decided(id, statement, value, Expected::Condition(format!("<= {bound}")), value <= bound)
+    pub fn at_most(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: impl Into<Option<f64>>,
+        bound: f64,
+    ) -> &mut Claim {
+        self.condition(id, statement, value.into(), format!("<= {bound}"), |v| v <= bound)
     }
 
     /// `value >= bound`.
-    pub fn at_least(id: impl Into<String>, statement: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self::decided(id, statement, value, Expected::Condition(format!(">= {bound}")), value >= bound)
+    pub fn at_least(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: impl Into<Option<f64>>,
+        bound: f64,
+    ) -> &mut Claim {
+        self.condition(id, statement, value.into(), format!(">= {bound}"), |v| v >= bound)
     }
 
     /// `value < bound`.
-    pub fn below(id: impl Into<String>, statement: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self::decided(id, statement, value, Expected::Condition(format!("< {bound}")), value < bound)
+    pub fn below(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: impl Into<Option<f64>>,
+        bound: f64,
+    ) -> &mut Claim {
+        self.condition(id, statement, value.into(), format!("< {bound}"), |v| v < bound)
     }
 
     /// `value > bound`.
-    pub fn above(id: impl Into<String>, statement: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self::decided(id, statement, value, Expected::Condition(format!("> {bound}")), value > bound)
+    pub fn above(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: impl Into<Option<f64>>,
+        bound: f64,
+    ) -> &mut Claim {
+        self.condition(id, statement, value.into(), format!("> {bound}"), |v| v > bound)
     }
 
-    /// No counterexample among those looked at: `violations` counts the rows that break the statement.
-    pub fn never(id: impl Into<String>, statement: impl Into<String>, violations: usize) -> Self {
-        Self::decided(id, statement, violations as f64, Expected::Condition("0 violations".to_owned()), violations == 0)
+    /// Each value is strictly smaller than the next; the value is the number of neighbours that are not. At least two values.
+    pub fn increasing<V: Into<Option<f64>>>(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        values: impl IntoIterator<Item = V>,
+    ) -> &mut Claim {
+        let values: Option<Vec<f64>> = values.into_iter().map(Into::into).collect();
+        let values = values.filter(|v| v.len() > 1);
+        let broken = values.map(|v| v.windows(2).filter(|pair| !increases(pair[0], pair[1])).count() as f64);
+        self.condition(id, statement, broken, "0 violations".to_owned(), |v| v == 0.0)
     }
 
-    /// The claim is made for the figure's own parameters only; skipped after `--set`.
-    #[must_use]
-    pub fn at_defaults(self) -> Self {
-        Self {
-            at_defaults: true,
-            ..self
-        }
+    /// Each value is strictly larger than the next.
+    pub fn decreasing<V: Into<Option<f64>>>(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        values: impl IntoIterator<Item = V>,
+    ) -> &mut Claim {
+        self.increasing(id, statement, values.into_iter().map(|v| v.into().map(|v: f64| -v)))
     }
 
-    /// The claim can only be decided at the full trial count; skipped with fewer trials.
-    #[must_use]
-    pub fn needs_full_trials(self) -> Self {
-        Self {
-            full_effort: true,
-            ..self
-        }
+    /// The estimate is within `errors` of its standard errors of `expected`; the value is its deviation in standard errors.
+    pub fn within(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        estimate: impl Into<Option<Measured>>,
+        expected: f64,
+        errors: f64,
+    ) -> &mut Claim {
+        let z = estimate.into().and_then(|e| e.z_score(expected));
+        self.condition(id, statement, z, format!("{} within {errors} standard errors", Value::Number(expected)), |z| {
+            z.abs() <= errors
+        })
     }
 
-    pub(crate) fn judged(self, defaults: bool, full_effort: bool) -> Self {
-        let undecided = (self.at_defaults && !defaults) || (self.full_effort && !full_effort);
-        if undecided {
-            Self {
-                verdict: Verdict::Skipped,
-                ..self
+    /// Every row's estimate is within `errors` of its standard errors of the row's expectation; the value is the largest
+    /// deviation in standard errors.
+    pub fn all_within<R>(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        rows: impl IntoIterator<Item = R>,
+        pair: impl Fn(R) -> (Measured, f64),
+        errors: f64,
+    ) -> &mut Claim {
+        let scores = rows
+            .into_iter()
+            .map(pair)
+            .map(|(estimate, expected)| estimate.z_score(expected));
+        let scores: Option<Vec<f64>> = scores.map(|z| z.map(f64::abs)).collect();
+        // NaN must survive: `f64::max` would drop it.
+        let worst = scores.and_then(|z| z.into_iter().reduce(|a, b| if a.is_nan() || a >= b { a } else { b }));
+        self.condition(id, statement, worst, format!("<= {errors} standard errors"), |z| z <= errors)
+    }
+
+    /// The (paired) difference is negative by at least `errors` of its standard errors: the first is smaller than the second.
+    pub fn less(
+        &mut self,
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        difference: impl Into<Option<Measured>>,
+        errors: f64,
+    ) -> &mut Claim {
+        let z = difference.into().and_then(|d| d.z_score(0.0));
+        self.condition(id, statement, z, format!("< -{errors} standard errors"), |z| z < -errors)
+    }
+
+    /// One claim for each reference `<figure>/<quantity>/<key>`: the row of that key has that value, within the reference's
+    /// tolerance or, where it has a standard error, within four combined standard errors. A reference whose row is absent
+    /// fails. References hold at the paper's setting only.
+    pub fn references<R, V: Cell>(
+        &mut self,
+        quantity: &str,
+        statement: &str,
+        rows: impl IntoIterator<Item = R>,
+        key_and_value: impl Fn(R) -> (String, V),
+    ) {
+        let rows: Vec<_> = rows.into_iter().map(key_and_value).collect();
+        let known = match reference::group(self.figure, quantity) {
+            Ok(known) if !known.is_empty() => known,
+            Ok(_) => {
+                let empty = "there are references of that name";
+                self.at_least(format!("{quantity}-references"), empty, 0.0, 1.0);
+                return;
             }
-        } else {
-            self
+            Err(error) => {
+                self.condition(format!("{quantity}-references"), error, None, "to be read".to_owned(), |_| false);
+                return;
+            }
+        };
+        for (key, known) in known {
+            let found = rows.iter().find(|(name, _)| name == key).map(|(_, value)| value);
+            let own = found.and_then(Cell::standard_error).unwrap_or(0.0);
+            let tolerance = known.tolerance + 4.0 * known.standard_error.unwrap_or(0.0).hypot(own);
+            let id = format!("{quantity}/{key}").replace(' ', "-");
+            let statement = format!("{statement}, {key}");
+            self.near(id, statement, found.and_then(Cell::number), known.value, tolerance)
+                .at_defaults();
         }
+    }
+
+    /// The claims with the verdicts of a run: undecided ones are skipped.
+    pub(crate) fn judged(self, defaults: bool, full_effort: bool) -> Vec<Claim> {
+        let undecided = |c: &Claim| ((c.at_defaults || c.absent) && !defaults) || (c.full_effort && !full_effort);
+        self.made
+            .into_iter()
+            .map(|claim| {
+                if undecided(&claim) {
+                    Claim {
+                        verdict: Verdict::Skipped,
+                        ..claim
+                    }
+                } else {
+                    claim
+                }
+            })
+            .collect()
     }
 }
 
-/// Number of neighbours in `values` that do not increase strictly.
-pub fn not_increasing(values: &[f64]) -> usize {
-    values
-        .windows(2)
-        .filter(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less))
-        .count()
+/// Strictly, and false where either is not a number.
+fn increases(a: f64, b: f64) -> bool {
+    a < b
 }
 
-/// Number of neighbours in `values` that do not decrease strictly.
-pub fn not_decreasing(values: &[f64]) -> usize {
-    values
-        .windows(2)
-        .filter(|pair| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Less))
-        .count()
+/// What a reference can be compared with: a number, perhaps missing, perhaps with a standard error.
+pub trait Cell {
+    /// The number.
+    fn number(&self) -> Option<f64>;
+    /// Its standard error.
+    fn standard_error(&self) -> Option<f64> {
+        None
+    }
 }
 
-/// Largest entry; `-inf` of nothing.
-pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(f64::NEG_INFINITY, f64::max)
+impl Cell for f64 {
+    fn number(&self) -> Option<f64> {
+        Some(*self)
+    }
 }
 
-/// Smallest entry; `+inf` of nothing.
-pub fn smallest(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(f64::INFINITY, f64::min)
+impl Cell for Option<f64> {
+    fn number(&self) -> Option<f64> {
+        *self
+    }
+}
+
+impl Cell for Measured {
+    fn number(&self) -> Option<f64> {
+        Some(self.value)
+    }
+
+    fn standard_error(&self) -> Option<f64> {
+        self.standard_error
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(make: impl FnOnce(&mut Claims)) -> Verdict {
+        let mut claims = Claims::about("demo-fig1");
+        make(&mut claims);
+        let judged = claims.judged(true, true);
+        assert!(!judged.is_empty());
+        if judged.iter().all(|c| c.verdict == Verdict::Pass) {
+            Verdict::Pass
+        } else {
+            Verdict::Fail
+        }
+    }
+
+    fn measured(value: f64, error: f64) -> Measured {
+        Measured {
+            value,
+            standard_error: Some(error),
+        }
+    }
+
+    /// Every kind: an example that holds, one that does not, and one about nothing.
+    #[test]
+    fn every_kind_can_hold_and_can_fail() {
+        type Make = Box<dyn Fn(&mut Claims, usize)>;
+        let none: Option<f64> = None;
+        let kinds: Vec<(&str, Make)> = vec![
+            (
+                "all",
+                Box::new(|c, i| {
+                    drop(
+                        c.all("x", "", [vec![1, 2], vec![1, -2], vec![]][i].iter(), |v| *v > 0)
+                            .id
+                            .clone(),
+                    )
+                }),
+            ),
+            (
+                "near",
+                Box::new(move |c, i| drop(c.near("x", "", [Some(1.05), Some(1.2), none][i], 1.0, 0.1).id.clone())),
+            ),
+            (
+                "at_most",
+                Box::new(move |c, i| drop(c.at_most("x", "", [Some(1.0), Some(1.1), none][i], 1.0).id.clone())),
+            ),
+            (
+                "at_least",
+                Box::new(move |c, i| drop(c.at_least("x", "", [Some(1.0), Some(0.9), none][i], 1.0).id.clone())),
+            ),
+            (
+                "below",
+                Box::new(move |c, i| drop(c.below("x", "", [Some(0.9), Some(1.0), none][i], 1.0).id.clone())),
+            ),
+            (
+                "above",
+                Box::new(move |c, i| drop(c.above("x", "", [Some(1.1), Some(1.0), none][i], 1.0).id.clone())),
+            ),
+            (
+                "increasing",
+                Box::new(|c, i| {
+                    drop(
+                        c.increasing("x", "", [vec![1.0, 2.0], vec![1.0, 1.0], vec![1.0]][i].clone())
+                            .id
+                            .clone(),
+                    )
+                }),
+            ),
+            (
+                "decreasing",
+                Box::new(|c, i| {
+                    drop(
+                        c.decreasing("x", "", [vec![2.0, 1.0], vec![1.0, 1.0], vec![]][i].clone())
+                            .id
+                            .clone(),
+                    )
+                }),
+            ),
+            (
+                "within",
+                Box::new(|c, i| {
+                    drop(
+                        c.within("x", "", [Some(measured(1.3, 0.1)), Some(measured(1.5, 0.1)), None][i], 1.0, 4.0)
+                            .id
+                            .clone(),
+                    )
+                }),
+            ),
+            (
+                "less",
+                Box::new(|c, i| {
+                    drop(
+                        c.less("x", "", [Some(measured(-0.4, 0.1)), Some(measured(-0.2, 0.1)), None][i], 3.0)
+                            .id
+                            .clone(),
+                    )
+                }),
+            ),
+            (
+                "all_within",
+                Box::new(|c, i| {
+                    let rows = [
+                        vec![measured(1.3, 0.1)],
+                        vec![measured(1.0, 0.1), measured(1.5, 0.1)],
+                        vec![],
+                    ];
+                    c.all_within("x", "", &rows[i], |r| (*r, 1.0), 4.0);
+                }),
+            ),
+        ];
+        for (kind, make) in kinds {
+            assert_eq!(verdict(|c| make(c, 0)), Verdict::Pass, "{kind}");
+            assert_eq!(verdict(|c| make(c, 1)), Verdict::Fail, "{kind} with a counterexample");
+            assert_eq!(verdict(|c| make(c, 2)), Verdict::Fail, "{kind} of nothing");
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_fails_every_kind() {
+        let nan = f64::NAN;
+        assert_eq!(verdict(|c| drop(c.near("x", "", nan, 0.0, 1.0).id.clone())), Verdict::Fail);
+        assert_eq!(verdict(|c| drop(c.at_most("x", "", f64::NEG_INFINITY, 1.0).id.clone())), Verdict::Fail);
+        assert_eq!(verdict(|c| drop(c.increasing("x", "", [0.0, nan, 1.0]).id.clone())), Verdict::Fail);
+        assert_eq!(verdict(|c| drop(c.within("x", "", measured(nan, 1.0), 0.0, 4.0).id.clone())), Verdict::Fail);
+        let rows = [measured(nan, 1.0), measured(0.0, 1.0)];
+        assert_eq!(verdict(|c| drop(c.all_within("x", "", rows, |r| (r, 0.0), 4.0).id.clone())), Verdict::Fail);
+        // A single trial has no standard error and shows nothing.
+        let single = Measured {
+            value: 1.0,
+            standard_error: None,
+        };
+        assert_eq!(verdict(|c| drop(c.within("x", "", single, 0.9, 4.0).id.clone())), Verdict::Fail);
+    }
+
+    #[test]
+    fn undecided_claims_are_skipped() {
+        let of = |defaults, full| {
+            let mut claims = Claims::about("demo-fig1");
+            claims.near("a", "", 0.0, 1.0, 0.1).at_defaults();
+            claims.near("b", "", 0.0, 1.0, 0.1).at_full_trials();
+            claims.near("c", "", None, 1.0, 0.1);
+            claims
+                .judged(defaults, full)
+                .into_iter()
+                .map(|c| c.verdict)
+                .collect::<Vec<_>>()
+        };
+        use Verdict::{Fail, Skipped};
+        assert_eq!(of(true, true), [Fail, Fail, Fail]);
+        assert_eq!(of(false, true), [Skipped, Fail, Skipped]);
+        assert_eq!(of(true, false), [Fail, Skipped, Fail]);
+    }
+
+    #[test]
+    fn references_are_found_by_key_and_fail_where_the_row_is_absent_or_off() {
+        let judge = |rows: Vec<(&str, f64)>| {
+            let mut claims = Claims::about("mi-table4-3");
+            claims.references("mse", "squared error", rows, |(key, value)| (key.to_owned(), value));
+            let of = |c: Claim| (c.id == "mse/lloyd-x").then_some(c.verdict);
+            claims.judged(true, true).into_iter().find_map(of).unwrap()
+        };
+        assert_eq!(judge(vec![("other", 1.0), ("lloyd-x", 0.130_486_15)]), Verdict::Pass);
+        assert_eq!(judge(vec![("lloyd-x", 0.130_487)]), Verdict::Fail);
+        assert_eq!(judge(vec![("other", 0.130_486_15)]), Verdict::Fail);
+        // A group without references is a mistake, not a success.
+        assert_eq!(verdict(|c| c.references("nothing", "", [1.0], |v| (String::new(), v))), Verdict::Fail);
+    }
 }

@@ -28,7 +28,39 @@ pub enum Error {
         /// What would have been accepted.
         expected: String,
     },
-    /// A table was built or read wrongly.
+    /// A parameter of the wrong type or out of range.
+    #[error("parameter `{name}` of figure `{figure}` is `{value}`: {reason}")]
+    Refused {
+        /// Id of the figure.
+        figure: &'static str,
+        /// The parameter, or the entry of it, such as `a[0]`.
+        name: String,
+        /// The refused value.
+        value: String,
+        /// Why.
+        reason: String,
+    },
+    /// A parameter that changes nothing beside the others' values.
+    #[error("parameter `{name}` of figure `{figure}` is without effect at these settings; see `describe {figure}`")]
+    Idle {
+        /// Id of the figure.
+        figure: &'static str,
+        /// The parameter.
+        name: String,
+    },
+    /// A run that would take too long or too much memory.
+    #[error("figure `{figure}` would need about {need:.1e} {unit} at these settings, beyond {limit:.1e}")]
+    TooLarge {
+        /// Id of the figure.
+        figure: &'static str,
+        /// The estimate.
+        need: f64,
+        /// The most that is accepted.
+        limit: f64,
+        /// Of what.
+        unit: &'static str,
+    },
+    /// A table was built or read wrongly, or holds a number that is not finite.
     #[error("table: {0}")]
     Table(String),
     /// The run was cancelled.

@@ -1,13 +1,17 @@
 //! What a figure is, and how it is run.
 
-use crate::claim::Claim;
+use crate::claim::{Claim, Claims};
 use crate::error::Error;
+use crate::parameters::{self, Settings};
 use crate::plot::Plot;
+use crate::schema::{self, Fields, Parameter};
 use crate::table::Tables;
 use fewbits_monte_carlo::{MonteCarlo, Stream};
+use garde::Validate;
+use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value as Json};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What stands above a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -22,7 +26,7 @@ pub struct About {
     pub source: &'static str,
 }
 
-/// The surroundings of a run: the seed, and who wants to hear of progress.
+/// The surroundings of a run: the seed, and who wants to know of progress.
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
     /// Root of all randomness.
@@ -59,53 +63,80 @@ impl Context<'_> {
         }
         run
     }
+
+    /// Ends a long computation that is no Monte-Carlo run where the user asked for it: call it between its pieces.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] once the run is cancelled.
+    pub fn check(&self) -> Result<(), Error> {
+        if self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+            return Err(Error::Cancelled);
+        }
+        Ok(())
+    }
 }
 
-/// A figure or table of a publication, or one of our own: parameters in, tables out, and the claims they must meet.
+/// Rough need of a run: seconds on one core, bytes at its peak.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Cost {
+    /// Seconds on one core.
+    pub seconds: f64,
+    /// Bytes.
+    pub bytes: f64,
+}
+
+impl Cost {
+    /// More is refused: a day on one core, 2 GB.
+    const LIMIT: Self = Self {
+        seconds: 86_400.0,
+        bytes: 2e9,
+    };
+}
+
+/// A figure or table of a publication, or one of our own: parameters in, rows out, and the claims they must meet.
 ///
-/// `Parameters` is a flat serde struct (numbers, booleans, strings and lists of these) whose `Default` is the paper's
-/// setting; derive `Serialize, Deserialize` with `#[serde(deny_unknown_fields)]`. A parameter named `trials` or ending in
-/// `_trials` is effort: lowering it leaves the meaning of the figure and skips the claims that need the full count.
+/// A parameter named `trials` or ending in `_trials` is effort: lowering it leaves the meaning of the figure and skips the
+/// claims that need the full count.
 pub trait Figure: Sync {
-    /// The figure's parameters.
-    type Parameters: Serialize + DeserializeOwned + Default;
+    /// A flat struct whose `Default` is the paper's setting, and whose fields have documentation and ranges (`garde`). Derive
+    /// `Serialize, Deserialize, JsonSchema, Validate` and `#[serde(deny_unknown_fields)]`.
+    type Parameters: Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Default;
+
+    /// `Vec<Row>`, or a struct of such lists (the first is the main table): see [`Tables::of`].
+    type Tables: Serialize + JsonSchema;
 
     /// What stands above the figure.
     fn about(&self) -> About;
 
-    /// Checks ranges beyond the types, before any work. The default accepts everything.
-    ///
-    /// # Errors
-    /// [`Error::BadParameter`] or an argument error of a crate below.
-    fn check(&self, _parameters: &Self::Parameters) -> Result<(), Error> {
-        Ok(())
-    }
-
     /// Reduces effort for `--quick`: the whole figure should then take about a second. The default changes nothing.
     fn quicken(&self, _parameters: &mut Self::Parameters) {}
+
+    /// Parameters without effect under these values: setting one is refused.
+    fn idle(&self, _parameters: &Self::Parameters) -> Vec<&'static str> {
+        Vec::new()
+    }
+
+    /// What a run with these parameters needs, roughly: more than a day or 2 GB is refused before it starts.
+    fn cost(&self, _parameters: &Self::Parameters) -> Cost {
+        Cost::default()
+    }
 
     /// Whether the figure measures time and must not share the machine with others.
     fn measures_time(&self) -> bool {
         false
     }
 
-    /// Computes the tables. Same parameters and seed, same bytes, on any number of threads.
+    /// Computes the rows. Same parameters and seed, same bytes, on any number of threads.
     ///
     /// # Errors
-    /// If a parameter is out of range or a computation fails.
-    fn run(&self, parameters: &Self::Parameters, context: &Context<'_>) -> Result<Tables, Error>;
+    /// If a computation fails or the run is cancelled.
+    fn run(&self, parameters: &Self::Parameters, context: &Context<'_>) -> Result<Self::Tables, Error>;
 
-    /// Judges the tables.
-    ///
-    /// # Errors
-    /// If a column is missing.
-    fn claims(&self, parameters: &Self::Parameters, tables: &Tables) -> Result<Vec<Claim>, Error>;
+    /// Judges the rows.
+    fn claims(&self, parameters: &Self::Parameters, tables: &Self::Tables, claims: &mut Claims);
 
-    /// Draws the tables.
-    ///
-    /// # Errors
-    /// If a column is missing.
-    fn plot(&self, parameters: &Self::Parameters, tables: &Tables) -> Result<Plot, Error>;
+    /// Draws the rows.
+    fn plot(&self, parameters: &Self::Parameters, tables: &Self::Tables) -> Plot;
 }
 
 /// What came out of one run.
@@ -121,7 +152,7 @@ pub struct Outcome {
     pub plot: Plot,
 }
 
-/// A figure whatever its parameter type: what the registry holds. Implemented by every [`Figure`].
+/// A figure whatever its types: what the registry holds. Implemented by every [`Figure`].
 pub trait AnyFigure: Sync {
     /// What stands above the figure.
     fn about(&self) -> About;
@@ -129,15 +160,18 @@ pub trait AnyFigure: Sync {
     /// Whether the figure measures time and must not share the machine with others.
     fn measures_time(&self) -> bool;
 
-    /// The parameters and their defaults.
-    fn defaults(&self) -> Map<String, Json>;
+    /// The parameters with defaults, ranges and meanings.
+    fn parameters(&self) -> Vec<Parameter>;
+
+    /// The tables and their columns, main table first.
+    fn tables(&self) -> Vec<Fields>;
 
     /// The defaults, quickened if asked for, with `overrides` (`name`, text) applied on top, checked.
     ///
-    /// A single value stands for a list of one, and commas separate the entries of a list.
+    /// A list is written `0.5,0.9`, a list of points `0.5:0.1,0.9:0.2` (entries in the order of the point's fields).
     ///
     /// # Errors
-    /// [`Error::UnknownParameter`] or [`Error::BadParameter`].
+    /// If a parameter is unknown, out of range or without effect, or the run would be too large.
     fn configure(&self, overrides: &[(String, String)], quick: bool) -> Result<Map<String, Json>, Error>;
 
     /// Runs the figure with a full set of parameters, as [`AnyFigure::configure`] gives it.
@@ -147,54 +181,25 @@ pub trait AnyFigure: Sync {
     fn produce(&self, parameters: &Map<String, Json>, context: &Context<'_>) -> Result<Outcome, Error>;
 }
 
-fn is_effort(name: &str) -> bool {
-    name == "trials" || name.ends_with("_trials")
-}
-
-/// Reads `text` as a value of the same kind as `example`.
-fn parse_like(example: &Json, text: &str) -> Result<Json, String> {
-    let number = |text: &str| -> Result<f64, String> {
-        let value: f64 = text.trim().parse().map_err(|_| "a number".to_owned())?;
-        if value.is_finite() {
-            Ok(value)
-        } else {
-            Err("a finite number".to_owned())
+/// A checked set of parameters, as [`AnyFigure::produce`] takes it.
+fn typed<F: Figure>(figure: &F, map: &Map<String, Json>) -> Result<F::Parameters, Error> {
+    let id = Figure::about(figure).id;
+    let parameters: F::Parameters = parameters::typed(id, map)?;
+    let cost = figure.cost(&parameters);
+    for (need, limit, unit) in [
+        (cost.bytes, Cost::LIMIT.bytes, "bytes"),
+        (cost.seconds, Cost::LIMIT.seconds, "seconds on one core"),
+    ] {
+        if need.is_nan() || need > limit {
+            return Err(Error::TooLarge {
+                figure: id,
+                need,
+                limit,
+                unit,
+            });
         }
-    };
-    match example {
-        Json::Number(n) if n.is_f64() => Ok(number(text)?.into()),
-        Json::Number(n) if n.is_u64() => text
-            .trim()
-            .parse::<u64>()
-            .map(Json::from)
-            .map_err(|_| "a whole number, 0 or above".to_owned()),
-        Json::Number(_) => text
-            .trim()
-            .parse::<i64>()
-            .map(Json::from)
-            .map_err(|_| "a whole number".to_owned()),
-        Json::Bool(_) => text
-            .trim()
-            .parse::<bool>()
-            .map(Json::from)
-            .map_err(|_| "true or false".to_owned()),
-        Json::Array(entries) => {
-            let first = entries.first().unwrap_or(&Json::Null);
-            text.split(',')
-                .map(|entry| parse_like(first, entry))
-                .collect::<Result<Vec<_>, _>>()
-                .map(Json::from)
-                .map_err(|expected| format!("a list, entries separated by commas, each {expected}"))
-        }
-        _ => Ok(Json::from(text)),
     }
-}
-
-fn as_map<P: Serialize>(parameters: &P) -> Map<String, Json> {
-    match serde_json::to_value(parameters) {
-        Ok(Json::Object(map)) => map,
-        _ => Map::new(),
-    }
+    Ok(parameters)
 }
 
 impl<F: Figure> AnyFigure for F {
@@ -206,8 +211,12 @@ impl<F: Figure> AnyFigure for F {
         Figure::measures_time(self)
     }
 
-    fn defaults(&self) -> Map<String, Json> {
-        as_map(&F::Parameters::default())
+    fn parameters(&self) -> Vec<Parameter> {
+        schema::parameters::<F::Parameters>(&parameters::map(&F::Parameters::default()))
+    }
+
+    fn tables(&self) -> Vec<Fields> {
+        schema::tables::<F::Tables>()
     }
 
     fn configure(&self, overrides: &[(String, String)], quick: bool) -> Result<Map<String, Json>, Error> {
@@ -216,60 +225,30 @@ impl<F: Figure> AnyFigure for F {
         if quick {
             self.quicken(&mut start);
         }
-        let mut map = as_map(&start);
+        let mut settings = Settings::new(figure, parameters::map(&start), AnyFigure::parameters(self));
         for (name, text) in overrides {
-            let Some(example) = map.get(name) else {
-                let valid: Vec<_> = map.keys().map(String::as_str).collect();
-                let valid = if valid.is_empty() {
-                    "none".to_owned()
-                } else {
-                    valid.join(", ")
-                };
-                return Err(Error::UnknownParameter {
-                    figure,
-                    name: name.clone(),
-                    valid,
-                });
-            };
-            let value = parse_like(example, text).map_err(|expected| Error::BadParameter {
+            settings.set(name, text)?;
+        }
+        let map = settings.into_map();
+        let idle = self.idle(&typed(self, &map)?);
+        if let Some((name, _)) = overrides.iter().find(|(name, _)| idle.contains(&name.as_str())) {
+            return Err(Error::Idle {
                 figure,
                 name: name.clone(),
-                value: text.clone(),
-                expected,
-            })?;
-            if is_effort(name) && value.as_u64() == Some(0) {
-                return Err(Error::BadParameter {
-                    figure,
-                    name: name.clone(),
-                    value: text.clone(),
-                    expected: "at least 1".to_owned(),
-                });
-            }
-            map.insert(name.clone(), value);
+            });
         }
-        self.check(&typed::<F>(figure, &map)?)?;
         Ok(map)
     }
 
     fn produce(&self, parameters: &Map<String, Json>, context: &Context<'_>) -> Result<Outcome, Error> {
-        let typed = typed::<F>(Figure::about(self).id, parameters)?;
-        self.check(&typed)?;
-        let tables = self.run(&typed, context)?;
-        let defaults = AnyFigure::defaults(self);
-        let lowered = |name: &String, value: &Json| match (value.as_f64(), defaults.get(name).and_then(Json::as_f64)) {
-            (Some(value), Some(default)) => value < default,
-            _ => false,
-        };
-        let at_defaults = parameters
-            .iter()
-            .all(|(n, v)| is_effort(n) || defaults.get(n) == Some(v));
-        let full_effort = !parameters.iter().any(|(n, v)| is_effort(n) && lowered(n, v));
-        let claims = self
-            .claims(&typed, &tables)?
-            .into_iter()
-            .map(|claim| claim.judged(at_defaults, full_effort))
-            .collect();
-        let plot = self.plot(&typed, &tables)?;
+        let typed = typed(self, parameters)?;
+        let rows = self.run(&typed, context)?;
+        let tables = Tables::of(&rows)?;
+        let mut claims = Claims::about(Figure::about(self).id);
+        Figure::claims(self, &typed, &rows, &mut claims);
+        let (defaults, full) = parameters::meaning(parameters, &parameters::map(&F::Parameters::default()));
+        let claims = claims.judged(defaults, full);
+        let plot = self.plot(&typed, &rows);
         Ok(Outcome {
             parameters: parameters.clone(),
             tables,
@@ -277,13 +256,4 @@ impl<F: Figure> AnyFigure for F {
             plot,
         })
     }
-}
-
-fn typed<F: Figure>(figure: &'static str, map: &Map<String, Json>) -> Result<F::Parameters, Error> {
-    serde_json::from_value(Json::Object(map.clone())).map_err(|error| Error::BadParameter {
-        figure,
-        name: "(all)".to_owned(),
-        value: Json::Object(map.clone()).to_string(),
-        expected: error.to_string(),
-    })
 }

@@ -15,6 +15,20 @@
 //! assert_eq!(plot.panels.len(), 1);
 //! ```
 
+use crate::Measured;
+
+/// The points of a curve, a row each; rows without a value are left out.
+pub fn points<R, Y: Into<Option<f64>>>(
+    rows: impl IntoIterator<Item = R>,
+    point: impl Fn(R) -> (f64, Y),
+) -> Vec<(f64, f64)> {
+    let place = |row| {
+        let (x, y) = point(row);
+        Some((x, y.into()?))
+    };
+    rows.into_iter().filter_map(place).collect()
+}
+
 /// A grid of panels, filled row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plot {
@@ -228,6 +242,21 @@ impl Layer {
                 marker: Marker::Circle,
             },
         )
+    }
+
+    /// Markers with error bars of one standard error: simulated points, a row each.
+    pub fn measured<R, Y: Into<Option<Measured>>>(
+        label: impl Into<String>,
+        rows: impl IntoIterator<Item = R>,
+        point: impl Fn(R) -> (f64, Y),
+    ) -> Self {
+        let place = |row| {
+            let (x, y) = point(row);
+            let y: Measured = y.into()?;
+            Some(((x, y.value), y.standard_error.unwrap_or(0.0)))
+        };
+        let (points, errors) = rows.into_iter().filter_map(place).unzip();
+        Self::points(label, points).with_errors(errors)
     }
 
     /// Vertical bars.

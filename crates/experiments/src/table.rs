@@ -1,14 +1,23 @@
-//! Tables: what an experiment computes, ready to be written as CSV.
+//! Tables ready to be written: typed rows become named columns with units and meanings.
+//!
+//! A figure's result is a plain value: `Vec<Row>`, or a struct of such lists whose first field is the main table. The fields of
+//! a row *are* the columns: their documentation is the meaning, `#[schemars(extend("unit" = "m"))]` the unit, `Option` may be
+//! empty, a [`Measured`](crate::Measured) fills two columns (`mse`, `mse_se`), and a unit enum is a label. A cell that is not
+//! finite is an error: what did not converge must say so.
 
 use crate::error::Error;
+use crate::schema::{self, Fields};
+use ciborium::Value as Cbor;
+use schemars::JsonSchema;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::fmt;
 
 /// One entry of a table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// A finite number or an infinity.
+    /// A number.
     Number(f64),
     /// A count or an index.
     Integer(i64),
@@ -16,17 +25,6 @@ pub enum Value {
     Text(String),
     /// No value: an empty field.
     Missing,
-}
-
-impl Value {
-    /// The entry as a number, if it is one.
-    pub fn as_number(&self) -> Option<f64> {
-        match self {
-            Self::Number(number) => Some(*number),
-            Self::Integer(integer) => Some(*integer as f64),
-            Self::Text(_) | Self::Missing => None,
-        }
-    }
 }
 
 /// Numbers are written with the shortest digits that read back to the same bits.
@@ -42,119 +40,25 @@ impl fmt::Display for Value {
     }
 }
 
-impl From<f64> for Value {
-    fn from(number: f64) -> Self {
-        Self::Number(number)
-    }
-}
-
-impl From<Option<f64>> for Value {
-    fn from(number: Option<f64>) -> Self {
-        number.map_or(Self::Missing, Self::Number)
-    }
-}
-
-impl From<usize> for Value {
-    fn from(count: usize) -> Self {
-        Self::Integer(count as i64)
-    }
-}
-
-impl From<u64> for Value {
-    fn from(count: u64) -> Self {
-        Self::Integer(count as i64)
-    }
-}
-
-impl From<u32> for Value {
-    fn from(count: u32) -> Self {
-        Self::Integer(i64::from(count))
-    }
-}
-
-impl From<i64> for Value {
-    fn from(integer: i64) -> Self {
-        Self::Integer(integer)
-    }
-}
-
-impl From<&str> for Value {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
-    }
-}
-
-impl From<String> for Value {
-    fn from(text: String) -> Self {
-        Self::Text(text)
-    }
-}
-
 /// A column: its name in the CSV header, its unit and what it holds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Column {
     /// Name in the header: lower case with underscores.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Unit; empty for pure numbers and labels.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// What the column holds, in a few words.
-    pub meaning: &'static str,
-}
-
-/// A column.
-pub const fn column(name: &'static str, unit: &'static str, meaning: &'static str) -> Column {
-    Column { name, unit, meaning }
+    pub meaning: Cow<'static, str>,
 }
 
 /// Rows under named columns.
-///
-/// ```
-/// use fewbits_experiments::{column, row, Table};
-/// let mut table = Table::new([column("gamma", "", "noise ratio"), column("mse", "unit^2", "mean squared error")]);
-/// table.push(row![0.5, 0.7296])?;
-/// assert_eq!(table.numbers("mse")?, [0.7296]);
-/// # Ok::<(), fewbits_experiments::Error>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Table {
-    columns: Vec<Column>,
-    rows: Vec<Vec<Value>>,
-}
-
-/// Builds a row for [`Table::push`] from anything that turns into a [`Value`].
-#[macro_export]
-macro_rules! row {
-    ($($value:expr),* $(,)?) => { vec![$($crate::Value::from($value)),*] };
+    pub(crate) columns: Vec<Column>,
+    pub(crate) rows: Vec<Vec<Value>>,
 }
 
 impl Table {
-    /// An empty table.
-    pub fn new(columns: impl IntoIterator<Item = Column>) -> Self {
-        Self {
-            columns: columns.into_iter().collect(),
-            rows: Vec::new(),
-        }
-    }
-
-    /// Appends a row.
-    ///
-    /// # Errors
-    /// If its length differs from the number of columns, or it holds NaN.
-    pub fn push(&mut self, row: Vec<Value>) -> Result<(), Error> {
-        if row.len() != self.columns.len() {
-            return Err(Error::Table(format!(
-                "row of {} values in a table of {} columns",
-                row.len(),
-                self.columns.len()
-            )));
-        }
-        if let Some(at) = row.iter().position(|v| matches!(v, Value::Number(x) if x.is_nan())) {
-            return Err(Error::Table(format!("NaN in column `{}` of row {}", self.columns[at].name, self.rows.len())));
-        }
-        self.rows.push(row);
-        Ok(())
-    }
-
     /// The columns.
     pub fn columns(&self) -> &[Column] {
         &self.columns
@@ -174,68 +78,6 @@ impl Table {
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
-
-    fn position(&self, name: &str) -> Result<usize, Error> {
-        self.columns
-            .iter()
-            .position(|c| c.name == name)
-            .ok_or_else(|| Error::Table(format!("no column `{name}`")))
-    }
-
-    /// A column of numbers.
-    ///
-    /// # Errors
-    /// If there is no such column, or an entry is no number.
-    pub fn numbers(&self, name: &str) -> Result<Vec<f64>, Error> {
-        let at = self.position(name)?;
-        self.rows
-            .iter()
-            .map(|row| {
-                row[at]
-                    .as_number()
-                    .ok_or_else(|| Error::Table(format!("column `{name}` holds `{}`", row[at])))
-            })
-            .collect()
-    }
-
-    /// A column as text.
-    ///
-    /// # Errors
-    /// If there is no such column.
-    pub fn texts(&self, name: &str) -> Result<Vec<String>, Error> {
-        let at = self.position(name)?;
-        Ok(self.rows.iter().map(|row| row[at].to_string()).collect())
-    }
-
-    /// The rows in which column `name` equals `value` (numbers are compared exactly), as a table of the same columns.
-    ///
-    /// # Errors
-    /// If there is no such column.
-    pub fn only(&self, name: &str, value: impl Into<Value>) -> Result<Self, Error> {
-        let at = self.position(name)?;
-        let value = value.into();
-        let same = |entry: &Value| match (entry.as_number(), value.as_number()) {
-            (Some(a), Some(b)) => a == b,
-            _ => entry == &value,
-        };
-        Ok(Self {
-            columns: self.columns.clone(),
-            rows: self.rows.iter().filter(|row| same(&row[at])).cloned().collect(),
-        })
-    }
-
-    /// Pairs of two columns, leaving out rows in which either is missing: the points of a curve.
-    ///
-    /// # Errors
-    /// If a column does not exist.
-    pub fn points(&self, x: &str, y: &str) -> Result<Vec<(f64, f64)>, Error> {
-        let (x, y) = (self.position(x)?, self.position(y)?);
-        Ok(self
-            .rows
-            .iter()
-            .filter_map(|row| Some((row[x].as_number()?, row[y].as_number()?)))
-            .collect())
-    }
 }
 
 /// The tables of one figure: the main one, written as `<id>.csv`, and further ones, written as `<id>-<name>.csv`.
@@ -244,45 +86,182 @@ pub struct Tables {
     /// The main table.
     pub main: Table,
     /// Further tables by name.
-    pub further: Vec<(&'static str, Table)>,
+    pub further: Vec<(Cow<'static, str>, Table)>,
     /// Names of further tables that hold measured times, and so differ from run to run.
-    pub volatile: Vec<&'static str>,
-}
-
-impl From<Table> for Tables {
-    fn from(main: Table) -> Self {
-        Self {
-            main,
-            further: Vec::new(),
-            volatile: Vec::new(),
-        }
-    }
+    pub volatile: Vec<Cow<'static, str>>,
 }
 
 impl Tables {
-    /// Adds a table.
-    #[must_use]
-    pub fn with(mut self, name: &'static str, table: Table) -> Self {
-        self.further.push((name, table));
-        self
-    }
-
-    /// Adds a table of measured times: the only one that may differ between two runs of the same command.
-    #[must_use]
-    pub fn with_volatile(mut self, name: &'static str, table: Table) -> Self {
-        self.volatile.push(name);
-        self.with(name, table)
-    }
-
-    /// The further table of the given name.
+    /// Turns typed rows into tables.
     ///
     /// # Errors
-    /// If there is none.
-    pub fn named(&self, name: &str) -> Result<&Table, Error> {
-        self.further
+    /// If a cell is not finite, or a field is no number, label or [`Measured`](crate::Measured).
+    pub fn of<T: Serialize + JsonSchema>(rows: &T) -> Result<Self, Error> {
+        let bad = |reason: String| Error::Table(reason);
+        let rows = Cbor::serialized(rows).map_err(|error| bad(error.to_string()))?;
+        let mut tables = Vec::new();
+        let mut volatile = Vec::new();
+        for described in schema::tables::<T>() {
+            let list = match &rows {
+                Cbor::Array(list) => Some(list),
+                other => entry(other, &described.key).and_then(Cbor::as_array),
+            };
+            let list = list.ok_or_else(|| bad(format!("`{}` is no list of rows", described.name)))?;
+            let table = fill(&described, list)?;
+            if described.volatile {
+                volatile.push(described.name.clone().into());
+            }
+            tables.push((Cow::Owned(described.name), table));
+        }
+        let mut tables = tables.into_iter();
+        let (_, main) = tables.next().ok_or_else(|| bad("no table".to_owned()))?;
+        Ok(Self {
+            main,
+            further: tables.collect(),
+            volatile,
+        })
+    }
+}
+
+fn entry<'a>(map: &'a Cbor, key: &str) -> Option<&'a Cbor> {
+    let of = |(name, value): &'a (Cbor, Cbor)| (name.as_text() == Some(key)).then_some(value);
+    map.as_map()?.iter().find_map(of)
+}
+
+fn fill(described: &Fields, list: &[Cbor]) -> Result<Table, Error> {
+    let mut rows = Vec::with_capacity(list.len());
+    for (index, row) in list.iter().enumerate() {
+        let mut cells = Vec::with_capacity(described.columns.len());
+        for (path, column) in &described.columns {
+            let found = path
+                .iter()
+                .try_fold(row, |at, key| entry(at, key))
+                .unwrap_or(&Cbor::Null);
+            let refused = |reason: &str| {
+                Error::Table(format!("{reason} in column `{}`, row {index} of `{}`", column.name, described.name))
+            };
+            cells.push(match found {
+                Cbor::Null => Value::Missing,
+                Cbor::Bool(flag) => Value::Text(flag.to_string()),
+                Cbor::Text(text) => Value::Text(text.clone()),
+                Cbor::Float(number) if number.is_finite() => Value::Number(*number),
+                Cbor::Float(number) => return Err(refused(&format!("{number}"))),
+                Cbor::Integer(integer) => {
+                    Value::Integer(i64::try_from(*integer).map_err(|_| refused("a count beyond 63 bits"))?)
+                }
+                _ => return Err(refused("neither number nor label")),
+            });
+        }
+        rows.push(cells);
+    }
+    let columns = described.columns.iter().map(|(_, column)| column.clone()).collect();
+    Ok(Table { columns, rows })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Measured;
+
+    #[derive(Serialize, JsonSchema)]
+    #[serde(rename_all = "kebab-case")]
+    enum Method {
+        LloydMax,
+    }
+
+    #[derive(Serialize, JsonSchema)]
+    struct Key {
+        /// How.
+        method: Method,
+    }
+
+    #[derive(Serialize, JsonSchema)]
+    struct Row {
+        #[serde(flatten)]
+        key: Key,
+        /// Time.
+        #[schemars(extend("unit" = "s"))]
+        time: f64,
+        /// Squared error.
+        #[schemars(extend("unit" = "m^2"))]
+        mse: Measured,
+        /// Of another.
+        other: Option<Measured>,
+        /// As printed.
+        printed: Option<f64>,
+    }
+
+    #[derive(Serialize, JsonSchema)]
+    struct Two {
+        /// Main.
+        rows: Vec<Row>,
+        /// Counts.
+        #[schemars(extend("volatile" = true))]
+        run_times: Vec<Count>,
+    }
+
+    #[derive(Serialize, JsonSchema)]
+    struct Count {
+        /// A count.
+        n: u64,
+    }
+
+    fn row(time: f64) -> Row {
+        let mse = Measured {
+            value: 2.0,
+            standard_error: Some(0.5),
+        };
+        Row {
+            key: Key {
+                method: Method::LloydMax,
+            },
+            time,
+            mse,
+            other: None,
+            printed: None,
+        }
+    }
+
+    #[test]
+    fn the_fields_are_the_columns() {
+        let table = Tables::of(&vec![row(1.0)]).unwrap().main;
+        let mut cells: Vec<_> = table
+            .columns()
             .iter()
-            .find(|(n, _)| *n == name)
-            .map(|(_, table)| table)
-            .ok_or_else(|| Error::Table(format!("no table `{name}`")))
+            .zip(&table.rows()[0])
+            .map(|(c, v)| format!("{}[{}]={v}", c.name, c.unit))
+            .collect();
+        cells.sort();
+        let expected = [
+            "method[]=lloyd-max",
+            "mse[m^2]=2",
+            "mse_se[m^2]=0.5",
+            "other[]=",
+            "other_se[]=",
+            "printed[]=",
+            "time[s]=1",
+        ];
+        assert_eq!(cells, expected);
+        assert!(table.columns().iter().all(|c| !c.meaning.is_empty()));
+    }
+
+    #[test]
+    fn a_struct_of_lists_is_several_tables() {
+        let tables = Tables::of(&Two {
+            rows: Vec::new(),
+            run_times: vec![Count { n: 3 }],
+        })
+        .unwrap();
+        assert_eq!((tables.main.len(), tables.main.columns().len()), (0, 7));
+        assert_eq!((&*tables.further[0].0, tables.further[0].1.len()), ("run-times", 1));
+        assert_eq!(tables.volatile, ["run-times"]);
+    }
+
+    #[test]
+    fn a_cell_that_is_not_finite_is_refused_by_name() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let message = Tables::of(&vec![row(1.0), row(bad)]).unwrap_err().to_string();
+            assert!(message.contains("`time`, row 1"), "{message}");
+        }
     }
 }

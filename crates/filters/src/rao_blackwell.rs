@@ -115,8 +115,9 @@ impl<const D: usize> RaoBlackwellised<D> {
         let log_likelihood = self.reweigh(&row, |predicted| log_sum(log_shares(&pieces, predicted, deviation)))?;
         self.absorb(&row, &gain, |predicted| {
             let (lower, upper) = choose(rng, &pieces, predicted, deviation);
-            let z = normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation);
-            predicted + deviation * z
+            // A piece of positive mass holds numbers: it is never refused.
+            normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation)
+                .map_or(predicted, |z| predicted + deviation * z)
         });
         self.covariance = *updated.covariance();
         Ok(self.info(log_likelihood))

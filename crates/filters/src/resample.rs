@@ -1,7 +1,7 @@
 //! Resampling: from weighted particles to equally weighted ones.
 
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::sums::sum;
+use fewbits_numerics::kernels::sum;
 use rand::{Rng, RngExt};
 use rand_distr::Open01;
 use serde::{Deserialize, Serialize};

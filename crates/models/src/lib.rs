@@ -17,6 +17,7 @@
 //! | white-noise acceleration on a line, in a plane | [`constant_velocity_1d`], [`constant_velocity_2d`] |
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
 //! | received amplitude that falls with distance | [`ReceivedPower`] |
+//! | a substance that diffuses through air, ground, vessels | [`diffusion`] |
 //!
 //! ```
 //! use fewbits_models::{constant_velocity_1d, Ar1};
@@ -35,6 +36,7 @@
 
 mod ar1;
 mod constant_velocity;
+pub mod diffusion;
 mod error;
 mod linear_gaussian;
 mod linear_sensor;

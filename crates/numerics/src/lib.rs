@@ -4,8 +4,9 @@
 //! |---|---|
 //! | [`normal`] | the standard normal distribution, exact in its tails and in narrow cells |
 //! | [`quadrature`] | Gauss-Legendre rules |
-//! | [`linalg`] | square roots of singular covariances |
-//! | [`sums`], [`exponential`] | sums in a fixed order, exponentials of a whole column |
+//! | [`kernels`] | the same functions, sums and exponentials over whole columns, in vector registers |
+//! | [`linalg`], [`tridiagonal`] | square roots of singular covariances, tridiagonal systems |
+//! | [`roots`], [`binomial`] | roots inside a bracket, binomial coefficients |
 //! | [`error`] | the argument error all constructors share, and the checks that raise it |
 //!
 //! The central choice: **probabilities of intervals live in the log domain, and nowhere else is one formed.** It costs an
@@ -19,11 +20,13 @@
 //! assert!((normal::log_cdf(-40.0) + 804.608_442_013_754).abs() < 1e-9);
 //! ```
 
+pub mod binomial;
 pub mod error;
-pub mod exponential;
+pub mod kernels;
 pub mod linalg;
 pub mod normal;
 pub mod quadrature;
-pub mod sums;
+pub mod roots;
+pub mod tridiagonal;
 
 pub use error::ArgumentError;

@@ -1,11 +1,11 @@
 //! What small covariance matrices need beyond nalgebra.
 
 use crate::error::{self, ArgumentError};
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
-/// Pivots below this share of the largest variance count as zero.
+/// Pivots below this share of the variance of their own coordinate count as zero.
 pub const SEMIDEFINITE_TOLERANCE: f64 = 1e-12;
-/// Asymmetries above this share of the largest entry are refused.
+/// Asymmetries above this share of the standard deviations of their row and column are refused.
 pub const SYMMETRY_TOLERANCE: f64 = 1e-9;
 
 /// `(m + m')/2`.
@@ -15,38 +15,110 @@ pub fn symmetrised<const D: usize>(m: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D>
 
 /// A square root `S` with `S S' = m` of a symmetric positive **semi**definite matrix, by Cholesky with diagonal pivoting.
 ///
-/// Unlike a plain Cholesky factor it exists for singular matrices (rank-1 process noise, a known start).
+/// Unlike a plain Cholesky factor it exists for singular matrices (rank-1 process noise, a known start). The matrix is scaled
+/// to a unit diagonal first and every judgement (symmetry, rank, definiteness) is made on that correlation matrix: a
+/// coordinate in metres and one in nanoseconds both survive, and so do `diag(1e8, 1e-5)` and its like.
 ///
 /// # Errors
-/// If `m` has an entry that is not finite, is not symmetric, or has an eigenvalue clearly below zero.
+/// If `m` has an entry that is not finite, is not symmetric, or is not positive semidefinite: a negative variance, a
+/// covariance beside a variance of zero, or a correlation matrix with an eigenvalue clearly below zero.
 pub fn semidefinite_factor<const D: usize>(
     name: &'static str,
     m: &SMatrix<f64, D, D>,
 ) -> Result<SMatrix<f64, D, D>, ArgumentError> {
     error::all_finite(name, m.as_slice())?;
-    let scale = m.amax();
-    if (m - m.transpose()).amax() > SYMMETRY_TOLERANCE * scale {
-        return Err(ArgumentError::new(name, format!("{m:?}"), "a symmetric matrix"));
-    }
     let indefinite = || ArgumentError::new(name, format!("{m:?}"), "a positive semidefinite matrix");
-    let tolerance = SEMIDEFINITE_TOLERANCE * scale;
-    let mut rest = symmetrised(m);
-    let mut factor = SMatrix::zeros();
+    let deviations: SVector<f64, D> = m.diagonal().map(f64::sqrt);
+    // A negative variance has no square root.
+    if deviations.iter().any(|d| d.is_nan()) {
+        return Err(indefinite());
+    }
+    let mut rest = SMatrix::<f64, D, D>::zeros();
+    for i in 0..D {
+        for j in 0..=i {
+            let (below, above) = (m[(i, j)], m[(j, i)]);
+            if deviations[i] == 0.0 || deviations[j] == 0.0 {
+                if below != 0.0 || above != 0.0 {
+                    return Err(indefinite());
+                }
+                continue;
+            }
+            let (below, above) = (below / deviations[i] / deviations[j], above / deviations[i] / deviations[j]);
+            if (below - above).abs() > SYMMETRY_TOLERANCE {
+                return Err(ArgumentError::new(name, format!("{m:?}"), "a symmetric matrix"));
+            }
+            rest[(i, j)] = 0.5 * (below + above);
+            rest[(j, i)] = rest[(i, j)];
+        }
+    }
+    let mut factor = SMatrix::<f64, D, D>::zeros();
     for column in 0..D {
         let (pivot, variance) = rest.diagonal().argmax();
-        if variance <= tolerance {
-            // What is left must be zero up to rounding, negative variances included.
-            return if rest.amax() <= 10.0 * tolerance {
-                Ok(factor)
-            } else {
-                Err(indefinite())
-            };
+        if variance <= SEMIDEFINITE_TOLERANCE {
+            // What is left must be zero up to rounding, negative pivots included.
+            if rest.amax() > 10.0 * SEMIDEFINITE_TOLERANCE {
+                return Err(indefinite());
+            }
+            break;
         }
         let direction = rest.column(pivot) / variance.sqrt();
         rest -= direction * direction.transpose();
         rest.row_mut(pivot).fill(0.0);
         rest.column_mut(pivot).fill(0.0);
-        factor.set_column(column, &direction);
+        factor.set_column(column, &direction.component_mul(&deviations));
     }
     Ok(factor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+    use proptest::prelude::*;
+
+    fn close<const D: usize>(m: &SMatrix<f64, D, D>) -> bool {
+        let s = semidefinite_factor("m", m).unwrap();
+        let back = s * s.transpose();
+        (0..D).all(|i| (0..D).all(|j| (back[(i, j)] - m[(i, j)]).abs() <= 1e-11 * m[(i, i)].sqrt() * m[(j, j)].sqrt()))
+    }
+
+    #[test]
+    fn metres_and_nanoseconds_both_survive() {
+        assert!(close(&Matrix2::from_diagonal(&Vector2::new(1e8, 1e-5))));
+        assert!(close(&Matrix3::from_diagonal(&Vector3::new(1e6, 1e-18, 0.0))));
+        // Position in kilometres, time in nanoseconds, correlated.
+        assert!(close(&Matrix2::new(1e-6, 0.9e-12, 0.9e-12, 1e-18)));
+        assert!(close(&Matrix2::new(1e300, 1e5, 1e5, 1e-288)));
+    }
+
+    #[test]
+    fn judgements_are_relative_to_their_own_row() {
+        let refused = |m: &Matrix3<f64>| semidefinite_factor("m", m).is_err();
+        let asymmetric = Matrix3::new(1.0, 0.9, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1e10);
+        assert!(refused(&asymmetric));
+        assert!(refused(&Matrix3::from_diagonal(&Vector3::new(1e8, -1e-4, 1.0))));
+        assert!(refused(&Matrix3::from_diagonal(&Vector3::new(1.0, -1e-300, 1.0))));
+        // A correlation of 1.5 between the small coordinates.
+        assert!(refused(&Matrix3::new(1e-8, 1.5e-8, 0.0, 1.5e-8, 1e-8, 0.0, 0.0, 0.0, 1e10)));
+        // What is known exactly varies with nothing.
+        assert!(refused(&Matrix3::new(0.0, 1e-9, 0.0, 1e-9, 1.0, 0.0, 0.0, 0.0, 1.0)));
+        assert!(refused(&Matrix3::from_element(f64::NAN)));
+    }
+
+    proptest! {
+        #[test]
+        fn square_roots_of_any_rank_and_unit_multiply_back(
+            entries in prop::array::uniform9(-2.0..2.0_f64),
+            units in prop::array::uniform3(-12..12_i32),
+            rank in 0_usize..=3,
+        ) {
+            let mut g = Matrix3::from_row_slice(&entries);
+            for column in rank..3 {
+                g.column_mut(column).fill(0.0);
+            }
+            let scaling = Matrix3::from_diagonal(&Vector3::from(units.map(|u| 10.0_f64.powi(u))));
+            let p = scaling * g * g.transpose() * scaling;
+            prop_assert!(close(&symmetrised(&p)));
+        }
+    }
 }

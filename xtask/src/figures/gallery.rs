@@ -1,9 +1,8 @@
 //! `index.html`: each plot beside its claims.
 
 use super::Error;
-use super::select::brief;
 use super::write::Directory;
-use fewbits_experiments::all;
+use fewbits_experiments::{all, plain};
 use serde_json::Value as Json;
 use std::fmt::Write as _;
 
@@ -88,7 +87,7 @@ fn section(page: &mut String, id: &str, document: &Json) -> [usize; 3] {
         .as_object()
         .into_iter()
         .flatten()
-        .map(|(name, value)| format!("{name}={}", brief(value)))
+        .map(|(name, value)| format!("{name}={}", plain(value)))
         .collect();
     let _ = write!(
         page,

@@ -1,5 +1,6 @@
 //! `cargo xtask figures`: every figure and table, and whether its claims hold.
 
+mod describe;
 mod draw;
 mod gallery;
 mod progress;
@@ -10,8 +11,9 @@ mod write;
 
 pub use draw::to_svg;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use fewbits_experiments::{AnyFigure, Context, Outcome};
+use std::io::Write;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -20,10 +22,14 @@ use thiserror::Error;
 
 /// Options of `cargo xtask figures`.
 #[derive(Debug, Clone, Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct Options {
+    /// What to do instead of making figures.
+    #[command(subcommand)]
+    pub action: Option<Action>,
     /// Ids or globs of the figures to make, such as `dymbo-fig5` or `mi-*`; all without any.
     pub ids: Vec<String>,
-    /// List the figures with their parameters, and make nothing.
+    /// List the figures and make nothing; `describe ID` has their parameters and columns.
     #[arg(long)]
     pub list: bool,
     /// Set a parameter of the chosen figures; lists are separated by commas. Repeatable.
@@ -47,6 +53,17 @@ pub struct Options {
     /// Fewer trials; claims that need the full count are skipped.
     #[arg(long)]
     pub quick: bool,
+}
+
+/// What to do instead of making figures.
+#[derive(Debug, Clone, Subcommand)]
+pub enum Action {
+    /// Say what figures take and give: parameters with ranges, tables with columns and units.
+    Describe {
+        /// Ids or globs.
+        #[arg(required = true)]
+        ids: Vec<String>,
+    },
 }
 
 /// Why figures could not be made.
@@ -111,10 +128,13 @@ pub(crate) struct Finished {
 /// # Errors
 /// If an option is refused or output cannot be written. Nothing is written before all options are accepted.
 pub fn run(options: &Options) -> Result<bool, Error> {
+    if let Some(Action::Describe { ids }) = &options.action {
+        let pages: Vec<_> = select::figures(ids)?.into_iter().map(describe::one).collect();
+        return Ok(print(&pages.join("\n")));
+    }
     let chosen = select::figures(&options.ids)?;
     if options.list {
-        select::list(&chosen);
-        return Ok(true);
+        return Ok(print(&describe::list(&chosen)));
     }
     let jobs = select::configure(&chosen, options)?;
     let out = write::Directory::create(&options.out)?;
@@ -156,6 +176,13 @@ pub fn run(options: &Options) -> Result<bool, Error> {
     progress.clear();
     gallery::write(&out)?;
     Ok(summary::print(&finished, &out, started.elapsed()))
+}
+
+/// Prints a page; a reader that has seen enough and closed the pipe is no error.
+fn print(page: &str) -> bool {
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(page.as_bytes()).and_then(|()| out.flush());
+    true
 }
 
 /// Runs jobs on up to `workers` threads; results in job order.

@@ -45,34 +45,8 @@ pub(super) fn figures(patterns: &[String]) -> Result<Vec<&'static dyn AnyFigure>
         .collect())
 }
 
-/// A parameter's value as `--set` would take it; long lists by their first and last entries.
-pub(super) fn brief(value: &Json) -> String {
-    const LONGEST: usize = 12;
-    match value {
-        Json::Array(entries) if entries.len() > LONGEST => {
-            let ends = [&entries[0], &entries[1], &entries[entries.len() - 1]].map(brief);
-            format!("{},{},..,{} ({} values)", ends[0], ends[1], ends[2], entries.len())
-        }
-        Json::Array(entries) => entries.iter().map(brief).collect::<Vec<_>>().join(","),
-        Json::String(text) => text.clone(),
-        other => other.to_string(),
-    }
-}
-
-/// Prints the figures with their parameters.
-pub(super) fn list(figures: &[&'static dyn AnyFigure]) {
-    for figure in figures {
-        let about = figure.about();
-        println!("{}  {}", about.id, about.title);
-        let defaults: Vec<_> = figure
-            .defaults()
-            .iter()
-            .map(|(name, value)| format!("{name}={}", brief(value)))
-            .collect();
-        if !defaults.is_empty() {
-            println!("    {}", defaults.join("  "));
-        }
-    }
+fn has(figure: &dyn AnyFigure, parameter: &str) -> bool {
+    figure.parameters().iter().any(|own| own.name == parameter)
 }
 
 /// Applies `--set`, `--trials` and `--quick`.
@@ -91,7 +65,7 @@ pub(super) fn configure(figures: &[&'static dyn AnyFigure], options: &Options) -
         settings.push(("trials".to_owned(), trials.to_string()));
     }
     for setting in &settings {
-        let known = figures.iter().any(|figure| figure.defaults().contains_key(&setting.0));
+        let known = figures.iter().any(|figure| has(*figure, &setting.0));
         if let (false, Some(first)) = (known, figures.first()) {
             // The figure's own refusal names the parameters it has.
             first
@@ -102,12 +76,7 @@ pub(super) fn configure(figures: &[&'static dyn AnyFigure], options: &Options) -
     figures
         .iter()
         .map(|&figure| {
-            let defaults = figure.defaults();
-            let own: Vec<_> = settings
-                .iter()
-                .filter(|(name, _)| defaults.contains_key(name))
-                .cloned()
-                .collect();
+            let own: Vec<_> = settings.iter().filter(|(name, _)| has(figure, name)).cloned().collect();
             let parameters = figure.configure(&own, options.quick).map_err(Error::Setting)?;
             Ok(Job { figure, parameters })
         })

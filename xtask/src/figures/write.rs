@@ -98,7 +98,7 @@ pub(super) fn figure(
 
 fn to_csv(table: &Table) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(table.columns().iter().map(|column| column.name))?;
+    writer.write_record(table.columns().iter().map(|column| column.name.as_ref()))?;
     for row in table.rows() {
         writer.write_record(row.iter().map(ToString::to_string))?;
     }

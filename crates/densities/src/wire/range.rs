@@ -1,8 +1,7 @@
 //! Symbols through a range coder, ended to the bit.
 
-use super::table::Table;
+use super::table::{Found, Table};
 use constriction::UnwrapInfallible;
-use constriction::stream::model::EncoderModel;
 use constriction::stream::queue::{EncoderSituation, RangeDecoder, RangeEncoder};
 use constriction::stream::{Decode, Encode};
 use fewbits_core::{BitReader, BitWriter, CodecError};
@@ -154,6 +153,8 @@ pub(super) struct Reader {
     available: usize,
     /// Bits that the symbols so far took at least.
     spent: usize,
+    /// The code of the symbols so far.
+    pub(super) canonical: Writer,
 }
 
 impl Reader {
@@ -170,13 +171,20 @@ impl Reader {
             decoder: RangeDecoder::from_compressed(words).unwrap_infallible(),
             available: bits,
             spent: 0,
+            canonical: Writer::new(),
         })
     }
 
     fn get(&mut self, table: Table) -> Result<u32, CodecError> {
-        let index = self.decoder.decode_symbol(table).map_err(|_| out_of_range("code word", "past the last symbol"))?;
+        let found = Found {
+            table: Some(&table),
+            ..Found::default()
+        };
+        let index = self.decoder.decode_symbol(&found).map_err(|_| out_of_range("code word", "past the last symbol"))?;
+        let (_, _, frequency) = found.place.get().ok_or_else(|| out_of_range("symbol", index))?;
+        // What the encoder would write for the same symbols.
+        self.canonical.encoder.encode_symbol(index, &found).map_err(|_| out_of_range("symbol", index))?;
         // A symbol of frequency 2^k to 2^(k+1) takes over 15 - k bits. Beyond the end there is nothing left to decode.
-        let (_, frequency) = table.left_cumulative_and_probability(index).ok_or_else(|| out_of_range("symbol", index))?;
         self.spent += 15_usize.saturating_sub(frequency.ilog2() as usize);
         if self.spent > self.available {
             let requested = (self.spent - self.available) as u32;

@@ -1,8 +1,8 @@
 //! `assign-fig6-3` and `assign-fig6-4`: random networks of given mean and spread of their noise variances.
 
-use crate::claim::{largest, not_decreasing, not_increasing};
+use crate::legacy::claim::{largest, not_decreasing, not_increasing};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_sensor_assignment::{
     CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,

@@ -1,7 +1,7 @@
 //! `assign-fig6-1` and `assign-figC-1`: where a wrong bit lands, and how likely it is.
 
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_sensor_assignment::{CodedSensors, bit_error, flipped_estimate};
 use serde::{Deserialize, Serialize};
 
@@ -209,8 +209,12 @@ impl Figure for BitErrors {
             )
             .at_defaults(),
             Claim::never("probabilities", "all values are probabilities", beyond),
-            Claim::never("order", "finer bits are wrong more often on average", crate::claim::not_increasing(&means))
-                .at_defaults(),
+            Claim::never(
+                "order",
+                "finer bits are wrong more often on average",
+                crate::legacy::claim::not_increasing(&means),
+            )
+            .at_defaults(),
         ])
     }
 

@@ -1,7 +1,7 @@
 //! `assign-table6-1`: eight sensors, three assignments.
 
+use crate::legacy::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use fewbits_sensor_assignment::{
     CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, by_precision, pair_costs,
     quantization_error,

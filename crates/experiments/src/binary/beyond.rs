@@ -2,8 +2,8 @@
 
 use super::feedback::descend;
 use super::{Scene, pattern};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_binary_patterns::baselines::{AdaptiveRule, adaptive};
 use fewbits_binary_patterns::search::{Descent, free_thresholds};
 use fewbits_binary_patterns::{BinaryQuantizer, Grid, Mask, Pattern, Sensor, Source, gray_basis};
@@ -167,7 +167,7 @@ fn free(id: &'static str, name: &'static str, scene: Scene, sensors: usize, jitt
             idea: "free thresholds",
             case: name.to_owned(),
             before: linear.mse,
-            after: crate::claim::smallest(results.iter().map(|r| r.mse)),
+            after: crate::legacy::claim::smallest(results.iter().map(|r| r.mse)),
             expected: if expected.0 > 0.0 {
                 expected
             } else {

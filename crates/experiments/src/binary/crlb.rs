@@ -1,8 +1,8 @@
 //! `binary-fig5-6`: equation 5.13 for three sets of patterns, and why it misleads.
 
 use super::{Scene, check_sweep, crossing, each, sweep};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_binary_patterns::bounds::printed_crlb;
 use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 //! `binary-fig5-8`: decoders and bounds for three Gray bits.
 
 use super::{Scene, check_sweep, each, sweep};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, printed_crlb, remote_distortion, van_trees,
 };

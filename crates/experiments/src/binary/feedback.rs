@@ -1,8 +1,8 @@
 //! `binary-fig5-10`: ten sensors, with and without feedback.
 
 use super::{Scene, check_sweep, each, mask_text, pattern, sweep};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_binary_patterns::baselines::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
 use fewbits_binary_patterns::bounds::ConditionalMean;
 use fewbits_binary_patterns::search::Descent;

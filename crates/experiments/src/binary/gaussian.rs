@@ -1,8 +1,8 @@
 //! `binary-fig5-9`: a Gaussian source, three sensors of three bits.
 
 use super::{Scene, check_sweep, crossing, each, mask_text, sweep};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, remote_distortion, van_trees};
 use serde::{Deserialize, Serialize};

@@ -12,6 +12,7 @@ mod patterns;
 mod table5_1;
 mod table5_2;
 
+use crate::legacy::Old;
 use crate::plot::{Axis, Layer, Legend, Panel};
 use crate::{AnyFigure, Error};
 use fewbits_binary_patterns::search::LinearSearch;
@@ -21,19 +22,19 @@ use rayon::prelude::*;
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
-        &patterns::Clipping,
-        &patterns::Natural,
-        &patterns::Gray,
-        &patterns::Extra,
-        &patterns::Response,
-        &crlb::PrintedBounds,
-        &table5_1::Table,
-        &optimum::Optimum,
-        &decoders::Decoders,
-        &gaussian::GaussianSource,
-        &table5_2::Table,
-        &feedback::Feedback,
-        &beyond::Beyond,
+        &Old(patterns::Clipping),
+        &Old(patterns::Natural),
+        &Old(patterns::Gray),
+        &Old(patterns::Extra),
+        &Old(patterns::Response),
+        &Old(crlb::PrintedBounds),
+        &Old(table5_1::Table),
+        &Old(optimum::Optimum),
+        &Old(decoders::Decoders),
+        &Old(gaussian::GaussianSource),
+        &Old(table5_2::Table),
+        &Old(feedback::Feedback),
+        &Old(beyond::Beyond),
     ]
 }
 

@@ -1,9 +1,9 @@
 //! `binary-fig5-7`: optimal linear patterns against the signal-to-noise ratio, shortcuts, and Luo's scheme.
 
 use super::{Scene, check_sweep, crossing, each, mask_text, pattern, sweep};
-use crate::claim::largest;
+use crate::legacy::claim::largest;
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_binary_patterns::baselines::Luo;
 use fewbits_binary_patterns::search::{Descent, by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis, rank};

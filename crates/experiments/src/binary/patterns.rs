@@ -1,8 +1,8 @@
 //! `binary-fig5-2` to `binary-fig5-5` and `binary-figB-1`: the grid, its patterns, and what noise makes of one.
 
 use super::{Scene, pattern, pattern_panel};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_binary_patterns::{
     BinaryQuantizer, Grid, Mask, Pattern, Source, check_separation, generator_matrix, gray_basis, natural_basis,
 };
@@ -103,7 +103,10 @@ impl Figure for Clipping {
             .par_iter()
             .map(|set| swapped_mse(&set.masks))
             .collect::<Result<Vec<_>, _>>()?;
-        errors.push(row!["sides swapped, best masks for that", crate::claim::smallest(best)])?;
+        errors.push(row![
+            "sides swapped, best masks for that",
+            crate::legacy::claim::smallest(best)
+        ])?;
         Ok(Tables::from(table).with("errors", errors))
     }
 
@@ -470,7 +473,7 @@ impl Figure for Response {
             Claim::at_most(
                 "half",
                 "at an edge far from the others both bits are equally likely",
-                crate::claim::largest(at_edges),
+                crate::legacy::claim::largest(at_edges),
                 2e-3,
             )
             .at_defaults(),

@@ -1,8 +1,8 @@
 //! `binary-table5-1`: eight patterns of three bits at 18.2 dB.
 
 use super::{Scene, mask_text, pattern, pattern_panel};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use crate::plot::Plot;
-use crate::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use fewbits_binary_patterns::bounds::{printed_crlb, van_trees};
 use fewbits_binary_patterns::search::MaskSet;
 use fewbits_binary_patterns::{Decoder, Mask, count};

@@ -1,8 +1,8 @@
 //! `binary-table5-2`: three patterns for a Gaussian source at 5.2 dB.
 
 use super::{Scene, each, pattern, pattern_panel, sweep};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use crate::plot::Plot;
-use crate::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use fewbits_binary_patterns::{Decoder, Pattern, check_separation, count, mask_of};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

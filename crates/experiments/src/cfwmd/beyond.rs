@@ -3,12 +3,12 @@
 use super::case::{Case, by_budget};
 use super::ensemble::{Ensemble, Part, agrees, beats, value};
 use super::linear::{Scheme, Setting, run};
-use crate::claim::Claim;
 use crate::error::Error;
-use crate::figure::{About, Context};
+use crate::legacy::claim::Claim;
+use crate::legacy::row;
+use crate::legacy::{About, Context};
+use crate::legacy::{Table, Tables, column};
 use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::row;
-use crate::table::{Table, Tables, column};
 use fewbits_cfwmd::information::fisher_information;
 use fewbits_cfwmd::rule::Weighing;
 use fewbits_filters::cramer_rao;
@@ -319,7 +319,7 @@ impl Case for Scheduled {
         let four = |table: &Table| -> Result<Table, Error> {
             let mut kept = Table::new(table.columns().to_vec());
             for row in table.rows() {
-                if !matches!(&row[0], crate::table::Value::Text(name) if name.ends_with("sensors")) {
+                if !matches!(&row[0], crate::legacy::Value::Text(name) if name.ends_with("sensors")) {
                     kept.push(row.clone())?;
                 }
             }

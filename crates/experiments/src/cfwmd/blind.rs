@@ -3,11 +3,11 @@
 use super::case::Case;
 use super::ensemble::{Ensemble, Part, agrees, beats, ordered_at_every_step, value};
 use super::linear::{Scheme, Setting, run};
-use crate::claim::Claim;
 use crate::error::Error;
-use crate::figure::{About, Context};
+use crate::legacy::Tables;
+use crate::legacy::claim::Claim;
+use crate::legacy::{About, Context};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::table::Tables;
 use fewbits_cfwmd::no_feedback::NoFeedback;
 
 /// Figure 3.

@@ -1,11 +1,11 @@
 //! One shape for all simulated figures: schemes on common trials, step and summary tables, paired differences.
 
 use super::ensemble::{Ensemble, find, paired_table, step_table, summary_table};
-use crate::claim::Claim;
 use crate::error::Error;
-use crate::figure::{About, Context, Figure};
+use crate::legacy::claim::Claim;
+use crate::legacy::{About, Context, Figure};
+use crate::legacy::{Table, Tables};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::table::{Table, Tables};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;

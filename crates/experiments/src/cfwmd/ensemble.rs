@@ -1,9 +1,9 @@
 //! What a Monte-Carlo run of one scheme leaves: squared errors and message counts of every trial and step.
 
-use crate::claim::Claim;
 use crate::error::Error;
-use crate::row;
-use crate::table::{Table, column};
+use crate::legacy::claim::Claim;
+use crate::legacy::row;
+use crate::legacy::{Table, column};
 use fewbits_monte_carlo::statistics::paired_difference;
 use fewbits_monte_carlo::{Estimate, Moments};
 

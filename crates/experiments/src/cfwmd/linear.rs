@@ -4,7 +4,7 @@ mod scalar_only;
 
 use super::ensemble::{Ensemble, Record};
 use crate::error::Error;
-use crate::figure::Context;
+use crate::legacy::Context;
 use fewbits_cfwmd::message::Format;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{LocalSensor, NoFeedback, NoFeedbackCentre};

@@ -4,7 +4,7 @@ pub(super) mod figures;
 
 use super::ensemble::{Ensemble, Record};
 use crate::error::Error;
-use crate::figure::Context;
+use crate::legacy::Context;
 use fewbits_cfwmd::particle::HeardScalars;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::Budget;

@@ -3,12 +3,12 @@
 use super::case::{Case, distinct};
 use super::ensemble::{Ensemble, Part, agrees, beats, find, ordered_at_every_step, value};
 use super::linear::{Scheme, Setting, run};
-use crate::claim::{Claim, largest};
 use crate::error::Error;
-use crate::figure::{About, Context};
+use crate::legacy::claim::{Claim, largest};
+use crate::legacy::row;
+use crate::legacy::{About, Context};
+use crate::legacy::{Table, Tables, column};
 use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::row;
-use crate::table::{Table, Tables, column};
 use fewbits_cfwmd::rule::Weighing;
 use fewbits_monte_carlo::Moments;
 

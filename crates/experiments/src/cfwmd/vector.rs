@@ -4,11 +4,11 @@ use super::case::Case;
 use super::ensemble::{Ensemble, Part, agrees, beats, ordered_at_every_step, value};
 use super::linear::{Scheme, Setting, run};
 use super::scalar::{printed_rates, rate_plot, rate_table};
-use crate::claim::Claim;
 use crate::error::Error;
-use crate::figure::{About, Context};
+use crate::legacy::claim::Claim;
+use crate::legacy::{About, Context};
+use crate::legacy::{Table, Tables};
 use crate::plot::Plot;
-use crate::table::{Table, Tables};
 use fewbits_cfwmd::no_feedback::NoFeedback;
 use fewbits_cfwmd::rule::Weighing;
 

@@ -1,9 +1,9 @@
 //! How many bits a sample are worth sending.
 
 use super::common::{bad, kalman_variance, not_empty, pairs, plant};
-use crate::claim::not_decreasing;
+use crate::legacy::claim::not_decreasing;
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_dymbo::{MultibitFilter, chain, iterated};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -2,8 +2,8 @@
 
 use super::common::{bad, not_empty, plant};
 use super::referee::{Scheme, gap_to_exact};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_dymbo::{chain, steady};
 use serde::{Deserialize, Serialize};
 
@@ -125,7 +125,7 @@ impl Figure for NoisyBits {
             claims.push(Claim::at_most(format!("small-{gamma}"), statement, gain.abs(), 1e-4).at_defaults());
         }
         let rows = tables.main.only("gamma", 0.5)?.points("riccati", "aware_mse")?;
-        let under = crate::claim::largest(rows.iter().map(|(riccati, exact)| exact / riccati - 1.0));
+        let under = crate::legacy::claim::largest(rows.iter().map(|(riccati, exact)| exact / riccati - 1.0));
         let statement = "gamma = 0.5: the prediction is too low by up to 1.6 %";
         claims.push(Claim::near("under-predicts", statement, under, 0.0155, 0.001).at_defaults());
         for &gamma in &p.gamma {
@@ -135,7 +135,7 @@ impl Figure for NoisyBits {
                 .into_iter()
                 .zip(rows.numbers("aware_mse")?)
                 .zip(rows.numbers("crossover")?);
-            let gap = crate::claim::largest(
+            let gap = crate::legacy::claim::largest(
                 noisy
                     .filter(|(_, eps)| *eps >= 0.1)
                     .map(|((excess, mse), _)| excess / mse),

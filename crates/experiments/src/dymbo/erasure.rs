@@ -1,9 +1,9 @@
 //! Lost bits.
 
 use super::common::{LONGEST_RUN, bad, dymbo_steady, not_empty, stationary_plant};
-use crate::claim::smallest;
+use crate::legacy::claim::smallest;
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_core::{Dynamics, Encoder, Gaussian, Observation, Sensing};
 use fewbits_dymbo::{DymboFilter, OneBitSensor, ScalarPlant, steady};
 use fewbits_monte_carlo::{Moments, Stream};

@@ -1,9 +1,9 @@
 //! How much of the measurement noise the filters remove, against the noise ratio.
 
 use super::common::{dymbo_steady, kalman_variance, log_spaced, nearest, not_empty, plant};
-use crate::claim::{not_increasing, smallest};
+use crate::legacy::claim::{not_increasing, smallest};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-fig3";

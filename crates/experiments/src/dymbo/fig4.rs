@@ -1,9 +1,9 @@
 //! What the missing bits cost: the loss over the plane of plants.
 
 use super::common::{bad, log_spaced, nearest, not_empty, plant};
-use crate::claim::{largest, smallest};
+use crate::legacy::claim::{largest, smallest};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_dymbo::{ScalarPlant, chain, steady};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

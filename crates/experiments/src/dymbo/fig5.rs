@@ -1,9 +1,9 @@
 //! Convergence from the first message: simulated, exact and predicted.
 
 use super::common::{LONGEST_RUN, bad, dymbo_steady, kalman_variance, nearest, not_empty, stationary_plant};
-use crate::claim::largest;
+use crate::legacy::claim::largest;
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_core::{Dynamics, Encoder, Gaussian, Observation, Sensing};
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{DymboFilter, FineSensor, Initialisation, OneBitSensor, ScalarPlant, first_message_value};

@@ -2,8 +2,8 @@
 
 use super::common::{bad, dymbo_steady, pairs, plant};
 use super::referee::{Scheme, gap_to_exact};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_dymbo::chain::{self, MessageLaw};
 use fewbits_dymbo::{MultibitFilter, ScalarPlant, tree};
 use serde::{Deserialize, Serialize};
@@ -169,7 +169,12 @@ impl Figure for GapToExact {
             .zip(&chain)
             .map(|((m, e), c)| (m + e - c).abs());
         let statement = "minimum error and excess add up to the error chain's, at every step";
-        let mut claims = vec![Claim::at_most("adds-up", statement, crate::claim::largest(off), 1e-12)];
+        let mut claims = vec![Claim::at_most(
+            "adds-up",
+            statement,
+            crate::legacy::claim::largest(off),
+            1e-12,
+        )];
         for (gamma, value) in [(0.5, 0.729457924632), (0.05, 0.169930778412)] {
             let last = tables
                 .main

@@ -1,9 +1,9 @@
 //! How normal the posterior of one bit is.
 
 use super::common::{bad, not_empty};
-use crate::claim::not_decreasing;
+use crate::legacy::claim::not_decreasing;
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_core::{Gaussian, Sign};
 use fewbits_dymbo::bit_update;
 use fewbits_dymbo::skew_normal::{distance_from_normal, posterior_density};

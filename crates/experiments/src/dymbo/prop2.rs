@@ -1,9 +1,9 @@
 //! The fine first message: what it brings, and the variance to start from.
 
 use super::common::{bad, not_empty};
-use crate::claim::smallest;
+use crate::legacy::claim::smallest;
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_core::Gaussian;
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{FineSensor, ScalarPlant, first_message_mse};

@@ -1,8 +1,8 @@
 //! Several one-bit sensors in each slot.
 
 use super::common::{bad, not_empty, plant};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant, chain, steady};
 use serde::{Deserialize, Serialize};
 

@@ -2,9 +2,9 @@
 
 use super::common::{bad, dymbo_steady, not_empty, pairs, plant};
 use super::referee::{BURN, Scheme, Twin, exact_filter};
-use crate::claim::largest;
+use crate::legacy::claim::largest;
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_dymbo::ScalarPlant;
 use fewbits_filters::{PointMassFilter, scalar_fixed_lag_variance, smoother::smooth_step};
 use fewbits_monte_carlo::{Moments, Stream};

@@ -1,8 +1,8 @@
 //! Where the threshold belongs, and what an unstable plant does.
 
 use super::common::{LONGEST_RUN, bad, pairs, stationary_plant};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_core::{Dynamics, Encoder, Gaussian, Observation, Sensing};
 use fewbits_dymbo::{DymboFilter, FineSensor, Initialisation, OneBitSensor, ScalarPlant, ThresholdRule};
 use fewbits_monte_carlo::{Estimate, Moments, Stream};

@@ -1,8 +1,8 @@
 //! A two-dimensional state watched by one or three one-bit sensors.
 
 use super::common::{LONGEST_RUN, bad};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use fewbits_core::{Dynamics, Encoder, Gaussian, Sensing, Sign};
 use fewbits_dymbo::OneBitSensor;
 use fewbits_dymbo::vector::SignFilter;

@@ -1,8 +1,8 @@
 //! Beyond the publication: folded cells, broken symmetry, words, bounds, effort.
 
 use super::common::{MI, MSE, breakpoints, bsc, cell, exact, lloyd, lloyd_system, name, scene};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, Value, claim, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, Value, claim, column, row};
 use fewbits_quantizer_design::design::{self, Discovery};
 use fewbits_quantizer_design::{Channel, Criterion, Group, Newton, Quantizer, System, bounds};
 use serde::{Deserialize, Serialize};

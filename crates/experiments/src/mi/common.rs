@@ -1,8 +1,10 @@
 //! What the tables of this system share: scenes, starting quantizers, rows of designs, and looking values up again.
 
-use crate::{Claim, Column, Error, Table, Value, column};
+use crate::legacy::{Claim, Column, Error, Table, Value, column};
 use fewbits_quantizer_design::design::Design;
 use fewbits_quantizer_design::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 pub(super) const MI: Criterion = Criterion::MutualInformation;
 pub(super) const MSE: Criterion = Criterion::MeanSquaredError;
@@ -55,6 +57,57 @@ pub(super) fn breakpoints(quantizer: &Quantizer) -> String {
         .map(rounded)
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// A design of two sensors.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub(super) struct Pair {
+    /// Breakpoints of sensor 1.
+    pub(super) gamma1: String,
+    /// Breakpoints of sensor 2.
+    pub(super) gamma2: String,
+    /// Largest breakpoint of sensor 1.
+    pub(super) outer1: f64,
+    /// Largest breakpoint of sensor 2.
+    pub(super) outer2: f64,
+    /// Mutual information between the unknown and all symbols.
+    #[schemars(extend("unit" = "nat"))]
+    pub(super) mi_nats: f64,
+    /// The same in bits.
+    #[schemars(extend("unit" = "bit"))]
+    pub(super) mi_bits: f64,
+    /// Mean squared error of the posterior mean, in prior variances.
+    pub(super) mse: f64,
+    /// Largest eigenvalue of the criterion's Hessian where it was a joint design.
+    pub(super) curvature: Option<f64>,
+}
+
+impl Pair {
+    /// The first and the last sensor of a system.
+    pub(super) fn of(system: &System) -> Result<Self, Error> {
+        let quantizers = system.quantizers();
+        let (first, last) = (&quantizers[0], &quantizers[quantizers.len() - 1]);
+        let outer = |q: &Quantizer| q.breakpoints().last().copied().unwrap_or_default();
+        let mi_nats = system.value(MI)?;
+        Ok(Self {
+            gamma1: breakpoints(first),
+            gamma2: breakpoints(last),
+            outer1: outer(first),
+            outer2: outer(last),
+            mi_nats,
+            mi_bits: mi_nats / std::f64::consts::LN_2,
+            mse: system.value(MSE)?,
+            curvature: None,
+        })
+    }
+
+    /// As [`Pair::of`], with the curvature of a joint design.
+    pub(super) fn joint(design: &Design) -> Result<Self, Error> {
+        Ok(Self {
+            curvature: Some(design.largest_curvature),
+            ..Self::of(&design.system)?
+        })
+    }
 }
 
 /// A table whose rows are designs of two sensors, behind the given key columns.

@@ -1,8 +1,8 @@
 //! Figures 4.2 to 4.5: how alternating maximisation proceeds.
 
 use super::common::{MI, MSE, bsc, exact, lloyd_system, scene};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, claim, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, claim, column, row};
 use fewbits_quantizer_design::{System, design};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::LN_2;

@@ -19,11 +19,21 @@ pub use table4_4::Table44;
 pub use table4_5::{Mismatch, Table45};
 
 use crate::AnyFigure;
+use crate::legacy::Old;
 
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
-        &Figure42, &Figure43, &Table41, &Table42, &Table43, &Table44, &Table45, &Mismatch, &Figure44, &Figure45,
-        &Beyond,
+        &Old(Figure42),
+        &Old(Figure43),
+        &Table41,
+        &Table42,
+        &Table43,
+        &Old(Table44),
+        &Old(Table45),
+        &Old(Mismatch),
+        &Old(Figure44),
+        &Old(Figure45),
+        &Old(Beyond),
     ]
 }

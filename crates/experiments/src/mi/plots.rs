@@ -1,22 +1,21 @@
 //! Panels that several tables draw.
 
-use crate::plot::{Axis, Layer, Legend, Marker, Panel};
-use crate::{Error, Table};
+use crate::plot::{Axis, Layer, Legend, Marker, Panel, points};
 
-/// Squared errors of designs, one a line, with the printed values beside them.
-pub(super) fn error_bars(title: &str, rows: &Table, labels: &[String]) -> Result<Panel, Error> {
-    let points = |column: &str| -> Result<Vec<(f64, f64)>, Error> {
-        let at = rows.columns().iter().position(|c| c.name == column);
-        let at = at.ok_or_else(|| Error::Table(format!("no column `{column}`")))?;
-        let values = rows.rows().iter().enumerate();
-        Ok(values
-            .filter_map(|(i, row)| Some((row[at].as_number()?, -(i as f64))))
-            .collect())
+/// Squared errors of designs, one a line: name, exact error, printed one.
+pub(super) fn errors(title: &str, rows: impl Iterator<Item = (String, f64, Option<f64>)>) -> Panel {
+    let rows: Vec<_> = rows
+        .enumerate()
+        .map(|(i, (name, mse, printed))| (-(i as f64), name, mse, printed))
+        .collect();
+    let place = |value: fn(&(f64, String, f64, Option<f64>)) -> Option<f64>| {
+        let place = |row| Some((value(row)?, row.0));
+        rows.iter().filter_map(place).collect::<Vec<_>>()
     };
-    let names = labels.iter().enumerate().map(|(i, label)| (-(i as f64), label.clone()));
-    let y = Axis::linear("").named(names).between(0.6 - labels.len() as f64, 0.6);
-    Ok(Panel::new(title, Axis::linear("mean squared error"), y)
-        .with(Layer::points("exact", points("mse")?))
-        .with(Layer::points("printed", points("printed_mse")?).marked(Marker::Cross))
-        .legend(Legend::Outside))
+    let names = rows.iter().map(|(at, name, ..)| (*at, name.clone()));
+    let y = Axis::linear("").named(names).between(0.6 - rows.len() as f64, 0.6);
+    Panel::new(title, Axis::linear("mean squared error / prior variances"), y)
+        .with(Layer::points("exact", points(place(|r| Some(r.2)), |p| p)))
+        .with(Layer::points("printed", points(place(|r| r.3), |p| p)).marked(Marker::Cross))
+        .legend(Legend::Outside)
 }

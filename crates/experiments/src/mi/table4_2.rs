@@ -1,20 +1,24 @@
 //! Table 4.2: two sensors of unequal noise.
 
-use super::common::{MI, MSE, cell, design_table, exact, lloyd_system, odd, push_design, push_joint, scene};
-use super::plots::error_bars;
+use super::common::{MI, MSE, Pair, lloyd_system, odd, scene};
+use super::plots::errors;
 use crate::plot::Plot;
-use crate::{About, Claim, Context, Error, Figure, Tables, Value, column, row};
+use crate::{About, Claims, Context, Error, Figure, reference};
 use fewbits_quantizer_design::{Newton, System, bounds, design};
+use garde::Validate;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Settings of Table 4.2.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
-    /// Noise variances, in prior variances.
-    pub noise_variances: Vec<f64>,
+    /// Noise variances of the two sensors, in prior variances.
+    #[garde(length(min = 2, max = 2), inner(range(min = 1e-6, max = 1e6)))]
+    noise_variances: Vec<f64>,
     /// Random starts of each joint design.
-    pub starts: usize,
+    #[garde(range(min = 1, max = 10_000))]
+    starts: usize,
 }
 
 impl Default for Parameters {
@@ -26,39 +30,48 @@ impl Default for Parameters {
     }
 }
 
-/// A printed pair: levels, positive breakpoints of both sensors, its error, and that of the printed Lloyd-Max baseline.
-type Printed = (usize, &'static [f64], &'static [f64], f64, f64);
+/// Levels, and the printed positive breakpoints of both sensors.
+const PRINTED: [(usize, &[f64], &[f64]); 2] = [(4, &[1.38], &[1.135]), (8, &[0.69, 1.45, 2.43], &[0.58, 1.22, 2.05])];
 
-const PRINTED: [Printed; 2] = [
-    (4, &[1.38], &[1.135], 0.310, 0.332),
-    (8, &[0.69, 1.45, 2.43], &[0.58, 1.22, 2.05], 0.264, 0.281),
-];
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Designs.
+    designs: Vec<Row>,
+    /// Random starts of the joint information design.
+    searches: Vec<Search>,
+}
 
-/// Independent values: levels, method, outer breakpoints, squared error.
-const KNOWN: [(usize, &str, f64, f64, f64); 16] = [
-    (4, "mi-printed", 1.38, 1.135, 0.312_205_18),
-    (4, "mi-greedy", 1.357_495_9, 1.150_693_7, 0.312_153_50),
-    (4, "mi-greedy-better-first", 1.385_624_0, 1.150_393_8, 0.312_082_97),
-    (4, "mi-joint", 1.385_648_4, 1.150_059_9, 0.312_085_02),
-    (4, "mse-joint", 1.445_817_1, 1.207_492_8, 0.311_841_77),
-    (4, "lloyd-noise", 0.981_598_8, 0.694_095_2, 0.332_015_63),
-    (4, "lloyd-x", 0.981_598_8, 0.981_598_8, 0.318_755_63),
-    (4, "lloyd-y", 1.388_190_4, 1.202_208_1, 0.311_895_34),
-    (8, "mi-printed", 2.43, 2.05, 0.267_603_72),
-    (8, "mi-greedy", 2.441_283_6, 2.083_432_5, 0.267_537_96),
-    (8, "mi-greedy-better-first", 2.461_850_4, 2.087_045_9, 0.267_527_31),
-    (8, "mi-joint", 2.462_057_2, 2.083_126_6, 0.267_531_16),
-    (8, "mse-joint", 2.515_778_0, 2.138_029_9, 0.267_495_41),
-    (8, "lloyd-noise", 1.747_927_5, 1.235_971_4, 0.282_463_74),
-    (8, "lloyd-x", 1.747_927_5, 1.747_927_5, 0.271_511_88),
-    (8, "lloyd-y", 2.471_942_8, 2.140_765_2, 0.267_499_97),
-];
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    /// Levels of each sensor.
+    levels: usize,
+    /// Criterion and how it was reached.
+    method: &'static str,
+    #[serde(flatten)]
+    design: Pair,
+    /// The publication's squared error.
+    printed_mse: Option<f64>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Search {
+    /// Levels of each sensor.
+    levels: usize,
+    /// Random starts of the joint information design.
+    starts: usize,
+    /// Starts that reached the best value found.
+    arrived: usize,
+    /// Least squared error of any codes at these rates.
+    ceo_bound: f64,
+}
 
 /// Table 4.2.
 pub struct Table42;
 
 impl Figure for Table42 {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
@@ -70,49 +83,34 @@ impl Figure for Table42 {
         }
     }
 
-    fn check(&self, p: &Parameters) -> Result<(), Error> {
-        if p.noise_variances.len() == 2 {
-            return Ok(());
-        }
-        Err(Error::BadParameter {
-            figure: "mi-table4-2",
-            name: "noise_variances".to_owned(),
-            value: format!("{:?}", p.noise_variances),
-            expected: "two numbers".to_owned(),
-        })
-    }
-
-    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let keys = [
-            column("levels", "", "levels of each sensor"),
-            column("method", "", "criterion and how it was reached"),
-        ];
-        let mut table = design_table(&keys);
-        let mut further = crate::Table::new([
-            column("levels", "", "levels of each sensor"),
-            column("starts", "", "random starts of the joint information design"),
-            column("arrived", "", "starts that reached the best value found"),
-            column("ceo_bound", "", "least squared error of any codes at these rates"),
-        ]);
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
+        let as_printed = p.noise_variances == [1.0, 0.5];
+        let (mut designs, mut searches) = (Vec::new(), Vec::new());
         let sds: Vec<f64> = p.noise_variances.iter().map(|v| v.sqrt()).collect();
         let scene = scene(&sds, 0.0)?;
         let newton = Newton::default();
-        for (levels, first, second, printed, printed_lloyd) in PRINTED {
+        for (levels, first, second) in PRINTED {
+            let mut push = |method: &'static str, design: Pair| {
+                let printed = reference::value(&format!("mi-table4-2/printed/{levels} levels {method}"));
+                designs.push(Row {
+                    levels,
+                    method,
+                    design,
+                    printed_mse: printed.filter(|_| as_printed),
+                });
+            };
             let sample = lloyd_system(&scene, levels, |n| scene.sample_sd(n))?;
-            let key = |method: &str| row![levels, method];
-            let system = System::ideal(scene.clone(), vec![odd(first)?, odd(second)?])?;
-            push_design(&mut table, key("mi-printed"), &system, None, Some(printed))?;
+            push("mi-printed", Pair::of(&System::ideal(scene.clone(), vec![odd(first)?, odd(second)?])?)?);
             for (criterion, greedy, reversed, joint) in [
                 (MI, "mi-greedy", "mi-greedy-better-first", "mi-joint"),
                 (MSE, "mse-greedy", "mse-greedy-better-first", "mse-joint"),
             ] {
-                let chain = design::greedy(&sample, &[0, 1], criterion, &newton)?;
-                push_design(&mut table, key(greedy), &chain[1].system, None, None)?;
+                push(greedy, Pair::of(&design::greedy(&sample, &[0, 1], criterion, &newton)?[1].system)?);
                 let mut quantizers = design::greedy(&sample, &[1, 0], criterion, &newton)?[1].quantizers();
                 quantizers.reverse();
-                push_design(&mut table, key(reversed), &System::ideal(scene.clone(), quantizers)?, None, None)?;
+                push(reversed, Pair::of(&System::ideal(scene.clone(), quantizers)?)?);
                 let best = design::joint(&sample, criterion, &newton)?;
-                push_joint(&mut table, key(joint), &best)?;
+                push(joint, Pair::joint(&best)?);
                 if criterion == MI {
                     let reached =
                         |s: &System| design::joint(s, MI, &newton).is_ok_and(|d| (d.value - best.value).abs() < 1e-10);
@@ -121,90 +119,62 @@ impl Figure for Table42 {
                         .filter(|s| reached(s))
                         .count();
                     let bits = (levels as f64).log2();
-                    let bound = bounds::ceo(1.0, &p.noise_variances, &[bits, bits])?;
-                    further.push(row![levels, p.starts, arrived, bound])?;
+                    let ceo_bound = bounds::ceo(1.0, &p.noise_variances, &[bits, bits])?;
+                    searches.push(Search {
+                        levels,
+                        starts: p.starts,
+                        arrived,
+                        ceo_bound,
+                    });
                 }
             }
-            let noise = lloyd_system(&scene, levels, |n| sds[n])?;
-            push_design(&mut table, key("lloyd-noise"), &noise, None, Some(printed_lloyd))?;
-            push_design(&mut table, key("lloyd-x"), &lloyd_system(&scene, levels, |_| 1.0)?, None, None)?;
-            push_design(&mut table, key("lloyd-y"), &sample, None, None)?;
+            push("lloyd-noise", Pair::of(&lloyd_system(&scene, levels, |n| sds[n])?)?);
+            push("lloyd-x", Pair::of(&lloyd_system(&scene, levels, |_| 1.0)?)?);
+            push("lloyd-y", Pair::of(&sample)?);
         }
-        Ok(Tables::from(table).with("searches", further))
+        Ok(Rows { designs, searches })
     }
 
-    fn claims(&self, _: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let at = |levels: usize, method: &str, column: &str| {
-            cell(&tables.main, &[("levels", Value::from(levels)), ("method", method.into())], column)
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let designs = || rows.designs.iter();
+        let key = |r: &Row| format!("{} levels {}", r.levels, r.method);
+        claims.references("mse", "squared error", designs(), |r| (key(r), r.design.mse));
+        claims.references("outer1", "outer breakpoint of sensor 1", designs(), |r| (key(r), r.design.outer1));
+        claims.references("outer2", "outer breakpoint of sensor 2", designs(), |r| (key(r), r.design.outer2));
+        let what = "the printed error is exact to 1.5 % for the designs, 0.6 % for Lloyd-Max (errata mi-8)";
+        claims.references("printed", what, designs(), |r| (key(r), r.design.mse));
+        for (levels, ..) in PRINTED {
+            let mse = |method: &str| {
+                designs()
+                    .find(|r| r.levels == levels && r.method == method)
+                    .map(|r| r.design.mse)
+            };
+            let what = "squared-error design < Lloyd-Max of the sample < information design, against the printed claim (errata \
+                        mi-7) < the printed baseline, scaled to the noise";
+            let order = ["mse-joint", "lloyd-y", "mi-joint", "lloyd-noise"];
+            claims
+                .increasing(format!("L{levels}-order"), what, order.map(mse))
+                .at_defaults();
+            let what = "that baseline is worse than Lloyd-Max of the unknown";
+            claims
+                .increasing(format!("L{levels}-baseline"), what, [mse("lloyd-x"), mse("lloyd-noise")])
+                .at_defaults();
+        }
+        let what = "every random start reaches the same joint optimum";
+        claims
+            .all("one-optimum", what, &rows.searches, |s| s.arrived == s.starts)
+            .at_defaults();
+        let what = "bound with all subset constraints";
+        claims.references("ceo", what, &rows.searches, |s| (format!("{} levels", s.levels), s.ceo_bound));
+        let bound = |r: &Row| rows.searches.iter().find(|s| s.levels == r.levels).map(|s| s.ceo_bound);
+        claims.all("ceo-gap", "no design beats the bound", designs(), |r| bound(r).is_some_and(|b| r.design.mse > b));
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let panel = |(levels, ..): (usize, _, _)| {
+            let rows = rows.designs.iter().filter(|r| r.levels == levels);
+            errors(&format!("{levels} levels"), rows.map(|r| (r.method.to_owned(), r.design.mse, r.printed_mse)))
         };
-        let mut claims = Vec::new();
-        for (levels, method, outer1, outer2, mse) in KNOWN {
-            let id = |what: &str| format!("L{levels}-{method}-{what}");
-            let what = format!("L = {levels}, {method}");
-            claims.push(exact(id("mse"), format!("{what}: squared error"), at(levels, method, "mse")?, mse, 1e-8));
-            let outer = [(1, outer1, "outer1"), (2, outer2, "outer2")];
-            for (sensor, known, column) in outer {
-                let found = at(levels, method, column)?;
-                claims.push(exact(id(column), format!("{what}: outer breakpoint {sensor}"), found, known, 1e-7));
-            }
-        }
-        for (levels, _, _, printed, printed_lloyd) in PRINTED {
-            let mse = |method: &str| at(levels, method, "mse");
-            let (joint, sample) = (mse("mi-joint")?, mse("lloyd-y")?);
-            claims.push(Claim::below(
-                format!("L{levels}-lloyd-wins"),
-                "Lloyd-Max of the sample beats the information design, against the printed claim (errata mi-7)",
-                sample - joint,
-                0.0,
-            ));
-            claims.push(Claim::below(
-                format!("L{levels}-order"),
-                "the squared-error design is best of all",
-                mse("mse-joint")? - sample,
-                0.0,
-            ));
-            let what = "the printed baseline, scaled to the noise, is worse than either correct scaling";
-            let least = mse("lloyd-x")?.max(sample);
-            claims.push(Claim::above(format!("L{levels}-baseline"), what, mse("lloyd-noise")? - least, 0.0));
-            let what = "printed error of the information design against the exact one, relative (errata mi-8)";
-            claims.push(
-                Claim::at_most(format!("L{levels}-printed"), what, (printed / mse("mi-printed")? - 1.0).abs(), 0.015)
-                    .at_defaults(),
-            );
-            let what = "printed error of the baseline, relative";
-            claims.push(
-                Claim::at_most(
-                    format!("L{levels}-printed-lloyd"),
-                    what,
-                    (printed_lloyd / mse("lloyd-noise")? - 1.0).abs(),
-                    0.006,
-                )
-                .at_defaults(),
-            );
-        }
-        let searches = tables.named("searches")?;
-        let missed = searches
-            .points("starts", "arrived")?
-            .iter()
-            .filter(|(s, a)| s != a)
-            .count();
-        claims.push(
-            Claim::never("one-optimum", "every random start reaches the same joint optimum", missed).at_defaults(),
-        );
-        for (levels, known) in [(4usize, 0.274_680_4), (8, 0.255_936_0)] {
-            let bound = cell(searches, &[("levels", levels.into())], "ceo_bound")?;
-            claims.push(exact(format!("L{levels}-ceo"), "bound with all subset constraints", bound, known, 1e-7));
-            let gap = at(levels, "mse-joint", "mse")? - bound;
-            claims.push(Claim::above(format!("L{levels}-ceo-gap"), "no design beats the bound", gap, 0.0));
-        }
-        Ok(claims)
-    }
-
-    fn plot(&self, _: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let panels = [4usize, 8].into_iter().map(|levels| {
-            let rows = tables.main.only("levels", levels)?;
-            error_bars(&format!("L = {levels}"), &rows, &rows.texts("method")?)
-        });
-        Ok(Plot::grid(2, panels.collect::<Result<_, Error>>()?))
+        Plot::grid(2, PRINTED.map(panel).to_vec())
     }
 }

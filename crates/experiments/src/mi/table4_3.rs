@@ -1,19 +1,23 @@
 //! Table 4.3: nine sensors.
 
-use super::common::{MI, MSE, cell, exact, lloyd, scene};
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, claim, column, row};
+use super::common::{MI, MSE, lloyd, scene};
+use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure, reference};
 use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design};
+use garde::Validate;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Settings of Table 4.3.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
-    /// Number of sensors.
-    pub sensors: usize,
+    /// Number of sensors; the greedy chain enumerates `4^sensors` outcomes.
+    #[garde(range(min = 2, max = 10))]
+    sensors: usize,
     /// Noise standard deviation, in prior standard deviations.
-    pub noise_sd: f64,
+    #[garde(range(min = 1e-3, max = 1e3))]
+    noise_sd: f64,
 }
 
 impl Default for Parameters {
@@ -25,35 +29,88 @@ impl Default for Parameters {
     }
 }
 
-/// Greedy chain: outer breakpoints.
-const CHAIN: [f64; 9] = [
-    1.357_495_91,
-    1.363_730_22,
-    1.367_906_35,
-    1.370_904_78,
-    1.373_168_84,
-    1.374_943_25,
-    1.376_374_08,
-    1.377_554_04,
-    1.378_544_93,
-];
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Designs.
+    designs: Vec<Design>,
+    /// The greedy chains, sensor by sensor.
+    chain: Vec<Stage>,
+    /// Identical quantizers against their outer breakpoint.
+    curve: Vec<Point>,
+    /// Least squared errors.
+    bounds: Vec<Bound>,
+}
 
-/// Independent values: method, common outer breakpoint if any, squared error.
-const KNOWN: [(&str, Option<f64>, f64); 7] = [
-    ("mse-joint", Some(1.443_682_4), 0.124_480_98),
-    ("lloyd-y", Some(1.388_190_4), 0.124_557_96),
-    ("mi-joint", Some(1.377_921_5), 0.124_589_41),
-    ("mi-greedy", None, 0.124_613_95),
-    ("mi-printed", Some(1.275), 0.125_215_57),
-    ("lloyd-printed", Some(0.982), 0.130_475_00),
-    ("lloyd-x", Some(0.981_598_8), 0.130_486_15),
-];
+#[derive(Serialize, JsonSchema)]
+struct Design {
+    /// Criterion and how it was reached.
+    method: String,
+    /// Common outer breakpoint; missing where the sensors differ.
+    t: Option<f64>,
+    /// Mutual information.
+    #[schemars(extend("unit" = "nat"))]
+    mi_nats: f64,
+    /// Squared error, in prior variances.
+    mse: f64,
+    /// The publication's value.
+    printed_mse: Option<f64>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Stage {
+    /// Criterion of the chain.
+    criterion: &'static str,
+    /// Sensors designed so far.
+    stage: usize,
+    /// Outer breakpoint of the last one.
+    t: f64,
+    /// Mutual information of the sensors so far.
+    #[schemars(extend("unit" = "nat"))]
+    mi_nats: f64,
+    /// Their squared error.
+    mse: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Point {
+    /// Common outer breakpoint.
+    t: f64,
+    /// Mutual information.
+    #[schemars(extend("unit" = "nat"))]
+    mi_nats: f64,
+    /// Squared error.
+    mse: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Bound {
+    /// Which bound.
+    bound: &'static str,
+    /// Least squared error.
+    mse: f64,
+}
+
+impl Rows {
+    fn design(&self, method: &str) -> Option<&Design> {
+        self.designs.iter().find(|d| d.method == method)
+    }
+
+    fn mse(&self, method: &str) -> Option<f64> {
+        self.design(method).map(|d| d.mse)
+    }
+
+    fn bound(&self, name: &str) -> Option<f64> {
+        self.bounds.iter().find(|b| b.bound == name).map(|b| b.mse)
+    }
+}
 
 /// Table 4.3.
 pub struct Table43;
 
 impl Figure for Table43 {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
@@ -70,14 +127,7 @@ impl Figure for Table43 {
         p.sensors = 6;
     }
 
-    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("method", "", "criterion and how it was reached"),
-            column("t", "", "common outer breakpoint; missing where the sensors differ"),
-            column("mi_nats", "nat", "mutual information"),
-            column("mse", "", "squared error, in prior variances"),
-            column("printed_mse", "", "the publication's value"),
-        ]);
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let scene = scene(&vec![p.noise_sd; p.sensors], 0.0)?;
         let common =
             |t: f64| -> Result<System, Error> { Ok(System::identical(scene.clone(), Quantizer::symmetric(t)?)?) };
@@ -87,128 +137,148 @@ impl Figure for Table43 {
         let best = |criterion| -> Result<f64, Error> {
             Ok(design::joint(&common(sample)?, criterion, &newton)?.quantizers()[0].breakpoints()[2])
         };
-        for (method, t, printed) in [
-            ("mse-joint", best(MSE)?, None),
-            ("lloyd-y", sample, None),
-            ("mi-joint", best(MI)?, None),
-            ("mi-printed", 1.275, Some(0.1233)),
-            ("lloyd-printed", 0.982, Some(0.1295)),
-            ("lloyd-x", unit, None),
+        // The prints are for nine sensors of unit noise.
+        let as_printed = p.sensors == 9 && p.noise_sd == 1.0;
+        let printed = |method: &str| reference::value(&format!("mi-table4-3/printed/{method}")).filter(|_| as_printed);
+        let mut designs = Vec::new();
+        for (method, t) in [
+            ("mse-joint", best(MSE)?),
+            ("lloyd-y", sample),
+            ("mi-joint", best(MI)?),
+            ("mi-printed", 1.275),
+            ("lloyd-printed", 0.982),
+            ("lloyd-x", unit),
         ] {
             let system = common(t)?;
-            table.push(row![method, t, system.value(MI)?, system.value(MSE)?, printed])?;
+            let (mi_nats, mse) = (system.value(MI)?, system.value(MSE)?);
+            designs.push(Design {
+                method: method.to_owned(),
+                t: Some(t),
+                mi_nats,
+                mse,
+                printed_mse: printed(method),
+            });
         }
-        let mut chain = Table::new([
-            column("criterion", "", "criterion of the chain"),
-            column("stage", "", "sensors designed so far"),
-            column("t", "", "outer breakpoint of the last one"),
-            column("mi_nats", "nat", "mutual information of the sensors so far"),
-            column("mse", "", "their squared error"),
-        ]);
+        let mut chain = Vec::new();
         let order: Vec<usize> = (0..p.sensors).collect();
         let start = System::ideal(scene.clone(), vec![Quantizer::symmetric(sample)?; p.sensors])?;
-        for (name, criterion) in [("mi", MI), ("mse", MSE)] {
-            let stages = design::greedy(&start, &order, criterion, &newton)?;
-            let mut last = (0.0, 0.0);
-            for (i, stage) in stages.iter().enumerate() {
-                last = (stage.system.value(MI)?, stage.system.value(MSE)?);
+        for (criterion, by) in [("mi", MI), ("mse", MSE)] {
+            let (mut mi_nats, mut mse) = (0.0, 0.0);
+            for (i, stage) in design::greedy(&start, &order, by, &newton)?.iter().enumerate() {
+                (mi_nats, mse) = (stage.system.value(MI)?, stage.system.value(MSE)?);
                 let t = stage.system.groups()[i].quantizer().breakpoints()[2];
-                chain.push(row![name, i + 1, t, last.0, last.1])?;
+                chain.push(Stage {
+                    criterion,
+                    stage: i + 1,
+                    t,
+                    mi_nats,
+                    mse,
+                });
             }
-            table.push(row![format!("{name}-greedy"), None::<f64>, last.0, last.1, None::<f64>])?;
+            designs.push(Design {
+                method: format!("{criterion}-greedy"),
+                t: None,
+                mi_nats,
+                mse,
+                printed_mse: None,
+            });
         }
-        let mut curve = Table::new([
-            column("t", "", "common outer breakpoint"),
-            column("mi_nats", "nat", "mutual information"),
-            column("mse", "", "squared error"),
-        ]);
+        let mut curve = Vec::new();
         for i in 0..=60 {
             let t = 0.8 + 0.02 * f64::from(i);
             let system = common(t)?;
-            curve.push(row![t, system.value(MI)?, system.value(MSE)?])?;
+            curve.push(Point {
+                t,
+                mi_nats: system.value(MI)?,
+                mse: system.value(MSE)?,
+            });
         }
         let variance = p.noise_sd * p.noise_sd;
-        let mut limits = Table::new([
-            column("bound", "", "which bound"),
-            column("mse", "", "least squared error"),
-        ]);
         let codes = bounds::ceo(1.0, &vec![variance; p.sensors], &vec![2.0; p.sensors])?;
-        limits.push(row!["ceo", codes])?;
-        limits.push(row!["unquantized", variance / (variance + p.sensors as f64)])?;
-        Ok(Tables::from(table)
-            .with("chain", chain)
-            .with("curve", curve)
-            .with("bounds", limits))
+        let bounds = vec![
+            Bound {
+                bound: "ceo",
+                mse: codes,
+            },
+            Bound {
+                bound: "unquantized",
+                mse: variance / (variance + p.sensors as f64),
+            },
+        ];
+        Ok(Rows {
+            designs,
+            chain,
+            curve,
+            bounds,
+        })
     }
 
-    fn claims(&self, _: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let at = |method: &str, column: &str| cell(&tables.main, &[("method", method.into())], column);
-        let mut claims = Vec::new();
-        for (method, t, mse) in KNOWN {
-            let what = format!("{method}: squared error");
-            claims.push(exact(format!("{method}-mse"), what, at(method, "mse")?, mse, 1e-8));
-            if let Some(t) = t {
-                let what = format!("{method}: outer breakpoint");
-                claims.push(exact(format!("{method}-t"), what, at(method, "t")?, t, 1e-7));
-            }
-        }
-        claims.push(exact(
-            "information",
-            "information of the joint design",
-            at("mi-joint", "mi_nats")?,
-            1.046_491_09,
-            1e-8,
-        ));
-        let order = KNOWN
-            .iter()
-            .filter(|k| k.0 != "lloyd-printed")
-            .map(|k| at(k.0, "mse"))
-            .collect::<Result<Vec<_>, _>>()?;
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let designs = || rows.designs.iter();
+        claims.references("mse", "squared error", designs(), |d| (d.method.clone(), d.mse));
+        claims.references("t", "outer breakpoint", designs(), |d| (d.method.clone(), d.t));
+        claims.references("mi_nats", "information", designs(), |d| (d.method.clone(), d.mi_nats));
+        let what = "printed errors are exact at the printed breakpoints to 1.6 % (errata mi-8)";
+        claims.references("printed", what, designs(), |d| (d.method.clone(), d.mse));
         let what =
             "squared-error design < Lloyd-Max of the sample < joint < greedy < printed < Lloyd-Max of the unknown";
-        claims.push(Claim::never("order", what, claim::not_increasing(&order)).at_defaults());
-        let chain = tables.named("chain")?.only("criterion", "mi")?.numbers("t")?;
-        let off = claim::largest(chain.iter().zip(CHAIN).map(|(a, b)| (a - b).abs()));
-        claims.push(exact("chain", "the greedy chain's nine outer breakpoints", off, 0.0, 1e-7));
-        let same = chain.windows(2).filter(|w| (w[0] - w[1]).abs() < 1e-6).count();
-        claims.push(Claim::never("chain-differs", "a greedy chain cannot give equal quantizers (errata mi-5)", same));
-        let best = at("mse-joint", "mse")?;
+        let order = ["mse-joint", "lloyd-y", "mi-joint", "mi-greedy", "mi-printed", "lloyd-x"];
+        claims
+            .increasing("order", what, order.map(|method| rows.mse(method)))
+            .at_defaults();
+        let chain: Vec<&Stage> = rows.chain.iter().filter(|s| s.criterion == "mi").collect();
+        claims.references("chain", "outer breakpoint of the greedy chain, sensor", &chain, |s| {
+            (s.stage.to_string(), s.t)
+        });
+        let what = "a greedy chain cannot give equal quantizers (errata mi-5)";
+        claims.all("chain-differs", what, chain.windows(2), |w| (w[0].t - w[1].t).abs() > 1e-6);
+        let gap = rows
+            .mse("mse-joint")
+            .zip(rows.design("mi-printed").and_then(|d| d.printed_mse))
+            .map(|(a, b)| a - b);
         let what = "the printed 0.1233 lies below the best of all identical designs (errata mi-8)";
-        claims.push(Claim::above("too-low", what, best - 0.1233, 0.0).at_defaults());
-        for (method, printed) in [("mi-printed", 0.1233), ("lloyd-printed", 0.1295)] {
-            let gap = (printed / at(method, "mse")? - 1.0).abs();
-            claims.push(
-                Claim::at_most(method, "printed error against the exact one, relative", gap, 0.016).at_defaults(),
-            );
-        }
+        claims.above("too-low", what, gap, 0.0);
+        let short = rows.design("mi-joint").and_then(|d| d.t).map(|t| 1.0 - 1.275 / t);
         let what = "the printed breakpoint is 7.5 % short of the optimum (errata mi-9)";
-        claims.push(exact("unconverged", what, 1.0 - 1.275 / at("mi-joint", "t")?, 0.0747, 1e-4));
-        let bound = cell(tables.named("bounds")?, &[("bound", "ceo".into())], "mse")?;
-        claims.push(exact("ceo", "least error of any codes of two bits", bound, 0.107_764_26, 1e-8));
-        claims.push(Claim::above("above-ceo", "the best design stays above it", best - bound, 0.0));
-        Ok(claims)
+        claims.near("unconverged", what, short, 0.0747, 1e-4).at_defaults();
+        let what = "least error of any codes of two bits";
+        claims.references("bound", what, &rows.bounds, |b| (b.bound.to_owned(), b.mse));
+        let bound = rows.bound("ceo").unwrap_or(f64::INFINITY);
+        claims.all("above-ceo", "every design stays above that bound", designs(), |d| d.mse > bound);
     }
 
-    fn plot(&self, _: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let curve = tables.named("curve")?;
-        let marks = |column: &str| tables.main.points("t", column);
-        let flat = |y: f64| vec![(0.8, y), (2.0, y)];
-        let bounds = tables.named("bounds")?.numbers("mse")?;
-        let chain = tables.named("chain")?.only("criterion", "mi")?;
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let flat = |name: &str| {
+            points(
+                rows.bounds
+                    .iter()
+                    .filter(|b| b.bound == name)
+                    .flat_map(|b| [(0.8, b.mse), (2.0, b.mse)]),
+                |p| p,
+            )
+        };
+        let marks = |value: fn(&Design) -> Option<f64>| {
+            points(&rows.designs, |d| (d.t.unwrap_or(f64::NAN), d.t.and_then(|_| value(d))))
+        };
         let error = Panel::new(
-            "error of one quantizer for all",
-            Axis::linear("outer breakpoint t"),
-            Axis::linear("mean squared error"),
+            "One quantizer for all sensors",
+            Axis::linear("outer breakpoint t / prior deviations"),
+            Axis::linear("mean squared error / prior variances"),
         )
-        .with(Layer::line("identical quantizers", curve.points("t", "mse")?))
-        .with(Layer::points("designs", marks("mse")?))
-        .with(Layer::points("printed", marks("printed_mse")?).marked(Marker::Cross))
-        .with(Layer::dashed("CEO bound", flat(bounds[0])))
-        .with(Layer::dashed("unquantized", flat(bounds[1])));
-        let stages = Panel::new("greedy chain", Axis::linear("stage"), Axis::linear("outer breakpoint t"))
-            .with(Layer::line("information", chain.points("stage", "t")?))
-            .with(Layer::points("", chain.points("stage", "t")?).coloured(0))
-            .legend(Legend::BottomRight);
-        Ok(Plot::grid(2, vec![error, stages]))
+        .with(Layer::line("identical quantizers", points(&rows.curve, |p| (p.t, p.mse))))
+        .with(Layer::points("designs", marks(|d| Some(d.mse))))
+        .with(Layer::points("printed", marks(|d| d.printed_mse)).marked(Marker::Cross))
+        .with(Layer::dashed("bound for any codes", flat("ceo")))
+        .with(Layer::dashed("unquantized", flat("unquantized")));
+        let chain = points(rows.chain.iter().filter(|s| s.criterion == "mi"), |s| (s.stage as f64, s.t));
+        let stages = Panel::new(
+            "Greedy chain for information",
+            Axis::linear("sensor, in order of design"),
+            Axis::linear("outer breakpoint t / prior deviations"),
+        )
+        .with(Layer::line("", chain.clone()).coloured(0))
+        .with(Layer::points("", chain).coloured(0))
+        .legend(Legend::Hidden);
+        Plot::grid(2, vec![error, stages])
     }
 }

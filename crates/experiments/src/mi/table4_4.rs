@@ -1,8 +1,8 @@
 //! Table 4.4: detection of a constant in noise by five sensors.
 
 use super::common::{MI, cell, exact};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, Value, column, row};
 use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, Value, column, row};
 use fewbits_numerics::normal;
 use fewbits_quantizer_design::decoder::NeymanPearson;
 use fewbits_quantizer_design::design::{self, Separation};
@@ -223,7 +223,8 @@ impl Figure for Table44 {
             let order = [pe("pe")?, pe("matusita")?, pe("mi-joint")?, pe("j-divergence")?];
             let what = "least error < Matusita < mutual information < J-divergence (errata mi-11)";
             claims.push(
-                Claim::never(format!("{signal}-order"), what, crate::claim::not_increasing(&order)).at_defaults(),
+                Claim::never(format!("{signal}-order"), what, crate::legacy::claim::not_increasing(&order))
+                    .at_defaults(),
             );
             let worst = pe("mi-joint")?
                 .max(pe("mi-greedy")?)

@@ -1,8 +1,8 @@
 //! Table 4.5: words over a binary symmetric channel, and what a wrong assumption about it costs.
 
 use super::common::{MI, MSE, bsc, cell, design_table, exact, lloyd_system, odd, push_design, push_joint, scene};
+use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, Value, claim, column, row};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::{About, Claim, Context, Error, Figure, Table, Tables, Value, claim, column, row};
 use fewbits_quantizer_design::design::Design;
 use fewbits_quantizer_design::{Newton, System, design};
 use serde::{Deserialize, Serialize};

@@ -1,19 +1,26 @@
 //! Rectangle probabilities of two correlated normal variables.
 
-use super::{interval, pdf};
+use super::{interval, log_interval};
 use crate::error::{self, ArgumentError};
+use crate::kernels::elementary::exp;
 use crate::quadrature::gauss_legendre;
 
 /// Beyond this the density underflows.
-const REACH: f64 = 38.0;
-/// Panels whose middle is this much below the largest one carry nothing.
-const NEGLIGIBLE: f64 = 1e-22;
+const REACH: f64 = 39.0;
+/// Logarithmic drop from the peak of the integrand beyond which nothing is left.
+const DROP: f64 = 60.0;
+/// Two rules that agree to this share of the whole are right.
+const AGREEMENT: f64 = 1e-13;
+/// Halvings of one panel; a log-concave integrand needs about ten.
+const DEEPEST: usize = 40;
 
 /// `P(lower[0] < X < upper[0], lower[1] < Y < upper[1])` for standard normal `X`, `Y` with correlation `rho`.
 ///
-/// Integrates `phi(x) [Phi((u - rho x)/s) - Phi((l - rho x)/s)]`, `s = sqrt(1 - rho^2)`, with Gauss-Legendre panels that are
-/// fine around the two steps of the bracket. All terms are positive, so far rectangles keep their relative accuracy
-/// (about 1e-13). `|rho| = 1` is the interval that remains on the diagonal.
+/// Integrates `phi(x) [Phi((u - rho x)/s) - Phi((l - rho x)/s)]`, `s = sqrt(1 - rho^2)`. The integrand is log-concave
+/// (Prekopa), so its peak and the interval that holds its mass are found first, in the log domain, and Gauss-Legendre panels
+/// are halved there until two rules agree. Relative error below 1e-11 for probabilities down to the smallest normal number,
+/// for all correlations up to `1 - 1e-9`; beyond that the problem itself magnifies the rounding of `rho`. `|rho| = 1` is the
+/// interval that remains on the diagonal.
 ///
 /// # Errors
 /// If `rho` is outside `[-1, 1]` or an edge is NaN. Empty rectangles have probability 0.
@@ -24,60 +31,113 @@ pub fn bivariate_rectangle(lower: [f64; 2], upper: [f64; 2], rho: f64) -> Result
             return Err(ArgumentError::new("edge", edge, "a number or an infinity"));
         }
     }
-    if rho.abs() == 1.0 {
-        let (l, u) = if rho > 0.0 {
-            (lower[1], upper[1])
-        } else {
-            (-upper[1], -lower[1])
-        };
-        return Ok(interval(lower[0].max(l), upper[0].min(u)));
-    }
-    let s = ((1.0 - rho) * (1.0 + rho)).sqrt();
-    let (from, to) = (lower[0].max(-REACH), upper[0].min(REACH));
-    if from >= to || lower[1] >= upper[1] {
+    if lower[0] >= upper[0] || lower[1] >= upper[1] {
         return Ok(0.0);
     }
-    let bracket = |x: f64| interval((lower[1] - rho * x) / s, (upper[1] - rho * x) / s);
-    let mut edges = panel_edges(from, to);
-    if rho != 0.0 {
-        for step in [lower[1] / rho, upper[1] / rho] {
-            refine(&mut edges, from, to, step, s / rho.abs());
-        }
+    // A negative correlation is the reflected rectangle.
+    let (l, u) = if rho < 0.0 {
+        (-upper[1], -lower[1])
+    } else {
+        (lower[1], upper[1])
+    };
+    let rho = rho.abs();
+    if rho == 1.0 {
+        return Ok(interval(lower[0].max(l), upper[0].min(u)));
     }
-    edges.sort_by(f64::total_cmp);
-    let middles: Vec<f64> = edges
-        .windows(2)
-        .map(|e| {
-            let middle = 0.5 * (e[0] + e[1]);
-            (e[1] - e[0]) * pdf(middle) * bracket(middle)
-        })
-        .collect();
-    let largest = middles.iter().copied().fold(0.0, f64::max);
-    let rule = gauss_legendre::<20>();
-    Ok(edges
-        .windows(2)
-        .zip(&middles)
-        .filter(|(e, middle)| e[0] < e[1] && **middle >= NEGLIGIBLE * largest)
-        .map(|(e, _)| rule.sum(e[0], e[1], |x| pdf(x) * bracket(x)))
-        .sum())
+    let (from, to) = (lower[0].max(-REACH), upper[0].min(REACH));
+    if from >= to {
+        return Ok(0.0);
+    }
+    let s = ((1.0 - rho) * (1.0 + rho)).sqrt();
+    let standardised = |edge: f64, x: f64| {
+        // Near correlation one `rho x` would lose what `edge - x` keeps.
+        let distance = if rho > 0.5 {
+            (edge - x) + (1.0 - rho) * x
+        } else {
+            edge - rho * x
+        };
+        distance / s
+    };
+    let log_integrand = |x: f64| log_interval(standardised(l, x), standardised(u, x)) - 0.5 * x * x;
+
+    let peak = peak(&log_integrand, from, to);
+    let top = log_integrand(peak);
+    if top == f64::NEG_INFINITY {
+        return Ok(0.0);
+    }
+    let left = fall(&log_integrand, peak, from, top - DROP);
+    let right = fall(&log_integrand, peak, to, top - DROP);
+    let integrand = |x: f64| exp(log_integrand(x) - top);
+    let rough = coarse(&integrand, left, peak) + coarse(&integrand, peak, right);
+    let whole = halved(&integrand, left, peak, rough, DEEPEST) + halved(&integrand, peak, right, rough, DEEPEST);
+    Ok(whole * exp(top) * super::INV_SQRT_2PI)
 }
 
-fn panel_edges(from: f64, to: f64) -> Vec<f64> {
-    let panels = ((to - from).ceil() as usize).max(1);
-    (0..=panels)
-        .map(|i| from + (to - from) * i as f64 / panels as f64)
-        .collect()
-}
-
-/// Adds edges around a step of the bracket at `centre` whose width is `scale`.
-fn refine(edges: &mut Vec<f64>, from: f64, to: f64, centre: f64, scale: f64) {
-    if !centre.is_finite() {
-        return;
-    }
-    for i in -10..=10 {
-        let edge = centre + f64::from(i) * scale;
-        if from < edge && edge < to {
-            edges.push(edge);
+/// Where a concave function is largest on `[from, to]`, to about a thousandth of the way to where it has dropped by one.
+fn peak(f: &impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
+    const RATIO: f64 = 0.618_033_988_749_894_9;
+    let (mut low, mut high) = (from, to);
+    let (mut a, mut b) = (high - RATIO * (high - low), low + RATIO * (high - low));
+    let (mut at_a, mut at_b) = (f(a), f(b));
+    // Seventy steps leave 1e-13 of the interval: less than the narrowest step of the bracket.
+    for _ in 0..70 {
+        if at_a >= at_b {
+            high = b;
+            (b, at_b) = (a, at_a);
+            a = high - RATIO * (high - low);
+            at_a = f(a);
+        } else {
+            low = a;
+            (a, at_a) = (b, at_b);
+            b = low + RATIO * (high - low);
+            at_b = f(b);
         }
     }
+    // At the ends the open search stays short of the edge.
+    [from, to, a]
+        .into_iter()
+        .fold(a, |best, x| if f(x) > f(best) { x } else { best })
+}
+
+/// The point between `peak` and `end` where a concave function has fallen to `level`, or `end` if it has not.
+fn fall(f: &impl Fn(f64) -> f64, peak: f64, end: f64, level: f64) -> f64 {
+    if f(end) >= level {
+        return end;
+    }
+    let (mut inside, mut outside) = (peak, end);
+    // Doubling first: the mass may hold a billionth of the way.
+    let mut share = 1e-12;
+    while share < 1.0 {
+        let x = peak + share * (end - peak);
+        if f(x) < level {
+            outside = x;
+            break;
+        }
+        inside = x;
+        share *= 4.0;
+    }
+    for _ in 0..8 {
+        let middle = 0.5 * (inside + outside);
+        if f(middle) < level {
+            outside = middle;
+        } else {
+            inside = middle;
+        }
+    }
+    outside
+}
+
+fn coarse(f: &impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
+    gauss_legendre::<20>().sum(from, to, f)
+}
+
+/// Integral by halving until the parts agree with the whole, relative to the integral sought.
+fn halved(f: &impl Fn(f64) -> f64, from: f64, to: f64, scale: f64, depth: usize) -> f64 {
+    let whole = coarse(f, from, to);
+    let middle = 0.5 * (from + to);
+    let parts = coarse(f, from, middle) + coarse(f, middle, to);
+    if depth == 0 || (whole - parts).abs() <= AGREEMENT * scale.max(parts) {
+        return parts;
+    }
+    halved(f, from, middle, scale, depth - 1) + halved(f, middle, to, scale, depth - 1)
 }

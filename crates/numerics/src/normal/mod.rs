@@ -1,6 +1,6 @@
 //! The standard normal distribution, exact in its tails.
 //!
-//! Everything a one-bit or censored sensor says is a statement about a normal variable falling in an interval, often a far
+//! Everything a one-bit or censored sensor reports is a statement about a normal variable falling in an interval, often a far
 //! or a narrow one. Written naively, `1 - cdf`, `pdf / cdf` and `cdf(b) - cdf(a)` lose every digit there, so this module is
 //! the only place in the workspace where such quantities are formed. Probabilities of intervals live in the log domain.
 //!
@@ -21,20 +21,22 @@
 //! assert!((normal::log_cdf(-40.0) + 804.608_442_013_754).abs() < 1e-9);
 //! ```
 //!
-//! Arguments are plain `f64` and are not checked: NaN in gives NaN out, infinities are meant.
+//! Arguments are plain `f64` and are not checked: NaN in gives NaN out, infinities are meant. Over slices the same functions,
+//! to the last bit, are in [`kernels`](crate::kernels), which states their bounds.
 
 mod bivariate;
-mod erfcx;
 mod one_sided;
+mod quantile;
 mod truncated;
 
 pub use bivariate::bivariate_rectangle;
-pub use erfcx::erfcx;
 pub use one_sided::{OneSided, one_sided, one_sided_variance};
+pub use quantile::quantile;
 pub use truncated::{TruncatedMoments, sample_truncated, truncated_moments};
 
-use crate::quadrature::gauss_legendre;
-use std::f64::consts::{FRAC_1_SQRT_2, LN_2};
+use crate::kernels::elementary::{ln_corrected, ln_one_minus};
+use crate::kernels::scalar;
+use crate::kernels::tail::{cut, scaled_tail};
 
 /// `1 / sqrt(2 pi)`.
 pub const INV_SQRT_2PI: f64 = 0.398_942_280_401_432_7;
@@ -44,9 +46,8 @@ pub const LN_SQRT_2PI: f64 = 0.918_938_533_204_672_7;
 pub const SQRT_2_OVER_PI: f64 = 0.797_884_560_802_865_4;
 
 /// Density `phi(x) = exp(-x^2/2) / sqrt(2 pi)`.
-#[inline]
 pub fn pdf(x: f64) -> f64 {
-    INV_SQRT_2PI * (-0.5 * x * x).exp()
+    scalar::pdf(x)
 }
 
 /// `ln phi(x)`.
@@ -62,112 +63,47 @@ pub fn log_pdf_with(x: f64, mean: f64, variance: f64) -> f64 {
     -0.5 * d * d / variance - 0.5 * variance.ln() - LN_SQRT_2PI
 }
 
-/// Distribution function `Phi(x)`, accurate in the left tail up to the rounding of `x` itself (relative error below
-/// `(4 + x^2) 2^-53`). The right tail is `cdf(-x)`.
-#[inline]
+/// `erfcx(x) = exp(x^2) erfc(x)`, within six units in the last place for arguments of either sign.
+///
+/// Positive and decreasing; `+inf` below `x = -26.62`, `~ 1/(x sqrt(pi))` for large `x`. NaN in, NaN out.
+pub fn erfcx(x: f64) -> f64 {
+    scalar::erfcx(x)
+}
+
+/// Distribution function `Phi(x)`, within six units in the last place, the left tail included. The right tail is `cdf(-x)`.
 pub fn cdf(x: f64) -> f64 {
-    0.5 * libm::erfc(-x * FRAC_1_SQRT_2)
+    scalar::cdf(x)
 }
 
-/// `ln Phi(x)`, finite for every finite `x`.
-#[inline]
+/// `ln Phi(x)`, within six units in the last place; finite down to `x = -1.8e154`, where the square overflows.
 pub fn log_cdf(x: f64) -> f64 {
+    // The same bits as the branch-free form; what that would discard is not computed.
     if x <= 0.0 {
-        if x == f64::NEG_INFINITY {
-            return x;
-        }
-        erfcx(-x * FRAC_1_SQRT_2).ln() - LN_2 - 0.5 * x * x
+        ln_corrected(scaled_tail(-x), 0.0) - 0.5 * x * x
     } else {
-        (-cdf(-x)).ln_1p()
+        ln_one_minus(cut(x).outside)
     }
 }
-
-/// Quantile `Phi^-1(p)` for `p` in `[0, 1]`; infinite at the ends, NaN outside.
-pub fn quantile(p: f64) -> f64 {
-    if p.is_nan() || !(0.0..=1.0).contains(&p) {
-        return f64::NAN;
-    }
-    if p == 0.0 {
-        return f64::NEG_INFINITY;
-    }
-    if p == 1.0 {
-        return f64::INFINITY;
-    }
-    // Above the median p itself limits the accuracy, and 1 - p is exact there.
-    if p > 0.5 {
-        return -left_quantile(1.0 - p);
-    }
-    left_quantile(p)
-}
-
-fn left_quantile(p: f64) -> f64 {
-    let x = -std::f64::consts::SQRT_2 * statrs::function::erf::erfc_inv(2.0 * p);
-    // One Newton step on ln Phi settles the last digits of the rational start.
-    x - (log_cdf(x) - p.ln()) / inverse_mills(x)
-}
-
-/// Intervals narrower than this, measured in local decay lengths, are integrated instead of differenced.
-const NARROW: f64 = 1.0;
 
 /// `Phi(b) - Phi(a)` for `a <= b`, accurate relative to itself; 0 for `a >= b`.
-#[inline]
 pub fn interval(a: f64, b: f64) -> f64 {
-    if a >= b {
-        return 0.0;
-    }
-    if a <= 0.0 && b >= 0.0 {
-        return 0.5 * (libm::erf(b * FRAC_1_SQRT_2) + libm::erf(-a * FRAC_1_SQRT_2));
-    }
-    let (a, b) = if a > 0.0 { (-b, -a) } else { (a, b) };
-    (-0.5 * b * b).exp() * scaled_left_interval(a, b)
+    scalar::interval(a, b)
 }
 
 /// `ln(Phi(b) - Phi(a))` for `a < b`, exact in both tails and for narrow intervals; `-inf` for `a >= b`.
 ///
-/// Intervals around zero add two error functions of positive terms. Elsewhere the interval is reflected to the left tail and
-/// the factor `exp(-b^2/2)` of its inner edge is taken out; what remains is a difference of [`erfcx`] values or, where
-/// these would cancel, a Gauss-Legendre sum.
-#[inline]
+/// Intervals around zero are one less their two tails. Elsewhere the interval is reflected to the left tail and the factor
+/// `exp(-b^2/2)` of its inner edge is taken out; what remains is a difference of two scaled tails or, where these would cancel,
+/// a power series around the middle.
 pub fn log_interval(a: f64, b: f64) -> f64 {
-    if a >= b {
-        return f64::NEG_INFINITY;
-    }
-    if a <= 0.0 && b >= 0.0 {
-        if a < -1.0 && b > 1.0 {
-            return (-(cdf(a) + cdf(-b))).ln_1p();
-        }
-        return (0.5 * (libm::erf(b * FRAC_1_SQRT_2) + libm::erf(-a * FRAC_1_SQRT_2))).ln();
-    }
-    let (a, b) = if a > 0.0 { (-b, -a) } else { (a, b) };
-    if b == f64::NEG_INFINITY {
-        return b;
-    }
-    scaled_left_interval(a, b).ln() - 0.5 * b * b
-}
-
-/// `(Phi(b) - Phi(a)) exp(b^2/2)` for `a < b <= 0`.
-#[inline]
-fn scaled_left_interval(a: f64, b: f64) -> f64 {
-    let width = b - a;
-    if width * (-b).max(1.0) < NARROW {
-        let sum = gauss_legendre::<12>().sum(0.0, width, |t| (t * (b - 0.5 * t)).exp());
-        INV_SQRT_2PI * sum
-    } else {
-        let near = erfcx(-b * FRAC_1_SQRT_2);
-        if a == f64::NEG_INFINITY {
-            return 0.5 * near;
-        }
-        let far = erfcx(-a * FRAC_1_SQRT_2) * (0.5 * width * (a + b)).exp();
-        0.5 * (near - far)
-    }
+    scalar::log_interval(a, b)
 }
 
 /// Inverse Mills ratio `phi(x) / Phi(x)`, positive and decreasing; `~ -x` in the left tail.
-#[inline]
 pub fn inverse_mills(x: f64) -> f64 {
     if x <= 0.0 {
-        SQRT_2_OVER_PI / erfcx(-x * FRAC_1_SQRT_2)
+        INV_SQRT_2PI / scaled_tail(-x)
     } else {
-        pdf(x) / cdf(x)
+        cut(x).inverse_mills(x)
     }
 }

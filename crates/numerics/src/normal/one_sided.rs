@@ -1,9 +1,8 @@
 //! The variance of a normal variable beyond a cut.
 
-use super::erfcx::erfcx;
-use super::erfcx::polynomial;
-use super::{SQRT_2_OVER_PI, cdf, inverse_mills, pdf};
-use std::f64::consts::{FRAC_1_SQRT_2, LN_2};
+use super::inverse_mills;
+use crate::kernels::elementary::polynomial;
+use crate::kernels::tail::cut;
 
 /// Where the rational approximation in the cut hands over to the one in its inverse square.
 const SPLIT: f64 = 4.0;
@@ -94,24 +93,17 @@ pub struct OneSided {
     pub variance: f64,
 }
 
-/// Probability, mean and variance beyond a cut together, for the price of one [`erfcx`].
-#[inline]
+/// Probability, mean and variance beyond a cut together, for the price of one scaled tail and one exponential.
 pub fn one_sided(x: f64) -> OneSided {
-    if x > 0.0 {
-        let outside = cdf(-x);
-        // At most one half is taken from one: nothing cancels.
-        let mean = pdf(x) / (1.0 - outside);
-        OneSided {
-            log_probability: (-outside).ln_1p(),
-            mean,
-            variance: variance_with_mean(x, mean),
-        }
-    } else {
-        let scaled = erfcx(-x * FRAC_1_SQRT_2);
-        OneSided {
-            log_probability: scaled.ln() - LN_2 - 0.5 * x * x,
-            mean: SQRT_2_OVER_PI / scaled,
-            variance: one_sided_variance(x),
-        }
+    let cut = cut(x);
+    let mean = cut.inverse_mills(x);
+    OneSided {
+        log_probability: cut.log_cdf(x),
+        mean,
+        variance: if x > 0.0 {
+            variance_with_mean(x, mean)
+        } else {
+            one_sided_variance(x)
+        },
     }
 }

@@ -3,6 +3,7 @@
 use super::{cdf, log_interval, log_pdf, quantile};
 use crate::error::ArgumentError;
 use crate::quadrature::gauss_legendre;
+use rand::distr::Open01;
 use rand::{Rng, RngExt};
 
 /// Mean and variance of `N(0, 1)` truncated to a cell.
@@ -115,15 +116,30 @@ fn by_quadrature(lower: f64, width: f64) -> TruncatedMoments {
 /// Beyond this edge inversion gives way to exponential rejection.
 const REJECTION_EDGE: f64 = 8.0;
 
-/// Draws from `N(0, 1)` restricted to `[lower, upper]`, `lower < upper`.
+/// Draws from `N(0, 1)` restricted to `[lower, upper]`; either end may be infinite. A cell of one point gives that point.
 ///
 /// Inverts the distribution function in the tail where it is accurate; beyond eight standard deviations an exponential
 /// proposal at the inner edge is accepted with probability above 0.98 (Robert 1995).
-pub fn sample_truncated<R: Rng + ?Sized>(rng: &mut R, lower: f64, upper: f64) -> f64 {
-    if lower + upper > 0.0 || upper == f64::INFINITY {
-        return -sample_left(rng, -upper, -lower);
+///
+/// # Errors
+/// If the cell holds no number: `lower > upper`, an end that is NaN, or both ends the same infinity.
+pub fn sample_truncated<R: Rng + ?Sized>(rng: &mut R, lower: f64, upper: f64) -> Result<f64, ArgumentError> {
+    let ordered = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
+    if !ordered {
+        return Err(ArgumentError::new(
+            "cell",
+            format!("[{lower}, {upper}]"),
+            "lower <= upper, a finite number between",
+        ));
     }
-    sample_left(rng, lower, upper)
+    if lower == upper {
+        return Ok(lower);
+    }
+    Ok(if lower + upper > 0.0 || upper == f64::INFINITY {
+        -sample_left(rng, -upper, -lower)
+    } else {
+        sample_left(rng, lower, upper)
+    })
 }
 
 /// Cells whose bulk lies left of zero.
@@ -141,6 +157,75 @@ fn sample_left<R: Rng + ?Sized>(rng: &mut R, lower: f64, upper: f64) -> f64 {
         }
     }
     let (from, to) = (cdf(lower), cdf(upper));
-    let p = from + rng.random::<f64>() * (to - from);
-    quantile(p).clamp(lower, upper)
+    // An open interval: a uniform number of zero would be minus infinity in an unbounded cell.
+    let u: f64 = rng.sample(Open01);
+    quantile(from + u * (to - from)).clamp(lower, upper)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::convert::Infallible;
+
+    /// A generator stuck at one word.
+    struct Stuck(u64);
+
+    impl rand::TryRng for Stuck {
+        type Error = Infallible;
+
+        fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+            Ok(self.0 as u32)
+        }
+
+        fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+            Ok(self.0)
+        }
+
+        fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+            bytes.fill(self.0 as u8);
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn cells_without_a_number_are_refused_at_once() {
+        let (nan, inf) = (f64::NAN, f64::INFINITY);
+        for (lower, upper) in [
+            (nan, -9.0),
+            (nan, 1.0),
+            (-9.0, nan),
+            (nan, nan),
+            (inf, inf),
+            (-inf, -inf),
+            (1.0, 0.0),
+            (inf, -inf),
+        ] {
+            assert!(sample_truncated(&mut Stuck(0), lower, upper).is_err(), "[{lower}, {upper}]");
+        }
+        assert_eq!(sample_truncated(&mut Stuck(0), -9.5, -9.5), Ok(-9.5));
+    }
+
+    #[test]
+    fn extreme_uniform_numbers_give_finite_draws_inside() {
+        let inf = f64::INFINITY;
+        let cells = [
+            (-inf, inf),
+            (-inf, -3.0),
+            (2.0, inf),
+            (-inf, 40.0),
+            (-40.0, inf),
+            (-1e300, 1.0),
+            (-0.1, 1e300),
+        ];
+        for word in [0, u64::MAX] {
+            for (lower, upper) in cells {
+                let x = sample_truncated(&mut Stuck(word), lower, upper).unwrap();
+                assert!(x.is_finite() && (lower..=upper).contains(&x), "{x} in [{lower}, {upper}]");
+            }
+        }
+        for (lower, upper) in [(-inf, -9.0), (30.0, inf), (1e200, inf), (-1e9, -1e9 + 1.0)] {
+            let x = sample_truncated(&mut Stuck(0), lower, upper).unwrap();
+            assert!(x.is_finite() && (lower..=upper).contains(&x), "{x} in [{lower}, {upper}]");
+        }
+    }
 }

@@ -4,12 +4,12 @@ use super::{FOUR, Field, HEARD, Named, Scheme, World, every, run};
 use crate::cfwmd::case::{Case, by_budget};
 use crate::cfwmd::ensemble::{Ensemble, Part, agrees, beats, summary_table, value};
 use crate::cfwmd::scalar::{printed_rates, rate_plot, rate_table};
-use crate::claim::Claim;
 use crate::error::Error;
-use crate::figure::{About, Context, Figure};
+use crate::legacy::claim::Claim;
+use crate::legacy::row;
+use crate::legacy::{About, Context, Figure};
+use crate::legacy::{Table, Tables, column};
 use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use crate::row;
-use crate::table::{Table, Tables, column};
 use serde::{Deserialize, Serialize};
 
 /// Figure 7: the sensors and one target.

@@ -1,0 +1,410 @@
+//! The exact posterior of one update, over cells.
+
+use crate::rate::{RateModel, RateRange, cut_normal, log_inside};
+use crate::{Error, Record, SourceLikelihood};
+use fewbits_core::{Belief, Columns, Density, Gaussian};
+use fewbits_densities::{CellOptions, CellTarget, Cells, Clumps, Lpg, Mixture};
+use nalgebra::{Matrix2, Vector2};
+
+/// Where the source can be, m: the box that the first cells cover, and to which all later ones are cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchBox {
+    /// Lower corner.
+    pub lower: [f64; 2],
+    /// Upper corner.
+    pub upper: [f64; 2],
+}
+
+/// A belief about the position that travels, apart from raw records.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PositionBelief {
+    /// A Gaussian mixture.
+    Mixture(Mixture<2>),
+    /// Polynomial Gaussians.
+    Lpg(Lpg<2>),
+}
+
+/// What the cells are an update of.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Prior {
+    /// A position prior and all records at once: nothing approximated.
+    Exact(Gaussian<2>),
+    /// A position belief that was sent on.
+    Position(PositionBelief),
+    /// A belief over position and rate that was sent on, and the range of the rate.
+    WithRate(Mixture<3>, RateRange),
+}
+
+/// Posterior over cells, with the rate given each cell where it is unknown and carried.
+#[derive(Debug, Clone)]
+pub struct Posterior {
+    /// The position.
+    pub cells: Cells<2>,
+    /// Mean and variance of the rate in each cell.
+    pub rates: Option<(Vec<f64>, Vec<f64>)>,
+}
+
+/// Cells along the longer side of the box for a wide prior, and for a belief that was sent on.
+const WIDE: usize = 90;
+const NARROW: usize = 44;
+/// A Gaussian ends here, in standard deviations.
+const ENDS: f64 = 6.5;
+
+impl Posterior {
+    /// Multiplies a prior by the likelihood of records and covers the product with cells. `near` is a box that is known to hold
+    /// the posterior, such as the cells of the step before.
+    ///
+    /// # Errors
+    /// As [`Cells::cover`]; a belief that excludes the records is [`fewbits_densities::Error::BeliefMiss`].
+    pub fn new(
+        prior: &Prior,
+        likelihood: &SourceLikelihood,
+        search: &SearchBox,
+        near: Option<SearchBox>,
+        options: &CellOptions,
+    ) -> Result<Self, Error> {
+        let (around, per_axis) = match (prior, near) {
+            (Prior::Exact(_), None) => (*search, WIDE),
+            (Prior::Exact(_), Some(near)) => (near, NARROW),
+            (Prior::Position(belief), _) => (belief.bounds(), NARROW),
+            (Prior::WithRate(mixture, _), _) => (bounds(mixture.components().iter().map(|c| {
+                (Vector2::new(c.mean()[0], c.mean()[1]), Vector2::new(c.covariance()[(0, 0)], c.covariance()[(1, 1)]))
+            })), NARROW),
+        };
+        let around = around.within(search);
+        let wide = around.upper[0] - around.lower[0] > 0.5 * (search.upper[0] - search.lower[0]);
+        let per_axis = if wide { WIDE } else { per_axis };
+        let target = Target::new(prior, likelihood)?;
+        let cells = Cells::cover(&target, around.lower, around.upper, per_axis, options)?;
+        let rates = target.rates(&cells);
+        Ok(Self { cells, rates })
+    }
+
+    /// Mean and covariance of the position.
+    pub fn gaussian(&self) -> Gaussian<2> {
+        Gaussian::from_trusted_parts(self.cells.mean(), self.cells.covariance())
+    }
+
+    /// The position as clumps.
+    ///
+    /// # Errors
+    /// If `count` is zero.
+    pub fn clumps(&self, count: usize) -> Result<Clumps<2>, Error> {
+        Ok(Clumps::new(&self.cells.columns(), &[&[], &[]], self.cells.weights(), count)?)
+    }
+
+    /// Position and rate as clumps; a known rate has no spread.
+    ///
+    /// # Errors
+    /// If `count` is zero.
+    pub fn clumps_with_rate(&self, known: f64, count: usize) -> Result<Clumps<3>, Error> {
+        let [x, y] = self.cells.columns();
+        let fixed;
+        let (mean, spread): (&[f64], &[f64]) = match &self.rates {
+            Some((mean, variance)) => (mean, variance),
+            None => {
+                fixed = vec![known; x.len()];
+                (&fixed, &[])
+            }
+        };
+        Ok(Clumps::new(&[x, y, mean], &[&[], &[], spread], self.cells.weights(), count)?)
+    }
+
+    /// Share of the mass within a cell of the border of the search box: a source outside shows here.
+    pub fn mass_at_border(&self, search: &SearchBox) -> f64 {
+        let [x, y] = self.cells.columns();
+        let edge = self.cells.width();
+        let outside = |v: f64, d: usize| v < search.lower[d] + edge || v > search.upper[d] - edge;
+        let masses = x.iter().zip(y).zip(self.cells.weights());
+        masses.filter(|((x, y), _)| outside(**x, 0) || outside(**y, 1)).map(|(_, w)| w).sum()
+    }
+
+    /// The box of the cells with a margin, within which the next posterior lies if all records stay in use.
+    pub fn around(&self, search: &SearchBox) -> SearchBox {
+        let (lower, upper) = self.cells.bounds();
+        let margin = |d: usize| 0.1 * (upper[d] - lower[d]) + 4.0 * self.cells.width();
+        SearchBox {
+            lower: [lower[0] - margin(0), lower[1] - margin(1)],
+            upper: [upper[0] + margin(0), upper[1] + margin(1)],
+        }
+        .within(search)
+    }
+}
+
+impl SearchBox {
+    /// The part that lies within another box; the nearest corner of the other, if none does.
+    fn within(&self, other: &Self) -> Self {
+        let lower: [f64; 2] = std::array::from_fn(|d| self.lower[d].max(other.lower[d]));
+        let upper: [f64; 2] = std::array::from_fn(|d| self.upper[d].min(other.upper[d]));
+        if lower[0] < upper[0] && lower[1] < upper[1] { Self { lower, upper } } else { *other }
+    }
+}
+
+fn bounds(parts: impl Iterator<Item = (Vector2<f64>, Vector2<f64>)>) -> SearchBox {
+    let mut hull = SearchBox {
+        lower: [f64::INFINITY; 2],
+        upper: [f64::NEG_INFINITY; 2],
+    };
+    for (mean, variances) in parts {
+        for d in 0..2 {
+            let reach = ENDS * variances[d].sqrt();
+            hull.lower[d] = hull.lower[d].min(mean[d] - reach);
+            hull.upper[d] = hull.upper[d].max(mean[d] + reach);
+        }
+    }
+    hull
+}
+
+impl PositionBelief {
+    fn bounds(&self) -> SearchBox {
+        match self {
+            Self::Mixture(mixture) => bounds(mixture.components().iter().map(|c| (*c.mean(), c.covariance().diagonal()))),
+            // A polynomial of the degrees in use reaches a little farther than its Gaussian.
+            Self::Lpg(lpg) => bounds(lpg.gaussians().map(|c| (*c.mean(), c.covariance().diagonal() * 1.7))),
+        }
+    }
+
+    /// Mean and covariance.
+    pub fn gaussian(&self) -> Gaussian<2> {
+        match self {
+            Self::Mixture(mixture) => mixture.moment_matched(),
+            Self::Lpg(lpg) => Gaussian::from_trusted_parts(lpg.mean(), lpg.covariance()),
+        }
+    }
+
+    /// Log density.
+    pub fn log_density(&self, x: &Vector2<f64>) -> f64 {
+        match self {
+            Self::Mixture(mixture) => mixture.log_pdf(x),
+            Self::Lpg(lpg) => lpg.log_density(x),
+        }
+    }
+}
+
+/// A Gaussian over the plane, ready to be blurred over cells of any width.
+#[derive(Debug, Clone, Copy)]
+struct Lobe {
+    log_scale: f64,
+    mean: Vector2<f64>,
+    covariance: Matrix2<f64>,
+}
+
+impl Lobe {
+    fn new(weight: f64, mean: Vector2<f64>, covariance: Matrix2<f64>) -> Self {
+        Self {
+            log_scale: weight.ln() - 0.5 * covariance.determinant().ln() - std::f64::consts::TAU.ln(),
+            mean,
+            covariance,
+        }
+    }
+
+    /// Inverse covariance with `extra` on the diagonal, as (xx, xy, yy).
+    fn precision(&self, extra: f64) -> [f64; 3] {
+        let c = &self.covariance;
+        let (a, b, d) = (c[(0, 0)] + extra, c[(0, 1)], c[(1, 1)] + extra);
+        let determinant = a * d - b * b;
+        [d / determinant, -b / determinant, a / determinant]
+    }
+}
+
+#[inline]
+fn quadratic(p: &[f64; 3], d: &Vector2<f64>) -> f64 {
+    p[0] * d.x * d.x + 2.0 * p[1] * d.x * d.y + p[2] * d.y * d.y
+}
+
+/// The rate given the position, in one lobe of a belief over both.
+#[derive(Debug, Clone, Copy)]
+struct Conditional {
+    mean: f64,
+    gain: Vector2<f64>,
+    variance: f64,
+}
+
+struct Target<'a> {
+    prior: &'a Prior,
+    likelihood: &'a SourceLikelihood,
+    lobes: Vec<Lobe>,
+    conditionals: Vec<Conditional>,
+}
+
+impl<'a> Target<'a> {
+    fn new(prior: &'a Prior, likelihood: &'a SourceLikelihood) -> Result<Self, Error> {
+        let (mut lobes, mut conditionals) = (Vec::new(), Vec::new());
+        match prior {
+            Prior::Exact(gaussian) => lobes.push(Lobe::new(1.0, *gaussian.mean(), *gaussian.covariance())),
+            Prior::Position(PositionBelief::Mixture(mixture)) => {
+                lobes.extend(mixture.components().iter().map(|c| Lobe::new(c.weight(), *c.mean(), *c.covariance())));
+            }
+            Prior::Position(PositionBelief::Lpg(_)) => {}
+            Prior::WithRate(mixture, _) => {
+                for c in mixture.components() {
+                    let s = c.covariance();
+                    let position = s.fixed_view::<2, 2>(0, 0).into_owned();
+                    let cross = Vector2::new(s[(2, 0)], s[(2, 1)]);
+                    let lobe = Lobe::new(c.weight(), Vector2::new(c.mean()[0], c.mean()[1]), position);
+                    let p = lobe.precision(0.0);
+                    let gain = Vector2::new(p[0] * cross.x + p[1] * cross.y, p[1] * cross.x + p[2] * cross.y);
+                    // A Cholesky factor exists, so that the Schur complement is positive; rounding may bring it to zero.
+                    let variance = (s[(2, 2)] - gain.dot(&cross)).max(1e-14 * s[(2, 2)]);
+                    lobes.push(lobe);
+                    conditionals.push(Conditional { mean: c.mean()[2], gain, variance });
+                }
+            }
+        }
+        Ok(Self { prior, likelihood, lobes, conditionals })
+    }
+
+    /// Mean and variance of the rate at every cell.
+    fn rates(&self, cells: &Cells<2>) -> Option<(Vec<f64>, Vec<f64>)> {
+        let [x, y] = cells.columns();
+        let positions = x.iter().zip(y).map(|(x, y)| Vector2::new(*x, *y));
+        match (self.prior, self.likelihood.rate()) {
+            (Prior::WithRate(_, range), _) => Some(positions.map(|at| self.rate_of_mixture(&at, range)).unzip()),
+            (Prior::Exact(_), RateModel::Joint(range)) => {
+                Some(positions.map(|at| self.likelihood.sums(&at).rate_given_position(range)).unzip())
+            }
+            _ => None,
+        }
+    }
+
+    fn rate_of_mixture(&self, at: &Vector2<f64>, range: &RateRange) -> (f64, f64) {
+        let sums = self.likelihood.sums(at);
+        let (mut total, mut first, mut second, mut best) = (0.0, 0.0, 0.0, f64::NEG_INFINITY);
+        let middle = range.middle();
+        for (lobe, given) in self.lobes.iter().zip(&self.conditionals) {
+            let d = at - lobe.mean;
+            let log = lobe.log_scale - 0.5 * quadratic(&lobe.precision(0.0), &d);
+            let (evidence, mean, variance) = updated(given, &d, [sums.response, sums.correlation, sums.energy], range);
+            let log = log + evidence;
+            if log < best - 30.0 || !log.is_finite() {
+                continue;
+            }
+            if log > best {
+                let shrink = (best - log).exp();
+                total *= shrink;
+                first *= shrink;
+                second *= shrink;
+                best = log;
+            }
+            let weight = (log - best).exp();
+            let (m, v) = cut_normal(mean, variance, range);
+            let m = m - middle;
+            total += weight;
+            first += weight * m;
+            second += weight * (v + m * m);
+        }
+        let mean = first / total;
+        if total > 0.0 { (mean + middle, (second / total - mean * mean).max(0.0)) } else { (middle, 0.0) }
+    }
+}
+
+/// Log evidence of sums `[A, B, C]` under a Gaussian rate cut to a range (without the constant of the cut prior and of the
+/// noise), and the updated mean and variance.
+#[inline]
+fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3], range: &RateRange) -> (f64, f64, f64) {
+    let (m, v) = (given.mean + given.gain.dot(d), given.variance);
+    let spread = 1.0 + v * a;
+    let residual = b - a * m;
+    let variance = v / spread;
+    let mean = m + residual * variance;
+    let log = -0.5 * (c - m * (2.0 * b - m * a)) + 0.5 * residual * residual * variance - 0.5 * spread.ln();
+    (log + log_inside(mean, variance, range), mean, variance)
+}
+
+impl CellTarget<2> for Target<'_> {
+    fn evaluate(&self, centres: &Columns<'_, 2>, half_width: f64, logs: &mut [f64], scores: &mut [f64]) {
+        let extra = half_width * half_width;
+        let precisions: Vec<[[f64; 3]; 2]> = self.lobes.iter().map(|l| [l.precision(0.0), l.precision(extra)]).collect();
+        for i in 0..logs.len() {
+            let at = Vector2::new(centres[0][i], centres[1][i]);
+            (logs[i], scores[i]) = match self.prior {
+                Prior::Position(PositionBelief::Lpg(lpg)) => {
+                    let (log, blurred) = self.likelihood.blurred(&at, half_width);
+                    (log + lpg.log_density(&at), blurred + lpg.log_bound(&at, half_width))
+                }
+                Prior::WithRate(_, range) => self.with_rate(&at, half_width, &precisions, range),
+                _ => {
+                    let (log, blurred) = self.likelihood.blurred(&at, half_width);
+                    let [own, wide] = log_mixture(&self.lobes, &precisions, &at);
+                    (log + own, blurred + wide)
+                }
+            };
+        }
+    }
+}
+
+impl Target<'_> {
+    #[inline]
+    fn with_rate(&self, at: &Vector2<f64>, half: f64, precisions: &[[[f64; 3]; 2]], range: &RateRange) -> (f64, f64) {
+        let (mut plain, mut blurred, mut log_noise) = ([0.0; 3], [0.0; 3], 0.0);
+        for record in self.likelihood.records() {
+            let sums = record.sums(at);
+            let share = record.discount(at, half);
+            for (k, value) in [sums.response, sums.correlation, sums.energy].into_iter().enumerate() {
+                plain[k] += value;
+                blurred[k] += share * value;
+            }
+            log_noise += sums.log_noise;
+        }
+        let mut results = [LogSum::default(), LogSum::default()];
+        for ((lobe, given), precision) in self.lobes.iter().zip(&self.conditionals).zip(precisions) {
+            let d = at - lobe.mean;
+            let own = lobe.log_scale - 0.5 * quadratic(&precision[0], &d);
+            // The evidence is at most zero: lobes that cannot matter are not evaluated.
+            if own > results[0].largest - 30.0 {
+                results[0].add(own + updated(given, &d, plain, range).0);
+            }
+            let wide = lobe.log_scale - 0.5 * quadratic(&precision[1], &d);
+            if wide > results[1].largest - 30.0 {
+                results[1].add(wide + updated(given, &d, blurred, range).0);
+            }
+        }
+        (results[0].log() - log_noise, results[1].log() - log_noise)
+    }
+}
+
+/// A sum of exponentials, kept scaled by its largest term.
+#[derive(Clone, Copy)]
+struct LogSum {
+    largest: f64,
+    scaled: f64,
+}
+
+impl Default for LogSum {
+    fn default() -> Self {
+        Self {
+            largest: f64::NEG_INFINITY,
+            scaled: 0.0,
+        }
+    }
+}
+
+impl LogSum {
+    #[inline]
+    fn add(&mut self, log: f64) {
+        if log > self.largest {
+            self.scaled = self.scaled * (self.largest - log).exp() + 1.0;
+            self.largest = log;
+        } else if log > self.largest - 40.0 {
+            self.scaled += (log - self.largest).exp();
+        }
+    }
+
+    #[inline]
+    fn log(&self) -> f64 {
+        if self.largest == f64::NEG_INFINITY { self.largest } else { self.largest + self.scaled.ln() }
+    }
+}
+
+/// Log density of a mixture and of the same blurred.
+#[inline]
+fn log_mixture(lobes: &[Lobe], precisions: &[[[f64; 3]; 2]], at: &Vector2<f64>) -> [f64; 2] {
+    let mut results = [LogSum::default(), LogSum::default()];
+    for (lobe, precision) in lobes.iter().zip(precisions) {
+        let d = at - lobe.mean;
+        for (result, p) in results.iter_mut().zip(precision) {
+            result.add(lobe.log_scale - 0.5 * quadratic(p, &d));
+        }
+    }
+    [results[0].log(), results[1].log()]
+}

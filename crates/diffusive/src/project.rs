@@ -1,0 +1,164 @@
+//! From an exact posterior to what travels on.
+
+use crate::posterior::{PositionBelief, Posterior};
+use crate::{Error, RateModel};
+use fewbits_core::Gaussian;
+use fewbits_densities::{Component, Lpg, Mixture, MixtureFit};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::at_least_one;
+use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+
+/// Clumps that a mixture is fitted to.
+const CLUMPS: usize = 200;
+/// Widening of the Gaussians under polynomial Gaussians: their tails must reach beyond the posterior's.
+const LPG_WIDENING: f64 = 1.3;
+
+/// What travels from node to node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Form {
+    /// The samples of every node visited: nothing is lost.
+    Raw,
+    /// Mean and covariance.
+    Gaussian,
+    /// A Gaussian mixture of at most so many components.
+    Mixture(usize),
+    /// Polynomial Gaussians.
+    Lpg {
+        /// The most components.
+        components: usize,
+        /// Highest degree of the polynomials.
+        degree: usize,
+    },
+    /// Equally weighted points under one Gaussian kernel.
+    Particles(usize),
+    /// Mode and inverse curvature, with mean and covariance instead where there is no peak. Reports convergence in the wrong place
+    /// when it starts from a ring; here to show it.
+    Laplace,
+}
+
+impl Form {
+    pub(crate) fn check(&self, rate: &RateModel) -> Result<(), Error> {
+        match *self {
+            Self::Mixture(n) | Self::Particles(n) => at_least_one("components", n).map(|_| ())?,
+            Self::Lpg { components, degree } => {
+                at_least_one("components", components)?;
+                if degree > fewbits_densities::hermite::HIGHEST_DEGREE {
+                    return Err(ArgumentError::new("degree", degree, "at most 20").into());
+                }
+            }
+            Self::Raw | Self::Gaussian | Self::Laplace => {}
+        }
+        let carries_rate = matches!(self, Self::Raw | Self::Gaussian | Self::Mixture(_));
+        if matches!(rate, RateModel::Joint(_)) && !carries_rate {
+            return Err(ArgumentError::new("form", format!("{self:?}"), "Raw, Gaussian or Mixture with a joint rate").into());
+        }
+        Ok(())
+    }
+
+    /// Numbers that one message of this form holds, apart from raw records.
+    pub fn scalars(&self, rate: &RateModel) -> Option<usize> {
+        let carried = matches!(rate, RateModel::Joint(_));
+        match *self {
+            Self::Raw => None,
+            Self::Gaussian | Self::Laplace => Some(if carried { 9 } else { 5 }),
+            Self::Mixture(n) => Some(n * if carried { 10 } else { 6 } - 1),
+            Self::Lpg { components, degree } => Some(components * (5 + (degree + 1) * (degree + 2) / 2) - 1),
+            Self::Particles(n) => Some(2 * n),
+        }
+    }
+}
+
+/// What travels on, apart from raw records.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Travelling {
+    /// A belief about the position.
+    Position(PositionBelief),
+    /// A belief about position and rate.
+    WithRate(Mixture<3>),
+}
+
+impl Travelling {
+    /// Mean and covariance of the position.
+    pub fn gaussian(&self) -> Gaussian<2> {
+        match self {
+            Self::Position(belief) => belief.gaussian(),
+            Self::WithRate(mixture) => {
+                let s = mixture.covariance();
+                let m = mixture.mean();
+                Gaussian::from_trusted_parts(Vector2::new(m[0], m[1]), s.fixed_view::<2, 2>(0, 0).into_owned())
+            }
+        }
+    }
+}
+
+/// Approximates a posterior by what travels on. Raw records are not projected: `None`.
+///
+/// # Errors
+/// If the posterior has no spread in some direction.
+pub fn project(posterior: &Posterior, form: Form, rate: &RateModel) -> Result<Option<Travelling>, Error> {
+    let carried = matches!(rate, RateModel::Joint(_));
+    let components = match form {
+        Form::Raw => return Ok(None),
+        Form::Lpg { components, degree } => return Ok(Some(lpg(posterior, components, degree)?)),
+        Form::Particles(count) => return Ok(Some(particles(posterior, count)?)),
+        Form::Gaussian | Form::Laplace => 1,
+        Form::Mixture(components) => components,
+    };
+    if carried {
+        let clumps = posterior.clumps_with_rate(rate.typical(), if components == 1 { 1 } else { CLUMPS })?;
+        return Ok(Some(Travelling::WithRate(clumps.fit(&MixtureFit::new(components)?)?)));
+    }
+    if components == 1 {
+        return Ok(Some(position(Mixture::single(&posterior.gaussian())?)));
+    }
+    Ok(Some(position(posterior.clumps(CLUMPS)?.fit(&MixtureFit::new(components)?)?)))
+}
+
+fn position(mixture: Mixture<2>) -> Travelling {
+    Travelling::Position(PositionBelief::Mixture(mixture))
+}
+
+/// Polynomial Gaussians about the components of a mixture, widened.
+fn lpg(posterior: &Posterior, components: usize, degree: usize) -> Result<Travelling, Error> {
+    let mixture = posterior.clumps(CLUMPS)?.fit(&MixtureFit::new(components)?)?;
+    let widened: Vec<Component<2>> = mixture
+        .components()
+        .iter()
+        .map(|c| Component::new(c.weight(), *c.mean(), c.covariance() * LPG_WIDENING))
+        .collect::<Result<_, _>>()?;
+    let fit = match Lpg::fit(&posterior.cells, &widened, degree) {
+        Ok(fit) => fit,
+        // Gaussians too much alike: one does.
+        Err(_) => {
+            let g = posterior.gaussian();
+            Lpg::fit(&posterior.cells, &[Component::new(1.0, *g.mean(), g.covariance() * LPG_WIDENING)?], degree)?
+        }
+    };
+    Ok(Travelling::Position(PositionBelief::Lpg(fit.belief)))
+}
+
+/// Points at equal steps of the cumulative weight along the cells' order, under a Gaussian kernel of the normal-reference width;
+/// points are drawn in towards the mean, so that the covariance is kept.
+fn particles(posterior: &Posterior, count: usize) -> Result<Travelling, Error> {
+    let clumps = posterior.clumps(count)?;
+    let g = posterior.gaussian();
+    // The normal-reference width in the plane.
+    let h2 = (count as f64).powf(-1.0 / 3.0);
+    let shrink = (1.0 - h2).max(0.0).sqrt();
+    let mut chosen = Vec::with_capacity(count);
+    let mut level = 0.5 / count as f64;
+    let mut total = 0.0;
+    for clump in clumps.clumps() {
+        total += clump.weight;
+        while level < total && chosen.len() < count {
+            chosen.push(clump.mean);
+            level += 1.0 / count as f64;
+        }
+    }
+    let parts = chosen.into_iter().map(|x| {
+        Component::new(1.0, g.mean() + (x - g.mean()) * shrink, g.covariance() * h2)
+    });
+    Ok(position(Mixture::new(parts.collect::<Result<_, _>>()?)?))
+}

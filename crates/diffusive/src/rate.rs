@@ -1,0 +1,218 @@
+//! The release rate, known or integrated out.
+
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, finite, non_negative, positive};
+use fewbits_numerics::normal::{LN_SQRT_2PI, log_interval, truncated_moments};
+use serde::{Deserialize, Serialize};
+
+/// A uniform prior of the release rate, kg/s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "(f64, f64)", into = "(f64, f64)")]
+pub struct RateRange {
+    low: f64,
+    high: f64,
+}
+
+impl RateRange {
+    /// Rates between `low` and `high`, kg/s.
+    ///
+    /// # Errors
+    /// If `low` is negative, or `high` is not finite and above it.
+    pub fn new(low: f64, high: f64) -> Result<Self, ArgumentError> {
+        non_negative("low", low)?;
+        finite("high", high)?;
+        if high > low {
+            Ok(Self { low, high })
+        } else {
+            Err(ArgumentError::new("high", high, format!("a number above `low` = {low}")))
+        }
+    }
+
+    /// Lower end, kg/s.
+    pub fn low(&self) -> f64 {
+        self.low
+    }
+
+    /// Upper end, kg/s.
+    pub fn high(&self) -> f64 {
+        self.high
+    }
+
+    pub(crate) fn middle(&self) -> f64 {
+        0.5 * (self.low + self.high)
+    }
+}
+
+impl TryFrom<(f64, f64)> for RateRange {
+    type Error = ArgumentError;
+
+    fn try_from((low, high): (f64, f64)) -> Result<Self, ArgumentError> {
+        Self::new(low, high)
+    }
+}
+
+impl From<RateRange> for (f64, f64) {
+    fn from(range: RateRange) -> Self {
+        (range.low, range.high)
+    }
+}
+
+/// What is assumed of the release rate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum RateModel {
+    /// The rate is known, kg/s.
+    Known(f64),
+    /// One unknown rate for all nodes: the truth, and the default.
+    Joint(RateRange),
+    /// A new unknown rate for every node: independent nodes, too wide a belief.
+    NodeWise(RateRange),
+    /// A new unknown rate for every sample, equations (13) and (18) of the paper with the sign of (13) mended. Inconsistent: it
+    /// pushes the source as far away as the largest rate allows.
+    SampleWise(RateRange),
+}
+
+impl RateModel {
+    /// # Errors
+    /// If a known rate is not a positive number.
+    pub(crate) fn check(&self) -> Result<(), ArgumentError> {
+        match self {
+            Self::Known(rate) => positive("rate", *rate).map(|_| ()),
+            _ => Ok(()),
+        }
+    }
+
+    /// A rate to start from.
+    pub(crate) fn typical(&self) -> f64 {
+        match self {
+            Self::Known(rate) => *rate,
+            Self::Joint(range) | Self::NodeWise(range) | Self::SampleWise(range) => range.middle(),
+        }
+    }
+}
+
+/// What samples say about the rate at one position of the source: `sum a^2 / sigma^2`, `sum a y / sigma^2`, `sum y^2 / sigma^2`,
+/// and the logarithm of the noise's normalisation. Sums of several nodes add.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RateSums {
+    /// `A = sum a_j^2 / sigma^2`, (s/kg)^2.
+    pub response: f64,
+    /// `B = sum a_j y_j / sigma^2`, s/kg.
+    pub correlation: f64,
+    /// `C = sum y_j^2 / sigma^2`.
+    pub energy: f64,
+    /// `sum ln(sigma_j sqrt(2 pi))`.
+    pub log_noise: f64,
+}
+
+/// Beyond this many standard deviations on both sides nothing is cut off.
+const UNCUT: f64 = 8.5;
+/// A response below this (times the square of the largest rate) says nothing about the rate.
+const SILENT: f64 = 1e-20;
+
+impl RateSums {
+    /// The sums of samples `y` (without bias) and responses `a` under noise of standard deviation `noise`.
+    ///
+    /// # Errors
+    /// If the lengths differ or are zero, a number is not finite, or `noise` is not positive.
+    pub fn of(samples: &[f64], responses: &[f64], noise: f64) -> Result<Self, ArgumentError> {
+        positive("noise", noise)?;
+        all_finite("samples", samples)?;
+        all_finite("responses", responses)?;
+        if samples.len() != responses.len() || samples.is_empty() {
+            let expected = format!("{}, one for each sample (at least one)", samples.len());
+            return Err(ArgumentError::new("responses", responses.len(), expected));
+        }
+        let mut sums = Self {
+            log_noise: samples.len() as f64 * (noise.ln() + LN_SQRT_2PI),
+            ..Self::default()
+        };
+        for (y, a) in samples.iter().zip(responses) {
+            let (y, a) = (y / noise, a / noise);
+            sums.response += a * a;
+            sums.correlation += a * y;
+            sums.energy += y * y;
+        }
+        Ok(sums)
+    }
+
+    /// The sums of both.
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            response: self.response + other.response,
+            correlation: self.correlation + other.correlation,
+            energy: self.energy + other.energy,
+            log_noise: self.log_noise + other.log_noise,
+        }
+    }
+
+    /// `ln p(samples | position, rate)`.
+    #[inline]
+    pub fn log_given_rate(&self, rate: f64) -> f64 {
+        -0.5 * (self.energy - rate * (2.0 * self.correlation - rate * self.response)) - self.log_noise
+    }
+
+    /// `ln p(samples | position)` with one rate, uniform over the range, integrated out:
+    /// `-(C - B^2/A)/2 + ln sqrt(2 pi / A) - ln(high - low) + ln[Phi((high - B/A) sqrt A) - Phi((low - B/A) sqrt A)]`.
+    #[inline]
+    pub fn log_marginal(&self, range: &RateRange) -> f64 {
+        let (a, b) = (self.response, self.correlation);
+        if a * range.high * range.high < SILENT {
+            return self.log_given_rate(range.middle());
+        }
+        let root = a.sqrt();
+        let best = b / a;
+        let (from, to) = ((range.low - best) * root, (range.high - best) * root);
+        let inside = if from < -UNCUT && to > UNCUT { 0.0 } else { log_interval(from, to) };
+        -0.5 * (self.energy - b * best) + LN_SQRT_2PI - root.ln() - (range.high - range.low).ln() + inside - self.log_noise
+    }
+
+    /// Mean and variance of the rate given the position: `N(B/A, 1/A)` cut to the range.
+    pub fn rate_given_position(&self, range: &RateRange) -> (f64, f64) {
+        if self.response * range.high * range.high < SILENT {
+            return uniform(range);
+        }
+        cut_normal(self.correlation / self.response, self.response.recip(), range)
+    }
+}
+
+fn uniform(range: &RateRange) -> (f64, f64) {
+    let width = range.high - range.low;
+    (range.middle(), width * width / 12.0)
+}
+
+/// Mean and variance of `N(mean, variance)` cut to a range.
+#[inline]
+pub(crate) fn cut_normal(mean: f64, variance: f64, range: &RateRange) -> (f64, f64) {
+    let deviation = variance.sqrt();
+    let (from, to) = ((range.low - mean) / deviation, (range.high - mean) / deviation);
+    if from < -UNCUT && to > UNCUT {
+        return (mean, variance);
+    }
+    match truncated_moments(from, to) {
+        Ok(m) => {
+            ((mean + deviation * m.mean).clamp(range.low, range.high), variance * m.variance)
+        }
+        Err(_) => uniform(range),
+    }
+}
+
+/// `ln[Phi((high - mean)/sd) - Phi((low - mean)/sd)]`.
+#[inline]
+pub(crate) fn log_inside(mean: f64, variance: f64, range: &RateRange) -> f64 {
+    let deviation = variance.sqrt();
+    let (from, to) = ((range.low - mean) / deviation, (range.high - mean) / deviation);
+    if from < -UNCUT && to > UNCUT { 0.0 } else { log_interval(from, to) }
+}
+
+/// `ln p(y | position)` of a single sample with its own rate: equation (13), its distribution functions in the right order.
+pub fn log_sample_marginal(sample: f64, response: f64, noise: f64, range: &RateRange) -> f64 {
+    let width = range.high - range.low;
+    let reach = response * width / noise;
+    let y = sample / noise;
+    if reach < 1e-10 {
+        // A response far below the noise: the sample is noise about the mean response.
+        let d = y - range.middle() * response / noise;
+        return -0.5 * d * d - LN_SQRT_2PI - noise.ln();
+    }
+    log_interval(y - range.high * response / noise, y - range.low * response / noise) - reach.ln() - noise.ln()
+}

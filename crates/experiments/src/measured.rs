@@ -1,0 +1,73 @@
+//! A simulated number and its standard error, as one cell of a row.
+
+use fewbits_monte_carlo::{Estimate, Moments};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A simulated number and its standard error: two columns (`mse`, `mse_se`) of a table, one mark with its error bar in a plot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(extend("measured" = true))]
+pub struct Measured {
+    /// The estimate.
+    pub value: f64,
+    /// Its standard error; none from a single trial.
+    pub standard_error: Option<f64>,
+}
+
+impl Measured {
+    /// The mean of what was added.
+    pub fn mean(moments: &Moments) -> Self {
+        Self {
+            value: moments.mean(),
+            standard_error: (moments.count() > 1).then(|| moments.standard_error()),
+        }
+    }
+
+    /// The root of the mean: an RMSE from squared errors.
+    pub fn root_mean(moments: &Moments) -> Self {
+        let root = moments.root_mean();
+        Self {
+            value: root.value,
+            standard_error: (moments.count() > 1).then_some(root.standard_error),
+        }
+    }
+
+    /// The same in another unit, or against a reference without error.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self {
+            value: self.value * factor,
+            standard_error: self.standard_error.map(|s| s * factor.abs()),
+        }
+    }
+
+    /// Deviation from `expected` in standard errors; none without a standard error.
+    pub fn z_score(self, expected: f64) -> Option<f64> {
+        let deviation = self.value - expected;
+        if deviation == 0.0 {
+            return Some(0.0);
+        }
+        self.standard_error.map(|error| deviation / error)
+    }
+}
+
+impl From<Estimate> for Measured {
+    fn from(estimate: Estimate) -> Self {
+        Self {
+            value: estimate.value,
+            standard_error: Some(estimate.standard_error),
+        }
+    }
+}
+
+impl From<&Moments> for Measured {
+    fn from(moments: &Moments) -> Self {
+        Self::mean(moments)
+    }
+}
+
+impl From<Measured> for Option<f64> {
+    fn from(measured: Measured) -> Self {
+        Some(measured.value)
+    }
+}

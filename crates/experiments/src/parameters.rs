@@ -1,0 +1,270 @@
+//! From `--set name=value` to checked parameters.
+
+use crate::error::Error;
+use crate::schema::{Parameter, plain};
+use garde::Validate;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value as Json};
+
+/// Whether a parameter is effort: lowering it leaves the meaning of the figure.
+pub(crate) fn is_effort(name: &str) -> bool {
+    name == "trials" || name.ends_with("_trials")
+}
+
+/// Whether these parameters are the defaults (but for effort), and whether effort is not below the defaults.
+pub(crate) fn meaning(map: &Map<String, Json>, defaults: &Map<String, Json>) -> (bool, bool) {
+    let (effort, setting): (Vec<_>, Vec<_>) = map.iter().partition(|(name, _)| is_effort(name));
+    let same = setting
+        .into_iter()
+        .all(|(name, value)| defaults.get(name) == Some(value));
+    let number = |value: Option<&Json>| value.and_then(Json::as_f64).unwrap_or(0.0);
+    (
+        same,
+        effort
+            .into_iter()
+            .all(|(name, value)| number(Some(value)) >= number(defaults.get(name))),
+    )
+}
+
+/// A struct as the map of its fields.
+pub(crate) fn map<P: Serialize>(parameters: &P) -> Map<String, Json> {
+    match serde_json::to_value(parameters) {
+        Ok(Json::Object(map)) => map,
+        _ => Map::new(),
+    }
+}
+
+/// The parameters that `map` describes, within their ranges.
+pub(crate) fn typed<P: DeserializeOwned + Validate<Context = ()>>(
+    figure: &'static str,
+    map: &Map<String, Json>,
+) -> Result<P, Error> {
+    let json = Json::Object(map.clone());
+    let refuse = |path: String, reason: String| {
+        let path = path.trim_start_matches('.').to_owned();
+        let value = pointed(&json, &path).map(plain).unwrap_or_default();
+        Error::Refused {
+            figure,
+            name: path,
+            value,
+            reason,
+        }
+    };
+    let parameters: P = serde_path_to_error::deserialize(&json)
+        .map_err(|error| refuse(error.path().to_string(), in_words(&error.inner().to_string())))?;
+    match parameters.validate() {
+        Ok(()) => Ok(parameters),
+        Err(report) => match report.iter().next() {
+            Some((path, error)) => Err(refuse(path.to_string(), error.to_string())),
+            None => Ok(parameters),
+        },
+    }
+}
+
+/// The reason of a type mismatch without the names of types.
+fn in_words(reason: &str) -> String {
+    let words = |kind: &str| match kind {
+        "f64" => "a number",
+        "u64" | "u32" | "usize" => "a whole number, 0 or above",
+        "i64" | "i32" => "a whole number",
+        "a boolean" => "true or false",
+        _ => "",
+    };
+    match reason.rsplit_once("expected ").map(|(_, kind)| words(kind)) {
+        Some(known) if !known.is_empty() => format!("expected {known}"),
+        _ => reason.to_owned(),
+    }
+}
+
+/// The value at a path such as `points[1].a`.
+fn pointed<'a>(json: &'a Json, path: &str) -> Option<&'a Json> {
+    json.pointer(&format!("/{}", path.replace(['.', '['], "/").replace(']', "")))
+}
+
+/// Parameters as they are being set.
+pub(crate) struct Settings {
+    figure: &'static str,
+    values: Map<String, Json>,
+    described: Vec<Parameter>,
+}
+
+impl Settings {
+    pub(crate) fn new(figure: &'static str, values: Map<String, Json>, described: Vec<Parameter>) -> Self {
+        Self {
+            figure,
+            values,
+            described,
+        }
+    }
+
+    pub(crate) fn into_map(self) -> Map<String, Json> {
+        self.values
+    }
+
+    /// Sets one parameter from its text.
+    pub(crate) fn set(&mut self, name: &str, text: &str) -> Result<(), Error> {
+        let (figure, described) = (self.figure, &self.described);
+        let Some(slot) = self.values.get_mut(name) else {
+            let valid: Vec<_> = described.iter().map(|p| p.name.as_str()).collect();
+            let valid = if valid.is_empty() {
+                "none".to_owned()
+            } else {
+                valid.join(", ")
+            };
+            return Err(Error::UnknownParameter {
+                figure,
+                name: name.to_owned(),
+                valid,
+            });
+        };
+        let entries = described
+            .iter()
+            .find(|p| p.name == name)
+            .map_or(&[][..], |p| &p.entries);
+        let refused = |reason: &str| Error::Refused {
+            figure,
+            name: name.to_owned(),
+            value: text.to_owned(),
+            reason: reason.to_owned(),
+        };
+        *slot = match slot {
+            _ if text.trim_start().starts_with(['[', '{']) => {
+                serde_json::from_str(text).map_err(|error| refused(&error.to_string()))?
+            }
+            Json::Array(_) if entries.is_empty() => text.split(',').map(scalar).collect(),
+            Json::Array(_) => {
+                let point = |text: &str| -> Result<Json, Error> {
+                    let values: Vec<&str> = text.split(':').collect();
+                    if values.len() != entries.len() {
+                        return Err(refused(&format!("expected points {}, separated by commas", entries.join(":"))));
+                    }
+                    Ok(Json::Object(entries.iter().cloned().zip(values.into_iter().map(scalar)).collect()))
+                };
+                text.split(',').map(point).collect::<Result<_, _>>()?
+            }
+            _ => scalar(text),
+        };
+        if is_effort(name) && slot.as_u64() == Some(0) {
+            return Err(refused("expected at least 1"));
+        }
+        Ok(())
+    }
+}
+
+/// A number, `true`, `false`, or else a word. Whole numbers may be written `1e5`.
+fn scalar(text: &str) -> Json {
+    let text = text.trim();
+    let value = serde_json::from_str(text)
+        .ok()
+        .filter(|v: &Json| v.is_number() || v.is_boolean());
+    match value {
+        Some(Json::Number(n)) if n.is_f64() => {
+            let number = n.as_f64().unwrap_or(f64::NAN);
+            let whole = text.contains(['e', 'E']) && number.fract() == 0.0 && (0.0..9e15).contains(&number);
+            if whole {
+                Json::from(number as u64)
+            } else {
+                Json::Number(n)
+            }
+        }
+        Some(value) => value,
+        None => Json::from(text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use schemars::JsonSchema;
+    use serde::Deserialize;
+
+    #[derive(Serialize, Deserialize, JsonSchema, Validate)]
+    #[serde(deny_unknown_fields)]
+    struct Point {
+        /// Plant coefficient.
+        #[garde(range(min = -1.0, max = 1.0))]
+        a: f64,
+        /// Noise ratio.
+        #[garde(range(min = 1e-12, max = 1e12))]
+        gamma: f64,
+    }
+
+    #[derive(Serialize, Deserialize, JsonSchema, Validate)]
+    #[serde(deny_unknown_fields)]
+    struct Parameters {
+        /// Plants.
+        #[garde(length(min = 1, max = 9), dive)]
+        points: Vec<Point>,
+        /// Levels.
+        #[garde(length(min = 1), inner(range(min = 2, max = 64)))]
+        levels: Vec<u32>,
+        /// Trials.
+        #[garde(range(min = 1, max = 1_000_000))]
+        trials: u64,
+    }
+
+    fn described() -> (Map<String, Json>, Vec<Parameter>) {
+        let start = map(&Parameters {
+            points: vec![Point { a: 0.5, gamma: 0.1 }],
+            levels: vec![4],
+            trials: 100,
+        });
+        let described = crate::schema::parameters::<Parameters>(&start);
+        (start, described)
+    }
+
+    fn set(name: &str, text: &str) -> Result<Parameters, Error> {
+        let (start, described) = described();
+        let mut settings = Settings::new("demo-fig1", start, described);
+        settings.set(name, text)?;
+        typed("demo-fig1", &settings.into_map())
+    }
+
+    #[test]
+    fn settings_are_written_as_they_are_described() {
+        assert_eq!(set("points", "0.9:0.2,-0.5:3").unwrap().points[1].gamma, 3.0);
+        assert_eq!(set("points", r#"[{"a": 0.9, "gamma": 1}]"#).unwrap().points[0].a, 0.9);
+        assert_eq!(set("levels", "2, 8").unwrap().levels, [2, 8]);
+        assert_eq!(set("trials", "1e5").unwrap().trials, 100_000);
+        let (_, described) = described();
+        assert_eq!(described[0].default, "0.5:0.1");
+        assert_eq!(described[0].range, "1 to 9 entries; a from -1.0 to 1.0; gamma from 1e-12 to 1000000000000.0");
+        assert_eq!(described[1].range, "at least 1 entries; from 2 to 64");
+    }
+
+    #[test]
+    fn what_is_refused_is_named_with_its_place_and_value() {
+        for (name, text, words) in [
+            ("points", "0.9:0.2,1.5:3", ["points[1].a", "1.5", "1"]),
+            ("points", "0.9", ["points", "0.9", "a:gamma"]),
+            ("points", "", ["points", "", "a:gamma"]),
+            ("points", "a:b", ["points[0].a", "a", "expected a number"]),
+            ("levels", "4,1", ["levels[1]", "1", "2"]),
+            ("levels", "4.5", ["levels[0]", "4.5", "whole"]),
+            ("levels", "-4", ["levels[0]", "-4", "0 or above"]),
+            ("trials", "0", ["trials", "0", "1"]),
+            ("trials", "many", ["trials", "many", "whole"]),
+            ("trials", "NaN", ["trials", "NaN", "whole"]),
+            ("trials", "1e30", ["trials", "1e+30", "whole"]),
+            ("trail", "5", ["trail", "points, levels, trials", ""]),
+        ] {
+            let message = set(name, text).err().map(|e| e.to_string()).unwrap_or_default();
+            assert!(!message.is_empty() && words.iter().all(|w| message.contains(w)), "{name}={text}: {message}");
+        }
+    }
+
+    #[test]
+    fn effort_and_setting_are_told_apart() {
+        let (defaults, _) = described();
+        let with = |name: &str, value: Json| {
+            let mut map = defaults.clone();
+            map.insert(name.to_owned(), value);
+            meaning(&map, &defaults)
+        };
+        assert_eq!(meaning(&defaults, &defaults), (true, true));
+        assert_eq!(with("trials", 99.into()), (true, false));
+        assert_eq!(with("trials", 101.into()), (true, true));
+        assert_eq!(with("levels", Json::from(vec![8])), (false, true));
+    }
+}

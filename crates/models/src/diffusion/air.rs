@@ -1,0 +1,223 @@
+//! A point source that releases at a constant rate: closed forms.
+
+use super::axis::Axis;
+use super::half_space::{Flux, Wall};
+use super::space::{ImpulseResponse, Space, step_response};
+use crate::Error;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, positive};
+use fewbits_numerics::normal::erfcx;
+use nalgebra::Vector3;
+use std::f64::consts::PI;
+
+/// Distances below this many metres count as this: the concentration has a pole at the source.
+pub const CLOSEST: f64 = 1e-3;
+const SQRT_PI: f64 = 1.772_453_850_905_516;
+
+/// What bounds the air below.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ground {
+    /// Nothing: the medium is unbounded.
+    None,
+    /// Ground at `z = 0` with the given wall law, `z >= 0`.
+    Wall(Wall),
+    /// Ground at `z = 0` through which nothing passes: `Wall(Wall::IMPERMEABLE)`.
+    Impermeable,
+}
+
+/// Unbounded air, or the half-space above the ground, with a uniform wind.
+///
+/// The concentration of a continuous unit-rate source is in closed form for open air and for impermeable or absorbing ground
+/// with a horizontal wind, and an integral (relative accuracy 1e-12) over permeable ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Air {
+    diffusivity: f64,
+    wind: Vector3<f64>,
+    ground: Ground,
+    closest: f64,
+    space: Space,
+}
+
+/// A concentration and how it changes with the place of the source.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SourceGradient {
+    /// Concentration per unit rate, kg/m^3 per kg/s.
+    pub value: f64,
+    /// Its gradient with respect to the position of the source, per metre.
+    pub gradient: Vector3<f64>,
+}
+
+impl Air {
+    /// Air of the given diffusivity (m^2/s) and wind (m/s).
+    ///
+    /// # Errors
+    /// If `diffusivity` is not positive, `wind` is not finite, or it blows across the ground: compose a [`Space`] then, where
+    /// the wall law says which flux it is about.
+    pub fn new(diffusivity: f64, wind: Vector3<f64>, ground: Ground) -> Result<Self, Error> {
+        positive("diffusivity", diffusivity)?;
+        all_finite("wind", wind.as_slice())?;
+        let open = |v| Axis::open(diffusivity)?.with_wind(v, Flux::Total);
+        let vertical = match ground {
+            Ground::None => open(wind.z)?,
+            _ if wind.z != 0.0 => return Err(ArgumentError::new("wind.z", wind.z, "0 above ground").into()),
+            Ground::Impermeable => Axis::half_space(diffusivity, Wall::IMPERMEABLE)?,
+            Ground::Wall(wall) => Axis::half_space(diffusivity, wall)?,
+        };
+        Ok(Self {
+            diffusivity,
+            wind,
+            ground,
+            closest: CLOSEST,
+            space: Space::new([open(wind.x)?, open(wind.y)?, vertical])?,
+        })
+    }
+
+    /// The same with another distance, in metres, below which distances count as this one (1 mm unless told).
+    ///
+    /// # Errors
+    /// If `closest` is not a positive number.
+    pub fn with_closest(self, closest: f64) -> Result<Self, Error> {
+        Ok(Self {
+            closest: positive("closest", closest)?,
+            ..self
+        })
+    }
+
+    /// Wind, m/s.
+    pub fn wind(&self) -> &Vector3<f64> {
+        &self.wind
+    }
+
+    /// The distance, m, below which distances count as this one.
+    pub fn closest(&self) -> f64 {
+        self.closest
+    }
+
+    /// Sign of the image source below the ground, where the closed form has one.
+    fn image(&self) -> Option<f64> {
+        match self.ground {
+            Ground::None => Some(0.0),
+            Ground::Impermeable => Some(1.0),
+            Ground::Wall(wall) if wall == Wall::IMPERMEABLE => Some(1.0),
+            Ground::Wall(wall) if wall == Wall::ABSORBING => Some(-1.0),
+            Ground::Wall(_) => None,
+        }
+    }
+
+    fn has_ground(&self) -> bool {
+        self.ground != Ground::None
+    }
+
+    /// Concentration at `field`, kg/m^3 per kg/s, of a source at `source` that has released for `age` seconds. Zero at age zero
+    /// and before, and below the ground.
+    pub fn concentration(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> f64 {
+        if age <= 0.0 || (self.has_ground() && (field.z < 0.0 || source.z < 0.0)) {
+            return 0.0;
+        }
+        let Some(sign) = self.image() else {
+            return step_response(&self.space, field, source, age, self.closest);
+        };
+        let direct = self.from_offset(&(field - source), age).0;
+        if sign == 0.0 {
+            return direct;
+        }
+        if source.z == 0.0 {
+            // The image falls on the source.
+            return (1.0 + sign) * direct;
+        }
+        let mirrored = Vector3::new(source.x, source.y, -source.z);
+        (direct + sign * self.from_offset(&(field - mirrored), age).0).max(0.0)
+    }
+
+    /// Concentration and its gradient with respect to the source position.
+    ///
+    /// The derivative with respect to the height of a source **on** the ground is the one-sided limit, 0 over impermeable
+    /// ground. Over permeable ground the gradient is a central difference of relative step 1e-5, good to about eight digits.
+    pub fn source_gradient(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> SourceGradient {
+        let none = SourceGradient {
+            value: 0.0,
+            gradient: Vector3::zeros(),
+        };
+        if age <= 0.0 || (self.has_ground() && (field.z < 0.0 || source.z < 0.0)) {
+            return none;
+        }
+        let Some(sign) = self.image() else {
+            return self.numeric_gradient(field, source, age);
+        };
+        let (value, slope) = self.from_offset(&(field - source), age);
+        let mirrored = Vector3::new(source.x, source.y, -source.z);
+        let (image, image_slope) =
+            if sign == 0.0 { (0.0, Vector3::zeros()) } else { self.from_offset(&(field - mirrored), age) };
+        // The offset falls as the source moves; that of the image rises with its height.
+        let image_gradient = Vector3::new(-image_slope.x, -image_slope.y, image_slope.z);
+        SourceGradient {
+            value: value + sign * image,
+            gradient: -slope + sign * image_gradient,
+        }
+    }
+
+    fn numeric_gradient(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> SourceGradient {
+        let reach = (field - source).norm().max(self.closest).min((4.0 * self.diffusivity * age).sqrt());
+        let step = 1e-5 * reach;
+        let at = |i: usize, by: f64| {
+            let mut moved = *source;
+            moved[i] += by;
+            self.concentration(field, &moved, age)
+        };
+        let gradient = Vector3::from_fn(|i, _| {
+            if i == 2 && source.z < step {
+                // One-sided, second order, for a source on the ground.
+                (4.0 * at(2, step) - at(2, 2.0 * step) - 3.0 * at(2, 0.0)) / (2.0 * step)
+            } else {
+                (at(i, step) - at(i, -step)) / (2.0 * step)
+            }
+        });
+        SourceGradient {
+            value: self.concentration(field, source, age),
+            gradient,
+        }
+    }
+
+    /// Concentration in unbounded air and its gradient with respect to the offset `field - source`.
+    ///
+    /// `c = e^{v.d/2k} [e^{-rV/2k} erfc(zm) + e^{rV/2k} erfc(zp)] / (8 pi k r)`, `zm, zp = (r -+ V t) / sqrt(4 k t)`. Both terms
+    /// hold the factor `g = exp(-|d - v t|^2 / 4 k t)`, which leaves `erfcx` of the arguments: nothing overflows.
+    fn from_offset(&self, offset: &Vector3<f64>, age: f64) -> (f64, Vector3<f64>) {
+        let k = self.diffusivity;
+        let true_distance = offset.norm();
+        let r = true_distance.max(self.closest);
+        let spread = (4.0 * k * age).sqrt();
+        let speed = self.wind.norm();
+        let prefactor = 1.0 / (8.0 * PI * k * r);
+        let direction = if true_distance > 0.0 { offset / true_distance } else { Vector3::zeros() };
+        if speed == 0.0 {
+            let z = r / spread;
+            let g = (-z * z).exp();
+            let both = 2.0 * prefactor * g * erfcx(z);
+            let slope = -both / r - prefactor * 4.0 * g / (SQRT_PI * spread);
+            return (both, direction * slope);
+        }
+        // An offset moved out to the closest distance keeps its direction.
+        let along = self.wind.dot(&direction) * r;
+        let (minus, plus) = ((r - speed * age) / spread, (r + speed * age) / spread);
+        // |d - v t|^2 = minus^2 spread^2 + 2 (r V - v.d) t, without the cancellation of the difference of vectors.
+        let lag = (along - r * speed) / (2.0 * k);
+        let g = (lag - minus * minus).exp();
+        let first = if minus >= 0.0 { g * erfcx(minus) } else { lag.exp() * libm::erfc(minus) };
+        let second = g * erfcx(plus);
+        let sum = prefactor * (first + second);
+        let radial = -sum / r
+            + prefactor * (speed / (2.0 * k) * (second - first) - 4.0 * g / (SQRT_PI * spread));
+        (sum, self.wind * (sum / (2.0 * k)) + direction * radial)
+    }
+}
+
+impl ImpulseResponse for Air {
+    fn green(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> f64 {
+        self.space.green(field, source, age)
+    }
+
+    fn diffusivity(&self) -> f64 {
+        self.diffusivity
+    }
+}

@@ -1,0 +1,72 @@
+//! Where the concentration on the ground exceeds a threshold.
+
+use super::air::{Air, Ground};
+use super::space::ImpulseResponse;
+use crate::Error;
+use fewbits_numerics::error::{at_least_one, positive};
+use nalgebra::{Vector2, Vector3};
+use std::f64::consts::{PI, TAU};
+
+/// Radius (m) on the ground within which a source on impermeable ground, without wind, exceeds `threshold` (kg/m^3) after `age`
+/// seconds at `rate` (kg/s): the root of `rate erfc(R / sqrt(4 kappa t)) / (2 pi kappa R) = threshold`. Zero at age zero.
+///
+/// # Errors
+/// If `rate`, `threshold` or `diffusivity` is not a positive number.
+pub fn contour_radius(rate: f64, threshold: f64, age: f64, diffusivity: f64) -> Result<f64, Error> {
+    positive("rate", rate)?;
+    positive("threshold", threshold)?;
+    let air = Air::new(diffusivity, Vector3::zeros(), Ground::Impermeable)?.with_closest(f64::MIN_POSITIVE)?;
+    Ok(reach(&air, &Vector3::zeros(), &Vector3::x(), rate, threshold, age))
+}
+
+/// The contour `c = threshold` on the ground about a source, one point for each of `directions` equally spaced angles that start
+/// downwind (along x without wind). Every ray from the source crosses it exactly once, because the concentration of a
+/// continuous point source falls along every ray. The points coincide with the source where the threshold is nowhere reached.
+///
+/// # Errors
+/// If `rate` or `threshold` is not a positive number, or `directions` is zero.
+pub fn contour(
+    air: &Air,
+    source: &Vector2<f64>,
+    rate: f64,
+    threshold: f64,
+    age: f64,
+    directions: usize,
+) -> Result<Vec<Vector2<f64>>, Error> {
+    positive("rate", rate)?;
+    positive("threshold", threshold)?;
+    at_least_one("directions", directions)?;
+    let wind = air.wind();
+    let downwind = wind.y.atan2(wind.x);
+    let origin = Vector3::new(source.x, source.y, 0.0);
+    Ok((0..directions)
+        .map(|i| {
+            let angle = downwind + TAU * i as f64 / directions as f64;
+            let ray = Vector3::new(angle.cos(), angle.sin(), 0.0);
+            let radius = reach(air, &origin, &ray, rate, threshold, age);
+            Vector2::new(origin.x + radius * ray.x, origin.y + radius * ray.y)
+        })
+        .collect())
+}
+
+/// Distance along a ray at which the concentration falls to the threshold, by bisection of the logarithm of the distance.
+fn reach(air: &Air, source: &Vector3<f64>, ray: &Vector3<f64>, rate: f64, threshold: f64, age: f64) -> f64 {
+    if age <= 0.0 {
+        return 0.0;
+    }
+    let above = |radius: f64| rate * air.concentration(&(source + ray * radius), source, age) > threshold;
+    // Without the loss of the second term c < rate / (2 pi kappa R), and with wind no more than that downwind.
+    let mut high = rate / (2.0 * PI * air.diffusivity() * threshold);
+    let mut low = air.closest().max(high * 1e-12);
+    if !above(low) {
+        return 0.0;
+    }
+    for _ in 0..200 {
+        let middle = (low * high).sqrt();
+        if middle <= low || middle >= high || high / low < 1.0 + 4.0 * f64::EPSILON {
+            break;
+        }
+        if above(middle) { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}

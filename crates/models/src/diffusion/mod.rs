@@ -1,0 +1,62 @@
+//! How a substance released into air or water spreads: Green's functions of the diffusion equation, and the concentrations
+//! that sources of every shape cause.
+//!
+//! All of it solves `dc/dt = kappa lap c - v . grad c + release` (Zhao and Nehorai, IEEE Trans. Signal Processing 55 (2007)
+//! 2729, section II). Units are SI: metres, seconds, kilograms, kg/m^3; any other consistent set serves as well.
+//!
+//! | question | answer |
+//! |---|---|
+//! | one coordinate: open, one wall, a slab | [`Axis`] |
+//! | two media side by side | [`TwoMedia`] |
+//! | a cross-section of a pipe, a tank, a ball | [`Cylinder`], [`Sphere`] |
+//! | three dimensions with wind | [`Space`] |
+//! | a source that releases at a constant rate, closed form, with gradient | [`Air`] |
+//! | a release that lasts, varies, moves, covers a disk | [`Release`], [`moving_source`], [`disk_source`] |
+//! | where the concentration exceeds a threshold | [`contour_radius`], [`contour`] |
+//! | the same response at many places | [`Profile`] |
+//! | layered media, and the referee of the tests | `finite_volume` (feature `finite-volume`) |
+//!
+//! The central choice is that a Green's function takes field **and** source, `green(field, source, age)`: the difference
+//! `field - source` is enough only far from every wall, although equation (10) of the paper is written with it. The age counts
+//! from the release; nothing has arrived at age zero or before, so every response there is exactly 0.
+//!
+//! ```
+//! use fewbits_models::diffusion::{Air, Ground};
+//! use nalgebra::Vector3;
+//! // 1 kg/s released on impermeable ground, observed 10 m upwind of the source after 5 s of wind.
+//! let air = Air::new(40.0, Vector3::new(-20.0, -10.0, 0.0), Ground::Impermeable)?;
+//! let (source, sensor) = (Vector3::new(73.0, 38.0, 0.0), Vector3::new(63.0, 38.0, 0.0));
+//! assert!((air.concentration(&sensor, &source, 5.0) - 2.962_145_268_583e-4).abs() < 1e-15);
+//! assert_eq!(air.concentration(&sensor, &source, -1.0), 0.0);
+//! # Ok::<(), fewbits_models::Error>(())
+//! ```
+
+mod air;
+mod axis;
+mod bessel;
+mod contour;
+mod cylinder;
+mod extended;
+#[cfg(feature = "finite-volume")]
+pub mod finite_volume;
+mod half_space;
+mod integrate;
+mod profile;
+mod release;
+mod slab;
+mod space;
+mod sphere;
+mod two_media;
+
+pub use air::{Air, CLOSEST, Ground, SourceGradient};
+pub use axis::Axis;
+pub use contour::{contour, contour_radius};
+pub use cylinder::Cylinder;
+pub use extended::{disk_source, moving_source};
+pub use half_space::{Flux, Wall};
+pub use profile::Profile;
+pub use release::Release;
+pub use slab::SlabWall;
+pub use space::{ImpulseResponse, Space, step_response};
+pub use sphere::Sphere;
+pub use two_media::TwoMedia;

@@ -1,0 +1,205 @@
+//! Reductions in eight lanes: faster than one chain of additions, closer to the true sum, and in a fixed order.
+
+use super::elementary;
+use super::vectorised;
+
+/// Lanes of every reduction, whatever the machine: the order of additions is part of the result.
+const LANES: usize = 8;
+
+/// Adds the lanes in a fixed tree.
+#[inline(always)]
+fn folded(lane: [f64; LANES]) -> f64 {
+    ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]))
+}
+
+/// `sum a_i b_i` over the shorter of the two.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    vectorised(
+        #[inline(always)]
+        || {
+            let count = a.len().min(b.len());
+            let (a, b) = (a[..count].chunks_exact(LANES), b[..count].chunks_exact(LANES));
+            let mut lane = [0.0; LANES];
+            for (j, (x, y)) in a.remainder().iter().zip(b.remainder()).enumerate() {
+                lane[j] = x * y;
+            }
+            for (x, y) in a.zip(b) {
+                for j in 0..LANES {
+                    lane[j] += x[j] * y[j];
+                }
+            }
+            folded(lane)
+        },
+    )
+}
+
+/// `sum w_i (a_i - mean_a) (b_i - mean_b)` over the weights; columns must be at least as long, shorter ones end the sum.
+pub fn weighted_covariance(weights: &[f64], (a, mean_a): (&[f64], f64), (b, mean_b): (&[f64], f64)) -> f64 {
+    vectorised(
+        #[inline(always)]
+        || {
+            let count = weights.len().min(a.len()).min(b.len());
+            let whole = count - count % LANES;
+            let mut lane = [0.0; LANES];
+            for i in whole..count {
+                lane[i - whole] = weights[i] * (a[i] - mean_a) * (b[i] - mean_b);
+            }
+            let columns = a[..whole].chunks_exact(LANES).zip(b[..whole].chunks_exact(LANES));
+            for (w, (a, b)) in weights[..whole].chunks_exact(LANES).zip(columns) {
+                for j in 0..LANES {
+                    lane[j] += w[j] * (a[j] - mean_a) * (b[j] - mean_b);
+                }
+            }
+            folded(lane)
+        },
+    )
+}
+
+/// `sum a_i`.
+pub fn sum(a: &[f64]) -> f64 {
+    vectorised(
+        #[inline(always)]
+        || {
+            let chunks = a.chunks_exact(LANES);
+            let mut lane = [0.0; LANES];
+            lane[..chunks.remainder().len()].copy_from_slice(chunks.remainder());
+            for chunk in chunks {
+                for j in 0..LANES {
+                    lane[j] += chunk[j];
+                }
+            }
+            folded(lane)
+        },
+    )
+}
+
+/// The largest entry; `-inf` of nothing. NaN is passed over.
+pub fn largest(a: &[f64]) -> f64 {
+    vectorised(
+        #[inline(always)]
+        || {
+            let chunks = a.chunks_exact(LANES);
+            let mut lane = [f64::NEG_INFINITY; LANES];
+            for (largest, x) in lane.iter_mut().zip(chunks.remainder()) {
+                *largest = if *x > *largest { *x } else { *largest };
+            }
+            for chunk in chunks {
+                for j in 0..LANES {
+                    lane[j] = if chunk[j] > lane[j] { chunk[j] } else { lane[j] };
+                }
+            }
+            lane.into_iter().fold(f64::NEG_INFINITY, f64::max)
+        },
+    )
+}
+
+/// Sums of a column of exponentials.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExpSums {
+    /// `sum e_i`.
+    pub sum: f64,
+    /// `sum e_i^2`.
+    pub sum_of_squares: f64,
+}
+
+/// Writes `e_i = exp(logs[i] - offset)` to `out[i]` over the shorter of the two and returns their sums: weights, their total
+/// and what the effective sample size needs, in one pass.
+pub fn exp_minus(logs: &[f64], offset: f64, out: &mut [f64]) -> ExpSums {
+    vectorised(
+        #[inline(always)]
+        || {
+            let count = logs.len().min(out.len());
+            let whole = count - count % LANES;
+            let (mut lane, mut square) = ([0.0; LANES], [0.0; LANES]);
+            for (j, (out, log)) in out[whole..count].iter_mut().zip(&logs[whole..count]).enumerate() {
+                let e = elementary::exp(log - offset);
+                *out = e;
+                lane[j] = e;
+                square[j] = e * e;
+            }
+            let chunks = out[..whole]
+                .chunks_exact_mut(LANES)
+                .zip(logs[..whole].chunks_exact(LANES));
+            for (out, logs) in chunks {
+                for j in 0..LANES {
+                    let e = elementary::exp(logs[j] - offset);
+                    out[j] = e;
+                    lane[j] += e;
+                    square[j] += e * e;
+                }
+            }
+            ExpSums {
+                sum: folded(lane),
+                sum_of_squares: folded(square),
+            }
+        },
+    )
+}
+
+/// `ln sum exp(logs[i])` without overflow: `-inf` of nothing or of zeros alone, `+inf` if an entry is, NaN if an entry is NaN.
+pub fn log_sum_exp(logs: &[f64]) -> f64 {
+    let offset = largest(logs);
+    if !offset.is_finite() {
+        return if logs.iter().any(|x| x.is_nan()) {
+            f64::NAN
+        } else {
+            offset
+        };
+    }
+    let total = vectorised(
+        #[inline(always)]
+        || {
+            let chunks = logs.chunks_exact(LANES);
+            let mut lane = [0.0; LANES];
+            for (j, log) in chunks.remainder().iter().enumerate() {
+                lane[j] = elementary::exp(log - offset);
+            }
+            for chunk in chunks {
+                for j in 0..LANES {
+                    lane[j] += elementary::exp(chunk[j] - offset);
+                }
+            }
+            folded(lane)
+        },
+    );
+    offset + elementary::ln(total)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_remainder_is_summed_once() {
+        for count in 0..26 {
+            let values: Vec<f64> = (0..count).map(|i| i as f64 + 1.0).collect();
+            assert_eq!(sum(&values), (count * (count + 1) / 2) as f64);
+            assert_eq!(dot(&values, &values), values.iter().map(|v| v * v).sum::<f64>());
+            let squares = weighted_covariance(&values, (&values, 0.0), (&values, -1.0));
+            assert_eq!(squares, values.iter().map(|v| v * v * (v + 1.0)).sum::<f64>());
+            assert_eq!(largest(&values), if count == 0 { f64::NEG_INFINITY } else { count as f64 });
+            let logs: Vec<f64> = values.iter().map(|v| v.ln()).collect();
+            let mut out = vec![0.0; count];
+            let sums = exp_minus(&logs, 0.0, &mut out);
+            assert!((sums.sum - sum(&values)).abs() <= 1e-12);
+            assert!((sums.sum_of_squares - dot(&values, &values)).abs() <= 1e-11);
+            assert!((log_sum_exp(&logs) - sum(&values).ln()).abs() < 1e-14 || count == 0);
+        }
+    }
+
+    #[test]
+    fn sums_of_exponentials_do_not_overflow() {
+        assert!((log_sum_exp(&[1e4, 1e4]) - (1e4 + 2.0_f64.ln())).abs() < 1e-11);
+        assert!((log_sum_exp(&[-1e4, f64::NEG_INFINITY]) + 1e4).abs() < 1e-11);
+        assert_eq!(log_sum_exp(&[]), f64::NEG_INFINITY);
+        assert_eq!(log_sum_exp(&[f64::NEG_INFINITY; 3]), f64::NEG_INFINITY);
+        assert_eq!(log_sum_exp(&[0.0, f64::INFINITY]), f64::INFINITY);
+        assert!(log_sum_exp(&[0.0, f64::NAN]).is_nan() && log_sum_exp(&[f64::INFINITY, f64::NAN]).is_nan());
+    }
+
+    #[test]
+    fn nan_is_no_largest_entry() {
+        assert_eq!(largest(&[f64::NAN, 1.0, f64::NAN]), 1.0);
+        assert_eq!(largest(&[f64::NAN; 20]), f64::NEG_INFINITY);
+    }
+}

@@ -1,0 +1,183 @@
+//! Distances in hops, routes, pieces of the network.
+
+use crate::{Error, Graph};
+
+const UNREACHED: u32 = u32::MAX;
+
+/// Distances in hops from one node, and the routing tree that they form: every node's parent is the lowest-numbered of its
+/// neighbours that is one hop nearer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Hops {
+    root: usize,
+    distances: Vec<u32>,
+    parents: Vec<u32>,
+    /// Reached nodes, by distance.
+    order: Vec<u32>,
+}
+
+impl Hops {
+    /// The node that all distances are from.
+    pub fn root(&self) -> usize {
+        self.root
+    }
+
+    /// Hops to `node`, or `None` where no route leads.
+    pub fn distance(&self, node: usize) -> Option<usize> {
+        self.distances.get(node).filter(|d| **d != UNREACHED).map(|d| *d as usize)
+    }
+
+    /// The next node from `node` towards the root; `None` at the root and where no route leads.
+    pub fn parent(&self, node: usize) -> Option<usize> {
+        self.parents.get(node).filter(|p| **p != UNREACHED).map(|p| *p as usize)
+    }
+
+    /// Reached nodes, the root first, by increasing distance.
+    pub fn reached(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// A shortest route from the root to `node`, both included; `None` where no route leads.
+    pub fn route(&self, node: usize) -> Option<Vec<usize>> {
+        let length = self.distance(node)? + 1;
+        let mut route = Vec::with_capacity(length);
+        let mut at = node;
+        route.push(at);
+        while let Some(parent) = self.parent(at) {
+            route.push(parent);
+            at = parent;
+        }
+        route.reverse();
+        Some(route)
+    }
+}
+
+/// The pieces of a network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Components {
+    labels: Vec<u32>,
+    sizes: Vec<usize>,
+}
+
+impl Components {
+    /// Which piece a node belongs to: pieces are numbered by their lowest node.
+    pub fn label(&self, node: usize) -> Option<usize> {
+        self.labels.get(node).map(|label| *label as usize)
+    }
+
+    /// Number of nodes of each piece.
+    pub fn sizes(&self) -> &[usize] {
+        &self.sizes
+    }
+
+    /// Whether every node reaches every other.
+    pub fn is_connected(&self) -> bool {
+        self.sizes.len() <= 1
+    }
+
+    /// Share of the nodes in the largest piece.
+    pub fn largest_share(&self) -> f64 {
+        let largest = self.sizes.iter().copied().max().unwrap_or(0);
+        largest as f64 / self.labels.len().max(1) as f64
+    }
+}
+
+impl Graph {
+    /// Breadth-first distances and routing tree.
+    ///
+    /// # Errors
+    /// If `root` does not exist.
+    pub fn hops_from(&self, root: usize) -> Result<Hops, Error> {
+        self.check(root)?;
+        let mut hops = Hops {
+            root,
+            distances: vec![UNREACHED; self.len()],
+            parents: vec![UNREACHED; self.len()],
+            order: Vec::new(),
+        };
+        self.flood(root, &mut hops);
+        // Parents by index rather than by the order of the search.
+        for at in 0..hops.order.len() {
+            let node = hops.order[at] as usize;
+            let nearer = hops.distances[node].checked_sub(1);
+            if let Some(parent) =
+                self.neighbours(node).iter().find(|other| Some(hops.distances[**other as usize]) == nearer)
+            {
+                hops.parents[node] = *parent;
+            }
+        }
+        Ok(hops)
+    }
+
+    fn flood(&self, root: usize, hops: &mut Hops) {
+        hops.distances[root] = 0;
+        hops.order.push(root as u32);
+        let mut at = hops.order.len() - 1;
+        while let Some(&node) = hops.order.get(at) {
+            let next = hops.distances[node as usize] + 1;
+            for &other in self.neighbours(node as usize) {
+                if hops.distances[other as usize] == UNREACHED {
+                    hops.distances[other as usize] = next;
+                    hops.order.push(other);
+                }
+            }
+            at += 1;
+        }
+    }
+
+    /// The pieces of the network.
+    pub fn components(&self) -> Components {
+        let mut labels = vec![UNREACHED; self.len()];
+        let mut sizes = Vec::new();
+        let mut queue = Vec::new();
+        for root in 0..self.len() {
+            if labels[root] != UNREACHED {
+                continue;
+            }
+            let label = sizes.len() as u32;
+            labels[root] = label;
+            queue.push(root);
+            let mut size = 0;
+            while let Some(node) = queue.pop() {
+                size += 1;
+                for &other in self.neighbours(node) {
+                    if labels[other as usize] == UNREACHED {
+                        labels[other as usize] = label;
+                        queue.push(other as usize);
+                    }
+                }
+            }
+            sizes.push(size);
+        }
+        Components { labels, sizes }
+    }
+
+    /// The nodes fewest hops from `root`, the root left out, that satisfy `wanted`, and that number of hops: neighbours if one
+    /// of them does, else the way past dead ends through nodes that do not. Empty if no reachable node does.
+    ///
+    /// # Errors
+    /// If `root` does not exist.
+    pub fn nearest(&self, root: usize, wanted: impl Fn(usize) -> bool) -> Result<(Vec<usize>, usize), Error> {
+        self.check(root)?;
+        let mut seen = vec![false; self.len()];
+        seen[root] = true;
+        let (mut ring, mut hops) = (vec![root], 0);
+        while !ring.is_empty() {
+            let mut next = Vec::new();
+            for node in ring {
+                for &other in self.neighbours(node) {
+                    if !std::mem::replace(&mut seen[other as usize], true) {
+                        next.push(other as usize);
+                    }
+                }
+            }
+            hops += 1;
+            next.sort_unstable();
+            let found: Vec<usize> = next.iter().copied().filter(|node| wanted(*node)).collect();
+            if !found.is_empty() {
+                return Ok((found, hops));
+            }
+            ring = next;
+        }
+        Ok((Vec::new(), 0))
+    }
+}
