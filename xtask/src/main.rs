@@ -2,6 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+use xtask::figures::Ending;
 
 /// The project's tasks.
 #[derive(Parser)]
@@ -17,19 +18,28 @@ enum Task {
     Figures(xtask::figures::Options),
     /// Run the benchmarks and print each as a multiple of its unit.
     Bench(xtask::bench::Options),
+    /// Build every crate as a user would depend on it, outside the workspace, and run its examples.
+    Alone(xtask::alone::Options),
     /// Check the house rules.
     Tidy,
 }
 
 fn main() -> ExitCode {
+    let ended = |good: bool| if good { Ending::Good } else { Ending::Failed };
     let done = match Cli::parse().task {
         Task::Figures(options) => xtask::figures::run(&options).map_err(|error| error.to_string()),
-        Task::Bench(options) => xtask::bench::run(&options).map_err(|error| error.to_string()),
-        Task::Tidy => xtask::tidy::run().map_err(|error| error.to_string()),
+        Task::Bench(options) => xtask::bench::run(&options)
+            .map(ended)
+            .map_err(|error| error.to_string()),
+        Task::Alone(options) => xtask::alone::run(&options)
+            .map(ended)
+            .map_err(|error| error.to_string()),
+        Task::Tidy => xtask::tidy::run().map(ended).map_err(|error| error.to_string()),
     };
     match done {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
+        Ok(Ending::Good) => ExitCode::SUCCESS,
+        Ok(Ending::Failed) => ExitCode::FAILURE,
+        Ok(Ending::Interrupted) => ExitCode::from(130),
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(2)

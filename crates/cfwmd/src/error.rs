@@ -3,61 +3,52 @@
 use fewbits_numerics::ArgumentError;
 use thiserror::Error;
 
-/// What a censoring sensor or its fusion centre refuses, or finds impossible.
+/// What a censoring sensor or its fusion centre refuses, or finds impossible. A failed step leaves the belief as it was.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument outside its range.
+    /// An argument out of range, or an observation that is impossible under the belief ([`fewbits_core::Error::Impossible`]).
     #[error(transparent)]
-    Argument(#[from] ArgumentError),
-    /// A particle belief that cannot be: what was heard is impossible for every particle.
-    #[error(transparent)]
-    Density(#[from] fewbits_densities::Error),
+    Core(#[from] fewbits_core::Error),
     /// A filter refused a step.
     #[error(transparent)]
-    Filter(#[from] fewbits_filters::Error),
+    Filter(fewbits_filters::Error),
     /// A model refused its parameters.
     #[error(transparent)]
     Model(#[from] fewbits_models::Error),
     /// The number of observations differs from the number of sensors.
-    #[error("{heard} observations were handed over: expected {sensors}, one a sensor")]
+    #[error("{observations} observations were handed over: expected {sensors}, one per sensor")]
     ObservationCount {
         /// Observations handed over.
-        heard: usize,
+        observations: usize,
         /// Sensors of the network.
         sensors: usize,
     },
-    /// A message names a sensor that does not exist.
-    #[error("a message came from sensor {sensor}: expected an index below {sensors}")]
+    /// A report names a sensor that does not exist.
+    #[error("a report came from sensor {sensor}: expected an index below {sensors}")]
     UnknownSensor {
-        /// Index in the message.
+        /// Index in the report.
         sensor: usize,
         /// Sensors of the network.
         sensors: usize,
     },
-    /// A sensor was heard twice in one step.
-    #[error("sensor {sensor} was heard twice in one step: expected at most one message a sensor and step")]
-    HeardTwice {
+    /// A sensor reported twice in one step.
+    #[error("sensor {sensor} reported twice in one step: expected at most one report per sensor and step")]
+    ReportedTwice {
         /// Index of the sensor.
         sensor: usize,
     },
-    /// A received value that the sensor, had it followed the rule, would have kept to itself.
+    /// A received value that the sensor, had it followed the rule, would not have sent.
     #[error(
         "sensor {sensor} sent a measurement with normalised innovation squared {statistic}: expected at least the threshold {threshold}"
     )]
     ProtocolViolation {
         /// Index of the sensor.
         sensor: usize,
-        /// `nu^T S^-1 nu` of what it sent.
+        /// `nu' S^-1 nu` of what it sent.
         statistic: f64,
         /// The threshold it should have reached.
         threshold: f64,
-    },
-    /// Silence where the sensor always sends and the link never loses.
-    #[error("sensor {sensor} was silent although its threshold is 0 and the link loses nothing: expected a message")]
-    ImpossibleSilence {
-        /// Index of the sensor.
-        sensor: usize,
     },
     /// A measurement that says nothing about the state (`s = r`), for which the divergence rule is undefined.
     #[error(
@@ -69,7 +60,32 @@ pub enum Error {
         /// `r`.
         noise_variance: f64,
     },
-    /// Everything heard has probability zero under the belief.
-    #[error("what was heard is impossible under the belief: expected a positive likelihood")]
-    Impossible,
+}
+
+impl Error {
+    /// An observation of probability zero under the belief.
+    pub const IMPOSSIBLE: Self = Self::Core(fewbits_core::Error::Impossible);
+}
+
+impl From<ArgumentError> for Error {
+    fn from(error: ArgumentError) -> Self {
+        Self::Core(error.into())
+    }
+}
+
+/// Unwraps what the filters only pass on, so that an impossible observation is one error whoever finds it.
+impl From<fewbits_filters::Error> for Error {
+    fn from(error: fewbits_filters::Error) -> Self {
+        match error {
+            fewbits_filters::Error::Core(error) => Self::Core(error),
+            fewbits_filters::Error::Argument(error) => error.into(),
+            other => Self::Filter(other),
+        }
+    }
+}
+
+impl From<fewbits_densities::Error> for Error {
+    fn from(error: fewbits_densities::Error) -> Self {
+        fewbits_filters::Error::from(error).into()
+    }
 }

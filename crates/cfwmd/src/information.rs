@@ -53,7 +53,7 @@ fn line(direction: Direction, s: f64, r: f64) -> Result<(f64, f64), Error> {
 /// Divergence, in nats, between the beliefs before and after a scalar Kalman update with this innovation.
 ///
 /// # Errors
-/// Variances that are not positive; [`Error::Uninformative`] for `s <= r`.
+/// If a variance is not positive; [`Error::Uninformative`] for `s <= r`.
 pub fn divergence(
     direction: Direction,
     innovation: f64,
@@ -85,10 +85,10 @@ pub fn equivalent_threshold(
 /// `J = (1 - [pi + a phi(a) - b phi(b)])/r + (phi(b) - phi(a))^2/(r pi)`, `a = (-c - mu)/sqrt r`, `b = (c - mu)/sqrt r`,
 /// `pi = Phi(b) - Phi(a)`.
 ///
-/// Between what the values alone give and `1/r`, that of a sensor that always speaks.
+/// Between what the values alone give and `1/r`, that of a sensor that always reports.
 ///
 /// # Errors
-/// A half-width that is negative, a noise variance that is not positive, an offset that is not finite.
+/// If the half-width is negative, the noise variance not positive or the offset not finite.
 pub fn fisher_information(mu: f64, half_width: f64, noise_variance: f64) -> Result<f64, Error> {
     finite("mu", mu)?;
     fewbits_numerics::error::non_negative("half_width", half_width)?;

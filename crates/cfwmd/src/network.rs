@@ -1,98 +1,66 @@
 //! A network of censoring sensors with feedback, as its fusion centre knows it.
 
 use crate::Error;
-use crate::assumed_density::{ScalarSilence, hear_scalar_silence, hear_silence};
-use crate::message::{Format, Report};
+use crate::censored::Censored;
 use crate::rule::CensoringRule;
-use crate::silence::check_loss;
-use fewbits_core::{Encoder, Gaussian, Observation};
-use fewbits_filters::kalman;
-use fewbits_models::LinearSensor;
+use crate::scheme::{Censoring, rule_under};
+use fewbits_core::{Gaussian, LinearSensing, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
+use fewbits_filters::{assumed_density, kalman};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, at_least_one};
-use nalgebra::{SMatrix, SVector};
+use fewbits_numerics::error::{all_finite, at_least_one, non_negative};
+use nalgebra::SVector;
+use rand::Rng;
 
-/// What the fusion centre knows of the network: the sensors, the threshold `eta` of all, and the loss rate of the links.
+/// What the fusion centre knows of the network: the sensors, the threshold `eta` of all, the links and how values travel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Network<const D: usize, const M: usize> {
-    sensors: Vec<LinearSensor<D, M>>,
+pub struct Network<S, const D: usize, const M: usize> {
+    sensors: Vec<S>,
     /// For each sensor the first one that is identical with it.
-    twin: Vec<usize>,
+    identical: Vec<usize>,
     threshold: f64,
-    loss: f64,
+    link: Link,
+    format: NumberFormat,
 }
 
 /// What a step of fusion learned.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct FusionInfo {
-    /// `ln p(all that was heard | heard before)`: densities of the values, probabilities of the silences. For the
+    /// `ln p(all observations | those of the past)`: densities of the values, probabilities of the silences. For the
     /// assumed-density filter an approximation, as its belief is.
     pub log_likelihood: f64,
     /// Number of values received.
     pub received: usize,
 }
 
-/// The sensor's half with feedback: compares its measurement with the broadcast prediction of it.
-///
-/// Cheap and free of allocation: one product with the factor of `S`, which is data-free in the linear case.
-#[derive(Debug, Clone)]
-pub struct CensoringSensor<const M: usize> {
-    /// The rule of this step.
-    pub rule: CensoringRule<M>,
-    /// How its values travel.
-    pub format: Format,
-}
-
-impl<const M: usize> Encoder for CensoringSensor<M> {
-    type Measurement = SVector<f64, M>;
-    /// The prediction of this sensor's measurement, as the fusion centre broadcast it: if the broadcast is rounded, both
-    /// sides must use the rounded one.
-    type Feedback = SVector<f64, M>;
-    type Message = Report<M>;
-
-    fn encode(&self, measurement: &SVector<f64, M>, prediction: &SVector<f64, M>) -> Report<M> {
-        let rounded = measurement.map(|z| self.format.rounded(z));
-        if self.rule.speaks(&(rounded - prediction)) {
-            Report::Value(rounded)
-        } else {
-            Report::Silence
-        }
-    }
-}
-
-impl<const D: usize, const M: usize> Network<D, M> {
-    /// A network of at least one sensor with threshold `eta >= 0` and loss in `[0, 1)`.
+impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
+    /// A network of at least one sensor with threshold `eta >= 0`; values travel in double precision.
     ///
     /// # Errors
-    /// Arguments out of range.
-    pub fn new(sensors: Vec<LinearSensor<D, M>>, threshold: f64, loss: f64) -> Result<Self, Error> {
+    /// If there is no sensor or the threshold is negative.
+    pub fn new(sensors: Vec<S>, threshold: f64, link: Link) -> Result<Self, Error> {
         at_least_one("sensors", sensors.len())?;
-        fewbits_numerics::error::non_negative("threshold", threshold)?;
-        check_loss(loss)?;
-        let twin = (0..sensors.len())
+        let identical = (0..sensors.len())
             .map(|i| sensors.iter().position(|s| *s == sensors[i]).unwrap_or(i))
             .collect();
         Ok(Self {
             sensors,
-            twin,
-            threshold,
-            loss,
+            identical,
+            threshold: non_negative("threshold", threshold)?,
+            link,
+            format: NumberFormat::Double,
         })
     }
 
+    /// The same network with values in another format.
+    #[must_use]
+    pub fn with_format(self, format: NumberFormat) -> Self {
+        Self { format, ..self }
+    }
+
     /// The sensors.
-    pub fn sensors(&self) -> &[LinearSensor<D, M>] {
+    pub fn sensors(&self) -> &[S] {
         &self.sensors
-    }
-
-    /// Number of sensors.
-    pub fn len(&self) -> usize {
-        self.sensors.len()
-    }
-
-    /// Never true: a network has at least one sensor.
-    pub fn is_empty(&self) -> bool {
-        self.sensors.is_empty()
     }
 
     /// `eta`.
@@ -100,150 +68,180 @@ impl<const D: usize, const M: usize> Network<D, M> {
         self.threshold
     }
 
-    /// Probability that a message that is sent does not arrive.
-    pub fn loss(&self) -> f64 {
-        self.loss
+    /// What is known of the links.
+    pub fn link(&self) -> &Link {
+        &self.link
     }
 
-    /// The first sensor that is identical with sensor `i`; identical sensors share evaluations.
-    pub fn twin(&self, i: usize) -> usize {
-        self.twin[i]
-    }
-
-    /// The rule of sensor `i` weighed with `S = R + H P H'`, `P` the fusion centre's (or a scheduled) predicted covariance.
+    /// The rule of sensor `i` weighed with `S = R + H P H'`, `P` the fusion centre's (or a scheduled) predicted covariance and
+    /// `H` the Jacobian at the prediction.
     ///
     /// # Errors
-    /// An unknown sensor; a covariance that is not finite or not positive semidefinite.
-    pub fn rule_under(&self, i: usize, predicted: &SMatrix<f64, D, D>) -> Result<CensoringRule<M>, Error> {
-        let sensor = self.sensors.get(i).ok_or(Error::UnknownSensor {
-            sensor: i,
-            sensors: self.len(),
-        })?;
-        let innovation = sensor.matrix() * predicted * sensor.matrix().transpose() + sensor.noise_covariance();
-        CensoringRule::new(&fewbits_numerics::linalg::symmetrised(&innovation), self.threshold)
+    /// [`Error::UnknownSensor`]; if `S` is not positive definite.
+    pub fn rule_under(&self, i: usize, predicted: &Gaussian<D>) -> Result<CensoringRule<M>, Error> {
+        let sensors = self.sensors.len();
+        let sensor = self.sensors.get(i).ok_or(Error::UnknownSensor { sensor: i, sensors })?;
+        rule_under(sensor, predicted, self.threshold)
     }
 
-    /// Checks that what was heard can have come from this network under these rules and this broadcast.
+    /// [`Network::rule_under`] for every sensor.
     ///
     /// # Errors
-    /// [`Error::ObservationCount`], values that are not finite, [`Error::ProtocolViolation`], [`Error::ImpossibleSilence`].
-    pub fn audit(
+    /// As there.
+    pub fn rules_under(&self, predicted: &Gaussian<D>) -> Result<Vec<CensoringRule<M>>, Error> {
+        (0..self.sensors.len()).map(|i| self.rule_under(i, predicted)).collect()
+    }
+
+    /// Sensor `i` in a slot with this rule.
+    fn scheme(&self, i: usize, rule: &CensoringRule<M>) -> Result<Censoring<S, D, M>, Error> {
+        Censoring::new(self.sensors[i].clone(), rule.clone(), self.format)
+    }
+
+    /// One slot of all sensors: each compares its measurement with the broadcast, and what it sends crosses its link. Returns
+    /// what arrives and how many reports were sent.
+    ///
+    /// # Errors
+    /// If the numbers of rules or measurements are wrong or a number is not finite.
+    pub fn transmit<R: Rng + ?Sized>(
         &self,
+        rng: &mut R,
         rules: &[CensoringRule<M>],
         broadcast: &SVector<f64, D>,
-        heard: &[Observation<SVector<f64, M>>],
-    ) -> Result<(), Error> {
-        if heard.len() != self.len() {
-            return Err(Error::ObservationCount {
-                heard: heard.len(),
-                sensors: self.len(),
-            });
+        measurements: &[SVector<f64, M>],
+    ) -> Result<(Vec<Observation<SVector<f64, M>>>, usize), Error> {
+        self.count(rules.len(), measurements.len())?;
+        let mut sent = 0;
+        let observations = (0..self.sensors.len()).map(|i| {
+            let scheme = self.scheme(i, &rules[i])?;
+            let report = scheme.encode(rng, &mut (), &measurements[i], broadcast)?;
+            sent += usize::from(report.is_some());
+            let arrived = self.link.transmit(rng, report.as_ref(), &self.format);
+            arrived.map_err(|e| ArgumentError::new("report", e.to_string(), "a message of its format").into())
+        });
+        Ok((observations.collect::<Result<_, Error>>()?, sent))
+    }
+
+    fn count(&self, rules: usize, observations: usize) -> Result<(), Error> {
+        let sensors = self.sensors.len();
+        if rules != sensors {
+            return Err(ArgumentError::new("rules", rules, format!("{sensors} rules, one per sensor")).into());
         }
-        if rules.len() != self.len() {
-            return Err(ArgumentError::new("rules", rules.len(), format!("{} rules, one a sensor", self.len())).into());
-        }
-        all_finite("broadcast", broadcast.as_slice())?;
-        for (i, (observation, rule)) in heard.iter().zip(rules).enumerate() {
-            match observation {
-                Observation::Received(value) => {
-                    all_finite("measurement", value.as_slice())?;
-                    rule.audit(i, &(value - self.sensors[i].matrix() * broadcast))?;
-                }
-                Observation::Silent if rule.threshold() == 0.0 && self.loss == 0.0 => {
-                    return Err(Error::ImpossibleSilence { sensor: i });
-                }
-                Observation::Silent | Observation::Lost => {}
-            }
+        if observations != sensors {
+            return Err(Error::ObservationCount { observations, sensors });
         }
         Ok(())
     }
 
+    /// What was observed, as a likelihood for particle and grid filters: one entry per group of identical scalar sensors that
+    /// sent a value, one per group that is silent under the same rule, one per sensor otherwise.
+    ///
+    /// # Errors
+    /// If the numbers of rules or observations are wrong, a number is not finite, or a value violates its rule.
+    pub fn likelihood(
+        &self,
+        rules: &[CensoringRule<M>],
+        broadcast: &SVector<f64, D>,
+        observations: &[Observation<SVector<f64, M>>],
+    ) -> Result<Vec<Observed<S, Censored<M>, M>>, Error> {
+        self.count(rules.len(), observations.len())?;
+        let plain = !matches!(self.format, NumberFormat::Fixed(_));
+        let mut all = Vec::new();
+        for (i, observation) in observations.iter().enumerate() {
+            let mut push = |factor| all.push(Observed::new(self.sensors[i].clone(), factor));
+            if let Observation::Received(value) = observation {
+                let single = self.scheme(i, &rules[i])?.received(i, broadcast, value, &self.link)?;
+                if !(M == 1 && plain) {
+                    push(single);
+                }
+            }
+            if M == 1 && plain && self.identical[i] == i {
+                let like = |j: usize| self.identical[j] == i;
+                let received = |j: usize| observations[j].received().filter(|_| like(j)).copied();
+                let values: Vec<_> = (i..observations.len()).filter_map(received).collect();
+                if !values.is_empty() {
+                    let noise = self.sensors[i].noise_covariance_at(broadcast);
+                    push(Censored::values(&values, &noise, 1.0 - self.link.loss())?);
+                }
+            }
+            let count = self.silent_together(rules, observations, i);
+            if count > 0 {
+                push(self.scheme(i, &rules[i])?.silence(broadcast, &self.link, count)?);
+            }
+        }
+        Ok(all)
+    }
+
+    /// How many silent sensors share the factor of sensor `i`: itself and, for scalar measurements, later identical ones under
+    /// the same rule; none if it reported or an earlier one shares its own factor with it.
+    fn silent_together(
+        &self,
+        rules: &[CensoringRule<M>],
+        observations: &[Observation<SVector<f64, M>>],
+        i: usize,
+    ) -> usize {
+        let silent = |j: usize| matches!(observations[j], Observation::Nothing);
+        let alike = |j: usize| silent(j) && self.identical[j] == self.identical[i] && rules[j] == rules[i];
+        match (silent(i), M) {
+            (false, _) => 0,
+            (true, 1) if (0..i).any(alike) => 0,
+            (true, 1) => (i..self.sensors.len()).filter(|j| alike(*j)).count(),
+            (true, _) => 1,
+        }
+    }
+}
+
+impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
     /// One update of the Gaussian fusion centre: values, then silences. `broadcast` is the state prediction that the sensors
     /// compared with; without rounding it is the mean of `predicted`.
     ///
-    /// Identical scalar sensors are heard together and exactly; distinct or vector ones one after the other.
+    /// Identical silent scalar sensors are fused together and exactly; distinct or vector ones one after the other.
     ///
     /// # Errors
-    /// As [`audit`](Self::audit); the belief handed in is untouched.
+    /// As [`Network::likelihood`]; [`fewbits_core::Error::Impossible`] if the observations have probability zero.
     pub fn fuse(
         &self,
         predicted: &Gaussian<D>,
         rules: &[CensoringRule<M>],
         broadcast: &SVector<f64, D>,
-        heard: &[Observation<SVector<f64, M>>],
+        observations: &[Observation<SVector<f64, M>>],
     ) -> Result<(Gaussian<D>, FusionInfo), Error> {
-        self.audit(rules, broadcast, heard)?;
-        let (mut belief, mut info) = self.fuse_values(predicted, heard)?;
-        for (i, sensor) in self.sensors.iter().enumerate() {
-            let count = self.heard_together(rules, heard, i);
-            if count == 0 {
-                continue;
+        self.count(rules.len(), observations.len())?;
+        let (mut belief, mut info) = (*predicted, FusionInfo::default());
+        let mut update = |belief: &mut Gaussian<D>, i: usize, factor: Censored<M>| -> Result<(), Error> {
+            let (next, step) = assumed_density::update(belief, self.sensors[i].matrix(), &factor)?;
+            *belief = next;
+            info.log_likelihood += step.log_likelihood;
+            Ok(())
+        };
+        for (i, observation) in observations.iter().enumerate() {
+            if let Observation::Received(value) = observation {
+                let factor = self.scheme(i, &rules[i])?.received(i, broadcast, value, &self.link)?;
+                update(&mut belief, i, factor)?;
             }
-            let prediction = sensor.matrix() * broadcast;
-            let (next, log_likelihood) = if M == 1 {
-                let silence = ScalarSilence {
-                    centre: prediction[0],
-                    half_width: rules[i].first_half_width(),
-                    noise_variance: sensor.noise_covariance()[(0, 0)],
-                    loss: self.loss,
-                    count,
-                };
-                hear_scalar_silence(&belief, &sensor.matrix().row(0).transpose(), &silence)?
-            } else {
-                hear_silence(&belief, sensor, &rules[i], &prediction, self.loss)?
-            };
-            belief = next;
-            info.log_likelihood += log_likelihood;
         }
+        for i in 0..self.sensors.len() {
+            let count = self.silent_together(rules, observations, i);
+            if count > 0 {
+                update(&mut belief, i, self.scheme(i, &rules[i])?.silence(broadcast, &self.link, count)?)?;
+            }
+        }
+        info.received = observations.iter().filter(|o| o.received().is_some()).count();
         Ok((belief, info))
     }
 
-    /// How many silent sensors are heard in the name of sensor `i`: itself and, for scalar measurements, its later twins under
-    /// the same rule; none if it spoke or an earlier twin stands for it.
-    pub(crate) fn heard_together(
-        &self,
-        rules: &[CensoringRule<M>],
-        heard: &[Observation<SVector<f64, M>>],
-        i: usize,
-    ) -> usize {
-        let alike = |j: usize| {
-            self.twin[j] == self.twin[i]
-                && heard[j] == Observation::Silent
-                && rules[j].first_half_width() == rules[i].first_half_width()
-        };
-        if heard[i] != Observation::Silent {
-            0
-        } else if M > 1 {
-            1
-        } else if (0..i).any(alike) {
-            0
-        } else {
-            (i..self.len()).filter(|j| alike(*j)).count()
-        }
-    }
-
-    /// The baseline (the paper's CFoMD, and all-send and random censoring): a Kalman filter on what was received, deaf to
-    /// silence.
+    /// The baseline (the paper's CFoMD, and all-send and random censoring): a Kalman filter on what was received, to which
+    /// silence says nothing.
     ///
     /// # Errors
-    /// [`Error::ObservationCount`], values that are not finite.
-    pub fn fuse_values(
+    /// [`Error::ObservationCount`]; if a value is not finite.
+    pub fn fuse_received(
         &self,
         predicted: &Gaussian<D>,
-        heard: &[Observation<SVector<f64, M>>],
+        observations: &[Observation<SVector<f64, M>>],
     ) -> Result<(Gaussian<D>, FusionInfo), Error> {
-        if heard.len() != self.len() {
-            return Err(Error::ObservationCount {
-                heard: heard.len(),
-                sensors: self.len(),
-            });
-        }
-        let mut belief = *predicted;
-        let mut info = FusionInfo {
-            log_likelihood: 0.0,
-            received: 0,
-        };
-        for (sensor, observation) in self.sensors.iter().zip(heard) {
+        self.count(self.sensors.len(), observations.len())?;
+        let (mut belief, mut info) = (*predicted, FusionInfo::default());
+        for (sensor, observation) in self.sensors.iter().zip(observations) {
             if let Observation::Received(value) = observation {
                 let (next, update) = kalman::update(sensor, &belief, value)?;
                 belief = next;
@@ -253,4 +251,24 @@ impl<const D: usize, const M: usize> Network<D, M> {
         }
         Ok((belief, info))
     }
+}
+
+/// Sorts the reports of one step by sensor: from whoever is not among them nothing arrived.
+///
+/// # Errors
+/// [`Error::UnknownSensor`], [`Error::ReportedTwice`]; if a value is not finite.
+pub fn gather<const M: usize>(
+    sensors: usize,
+    reports: impl IntoIterator<Item = (usize, SVector<f64, M>)>,
+) -> Result<Vec<Observation<SVector<f64, M>>>, Error> {
+    let mut observations = vec![Observation::Nothing; sensors];
+    for (sensor, value) in reports {
+        let slot = observations.get_mut(sensor).ok_or(Error::UnknownSensor { sensor, sensors })?;
+        if slot.received().is_some() {
+            return Err(Error::ReportedTwice { sensor });
+        }
+        all_finite("report", value.as_slice())?;
+        *slot = Observation::Received(value);
+    }
+    Ok(observations)
 }

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::ellipsoid::Ellipsoid;
-use fewbits_core::{Gaussian, GaussianDynamics, Sensing};
+use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics, Sensing};
 use fewbits_filters::extended_kalman;
 use fewbits_numerics::error::positive;
 use nalgebra::{SMatrix, SVector};
@@ -28,22 +28,36 @@ pub enum Weighing {
 ///
 /// For the measurement of a scalar sensor this is also the rule that sends whatever moves the posterior far in
 /// Kullback-Leibler divergence; see [`information`](crate::information).
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Ellipsoid<M>", into = "Ellipsoid<M>")]
 pub struct CensoringRule<const M: usize> {
     region: Ellipsoid<M>,
+    /// `sqrt(eta S_11)`.
     half_width: f64,
+}
+
+impl<const M: usize> From<CensoringRule<M>> for Ellipsoid<M> {
+    fn from(rule: CensoringRule<M>) -> Self {
+        rule.region
+    }
+}
+
+impl<const M: usize> From<Ellipsoid<M>> for CensoringRule<M> {
+    fn from(region: Ellipsoid<M>) -> Self {
+        Self {
+            half_width: (region.threshold() * region.innovation_covariance()[(0, 0)]).sqrt(),
+            region,
+        }
+    }
 }
 
 impl<const M: usize> CensoringRule<M> {
     /// The rule with innovation covariance `S` (positive definite) and threshold `eta >= 0`.
     ///
     /// # Errors
-    /// `S` not positive definite, a negative threshold.
+    /// If `S` is not positive definite or the threshold negative.
     pub fn new(innovation_covariance: &SMatrix<f64, M, M>, threshold: f64) -> Result<Self, Error> {
-        Ok(Self {
-            region: Ellipsoid::new(innovation_covariance, threshold)?,
-            half_width: (threshold * innovation_covariance[(0, 0)]).sqrt(),
-        })
+        Ok(Ellipsoid::new(innovation_covariance, threshold)?.into())
     }
 
     /// `eta`.
@@ -62,9 +76,9 @@ impl<const M: usize> CensoringRule<M> {
         self.region.statistic(innovation)
     }
 
-    /// Whether a sensor with this innovation speaks.
+    /// Whether a sensor with this innovation reports.
     #[inline]
-    pub fn speaks(&self, innovation: &SVector<f64, M>) -> bool {
+    pub fn sends(&self, innovation: &SVector<f64, M>) -> bool {
         if M == 1 {
             // The fusion centre works with this very interval.
             innovation[0].abs() >= self.half_width
@@ -73,13 +87,18 @@ impl<const M: usize> CensoringRule<M> {
         }
     }
 
-    /// Refuses a received measurement that the rule would have kept silent; rounding of the order 1e-9 is forgiven.
+    /// Refuses an innovation that the rule would not have sent; rounding of 1e-9 relative is forgiven, and up to
+    /// `rounding` in each component (how far the format moved it).
     ///
     /// # Errors
     /// [`Error::ProtocolViolation`] naming `sensor`.
-    pub fn audit(&self, sensor: usize, innovation: &SVector<f64, M>) -> Result<(), Error> {
+    pub fn check(&self, sensor: usize, innovation: &SVector<f64, M>, rounding: &SVector<f64, M>) -> Result<(), Error> {
         let statistic = self.statistic(innovation);
-        if statistic < self.threshold() * (1.0 - 1e-9) {
+        let slack: f64 = (0..M)
+            .filter(|j| rounding[*j] > 0.0)
+            .map(|j| self.statistic(&SVector::from_fn(|i, _| if i == j { rounding[j] } else { 0.0 })).sqrt())
+            .sum();
+        if (statistic.sqrt() + slack).powi(2) < self.threshold() * (1.0 - 1e-9) {
             return Err(Error::ProtocolViolation {
                 sensor,
                 statistic,
@@ -88,17 +107,18 @@ impl<const M: usize> CensoringRule<M> {
         }
         Ok(())
     }
-}
 
-impl<const M: usize> CensoringRule<M> {
-    /// `sqrt(eta S_11)`: half the width of the region of silence along the first axis through its centre.
-    pub(crate) fn first_half_width(&self) -> f64 {
-        self.half_width
+    /// Ends of the interval of silence about a prediction of the first component.
+    pub(crate) fn interval(&self, prediction: f64) -> (f64, f64) {
+        (prediction - self.half_width, prediction + self.half_width)
     }
 }
 
 impl CensoringRule<1> {
     /// `c = sqrt(eta s)`: a silent innovation lies in `(-c, c)`.
+    ///
+    /// The root covers `eta s` only; the paper's printed formulas let it cover the offset `mu` of the prediction too, which is
+    /// NaN for `mu > eta s` (erratum `cfwmd-1`).
     pub fn half_width(&self) -> f64 {
         self.half_width
     }
@@ -106,7 +126,7 @@ impl CensoringRule<1> {
     /// The rule with innovation variance `s`.
     ///
     /// # Errors
-    /// `s` not positive, a negative threshold.
+    /// If `s` is not positive or the threshold negative.
     pub fn scalar(innovation_variance: f64, threshold: f64) -> Result<Self, Error> {
         positive("innovation_variance", innovation_variance)?;
         Self::new(&SMatrix::from([[innovation_variance]]), threshold)
@@ -118,7 +138,7 @@ impl<const M: usize> CensoringRule<M> {
     /// the belief's mean and the sensing at its prediction.
     ///
     /// # Errors
-    /// `S` not positive definite, a negative threshold.
+    /// If `S` is not positive definite or the threshold negative.
     pub fn under<const D: usize>(
         dynamics: &impl GaussianDynamics<D>,
         sensing: &impl Sensing<D, M>,
@@ -140,9 +160,22 @@ impl<const M: usize> CensoringRule<M> {
 /// S = H P H' + R,  H the Jacobian at the prediction
 /// P = P - P H' S^-1 H P
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Gaussian<D>", into = "Gaussian<D>")]
 pub struct OwnRecursion<const D: usize> {
     covariance: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> From<Gaussian<D>> for OwnRecursion<D> {
+    fn from(start: Gaussian<D>) -> Self {
+        Self::new(&start)
+    }
+}
+
+impl<const D: usize> From<OwnRecursion<D>> for Gaussian<D> {
+    fn from(recursion: OwnRecursion<D>) -> Self {
+        Self::from_trusted_parts(SVector::zeros(), recursion.covariance)
+    }
 }
 
 /// What one step of [`OwnRecursion`] gives.
@@ -172,7 +205,7 @@ impl<const D: usize> OwnRecursion<D> {
     /// One step. `estimate` is the state the models are linearised about, of the step before; linear models ignore it.
     ///
     /// # Errors
-    /// An innovation covariance that is not positive definite.
+    /// If an innovation covariance is not positive definite.
     pub fn advance<const M: usize>(
         &mut self,
         dynamics: &impl GaussianDynamics<D>,
@@ -198,14 +231,14 @@ impl<const D: usize> OwnRecursion<D> {
 /// All sensors share the start: the recursion begins with `F P0 F' + Q`, not with `Q` alone unless the start is known exactly
 /// (erratum `cfwmd-5`).
 pub fn cross_covariance_step<const D: usize, const M: usize>(
-    dynamics: &impl GaussianDynamics<D>,
+    dynamics: &impl LinearDynamics<D>,
     cross: &SMatrix<f64, D, D>,
     first: (&OwnStep<D, M>, &SMatrix<f64, M, D>),
     second: (&OwnStep<D, M>, &SMatrix<f64, M, D>),
 ) -> SMatrix<f64, D, D> {
     let keep =
         |(step, matrix): (&OwnStep<D, M>, &SMatrix<f64, M, D>)| SMatrix::<f64, D, D>::identity() - step.gain * matrix;
-    let transition = dynamics.jacobian(&SVector::zeros());
+    let transition = dynamics.transition();
     let after = keep(first) * cross * keep(second).transpose();
     transition * after * transition.transpose() + dynamics.noise_covariance()
 }

@@ -4,20 +4,36 @@ use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::normal;
-use statrs::function::gamma::{checked_gamma_ur, ln_gamma};
+use serde::{Deserialize, Serialize};
 
-/// How often the network may speak: `messages` a step on average, from `sensors` sensors (the paper's `l` of `N`).
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// How often the network may report: `messages` per step on average, from `sensors` sensors (the paper's `l` of `N`).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers")]
 pub struct Budget {
     messages: f64,
     sensors: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    messages: f64,
+    sensors: usize,
+}
+
+impl TryFrom<Numbers> for Budget {
+    type Error = Error;
+
+    fn try_from(numbers: Numbers) -> Result<Self, Error> {
+        Self::new(numbers.messages, numbers.sensors)
+    }
 }
 
 impl Budget {
     /// A budget of `messages` in `(0, sensors]`.
     ///
     /// # Errors
-    /// No sensor, or a budget outside the range.
+    /// If there is no sensor, or the budget is outside the range.
     pub fn new(messages: f64, sensors: usize) -> Result<Self, Error> {
         at_least_one("sensors", sensors)?;
         if messages > 0.0 && messages <= sensors as f64 {
@@ -27,7 +43,7 @@ impl Budget {
         }
     }
 
-    /// Messages a step.
+    /// Messages per step.
     pub fn messages(&self) -> f64 {
         self.messages
     }
@@ -37,7 +53,7 @@ impl Budget {
         self.sensors
     }
 
-    /// Probability `l/N` that one sensor speaks.
+    /// Probability `l/N` that one sensor reports.
     pub fn rate(&self) -> f64 {
         self.messages / self.sensors as f64
     }
@@ -45,7 +61,7 @@ impl Budget {
     /// The threshold `eta` of a normalised innovation squared with `dimension` degrees of freedom.
     ///
     /// # Errors
-    /// A dimension of zero.
+    /// If `dimension` is zero.
     pub fn threshold(&self, dimension: usize) -> Result<f64, Error> {
         threshold(self.rate(), dimension)
     }
@@ -53,10 +69,10 @@ impl Budget {
 
 /// The `eta` that a chi-square variable of `dimension` degrees of freedom reaches with probability `rate`.
 ///
-/// One degree: `(Phi^-1(rate/2))^2`. Two: `-2 ln rate`. More: Newton steps on the regularised incomplete gamma function.
+/// One degree: `(Phi^-1(rate/2))^2`. Two: `-2 ln rate`. More: Newton steps on [`chi_square_upper_tail`].
 ///
 /// # Errors
-/// A rate outside `(0, 1]`, a dimension of zero.
+/// If `rate` is outside `(0, 1]` or `dimension` is zero.
 pub fn threshold(rate: f64, dimension: usize) -> Result<f64, Error> {
     if !(rate > 0.0 && rate <= 1.0) {
         return Err(ArgumentError::new("rate", rate, "a probability in (0, 1]").into());
@@ -66,42 +82,57 @@ pub fn threshold(rate: f64, dimension: usize) -> Result<f64, Error> {
         _ if rate == 1.0 => 0.0,
         1 => normal::quantile(0.5 * rate).powi(2),
         2 => -2.0 * rate.ln(),
-        _ => chi_square_upper_quantile(rate, dimension)?,
+        _ => chi_square_upper_quantile(rate, dimension),
     })
 }
 
-/// Bracketing, then Newton steps on `ln P(chi^2 > x)` kept inside the bracket.
-fn chi_square_upper_quantile(rate: f64, dimension: usize) -> Result<f64, Error> {
-    let shape = 0.5 * dimension as f64;
-    let upper = |x: f64| {
-        checked_gamma_ur(shape, 0.5 * x).map_err(|e| ArgumentError::new("rate", rate, format!("a solvable rate ({e})")))
+/// `P(chi^2 > x)` and its density at `x > 0`: finite sums of positive terms,
+///
+/// `P(n + 2 degrees) = P(n degrees) + (x/2)^(n/2) exp(-x/2) / Gamma(n/2 + 1)`, from `2 Phi(-sqrt x)` at one degree and
+/// `exp(-x/2)` at two.
+fn chi_square_upper_tail(x: f64, dimension: usize) -> (f64, f64) {
+    let half = 0.5 * x;
+    // The density at the first number of degrees, then at two more each time.
+    let (mut tail, mut density, mut degrees) = if dimension % 2 == 1 {
+        (2.0 * normal::cdf(-x.sqrt()), normal::pdf(x.sqrt()) / x.sqrt(), 1)
+    } else {
+        ((-half).exp(), 0.5 * (-half).exp(), 2)
     };
-    let log_density = |x: f64| (shape - 1.0) * (0.5 * x).ln() - 0.5 * x - ln_gamma(shape) - std::f64::consts::LN_2;
+    while degrees < dimension {
+        density *= x / degrees as f64;
+        tail += 2.0 * density;
+        degrees += 2;
+    }
+    (tail, density)
+}
+
+/// Bracketing, then Newton steps on `ln P(chi^2 > x)` kept inside the bracket.
+fn chi_square_upper_quantile(rate: f64, dimension: usize) -> f64 {
     let (mut low, mut high) = (0.0, dimension as f64);
-    while upper(high)? > rate {
+    while chi_square_upper_tail(high, dimension).0 > rate {
         low = high;
         high *= 2.0;
     }
     let mut x = 0.5 * (low + high);
     for _ in 0..200 {
-        let p = upper(x)?;
+        let (p, density) = chi_square_upper_tail(x, dimension);
         if p > rate {
             low = x
         } else {
             high = x
         }
-        let step = x + (p.ln() - rate.ln()) * p / log_density(x).exp();
+        let step = x + (p.ln() - rate.ln()) * p / density;
         let next = if step > low && step < high {
             step
         } else {
             0.5 * (low + high)
         };
         if (next - x).abs() <= 1e-15 * x {
-            return Ok(next);
+            return next;
         }
         x = next;
     }
-    Ok(x)
+    x
 }
 
 #[cfg(test)]
@@ -111,7 +142,7 @@ mod tests {
 
     #[test]
     fn every_dimension_inverts_the_upper_tail() {
-        for dimension in 1..8 {
+        for dimension in (1..8).chain([33, 80]) {
             for rate in [1e-9, 0.01, 0.25, 0.5, 0.9, 0.999_999] {
                 let eta = threshold(rate, dimension).unwrap();
                 let back = gamma_ur(0.5 * dimension as f64, 0.5 * eta);
@@ -133,6 +164,7 @@ mod tests {
             assert!(Budget::new(messages, 4).is_err());
         }
         assert!(Budget::new(1.0, 0).is_err());
+        assert!(serde_json::from_str::<Budget>(r#"{"messages":5.0,"sensors":4}"#).is_err());
         assert!(threshold(0.5, 0).is_err());
     }
 }

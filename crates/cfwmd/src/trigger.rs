@@ -1,26 +1,44 @@
 //! A random trigger that keeps the belief Gaussian.
 
 use crate::Error;
-use fewbits_models::{LinearSensor, ScalarSensor};
+use fewbits_core::factor::{Tilted, Value};
+use fewbits_core::{Columns, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::positive;
+use fewbits_numerics::error::{finite, positive};
+use nalgebra::SVector;
 use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
 
 /// Sends with probability `1 - exp(-nu^2 Y/2)` (Han and others 2015).
 ///
 /// The probability of silence is a Gaussian function of the innovation, so silence is a measurement `nu = 0` with noise
-/// variance `r + 1/Y`, and the Kalman filter stays exact. The price is paid in information: at equal rate the error is larger
-/// than with a deterministic threshold whose silence is fused.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// variance `r + 1/Y`, and over a perfect link the Kalman filter stays exact. The price is paid in information: at equal rate
+/// the error is larger than with a deterministic threshold whose silence is fused.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers")]
 pub struct StochasticTrigger {
     precision: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    precision: f64,
+}
+
+impl TryFrom<Numbers> for StochasticTrigger {
+    type Error = Error;
+
+    fn try_from(numbers: Numbers) -> Result<Self, Error> {
+        Self::new(numbers.precision)
+    }
 }
 
 impl StochasticTrigger {
     /// The trigger with precision `Y > 0` (inverse measurement units squared).
     ///
     /// # Errors
-    /// A precision that is not positive.
+    /// If the precision is not positive.
     pub fn new(precision: f64) -> Result<Self, Error> {
         Ok(Self {
             precision: positive("precision", precision)?,
@@ -30,7 +48,7 @@ impl StochasticTrigger {
     /// The trigger that sends innovations `N(0, s)` with probability `rate`: `Y = ((1 - rate)^-2 - 1)/s`.
     ///
     /// # Errors
-    /// A rate outside `(0, 1)`, a variance that is not positive.
+    /// If the rate is outside `(0, 1)` or the variance not positive.
     pub fn for_rate(rate: f64, innovation_variance: f64) -> Result<Self, Error> {
         if !(rate > 0.0 && rate < 1.0) {
             return Err(ArgumentError::new("rate", rate, "a probability in (0, 1), both ends excluded").into());
@@ -45,22 +63,131 @@ impl StochasticTrigger {
         self.precision
     }
 
-    /// Probability that a sensor with this innovation speaks.
+    /// Probability that a sensor with this innovation reports.
     pub fn probability(&self, innovation: f64) -> f64 {
         -(-0.5 * innovation * innovation * self.precision).exp_m1()
     }
+}
 
-    /// Whether it speaks this time.
-    pub fn speaks<R: Rng + ?Sized>(&self, rng: &mut R, innovation: f64) -> bool {
-        rng.random::<f64>() < self.probability(innovation)
+/// A sensor of scalar measurements with a [`StochasticTrigger`], told the state prediction of the fusion centre. Values travel in
+/// double precision.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Triggered<S, const D: usize> {
+    /// The sensor.
+    pub sensing: S,
+    /// Its trigger.
+    pub trigger: StochasticTrigger,
+}
+
+/// What a triggered sensor's report or silence says: `floor + exp(log_share) N(centre; m, variance)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bump {
+    value: Value<1>,
+    log_share: f64,
+    floor: f64,
+}
+
+impl Bump {
+    fn mixed(&self, log_peak: f64) -> f64 {
+        if self.floor == 0.0 {
+            log_peak
+        } else {
+            (self.floor + log_peak.exp()).ln()
+        }
+    }
+}
+
+impl Factor<1> for Bump {
+    fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
+        self.mixed(self.log_share + self.value.log_likelihood(m))
     }
 
-    /// The sensor whose measurement of exactly the prediction is what silence says: noise variance `r + 1/Y`.
-    ///
-    /// # Errors
-    /// None for a sensor that was accepted once.
-    pub fn silent_sensor<const D: usize>(&self, sensor: &ScalarSensor<D>) -> Result<ScalarSensor<D>, Error> {
-        Ok(LinearSensor::scalar(sensor.direction(), sensor.noise_variance() + 1.0 / self.precision)?)
+    fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        for (log_weight, m) in log_weights.iter_mut().zip(means[0]) {
+            *log_weight += self.log_likelihood(&[*m].into());
+        }
+    }
+
+    /// The mixture of the prior, by the weight of the floor, and of the Kalman update.
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, fewbits_core::Error> {
+        let inside = self.value.tilted(prior)?;
+        let log_evidence = self.mixed(self.log_share + inside.log_evidence);
+        if log_evidence == f64::NEG_INFINITY {
+            return Err(fewbits_core::Error::Impossible);
+        }
+        let weight = if self.floor == 0.0 {
+            1.0
+        } else {
+            (self.log_share + inside.log_evidence - log_evidence).exp()
+        };
+        let step = inside.mean - prior.mean();
+        Ok(Tilted {
+            log_evidence,
+            mean: prior.mean() + step * weight,
+            covariance: (prior.covariance() + step * step * weight) * (1.0 - weight) + inside.covariance * weight,
+        })
+    }
+}
+
+impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
+    type State = ();
+    /// The state prediction of the fusion centre.
+    type Feedback = SVector<f64, D>;
+    type Report = f64;
+    type Factor = Bump;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn report_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        (): &mut (),
+        measurement: &SVector<f64, 1>,
+        broadcast: &SVector<f64, D>,
+    ) -> Result<Option<f64>, fewbits_core::Error> {
+        let z = finite("measurement", measurement[0])?;
+        let innovation = finite("innovation", z - self.sensing.mean(broadcast)[0])?;
+        Ok((rng.random::<f64>() < self.trigger.probability(innovation)).then_some(z))
+    }
+
+    /// Silence: `E exp(-(m + n - prediction)^2 Y/2) = sqrt(2 pi/Y) N(prediction; m, r + 1/Y)`. An erased report has the
+    /// factor 1.
+    fn factor(
+        &self,
+        broadcast: &SVector<f64, D>,
+        observation: &Observation<f64>,
+        link: &Link,
+    ) -> Result<Bump, fewbits_core::Error> {
+        let (prediction, r) = (self.sensing.mean(broadcast)[0], self.sensing.noise_covariance_at(broadcast)[0]);
+        let (arrival, y) = ((1.0 - link.loss()).ln(), self.trigger.precision);
+        Ok(match observation {
+            Observation::Received(z) => {
+                fewbits_numerics::error::within("crossover", link.crossover(), 0.0, 0.0)?;
+                Bump {
+                    value: Value::scalar(*z, r)?,
+                    log_share: arrival + self.trigger.probability(z - prediction).ln(),
+                    floor: 0.0,
+                }
+            }
+            Observation::Nothing => Bump {
+                value: Value::scalar(prediction, r + 1.0 / y)?,
+                log_share: arrival + 0.5 * (std::f64::consts::TAU / y).ln(),
+                floor: link.loss(),
+            },
+            Observation::Erased => Bump {
+                value: Value::scalar(prediction, r)?,
+                log_share: f64::NEG_INFINITY,
+                floor: 1.0,
+            },
+        })
     }
 }
 

@@ -8,6 +8,7 @@ use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// A normal distribution over a state of `D` coordinates: the belief of every Kalman-like estimator.
@@ -23,8 +24,9 @@ use serde::{Deserialize, Serialize};
 /// assert!(Gaussian::scalar(0.0, -1.0).is_err());
 /// # Ok::<(), fewbits_numerics::ArgumentError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Moments<D>")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Moments<D>"))]
 pub struct Gaussian<const D: usize> {
     mean: SVector<f64, D>,
     covariance: SMatrix<f64, D, D>,
@@ -153,6 +155,7 @@ impl Gaussian<1> {
 }
 
 /// The stored form, checked when it is read.
+#[cfg(feature = "serde")]
 #[derive(Deserialize)]
 #[serde(rename = "Gaussian", deny_unknown_fields)]
 struct Moments<const D: usize> {
@@ -160,6 +163,7 @@ struct Moments<const D: usize> {
     covariance: SMatrix<f64, D, D>,
 }
 
+#[cfg(feature = "serde")]
 impl<const D: usize> TryFrom<Moments<D>> for Gaussian<D> {
     type Error = ArgumentError;
 

@@ -5,11 +5,13 @@ use crate::cell::Cell;
 use crate::message::Message;
 use fewbits_numerics::error::{ArgumentError, finite, within};
 use nalgebra::SVector;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// How a number travels. Both ends know it; it costs no bits itself.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum NumberFormat {
     /// 64-bit floating point.
     #[default]
@@ -22,14 +24,16 @@ pub enum NumberFormat {
 
 /// `2^bits` evenly spaced levels from `lower` to `upper`, ends included. A value takes the nearest; beyond the ends it
 /// saturates.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Numbers")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Numbers"))]
 pub struct Levels {
     lower: f64,
     upper: f64,
     bits: u32,
 }
 
+#[cfg(feature = "serde")]
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
@@ -38,6 +42,7 @@ struct Numbers {
     bits: u32,
 }
 
+#[cfg(feature = "serde")]
 impl TryFrom<Numbers> for Levels {
     type Error = ArgumentError;
 

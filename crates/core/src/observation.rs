@@ -4,10 +4,12 @@ use crate::bits::BitString;
 use crate::message::Message;
 use fewbits_numerics::ArgumentError;
 use rand::{Rng, RngExt};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// What arrives at the receiver in one slot from one sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Observation<R> {
     /// A report was received.
     Received(R),
@@ -48,13 +50,15 @@ impl<R> From<Option<R>> for Observation<R> {
 /// A report vanishes without a trace with probability `loss`; each bit of a report that arrives is inverted with probability
 /// `crossover`, independently (a binary symmetric channel). [`Observation::Erased`] is not a matter of the link's law:
 /// factors condition on it.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(try_from = "Numbers")]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Numbers"))]
 pub struct Link {
     loss: f64,
     crossover: f64,
 }
 
+#[cfg(feature = "serde")]
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
@@ -62,6 +66,7 @@ struct Numbers {
     crossover: f64,
 }
 
+#[cfg(feature = "serde")]
 impl TryFrom<Numbers> for Link {
     type Error = ArgumentError;
 

@@ -158,7 +158,11 @@ impl Bandwidth {
         let covariance = particles.covariance_about(&mean);
         let mut shrunk = particles.clone();
         for (k, column) in shrunk.columns_mut().into_iter().enumerate() {
-            let share = if covariance[(k, k)] > 0.0 { kernel[(k, k)] / covariance[(k, k)] } else { 1.0 };
+            let share = if covariance[(k, k)] > 0.0 {
+                kernel[(k, k)] / covariance[(k, k)]
+            } else {
+                1.0
+            };
             let scale = (1.0 - share).max(0.0).sqrt();
             column.iter_mut().for_each(|x| *x = mean[k] + scale * (*x - mean[k]));
         }
@@ -173,7 +177,9 @@ mod tests {
 
     fn sample(scale: f64) -> Particles<2> {
         let x: Vec<f64> = (0..50).map(|i| scale * (i as f64 * 0.7).sin()).collect();
-        let y: Vec<f64> = (0..50).map(|i| scale * (0.3 * (i as f64 * 0.7).sin() + (i as f64 * 1.9).cos())).collect();
+        let y: Vec<f64> = (0..50)
+            .map(|i| scale * (0.3 * (i as f64 * 0.7).sin() + (i as f64 * 1.9).cos()))
+            .collect();
         let logs: Vec<f64> = (0..50).map(|i| (i as f64 * 0.37).sin()).collect();
         Particles::new([x, y], &logs).unwrap()
     }
@@ -181,7 +187,10 @@ mod tests {
     #[test]
     fn shrinkage_keeps_the_variances_of_the_sample() {
         for shape in [Shape::Diagonal, Shape::Full] {
-            let rule = Bandwidth { shape, ..Bandwidth::default() };
+            let rule = Bandwidth {
+                shape,
+                ..Bandwidth::default()
+            };
             let p = sample(1.0);
             let h = rule.kernel(&p).unwrap();
             let total = rule.shrunk(&p, &h).unwrap().covariance() + h;
@@ -193,7 +202,10 @@ mod tests {
 
     #[test]
     fn kernels_scale_with_the_unit() {
-        let rule = Bandwidth { size: SampleSize::Effective, ..Bandwidth::default() };
+        let rule = Bandwidth {
+            size: SampleSize::Effective,
+            ..Bandwidth::default()
+        };
         let reference = rule.kernel(&sample(1.0)).unwrap();
         for scale in [1e-4, 1e4] {
             let kernel = rule.kernel(&sample(scale)).unwrap() / (scale * scale);
@@ -205,7 +217,12 @@ mod tests {
     fn coincident_particles_need_a_floor() {
         let p = Particles::uniform([vec![2.0; 4], vec![-1.0; 4]]).unwrap();
         assert!(Bandwidth::default().kernel(&p).is_err());
-        let kernel = Bandwidth { floor: 0.1, ..Bandwidth::default() }.kernel(&p).unwrap();
+        let kernel = Bandwidth {
+            floor: 0.1,
+            ..Bandwidth::default()
+        }
+        .kernel(&p)
+        .unwrap();
         assert!((kernel[(0, 0)] - 0.01).abs() < 1e-15);
         let line = Particles::uniform([vec![2.0, 3.0], vec![-1.0, -1.0]]).unwrap();
         assert!(Bandwidth::default().kernel(&line).unwrap()[(1, 1)] > 0.0);
@@ -213,9 +230,23 @@ mod tests {
 
     #[test]
     fn rules_agree_where_they_must() {
-        let with = |rule| Bandwidth { rule, ..Bandwidth::default() }.width::<2>(500.0).unwrap();
+        let with = |rule| {
+            Bandwidth {
+                rule,
+                ..Bandwidth::default()
+            }
+            .width::<2>(500.0)
+            .unwrap()
+        };
         assert!((with(Rule::Silverman) - with(Rule::Scott)).abs() < 1e-15);
         assert!((with(Rule::Power { exponent: 1.0 / 6.0 }) - with(Rule::Scott)).abs() < 1e-15);
-        assert!(Bandwidth { factor: 0.0, ..Bandwidth::default() }.width::<2>(5.0).is_err());
+        assert!(
+            Bandwidth {
+                factor: 0.0,
+                ..Bandwidth::default()
+            }
+            .width::<2>(5.0)
+            .is_err()
+        );
     }
 }

@@ -1,45 +1,10 @@
-//! Particles, estimates and mixtures as [`Belief`]s; the last two have a [`Density`].
+//! Estimates and mixtures as [`Belief`]s with a [`Density`].
 
-use crate::{KernelEstimate, Mixture, Particles};
+use crate::{KernelEstimate, Mixture};
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
-
-/// Fills the columns with copies of independently drawn particles and returns nothing else.
-fn draw_particles<const D: usize, R: Rng + ?Sized>(particles: &Particles<D>, rng: &mut R, states: &mut ColumnsMut<'_, D>) {
-    let mut cumulative = Vec::with_capacity(particles.len());
-    let mut total = 0.0;
-    for w in particles.weights() {
-        total += w;
-        cumulative.push(total);
-    }
-    // Rounding may leave the last sum a little off; a level above it belongs to the last particle that has weight.
-    let last = cumulative.partition_point(|c| *c < total);
-    let count = states.iter().map(|c| c.len()).min().unwrap_or(0);
-    let columns = particles.columns();
-    for k in 0..count {
-        let level = rng.random::<f64>() * total;
-        let i = cumulative.partition_point(|c| *c <= level).min(last);
-        for (state, column) in states.iter_mut().zip(&columns) {
-            state[k] = column[i];
-        }
-    }
-}
-
-impl<const D: usize> Belief<D> for Particles<D> {
-    fn mean(&self) -> SVector<f64, D> {
-        self.mean()
-    }
-
-    fn covariance(&self) -> SMatrix<f64, D, D> {
-        self.covariance()
-    }
-
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        draw_particles(self, rng, &mut states);
-    }
-}
 
 impl<const D: usize> Belief<D> for KernelEstimate<D> {
     fn mean(&self) -> SVector<f64, D> {
@@ -51,7 +16,8 @@ impl<const D: usize> Belief<D> for KernelEstimate<D> {
     }
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
-        draw_particles(self.particles(), rng, &mut states);
+        let drawn = states.each_mut().map(|column| &mut **column);
+        self.particles().sample_columns(rng, drawn);
         let count = states.iter().map(|c| c.len()).min().unwrap_or(0);
         for k in 0..count {
             let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));

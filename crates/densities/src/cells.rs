@@ -5,7 +5,8 @@ use crate::matrix::eigen;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, positive};
-use fewbits_numerics::kernels::{exp_minus, largest, sum};
+use fewbits_numerics::kernels::exp_minus;
+use fewbits_numerics::kernels::{largest, sum};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use std::collections::HashMap;
@@ -80,7 +81,7 @@ impl<const D: usize> Cells<D> {
     /// Covers the box between two corners with `per_axis` cells along its longest side, and refines.
     ///
     /// # Errors
-    /// If the box is empty or `per_axis` is zero; [`Error::BeliefMiss`] if the density is zero at every centre or a value is NaN;
+    /// If the box is empty or `per_axis` is zero; [`fewbits_core::Error::Impossible`] if the density is zero at every centre or a value is NaN;
     /// [`Error::Unresolved`] if the density needs more cells than allowed.
     pub fn cover(
         target: &impl CellTarget<D>,
@@ -111,7 +112,7 @@ impl<const D: usize> Cells<D> {
             evaluations += count;
             let (best, best_score) = (largest(&logs), largest(&scores));
             if !best_score.is_finite() || logs.iter().chain(&scores).any(|x| x.is_nan()) {
-                return Err(Error::BeliefMiss { largest: best_score });
+                return Err(Error::IMPOSSIBLE);
             }
             if best.is_finite() {
                 weights.clear();
@@ -127,7 +128,13 @@ impl<const D: usize> Cells<D> {
                         && (determinant / size - 1.0).abs() < options.determinant_tolerance
                 });
                 if settled && width < options.width * narrowest {
-                    return Ok(Self::finished(centres, weights, total, (width, log_evidence, evaluations), (mean, covariance)));
+                    return Ok(Self::finished(
+                        centres,
+                        weights,
+                        total,
+                        (width, log_evidence, evaluations),
+                        (mean, covariance),
+                    ));
                 }
                 before = Some((log_evidence, determinant));
             }
@@ -139,7 +146,9 @@ impl<const D: usize> Cells<D> {
             centres = split(&centres, &scores, threshold, 0.25 * width, kept);
             width *= 0.5;
         }
-        Err(Error::Unresolved { cells: centres[0].len() })
+        Err(Error::Unresolved {
+            cells: centres[0].len(),
+        })
     }
 
     fn finished(
@@ -151,7 +160,10 @@ impl<const D: usize> Cells<D> {
     ) -> Self {
         let keep = |values: &[f64], scale: f64| -> Vec<f64> {
             let paired = values.iter().zip(&weights);
-            paired.filter(|(_, w)| **w > NEGLIGIBLE).map(|(v, _)| v * scale).collect()
+            paired
+                .filter(|(_, w)| **w > NEGLIGIBLE)
+                .map(|(v, _)| v * scale)
+                .collect()
         };
         let columns = centres.each_ref().map(|column| keep(column, 1.0));
         let weights = keep(&weights, total.recip());
@@ -260,7 +272,9 @@ impl<const D: usize> Belief<D> for Cells<D> {
 impl<const D: usize> Density<D> for Cells<D> {
     fn log_density(&self, state: &SVector<f64, D>) -> f64 {
         let places = self.places.get_or_init(|| {
-            (0..self.len()).map(|i| (self.place(|d| self.columns[d][i]), i)).collect()
+            (0..self.len())
+                .map(|i| (self.place(|d| self.columns[d][i]), i))
+                .collect()
         });
         match places.get(&self.place(|d| state[d])) {
             Some(i) => self.log_weights[*i] - D as f64 * self.width.ln(),
@@ -276,7 +290,9 @@ fn lattice<const D: usize>(
     most: usize,
 ) -> Result<[Vec<f64>; D], Error> {
     let counts: [usize; D] = std::array::from_fn(|d| (((upper[d] - lower[d]) / width - 1e-9).ceil() as usize).max(1));
-    let total = counts.iter().try_fold(1_usize, |product, count| product.checked_mul(*count));
+    let total = counts
+        .iter()
+        .try_fold(1_usize, |product, count| product.checked_mul(*count));
     let Some(total) = total.filter(|total| *total <= most) else {
         return Err(ArgumentError::new("per_axis", format!("{counts:?} cells"), format!("at most {most} cells")).into());
     };
@@ -293,7 +309,13 @@ fn lattice<const D: usize>(
     Ok(columns)
 }
 
-fn split<const D: usize>(centres: &[Vec<f64>; D], scores: &[f64], threshold: f64, step: f64, kept: usize) -> [Vec<f64>; D] {
+fn split<const D: usize>(
+    centres: &[Vec<f64>; D],
+    scores: &[f64],
+    threshold: f64,
+    step: f64,
+    kept: usize,
+) -> [Vec<f64>; D] {
     std::array::from_fn(|d| {
         let mut column = Vec::with_capacity(kept << D);
         for (x, score) in centres[d].iter().zip(scores) {
@@ -362,7 +384,7 @@ mod tests {
     #[test]
     fn misses_are_errors() {
         let cover = |lower, upper, n| Cells::cover(&Nowhere, lower, upper, n, &CellOptions::default());
-        assert!(matches!(cover([0.0; 2], [1.0; 2], 8), Err(Error::BeliefMiss { .. })));
+        assert!(matches!(cover([0.0; 2], [1.0; 2], 8), Err(Error::Core(fewbits_core::Error::Impossible))));
         assert!(cover([0.0; 2], [0.0; 2], 8).is_err() && cover([0.0; 2], [1.0; 2], 0).is_err());
         assert!(cover([0.0; 2], [1.0; 2], 1 << 20).is_err());
     }

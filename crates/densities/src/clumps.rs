@@ -75,7 +75,9 @@ impl<const D: usize> Clumps<D> {
         count: usize,
     ) -> Result<Self, Error> {
         at_least_one("count", count)?;
-        if columns.iter().any(|c| c.len() != weights.len()) || spread.iter().any(|c| !c.is_empty() && c.len() != weights.len()) {
+        if columns.iter().any(|c| c.len() != weights.len())
+            || spread.iter().any(|c| !c.is_empty() && c.len() != weights.len())
+        {
             return Err(ArgumentError::new("columns", "of different lengths", "one number a weight").into());
         }
         let mut order: Vec<u32> = Vec::with_capacity(weights.len());
@@ -87,13 +89,20 @@ impl<const D: usize> Clumps<D> {
             }
         }
         if order.is_empty() {
-            return Err(Error::Degenerate { largest: f64::NEG_INFINITY });
+            return Err(Error::IMPOSSIBLE);
         }
-        let cloud = Cloud { columns, spread, weights, total };
+        let cloud = Cloud {
+            columns,
+            spread,
+            weights,
+            total,
+        };
         let mut parts = vec![cloud.part(&order, 0, order.len())];
         while parts.len() < count {
             let widest = (0..parts.len()).max_by(|a, b| parts[*a].urgency.total_cmp(&parts[*b].urgency));
-            let Some(chosen) = widest.filter(|at| parts[*at].urgency > 0.0) else { break };
+            let Some(chosen) = widest.filter(|at| parts[*at].urgency > 0.0) else {
+                break;
+            };
             let (from, to, axis) = (parts[chosen].from, parts[chosen].to, parts[chosen].axis);
             let cut = parts[chosen].clump.mean[axis];
             let middle = from + partition(&mut order[from..to], |i| columns[axis][i as usize] < cut);
@@ -123,10 +132,13 @@ impl<const D: usize> Clumps<D> {
     /// Covariance of the whole.
     pub fn covariance(&self) -> SMatrix<f64, D, D> {
         let mean = self.mean();
-        self.clumps.iter().map(|c| {
-            let d = c.mean - mean;
-            (c.covariance + d * d.transpose()) * c.weight
-        }).sum()
+        self.clumps
+            .iter()
+            .map(|c| {
+                let d = c.mean - mean;
+                (c.covariance + d * d.transpose()) * c.weight
+            })
+            .sum()
     }
 
     /// A Gaussian mixture of the same mean and covariance, by expectation-maximisation over the clumps.
@@ -141,14 +153,20 @@ impl<const D: usize> Clumps<D> {
         let mut components = self.start(options.components);
         loop {
             let fitted = self.improve(components, &whole, options);
-            let least = fitted.iter().enumerate().min_by(|a, b| a.1.weight.total_cmp(&b.1.weight)).map(|(at, c)| (at, c.weight));
+            let least = fitted
+                .iter()
+                .enumerate()
+                .min_by(|a, b| a.1.weight.total_cmp(&b.1.weight))
+                .map(|(at, c)| (at, c.weight));
             match least {
                 Some((at, weight)) if weight < options.least_weight && fitted.len() > 1 => {
                     components = fitted;
                     components.swap_remove(at);
                 }
                 _ => {
-                    let parts = fitted.into_iter().map(|c| Component::new(c.weight, c.mean, c.covariance));
+                    let parts = fitted
+                        .into_iter()
+                        .map(|c| Component::new(c.weight, c.mean, c.covariance));
                     return Mixture::new(parts.collect::<Result<_, _>>()?);
                 }
             }
@@ -317,7 +335,11 @@ impl<const D: usize> Cloud<'_, D> {
             from,
             to,
             axis,
-            urgency: if members.len() > 1 { weight * variance.max(0.0) } else { 0.0 },
+            urgency: if members.len() > 1 {
+                weight * variance.max(0.0)
+            } else {
+                0.0
+            },
         }
     }
 }
@@ -365,7 +387,12 @@ mod tests {
         let mut means: Vec<f64> = mixture.components().iter().map(|c| c.mean()[0]).collect();
         means.sort_by(f64::total_cmp);
         assert!((means[0]).abs() < 0.02 && (means[1] - 10.0).abs() < 0.02, "{means:?}");
-        assert!(mixture.components().iter().all(|c| (c.covariance()[(0, 0)] - 1.0).abs() < 0.02));
+        assert!(
+            mixture
+                .components()
+                .iter()
+                .all(|c| (c.covariance()[(0, 0)] - 1.0).abs() < 0.02)
+        );
         // The step floor only adds 1e-9 of the spread.
         assert!((mixture.covariance() - whole.covariance()).amax() < 1e-6);
     }

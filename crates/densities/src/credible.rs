@@ -23,7 +23,10 @@ impl Mixture<1> {
     pub fn quantile(&self, at: f64) -> Result<f64, Error> {
         level(at)?;
         let edge = |side: f64| {
-            let ends = self.components().iter().map(|c| c.mean()[0] + side * 40.0 * c.cholesky_factor()[(0, 0)]);
+            let ends = self
+                .components()
+                .iter()
+                .map(|c| c.mean()[0] + side * 40.0 * c.cholesky_factor()[(0, 0)]);
             ends.fold(-side * f64::INFINITY, |m, x| if side < 0.0 { m.min(x) } else { m.max(x) })
         };
         let (mut low, mut high) = (edge(-1.0), edge(1.0));

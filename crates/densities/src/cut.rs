@@ -74,7 +74,11 @@ impl NodeErrors {
     ///
     /// # Errors
     /// If there is not one per node, or the criterion is not a plug-in one.
-    pub fn from_plug_in<const D: usize>(tree: &Tree<D>, plug_in: &[PlugIn], criterion: Criterion) -> Result<Self, Error> {
+    pub fn from_plug_in<const D: usize>(
+        tree: &Tree<D>,
+        plug_in: &[PlugIn],
+        criterion: Criterion,
+    ) -> Result<Self, Error> {
         if plug_in.len() != tree.nodes().len() {
             let expected = format!("{}, one per node", tree.nodes().len());
             return Err(ArgumentError::new("plug_in", plug_in.len(), expected).into());
@@ -98,7 +102,9 @@ impl NodeErrors {
 
     /// Bound `B(S)` of a cut: the largest error of its nodes or their sum.
     pub fn bound(&self, cut: &[usize]) -> f64 {
-        cut.iter().filter_map(|s| self.values.get(*s)).fold(0.0, |total, e| self.combine.of(total, *e))
+        cut.iter()
+            .filter_map(|s| self.values.get(*s))
+            .fold(0.0, |total, e| self.combine.of(total, *e))
     }
 }
 
@@ -158,7 +164,13 @@ pub fn greedy_within<const D: usize>(
     };
     loop {
         // The first of the largest, as ties go to the first.
-        let worst = (1..cut.len()).fold(0, |w, i| if errors.values[cut[i]] > errors.values[cut[w]] { i } else { w });
+        let worst = (1..cut.len()).fold(0, |w, i| {
+            if errors.values[cut[i]] > errors.values[cut[w]] {
+                i
+            } else {
+                w
+            }
+        });
         let Some([left, right]) = tree.nodes()[cut[worst]].children else {
             return Ok(best);
         };

@@ -66,7 +66,11 @@ pub fn discrete(p: &[f64], q: &[f64]) -> Result<Divergence, Error> {
 
 /// `ln(p / q)`, accurate for nearly equal arguments.
 fn log_ratio(p: f64, q: f64) -> f64 {
-    if p > 0.5 * q && p < 2.0 * q { ((p - q) / q).ln_1p() } else { p.ln() - q.ln() }
+    if p > 0.5 * q && p < 2.0 * q {
+        ((p - q) / q).ln_1p()
+    } else {
+        p.ln() - q.ln()
+    }
 }
 
 /// Largest KL of two normalised densities whose `DR` is given: `phi(2 DR)` with
@@ -87,7 +91,11 @@ pub fn l1_from_dr(dr: f64) -> f64 {
 
 /// `KL <= ML tanh(ML / 2)`.
 pub fn kl_from_ml(ml: f64) -> f64 {
-    if ml == f64::INFINITY { ml } else { ml * (0.5 * ml).tanh() }
+    if ml == f64::INFINITY {
+        ml
+    } else {
+        ml * (0.5 * ml).tanh()
+    }
 }
 
 /// `ln((e^h - 1)/h) - 1 + h/(e^h - 1)`, without cancellation at either end.
@@ -137,7 +145,11 @@ fn scaled(factor: f64, x: f64) -> f64 {
 
 /// Smallest and largest `p/q` over the points that either law gives mass.
 pub fn ratio_range(p: &[f64], q: &[f64]) -> (f64, f64) {
-    let ratios = p.iter().zip(q).filter(|(p, q)| **p > 0.0 || **q > 0.0).map(|(p, q)| p / q);
+    let ratios = p
+        .iter()
+        .zip(q)
+        .filter(|(p, q)| **p > 0.0 || **q > 0.0)
+        .map(|(p, q)| p / q);
     ratios.fold((f64::INFINITY, 0.0), |(low, high), r| (r.min(low), r.max(high)))
 }
 

@@ -11,21 +11,12 @@ pub enum Error {
     /// An argument outside its range.
     #[error(transparent)]
     Argument(#[from] ArgumentError),
+    /// What a word of the core refused; [`fewbits_core::Error::Impossible`] where no probability is left.
+    #[error(transparent)]
+    Core(#[from] fewbits_core::Error),
     /// A belief that does not fit its wire format, or bits that are no belief.
     #[error(transparent)]
     Codec(#[from] CodecError),
-    /// No particle has any weight left, or a weight is not a number.
-    #[error("degenerate particles: the largest log weight is {largest}, expected a finite number")]
-    Degenerate {
-        /// The largest log weight found.
-        largest: f64,
-    },
-    /// A density is zero wherever it was looked for: the observation and the belief exclude each other.
-    #[error("the density vanishes on all of its support: the largest log density is {largest}, expected a finite number")]
-    BeliefMiss {
-        /// The largest log density found.
-        largest: f64,
-    },
     /// A density is too thin for the cells allowed.
     #[error("the density needs {cells} cells or more: expected a density that fewer resolve")]
     Unresolved {
@@ -38,4 +29,9 @@ pub enum Error {
         /// What is wrong with the place where the search ended.
         reason: &'static str,
     },
+}
+
+impl Error {
+    /// No probability is left.
+    pub(crate) const IMPOSSIBLE: Self = Self::Core(fewbits_core::Error::Impossible);
 }

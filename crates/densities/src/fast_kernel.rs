@@ -48,7 +48,12 @@ impl TabulatedEstimate {
             nodes *= count;
             if nodes.is_nan() || nodes > MOST_NODES {
                 let expected = "a sample within some thousand kernel widths";
-                return Err(ArgumentError::new("estimate", format!("a sample {} kernel widths wide", high - low), expected).into());
+                return Err(ArgumentError::new(
+                    "estimate",
+                    format!("a sample {} kernel widths wide", high - low),
+                    expected,
+                )
+                .into());
             }
             lower[d] = low;
             counts[d] = count as usize;
@@ -68,7 +73,9 @@ impl TabulatedEstimate {
         // Linear binning has variance step^2/6 averaged over positions within a cell.
         let variance = 1.0 - step * step / 6.0;
         let half = (REACH * FINENESS) as usize;
-        let kernel: Vec<f64> = (0..=half).map(|k| (-0.5 * (k as f64 * step).powi(2) / variance).exp() / (std::f64::consts::TAU * variance).sqrt()).collect();
+        let kernel: Vec<f64> = (0..=half)
+            .map(|k| (-0.5 * (k as f64 * step).powi(2) / variance).exp() / (std::f64::consts::TAU * variance).sqrt())
+            .collect();
         let rows = smoothed_rows(&binned, counts, &kernel);
         let columns = smoothed_rows(&transposed(&rows, counts), [counts[1], counts[0]], &kernel);
         let values = transposed(&columns, [counts[1], counts[0]]);
@@ -128,7 +135,10 @@ fn smoothed_rows(values: &[f64], counts: [usize; 2], kernel: &[f64]) -> Vec<f64>
             let low = k.saturating_sub(kernel.len() - 1);
             let high = (k + kernel.len()).min(n);
             let (left, right) = (&mut out[low..high]).split_at_mut(k - low);
-            left.iter_mut().rev().zip(&kernel[1..]).for_each(|(o, w)| *o += value * w);
+            left.iter_mut()
+                .rev()
+                .zip(&kernel[1..])
+                .for_each(|(o, w)| *o += value * w);
             right.iter_mut().zip(kernel).for_each(|(o, w)| *o += value * w);
         }
     }

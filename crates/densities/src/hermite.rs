@@ -79,7 +79,10 @@ impl<const D: usize> Polynomial<D> {
         let mut terms: Vec<_> = self.terms.iter().collect();
         // The order of a hash map is not the same in every run.
         terms.sort_by(|a, b| a.0.cmp(b.0));
-        terms.iter().map(|(index, c)| **c * (0..D).map(|d| z[d].powi(index[d] as i32)).product::<f64>()).sum()
+        terms
+            .iter()
+            .map(|(index, c)| **c * (0..D).map(|d| z[d].powi(index[d] as i32)).product::<f64>())
+            .sum()
     }
 }
 
@@ -93,7 +96,9 @@ fn polynomial_of<const D: usize>(nu: [usize; D], w: &SMatrix<f64, D, D>) -> Poly
             return polynomial.clone();
         }
         let Some(i) = nu.iter().position(|n| *n > 0) else {
-            return Polynomial { terms: [([0; D], 1.0)].into() };
+            return Polynomial {
+                terms: [([0; D], 1.0)].into(),
+            };
         };
         let mut below = nu;
         below[i] -= 1;
@@ -135,7 +140,9 @@ pub fn gaussian_moment<const D: usize>(
         covariance: &SMatrix<f64, D, D>,
         known: &mut HashMap<[usize; D], f64>,
     ) -> f64 {
-        let Some(i) = nu.iter().position(|n| *n > 0) else { return 1.0 };
+        let Some(i) = nu.iter().position(|n| *n > 0) else {
+            return 1.0;
+        };
         if let Some(value) = known.get(&nu) {
             return *value;
         }
@@ -157,4 +164,68 @@ pub fn gaussian_moment<const D: usize>(
         return Err(ArgumentError::new("nu", order, format!("a sum of at most {}", 2 * HIGHEST_DEGREE)).into());
     }
     Ok(step(nu, mean, covariance, &mut HashMap::new()))
+}
+
+/// Mass, mean and covariance of a series.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeriesMoments<const D: usize> {
+    /// Integral.
+    pub mass: f64,
+    /// Mean.
+    pub mean: SVector<f64, D>,
+    /// Covariance.
+    pub covariance: SMatrix<f64, D, D>,
+}
+
+/// Moments of the plain series `N(x; mean, covariance) sum_nu C_nu He_nu(z; W)`, `z = W (x - mean)`, `W = covariance^-1`, which may be
+/// negative in places: the paper's own form. By `E[z^a (x - mean)^b]` of joint Gaussians.
+///
+/// # Errors
+/// If the covariance is not positive definite, a degree exceeds 20, or the mass is not positive.
+pub fn series_moments<const D: usize>(
+    mean: &SVector<f64, D>,
+    covariance: &SMatrix<f64, D, D>,
+    terms: &[([usize; D], f64)],
+) -> Result<SeriesMoments<D>, Error> {
+    let Some(factor) = covariance.cholesky() else {
+        return Err(ArgumentError::new("covariance", format!("{covariance:?}"), "a positive definite matrix").into());
+    };
+    let w = factor.inverse();
+    // As a polynomial in z, whose covariance is W and which x - mean is S times.
+    let mut polynomial: HashMap<[usize; D], f64> = HashMap::new();
+    for (nu, c) in terms {
+        for (index, coefficient) in hermite_terms(*nu, &w)? {
+            *polynomial.entry(index).or_insert(0.0) += c * coefficient;
+        }
+    }
+    let mut terms: Vec<_> = polynomial.into_iter().collect();
+    terms.sort_by(|a, b| a.0.cmp(&b.0));
+    let zero = SVector::<f64, D>::zeros();
+    let expectation = |raise: &[usize]| -> Result<f64, Error> {
+        let mut sum = 0.0;
+        for (index, c) in &terms {
+            let mut nu = *index;
+            raise.iter().for_each(|i| nu[*i] += 1);
+            sum += c * gaussian_moment(nu, &zero, &w)?;
+        }
+        Ok(sum)
+    };
+    let mass = expectation(&[])?;
+    if !(mass > 0.0 && mass.is_finite()) {
+        return Err(Error::IMPOSSIBLE);
+    }
+    let mut first = SVector::<f64, D>::zeros();
+    let mut second = SMatrix::<f64, D, D>::zeros();
+    for i in 0..D {
+        first[i] = expectation(&[i])? / mass;
+        for j in 0..D {
+            second[(i, j)] = expectation(&[i, j])? / mass;
+        }
+    }
+    let shift = covariance * first;
+    Ok(SeriesMoments {
+        mass,
+        mean: mean + shift,
+        covariance: covariance * second * covariance - shift * shift.transpose(),
+    })
 }

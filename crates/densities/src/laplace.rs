@@ -45,13 +45,15 @@ impl<const D: usize> Peak<D> {
         let mut x = *start;
         let mut height = log_density(&x);
         if !height.is_finite() {
-            return Err(Error::BeliefMiss { largest: height });
+            return Err(Error::IMPOSSIBLE);
         }
         let mut extent = *scale;
         for _ in 0..STEPS {
             let (gradient, hessian) = derivatives(log_density, &x, height, &(extent * STEP));
             let Some((step, definite)) = ascent(&gradient, &hessian, &extent) else {
-                return Err(Error::NoPeak { reason: "a derivative is not finite" });
+                return Err(Error::NoPeak {
+                    reason: "a derivative is not finite",
+                });
             };
             let gain = 0.5 * gradient.dot(&step);
             if definite && gain < SETTLED.max(1e-15 * height.abs()) {
@@ -67,13 +69,19 @@ impl<const D: usize> Peak<D> {
             match climbed {
                 Some((next, level)) => (x, height) = (next, level),
                 None if definite && gain < 1e-6 => return Self::at(log_density, x, height, extent),
-                None => return Err(Error::NoPeak { reason: "no step leads upwards" }),
+                None => {
+                    return Err(Error::NoPeak {
+                        reason: "no step leads upwards",
+                    });
+                }
             }
             if definite && let Some(inverse) = (-hessian).cholesky() {
                 extent = inverse.inverse().diagonal().map(f64::sqrt);
             }
         }
-        Err(Error::NoPeak { reason: "the search did not settle" })
+        Err(Error::NoPeak {
+            reason: "the search did not settle",
+        })
     }
 
     fn at(
@@ -90,7 +98,9 @@ impl<const D: usize> Peak<D> {
                 covariance: factor.inverse(),
                 half_log_curvature: factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum(),
             }),
-            None => Err(Error::NoPeak { reason: "the Hessian is not negative definite" }),
+            None => Err(Error::NoPeak {
+                reason: "the Hessian is not negative definite",
+            }),
         }
     }
 
@@ -121,7 +131,9 @@ pub fn cumulant_laplace<const D: usize>(
 ) -> Result<Gaussian<D>, Error> {
     let centre = Peak::climb(log_density, start, scale)?;
     let Some(factor) = centre.covariance.cholesky() else {
-        return Err(Error::NoPeak { reason: "the curvature is singular" });
+        return Err(Error::NoPeak {
+            reason: "the curvature is singular",
+        });
     };
     // In coordinates y with x = mode + L y the posterior is near a standard normal and tilts of size STEP are alike everywhere.
     let lower = factor.l();
@@ -149,7 +161,9 @@ pub fn cumulant_laplace<const D: usize>(
         }
     }
     if covariance.cholesky().is_none() {
-        return Err(Error::NoPeak { reason: "the cumulants are no covariance" });
+        return Err(Error::NoPeak {
+            reason: "the cumulants are no covariance",
+        });
     }
     Ok(Gaussian::from_trusted_parts(centre.mode + lower * mean, lower * covariance * lower.transpose()))
 }
@@ -170,7 +184,11 @@ pub fn tierney_kadane<const D: usize>(
     let plain = Peak::climb(log_density, start, scale)?;
     let weighted = |x: &SVector<f64, D>| {
         let value = g(x);
-        if value > 0.0 { log_density(x) + value.ln() } else { f64::NEG_INFINITY }
+        if value > 0.0 {
+            log_density(x) + value.ln()
+        } else {
+            f64::NEG_INFINITY
+        }
     };
     let peak = Peak::climb(&weighted, &plain.mode, &plain.covariance.diagonal().map(f64::sqrt))?;
     Ok((peak.log_evidence() - plain.log_evidence()).exp())
@@ -197,9 +215,8 @@ fn derivatives<const D: usize>(
         gradient[i] = (8.0 * (p1 - m1) - (p2 - m2)) / (12.0 * h[i]);
         hessian[(i, i)] = (16.0 * (p1 + m1) - (p2 + m2) - 30.0 * middle) / (12.0 * h[i] * h[i]);
         for j in 0..i {
-            let cross = |s: f64| {
-                shifted(i, s, j, s) - shifted(i, s, j, -s) - shifted(i, -s, j, s) + shifted(i, -s, j, -s)
-            };
+            let cross =
+                |s: f64| shifted(i, s, j, s) - shifted(i, s, j, -s) - shifted(i, -s, j, s) + shifted(i, -s, j, -s);
             // Four times the mixed derivative at steps 1 and 2; Richardson's combination cancels the second order.
             let mixed = (16.0 * cross(1.0) - cross(2.0)) / (48.0 * h[i] * h[j]);
             hessian[(i, j)] = mixed;

@@ -15,6 +15,8 @@
 //! - [`Lpg`]: a linear combination of products of Hermite polynomials and Gaussians, squared, so that it is nowhere negative.
 //! - [`Clumps`]: any cloud of weighted points summed up by a few hundred parts, to which [`Mixture`]s are fitted.
 //! - [`laplace`]: Gaussians from the peak of a density and from its cumulants.
+//! - [`GaussianCloud`]: weighted Gaussians that share one covariance, the belief of a Rao-Blackwellised filter.
+//! - [`PointMass`] on a [`Grid`], [`PlaneMass`] on a lattice: densities of one and two dimensions by their values at nodes.
 //!
 //! ```
 //! use fewbits_densities::Particles;
@@ -35,6 +37,8 @@ pub mod cut;
 pub mod divergence;
 mod error;
 mod fast_kernel;
+mod gaussian_cloud;
+mod grid;
 pub mod hermite;
 mod kernel;
 pub mod laplace;
@@ -43,11 +47,14 @@ mod matrix;
 pub mod merge;
 mod mixture;
 mod particles;
+mod plane;
 pub mod plug_in;
+mod point_mass;
 pub mod product;
 pub mod quadrature;
 mod reduce;
 mod refine;
+mod stored;
 pub mod tree;
 pub mod wire;
 
@@ -58,12 +65,17 @@ pub use credible::{HighestDensity, ellipse};
 pub use cut::{Criterion, Cut, NodeErrors};
 pub use error::Error;
 pub use fast_kernel::TabulatedEstimate;
+pub use gaussian_cloud::GaussianCloud;
+pub use grid::Grid;
 pub use kernel::KernelEstimate;
 pub use lpg::Lpg;
 pub use merge::MergeCost;
 pub use mixture::{Component, Mixture};
 pub use particles::Particles;
+pub use plane::PlaneMass;
 pub use plug_in::{Cubature, PlugIn};
+pub use point_mass::PointMass;
 pub use reduce::{PaperReductions, Reduction};
 pub use refine::refine;
 pub use tree::{Split, Tree};
+pub use {nalgebra, rand};

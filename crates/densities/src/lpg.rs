@@ -68,7 +68,7 @@ impl<const D: usize> Lpg<D> {
         let c = belief.stacked();
         let norm = c.dot(&(&gram * &c)).sqrt();
         if !(norm > 0.0 && norm.is_finite()) {
-            return Err(Error::Degenerate { largest: norm });
+            return Err(Error::IMPOSSIBLE);
         }
         belief.scale(norm.recip());
         belief.settle()?;
@@ -109,13 +109,16 @@ impl<const D: usize> Lpg<D> {
         let c = factor.solve(&b);
         let norm = c.dot(&(&gram * &c)).sqrt();
         if !(norm > 0.0 && norm.is_finite()) {
-            return Err(Error::BeliefMiss { largest: norm });
+            return Err(Error::IMPOSSIBLE);
         }
         for (l, term) in belief.terms.iter_mut().enumerate() {
             term.coefficients = c.rows(l * size, size).iter().map(|c| c / norm).collect();
         }
         belief.settle()?;
-        Ok(LpgFit { belief, affinity: b.dot(&c) / norm })
+        Ok(LpgFit {
+            belief,
+            affinity: b.dot(&c) / norm,
+        })
     }
 
     /// The smallest degree up to `highest` whose affinity reaches `1 - tolerance`, or the best found.
@@ -197,7 +200,8 @@ impl<const D: usize> Lpg<D> {
             polynomials(&self.indices, self.degree, &u, &mut values);
             let size: f64 = values.iter().zip(&term.coefficients).map(|(v, c)| (v * c).abs()).sum();
             let at_zero: f64 = term.coefficients.iter().map(|c| c.abs()).sum();
-            let log = term.half_log_peak - 0.25 * near.norm_squared() + size.max(if reach > 0.5 { at_zero } else { 0.0 }).ln();
+            let log = term.half_log_peak - 0.25 * near.norm_squared()
+                + size.max(if reach > 0.5 { at_zero } else { 0.0 }).ln();
             total = log_add(total, log);
         }
         2.0 * total
@@ -211,7 +215,10 @@ impl<const D: usize> Lpg<D> {
     }
 
     fn scale(&mut self, by: f64) {
-        self.terms.iter_mut().flat_map(|term| &mut term.coefficients).for_each(|c| *c *= by);
+        self.terms
+            .iter_mut()
+            .flat_map(|term| &mut term.coefficients)
+            .for_each(|c| *c *= by);
     }
 
     /// Calls `visit(l, m, weight, x, u_l, u_m)` at the nodes of rules that integrate `sqrt(phi_l phi_m)` times polynomials of
@@ -229,7 +236,8 @@ impl<const D: usize> Lpg<D> {
                 let Some(factor) = precision.cholesky() else {
                     return Err(ArgumentError::new("covariance", "singular", "a positive definite matrix").into());
                 };
-                let pull = a.inverse.tr_mul(&a.inverse) * a.gaussian.mean() + b.inverse.tr_mul(&b.inverse) * b.gaussian.mean();
+                let pull =
+                    a.inverse.tr_mul(&a.inverse) * a.gaussian.mean() + b.inverse.tr_mul(&b.inverse) * b.gaussian.mean();
                 let mean = factor.solve(&(pull * 0.5));
                 let covariance = factor.inverse();
                 let Some(root) = covariance.cholesky() else {
@@ -301,7 +309,7 @@ impl<const D: usize> Lpg<D> {
             second += d * d.transpose() * w;
         })?;
         if !(mass > 0.0 && mass.is_finite()) {
-            return Err(Error::Degenerate { largest: mass });
+            return Err(Error::IMPOSSIBLE);
         }
         self.scale(mass.sqrt().recip());
         let mean = first / mass;
@@ -327,7 +335,11 @@ impl<const D: usize> Lpg<D> {
             sum += polynomial * (log - largest).exp();
         }
         let size = sum.abs();
-        if size > 0.0 && size.is_finite() { largest + size.ln() } else { f64::NEG_INFINITY }
+        if size > 0.0 && size.is_finite() {
+            largest + size.ln()
+        } else {
+            f64::NEG_INFINITY
+        }
     }
 }
 
@@ -359,7 +371,8 @@ impl<const D: usize> Belief<D> for Lpg<D> {
         let mut values = vec![0.0; self.indices.len()];
         let log_proposal = |x: &SVector<f64, D>| {
             let parts = self.terms.iter().map(|term| {
-                -0.5 * term.whitened(x).norm_squared() / (WIDER * WIDER) + 2.0 * term.half_log_peak - D as f64 * WIDER.ln()
+                -0.5 * term.whitened(x).norm_squared() / (WIDER * WIDER) + 2.0 * term.half_log_peak
+                    - D as f64 * WIDER.ln()
             });
             parts.fold(f64::NEG_INFINITY, log_add) - (self.terms.len() as f64).ln()
         };
@@ -403,7 +416,11 @@ impl<const D: usize> Density<D> for Lpg<D> {
 
 fn log_add(a: f64, b: f64) -> f64 {
     let (high, low) = if a > b { (a, b) } else { (b, a) };
-    if high == f64::NEG_INFINITY { high } else { high + (low - high).exp().ln_1p() }
+    if high == f64::NEG_INFINITY {
+        high
+    } else {
+        high + (low - high).exp().ln_1p()
+    }
 }
 
 /// Orthonormal Hermite products `prod_d he_nu_d(u_d) / sqrt(nu_d!)` for every index.
@@ -424,7 +441,15 @@ fn polynomials<const D: usize>(indices: &[[usize; D]], degree: usize, u: &SVecto
 
 /// Nodes and weights of the rule for the standard normal weight, by the eigenvalues of the Jacobi matrix.
 fn gauss_hermite(nodes: usize) -> Vec<(f64, f64)> {
-    let jacobi = DMatrix::from_fn(nodes, nodes, |i, j| if i.abs_diff(j) == 1 { (i.max(j) as f64).sqrt() } else { 0.0 });
+    let jacobi = DMatrix::from_fn(nodes, nodes, |i, j| {
+        if i.abs_diff(j) == 1 {
+            (i.max(j) as f64).sqrt()
+        } else {
+            0.0
+        }
+    });
     let eigen = jacobi.symmetric_eigen();
-    (0..nodes).map(|i| (eigen.eigenvalues[i], eigen.eigenvectors[(0, i)].powi(2))).collect()
+    (0..nodes)
+        .map(|i| (eigen.eigenvalues[i], eigen.eigenvectors[(0, i)].powi(2)))
+        .collect()
 }

@@ -51,7 +51,8 @@ impl<const D: usize> Factored<D> {
             let root = pivot.sqrt();
             lower[(j, j)] = root;
             for i in j + 1..D {
-                let mut entry = 0.5 * (covariance[(i, j)] / scale[i] / scale[j] + covariance[(j, i)] / scale[i] / scale[j]);
+                let mut entry =
+                    0.5 * (covariance[(i, j)] / scale[i] / scale[j] + covariance[(j, i)] / scale[i] / scale[j]);
                 for k in 0..j {
                     entry -= lower[(i, k)] * lower[(j, k)];
                 }

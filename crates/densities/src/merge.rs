@@ -50,7 +50,11 @@ impl<const D: usize> Part<D> {
 
     fn joined(&self, other: &Self) -> Self {
         let weight = self.weight + other.weight;
-        let (a, b) = if weight > 0.0 { (self.weight / weight, other.weight / weight) } else { (0.5, 0.5) };
+        let (a, b) = if weight > 0.0 {
+            (self.weight / weight, other.weight / weight)
+        } else {
+            (0.5, 0.5)
+        };
         let gap = other.mean - self.mean;
         let covariance = self.covariance * a + other.covariance * b + gap * gap.transpose() * (a * b);
         Self::new(weight, self.mean + gap * b, covariance)
@@ -117,7 +121,9 @@ fn pairwise<const D: usize>(
     let mut best: Vec<(f64, usize)> = (0..n).map(|i| cheapest(i, &costs, &alive)).collect();
     let mut total = 0.0;
     for _ in components..n {
-        let chosen = (0..n).filter(|i| alive[*i] && best[*i].1 < n).min_by(|a, b| best[*a].0.total_cmp(&best[*b].0));
+        let chosen = (0..n)
+            .filter(|i| alive[*i] && best[*i].1 < n)
+            .min_by(|a, b| best[*a].0.total_cmp(&best[*b].0));
         let Some(i) = chosen else { break };
         let (price, j) = best[i];
         total += price;
@@ -136,7 +142,11 @@ fn pairwise<const D: usize>(
             }
         }
     }
-    let kept = parts.into_iter().zip(alive).filter(|(_, alive)| *alive).map(|(part, _)| part);
+    let kept = parts
+        .into_iter()
+        .zip(alive)
+        .filter(|(_, alive)| *alive)
+        .map(|(part, _)| part);
     (kept.collect(), total)
 }
 
@@ -151,16 +161,24 @@ fn log_overlap<const D: usize>(a: &Part<D>, b: &Part<D>) -> f64 {
 fn williams<const D: usize>(original: Vec<Part<D>>, components: usize) -> (Vec<Part<D>>, f64) {
     let mut parts = original.clone();
     // Overlaps span many orders in small units; the largest is taken out of all of them.
-    let scale = original.iter().map(|p| log_overlap(p, p)).fold(f64::NEG_INFINITY, f64::max);
+    let scale = original
+        .iter()
+        .map(|p| log_overlap(p, p))
+        .fold(f64::NEG_INFINITY, f64::max);
     let overlap = |a: &Part<D>, b: &Part<D>| (log_overlap(a, b) - scale).exp();
     let inner = |a: &Part<D>, all: &[Part<D>]| -> f64 { all.iter().map(|b| b.weight * overlap(a, b)).sum() };
     let own: f64 = original.iter().map(|p| p.weight * inner(p, &original)).sum();
     let mut error = 0.0;
     while parts.len() > components {
         let n = parts.len();
-        let within: Vec<Vec<f64>> = parts.iter().map(|a| parts.iter().map(|b| overlap(a, b)).collect()).collect();
+        let within: Vec<Vec<f64>> = parts
+            .iter()
+            .map(|a| parts.iter().map(|b| overlap(a, b)).collect())
+            .collect();
         let against: Vec<f64> = parts.iter().map(|p| inner(p, &original)).collect();
-        let rows: Vec<f64> = (0..n).map(|i| (0..n).map(|j| parts[j].weight * within[i][j]).sum()).collect();
+        let rows: Vec<f64> = (0..n)
+            .map(|i| (0..n).map(|j| parts[j].weight * within[i][j]).sum())
+            .collect();
         let reduced: f64 = (0..n).map(|i| parts[i].weight * rows[i]).sum();
         let crossed: f64 = (0..n).map(|i| parts[i].weight * against[i]).sum();
         let mut best: Option<(f64, usize, usize, Part<D>)> = None;
@@ -172,7 +190,10 @@ fn williams<const D: usize>(original: Vec<Part<D>>, components: usize) -> (Vec<P
                     + wi * wi * within[i][i]
                     + wj * wj * within[j][j]
                     + 2.0 * wi * wj * within[i][j];
-                let others: f64 = (0..n).filter(|k| *k != i && *k != j).map(|k| parts[k].weight * overlap(&joined, &parts[k])).sum();
+                let others: f64 = (0..n)
+                    .filter(|k| *k != i && *k != j)
+                    .map(|k| parts[k].weight * overlap(&joined, &parts[k]))
+                    .sum();
                 let w = joined.weight;
                 let hh = without + 2.0 * w * others + w * w * overlap(&joined, &joined);
                 let fh = crossed - wi * against[i] - wj * against[j] + w * inner(&joined, &original);

@@ -1,11 +1,13 @@
 //! Weighted particles in structure-of-arrays form.
 
 use crate::Error;
-use fewbits_core::{Columns, ColumnsMut};
+use crate::stored::StoredParticles;
+use fewbits_core::{Belief, Columns, ColumnsMut};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one};
-use fewbits_numerics::kernels::{dot, exp_minus, largest, weighted_covariance};
+use fewbits_numerics::kernels::{dot, exp_minus, largest, sum, weighted_covariance};
 use nalgebra::{SMatrix, SVector};
+use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 /// A belief `sum_i w_i delta(x - x_i)` over `R^D`, always normalised.
@@ -13,6 +15,9 @@ use serde::{Deserialize, Serialize};
 /// Each coordinate is one contiguous column and the weights are kept as logarithms and as themselves, so that a filter's
 /// inner loops run over plain slices, no weight underflows on the way, and one exponential a particle is paid where the
 /// weights change. They change only through [`reweigh`](Self::reweigh), which either succeeds or leaves the belief as it was.
+///
+/// Beside its state a particle may carry a row of numbers of its own ([`with_side`](Self::with_side)), which is selected with
+/// it: what a sensor estimates under the particle's history, a label, a statistic.
 ///
 /// ```
 /// use fewbits_densities::Particles;
@@ -22,12 +27,14 @@ use serde::{Deserialize, Serialize};
 /// # Ok::<(), fewbits_densities::Error>(())
 /// ```
 #[derive(Debug, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "StoredParticles", into = "StoredParticles")]
 pub struct Particles<const D: usize> {
     columns: [Vec<f64>; D],
     log_weights: Vec<f64>,
     weights: Vec<f64>,
     effective_sample_size: f64,
+    /// One row of `side.len() / len` numbers per particle.
+    side: Vec<f64>,
     /// Room for a column or for weights under construction, so that no step allocates.
     scratch: Vec<f64>,
 }
@@ -47,7 +54,7 @@ impl<const D: usize> Particles<D> {
             return Err(ArgumentError::new(
                 "log_weights",
                 format!("{} numbers", log_weights.len()),
-                format!("{}, one a particle", belief.len()),
+                format!("{}, one per particle", belief.len()),
             )
             .into());
         }
@@ -78,6 +85,7 @@ impl<const D: usize> Particles<D> {
             log_weights: Vec::with_capacity(count),
             weights: Vec::with_capacity(count),
             effective_sample_size: 0.0,
+            side: Vec::new(),
             scratch: Vec::with_capacity(count),
         };
         belief.equalise(count);
@@ -97,6 +105,45 @@ impl<const D: usize> Particles<D> {
             }
         }
         Self::uniform(columns)
+    }
+
+    /// Equally weighted particles, independent draws from a belief.
+    ///
+    /// # Errors
+    /// If `count` is zero or a draw is not finite.
+    pub fn from_belief<R: Rng + ?Sized>(rng: &mut R, belief: &impl Belief<D>, count: usize) -> Result<Self, Error> {
+        let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| vec![0.0; count]);
+        belief.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
+        Self::uniform(columns)
+    }
+
+    /// The same particles, each with a row of numbers of its own; `side` holds the rows one after the other.
+    ///
+    /// # Errors
+    /// If the length of `side` is no multiple of the number of particles, or an entry is not finite.
+    pub fn with_side(mut self, side: Vec<f64>) -> Result<Self, Error> {
+        all_finite("side", &side)?;
+        if side.len() % self.len() != 0 {
+            let expected = format!("rows of equal length for {} particles", self.len());
+            return Err(ArgumentError::new("side", format!("{} numbers", side.len()), expected).into());
+        }
+        self.side = side;
+        Ok(self)
+    }
+
+    /// Numbers beside each particle's state.
+    pub fn side_width(&self) -> usize {
+        self.side.len() / self.len()
+    }
+
+    /// The numbers beside all states, one row after the other.
+    pub fn side(&self) -> &[f64] {
+        &self.side
+    }
+
+    /// Coordinates and side rows for work in place. Finite numbers must stay finite.
+    pub fn parts_mut(&mut self) -> (ColumnsMut<'_, D>, &mut [f64]) {
+        (self.columns.each_mut().map(Vec::as_mut_slice), &mut self.side)
     }
 
     /// Number of particles, at least one.
@@ -143,48 +190,82 @@ impl<const D: usize> Particles<D> {
     /// `ln sum_i exp(log weight_i)` after the change: the log-likelihood estimate if log likelihoods were added.
     ///
     /// # Errors
-    /// [`Error::Degenerate`] if no weight is left or one is NaN or infinite; the belief is then as it was before.
+    /// [`fewbits_core::Error::Impossible`] if no weight is left or one is NaN or infinite; the belief is then as it was before.
     pub fn reweigh(&mut self, change: impl FnOnce(Columns<'_, D>, &mut [f64])) -> Result<f64, Error> {
         self.scratch.clear();
         self.scratch.extend_from_slice(&self.log_weights);
         change(self.columns.each_ref().map(Vec::as_slice), &mut self.scratch);
-        let largest = largest(&self.scratch);
-        if !largest.is_finite() {
-            return Err(Error::Degenerate { largest });
-        }
-        let sums = exp_minus(&self.scratch, largest, &mut self.weights);
-        let total = sums.sum;
-        if !total.is_finite() {
-            exp_minus(&self.log_weights, 0.0, &mut self.weights);
-            return Err(Error::Degenerate { largest: total });
-        }
-        let log_sum = largest + total.ln();
-        let scale = 1.0 / total;
-        self.weights.iter_mut().for_each(|w| *w *= scale);
-        self.scratch.iter_mut().for_each(|w| *w -= log_sum);
+        let (log_sum, effective_sample_size) = normalise(&mut self.scratch, &mut self.weights)?;
         std::mem::swap(&mut self.log_weights, &mut self.scratch);
-        self.effective_sample_size = total * total / sums.sum_of_squares;
+        self.effective_sample_size = effective_sample_size;
         Ok(log_sum)
     }
 
-    /// Replaces the particles by copies of the chosen ones, equally weighted. Indices must be below [`len`](Self::len); the
-    /// number of particles becomes that of the indices.
+    /// Replaces the particles by copies of the chosen ones, equally weighted. The number of particles becomes that of the
+    /// indices.
     ///
     /// # Errors
-    /// No index, or one out of range; the belief is then as it was.
+    /// If there is no index, or one is not below [`len`](Self::len); the belief is then as it was.
     pub fn select(&mut self, ancestors: &[u32]) -> Result<(), Error> {
-        at_least_one("ancestors", ancestors.len())?;
-        let count = self.len();
-        if let Some(bad) = ancestors.iter().find(|a| **a as usize >= count) {
-            return Err(ArgumentError::new("ancestors", bad, format!("indices below {count}")).into());
-        }
+        self.check(ancestors)?;
+        let width = self.side_width();
         for column in &mut self.columns {
             self.scratch.clear();
             self.scratch.extend(ancestors.iter().map(|a| column[*a as usize]));
             std::mem::swap(column, &mut self.scratch);
         }
+        if width > 0 {
+            self.scratch.clear();
+            gather_rows(&self.side, width, ancestors, &mut self.scratch);
+            std::mem::swap(&mut self.side, &mut self.scratch);
+        }
         self.equalise(ancestors.len());
         Ok(())
+    }
+
+    /// Becomes a selection of the particles of `source`, equally weighted, in the memory of this belief.
+    ///
+    /// # Errors
+    /// As [`select`](Self::select).
+    pub fn select_from(&mut self, source: &Self, ancestors: &[u32]) -> Result<(), Error> {
+        source.check(ancestors)?;
+        for (column, from) in self.columns.iter_mut().zip(&source.columns) {
+            column.clear();
+            column.extend(ancestors.iter().map(|a| from[*a as usize]));
+        }
+        self.side.clear();
+        gather_rows(&source.side, source.side_width(), ancestors, &mut self.side);
+        self.equalise(ancestors.len());
+        Ok(())
+    }
+
+    /// Replaces the particles by copies of the chosen ones with the given log weights, which may share any offset: the
+    /// selection of an auxiliary filter, a pruning.
+    ///
+    /// # Errors
+    /// As [`select`](Self::select); if there is not one weight per index; [`fewbits_core::Error::Impossible`] if no weight is
+    /// left. The belief is then as it was.
+    pub fn select_weighted(&mut self, ancestors: &[u32], log_weights: &[f64]) -> Result<(), Error> {
+        self.check(ancestors)?;
+        if log_weights.len() != ancestors.len() {
+            let expected = format!("{}, one per ancestor", ancestors.len());
+            return Err(ArgumentError::new("log_weights", format!("{} numbers", log_weights.len()), expected).into());
+        }
+        let (mut logs, mut weights) = (log_weights.to_vec(), vec![0.0; log_weights.len()]);
+        normalise(&mut logs, &mut weights)?;
+        self.select(ancestors)?;
+        (self.log_weights, self.weights) = (logs, weights);
+        self.effective_sample_size = 1.0 / dot(&self.weights, &self.weights);
+        Ok(())
+    }
+
+    fn check(&self, ancestors: &[u32]) -> Result<(), Error> {
+        at_least_one("ancestors", ancestors.len())?;
+        let count = self.len();
+        match ancestors.iter().find(|a| **a as usize >= count) {
+            Some(bad) => Err(ArgumentError::new("ancestors", bad, format!("indices below {count}")).into()),
+            None => Ok(()),
+        }
     }
 
     /// Gives all particles the same weight.
@@ -192,7 +273,7 @@ impl<const D: usize> Particles<D> {
         self.equalise(self.len());
     }
 
-    fn equalise(&mut self, count: usize) {
+    pub(crate) fn equalise(&mut self, count: usize) {
         let weight = 1.0 / count as f64;
         self.weights.clear();
         self.weights.resize(count, weight);
@@ -234,6 +315,7 @@ impl<const D: usize> Clone for Particles<D> {
             log_weights: self.log_weights.clone(),
             weights: self.weights.clone(),
             effective_sample_size: self.effective_sample_size,
+            side: self.side.clone(),
             scratch: Vec::with_capacity(self.len()),
         }
     }
@@ -243,40 +325,113 @@ impl<const D: usize> Clone for Particles<D> {
         self.log_weights.clone_from(&other.log_weights);
         self.weights.clone_from(&other.weights);
         self.effective_sample_size = other.effective_sample_size;
+        self.side.clone_from(&other.side);
     }
 }
 
-/// Equality of the belief: columns and weights.
+/// Equality of the belief: columns, weights and side rows.
 impl<const D: usize> PartialEq for Particles<D> {
     fn eq(&self, other: &Self) -> bool {
-        self.columns == other.columns && self.log_weights == other.log_weights
+        self.columns == other.columns && self.log_weights == other.log_weights && self.side == other.side
     }
 }
 
-/// The plain form in which particles are stored. Weights rather than their logarithms: JSON has no infinity.
-#[derive(Serialize, Deserialize)]
-struct Stored {
-    columns: Vec<Vec<f64>>,
-    weights: Vec<f64>,
-}
+impl<const D: usize> Belief<D> for Particles<D> {
+    fn mean(&self) -> SVector<f64, D> {
+        self.mean()
+    }
 
-impl<const D: usize> From<Particles<D>> for Stored {
-    fn from(belief: Particles<D>) -> Self {
-        Self {
-            columns: belief.columns.into(),
-            weights: belief.weights,
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.covariance()
+    }
+
+    /// Each draw is a particle, chosen by its weight.
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+        let cumulative = Cumulative::new(&self.weights);
+        let count = fewbits_core::columns::count(&states);
+        let chosen: Vec<usize> = (0..count).map(|_| cumulative.draw(rng)).collect();
+        for (states, column) in states.into_iter().zip(&self.columns) {
+            for (x, i) in states.iter_mut().zip(&chosen) {
+                *x = column[*i];
+            }
         }
     }
 }
 
-impl<const D: usize> TryFrom<Stored> for Particles<D> {
+/// Running sums of weights, for draws in proportion to them.
+pub(crate) struct Cumulative {
+    sums: Vec<f64>,
+    last: usize,
+}
+
+impl Cumulative {
+    pub(crate) fn new(weights: &[f64]) -> Self {
+        let mut total = 0.0;
+        let mut sum = |w: &f64| {
+            total += w;
+            total
+        };
+        Self {
+            sums: weights.iter().map(&mut sum).collect(),
+            last: weights.iter().rposition(|w| *w > 0.0).unwrap_or(0),
+        }
+    }
+
+    /// An index of positive weight.
+    pub(crate) fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
+        let point = rng.random::<f64>() * self.sums.last().copied().unwrap_or(0.0);
+        self.sums.partition_point(|sum| *sum <= point).min(self.last)
+    }
+}
+
+/// Copies the chosen rows.
+fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut Vec<f64>) {
+    if width > 0 {
+        for a in chosen {
+            let start = *a as usize * width;
+            out.extend_from_slice(&rows[start..start + width]);
+        }
+    }
+}
+
+/// Normalises log weights and writes their exponentials; returns `ln sum exp` and the effective
+/// sample size. On failure `weights` is as it was.
+fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error> {
+    let largest = largest(logs);
+    // Without `+inf`, which `largest` would show, the sum is NaN if and only if a weight is.
+    if !largest.is_finite() || sum(logs).is_nan() {
+        return Err(Error::IMPOSSIBLE);
+    }
+    let sums = exp_minus(logs, largest, weights);
+    let log_sum = largest + sums.sum.ln();
+    let scale = 1.0 / sums.sum;
+    weights.iter_mut().for_each(|w| *w *= scale);
+    logs.iter_mut().for_each(|w| *w -= log_sum);
+    Ok((log_sum, sums.sum * sums.sum / sums.sum_of_squares))
+}
+
+impl<const D: usize> From<Particles<D>> for StoredParticles {
+    fn from(belief: Particles<D>) -> Self {
+        Self::new(belief.columns.into(), belief.weights, &belief.log_weights, belief.side)
+    }
+}
+
+impl<const D: usize> TryFrom<StoredParticles> for Particles<D> {
     type Error = Error;
 
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        let columns = stored.columns.try_into().map_err(|columns: Vec<Vec<f64>>| {
+    fn try_from(stored: StoredParticles) -> Result<Self, Error> {
+        let (columns, weights, log_weights, side) = stored.parts()?;
+        let columns = columns.try_into().map_err(|columns: Vec<Vec<f64>>| {
             ArgumentError::new("columns", format!("{} columns", columns.len()), format!("{D} columns"))
         })?;
-        let log_weights: Vec<f64> = stored.weights.iter().map(|w| w.ln()).collect();
-        Self::new(columns, &log_weights)
+        let mut belief = Self::new(columns, &log_weights)?.with_side(side)?;
+        // As it was stored, to the last bit.
+        if weights.windows(2).all(|pair| pair[0] == pair[1]) {
+            belief.equalise(weights.len());
+        } else {
+            belief.effective_sample_size = 1.0 / dot(&weights, &weights);
+            (belief.weights, belief.log_weights) = (weights, log_weights);
+        }
+        Ok(belief)
     }
 }

@@ -43,7 +43,10 @@ impl<const D: usize> Information<D> {
         Self {
             precision,
             shift: precision * mean,
-            log_weight: c.weight().ln() - 0.5 * c.factor().squared(&mean) - c.factor().half_log_det - D as f64 * LN_SQRT_2PI,
+            log_weight: c.weight().ln()
+                - 0.5 * c.factor().squared(&mean)
+                - c.factor().half_log_det
+                - D as f64 * LN_SQRT_2PI,
         }
     }
 }
@@ -67,13 +70,20 @@ fn check<const D: usize>(factors: &[&Mixture<D>]) -> Result<SVector<f64, D>, Err
 ///
 /// # Errors
 /// If there is no factor, there are more than [`MOST_TERMS`] choices, or every weight underflows
-/// ([`Error::Degenerate`]: factors that contradict each other astronomically).
+/// ([`fewbits_core::Error::Impossible`]: factors that contradict each other astronomically).
 pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<Mixture<D>>, Error> {
     let origin = check(factors)?;
-    let terms = factors.iter().try_fold(1_usize, |n, f| n.checked_mul(f.len()).filter(|n| *n <= MOST_TERMS));
+    let terms = factors
+        .iter()
+        .try_fold(1_usize, |n, f| n.checked_mul(f.len()).filter(|n| *n <= MOST_TERMS));
     if terms.is_none() {
         let sizes: Vec<usize> = factors.iter().map(|f| f.len()).collect();
-        return Err(ArgumentError::new("factors", format!("mixtures of {sizes:?} components"), format!("at most {MOST_TERMS} choices of labels")).into());
+        return Err(ArgumentError::new(
+            "factors",
+            format!("mixtures of {sizes:?} components"),
+            format!("at most {MOST_TERMS} choices of labels"),
+        )
+        .into());
     }
     let zero = Information {
         precision: SMatrix::zeros(),
@@ -82,7 +92,12 @@ pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<Mixture<
     };
     let mut products = vec![zero];
     for factor in factors {
-        let parts: Vec<Information<D>> = factor.components().iter().filter(|c| c.weight() > 0.0).map(|c| Information::of(c, &origin)).collect();
+        let parts: Vec<Information<D>> = factor
+            .components()
+            .iter()
+            .filter(|c| c.weight() > 0.0)
+            .map(|c| Information::of(c, &origin))
+            .collect();
         products = products
             .iter()
             .flat_map(|a| {
@@ -103,7 +118,7 @@ pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<Mixture<
     }
     let largest = gaussians.iter().fold(f64::NEG_INFINITY, |m, g| m.max(g.0));
     if !largest.is_finite() {
-        return Err(Error::Degenerate { largest });
+        return Err(Error::IMPOSSIBLE);
     }
     let total: f64 = gaussians.iter().map(|g| (g.0 - largest).exp()).sum();
     let components = gaussians.into_iter().map(|(log, mean, covariance)| {
@@ -137,8 +152,10 @@ pub fn gibbs<const D: usize, R: Rng + ?Sized>(
 ) -> Result<Particles<D>, Error> {
     let origin = check(factors)?;
     at_least_one("count", count)?;
-    let parts: Vec<Vec<Information<D>>> =
-        factors.iter().map(|f| f.components().iter().map(|c| Information::of(c, &origin)).collect()).collect();
+    let parts: Vec<Vec<Information<D>>> = factors
+        .iter()
+        .map(|f| f.components().iter().map(|c| Information::of(c, &origin)).collect())
+        .collect();
     let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| Vec::with_capacity(count));
     let mut labels = vec![0; factors.len()];
     let mut logs = Vec::new();
@@ -161,7 +178,10 @@ pub fn gibbs<const D: usize, R: Rng + ?Sized>(
         let (mean, _, factor) = gaussian(&precision, &shift)?;
         let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
         let draw = origin + mean + factor.whitener.transpose() * z;
-        columns.iter_mut().zip(draw.iter()).for_each(|(column, x)| column.push(*x));
+        columns
+            .iter_mut()
+            .zip(draw.iter())
+            .for_each(|(column, x)| column.push(*x));
     }
     Particles::uniform(columns)
 }
@@ -218,7 +238,7 @@ fn pick<R: Rng + ?Sized>(rng: &mut R, weights: impl Iterator<Item = f64> + Clone
 /// that factor is as concentrated as the product, as a prediction is; its weights tell when it is not.
 ///
 /// # Errors
-/// If there is no factor, no draw, no such factor, or no weight is left ([`Error::Degenerate`]).
+/// If there is no factor, no draw, no such factor, or no weight is left ([`fewbits_core::Error::Impossible`]).
 pub fn importance<const D: usize, R: Rng + ?Sized>(
     rng: &mut R,
     factors: &[&Mixture<D>],

@@ -99,7 +99,11 @@ impl Reduction {
                 let errors = NodeErrors::new(estimate, &tree, Criterion::LogDeterminant)?;
                 let coarse = greedy(&tree, &errors, cut.max(components))?.mixture(&tree)?;
                 let merged = merge(&coarse, components, MergeCost::Runnalls)?.mixture;
-                let rule = if D <= 3 { Cubature::GaussHermite } else { Cubature::Spherical };
+                let rule = if D <= 3 {
+                    Cubature::GaussHermite
+                } else {
+                    Cubature::Spherical
+                };
                 refine(estimate, &merged, iterations, rule)
             }
         }

@@ -93,12 +93,12 @@ impl<const D: usize> Tree<D> {
     /// Builds the tree. Kernels of weight zero are left out.
     ///
     /// # Errors
-    /// Never for a valid estimate; [`Error::Degenerate`] if every weight is zero.
+    /// Never for a valid estimate; [`fewbits_core::Error::Impossible`] if every weight is zero.
     pub fn new(estimate: &KernelEstimate<D>, split: Split) -> Result<Self, Error> {
         let weights = estimate.particles().weights();
         let order: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
         if order.is_empty() {
-            return Err(Error::Degenerate { largest: 0.0 });
+            return Err(Error::IMPOSSIBLE);
         }
         let mut tree = Self {
             nodes: Vec::with_capacity(2 * order.len()),
@@ -112,7 +112,14 @@ impl<const D: usize> Tree<D> {
 
     /// Adds the node of `range` and all below it; returns its index. Depth is `O(log n)` at the count median and at most `n`
     /// for wild weights, so the descent keeps its own stack.
-    fn build(&mut self, estimate: &KernelEstimate<D>, split: Split, whole: Range<usize>, depth: usize, keys: &mut [f64]) {
+    fn build(
+        &mut self,
+        estimate: &KernelEstimate<D>,
+        split: Split,
+        whole: Range<usize>,
+        depth: usize,
+        keys: &mut [f64],
+    ) {
         let mut pending = vec![(whole, depth, None::<(usize, usize)>)];
         while let Some((range, depth, parent)) = pending.pop() {
             let index = self.nodes.len();
@@ -164,7 +171,14 @@ impl<const D: usize> Tree<D> {
     }
 
     /// Orders the kernels of `range` along the split direction and returns the first position of the right child.
-    fn part(&mut self, estimate: &KernelEstimate<D>, split: Split, range: Range<usize>, depth: usize, keys: &mut [f64]) -> usize {
+    fn part(
+        &mut self,
+        estimate: &KernelEstimate<D>,
+        split: Split,
+        range: Range<usize>,
+        depth: usize,
+        keys: &mut [f64],
+    ) -> usize {
         let weights = estimate.particles().weights();
         let own = &mut self.order[range.clone()];
         let raw = estimate.particles().columns();
@@ -173,9 +187,13 @@ impl<const D: usize> Tree<D> {
             Axis::Widest | Axis::Alternating => raw,
         };
         let total: f64 = own.iter().map(|i| weights[*i]).sum();
-        let mean: [f64; D] = std::array::from_fn(|d| own.iter().map(|i| weights[*i] * columns[d][*i]).sum::<f64>() / total);
+        let mean: [f64; D] =
+            std::array::from_fn(|d| own.iter().map(|i| weights[*i] * columns[d][*i]).sum::<f64>() / total);
         let moment = |a: usize, b: usize, own: &[usize]| -> f64 {
-            own.iter().map(|i| weights[*i] * (columns[a][*i] - mean[a]) * (columns[b][*i] - mean[b])).sum::<f64>() / total
+            own.iter()
+                .map(|i| weights[*i] * (columns[a][*i] - mean[a]) * (columns[b][*i] - mean[b]))
+                .sum::<f64>()
+                / total
         };
         let direction: SVector<f64, D> = match split.axis {
             Axis::Widest => {
@@ -191,7 +209,10 @@ impl<const D: usize> Tree<D> {
             }
         };
         for i in own.iter() {
-            keys[*i] = (0..D).filter(|d| direction[*d] != 0.0).map(|d| direction[d] * columns[d][*i]).sum();
+            keys[*i] = (0..D)
+                .filter(|d| direction[*d] != 0.0)
+                .map(|d| direction[d] * columns[d][*i])
+                .sum();
         }
         own.sort_by(|a, b| keys[*a].total_cmp(&keys[*b]).then(a.cmp(b)));
         let left = match split.at {
@@ -225,7 +246,10 @@ impl<const D: usize> Tree<D> {
 
     /// The kernels under a node, by their number in the estimate, increasing; empty for a node that is not there.
     pub fn members(&self, index: usize) -> Vec<usize> {
-        let mut members = self.nodes.get(index).map_or(Vec::new(), |node| self.order[node.range.clone()].to_vec());
+        let mut members = self
+            .nodes
+            .get(index)
+            .map_or(Vec::new(), |node| self.order[node.range.clone()].to_vec());
         members.sort_unstable();
         members
     }
@@ -239,7 +263,9 @@ impl<const D: usize> Tree<D> {
         for index in cut {
             match self.nodes.get(*index) {
                 Some(node) => ranges.push(node.range.clone()),
-                None => return Err(ArgumentError::new("cut", index, format!("nodes below {}", self.nodes.len())).into()),
+                None => {
+                    return Err(ArgumentError::new("cut", index, format!("nodes below {}", self.nodes.len())).into());
+                }
             }
         }
         ranges.sort_by_key(|r| r.start);

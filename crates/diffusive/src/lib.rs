@@ -1,17 +1,25 @@
 //! Finding a diffusive source by a belief that travels from sensor to sensor.
 
+mod chain;
+mod envelope;
 mod error;
+pub mod information;
 mod likelihood;
+pub mod message;
 mod posterior;
 mod project;
 mod rate;
 mod record;
+mod select;
 mod sensor;
 
+pub use chain::{Outcome, Search, Status, Step};
+pub use envelope::Envelope;
 pub use error::Error;
 pub use likelihood::{RateLikelihood, SourceLikelihood};
 pub use posterior::{PositionBelief, Posterior, Prior, SearchBox};
 pub use project::{Form, Travelling, project};
 pub use rate::{RateModel, RateRange, RateSums, log_sample_marginal};
 pub use record::Record;
+pub use select::{Rule, Selector};
 pub use sensor::SourceSensor;

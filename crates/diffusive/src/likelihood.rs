@@ -39,24 +39,22 @@ impl SourceLikelihood {
     /// Sums over all records with the source at `position`.
     #[inline]
     pub fn sums(&self, position: &Vector2<f64>) -> RateSums {
-        self.records.iter().fold(RateSums::default(), |sum, record| sum.plus(&record.sums(position)))
+        self.records
+            .iter()
+            .fold(RateSums::default(), |sum, record| sum.plus(&record.sums(position)))
     }
 
-    /// The log likelihood, and the same blurred over a cell of the given half width.
+    /// The log likelihood blurred over a cell of the given half width, and the log likelihood itself where the first exceeds
+    /// `floor`; elsewhere the blurred one stands for both.
     #[inline]
-    pub(crate) fn blurred(&self, position: &Vector2<f64>, half_width: f64) -> (f64, f64) {
+    pub(crate) fn blurred(&self, position: &Vector2<f64>, half_width: f64, floor: f64) -> (f64, f64) {
         let (mut all, mut blurred) = (RateSums::default(), RateSums::default());
         let (mut log, mut blurred_log) = (0.0, 0.0);
         for record in &self.records {
             let sums = record.sums(position);
             let share = record.discount(position, half_width);
             // The normalisation of the noise is not discounted: it would favour cells where the response is steep.
-            let less = RateSums {
-                response: share * sums.response,
-                correlation: share * sums.correlation,
-                energy: share * sums.energy,
-                log_noise: sums.log_noise,
-            };
+            let less = sums.discounted(share);
             match &self.rate {
                 RateModel::Known(rate) => {
                     log += sums.log_given_rate(*rate);
@@ -78,7 +76,10 @@ impl SourceLikelihood {
             }
         }
         match &self.rate {
-            RateModel::Joint(range) => (all.log_marginal(range), blurred.log_marginal(range)),
+            RateModel::Joint(range) => {
+                let score = blurred.log_marginal(range);
+                (if score > floor { all.log_marginal(range) } else { score }, score)
+            }
             _ => (log, blurred_log),
         }
     }
@@ -90,9 +91,11 @@ impl Likelihood<2> for SourceLikelihood {
             RateModel::Known(rate) => self.sums(position).log_given_rate(*rate),
             RateModel::Joint(range) => self.sums(position).log_marginal(range),
             RateModel::NodeWise(range) => self.records.iter().map(|r| r.sums(position).log_marginal(range)).sum(),
-            RateModel::SampleWise(range) => {
-                self.records.iter().map(|r| r.log_sample_wise(position, range, 1.0)).sum()
-            }
+            RateModel::SampleWise(range) => self
+                .records
+                .iter()
+                .map(|r| r.log_sample_wise(position, range, 1.0))
+                .sum(),
         }
     }
 }
@@ -113,6 +116,9 @@ impl RateLikelihood {
 impl Likelihood<3> for RateLikelihood {
     fn log_likelihood(&self, state: &SVector<f64, 3>) -> f64 {
         let position = Vector2::new(state[0], state[1]);
-        self.records.iter().map(|record| record.sums(&position).log_given_rate(state[2])).sum()
+        self.records
+            .iter()
+            .map(|record| record.sums(&position).log_given_rate(state[2]))
+            .sum()
     }
 }

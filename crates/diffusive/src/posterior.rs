@@ -1,7 +1,7 @@
 //! The exact posterior of one update, over cells.
 
 use crate::rate::{RateModel, RateRange, cut_normal, log_inside};
-use crate::{Error, Record, SourceLikelihood};
+use crate::{Error, SourceLikelihood};
 use fewbits_core::{Belief, Columns, Density, Gaussian};
 use fewbits_densities::{CellOptions, CellTarget, Cells, Clumps, Lpg, Mixture};
 use nalgebra::{Matrix2, Vector2};
@@ -55,7 +55,7 @@ impl Posterior {
     /// the posterior, such as the cells of the step before.
     ///
     /// # Errors
-    /// As [`Cells::cover`]; a belief that excludes the records is [`fewbits_densities::Error::BeliefMiss`].
+    /// As [`Cells::cover`]; a belief that excludes the records is [`fewbits_core::Error::Impossible`].
     pub fn new(
         prior: &Prior,
         likelihood: &SourceLikelihood,
@@ -67,9 +67,15 @@ impl Posterior {
             (Prior::Exact(_), None) => (*search, WIDE),
             (Prior::Exact(_), Some(near)) => (near, NARROW),
             (Prior::Position(belief), _) => (belief.bounds(), NARROW),
-            (Prior::WithRate(mixture, _), _) => (bounds(mixture.components().iter().map(|c| {
-                (Vector2::new(c.mean()[0], c.mean()[1]), Vector2::new(c.covariance()[(0, 0)], c.covariance()[(1, 1)]))
-            })), NARROW),
+            (Prior::WithRate(mixture, _), _) => (
+                bounds(mixture.components().iter().map(|c| {
+                    (
+                        Vector2::new(c.mean()[0], c.mean()[1]),
+                        Vector2::new(c.covariance()[(0, 0)], c.covariance()[(1, 1)]),
+                    )
+                })),
+                NARROW,
+            ),
         };
         let around = around.within(search);
         let wide = around.upper[0] - around.lower[0] > 0.5 * (search.upper[0] - search.lower[0]);
@@ -116,7 +122,10 @@ impl Posterior {
         let edge = self.cells.width();
         let outside = |v: f64, d: usize| v < search.lower[d] + edge || v > search.upper[d] - edge;
         let masses = x.iter().zip(y).zip(self.cells.weights());
-        masses.filter(|((x, y), _)| outside(**x, 0) || outside(**y, 1)).map(|(_, w)| w).sum()
+        masses
+            .filter(|((x, y), _)| outside(**x, 0) || outside(**y, 1))
+            .map(|(_, w)| w)
+            .sum()
     }
 
     /// The box of the cells with a margin, within which the next posterior lies if all records stay in use.
@@ -136,7 +145,11 @@ impl SearchBox {
     fn within(&self, other: &Self) -> Self {
         let lower: [f64; 2] = std::array::from_fn(|d| self.lower[d].max(other.lower[d]));
         let upper: [f64; 2] = std::array::from_fn(|d| self.upper[d].min(other.upper[d]));
-        if lower[0] < upper[0] && lower[1] < upper[1] { Self { lower, upper } } else { *other }
+        if lower[0] < upper[0] && lower[1] < upper[1] {
+            Self { lower, upper }
+        } else {
+            *other
+        }
     }
 }
 
@@ -158,7 +171,12 @@ fn bounds(parts: impl Iterator<Item = (Vector2<f64>, Vector2<f64>)>) -> SearchBo
 impl PositionBelief {
     fn bounds(&self) -> SearchBox {
         match self {
-            Self::Mixture(mixture) => bounds(mixture.components().iter().map(|c| (*c.mean(), c.covariance().diagonal()))),
+            Self::Mixture(mixture) => bounds(
+                mixture
+                    .components()
+                    .iter()
+                    .map(|c| (*c.mean(), c.covariance().diagonal())),
+            ),
             // A polynomial of the degrees in use reaches a little farther than its Gaussian.
             Self::Lpg(lpg) => bounds(lpg.gaussians().map(|c| (*c.mean(), c.covariance().diagonal() * 1.7))),
         }
@@ -233,7 +251,12 @@ impl<'a> Target<'a> {
         match prior {
             Prior::Exact(gaussian) => lobes.push(Lobe::new(1.0, *gaussian.mean(), *gaussian.covariance())),
             Prior::Position(PositionBelief::Mixture(mixture)) => {
-                lobes.extend(mixture.components().iter().map(|c| Lobe::new(c.weight(), *c.mean(), *c.covariance())));
+                lobes.extend(
+                    mixture
+                        .components()
+                        .iter()
+                        .map(|c| Lobe::new(c.weight(), *c.mean(), *c.covariance())),
+                );
             }
             Prior::Position(PositionBelief::Lpg(_)) => {}
             Prior::WithRate(mixture, _) => {
@@ -247,11 +270,20 @@ impl<'a> Target<'a> {
                     // A Cholesky factor exists, so that the Schur complement is positive; rounding may bring it to zero.
                     let variance = (s[(2, 2)] - gain.dot(&cross)).max(1e-14 * s[(2, 2)]);
                     lobes.push(lobe);
-                    conditionals.push(Conditional { mean: c.mean()[2], gain, variance });
+                    conditionals.push(Conditional {
+                        mean: c.mean()[2],
+                        gain,
+                        variance,
+                    });
                 }
             }
         }
-        Ok(Self { prior, likelihood, lobes, conditionals })
+        Ok(Self {
+            prior,
+            likelihood,
+            lobes,
+            conditionals,
+        })
     }
 
     /// Mean and variance of the rate at every cell.
@@ -260,9 +292,11 @@ impl<'a> Target<'a> {
         let positions = x.iter().zip(y).map(|(x, y)| Vector2::new(*x, *y));
         match (self.prior, self.likelihood.rate()) {
             (Prior::WithRate(_, range), _) => Some(positions.map(|at| self.rate_of_mixture(&at, range)).unzip()),
-            (Prior::Exact(_), RateModel::Joint(range)) => {
-                Some(positions.map(|at| self.likelihood.sums(&at).rate_given_position(range)).unzip())
-            }
+            (Prior::Exact(_), RateModel::Joint(range)) => Some(
+                positions
+                    .map(|at| self.likelihood.sums(&at).rate_given_position(range))
+                    .unzip(),
+            ),
             _ => None,
         }
     }
@@ -294,7 +328,11 @@ impl<'a> Target<'a> {
             second += weight * (v + m * m);
         }
         let mean = first / total;
-        if total > 0.0 { (mean + middle, (second / total - mean * mean).max(0.0)) } else { (middle, 0.0) }
+        if total > 0.0 {
+            (mean + middle, (second / total - mean * mean).max(0.0))
+        } else {
+            (middle, 0.0)
+        }
     }
 }
 
@@ -315,27 +353,42 @@ impl CellTarget<2> for Target<'_> {
     fn evaluate(&self, centres: &Columns<'_, 2>, half_width: f64, logs: &mut [f64], scores: &mut [f64]) {
         let extra = half_width * half_width;
         let precisions: Vec<[[f64; 3]; 2]> = self.lobes.iter().map(|l| [l.precision(0.0), l.precision(extra)]).collect();
+        // Cells that score far below the best so far will be dropped: their log density need not be exact.
+        let mut floor = f64::NEG_INFINITY;
         for i in 0..logs.len() {
             let at = Vector2::new(centres[0][i], centres[1][i]);
             (logs[i], scores[i]) = match self.prior {
                 Prior::Position(PositionBelief::Lpg(lpg)) => {
-                    let (log, blurred) = self.likelihood.blurred(&at, half_width);
-                    (log + lpg.log_density(&at), blurred + lpg.log_bound(&at, half_width))
+                    let bound = lpg.log_bound(&at, half_width);
+                    let (log, blurred) = self.likelihood.blurred(&at, half_width, floor - bound);
+                    let score = blurred + bound;
+                    (if score > floor { log + lpg.log_density(&at) } else { score }, score)
                 }
-                Prior::WithRate(_, range) => self.with_rate(&at, half_width, &precisions, range),
+                Prior::WithRate(_, range) => self.with_rate(&at, half_width, &precisions, range, floor),
                 _ => {
-                    let (log, blurred) = self.likelihood.blurred(&at, half_width);
                     let [own, wide] = log_mixture(&self.lobes, &precisions, &at);
+                    let (log, blurred) = self.likelihood.blurred(&at, half_width, floor - wide);
                     (log + own, blurred + wide)
                 }
             };
+            floor = floor.max(scores[i] - DROPPED);
         }
     }
 }
 
+/// Cells this far below the best, in nats, are dropped by any cover; their mass is nothing.
+const DROPPED: f64 = 40.0;
+
 impl Target<'_> {
     #[inline]
-    fn with_rate(&self, at: &Vector2<f64>, half: f64, precisions: &[[[f64; 3]; 2]], range: &RateRange) -> (f64, f64) {
+    fn with_rate(
+        &self,
+        at: &Vector2<f64>,
+        half: f64,
+        precisions: &[[[f64; 3]; 2]],
+        range: &RateRange,
+        floor: f64,
+    ) -> (f64, f64) {
         let (mut plain, mut blurred, mut log_noise) = ([0.0; 3], [0.0; 3], 0.0);
         for record in self.likelihood.records() {
             let sums = record.sums(at);
@@ -346,20 +399,20 @@ impl Target<'_> {
             }
             log_noise += sums.log_noise;
         }
-        let mut results = [LogSum::default(), LogSum::default()];
-        for ((lobe, given), precision) in self.lobes.iter().zip(&self.conditionals).zip(precisions) {
-            let d = at - lobe.mean;
-            let own = lobe.log_scale - 0.5 * quadratic(&precision[0], &d);
-            // The evidence is at most zero: lobes that cannot matter are not evaluated.
-            if own > results[0].largest - 30.0 {
-                results[0].add(own + updated(given, &d, plain, range).0);
+        let sum = |which: usize, sums: [f64; 3]| {
+            let mut result = LogSum::default();
+            for ((lobe, given), precision) in self.lobes.iter().zip(&self.conditionals).zip(precisions) {
+                let d = at - lobe.mean;
+                let own = lobe.log_scale - 0.5 * quadratic(&precision[which], &d);
+                // The evidence is at most zero: lobes that cannot matter are not evaluated.
+                if own > result.largest - 30.0 {
+                    result.add(own + updated(given, &d, sums, range).0);
+                }
             }
-            let wide = lobe.log_scale - 0.5 * quadratic(&precision[1], &d);
-            if wide > results[1].largest - 30.0 {
-                results[1].add(wide + updated(given, &d, blurred, range).0);
-            }
-        }
-        (results[0].log() - log_noise, results[1].log() - log_noise)
+            result.log() - log_noise
+        };
+        let score = sum(1, blurred);
+        (if score > floor { sum(0, plain) } else { score }, score)
     }
 }
 
@@ -392,7 +445,11 @@ impl LogSum {
 
     #[inline]
     fn log(&self) -> f64 {
-        if self.largest == f64::NEG_INFINITY { self.largest } else { self.largest + self.scaled.ln() }
+        if self.largest == f64::NEG_INFINITY {
+            self.largest
+        } else {
+            self.largest + self.scaled.ln()
+        }
     }
 }
 

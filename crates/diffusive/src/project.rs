@@ -52,7 +52,9 @@ impl Form {
         }
         let carries_rate = matches!(self, Self::Raw | Self::Gaussian | Self::Mixture(_));
         if matches!(rate, RateModel::Joint(_)) && !carries_rate {
-            return Err(ArgumentError::new("form", format!("{self:?}"), "Raw, Gaussian or Mixture with a joint rate").into());
+            return Err(
+                ArgumentError::new("form", format!("{self:?}"), "Raw, Gaussian or Mixture with a joint rate").into()
+            );
         }
         Ok(())
     }
@@ -157,8 +159,8 @@ fn particles(posterior: &Posterior, count: usize) -> Result<Travelling, Error> {
             level += 1.0 / count as f64;
         }
     }
-    let parts = chosen.into_iter().map(|x| {
-        Component::new(1.0, g.mean() + (x - g.mean()) * shrink, g.covariance() * h2)
-    });
+    let parts = chosen
+        .into_iter()
+        .map(|x| Component::new(1.0, g.mean() + (x - g.mean()) * shrink, g.covariance() * h2));
     Ok(position(Mixture::new(parts.collect::<Result<_, _>>()?)?))
 }

@@ -145,6 +145,17 @@ impl RateSums {
         }
     }
 
+    /// The sums with a share of the information, and the full normalisation of the noise.
+    #[inline]
+    pub(crate) fn discounted(&self, share: f64) -> Self {
+        Self {
+            response: share * self.response,
+            correlation: share * self.correlation,
+            energy: share * self.energy,
+            log_noise: self.log_noise,
+        }
+    }
+
     /// `ln p(samples | position, rate)`.
     #[inline]
     pub fn log_given_rate(&self, rate: f64) -> f64 {
@@ -162,8 +173,13 @@ impl RateSums {
         let root = a.sqrt();
         let best = b / a;
         let (from, to) = ((range.low - best) * root, (range.high - best) * root);
-        let inside = if from < -UNCUT && to > UNCUT { 0.0 } else { log_interval(from, to) };
-        -0.5 * (self.energy - b * best) + LN_SQRT_2PI - root.ln() - (range.high - range.low).ln() + inside - self.log_noise
+        let inside = if from < -UNCUT && to > UNCUT {
+            0.0
+        } else {
+            log_interval(from, to)
+        };
+        -0.5 * (self.energy - b * best) + LN_SQRT_2PI - root.ln() - (range.high - range.low).ln() + inside
+            - self.log_noise
     }
 
     /// Mean and variance of the rate given the position: `N(B/A, 1/A)` cut to the range.
@@ -189,9 +205,7 @@ pub(crate) fn cut_normal(mean: f64, variance: f64, range: &RateRange) -> (f64, f
         return (mean, variance);
     }
     match truncated_moments(from, to) {
-        Ok(m) => {
-            ((mean + deviation * m.mean).clamp(range.low, range.high), variance * m.variance)
-        }
+        Ok(m) => ((mean + deviation * m.mean).clamp(range.low, range.high), variance * m.variance),
         Err(_) => uniform(range),
     }
 }
@@ -201,7 +215,11 @@ pub(crate) fn cut_normal(mean: f64, variance: f64, range: &RateRange) -> (f64, f
 pub(crate) fn log_inside(mean: f64, variance: f64, range: &RateRange) -> f64 {
     let deviation = variance.sqrt();
     let (from, to) = ((range.low - mean) / deviation, (range.high - mean) / deviation);
-    if from < -UNCUT && to > UNCUT { 0.0 } else { log_interval(from, to) }
+    if from < -UNCUT && to > UNCUT {
+        0.0
+    } else {
+        log_interval(from, to)
+    }
 }
 
 /// `ln p(y | position)` of a single sample with its own rate: equation (13), its distribution functions in the right order.

@@ -30,7 +30,12 @@ pub struct Record {
 }
 
 impl Record {
-    pub(crate) fn new(sensor: &SourceSensor, node: &Vector2<f64>, samples: Vec<f64>, noise: f64) -> Result<Self, Error> {
+    pub(crate) fn new(
+        sensor: &SourceSensor,
+        node: &Vector2<f64>,
+        samples: Vec<f64>,
+        noise: f64,
+    ) -> Result<Self, Error> {
         positive("noise", noise)?;
         let mut steepness = [0.0_f64; 2];
         for (y, t) in samples.iter().zip(sensor.instants()) {
@@ -155,9 +160,11 @@ impl Record {
     pub(crate) fn log_sample_wise(&self, position: &Vector2<f64>, range: &RateRange, share: f64) -> f64 {
         let offset = self.node - position;
         let wider = self.noise / share.sqrt();
-        let terms = self.samples.iter().enumerate().map(|(j, y)| {
-            log_sample_marginal(*y, self.sensor.response(j, &offset), wider, range)
-        });
+        let terms = self
+            .samples
+            .iter()
+            .enumerate()
+            .map(|(j, y)| log_sample_marginal(*y, self.sensor.response(j, &offset), wider, range));
         terms.sum()
     }
 }

@@ -163,7 +163,10 @@ impl SourceSensor {
         rate: f64,
     ) -> Vec<f64> {
         let clean = self.responses(node, source);
-        clean.into_iter().map(|a| rate * a + self.bias + self.noise * rng.sample::<f64, _>(StandardNormal)).collect()
+        clean
+            .into_iter()
+            .map(|a| rate * a + self.bias + self.noise * rng.sample::<f64, _>(StandardNormal))
+            .collect()
     }
 
     /// What was sampled at a node, ready for likelihoods.

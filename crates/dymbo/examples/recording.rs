@@ -4,12 +4,13 @@
 //! cargo run --release -p fewbits-dymbo --example recording -- FILE.csv COLUMN
 //! ```
 //!
-//! The file has a header line and one row a sample. The plant is fitted to the column by maximum likelihood, the innovations
-//! being those of the Kalman filter; then sensors with a few bits a sample follow the same column, and their estimates are
-//! compared with that of the Kalman filter, which hears every sample in full.
+//! The file has a header line and one row a sample. The plant is fitted to the first half of the column by maximum
+//! likelihood, the innovations being those of the Kalman filter; then sensors with a few bits a sample follow the whole column.
+//! Each filter is judged by how well it predicts the next sample in the second half, which the fit has not seen, beside the
+//! Kalman filter (every sample in full), the last sample, and the mean.
 
-use fewbits_core::{BitWriter, Encoder, Gaussian, Message, Observation};
-use fewbits_dymbo::{CellIndex, FineSensor, Initialisation, MultibitFilter, ScalarPlant};
+use fewbits_core::{BitWriter, Gaussian, Message, Observation, Scheme};
+use fewbits_dymbo::{Initialisation, MultibitFilter, RoundedSample, ScalarFilter, ScalarPlant};
 use fewbits_filters::kalman;
 use fewbits_models::{Ar1, LinearSensor};
 use nalgebra::Vector1;
@@ -63,6 +64,8 @@ pub struct Fit {
     pub plant: ScalarPlant,
     /// Log-likelihood of the samples after the first.
     pub log_likelihood: f64,
+    /// The bounds of the search on which the fit ended. Such a fit describes the bound and not the signal.
+    pub on_bounds: Vec<&'static str>,
 }
 
 /// Log-likelihood of a signal of zero mean, and the measurement variance that maximises it at the given coefficient and
@@ -96,7 +99,7 @@ pub fn fit(samples: &[f64]) -> Result<Fit, Box<dyn Error>> {
     if signal.iter().all(|x| *x == 0.0) {
         return Err("the signal is constant: there is nothing to fit".into());
     }
-    // a from 0 to 1 - 1e-6, gamma from 1e-6 to 1e4. A smooth record runs into the last bound: it shows no sensing noise.
+    // a from 0 to 1 - 1e-6, gamma from 1e-6 to 1e4.
     let bounds = [(0.0, 1e6_f64.ln()), (-1e6_f64.ln(), 1e4_f64.ln())];
     let plant_at = |at: [f64; 2]| (1.0 - (-at[0]).exp(), at[1].exp());
     let value = |at: [f64; 2]| {
@@ -120,12 +123,28 @@ pub fn fit(samples: &[f64]) -> Result<Fit, Box<dyn Error>> {
             step *= 0.5;
         }
     }
+    let names = [
+        [
+            "a = 0: the samples look independent",
+            "a = 1 - 1e-6: the signal wanders or drifts; take differences",
+        ],
+        [
+            "gamma = 1e-6: the signal hardly moves",
+            "gamma = 1e4: a smooth record shows no sensing noise",
+        ],
+    ];
+    let ends = (0..2).flat_map(|axis| [(axis, 0, bounds[axis].0), (axis, 1, bounds[axis].1)]);
+    let on_bounds = ends
+        .filter(|(axis, _, end)| best[*axis] == *end)
+        .map(|(axis, side, _)| names[axis][side]);
+    let on_bounds = on_bounds.collect();
     let (a, gamma) = plant_at(best);
     let (log_likelihood, variance) = profile(&signal, a, gamma)?;
     Ok(Fit {
         mean,
         plant: ScalarPlant::new(a, gamma * variance, variance)?,
         log_likelihood,
+        on_bounds,
     })
 }
 
@@ -142,29 +161,33 @@ pub fn full_precision(fit: &Fit, samples: &[f64]) -> Result<Vec<f64>, Box<dyn Er
     Ok(estimates)
 }
 
-/// Length of the first message in bits.
-const FIRST_WORD: u32 = 16;
-
 /// Estimates from words of `bits` bits after a fine first message, and the bits that were sent.
 pub fn few_bits(fit: &Fit, samples: &[f64], bits: usize) -> Result<(Vec<f64>, usize), Box<dyn Error>> {
     let filter = MultibitFilter::new(fit.plant, bits)?;
     // As fine as the innovations that follow.
-    let innovation =
-        fit.plant.steady_state(filter.information())?.predicted_variance + fit.plant.measurement_variance();
-    let sensor = FineSensor::new(innovation.sqrt())?;
-    let mut link = BitWriter::with_capacity(FIRST_WORD as usize + bits * samples.len());
+    let noise = fit.plant.measurement_variance();
+    let innovation = fit.plant.steady_state(filter.information())?.predicted_variance + noise;
+    let scheme = RoundedSample::new(noise, innovation.sqrt())?;
+    let mut link = BitWriter::with_capacity(scheme.bits() as usize + bits * samples.len());
 
-    let message = sensor.encode(&(samples[0] - fit.mean), &());
-    message.encode(&FIRST_WORD, &mut link)?;
-    let mut belief = Initialisation::Fine { sensor, message }.belief(&fit.plant)?;
+    let message = scheme.round(samples[0] - fit.mean)?;
+    message.encode(&scheme.bits(), &mut link)?;
+    let mut belief = Initialisation::Fine { scheme, message }.belief()?;
     let mut estimates = vec![belief.mean()[0] + fit.mean];
     for sample in &samples[1..] {
-        let word: CellIndex = filter.sensor().encode(&(sample - fit.mean), &filter.broadcast(&belief));
-        word.encode(&filter.sensor().bits(), &mut link)?;
-        belief = filter.step(&belief, Observation::Received(word))?.0;
+        let word = filter.scheme().word(sample - fit.mean, &filter.broadcast(&belief))?;
+        word.encode(&filter.scheme().report_format(), &mut link)?;
+        belief = filter.step(&belief, &Observation::Received(word))?.0;
         estimates.push(belief.mean()[0] + fit.mean);
     }
     Ok((estimates, link.bits()))
+}
+
+/// Root mean square of the errors of one-step predictions from `estimates`, over the samples from `first` on.
+pub fn prediction_error(fit: &Fit, samples: &[f64], estimates: &[f64], first: usize) -> f64 {
+    let ahead = |estimate: &f64| fit.mean + fit.plant.coefficient() * (estimate - fit.mean);
+    let predictions: Vec<f64> = estimates[first - 1..samples.len() - 1].iter().map(ahead).collect();
+    rms_difference(&predictions, &samples[first..])
 }
 
 /// Root mean square of the difference of two signals of equal length.
@@ -175,28 +198,36 @@ pub fn rms_difference(a: &[f64], b: &[f64]) -> f64 {
 
 /// What the example prints.
 pub struct Report {
-    /// The fitted plant.
+    /// The plant, fitted to the first half.
     pub fit: Fit,
     /// Number of samples.
     pub samples: usize,
-    /// Bits a sample, root mean square deviation from the Kalman filter's estimate, bits spent.
-    pub rows: Vec<(usize, f64, usize)>,
-    /// Root mean square of the samples' deviation from the Kalman filter's estimate.
-    pub residual: f64,
+    /// Bits per sample, root mean square deviation from the Kalman filter's estimate, root mean square error of held-out
+    /// one-step predictions, bits spent.
+    pub rows: Vec<(usize, f64, f64, usize)>,
+    /// Held-out one-step prediction errors of the Kalman filter, of the last sample, and of the mean of the first half.
+    pub reference_errors: [f64; 3],
 }
 
 /// Fits, tracks and compares.
 pub fn analyse(samples: &[f64]) -> Result<Report, Box<dyn Error>> {
-    let fit = fit(samples)?;
+    let half = samples.len() / 2;
+    let fit = fit(&samples[..half])?;
     let reference = full_precision(&fit, samples)?;
     let mut rows = Vec::new();
     for bits in 1..=3 {
         let (estimates, spent) = few_bits(&fit, samples, bits)?;
-        rows.push((bits, rms_difference(&estimates, &reference), spent));
+        let held_out = prediction_error(&fit, samples, &estimates, half);
+        rows.push((bits, rms_difference(&estimates, &reference), held_out, spent));
     }
+    let (last, unseen) = (&samples[half - 1..samples.len() - 1], &samples[half..]);
     Ok(Report {
         samples: samples.len(),
-        residual: rms_difference(samples, &reference),
+        reference_errors: [
+            prediction_error(&fit, samples, &reference, half),
+            rms_difference(last, unseen),
+            rms_difference(&vec![fit.mean; unseen.len()], unseen),
+        ],
         fit,
         rows,
     })
@@ -208,17 +239,30 @@ impl std::fmt::Display for Report {
         writeln!(f, "{} samples, mean {:.4}", self.samples, self.fit.mean)?;
         writeln!(
             f,
-            "fitted: a = {:.6}, sigma_u = {:.5}, sigma = {:.5} (gamma = {:.4}), log-likelihood {:.2}",
+            "fitted to the first half: a = {:.6}, sigma_u = {:.5}, sigma = {:.5} (gamma = {:.4}), log-likelihood {:.2}",
             plant.coefficient(),
             plant.process_variance().sqrt(),
             plant.measurement_variance().sqrt(),
             plant.noise_ratio(),
             self.fit.log_likelihood
         )?;
-        writeln!(f, "the samples deviate from the full-precision estimate by {:.5} (rms)", self.residual)?;
-        writeln!(f, "{:>12} {:>28} {:>12}", "bits/sample", "rms deviation from it", "bits spent")?;
-        for (bits, deviation, spent) in &self.rows {
-            writeln!(f, "{bits:>12} {deviation:>28.5} {spent:>12}")?;
+        for bound in &self.fit.on_bounds {
+            writeln!(f, "warning: the fit ended on the bound {bound}")?;
+        }
+        writeln!(f, "root mean square error of one-step predictions in the second half:")?;
+        for (who, error) in ["Kalman filter", "last sample", "mean"]
+            .into_iter()
+            .zip(self.reference_errors)
+        {
+            writeln!(f, "{who:>14} {error:>12.5}")?;
+        }
+        writeln!(
+            f,
+            "{:>14} {:>12} {:>28} {:>12}",
+            "bits/sample", "prediction", "rms deviation from Kalman", "bits spent"
+        )?;
+        for (bits, deviation, held_out, spent) in &self.rows {
+            writeln!(f, "{bits:>14} {held_out:>12.5} {deviation:>28.5} {spent:>12}")?;
         }
         Ok(())
     }

@@ -19,18 +19,24 @@ pub enum Error {
         /// The offending coefficient.
         coefficient: f64,
     },
+    /// What a word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
+    #[error(transparent)]
+    Core(fewbits_core::Error),
+    /// A report that does not fit its format.
+    #[error(transparent)]
+    Codec(#[from] fewbits_core::CodecError),
     /// A model refused its parameters.
     #[error(transparent)]
     Model(fewbits_models::Error),
     /// A filter below failed.
     #[error(transparent)]
-    Filter(#[from] fewbits_filters::Error),
+    Filter(fewbits_filters::Error),
     /// No quantizer table.
     #[error(transparent)]
     Quantizer(#[from] fewbits_quantizers::Error),
-    /// The message has probability zero under the belief, to the last digit of its logarithm.
-    #[error("the message is impossible under the belief")]
-    ImpossibleMessage,
+    /// No root of a steady-state equation.
+    #[error(transparent)]
+    Root(#[from] fewbits_numerics::roots::RootError),
     /// An iteration did not settle.
     #[error("{what} did not settle within {iterations} iterations")]
     NotConverged {
@@ -41,12 +47,36 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// The observation has probability zero under the belief.
+    pub(crate) const IMPOSSIBLE: Self = Self::Core(fewbits_core::Error::Impossible);
+}
+
+impl From<fewbits_core::Error> for Error {
+    fn from(error: fewbits_core::Error) -> Self {
+        match error {
+            fewbits_core::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::Core(other),
+        }
+    }
+}
+
 impl From<fewbits_models::Error> for Error {
     fn from(error: fewbits_models::Error) -> Self {
         match error {
             fewbits_models::Error::UnstablePlant { coefficient } => Self::UnstablePlant { coefficient },
             fewbits_models::Error::Argument(argument) => Self::Argument(argument),
             other => Self::Model(other),
+        }
+    }
+}
+
+impl From<fewbits_filters::Error> for Error {
+    fn from(error: fewbits_filters::Error) -> Self {
+        match error {
+            fewbits_filters::Error::Argument(argument) => Self::Argument(argument),
+            fewbits_filters::Error::Core(word) => word.into(),
+            other => Self::Filter(other),
         }
     }
 }

@@ -1,35 +1,99 @@
-//! The Dymbo filter: one sign bit a sample.
+//! The Dymbo filter, and the closed loop of every scalar filter here.
 
-use crate::plant::scalar;
-use crate::update::{UpdateInfo, bit_update};
-use crate::{Error, Initialisation, ScalarPlant};
-use fewbits_core::{Gaussian, Observation, Sign};
-use fewbits_numerics::error::within;
+use crate::plant::{filtered_variance, innovation_gain, scalar};
+use crate::sign_bit::{self, SignBit, missing_probability};
+use crate::{Error, ScalarPlant};
+use fewbits_core::factor::Scalar;
+use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
 use fewbits_numerics::normal::SQRT_2_OVER_PI;
-use std::f64::consts::{FRAC_2_PI, LN_2};
-
-/// Where the sensor's threshold stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum ThresholdRule {
-    /// At the prediction `a theta_hat(n-1)`, as the paper's text and propositions need it.
-    #[default]
-    Prediction,
-    /// At the previous estimate `theta_hat(n-1)`, as equation (14) prints it (erratum E1); the update stays exact. For
-    /// comparison only: at `a = -0.9` it costs 78 % of the mean squared error.
-    PreviousEstimate,
-}
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::LN_2;
 
 /// What a step reveals besides the new belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct StepInfo {
-    /// Predicted mean and variance, before the message.
+    /// Predicted mean and variance, before the observation.
     pub predicted: Gaussian<1>,
     /// Correction of the estimate.
     pub correction: f64,
-    /// What the message brought; `None` if it was lost.
-    pub update: Option<UpdateInfo>,
+    /// `ln p(observation | past)`, the increment of the log-likelihood of the data.
+    pub log_likelihood: f64,
+    /// Fraction of the variance reduction of the unquantized measurement that the observation brought. Negative where it
+    /// raised the variance, as a surprising bit through a noisy link may.
+    pub information: f64,
     /// Bits received.
     pub bits: u32,
+}
+
+/// A filter whose sensors are asked about its own prediction: what a closed loop needs of it.
+pub trait ScalarFilter {
+    /// What its sensors do.
+    type Scheme: Scheme<1, State = (), Factor = Scalar>;
+
+    /// The plant.
+    fn plant(&self) -> &ScalarPlant;
+
+    /// What is known of the link.
+    fn link(&self) -> &Link;
+
+    /// The sensor's half.
+    fn scheme(&self) -> Self::Scheme;
+
+    /// Mean fraction of a full measurement's information that a report brings when it arrives.
+    fn information(&self) -> f64;
+
+    /// What to broadcast, given a predicted belief.
+    fn feedback(&self, predicted: &Gaussian<1>) -> <Self::Scheme as Scheme<1>>::Feedback;
+
+    /// Corrects a predicted belief with what was observed of a sensor that was sent its [`feedback`](Self::feedback).
+    /// Call it once per sensor, the feedback refreshed each time, where several report one after the other.
+    ///
+    /// # Errors
+    /// [`fewbits_core::Error::Impossible`] for nothing from a link that loses nothing, or if the estimate overflows.
+    fn update(
+        &self,
+        predicted: &Gaussian<1>,
+        observation: &Observation<<Self::Scheme as Scheme<1>>::Report>,
+    ) -> Result<(Gaussian<1>, StepInfo), Error>;
+
+    /// Time update.
+    #[inline]
+    fn predict(&self, belief: &Gaussian<1>) -> Gaussian<1> {
+        self.plant().predict(belief)
+    }
+
+    /// One slot: predict, then correct with what was observed. Both ends must know of a report that was lost, or what they
+    /// compute drifts apart.
+    ///
+    /// # Errors
+    /// As [`ScalarFilter::update`].
+    #[inline]
+    fn step(
+        &self,
+        belief: &Gaussian<1>,
+        observation: &Observation<<Self::Scheme as Scheme<1>>::Report>,
+    ) -> Result<(Gaussian<1>, StepInfo), Error> {
+        self.update(&self.predict(belief), observation)
+    }
+
+    /// One slot of the closed loop, sensor and link included: predict, broadcast, encode the `measurement`, send the report
+    /// through the link, correct with what arrives.
+    ///
+    /// # Errors
+    /// If the measurement is not finite; as [`ScalarFilter::update`].
+    fn exchange<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        belief: &Gaussian<1>,
+        measurement: f64,
+    ) -> Result<(Gaussian<1>, StepInfo), Error> {
+        let (predicted, scheme) = (self.predict(belief), self.scheme());
+        let report = scheme.encode(rng, &mut (), &[measurement].into(), &self.feedback(&predicted))?;
+        let observation = self.link().transmit(rng, report.as_ref(), &scheme.report_format())?;
+        self.update(&predicted, &observation)
+    }
 }
 
 /// The filter at the fusion centre.
@@ -37,222 +101,252 @@ pub struct StepInfo {
 /// ```text
 /// predict   mean = a mean,  P = a^2 P + sigma_u^2
 /// broadcast threshold = mean
-/// hear      b = +1 if the sample reached the threshold, else -1 (lost: keep the prediction)
+/// receive   b = +1 if the sample reached the threshold, else -1 (lost: keep the prediction)
 /// correct   mean = mean + b sqrt(2/pi) P/sqrt(P + sigma^2)
 ///           P = P (sigma^2 + (1 - 2/pi) P)/(P + sigma^2)
 /// ```
 ///
-/// The variance does not depend on the data. The correction has the same size for both bits: its square is the variance
-/// that the bit removed, at every step.
+/// It is the assumed-density filter of a [`SignBit`] at the prediction, in closed form. The variance does not depend on the
+/// bits. The correction has the same size for both: its square is the variance that the bit removed, at every step. Over a
+/// link of crossover `eps` the correction shrinks by `1 - 2 eps`, the information by its square.
 ///
 /// ```
-/// use fewbits_core::{Encoder, Gaussian, Observation};
-/// use fewbits_dymbo::{DymboFilter, OneBitSensor, ScalarPlant};
+/// use fewbits_core::{Gaussian, Observation, Sign};
+/// use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant};
 /// let filter = DymboFilter::new(ScalarPlant::new(0.9, 0.5, 1.0)?);
 /// let mut belief = Gaussian::scalar(0.0, 2.6)?;
 /// for sample in [1.2, 0.8, 1.9] {
-///     let bit = OneBitSensor.encode(&sample, &filter.threshold(&belief));
-///     belief = filter.step(&belief, Observation::Received(bit))?.0;
+///     let bit = Sign::of(sample, filter.threshold(&belief))?;
+///     belief = filter.step(&belief, &Observation::Received(bit))?.0;
 /// }
 /// assert!(belief.mean()[0] > 0.5 && belief.covariance()[0] < 1.0);
 /// # Ok::<(), fewbits_dymbo::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct DymboFilter {
     plant: ScalarPlant,
-    crossover: f64,
-    rule: ThresholdRule,
+    link: Link,
 }
 
 impl DymboFilter {
-    /// The filter for a plant and a clean link, with the threshold at the prediction.
+    /// The filter for a plant and a perfect link.
     pub fn new(plant: ScalarPlant) -> Self {
         Self {
             plant,
-            crossover: 0.0,
-            rule: ThresholdRule::Prediction,
+            link: Link::PERFECT,
         }
     }
 
-    /// The same for a link that inverts a bit with known probability `crossover` in `[0, 1/2]`.
+    /// The same for another link.
+    #[must_use]
+    pub fn with_link(self, link: Link) -> Self {
+        Self { link, ..self }
+    }
+
+    /// The threshold to broadcast for the next sample, given the present belief: the prediction.
+    #[inline]
+    pub fn threshold(&self, belief: &Gaussian<1>) -> f64 {
+        self.plant.coefficient() * belief.mean()[0]
+    }
+
+    /// Size of the correction when every bit arrives and the variance has settled. At `a = 1` over a link that inverts no bit
+    /// it is `sigma_u`.
     ///
     /// # Errors
-    /// Any other probability.
-    pub fn with_crossover(self, crossover: f64) -> Result<Self, Error> {
-        Ok(Self {
-            crossover: within("crossover", crossover, 0.0, 0.5)?,
-            ..self
-        })
+    /// If the variance has no finite steady state.
+    pub fn steady_step(&self) -> Result<f64, Error> {
+        Ok(self.gain(self.plant.steady_state(self.information())?.predicted_variance))
     }
 
-    /// The same with another threshold.
-    #[must_use]
-    pub fn with_threshold_rule(self, rule: ThresholdRule) -> Self {
-        Self { rule, ..self }
+    #[inline]
+    fn gain(&self, predicted_variance: f64) -> f64 {
+        let clean = 1.0 - 2.0 * self.link.crossover();
+        SQRT_2_OVER_PI * clean * innovation_gain(predicted_variance, self.plant.measurement_variance())
     }
+}
 
-    /// The plant.
-    pub fn plant(&self) -> &ScalarPlant {
+impl ScalarFilter for DymboFilter {
+    type Scheme = SignBit;
+
+    fn plant(&self) -> &ScalarPlant {
         &self.plant
     }
 
-    /// Fraction of a full measurement's information that a bit at the prediction brings: `(2/pi)(1 - 2 eps)^2`.
-    pub fn information(&self) -> f64 {
-        let clean = 1.0 - 2.0 * self.crossover;
-        FRAC_2_PI * clean * clean
+    fn link(&self) -> &Link {
+        &self.link
     }
 
-    /// The belief to start from.
-    ///
-    /// # Errors
-    /// As [`Initialisation::belief`].
-    pub fn init(&self, start: &Initialisation) -> Result<Gaussian<1>, Error> {
-        start.belief(&self.plant)
+    fn scheme(&self) -> SignBit {
+        SignBit::of(&self.plant)
     }
 
-    /// The threshold to broadcast for the next sample, given the present belief.
+    fn information(&self) -> f64 {
+        sign_bit::information(&self.link)
+    }
+
     #[inline]
-    pub fn threshold(&self, belief: &Gaussian<1>) -> f64 {
-        match self.rule {
-            ThresholdRule::Prediction => self.plant.coefficient() * belief.mean()[0],
-            ThresholdRule::PreviousEstimate => belief.mean()[0],
-        }
+    fn feedback(&self, predicted: &Gaussian<1>) -> f64 {
+        predicted.mean()[0]
     }
 
-    /// Time update.
     #[inline]
-    pub fn predict(&self, belief: &Gaussian<1>) -> Gaussian<1> {
-        self.plant.predict(belief)
-    }
-
-    /// Corrects a predicted belief with a bit whose threshold was its mean. Call it once a sensor, the threshold refreshed
-    /// each time, where several sensors speak in one slot.
-    #[inline]
-    pub fn update(&self, predicted: &Gaussian<1>, bit: Sign) -> (Gaussian<1>, UpdateInfo) {
+    fn update(
+        &self,
+        predicted: &Gaussian<1>,
+        observation: &Observation<Sign>,
+    ) -> Result<(Gaussian<1>, StepInfo), Error> {
+        let Observation::Received(bit) = observation else {
+            return without_report(predicted, observation, &self.link);
+        };
         let p = predicted.covariance()[0];
-        let clean = 1.0 - 2.0 * self.crossover;
-        let information = FRAC_2_PI * clean * clean;
-        let gain = SQRT_2_OVER_PI * clean * self.plant.innovation_gain(p);
-        let mean = predicted.mean()[0] + bit.value() * gain;
-        let belief = scalar(mean, self.plant.filtered_variance(p, information));
         // Both bits are equally likely at the prediction, whatever the crossover.
-        let info = UpdateInfo {
-            log_likelihood: -LN_2,
-            information,
+        let log_likelihood = -LN_2 + (-self.link.loss()).ln_1p();
+        let report = Report {
+            correction: bit.value() * self.gain(p),
+            variance: filtered_variance(p, self.plant.measurement_variance(), self.information()),
+            information: self.information(),
+            log_likelihood,
+            bits: 1,
         };
-        (belief, info)
+        report.correct(predicted)
     }
+}
 
-    /// One slot: predict, then correct with the bit, unless it was lost. A sensor of this scheme always speaks, so silence
-    /// is read as loss; both ends must know of it, or their thresholds drift apart.
-    ///
-    /// # Errors
-    /// [`Error::ImpossibleMessage`] if the estimate overflows.
+/// What a received report says.
+pub(crate) struct Report {
+    pub(crate) correction: f64,
+    pub(crate) variance: f64,
+    pub(crate) information: f64,
+    pub(crate) log_likelihood: f64,
+    pub(crate) bits: u32,
+}
+
+impl Report {
+    /// The corrected belief, if its numbers are numbers.
     #[inline]
-    pub fn step(&self, belief: &Gaussian<1>, heard: Observation<Sign>) -> Result<(Gaussian<1>, StepInfo), Error> {
-        let predicted = self.predict(belief);
-        let Observation::Received(bit) = heard else {
-            return Ok((
-                predicted,
-                StepInfo {
-                    predicted,
-                    correction: 0.0,
-                    update: None,
-                    bits: 0,
-                },
-            ));
-        };
-        let (posterior, info) = match self.rule {
-            ThresholdRule::Prediction => self.update(&predicted, bit),
-            ThresholdRule::PreviousEstimate => {
-                let r = self.plant.measurement_variance();
-                bit_update(&predicted, r, bit, self.threshold(belief), self.crossover)?
-            }
-        };
-        if !(posterior.mean()[0].is_finite() && posterior.covariance()[0].is_finite()) {
-            return Err(Error::ImpossibleMessage);
+    pub(crate) fn correct(self, predicted: &Gaussian<1>) -> Result<(Gaussian<1>, StepInfo), Error> {
+        let mean = predicted.mean()[0] + self.correction;
+        if !(mean.is_finite() && self.variance.is_finite() && self.log_likelihood.is_finite()) {
+            return Err(Error::IMPOSSIBLE);
         }
-        let correction = posterior.mean()[0] - predicted.mean()[0];
-        Ok((
-            posterior,
-            StepInfo {
-                predicted,
-                correction,
-                update: Some(info),
-                bits: 1,
-            },
-        ))
+        let info = StepInfo {
+            predicted: *predicted,
+            correction: self.correction,
+            log_likelihood: self.log_likelihood,
+            information: self.information,
+            bits: self.bits,
+        };
+        Ok((scalar(mean, self.variance), info))
     }
+}
+
+/// What an observation without a report leaves: the prediction.
+pub(crate) fn without_report<R>(
+    predicted: &Gaussian<1>,
+    observation: &Observation<R>,
+    link: &Link,
+) -> Result<(Gaussian<1>, StepInfo), Error> {
+    let report = Report {
+        correction: 0.0,
+        variance: predicted.covariance()[0],
+        information: 0.0,
+        log_likelihood: missing_probability(observation, link).unwrap_or(1.0).ln(),
+        bits: 0,
+    };
+    report.correct(predicted)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{DymboFilter, ThresholdRule};
-    use crate::{Error, ScalarPlant, bit_update};
-    use fewbits_core::{Gaussian, Observation, Sign};
+    use super::{DymboFilter, ScalarFilter};
+    use crate::{Error, ScalarPlant};
+    use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
+    use fewbits_filters::assumed_density;
+    use fewbits_monte_carlo::Stream;
+    use nalgebra::Matrix1;
     use proptest::prelude::*;
 
     proptest! {
         #[test]
-        fn the_closed_form_is_the_general_update_at_the_prediction(
-            a in -1.0..1.0_f64, q in 0.0..3.0_f64, r in 0.1..3.0_f64, m in 0.0..5.0_f64, eps in 0.0..0.5_f64, above in any::<bool>(),
+        fn the_closed_form_is_the_assumed_density_update(
+            a in -1.0..1.0_f64, q in 0.0..3.0_f64, r in 0.1..3.0_f64, m in 0.0..5.0_f64, eps in 0.0..0.5_f64,
+            loss in 0.0..0.9_f64, above in any::<bool>(), scale in prop::sample::select(vec![1e-4, 1.0, 1e4]),
         ) {
-            let plant = ScalarPlant::new(a, q, r).unwrap();
-            let filter = DymboFilter::new(plant).with_crossover(eps).unwrap();
-            let bit = if above { Sign::Above } else { Sign::Below };
-            let belief = Gaussian::scalar(0.7, m).unwrap();
-            let (posterior, info) = filter.step(&belief, Observation::Received(bit)).unwrap();
+            let unit = scale * scale;
+            let link = Link::new(loss, eps).unwrap();
+            let filter = DymboFilter::new(ScalarPlant::new(a, q * unit, r * unit).unwrap()).with_link(link);
+            let bit = Observation::Received(if above { Sign::Above } else { Sign::Below });
+            let belief = Gaussian::scalar(0.7 * scale, m * unit).unwrap();
+            let (posterior, info) = filter.step(&belief, &bit).unwrap();
             let predicted = info.predicted;
-            let (general, _) = bit_update(&predicted, r, bit, filter.threshold(&belief), eps).unwrap();
-            prop_assert!((posterior.mean()[0] - general.mean()[0]).abs() < 1e-13);
-            prop_assert!((posterior.covariance()[0] - general.covariance()[0]).abs() < 1e-13);
+            let factor = filter.scheme().factor(&filter.threshold(&belief), &bit, &link).unwrap();
+            let (general, seen) = assumed_density::update(&predicted, &Matrix1::identity(), &factor).unwrap();
+            prop_assert!((posterior.mean()[0] - general.mean()[0]).abs() < 1e-13 * scale);
+            prop_assert!((posterior.covariance()[0] - general.covariance()[0]).abs() < 1e-13 * unit);
+            prop_assert!((info.log_likelihood - seen.log_likelihood).abs() < 1e-12);
             // The squared correction is the variance removed.
             let removed = predicted.covariance()[0] - posterior.covariance()[0];
-            prop_assert!((info.correction * info.correction - removed).abs() < 1e-12);
+            prop_assert!((info.correction * info.correction - removed).abs() < 1e-12 * unit);
             // A bit brings something, and less than the measurement would.
-            let p = predicted.covariance()[0];
+            let (p, r) = (predicted.covariance()[0], r * unit);
             prop_assert!(posterior.covariance()[0] <= p);
             prop_assert!(posterior.covariance()[0] >= p * r / (p + r) * (1.0 - 1e-12));
         }
     }
 
     #[test]
-    fn lost_bits_leave_the_prediction() {
+    fn what_does_not_arrive_leaves_the_prediction() {
         let filter = DymboFilter::new(ScalarPlant::new(0.9, 0.5, 1.0).unwrap());
+        let lossy = filter.with_link(Link::lossy(0.25).unwrap());
         let belief = Gaussian::scalar(1.0, 1.0).unwrap();
-        for heard in [Observation::Lost, Observation::Silent] {
-            let (posterior, info) = filter.step(&belief, heard).unwrap();
-            assert_eq!((posterior, info.bits, info.update), (filter.predict(&belief), 0, None));
+        for (filter, observation, log_likelihood) in [
+            (filter, Observation::Erased, 0.0),
+            (lossy, Observation::Erased, 0.0),
+            (lossy, Observation::Nothing, 0.25_f64.ln()),
+        ] {
+            let (posterior, info) = filter.step(&belief, &observation).unwrap();
+            assert_eq!((posterior, info.bits, info.information), (filter.predict(&belief), 0, 0.0));
+            assert_eq!(info.log_likelihood, log_likelihood);
         }
+        // Nothing cannot come out of a link that loses nothing.
+        assert_eq!(filter.step(&belief, &Observation::Nothing), Err(Error::IMPOSSIBLE));
     }
 
     #[test]
     fn edges() {
+        let above = Observation::Received(Sign::Above);
         // Nothing to learn: the estimate never moves.
         let still = DymboFilter::new(ScalarPlant::new(1.0, 0.0, 1.0).unwrap());
         let known = Gaussian::scalar(2.0, 0.0).unwrap();
-        assert_eq!(still.step(&known, Observation::Received(Sign::Above)).unwrap().0, known);
+        assert_eq!(still.step(&known, &above).unwrap().0, known);
         // Half of all bits inverted: the same.
-        let deaf = DymboFilter::new(ScalarPlant::new(0.5, 1.0, 1.0).unwrap())
-            .with_crossover(0.5)
-            .unwrap();
+        let useless =
+            DymboFilter::new(ScalarPlant::new(0.5, 1.0, 1.0).unwrap()).with_link(Link::flipping(0.5).unwrap());
         let belief = Gaussian::scalar(2.0, 1.0).unwrap();
-        assert_eq!(deaf.step(&belief, Observation::Received(Sign::Above)).unwrap().0, deaf.predict(&belief));
-        assert!(deaf.with_crossover(0.51).is_err());
+        assert_eq!(useless.step(&belief, &above).unwrap().0, useless.predict(&belief));
         let huge = Gaussian::scalar(f64::MAX, f64::MAX).unwrap();
         let plant = ScalarPlant::new_unstable(2.0, 1.0, 1.0).unwrap();
-        let overflow = DymboFilter::new(plant).step(&huge, Observation::Received(Sign::Above));
-        assert_eq!(overflow, Err(Error::ImpossibleMessage));
+        assert_eq!(DymboFilter::new(plant).step(&huge, &above), Err(Error::IMPOSSIBLE));
+        // At a = 1 the steady step is sigma_u.
+        let walk = DymboFilter::new(ScalarPlant::new(1.0, 0.49, 1.7).unwrap());
+        assert!((walk.steady_step().unwrap() - 0.7).abs() < 1e-14);
     }
 
     #[test]
-    fn the_previous_estimate_is_another_threshold() {
-        let filter = DymboFilter::new(ScalarPlant::new(0.5, 0.5, 1.0).unwrap());
-        let literal = filter.with_threshold_rule(ThresholdRule::PreviousEstimate);
-        let belief = Gaussian::scalar(2.0, 1.0).unwrap();
-        assert_eq!((filter.threshold(&belief), literal.threshold(&belief)), (1.0, 2.0));
-        let (posterior, info) = literal.step(&belief, Observation::Received(Sign::Above)).unwrap();
-        let expected = bit_update(&info.predicted, 1.0, Sign::Above, 2.0, 0.0).unwrap().0;
-        assert_eq!(posterior, expected);
+    fn the_loop_is_encode_transmit_and_step() {
+        let link = Link::new(0.3, 0.1).unwrap();
+        let filter = DymboFilter::new(ScalarPlant::new(0.9, 0.5, 1.0).unwrap()).with_link(link);
+        let belief = Gaussian::scalar(1.0, 1.0).unwrap();
+        let (mut rng, mut twin) = (Stream::new(1).rng(), Stream::new(1).rng());
+        for measurement in [0.2, 3.0, -1.0, 1.4, 0.8, 2.2] {
+            let bit = Sign::of(measurement, filter.threshold(&belief)).unwrap();
+            let observation = link.transmit(&mut twin, Some(&bit), &()).unwrap();
+            let by_hand = filter.step(&belief, &observation);
+            assert_eq!(filter.exchange(&mut rng, &belief, measurement), by_hand);
+        }
+        assert!(filter.exchange(&mut rng, &belief, f64::NAN).is_err());
+        let json = serde_json::to_string(&filter).unwrap();
+        assert_eq!(serde_json::from_str::<DymboFilter>(&json).unwrap(), filter);
     }
 }

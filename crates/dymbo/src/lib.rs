@@ -13,55 +13,63 @@
 //!
 //! | task | item |
 //! |---|---|
-//! | the sensor's half | [`OneBitSensor`], [`MultibitSensor`], [`FineSensor`] |
-//! | the filter, one bit | [`DymboFilter`], [`Initialisation`], [`bit_update`], [`cell_update`] |
-//! | more bits, more sensors | [`MultibitFilter`], [`ParallelFilter`], [`vector`] |
-//! | what to expect | [`steady`] (closed forms, loss, contours), [`chain`] and [`tree`] (exact errors) |
+//! | the sensors' schemes | [`SignBit`] (any threshold), [`InnovationWord`], [`RoundedSample`] |
+//! | the filter, one bit | [`DymboFilter`], [`Initialisation`] |
+//! | more bits, more sensors, vectors | [`MultibitFilter`], [`ParallelFilter`], [`SignFilter`] |
+//! | a closed loop in one call | [`ScalarFilter::exchange`] |
+//! | what to expect | [`steady`] (closed forms, loss, contours), [`chain`] and [`tree`] (exact errors), [`gap`] (beside the exact posterior) |
 //! | how normal the posterior is | [`skew_normal`]; successive bits of one sample: [`iterated`] |
 //!
-//! Erased bits are [`Observation::Lost`](fewbits_core::Observation::Lost). Smoothing is that of `fewbits_filters`, applied to
-//! the beliefs of any filter here.
+//! What a report says is a [`Factor`](fewbits_core::Factor), whatever the threshold and the [`Link`](fewbits_core::Link):
+//! `fewbits_filters::assumed_density::update` turns it into the moments of any Gaussian belief, and the filters here are its
+//! closed forms. Reports known to be lost are [`Observation::Erased`](fewbits_core::Observation::Erased). Smoothing is that of
+//! `fewbits_filters`, applied to the beliefs of any filter here.
 //!
 //! ```
-//! use fewbits_core::{Encoder, Gaussian, Observation};
-//! use fewbits_dymbo::{DymboFilter, FineSensor, Initialisation, OneBitSensor, ScalarPlant};
+//! use fewbits_core::{Gaussian, Observation, Sign};
+//! use fewbits_dymbo::{DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant};
 //!
 //! let filter = DymboFilter::new(ScalarPlant::new(0.9, 0.5, 1.0)?);
 //! let samples = [2.31, 1.27, 3.05, 0.42];
 //!
-//! let sensor = FineSensor::new(1.0)?;
-//! let message = sensor.encode(&samples[0], &());
-//! let mut belief = filter.init(&Initialisation::Fine { sensor, message })?;
+//! let scheme = RoundedSample::new(1.0, 1.0)?;
+//! let message = scheme.round(samples[0])?;
+//! let mut belief = Initialisation::Fine { scheme, message }.belief()?;
 //! for sample in &samples[1..] {
-//!     let bit = OneBitSensor.encode(sample, &filter.threshold(&belief));
-//!     belief = filter.step(&belief, Observation::Received(bit))?.0;
+//!     let bit = Sign::of(*sample, filter.threshold(&belief))?;      // at the sensor
+//!     belief = filter.step(&belief, &Observation::Received(bit))?.0;
 //! }
 //! assert!((belief.mean()[0] - 0.842_833).abs() < 1e-6);
 //! # Ok::<(), fewbits_dymbo::Error>(())
 //! ```
 //!
-//! Not here: energy and links (`fewbits-network`), the true state, any choice of which sensor speaks.
+//! Not here: energy (`fewbits-network`), the true state, any choice of which sensor reports.
 
 pub mod chain;
 mod error;
 mod filter;
-mod initial;
+mod first_message;
+pub mod gap;
+mod innovation_word;
 pub mod iterated;
 mod multibit;
 mod parallel;
 mod plant;
-mod sensor;
+pub mod sign_bit;
 pub mod skew_normal;
 pub mod steady;
 pub mod tree;
-mod update;
-pub mod vector;
+mod vector;
 
 pub use error::Error;
-pub use filter::{DymboFilter, StepInfo, ThresholdRule};
-pub use initial::{FirstMessageValue, Initialisation, first_message_mse, first_message_value};
+pub use filter::{DymboFilter, ScalarFilter, StepInfo};
+pub use first_message::{
+    FirstMessageValue, Initialisation, Multiple, RoundedSample, first_message_mse, first_message_value,
+};
+pub use innovation_word::{CellIndex, InnovationWord, Prediction};
 pub use multibit::MultibitFilter;
 pub use parallel::{CountFusion, ParallelFilter};
-pub use plant::ScalarPlant;
-pub use sensor::{CellIndex, FineMessage, FineSensor, MultibitSensor, OneBitSensor, Prediction};
-pub use update::{UpdateInfo, bit_update, cell_update, expected_bit_information};
+pub use plant::{ScalarPlant, filtered_variance, innovation_gain};
+pub use sign_bit::SignBit;
+pub use vector::{SignFilter, VectorInfo};
+pub use {nalgebra, rand};

@@ -5,15 +5,45 @@ use fewbits_core::Gaussian;
 use fewbits_filters::{ScalarSteadyState, scalar_steady_state};
 use fewbits_models::{Ar1, LinearSensor};
 use nalgebra::SMatrix;
+use serde::{Deserialize, Serialize};
 
 /// A first-order autoregression `theta(n) = a theta(n-1) + u(n)` sensed as `x(n) = theta(n) + w(n)`.
 ///
 /// Everything scales: with measurement standard deviation `sigma` all variances are `sigma^2` times those of unit noise at
 /// the same coefficient and the same [`noise_ratio`](Self::noise_ratio).
-#[derive(Debug, Clone, Copy, PartialEq)]
+///
+/// A stored plant is read through [`ScalarPlant::new`], so an unstable one is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers", into = "Numbers")]
 pub struct ScalarPlant {
     dynamics: Ar1,
     sensor: LinearSensor<1, 1>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    coefficient: f64,
+    process_variance: f64,
+    measurement_variance: f64,
+}
+
+impl From<ScalarPlant> for Numbers {
+    fn from(plant: ScalarPlant) -> Self {
+        Self {
+            coefficient: plant.coefficient(),
+            process_variance: plant.process_variance(),
+            measurement_variance: plant.measurement_variance(),
+        }
+    }
+}
+
+impl TryFrom<Numbers> for ScalarPlant {
+    type Error = Error;
+
+    fn try_from(numbers: Numbers) -> Result<Self, Error> {
+        Self::new(numbers.coefficient, numbers.process_variance, numbers.measurement_variance)
+    }
 }
 
 impl ScalarPlant {
@@ -88,20 +118,6 @@ impl ScalarPlant {
         scalar(self.coefficient() * belief.mean()[0], self.dynamics.predict_variance(belief.covariance()[0]))
     }
 
-    /// Variance after a message that brings the fraction `information` of what the measurement itself would bring:
-    /// `P - c P^2/(P + sigma^2)`, in the form that does not cancel.
-    #[inline]
-    pub fn filtered_variance(&self, predicted_variance: f64, information: f64) -> f64 {
-        let (p, r) = (predicted_variance, self.measurement_variance());
-        p * (r + (1.0 - information) * p) / (p + r)
-    }
-
-    /// `P/sqrt(P + sigma^2)`: the correction of the estimate per unit of the normalised innovation.
-    #[inline]
-    pub fn innovation_gain(&self, predicted_variance: f64) -> f64 {
-        predicted_variance / (predicted_variance + self.measurement_variance()).sqrt()
-    }
-
     /// Where the variances settle when each message brings the fraction `information` of a full measurement.
     ///
     /// # Errors
@@ -114,6 +130,20 @@ impl ScalarPlant {
             information,
         )?)
     }
+}
+
+/// Variance after a message that brings the fraction `information` of what the measurement itself would bring:
+/// `P - c P^2/(P + sigma^2)`, in the form that does not cancel.
+#[inline]
+pub fn filtered_variance(predicted_variance: f64, noise_variance: f64, information: f64) -> f64 {
+    let (p, r) = (predicted_variance, noise_variance);
+    p * (r + (1.0 - information) * p) / (p + r)
+}
+
+/// `P/sqrt(P + sigma^2)`: the correction of the estimate per unit of the normalised innovation.
+#[inline]
+pub fn innovation_gain(predicted_variance: f64, noise_variance: f64) -> f64 {
+    predicted_variance / (predicted_variance + noise_variance).sqrt()
 }
 
 /// A scalar belief from numbers already known to be sound.
@@ -142,5 +172,9 @@ mod tests {
         ] {
             assert!(matches!(ScalarPlant::new(bad.0, bad.1, bad.2), Err(Error::Argument(_))), "{bad:?}");
         }
+        let plant = ScalarPlant::new(-0.7, 0.5, 2.0).unwrap();
+        let json = serde_json::to_string(&plant).unwrap();
+        assert_eq!(serde_json::from_str::<ScalarPlant>(&json).unwrap(), plant);
+        assert!(serde_json::from_str::<ScalarPlant>(&json.replace("-0.7", "-1.7")).is_err());
     }
 }

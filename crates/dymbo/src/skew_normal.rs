@@ -1,7 +1,8 @@
 //! How far the posterior of one bit is from the normal density of the same moments.
 
-use crate::{Error, bit_update};
-use fewbits_core::{Gaussian, Sign};
+use crate::Error;
+use fewbits_core::factor::{Factor, InCell};
+use fewbits_core::{Gaussian, Link, Sign};
 use fewbits_numerics::error::positive;
 use fewbits_numerics::normal::{self, log_pdf_with};
 
@@ -25,8 +26,8 @@ const REFINEMENTS: usize = 60;
 pub fn distance_from_normal(prior_variance: f64, measurement_variance: f64) -> Result<f64, Error> {
     let s = positive("prior_variance", prior_variance)?.sqrt();
     let prior = Gaussian::scalar(0.0, prior_variance)?;
-    let (posterior, _) = bit_update(&prior, measurement_variance, Sign::Above, 0.0, 0.0)?;
-    let (mean, variance) = (posterior.mean()[0], posterior.covariance()[0]);
+    let posterior = InCell::sign(Sign::Above, 0.0, measurement_variance, &Link::PERFECT)?.tilted(&prior)?;
+    let (mean, variance) = (posterior.mean[0], posterior.covariance[0]);
     let difference = |theta: f64| {
         let exact = posterior_density(theta, &prior, measurement_variance, Sign::Above);
         (exact - log_pdf_with(theta, mean, variance).exp()).abs()
@@ -51,8 +52,8 @@ pub fn distance_from_normal(prior_variance: f64, measurement_variance: f64) -> R
 #[cfg(test)]
 mod tests {
     use super::{distance_from_normal, posterior_density};
-    use crate::bit_update;
-    use fewbits_core::{Gaussian, Sign};
+    use fewbits_core::factor::{Factor, InCell};
+    use fewbits_core::{Gaussian, Link, Sign};
     use fewbits_numerics::quadrature::gauss_legendre;
 
     #[test]
@@ -62,10 +63,13 @@ mod tests {
             let moment = |k: i32| {
                 gauss_legendre::<64>().composite(-12.0, 13.0, 4, |t| t.powi(k) * posterior_density(t, &prior, 0.3, bit))
             };
-            let (posterior, _) = bit_update(&prior, 0.3, bit, 0.5, 0.0).unwrap();
+            let posterior = InCell::sign(bit, 0.5, 0.3, &Link::PERFECT)
+                .unwrap()
+                .tilted(&prior)
+                .unwrap();
             assert!((moment(0) - 1.0).abs() < 1e-12);
-            assert!((moment(1) - posterior.mean()[0]).abs() < 1e-12);
-            assert!((moment(2) - moment(1).powi(2) - posterior.covariance()[0]).abs() < 1e-12);
+            assert!((moment(1) - posterior.mean[0]).abs() < 1e-12);
+            assert!((moment(2) - moment(1).powi(2) - posterior.covariance[0]).abs() < 1e-12);
         }
     }
 

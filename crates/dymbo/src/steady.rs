@@ -1,18 +1,12 @@
 //! Where the filters settle, and what the missing bits cost: closed forms and contours.
 
+use crate::plant::filtered_variance;
 use crate::{Error, ScalarPlant};
+use fewbits_core::Link;
 use fewbits_filters::ScalarSteadyState;
-use fewbits_numerics::error::{ArgumentError, finite, within};
+use fewbits_numerics::error::{ArgumentError, at_least_one, finite};
+use fewbits_numerics::roots::bracketed;
 use std::f64::consts::FRAC_2_PI;
-
-/// Information coefficient of a sign bit at the prediction through a link of known crossover: `(2/pi)(1 - 2 eps)^2`.
-///
-/// # Errors
-/// `crossover` outside `[0, 1/2]`.
-pub fn bit_information(crossover: f64) -> Result<f64, Error> {
-    let clean = 1.0 - 2.0 * within("crossover", crossover, 0.0, 0.5)?;
-    Ok(FRAC_2_PI * clean * clean)
-}
 
 /// Ratio of the steady filtered variances of the sign-bit filter and of the Kalman filter on the same plant: at least 1,
 /// increasing in `|a|` and in `gamma`.
@@ -53,7 +47,7 @@ pub fn coefficient_at_loss(level: f64, noise_ratio: f64) -> Result<Option<f64>, 
 /// Range of `ln gamma` that is searched.
 const LOG_GAMMA: (f64, f64) = (-30.0, 30.0);
 
-fn check_level(level: f64) -> Result<(), Error> {
+pub(crate) fn check_level(level: f64) -> Result<(), Error> {
     if finite("level", level)? > 1.0 {
         Ok(())
     } else {
@@ -61,105 +55,78 @@ fn check_level(level: f64) -> Result<(), Error> {
     }
 }
 
-/// Rounds after which halving alone has shrunk any interval to rounding.
-const ROUNDS: usize = 200;
-
-/// Where an increasing function crosses `level` within `range`, if it does: the method of Ridders, which halves the bracket
-/// at worst and converges quadratically at best.
-pub fn crossing(
+/// Where an increasing function crosses `level` within `range`, if it does.
+pub(crate) fn crossing(
     level: f64,
-    range: (f64, f64),
+    (low, high): (f64, f64),
     function: impl Fn(f64) -> Result<f64, Error>,
 ) -> Result<Option<f64>, Error> {
-    let (mut low, mut high) = range;
-    let (mut below, mut above) = (function(low)? - level, function(high)? - level);
-    if below > 0.0 || above < 0.0 {
+    if function(low)? > level || function(high)? < level {
         return Ok(None);
     }
-    let mut last = f64::NAN;
-    for _ in 0..ROUNDS {
-        if below == 0.0 || above == 0.0 {
-            return Ok(Some(if below == 0.0 { low } else { high }));
+    let mut failure = None;
+    let offset = |x: f64| match function(x) {
+        Ok(y) => y - level,
+        Err(error) => {
+            failure = Some(error);
+            f64::NAN
         }
-        let middle = 0.5 * (low + high);
-        let at_middle = function(middle)? - level;
-        let guess = middle - (middle - low) * at_middle / (at_middle * at_middle - below * above).sqrt();
-        if (guess - last).abs() <= 2.0 * f64::EPSILON * guess.abs() || high - low <= f64::EPSILON * low.abs() {
-            return Ok(Some(guess));
-        }
-        last = guess;
-        for (x, y) in [(middle, at_middle), (guess, function(guess)? - level)] {
-            if x > low && x < high {
-                if y <= 0.0 {
-                    (low, below) = (x, y);
-                } else {
-                    (high, above) = (x, y);
-                }
-            }
-        }
-    }
-    Ok(Some(last))
+    };
+    let root = bracketed(offset, low, high, 0.0);
+    failure.map_or_else(|| Ok(Some(root?)), Err)
 }
 
-/// Upper bound on the mean filtered variance when each bit is lost independently with probability `loss`, known to both
-/// ends: the steady state with information `(1 - p) 2/pi`.
+/// Upper bound on the mean filtered variance when each bit is lost independently with the link's probability, known to both
+/// ends: the steady state with information `(1 - p) 2/pi`, less what the crossover takes.
 ///
 /// One step of the variance is concave in the variance and linear in whether the bit arrives, so averaging inside can only
 /// raise it (Jensen). Tight to 0.4 % in the paper's range.
 ///
 /// # Errors
-/// `loss` outside `[0, 1]`; no finite bound.
-pub fn erasure_bound(plant: &ScalarPlant, loss: f64) -> Result<ScalarSteadyState, Error> {
-    let heard = 1.0 - within("loss", loss, 0.0, 1.0)?;
-    plant.steady_state(FRAC_2_PI * heard)
+/// If there is no finite bound.
+pub fn erasure_bound(plant: &ScalarPlant, link: &Link) -> Result<ScalarSteadyState, Error> {
+    plant.steady_state(crate::sign_bit::information(link) * (1.0 - link.loss()))
 }
 
-/// Steps after which a variance recursion that has not settled is given up.
-const MOST_STEPS: usize = 1_000_000;
-
-/// Relative changes below this that no longer shrink are rounding.
-const ROUNDING: f64 = 1e-13;
-
-/// The fixed point of a slot's variance recursion: `slot` maps a predicted variance to the filtered one.
+/// The fixed point of a slot's variance recursion: `slot` maps a predicted variance to the filtered one, is increasing and
+/// concave, and at least as good as one sign bit through the link.
 ///
 /// # Errors
-/// [`Error::NotConverged`].
-pub fn settle(plant: &ScalarPlant, slot: impl Fn(f64) -> f64) -> Result<ScalarSteadyState, Error> {
-    let mut filtered = plant.measurement_variance();
-    let mut last_change = f64::INFINITY;
-    for _ in 0..MOST_STEPS {
-        let predicted_variance = plant.dynamics().predict_variance(filtered);
-        let next = slot(predicted_variance);
-        let change = (next - filtered).abs();
-        // Near the fixed point changes shrink until rounding is all that is left of them.
-        let settled = change <= 1e-15 * next || change <= ROUNDING * next && change >= last_change;
-        last_change = change;
-        filtered = next;
-        if settled {
-            return Ok(ScalarSteadyState {
-                predicted_variance,
-                filtered_variance: filtered,
-            });
-        }
+/// If the plant is unstable, or the recursion has no finite fixed point.
+pub(crate) fn settle(plant: &ScalarPlant, link: &Link, slot: impl Fn(f64) -> f64) -> Result<ScalarSteadyState, Error> {
+    let coefficient = plant.coefficient();
+    if coefficient.abs() > 1.0 {
+        return Err(Error::UnstablePlant { coefficient });
     }
-    Err(Error::NotConverged {
-        what: "the variance recursion",
-        iterations: MOST_STEPS,
+    let one_bit = plant
+        .steady_state(crate::sign_bit::information(link))?
+        .predicted_variance;
+    let next = |p: f64| plant.dynamics().predict_variance(slot(p));
+    // The recursion falls from one bit's fixed point to its own, and never below the process noise.
+    let (low, high) = (plant.process_variance(), one_bit * (1.0 + 1e-9));
+    let root = crossing(0.0, (low, high), |p| Ok(p - next(p)))?;
+    let predicted_variance = root.unwrap_or(one_bit);
+    Ok(ScalarSteadyState {
+        predicted_variance,
+        filtered_variance: slot(predicted_variance),
     })
 }
 
-/// Steady state with `sensors` sign bits a slot, the threshold refreshed after each bit.
+/// Steady state with `sensors >= 1` sign bits a slot, the threshold refreshed after each bit.
 ///
 /// # Errors
-/// [`Error::NotConverged`].
+/// If there is no sensor, or the plant is unstable.
 pub fn sequential_steady_state(plant: &ScalarPlant, sensors: usize) -> Result<ScalarSteadyState, Error> {
-    settle(plant, |p| (0..sensors).fold(p, |p, _| plant.filtered_variance(p, FRAC_2_PI)))
+    at_least_one("sensors", sensors)?;
+    let r = plant.measurement_variance();
+    settle(plant, &Link::PERFECT, |p| (0..sensors).fold(p, |p, _| filtered_variance(p, r, FRAC_2_PI)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::{coefficient_at_loss, crossing, erasure_bound, loss, noise_ratio_at_loss, sequential_steady_state};
-    use crate::ScalarPlant;
+    use crate::{Error, ScalarPlant};
+    use fewbits_core::Link;
 
     #[test]
     fn contours_lie_on_the_surface() {
@@ -181,22 +148,40 @@ mod tests {
     }
 
     #[test]
-    fn crossing_finds_steep_and_flat_roots() {
-        let cube = crossing(0.0, (-3.0, 5.0), |x| Ok((x - 1.0).powi(3))).unwrap().unwrap();
-        assert!((cube - 1.0).abs() < 1e-5);
-        let steep = crossing(0.5, (-1e3, 1e3), |x| Ok(1.0 / (1.0 + (-100.0 * (x - 7.0)).exp())))
-            .unwrap()
-            .unwrap();
-        assert!((steep - 7.0).abs() < 1e-12);
+    fn crossings_are_within_their_range() {
+        let line = |x: f64| Ok(x);
+        for (level, found) in [
+            (2.0, Some(2.0)),
+            (2.4, Some(2.4)),
+            (3.0, Some(3.0)),
+            (1.9, None),
+            (3.1, None),
+        ] {
+            assert_eq!(crossing(level, (2.0, 3.0), line), Ok(found));
+        }
+        let ends = |x: f64| if x.abs() == 1.0 { Ok(x) } else { Err(Error::IMPOSSIBLE) };
+        assert_eq!(crossing(0.1, (-1.0, 1.0), ends), Err(Error::IMPOSSIBLE));
     }
 
     #[test]
     fn losing_all_bits_leaves_the_plant_alone() {
         let plant = ScalarPlant::new(0.9, 0.5, 1.0).unwrap();
-        let alone = erasure_bound(&plant, 1.0).unwrap().filtered_variance;
-        assert!((alone - plant.dynamics().stationary_variance().unwrap()).abs() < 1e-12);
-        assert!(erasure_bound(&plant, 1.1).is_err());
+        let at = |link: Link| erasure_bound(&plant, &link).unwrap().filtered_variance;
+        let alone = plant.dynamics().stationary_variance().unwrap();
+        assert!((at(Link::flipping(0.5).unwrap()) - alone).abs() < 1e-12);
+        assert!((at(Link::lossy(1.0 - 1e-12).unwrap()) - alone).abs() < 1e-10);
         let one = sequential_steady_state(&plant, 1).unwrap().filtered_variance;
-        assert!((one - erasure_bound(&plant, 0.0).unwrap().filtered_variance).abs() < 1e-13);
+        assert!((one - at(Link::PERFECT)).abs() < 1e-13);
+        assert!(sequential_steady_state(&plant, 0).is_err());
+        let wild = ScalarPlant::new_unstable(-3.0, 0.5, 1.0).unwrap();
+        assert_eq!(sequential_steady_state(&wild, 3), Err(Error::UnstablePlant { coefficient: -3.0 }));
+        // The fixed point of five steps in a row, found by walking to it.
+        let mut m = 1.0;
+        for _ in 0..500 {
+            m = (0..5).fold(plant.dynamics().predict_variance(m), |p, _| {
+                crate::filtered_variance(p, 1.0, std::f64::consts::FRAC_2_PI)
+            });
+        }
+        assert!((sequential_steady_state(&plant, 5).unwrap().filtered_variance - m).abs() < 1e-14);
     }
 }

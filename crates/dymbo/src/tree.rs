@@ -6,11 +6,11 @@
 //! [`chain`](crate::chain) computes by another way, and the two agree to 13 digits.
 
 use crate::plant::scalar;
-use crate::{DymboFilter, Error, ScalarPlant};
-use fewbits_core::{Gaussian, Sign};
+use crate::{DymboFilter, Error, ScalarFilter, ScalarPlant};
+use fewbits_core::factor::InCell;
+use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
 use fewbits_filters::{Grid, PointMass, PointMassFilter};
 use fewbits_numerics::error::{ArgumentError, positive};
-use fewbits_numerics::normal::{log_cdf, log_interval};
 
 /// Averages over all bit strings of one length.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -61,9 +61,9 @@ pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) ->
     let walk = Walk {
         filter,
         exact: PointMassFilter::new(plant.dynamics(), grid)?,
-        sigma,
     };
-    let density = PointMass::new(grid, |x| log_interval((-0.5 * tau - x) / sigma, (0.5 * tau - x) / sigma))?;
+    let cell = InCell::certain(Cell::new(-0.5 * tau, 0.5 * tau)?, plant.measurement_variance())?;
+    let density = PointMass::new(grid, |x| cell.log_probability(x))?;
     let mut levels = vec![TreeLevel::default(); depth];
     walk.descend(&start, &density, 1.0, &mut levels)?;
     Ok(levels)
@@ -72,7 +72,6 @@ pub fn first_message_tree(plant: &ScalarPlant, resolution: f64, depth: usize) ->
 struct Walk {
     filter: DymboFilter,
     exact: PointMassFilter,
-    sigma: f64,
 }
 
 impl Walk {
@@ -93,14 +92,16 @@ impl Walk {
         // At the first bit the two halves mirror each other.
         let first = belief.mean()[0] == 0.0 && weight == 1.0;
         for bit in [Sign::Above, Sign::Below].into_iter().take(if first { 1 } else { 2 }) {
-            let mut heard = ahead.clone();
-            let log_evidence = heard.update(|x| log_cdf(bit.value() * (x - threshold) / self.sigma))?;
+            let mut exact = ahead.clone();
+            let r = self.filter.plant().measurement_variance();
+            let factor = InCell::sign(bit, threshold, r, &Link::PERFECT)?;
+            let log_evidence = exact.update(|x| factor.log_probability(x))?;
             let weight = if first { 1.0 } else { weight * log_evidence.exp() };
-            let posterior = self.filter.update(&predicted, bit).0;
-            let distance = posterior.mean()[0] - heard.mean();
-            level.mmse += weight * heard.variance();
+            let posterior = self.filter.update(&predicted, &Observation::Received(bit))?.0;
+            let distance = posterior.mean()[0] - exact.mean();
+            level.mmse += weight * exact.variance();
             level.excess += weight * distance * distance;
-            self.descend(&posterior, &heard, weight, deeper)?;
+            self.descend(&posterior, &exact, weight, deeper)?;
         }
         Ok(())
     }

@@ -1,79 +1,45 @@
 //! Vector states: the sign-of-innovations filter.
 //!
 //! A bit of the sign of `x - h' prediction` moves the estimate along `P h`. It does what a Kalman step does whose noise
-//! variance is `(pi/2)(h'Ph + sigma^2) - h'Ph`, so the covariance stays positive definite. Several sensors of a slot speak one
-//! after the other, each against the refreshed prediction, or all at once.
+//! variance is `(pi/2)(h'Ph + sigma^2) - h'Ph`. Several sensors of a slot report one after the other, each against the refreshed
+//! prediction, or all at once.
 
-use crate::update::UpdateInfo;
-use crate::{Error, bit_update};
-use fewbits_core::{Gaussian, LinearDynamics, Sign};
-use fewbits_filters::{SteadyState, kalman};
+use crate::sign_bit::SignBit;
+use crate::{Error, sign_bit};
+use fewbits_core::{Gaussian, LinearDynamics, Link, Observation, Scheme, Sign};
+use fewbits_filters::{SteadyState, assumed_density, kalman};
 use fewbits_models::ScalarSensor;
-use fewbits_numerics::error::finite;
+use fewbits_numerics::error::{ArgumentError, finite};
 use fewbits_numerics::linalg::symmetrised;
-use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
-use std::f64::consts::FRAC_2_PI;
 
-/// Corrects a predicted belief with a sign bit of one sensor whose threshold was its prediction `h' mean`:
-/// `mean + b sqrt(2/pi) P h/s`, `P - (2/pi) P h h' P/s^2` with `s^2 = h'Ph + sigma^2`.
-#[inline]
-pub fn sign_update<const D: usize>(predicted: &Gaussian<D>, sensor: &ScalarSensor<D>, bit: Sign) -> Gaussian<D> {
-    let (cross, variance) = innovation(predicted, sensor);
-    let scale = SQRT_2_OVER_PI / variance.sqrt();
-    let step = cross * scale;
-    Gaussian::from_trusted_parts(
-        predicted.mean() + step * bit.value(),
-        predicted.covariance() - step * step.transpose(),
-    )
-}
-
-/// `P h` and the innovation variance `h'Ph + sigma^2`.
-#[inline]
-fn innovation<const D: usize>(belief: &Gaussian<D>, sensor: &ScalarSensor<D>) -> (SVector<f64, D>, f64) {
-    let direction = sensor.direction();
-    let cross = belief.covariance() * direction;
-    (cross, direction.dot(&cross) + sensor.noise_variance())
-}
-
-/// The exact moments for any threshold and a known crossover, as [`bit_update`] along `h`.
-///
-/// # Errors
-/// As [`bit_update`].
-pub fn vector_bit_update<const D: usize>(
-    prior: &Gaussian<D>,
-    sensor: &ScalarSensor<D>,
-    bit: Sign,
-    threshold: f64,
-    crossover: f64,
-) -> Result<(Gaussian<D>, UpdateInfo), Error> {
-    let (cross, total) = innovation(prior, sensor);
-    let seen = total - sensor.noise_variance();
-    let line = Gaussian::scalar(finite("mean", sensor.direction().dot(prior.mean()))?, seen.max(0.0))?;
-    let (posterior, info) = bit_update(&line, sensor.noise_variance(), bit, threshold, crossover)?;
-    if seen <= 0.0 {
-        return Ok((*prior, info));
-    }
-    // Everything that the bit says about x, it says about h'x.
-    let shift = posterior.mean()[0] - line.mean()[0];
-    let mean = prior.mean() + cross * (shift / seen);
-    let covariance = prior.covariance() - cross * cross.transpose() * (info.information / total);
-    Ok((Gaussian::from_trusted_parts(mean, covariance), info))
+/// What an update reveals besides the new belief.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct VectorInfo {
+    /// `ln p(observations | past)`, the increment of the log-likelihood of the data; for several bits at once to the
+    /// assumed-density approximation, bit after bit.
+    pub log_likelihood: f64,
+    /// Bits received.
+    pub bits: u32,
 }
 
 /// The filter for `M` one-bit sensors of a `D`-dimensional linear system.
 ///
+/// Each update is the assumed-density update with the factor of a [`SignBit`]. With the threshold at the prediction and a
+/// perfect link it is `mean + b sqrt(2/pi) P h/s`, `P - (2/pi) P h h' P/s^2` with `s^2 = h'Ph + sigma^2`.
+///
 /// ```
-/// use fewbits_core::{Encoder, Gaussian};
-/// use fewbits_dymbo::{vector::SignFilter, OneBitSensor};
+/// use fewbits_core::{Gaussian, Observation, Sign};
+/// use fewbits_dymbo::SignFilter;
 /// use fewbits_models::{constant_velocity_1d, ScalarSensor};
 /// let position = ScalarSensor::scalar([1.0, 0.0].into(), 1.0)?;
 /// let filter = SignFilter::new(constant_velocity_1d(1.0, 0.1)?, [position]);
 /// let mut belief = Gaussian::new([0.0, 1.0].into(), nalgebra::Matrix2::identity())?;
 /// for sample in [1.1, 2.3, 2.9] {
 ///     belief = filter.predict(&belief);
-///     let bit = OneBitSensor.encode(&sample, &filter.threshold(&belief, 0));
-///     belief = filter.update(&belief, 0, bit);
+///     let bit = Sign::of(sample, filter.threshold(&belief, 0)?)?;
+///     belief = filter.update(&belief, 0, &Observation::Received(bit))?.0;
 /// }
 /// assert!((belief.mean()[0] - 3.0).abs() < 1.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -82,12 +48,23 @@ pub fn vector_bit_update<const D: usize>(
 pub struct SignFilter<F, const D: usize, const M: usize> {
     dynamics: F,
     sensors: [ScalarSensor<D>; M],
+    link: Link,
 }
 
 impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
-    /// The filter for these dynamics and sensors; without sensors it only predicts.
+    /// The filter for these dynamics and sensors over perfect links; without sensors it only predicts.
     pub fn new(dynamics: F, sensors: [ScalarSensor<D>; M]) -> Self {
-        Self { dynamics, sensors }
+        Self {
+            dynamics,
+            sensors,
+            link: Link::PERFECT,
+        }
+    }
+
+    /// The same for other links, all alike.
+    #[must_use]
+    pub fn with_link(self, link: Link) -> Self {
+        Self { link, ..self }
     }
 
     /// The dynamics.
@@ -100,6 +77,11 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         &self.sensors
     }
 
+    fn sensor(&self, sensor: usize) -> Result<&ScalarSensor<D>, ArgumentError> {
+        let refusal = || ArgumentError::new("sensor", sensor, format!("an index below {M}"));
+        self.sensors.get(sensor).ok_or_else(refusal)
+    }
+
     /// Time update.
     #[inline]
     pub fn predict(&self, belief: &Gaussian<D>) -> Gaussian<D> {
@@ -108,93 +90,152 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
 
     /// The threshold to broadcast to a sensor: its predicted measurement under the belief so far.
     ///
-    /// # Panics
-    /// If `sensor >= M`, as indexing does.
+    /// # Errors
+    /// If there is no such sensor.
     #[inline]
-    pub fn threshold(&self, predicted: &Gaussian<D>, sensor: usize) -> f64 {
-        self.sensors[sensor].direction().dot(predicted.mean())
+    pub fn threshold(&self, predicted: &Gaussian<D>, sensor: usize) -> Result<f64, Error> {
+        Ok(self.sensor(sensor)?.direction().dot(predicted.mean()))
     }
 
-    /// Corrects with the bit of one sensor, whose threshold was [`SignFilter::threshold`] of this very belief.
-    ///
-    /// # Panics
-    /// If `sensor >= M`, as indexing does.
-    #[inline]
-    pub fn update(&self, predicted: &Gaussian<D>, sensor: usize, bit: Sign) -> Gaussian<D> {
-        sign_update(predicted, &self.sensors[sensor], bit)
-    }
-
-    /// Corrects with the bits of all sensors, whose thresholds were those of this belief: the best linear function of the
-    /// bits. Their covariance is `(2/pi) asin(correlation of the innovations)` (arcsine law), theirs with the state
-    /// `sqrt(2/pi) P H' D^(-1/2)`.
+    /// Corrects with what was observed of one sensor, whose threshold was [`SignFilter::threshold`] of this very belief.
     ///
     /// # Errors
-    /// [`fewbits_filters::Error::SingularInnovation`] if the belief is no covariance.
-    pub fn update_parallel(&self, predicted: &Gaussian<D>, bits: &[Sign; M]) -> Result<Gaussian<D>, Error> {
-        if M == 0 {
-            return Ok(*predicted);
-        }
-        let (gain, covariance) = self.parallel_gain(predicted)?;
-        let signs = SVector::<f64, M>::from_fn(|i, _| bits[i].value());
-        Ok(Gaussian::from_trusted_parts(predicted.mean() + gain * signs, covariance))
+    /// If there is no such sensor; [`fewbits_core::Error::Impossible`].
+    #[inline]
+    pub fn update(
+        &self,
+        predicted: &Gaussian<D>,
+        sensor: usize,
+        observation: &Observation<Sign>,
+    ) -> Result<(Gaussian<D>, VectorInfo), Error> {
+        let threshold = self.threshold(predicted, sensor)?;
+        self.update_at(predicted, sensor, threshold, observation)
     }
 
-    fn parallel_gain(&self, predicted: &Gaussian<D>) -> Result<(SMatrix<f64, D, M>, SMatrix<f64, D, D>), Error> {
-        let mut crosses = SMatrix::<f64, D, M>::zeros();
-        let mut deviations = SVector::<f64, M>::zeros();
-        for (i, sensor) in self.sensors.iter().enumerate() {
-            let (cross, variance) = innovation(predicted, sensor);
-            deviations[i] = variance.sqrt();
-            crosses.set_column(i, &(cross * (SQRT_2_OVER_PI / deviations[i])));
+    /// The same for any threshold.
+    ///
+    /// # Errors
+    /// As [`SignFilter::update`]; if the threshold is not finite.
+    pub fn update_at(
+        &self,
+        predicted: &Gaussian<D>,
+        sensor: usize,
+        threshold: f64,
+        observation: &Observation<Sign>,
+    ) -> Result<(Gaussian<D>, VectorInfo), Error> {
+        let sensor = self.sensor(sensor)?;
+        finite("threshold", threshold)?;
+        let factor = SignBit::new(sensor.noise_variance())?.factor(&threshold, observation, &self.link)?;
+        let (posterior, info) = assumed_density::update(predicted, sensor.matrix(), &factor)?;
+        let info = VectorInfo {
+            log_likelihood: info.log_likelihood,
+            bits: u32::from(observation.received().is_some()),
+        };
+        Ok((posterior, info))
+    }
+
+    /// Corrects with what was observed of all sensors, whose thresholds were those of this belief: the best linear function of
+    /// the bits. Their covariance is `(2/pi) asin(correlation of the innovations)` (arcsine law), theirs with the state
+    /// `sqrt(2/pi) P H' D^(-1/2)`, shrunk by the crossovers.
+    ///
+    /// # Errors
+    /// [`fewbits_filters::Error::SingularInnovation`] if the belief is no covariance; [`fewbits_core::Error::Impossible`].
+    pub fn update_parallel(
+        &self,
+        predicted: &Gaussian<D>,
+        observations: &[Observation<Sign>; M],
+    ) -> Result<(Gaussian<D>, VectorInfo), Error> {
+        let (gain, covariance) = self.parallel_gain(predicted, observations)?;
+        let signs = SVector::<f64, M>::from_fn(|i, _| observations[i].received().map_or(0.0, |bit| bit.value()));
+        let mut info = VectorInfo {
+            log_likelihood: 0.0,
+            bits: 0,
+        };
+        let mut so_far = *predicted;
+        for (i, observation) in observations.iter().enumerate() {
+            let threshold = self.threshold(predicted, i)?;
+            let (next, step) = self.update_at(&so_far, i, threshold, observation)?;
+            so_far = next;
+            info.log_likelihood += step.log_likelihood;
+            info.bits += step.bits;
         }
+        Ok((Gaussian::from_trusted_parts(predicted.mean() + gain * signs, covariance), info))
+    }
+
+    /// Gain and posterior covariance; sensors that were not received have no gain.
+    fn parallel_gain(
+        &self,
+        predicted: &Gaussian<D>,
+        observations: &[Observation<Sign>; M],
+    ) -> Result<(SMatrix<f64, D, M>, SMatrix<f64, D, D>), Error> {
+        if M == 0 {
+            return Ok((SMatrix::zeros(), *predicted.covariance()));
+        }
+        let information = sign_bit::information(&self.link);
+        let received = |i: usize| observations[i].received().is_some();
+        let crosses = self.sensors.map(|sensor| predicted.covariance() * sensor.direction());
+        let deviations = SVector::<f64, M>::from_fn(|i, _| {
+            (self.sensors[i].direction().dot(&crosses[i]) + self.sensors[i].noise_variance()).sqrt()
+        });
+        let with_state = SMatrix::<f64, D, M>::from_fn(|d, i| {
+            if received(i) {
+                crosses[i][d] * (information.sqrt() / deviations[i])
+            } else {
+                0.0
+            }
+        });
         let bits = SMatrix::<f64, M, M>::from_fn(|i, j| {
             if i == j {
                 // asin near 1 would turn a rounding error of 1e-16 into 1e-8.
                 return 1.0;
             }
-            let direction = self.sensors[i].direction();
-            let covariance = direction.dot(&(predicted.covariance() * self.sensors[j].direction()));
-            FRAC_2_PI * (covariance / (deviations[i] * deviations[j])).clamp(-1.0, 1.0).asin()
+            if !(received(i) && received(j)) {
+                return 0.0;
+            }
+            let correlation = self.sensors[i].direction().dot(&crosses[j]) / (deviations[i] * deviations[j]);
+            information * correlation.clamp(-1.0, 1.0).asin()
         });
         let factor = Cholesky::new(symmetrised(&bits)).ok_or(fewbits_filters::Error::SingularInnovation)?;
-        let gain = factor.solve(&crosses.transpose()).transpose();
-        Ok((gain, predicted.covariance() - gain * crosses.transpose()))
+        let gain = factor.solve(&with_state.transpose()).transpose();
+        Ok((gain, predicted.covariance() - gain * with_state.transpose()))
     }
 
-    /// Steady covariances with the threshold refreshed after every sensor, in the order of the sensors.
+    /// Steady covariances with the threshold refreshed after every sensor, in the order of the sensors, when every bit arrives.
     ///
     /// # Errors
     /// [`Error::NotConverged`].
     pub fn sequential_steady_state(&self) -> Result<SteadyState<D>, Error> {
+        let bit = Observation::Received(Sign::Above);
         self.settle(|predicted| {
-            Ok(self
-                .sensors
-                .iter()
-                .fold(*predicted, |belief, sensor| sign_update(&belief, sensor, Sign::Above)))
+            let slot = (0..M).try_fold(*predicted, |belief, i| Ok::<_, Error>(self.update(&belief, i, &bit)?.0))?;
+            Ok(*slot.covariance())
         })
     }
 
-    /// Steady covariances with all thresholds at the prediction.
+    /// Steady covariances with all thresholds at the prediction, when every bit arrives.
     ///
     /// # Errors
     /// [`Error::NotConverged`].
     pub fn parallel_steady_state(&self) -> Result<SteadyState<D>, Error> {
-        self.settle(|predicted| self.update_parallel(predicted, &[Sign::Above; M]))
+        let bits = [Observation::Received(Sign::Above); M];
+        self.settle(|predicted| Ok(self.parallel_gain(predicted, &bits)?.1))
     }
 
-    fn settle(&self, slot: impl Fn(&Gaussian<D>) -> Result<Gaussian<D>, Error>) -> Result<SteadyState<D>, Error> {
-        let mut filtered = Gaussian::from_trusted_parts(SVector::zeros(), SMatrix::identity());
+    fn settle(
+        &self,
+        slot: impl Fn(&Gaussian<D>) -> Result<SMatrix<f64, D, D>, Error>,
+    ) -> Result<SteadyState<D>, Error> {
+        // Only covariances matter: they depend on neither the bits nor the mean.
+        let mut filtered = SMatrix::<f64, D, D>::identity();
         for _ in 0..MOST_STEPS {
-            let predicted = self.predict(&filtered);
+            let predicted = self.predict(&Gaussian::from_trusted_parts(SVector::zeros(), filtered));
             let next = slot(&predicted)?;
-            let change = (next.covariance() - filtered.covariance()).amax();
-            let settled = change <= SETTLED * next.covariance().amax();
-            // Only covariances matter; the mean is kept from wandering.
-            filtered = Gaussian::from_trusted_parts(SVector::zeros(), *next.covariance());
+            let settled = (next - filtered).amax() <= SETTLED * next.amax();
+            filtered = next;
             if settled {
                 return Ok(SteadyState {
                     predicted_covariance: *predicted.covariance(),
-                    filtered_covariance: *filtered.covariance(),
+                    filtered_covariance: symmetrised(&filtered),
                 });
             }
         }
@@ -212,84 +253,123 @@ const SETTLED: f64 = 1e-15;
 
 #[cfg(test)]
 mod tests {
-    use super::{SignFilter, sign_update, vector_bit_update};
-    use crate::{DymboFilter, ScalarPlant, bit_update};
-    use fewbits_core::{Gaussian, Sign};
+    use super::SignFilter;
+    use crate::{CountFusion, DymboFilter, Error, ParallelFilter, ScalarFilter, ScalarPlant};
+    use fewbits_core::{Gaussian, Link, Observation, Sign};
     use fewbits_filters::kalman;
     use fewbits_models::{Ar1, LinearGaussian, LinearSensor, ScalarSensor};
     use nalgebra::{Matrix2, SMatrix, Vector1, Vector2};
+    use proptest::prelude::*;
+    use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
+
+    const ABOVE: Observation<Sign> = Observation::Received(Sign::Above);
+    const BELOW: Observation<Sign> = Observation::Received(Sign::Below);
 
     fn belief() -> Gaussian<2> {
         Gaussian::new(Vector2::new(0.3, -1.0), Matrix2::new(2.0, 0.5, 0.5, 1.0)).unwrap()
+    }
+
+    fn dynamics() -> LinearGaussian<2, 2> {
+        LinearGaussian::with_covariance(Matrix2::new(0.95, 0.25, -0.1, 0.9), Matrix2::identity() * 0.3).unwrap()
+    }
+
+    proptest! {
+        /// The closed form of the paper's vector recursion, to 1e-13 relative.
+        #[test]
+        fn a_bit_at_the_prediction_is_the_closed_form(
+            h in prop::array::uniform2(-2.0..2.0_f64), r in 0.1..3.0_f64, a in 0.1..3.0_f64, b in 0.1..3.0_f64, rho in -0.95..0.95_f64,
+            above in any::<bool>(), scale in prop::sample::select(vec![1e-4, 1.0, 1e4]),
+        ) {
+            let unit = scale * scale;
+            let c = rho * (a * b).sqrt();
+            let prior = Gaussian::new(Vector2::new(0.3, -1.0) * scale, Matrix2::new(a, c, c, b) * unit).unwrap();
+            let sensor = ScalarSensor::scalar(Vector2::from(h), r * unit).unwrap();
+            let filter = SignFilter::new(dynamics(), [sensor]);
+            let (posterior, info) = filter.update(&prior, 0, if above { &ABOVE } else { &BELOW }).unwrap();
+            let h = Vector2::from(h);
+            let s = ((h.transpose() * prior.covariance() * h)[0] + r * unit).sqrt();
+            let step = prior.covariance() * h * ((FRAC_2_PI).sqrt() / s);
+            let sign = if above { 1.0 } else { -1.0 };
+            let expected = prior.covariance() - step * step.transpose();
+            prop_assert!((posterior.mean() - prior.mean() - step * sign).amax() <= 1e-13 * scale);
+            prop_assert!((posterior.covariance() - expected).amax() <= 1e-13 * prior.covariance().amax());
+            prop_assert!((info.log_likelihood - 0.5_f64.ln()).abs() < 1e-12 && info.bits == 1);
+        }
     }
 
     #[test]
     fn in_one_dimension_it_is_the_scalar_filter() {
         let plant = ScalarPlant::new(0.9, 0.5, 1.2).unwrap();
         let predicted = Gaussian::scalar(0.7, 1.4).unwrap();
-        let scalar = DymboFilter::new(plant).update(&predicted, Sign::Below).0;
-        let vector = sign_update(&predicted, plant.sensor(), Sign::Below);
-        assert!(
-            (scalar.mean() - vector.mean()).amax() < 1e-15
-                && (scalar.covariance() - vector.covariance()).amax() < 1e-15
-        );
-        let general = bit_update(&predicted, 1.2, Sign::Below, 2.0, 0.1).unwrap().0;
-        let vector = vector_bit_update(&predicted, plant.sensor(), Sign::Below, 2.0, 0.1)
-            .unwrap()
-            .0;
-        assert!((general.mean() - vector.mean()).amax() < 1e-14);
-        assert!((general.covariance() - vector.covariance()).amax() < 1e-14);
+        for link in [Link::PERFECT, Link::new(0.2, 0.1).unwrap()] {
+            let (scalar, one) = DymboFilter::new(plant)
+                .with_link(link)
+                .update(&predicted, &BELOW)
+                .unwrap();
+            let filter = SignFilter::new(*plant.dynamics(), [*plant.sensor()]).with_link(link);
+            let (vector, same) = filter.update(&predicted, 0, &BELOW).unwrap();
+            assert!((scalar.mean() - vector.mean()).amax() < 1e-14);
+            assert!((scalar.covariance() - vector.covariance()).amax() < 1e-14);
+            assert!((one.log_likelihood - same.log_likelihood).abs() < 1e-14);
+        }
     }
 
     #[test]
     fn a_bit_at_the_prediction_is_a_kalman_step_with_inflated_noise() {
         let sensor = ScalarSensor::scalar(Vector2::new(1.0, -0.5), 0.8).unwrap();
         let seen = (sensor.matrix() * belief().covariance() * sensor.matrix().transpose())[0];
-        let noise = std::f64::consts::FRAC_PI_2 * (seen + 0.8) - seen;
-        let equivalent = LinearSensor::scalar(sensor.direction(), noise).unwrap();
+        let equivalent = LinearSensor::scalar(sensor.direction(), FRAC_PI_2 * (seen + 0.8) - seen).unwrap();
         let analog = kalman::update(&equivalent, &belief(), &Vector1::zeros()).unwrap().0;
-        let bit = sign_update(&belief(), &sensor, Sign::Above);
-        assert!((bit.covariance() - analog.covariance()).amax() < 1e-14);
-        let threshold = sensor.direction().dot(belief().mean());
-        let general = vector_bit_update(&belief(), &sensor, Sign::Above, threshold, 0.0)
-            .unwrap()
-            .0;
-        assert!(
-            (bit.mean() - general.mean()).amax() < 1e-14 && (bit.covariance() - general.covariance()).amax() < 1e-14
-        );
         // What a sensor cannot see does not move.
         let blind = ScalarSensor::scalar(Vector2::zeros(), 1.0).unwrap();
-        assert_eq!(vector_bit_update(&belief(), &blind, Sign::Above, 0.0, 0.0).unwrap().0, belief());
+        let filter = SignFilter::new(dynamics(), [sensor, blind]);
+        let bit = filter.update(&belief(), 0, &ABOVE).unwrap().0;
+        assert!((bit.covariance() - analog.covariance()).amax() < 1e-14);
+        assert_eq!(filter.update(&belief(), 1, &ABOVE).unwrap().0, belief());
+    }
+
+    /// Regression: an index beyond the sensors was a panic.
+    #[test]
+    fn refuses_sensors_that_are_not_there() {
+        let filter = SignFilter::new(dynamics(), [ScalarSensor::scalar(Vector2::new(1.0, 0.5), 1.0).unwrap()]);
+        assert!(matches!(filter.threshold(&belief(), 1), Err(Error::Argument(_))));
+        assert!(matches!(filter.update(&belief(), 1, &ABOVE), Err(Error::Argument(_))));
+        assert!(filter.update_at(&belief(), 0, f64::NAN, &ABOVE).is_err());
+        assert_eq!(filter.update(&belief(), 0, &Observation::Nothing), Err(Error::IMPOSSIBLE));
     }
 
     #[test]
     fn parallel_fusion_of_one_or_no_sensor() {
-        let dynamics =
-            LinearGaussian::with_covariance(Matrix2::new(0.95, 0.25, -0.1, 0.9), Matrix2::identity() * 0.3).unwrap();
         let sensor = ScalarSensor::scalar(Vector2::new(1.0, 0.5), 1.0).unwrap();
-        let filter = SignFilter::new(dynamics, [sensor]);
-        let parallel = filter.update_parallel(&belief(), &[Sign::Below]).unwrap();
-        let sequential = filter.update(&belief(), 0, Sign::Below);
-        assert!((parallel.mean() - sequential.mean()).amax() < 1e-14);
+        let filter = SignFilter::new(dynamics(), [sensor]).with_link(Link::flipping(0.1).unwrap());
+        let (parallel, both) = filter.update_parallel(&belief(), &[BELOW]).unwrap();
+        let (sequential, one) = filter.update(&belief(), 0, &BELOW).unwrap();
+        assert!((parallel.mean() - sequential.mean()).amax() < 1e-14 && both == one);
         assert!((parallel.covariance() - sequential.covariance()).amax() < 1e-14);
-        let blind = SignFilter::new(dynamics, []);
-        assert_eq!(blind.update_parallel(&belief(), &[]).unwrap(), belief());
+        // A sensor whose bit is lost might as well not be there.
+        let two = SignFilter::new(dynamics(), [sensor; 2]).with_link(Link::flipping(0.1).unwrap());
+        let (without, _) = two.update_parallel(&belief(), &[Observation::Erased, BELOW]).unwrap();
+        assert!((without.mean() - parallel.mean()).amax() < 1e-14);
+        assert!((without.covariance() - parallel.covariance()).amax() < 1e-14);
+        let blind = SignFilter::new(dynamics(), []);
+        assert_eq!(blind.update_parallel(&belief(), &[]).unwrap().0, belief());
         let alone = blind.sequential_steady_state().unwrap();
-        assert!((alone.filtered_covariance - dynamics.stationary_covariance().unwrap()).amax() < 1e-11);
+        assert!((alone.filtered_covariance - dynamics().stationary_covariance().unwrap()).amax() < 1e-11);
     }
 
     #[test]
     fn identical_sensors_in_parallel_are_the_scalar_count() {
         let plant = ScalarPlant::new(0.9, 0.5, 1.0).unwrap();
-        let filter = SignFilter::new(Ar1::new(0.9, 0.5).unwrap(), [*plant.sensor(); 3]);
-        let count = crate::ParallelFilter::new(plant, 3, crate::CountFusion::Linear).unwrap();
+        let link = Link::flipping(0.05).unwrap();
+        let filter = SignFilter::new(Ar1::new(0.9, 0.5).unwrap(), [*plant.sensor(); 3]).with_link(link);
+        let count = ParallelFilter::new(plant, 3, CountFusion::Linear)
+            .unwrap()
+            .with_link(link);
         let predicted = Gaussian::scalar(0.0, 1.1).unwrap();
-        let both = filter
-            .update_parallel(&predicted, &[Sign::Above, Sign::Above, Sign::Below])
-            .unwrap();
+        let (both, _) = filter.update_parallel(&predicted, &[ABOVE, ABOVE, BELOW]).unwrap();
         let (corrections, variance) = count.table(1.1);
         assert!((both.mean()[0] - corrections[2]).abs() < 1e-13 && (both.covariance()[0] - variance).abs() < 1e-13);
         let stuck = Gaussian::from_trusted_parts(Vector1::zeros(), SMatrix::<f64, 1, 1>::from([[f64::NAN]]));
-        assert!(filter.update_parallel(&stuck, &[Sign::Above; 3]).is_err());
+        assert!(filter.update_parallel(&stuck, &[ABOVE; 3]).is_err());
     }
 }

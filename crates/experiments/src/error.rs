@@ -81,8 +81,8 @@ impl Error {
     }
 }
 
-impl<E: std::error::Error + Send + Sync + 'static> From<fewbits_monte_carlo::MonteCarloError<E>> for Error {
-    fn from(error: fewbits_monte_carlo::MonteCarloError<E>) -> Self {
+impl From<fewbits_monte_carlo::MonteCarloError> for Error {
+    fn from(error: fewbits_monte_carlo::MonteCarloError) -> Self {
         match error {
             fewbits_monte_carlo::MonteCarloError::Cancelled => Self::Cancelled,
             other => Self::failed(other),
@@ -121,6 +121,24 @@ impl From<fewbits_sensor_assignment::Error> for Error {
     fn from(error: fewbits_sensor_assignment::Error) -> Self {
         match error {
             fewbits_sensor_assignment::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
+impl From<fewbits_handoff::Error> for Error {
+    fn from(error: fewbits_handoff::Error) -> Self {
+        match error {
+            fewbits_handoff::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
+impl From<fewbits_densities::Error> for Error {
+    fn from(error: fewbits_densities::Error) -> Self {
+        match error {
+            fewbits_densities::Error::Argument(argument) => Self::Argument(argument),
             other => Self::failed(other),
         }
     }

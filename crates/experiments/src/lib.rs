@@ -15,9 +15,11 @@ pub mod assign;
 pub mod binary;
 pub mod cfwmd;
 pub mod claim;
+pub mod diffusive;
 pub mod dymbo;
 mod error;
 mod figure;
+pub mod handoff;
 pub mod legacy;
 mod measured;
 pub mod mi;
@@ -44,6 +46,8 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         binary::figures(),
         assign::figures(),
         cfwmd::figures(),
+        diffusive::figures(),
+        handoff::figures(),
     ]
     .concat()
 }

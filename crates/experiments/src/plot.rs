@@ -136,6 +136,14 @@ pub enum Marker {
     Triangle,
     /// A filled square.
     Square,
+    /// A filled diamond.
+    Diamond,
+    /// An open circle.
+    OpenCircle,
+    /// An open square.
+    OpenSquare,
+    /// An upright cross.
+    Plus,
 }
 
 /// What a layer draws.
@@ -154,8 +162,8 @@ pub enum Shape {
         points: Vec<(f64, f64)>,
         /// Half lengths of the error bars; empty for none.
         errors: Vec<f64>,
-        /// The marker.
-        marker: Marker,
+        /// The marker; by colour where absent.
+        marker: Option<Marker>,
     },
     /// Vertical bars from zero (from the lower limit on a log axis), `width` wide in units of the horizontal axis.
     Bars {
@@ -197,6 +205,8 @@ pub struct Layer {
     pub label: String,
     /// Index into the palette; by order of layers where absent.
     pub colour: Option<usize>,
+    /// Whether the label stands at the curve and not in the legend.
+    pub inline: bool,
     /// What is drawn.
     pub shape: Shape,
 }
@@ -206,6 +216,7 @@ impl Layer {
         Self {
             label: label.into(),
             colour: None,
+            inline: false,
             shape,
         }
     }
@@ -239,7 +250,7 @@ impl Layer {
             Shape::Points {
                 points,
                 errors: Vec::new(),
-                marker: Marker::Circle,
+                marker: None,
             },
         )
     }
@@ -293,6 +304,12 @@ impl Layer {
         }
     }
 
+    /// Writes the label at the curve and not in the legend: contours.
+    #[must_use]
+    pub fn inline(self) -> Self {
+        Self { inline: true, ..self }
+    }
+
     /// Adds error bars of one standard error to markers; ignored by other shapes.
     #[must_use]
     pub fn with_errors(mut self, half_lengths: Vec<f64>) -> Self {
@@ -306,13 +323,13 @@ impl Layer {
     #[must_use]
     pub fn marked(mut self, with: Marker) -> Self {
         if let Shape::Points { marker, .. } = &mut self.shape {
-            *marker = with;
+            *marker = Some(with);
         }
         self
     }
 }
 
-/// Where the legend stands.
+/// Whether there is a legend. It stands below its panel, where it hides no data; the names of other places are kept for old callers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Legend {
     /// Top right.

@@ -5,7 +5,7 @@
 
 use crate::error::Error;
 use crate::figure::Context;
-use fewbits_monte_carlo::{Moments, MonteCarloError, Stream, Trial};
+use fewbits_monte_carlo::{Moments, Stream, Trial};
 
 /// What trials are added up in: [`Moments`], and lists, arrays and pairs of tallies.
 pub trait Tally: Send {
@@ -52,8 +52,7 @@ impl Context<'_> {
     ) -> Result<T, Error>
     where
         T: Tally,
-        E: Send,
-        Error: From<MonteCarloError<E>>,
+        E: std::fmt::Display,
     {
         Ok(self
             .monte_carlo(stream, trials)
@@ -76,8 +75,7 @@ impl Context<'_> {
     ) -> Result<Vec<T>, Error>
     where
         T: Tally,
-        E: Send,
-        Error: From<MonteCarloError<E>>,
+        E: std::fmt::Display,
     {
         let at = |point: &P| {
             let stream = self.stream(experiment).named(&name(point));
@@ -100,8 +98,7 @@ impl Context<'_> {
         trial: impl Fn(&P, &S, Trial) -> Result<[f64; K], E> + Sync,
     ) -> Result<Vec<Comparison<K>>, Error>
     where
-        E: Send,
-        Error: From<MonteCarloError<E>>,
+        E: std::fmt::Display,
     {
         let at = |point: &P| {
             let run = self.monte_carlo(self.stream(experiment).named(&name(point)), trials);

@@ -6,13 +6,13 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{AllocProfiler, Bencher, black_box};
-use fewbits_core::likelihood::{Heard, ScalarLikelihood};
-use fewbits_core::{Dynamics, Gaussian, Likelihood};
+use fewbits_core::factor::Value;
+use fewbits_core::{Dynamics, Gaussian, Likelihood, Observed};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
-use fewbits_models::{Ar1, LinearGaussian, constant_velocity_2d};
+use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
-use nalgebra::{Matrix4, SVector, Vector4};
+use nalgebra::{Matrix4, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
@@ -41,20 +41,20 @@ fn normals_unit<const DRAWS: usize>(bencher: Bencher<'_, '_>) {
 fn bench_steps<const D: usize>(
     bencher: Bencher<'_, '_>,
     dynamics: &impl Dynamics<D>,
-    heard: &impl Likelihood<D>,
+    observed: &impl Likelihood<D>,
     prior: Gaussian<D>,
 ) {
     let mut rng = Stream::new(2).fast_rng();
-    let start = Particles::from_draws(PARTICLES, || prior.sample(&mut rng).unwrap()).unwrap();
+    let start = Particles::from_belief(&mut rng, &prior, PARTICLES).unwrap();
     let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Always);
     let mut workspace = Workspace::default();
     let mut belief = start;
     filter
-        .step_in_place(&mut rng, dynamics, heard, &mut belief, &mut workspace)
+        .step_in_place(&mut rng, dynamics, &mut belief, observed, &mut workspace)
         .unwrap();
     bencher.bench_local(|| {
         filter
-            .step_in_place(&mut rng, dynamics, heard, &mut belief, &mut workspace)
+            .step_in_place(&mut rng, dynamics, &mut belief, observed, &mut workspace)
             .unwrap()
     });
 }
@@ -63,8 +63,8 @@ fn bench_steps<const D: usize>(
 #[divan::bench]
 fn step_ar1(bencher: Bencher<'_, '_>) {
     let dynamics = LinearGaussian::from(Ar1::new(0.95, 1.0).unwrap());
-    let heard = ScalarLikelihood::new(SVector::from([1.0]), 1.0, Heard::Value(0.4)).unwrap();
-    bench_steps(bencher, &dynamics, &heard, Gaussian::scalar(0.0, 4.0).unwrap());
+    let observed = Observed::new(LinearSensor::direct(1.0).unwrap(), Value::scalar(0.4, 1.0).unwrap());
+    bench_steps(bencher, &dynamics, &observed, Gaussian::scalar(0.0, 4.0).unwrap());
 }
 
 /// Constant velocity in the plane with a process noise of full rank, four draws a particle.
@@ -86,9 +86,10 @@ fn plane<const U: usize>(bencher: Bencher<'_, '_>, dynamics: &LinearGaussian<4, 
     // A stationary belief for the whole bench: velocity decays, so that weights stay ordinary.
     let damped =
         LinearGaussian::new(dynamics.transition() * 0.97, *dynamics.gain(), *dynamics.noise_variances()).unwrap();
-    let heard = ScalarLikelihood::new(Vector4::new(1.0, 0.0, 1.0, 0.0), 1.0, Heard::Value(0.4)).unwrap();
+    let sensor = LinearSensor::scalar(Vector4::new(1.0, 0.0, 1.0, 0.0), 1.0).unwrap();
+    let observed = Observed::new(sensor, Value::scalar(0.4, 1.0).unwrap());
     let prior = Gaussian::new(Vector4::zeros(), Matrix4::identity()).unwrap();
-    bench_steps(bencher, &damped, &heard, prior);
+    bench_steps(bencher, &damped, &observed, prior);
 }
 
 /// Each resampling law alone.

@@ -1,8 +1,9 @@
 //! The assumed-density filter: one update for every factor.
 
-use crate::Error;
-use fewbits_core::{Factor, Gaussian};
-use nalgebra::{Cholesky, SMatrix, SVector};
+use crate::linalg::solve_semidefinite;
+use crate::{Error, extended_kalman};
+use fewbits_core::{Factor, Gaussian, GaussianDynamics, Observed, Sensing};
+use nalgebra::{SMatrix, SVector};
 
 /// What an update reveals besides the new belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,12 +17,12 @@ pub struct UpdateInfo<const D: usize, const M: usize> {
     pub gain: SMatrix<f64, D, M>,
 }
 
-/// Gaussian update through a linear(ised) sensor: what the factor says about `m = H x`, `x` follows by regression.
+/// Gaussian update through a linear sensor: what the factor says about `m = H x`, `x` follows by regression.
 ///
 /// ```text
 /// m ~ N(H mean, V),  V = H P H'
 /// T = tilted moments of m given the observation
-/// G = P H' V^-1
+/// G = P H' V^-1                                      (pseudo-inverse where V is singular)
 /// mean = mean + G (T.mean - H mean)
 /// P = (I - G H) P (I - G H)' + G T.covariance G'
 /// ```
@@ -35,15 +36,45 @@ pub fn update<const D: usize, const M: usize>(
     matrix: &SMatrix<f64, M, D>,
     factor: &impl Factor<M>,
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
+    update_at(belief, matrix * belief.mean(), matrix, factor)
+}
+
+/// The same through any sensor, linearised at the belief's mean: `m = h(mean) + H (x - mean)`. With a value it is the extended
+/// Kalman filter.
+///
+/// # Errors
+/// As [`update`].
+pub fn update_through<const D: usize, const M: usize>(
+    belief: &Gaussian<D>,
+    observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
+) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
+    let (predicted, jacobian) = (observed.sensing.mean(belief.mean()), observed.sensing.jacobian(belief.mean()));
+    update_at(belief, predicted, &jacobian, &observed.factor)
+}
+
+/// One step: the time update about the mean ([`extended_kalman::predict`]), then [`update_through`].
+///
+/// # Errors
+/// As [`update`].
+pub fn step<const D: usize, const M: usize>(
+    dynamics: &impl GaussianDynamics<D>,
+    belief: &Gaussian<D>,
+    observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
+) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
+    update_through(&extended_kalman::predict(dynamics, belief), observed)
+}
+
+fn update_at<const D: usize, const M: usize>(
+    belief: &Gaussian<D>,
+    predicted: SVector<f64, M>,
+    matrix: &SMatrix<f64, M, D>,
+    factor: &impl Factor<M>,
+) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
     let cross = belief.covariance() * matrix.transpose();
-    let prior = Gaussian::from_trusted_parts(matrix * belief.mean(), matrix * cross);
+    let prior = Gaussian::from_trusted_parts(predicted, matrix * cross);
     let tilted = factor.tilted(&prior)?;
     let correction = tilted.mean - prior.mean();
-    let gain = match Cholesky::new(*prior.covariance()) {
-        Some(factor) => factor.solve(&cross.transpose()).transpose(),
-        // A measurement that is known beforehand teaches nothing.
-        None => SMatrix::zeros(),
-    };
+    let gain = solve_semidefinite(prior.covariance(), &cross.transpose())?.transpose();
     let keep = SMatrix::<f64, D, D>::identity() - gain * matrix;
     let covariance = keep * belief.covariance() * keep.transpose() + gain * tilted.covariance * gain.transpose();
     let info = UpdateInfo {
@@ -51,5 +82,9 @@ pub fn update<const D: usize, const M: usize>(
         correction,
         gain,
     };
-    Ok((Gaussian::from_trusted_parts(belief.mean() + gain * correction, covariance), info))
+    let mean = belief.mean() + gain * correction;
+    if !mean.iter().chain(covariance.iter()).all(|x| x.is_finite()) {
+        return Err(Error::IMPOSSIBLE);
+    }
+    Ok((Gaussian::from_trusted_parts(mean, covariance), info))
 }

@@ -15,16 +15,32 @@ pub enum Error {
     /// A model refused its parameters.
     #[error(transparent)]
     Model(#[from] fewbits_models::Error),
-    /// A particle belief that cannot be, most often because what was heard is impossible for every particle.
+    /// A message that does not fit its format.
     #[error(transparent)]
-    Density(#[from] fewbits_densities::Error),
+    Codec(#[from] fewbits_core::CodecError),
+    /// A density that cannot be.
+    #[error(transparent)]
+    Density(fewbits_densities::Error),
     /// The innovation covariance has no Cholesky factor.
     #[error("the innovation covariance is not positive definite: the belief or the sensing noise is no covariance")]
     SingularInnovation,
     /// The Riccati recursion has no finite limit.
     #[error("the error variance has no finite steady state: an unstable part of the state is not observed well enough")]
     NoSteadyState,
-    /// What was heard has probability zero under the belief.
-    #[error("what was heard is impossible under the belief")]
-    Impossible,
+}
+
+impl Error {
+    /// What was observed has probability zero under the belief.
+    pub(crate) const IMPOSSIBLE: Self = Self::Core(fewbits_core::Error::Impossible);
+}
+
+/// One name for one thing, whichever floor finds it.
+impl From<fewbits_densities::Error> for Error {
+    fn from(error: fewbits_densities::Error) -> Self {
+        match error {
+            fewbits_densities::Error::Argument(error) => Self::Argument(error),
+            fewbits_densities::Error::Core(error) => Self::Core(error),
+            other => Self::Density(other),
+        }
+    }
 }

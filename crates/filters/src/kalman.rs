@@ -1,4 +1,4 @@
-//! The Kalman filter.
+//! The Kalman filter: the assumed-density update with a value, in its own closed form.
 
 use crate::Error;
 use fewbits_core::{Gaussian, LinearDynamics, LinearSensing};
@@ -8,6 +8,7 @@ use nalgebra::{Cholesky, SMatrix, SVector};
 
 /// What an update reveals besides the new belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct KalmanInfo<const D: usize, const M: usize> {
     /// Measurement minus its prediction.
     pub innovation: SVector<f64, M>,
@@ -87,7 +88,9 @@ pub fn step<const D: usize, const M: usize>(
 mod tests {
     use super::{predict, step, update};
     use crate::Error;
+    use crate::assumed_density;
     use fewbits_core::Gaussian;
+    use fewbits_core::factor::Value;
     use fewbits_models::{LinearSensor, constant_velocity_1d};
     use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
 
@@ -111,6 +114,23 @@ mod tests {
         assert!((info.log_likelihood - predicted.log_pdf(&z).unwrap()).abs() < 1e-12);
     }
 
+    /// The Kalman filter is the assumed-density update with a value, at every scale.
+    #[test]
+    fn it_is_the_assumed_density_update_with_a_value() {
+        for scale in [1e-4, 1.0, 1e4] {
+            let covariance = Matrix3::new(2.0, 0.3, 0.1, 0.3, 1.0, -0.2, 0.1, -0.2, 0.5) * (scale * scale);
+            let prior = Gaussian::new(Vector3::new(1.0, -1.0, 0.5) * scale, covariance).unwrap();
+            let h = Matrix3x2::new(1.0, 0.0, 0.5, 2.0, -1.0, 1.0).transpose();
+            let r = Matrix2::new(1.0, 0.2, 0.2, 0.5) * (scale * scale);
+            let z = Vector2::new(0.4, -2.0) * scale;
+            let (own, info) = update(&LinearSensor::new(h, r).unwrap(), &prior, &z).unwrap();
+            let (general, other) = assumed_density::update(&prior, &h, &Value::new(z, r).unwrap()).unwrap();
+            assert!((own.mean() - general.mean()).amax() < 1e-13 * scale);
+            assert!((own.covariance() - general.covariance()).amax() < 1e-13 * scale * scale);
+            assert!((info.log_likelihood - other.log_likelihood).abs() < 1e-12);
+        }
+    }
+
     #[test]
     fn a_known_start_stays_semidefinite() {
         let dynamics = constant_velocity_1d(1.0, 0.1).unwrap();
@@ -126,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_it_cannot_hear() {
+    fn refuses_what_is_no_number() {
         let sensing = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
         let belief = Gaussian::known(Vector2::zeros()).unwrap();
         let nothing = update(&sensing, &belief, &SVector::from([f64::NAN]));

@@ -1,19 +1,25 @@
-//! Filters that hear any message through its likelihood.
+//! Filters that take in any observation through its factor or likelihood.
 //!
-//! A belief is a value, an estimator a function of it: each step takes a belief and what was heard, and returns the new
+//! A belief is a value, an estimator a function of it: each step takes a belief and what was observed, and returns the new
 //! belief with an `info` of diagnostics. Nothing is remembered behind the caller's back, so a belief can be stored, sent,
 //! compared and replayed; a step that fails leaves the old one as it was. The cost is a copy of a small matrix a step.
 //!
 //! | task | item |
 //! |---|---|
-//! | linear Gaussian filtering | [`kalman`] (Joseph form) |
+//! | a Gaussian belief and any factor | [`assumed_density`] |
+//! | linear Gaussian filtering of values | [`kalman`] (Joseph form), [`extended_kalman`] |
 //! | its steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) |
 //! | smoothing of Gaussian beliefs | [`smoother`] (Rauch-Tung-Striebel), [`FixedLagSmoother`] |
-//! | any dynamics, any message | [`ParticleFilter`] (bootstrap, guided, auxiliary), [`Resampling`] |
-//! | linear Gaussian state, any message | [`RaoBlackwellised`] (measurements imputed, states exact) |
-//! | mildly nonlinear sensing | [`extended_kalman`] |
+//! | any dynamics, any likelihood | [`ParticleFilter`] (bootstrap, guided, auxiliary), [`Resampling`] |
+//! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) |
 //! | the exact answer | [`PointMassFilter`] (scalar filter and smoother on a grid), [`PlaneFilter`] (two dimensions) |
+//! | world, sensors, link and filter in one call | [`ClosedLoop`] |
+//!
+//! All have one shape: `step(rng, model, belief, observation)` returns the next belief and an `info` whose `log_likelihood` is
+//! the increment `ln p(observation | past)`; what draws no random numbers takes no `rng`, and where a copy would cost there is
+//! `step_in_place` with the same arguments and a workspace. What is impossible under the belief is
+//! [`fewbits_core::Error::Impossible`], whichever filter finds it.
 //!
 //! ```
 //! use fewbits_core::Gaussian;
@@ -29,25 +35,30 @@
 //! Not here: the schemes of any one paper, and time-varying models (pass another model at each step).
 
 pub mod assumed_density;
+mod closed_loop;
 pub mod cramer_rao;
 mod error;
 pub mod extended_kalman;
 mod guided;
 pub mod kalman;
+mod linalg;
 mod particle;
+mod plane;
 mod point_mass;
-mod point_mass_2d;
 mod rao_blackwell;
 mod resample;
 pub mod smoother;
 mod steady_state;
 
+pub use closed_loop::{AssumedDensity, ClosedLoop, Filter, LoopState, Slot};
 pub use error::Error;
+pub use fewbits_densities::{GaussianCloud, Grid, Particles, PlaneMass, PointMass};
 pub use guided::OptimalProposal;
 pub use particle::{ParticleFilter, ParticleInfo, Proposal, Workspace};
-pub use point_mass::{Grid, PointMass, PointMassFilter};
-pub use point_mass_2d::{PlaneFilter, PlaneMass};
-pub use rao_blackwell::RaoBlackwellised;
+pub use plane::PlaneFilter;
+pub use point_mass::PointMassFilter;
+pub use rao_blackwell::{CloudWorkspace, RaoBlackwellised};
 pub use resample::{Resampling, Schedule};
 pub use smoother::{FixedLagSmoother, scalar_fixed_lag_variance};
 pub use steady_state::{ScalarSteadyState, SteadyState, scalar_steady_state, steady_state};
+pub use {nalgebra, rand};

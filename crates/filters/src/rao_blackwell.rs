@@ -1,151 +1,209 @@
-//! A linear Gaussian state heard through cells, Rao-Blackwellised.
+//! A linear Gaussian state observed through cells, Rao-Blackwellised.
 
-use crate::particle::{ParticleFilter, ParticleInfo, Workspace};
+use crate::particle::{ParticleFilter, ParticleInfo, Workspace, add, weigh};
 use crate::{Error, kalman};
+use fewbits_core::columns::{count, set_state};
 use fewbits_core::factor::Scalar;
-use fewbits_core::{Gaussian, LinearDynamics};
-use fewbits_densities::Particles;
-use fewbits_models::LinearSensor;
+use fewbits_core::{Cell, FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observed};
+use fewbits_densities::GaussianCloud;
 use fewbits_numerics::normal;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
 
-/// A belief about a linear Gaussian state that heard bits, cells, silence or values of scalar measurements.
+/// A filter of linear Gaussian states that imputes what was not received: bits, cells, silence, symbols.
 ///
 /// Given the measurements themselves the state is Gaussian, and its covariance does not depend on their values. So a particle
-/// is a Kalman mean with the measurements it imagined, all particles share one covariance, and far fewer are needed than of
-/// states. A value has no freedom and leaves no noise at all: with values only this is the Kalman filter.
+/// is a Kalman mean with the measurements imputed to it, all particles share one covariance ([`GaussianCloud`]), and far fewer
+/// are needed than of states. A value has no freedom and leaves no noise at all: with values only this is the Kalman filter.
 ///
 /// ```text
-/// update, with s = h'Ph + r and K = Ph/s, for each particle mean m:
-///     w *= p(heard | m) = sum over pieces (cell, share) of share * P(z in cell), z ~ N(h'm, s)
-///     z ~ N(h'm, s) restricted to a piece, the piece drawn by its share of p
-///     m += K (z - h'm)
-/// P -= K s K'
+/// update, with S = H P H' + R and K = P H' S^-1, for each particle mean m:
+///     w *= p(observed | m) = integral N(z; H m, S) p(observed | z) dz
+///     z ~ N(z; H m, S) p(observed | z)                                     (imputed)
+///     m += K (z - H m)
+/// P = (I - K H) P (I - K H)' + K R K'
 /// ```
-/// A bit through a noisy link and the silence of a lossy one are two pieces each: the likelihood of `z` is piecewise constant.
-/// (Chen and Liu 2000, mixture Kalman filters; here with imputation from the optimal proposal.)
-#[derive(Debug, Clone, PartialEq)]
-pub struct RaoBlackwellised<const D: usize> {
-    means: Particles<D>,
-    covariance: SMatrix<f64, D, D>,
+/// For a [`Scalar`] factor, `p(observed | z)` is piecewise constant and the draw exact; any other law, and what depends on the
+/// particle's own history (its side row), enters through [`impute`](Self::impute). (Chen and Liu 2000, mixture Kalman
+/// filters; here with imputation from the optimal proposal.)
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct RaoBlackwellised {
+    /// Resampling law of the conditional means and when to apply it.
+    pub filter: ParticleFilter,
 }
 
-/// A part of the line with the probability that what was heard follows from a measurement there.
-type Piece = (fewbits_core::Cell, f64);
+/// Buffers that a filter reuses from step to step.
+#[derive(Debug, Clone, Default)]
+pub struct CloudWorkspace<const D: usize> {
+    particles: Workspace<D>,
+    log_weights: Vec<f64>,
+    next: Option<GaussianCloud<D>>,
+    before: Option<GaussianCloud<D>>,
+}
 
-impl<const D: usize> RaoBlackwellised<D> {
-    /// `count` particles that agree on a Gaussian belief.
-    ///
-    /// # Errors
-    /// No particle.
-    pub fn new(belief: &Gaussian<D>, count: usize) -> Result<Self, Error> {
-        Ok(Self {
-            means: Particles::from_draws(count, || *belief.mean())?,
-            covariance: *belief.covariance(),
-        })
+impl RaoBlackwellised {
+    /// A filter that resamples so.
+    pub fn new(filter: ParticleFilter) -> Self {
+        Self { filter }
     }
 
-    /// The conditional means, weighted.
-    pub fn means(&self) -> &Particles<D> {
-        &self.means
-    }
-
-    /// The covariance that all particles share.
-    pub fn shared_covariance(&self) -> &SMatrix<f64, D, D> {
-        &self.covariance
-    }
-
-    /// Mean and covariance of the whole belief: the shared covariance plus the spread of the means.
-    pub fn gaussian(&self) -> Gaussian<D> {
-        let mean = self.means.mean();
-        Gaussian::from_trusted_parts(mean, self.covariance + self.means.covariance_about(&mean))
-    }
-
-    /// Resamples if `filter` says so and moves every mean by the dynamics.
+    /// Resamples if due and moves every mean by the dynamics. Side rows stay as they are.
     ///
     /// # Errors
     /// As [`ParticleFilter::resample`].
-    pub fn predict<R: Rng + ?Sized>(
-        &mut self,
+    pub fn predict<const D: usize, R: Rng + ?Sized>(
+        &self,
         rng: &mut R,
-        filter: &ParticleFilter,
         dynamics: &impl LinearDynamics<D>,
-        workspace: &mut Workspace,
+        belief: &mut GaussianCloud<D>,
+        workspace: &mut CloudWorkspace<D>,
     ) -> Result<(), Error> {
-        filter.resample(rng, &mut self.means, workspace)?;
-        let columns = self.means.columns_mut();
-        for i in 0..columns[0].len() {
+        self.filter
+            .resample(rng, belief.means_mut(), &mut workspace.particles)?;
+        let mut columns = belief.means_mut().columns_mut();
+        for i in 0..count(&columns) {
             let mean = dynamics.transition() * SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
-            for d in 0..D {
-                columns[d][i] = mean[d];
-            }
+            set_state(&mut columns, i, &mean);
         }
-        let shared = Gaussian::from_trusted_parts(SVector::zeros(), self.covariance);
-        self.covariance = *kalman::predict(dynamics, &shared).covariance();
+        let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
+        belief.set_shared_covariance(*kalman::predict(dynamics, &shared).covariance());
         Ok(())
     }
 
-    /// Hears a scalar sensor.
+    /// Takes in what was observed of a scalar sensor.
     ///
     /// # Errors
-    /// [`Error::Density`] if what was heard is impossible for every particle (the belief is then as it was); numbers out of
-    /// range.
-    pub fn update<R: Rng + ?Sized>(
-        &mut self,
+    /// [`fewbits_core::Error::Impossible`] if it is impossible for every particle. The belief is then as it was.
+    pub fn update<const D: usize, R: Rng + ?Sized, F: Clone + Into<Scalar>>(
+        &self,
         rng: &mut R,
-        sensor: &LinearSensor<D, 1>,
-        observed: &Scalar,
+        belief: &mut GaussianCloud<D>,
+        observed: &Observed<impl LinearSensing<D, 1>, F, 1>,
+        workspace: &mut CloudWorkspace<D>,
     ) -> Result<ParticleInfo, Error> {
-        let row = fewbits_core::LinearSensing::matrix(sensor).transpose();
-        let shared = Gaussian::from_trusted_parts(SVector::zeros(), self.covariance);
-        let (updated, info) = kalman::update(sensor, &shared, &SVector::zeros())?;
-        let (gain, deviation) = (info.gain.column(0).into_owned(), info.innovation_covariance[(0, 0)].sqrt());
-        let pieces = match observed {
-            Scalar::Value(value) => {
-                let value = value.value()[0];
-                let log_likelihood =
-                    self.reweigh(&row, |predicted| normal::log_pdf((value - predicted) / deviation) - deviation.ln())?;
-                self.absorb(&row, &gain, |_| value);
-                self.covariance = *updated.covariance();
-                return Ok(self.info(log_likelihood));
-            }
-            other => other.pieces(),
-        };
-        let log_likelihood = self.reweigh(&row, |predicted| log_sum(log_shares(&pieces, predicted, deviation)))?;
-        self.absorb(&row, &gain, |predicted| {
-            let (lower, upper) = choose(rng, &pieces, predicted, deviation);
-            // A piece of positive mass holds numbers: it is never refused.
-            normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation)
-                .map_or(predicted, |z| predicted + deviation * z)
-        });
-        self.covariance = *updated.covariance();
-        Ok(self.info(log_likelihood))
+        let imputation = Imputation::new(observed.factor.clone().into());
+        let next = workspace.next.get_or_insert_with(|| belief.clone());
+        next.clone_from(belief);
+        let log_weights = &mut workspace.log_weights;
+        log_weights.clear();
+        log_weights.resize(belief.means().len(), 0.0);
+        self.impute(rng, next, &observed.sensing, log_weights, |rng, innovation, predicted, _| {
+            let (z, log_weight) = imputation.draw(rng, predicted[0], innovation.lower()[(0, 0)]);
+            ([z].into(), log_weight)
+        })?;
+        let info = weigh(next.means_mut(), |_, logs| add(logs, log_weights))?;
+        std::mem::swap(belief, next);
+        Ok(info)
     }
 
-    fn info(&self, log_likelihood: f64) -> ParticleInfo {
-        ParticleInfo {
-            log_likelihood,
-            effective_sample_size: self.means.effective_sample_size(),
+    /// The core of an update, for any linear sensor and any law of what was observed: imputes a measurement to every particle,
+    /// conditions the cloud on it and adds the log importance weights to `log_weights`, one per particle, with which the
+    /// caller reweighs when all sensors are in.
+    ///
+    /// `draw(rng, innovation, predicted, side)` gets `N(0, S)`, a particle's `H m` and its side row, which it may change. It
+    /// returns a measurement `z` drawn from some law `q` and `ln (N(z; H m, S) p(observed | z) / q(z))`.
+    ///
+    /// # Errors
+    /// [`Error::SingularInnovation`]; the cloud is then as it was.
+    pub fn impute<const D: usize, const M: usize, R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        belief: &mut GaussianCloud<D>,
+        sensing: &impl LinearSensing<D, M>,
+        log_weights: &mut [f64],
+        mut draw: impl FnMut(&mut R, &FactoredGaussian<M>, &SVector<f64, M>, &mut [f64]) -> (SVector<f64, M>, f64),
+    ) -> Result<(), Error> {
+        let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
+        let (updated, info) = kalman::update(sensing, &shared, &SVector::zeros())?;
+        let innovation = Gaussian::from_trusted_parts(SVector::zeros(), info.innovation_covariance)
+            .factored()
+            .map_err(|_| Error::SingularInnovation)?;
+        let (matrix, width) = (sensing.matrix(), belief.means().side_width());
+        let (mut columns, side) = belief.means_mut().parts_mut();
+        for (i, log_weight) in log_weights.iter_mut().enumerate().take(count(&columns)) {
+            let mean = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
+            let predicted = matrix * mean;
+            let (z, increment) = draw(rng, &innovation, &predicted, &mut side[i * width..(i + 1) * width]);
+            *log_weight += increment;
+            set_state(&mut columns, i, &(mean + info.gain * (z - predicted)));
+        }
+        belief.set_shared_covariance(*updated.covariance());
+        Ok(())
+    }
+
+    /// One step: [`predict`](Self::predict), then [`update`](Self::update) with everything observed.
+    ///
+    /// # Errors
+    /// As the two.
+    pub fn step<const D: usize, R: Rng + ?Sized, F: Clone + Into<Scalar>>(
+        &self,
+        rng: &mut R,
+        dynamics: &impl LinearDynamics<D>,
+        belief: &GaussianCloud<D>,
+        observed: &Observed<impl LinearSensing<D, 1>, F, 1>,
+    ) -> Result<(GaussianCloud<D>, ParticleInfo), Error> {
+        let mut next = belief.clone();
+        let mut workspace = CloudWorkspace::default();
+        self.predict(rng, dynamics, &mut next, &mut workspace)?;
+        let info = self.update(rng, &mut next, observed, &mut workspace)?;
+        Ok((next, info))
+    }
+
+    /// The same in place.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step); the belief is then as it was before the step.
+    pub fn step_in_place<const D: usize, R: Rng + ?Sized, F: Clone + Into<Scalar>>(
+        &self,
+        rng: &mut R,
+        dynamics: &impl LinearDynamics<D>,
+        belief: &mut GaussianCloud<D>,
+        observed: &Observed<impl LinearSensing<D, 1>, F, 1>,
+        workspace: &mut CloudWorkspace<D>,
+    ) -> Result<ParticleInfo, Error> {
+        let mut before = workspace.before.take().unwrap_or_else(|| belief.clone());
+        before.clone_from(belief);
+        let info = self
+            .predict(rng, dynamics, belief, workspace)
+            .and_then(|()| self.update(rng, belief, observed, workspace));
+        if info.is_err() {
+            std::mem::swap(belief, &mut before);
+        }
+        workspace.before = Some(before);
+        info
+    }
+}
+
+/// How a scalar factor imputes.
+enum Imputation {
+    Value(f64),
+    /// `p(observed | z)`, piece by piece.
+    Pieces(Vec<(Cell, f64)>),
+}
+
+impl Imputation {
+    fn new(factor: Scalar) -> Self {
+        match factor {
+            Scalar::Value(value) => Self::Value(value.value()[0]),
+            other => Self::Pieces(other.pieces()),
         }
     }
 
-    fn reweigh(&mut self, row: &SVector<f64, D>, log_likelihood: impl Fn(f64) -> f64) -> Result<f64, Error> {
-        Ok(self.means.reweigh(|columns, log_weights| {
-            for (i, log_weight) in log_weights.iter_mut().enumerate() {
-                *log_weight += log_likelihood((0..D).map(|d| row[d] * columns[d][i]).sum());
-            }
-        })?)
-    }
-
-    /// Updates each mean with its own measurement, a function of the predicted one.
-    fn absorb(&mut self, row: &SVector<f64, D>, gain: &SVector<f64, D>, mut measurement: impl FnMut(f64) -> f64) {
-        let columns = self.means.columns_mut();
-        for i in 0..columns[0].len() {
-            let predicted: f64 = (0..D).map(|d| row[d] * columns[d][i]).sum();
-            let innovation = measurement(predicted) - predicted;
-            for d in 0..D {
-                columns[d][i] += gain[d] * innovation;
+    /// A measurement and the logarithm of the probability (density) of what was observed.
+    fn draw<R: Rng + ?Sized>(&self, rng: &mut R, predicted: f64, deviation: f64) -> (f64, f64) {
+        match self {
+            Self::Value(value) => (*value, normal::log_pdf((value - predicted) / deviation) - deviation.ln()),
+            Self::Pieces(pieces) => {
+                let total = log_sum(log_shares(pieces, predicted, deviation));
+                if total == f64::NEG_INFINITY {
+                    return (predicted, total);
+                }
+                let (lower, upper) = choose(rng, pieces, predicted, deviation, total);
+                // A piece of positive mass holds numbers: it is never refused.
+                normal::sample_truncated(rng, (lower - predicted) / deviation, (upper - predicted) / deviation)
+                    .map_or((predicted, total), |z| (predicted + deviation * z, total))
             }
         }
     }
@@ -153,11 +211,10 @@ impl<const D: usize> RaoBlackwellised<D> {
 
 /// `ln(share P(z in piece))` of each piece.
 #[inline]
-fn log_shares(pieces: &[Piece], predicted: f64, deviation: f64) -> impl Iterator<Item = f64> + Clone + '_ {
-    pieces.iter().map(move |(cell, share)| {
-        normal::log_interval((cell.lower() - predicted) / deviation, (cell.upper() - predicted) / deviation)
-            + share.ln()
-    })
+fn log_shares(pieces: &[(Cell, f64)], predicted: f64, deviation: f64) -> impl Iterator<Item = f64> + Clone + '_ {
+    pieces
+        .iter()
+        .map(move |(cell, share)| cell.log_probability(predicted, deviation) + share.ln())
 }
 
 /// `ln sum exp`.
@@ -172,28 +229,28 @@ fn log_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
 
 /// Ends of a piece drawn in proportion to its share; no uniform is spent where there is no choice.
 #[inline]
-fn choose<R: Rng + ?Sized>(rng: &mut R, pieces: &[Piece], predicted: f64, deviation: f64) -> (f64, f64) {
-    let ends = |i: usize| {
-        pieces
-            .get(i)
-            .map_or((f64::NEG_INFINITY, f64::INFINITY), |p| (p.0.lower(), p.0.upper()))
-    };
-    if pieces.len() == 1 {
-        return ends(0);
-    }
-    let terms = log_shares(pieces, predicted, deviation);
-    let total = log_sum(terms.clone());
-    let mut left = rng.random::<f64>();
+fn choose<R: Rng + ?Sized>(
+    rng: &mut R,
+    pieces: &[(Cell, f64)],
+    predicted: f64,
+    deviation: f64,
+    total: f64,
+) -> (f64, f64) {
     let mut chosen = 0;
-    for (i, term) in terms.enumerate() {
-        let share = (term - total).exp();
-        if share > 0.0 {
-            chosen = i;
-            if left < share {
-                break;
+    if pieces.len() > 1 {
+        let mut left = rng.random::<f64>();
+        for (i, term) in log_shares(pieces, predicted, deviation).enumerate() {
+            let share = (term - total).exp();
+            if share > 0.0 {
+                chosen = i;
+                if left < share {
+                    break;
+                }
+                left -= share;
             }
-            left -= share;
         }
     }
-    ends(chosen)
+    pieces
+        .get(chosen)
+        .map_or((f64::NEG_INFINITY, f64::INFINITY), |p| (p.0.lower(), p.0.upper()))
 }

@@ -3,11 +3,11 @@
 //! Both need nothing but the filtered beliefs and the dynamics, so they smooth the output of any filter that keeps Gaussian
 //! beliefs, whatever its messages were.
 
+use crate::linalg::solve_semidefinite;
 use crate::{Error, kalman};
 use fewbits_core::{Gaussian, LinearDynamics};
 use fewbits_numerics::error::at_least_one;
-use fewbits_numerics::linalg::semidefinite_factor;
-use nalgebra::{Cholesky, SMatrix};
+use nalgebra::SMatrix;
 use std::collections::VecDeque;
 
 /// One backward step: the belief at `n` given the future, from the filtered belief at `n` and the smoothed belief at `n + 1`.
@@ -35,26 +35,6 @@ pub fn smooth_step<const D: usize>(
         filtered.mean() + gain * (smoothed_next.mean() - predicted.mean()),
         keep * filtered.covariance() * keep.transpose() + gain * future * gain.transpose(),
     ))
-}
-
-/// Solves `S X = B` for a covariance `S`, in the sense of the pseudo-inverse if it is singular.
-fn solve_semidefinite<const D: usize>(
-    covariance: &SMatrix<f64, D, D>,
-    right: &SMatrix<f64, D, D>,
-) -> Result<SMatrix<f64, D, D>, Error> {
-    if let Some(factor) = Cholesky::new(*covariance) {
-        return Ok(factor.solve(right));
-    }
-    // S = L L' with r independent columns, so S^+ = L (L'L)^-2 L'; ones stand in for the columns beyond the rank.
-    let factor = semidefinite_factor("covariance", covariance)?;
-    let mut gram = factor.transpose() * factor;
-    for i in 0..D {
-        if gram[(i, i)] == 0.0 {
-            gram[(i, i)] = 1.0;
-        }
-    }
-    let gram = Cholesky::new(gram).ok_or(Error::SingularInnovation)?;
-    Ok(factor * gram.solve(&gram.solve(&(factor.transpose() * right))))
 }
 
 /// Smooths a whole record of filtered beliefs, oldest first.

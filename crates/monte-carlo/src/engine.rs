@@ -5,7 +5,10 @@
 //! one that fails can be run again alone.
 
 use crate::stream::Stream;
+#[cfg(feature = "rayon")]
 use rayon::prelude::*;
+use std::fmt::Display;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
 
@@ -21,19 +24,29 @@ pub struct Trial {
     pub stream: Stream,
 }
 
-/// Why a run has no result.
-#[derive(Debug, Clone, PartialEq, Error)]
+/// Why a run has no result. The failing trial of lowest index among those that ran is reported.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
-pub enum MonteCarloError<E> {
-    /// A trial failed. The failing trial of lowest index among those that ran is reported.
-    #[error("trial {index} failed ({source}); run it alone with `MonteCarlo::single({index}, ..)`")]
+pub enum MonteCarloError {
+    /// A trial failed.
+    #[error("trial {index} failed ({message}); run it alone with `MonteCarlo::single({index}, ..)`")]
     Trial {
         /// Number of the trial.
         index: u64,
         /// Its random stream.
         stream: Stream,
-        /// What went wrong.
-        source: E,
+        /// What went wrong, as the trial's error says it.
+        message: String,
+    },
+    /// A trial panicked; no other trial is affected.
+    #[error("trial {index} panicked ({message}); run it alone with `MonteCarlo::single({index}, ..)`")]
+    Panicked {
+        /// Number of the trial.
+        index: u64,
+        /// Its random stream.
+        stream: Stream,
+        /// The panic's message.
+        message: String,
     },
     /// The run was cancelled.
     #[error("cancelled")]
@@ -52,7 +65,7 @@ pub enum MonteCarloError<E> {
 ///     |total, chunk| total.merge(&chunk),
 /// )?;
 /// assert!(moments.estimate().z_score(0.5).abs() < 4.0);
-/// # Ok::<(), fewbits_monte_carlo::engine::MonteCarloError<std::convert::Infallible>>(())
+/// # Ok::<(), fewbits_monte_carlo::MonteCarloError>(())
 /// ```
 #[derive(Clone, Copy)]
 pub struct MonteCarlo<'a> {
@@ -102,32 +115,49 @@ impl<'a> MonteCarlo<'a> {
         }
     }
 
-    /// Runs one trial alone, exactly as the full run would.
+    /// Runs one trial alone, exactly as the full run would. Its error may be of any type that can be shown.
     ///
     /// # Errors
-    /// If the trial fails.
-    pub fn single<T, E>(&self, index: u64, trial: impl FnOnce(Trial) -> Result<T, E>) -> Result<T, MonteCarloError<E>> {
+    /// If the trial fails or panics.
+    pub fn single<T, E: Display>(
+        &self,
+        index: u64,
+        trial: impl FnOnce(Trial) -> Result<T, E>,
+    ) -> Result<T, MonteCarloError> {
         let it = self.trial(index);
-        trial(it).map_err(|source| MonteCarloError::Trial {
-            index,
-            stream: it.stream,
-            source,
-        })
+        let stream = it.stream;
+        match catch_unwind(AssertUnwindSafe(|| trial(it))) {
+            Ok(Ok(result)) => Ok(result),
+            Ok(Err(error)) => Err(MonteCarloError::Trial {
+                index,
+                stream,
+                message: error.to_string(),
+            }),
+            Err(panic) => {
+                let text = panic.downcast_ref::<String>().map(String::as_str);
+                let message = text.or_else(|| panic.downcast_ref::<&str>().copied());
+                Err(MonteCarloError::Panicked {
+                    index,
+                    stream,
+                    message: message.unwrap_or("no message").to_owned(),
+                })
+            }
+        }
     }
 
     /// Runs all trials and returns their results in trial order.
     ///
     /// # Errors
-    /// If a trial fails or the run is cancelled.
-    pub fn run<T: Send, E: Send>(
+    /// If a trial fails or panics, or the run is cancelled.
+    pub fn run<T: Send, E: Display>(
         &self,
         trial: impl Fn(Trial) -> Result<T, E> + Sync,
-    ) -> Result<Vec<T>, MonteCarloError<E>> {
+    ) -> Result<Vec<T>, MonteCarloError> {
         self.fold(
             Vec::new,
             |results, it| {
                 results.push(trial(it)?);
-                Ok(())
+                Ok::<_, E>(())
             },
             |all, mut chunk| all.append(&mut chunk),
         )
@@ -136,17 +166,18 @@ impl<'a> MonteCarlo<'a> {
     /// Folds all trials into one accumulator, in trial order within chunks and chunk order between them.
     ///
     /// # Errors
-    /// If a trial fails or the run is cancelled.
-    pub fn fold<A: Send, E: Send>(
+    /// If a trial fails or panics, or the run is cancelled.
+    pub fn fold<A: Send, E: Display>(
         &self,
         empty: impl Fn() -> A + Sync,
         trial: impl Fn(&mut A, Trial) -> Result<(), E> + Sync,
         merge: impl Fn(&mut A, A),
-    ) -> Result<A, MonteCarloError<E>> {
-        let chunks: Vec<Result<A, MonteCarloError<E>>> = (0..self.trials.div_ceil(CHUNK))
-            .into_par_iter()
-            .map(|chunk| self.fold_chunk(chunk, &empty, &trial))
-            .collect();
+    ) -> Result<A, MonteCarloError> {
+        let chunks = 0..self.trials.div_ceil(CHUNK);
+        #[cfg(feature = "rayon")]
+        let chunks = chunks.into_par_iter();
+        let chunks: Vec<Result<A, MonteCarloError>> =
+            chunks.map(|chunk| self.fold_chunk(chunk, &empty, &trial)).collect();
         let mut total = empty();
         for chunk in chunks {
             merge(&mut total, chunk?);
@@ -154,12 +185,12 @@ impl<'a> MonteCarlo<'a> {
         Ok(total)
     }
 
-    fn fold_chunk<A, E>(
+    fn fold_chunk<A, E: Display>(
         &self,
         chunk: u64,
         empty: impl Fn() -> A,
         trial: impl Fn(&mut A, Trial) -> Result<(), E>,
-    ) -> Result<A, MonteCarloError<E>> {
+    ) -> Result<A, MonteCarloError> {
         let mut accumulator = empty();
         let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.trials);
         let finished = indices.end - indices.start;

@@ -10,7 +10,7 @@
 //!     |total, part| total.merge(&part),
 //! )?;
 //! assert!(mean.estimate().z_score(0.5).abs() < 4.0);
-//! # Ok::<(), fewbits_monte_carlo::MonteCarloError<std::convert::Infallible>>(())
+//! # Ok::<(), fewbits_monte_carlo::MonteCarloError>(())
 //! ```
 
 pub mod engine;

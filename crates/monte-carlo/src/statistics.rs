@@ -1,6 +1,7 @@
 //! Summary statistics with standard errors.
 
 use fewbits_numerics::ArgumentError;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Running count, mean and variance (Welford's recursion; merging is Chan's).
@@ -12,7 +13,8 @@ use serde::{Deserialize, Serialize};
 /// assert!((m.variance() - 5.0 / 3.0).abs() < 1e-15);
 /// assert!((m.standard_error() - (5.0 / 12.0_f64).sqrt()).abs() < 1e-15);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Moments {
     count: u64,
     mean: f64,
@@ -99,7 +101,8 @@ impl FromIterator<f64> for Moments {
 }
 
 /// A Monte-Carlo estimate and its standard error.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Estimate {
     /// The estimate.
     pub value: f64,

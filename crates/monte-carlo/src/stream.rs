@@ -16,10 +16,12 @@
 //! ```
 
 use rand_pcg::{Pcg64Dxsm, Pcg64Mcg};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// A node in the tree of random streams.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Stream {
     key: [u64; 2],
 }

@@ -14,12 +14,18 @@ fn neighbour_graph(bencher: divan::Bencher<'_, '_>, nodes: usize) {
     let side = (nodes as f64).sqrt();
     let field = Deployment::uniform(&mut Pcg64Mcg::seed_from_u64(1), [0.0; 2], [side; 2], nodes);
     let Ok(field) = field else { return };
-    bencher.counter(ItemsCount::new(nodes)).bench_local(|| Graph::within(field.positions(), 2.0));
+    bencher
+        .counter(ItemsCount::new(nodes))
+        .bench_local(|| Graph::within(field.positions(), 2.0));
 }
 
 #[divan::bench(sample_count = 50)]
 fn standard_normal(bencher: divan::Bencher<'_, '_>) {
     use rand::RngExt;
     let mut rng = Pcg64Mcg::seed_from_u64(1);
-    bencher.counter(ItemsCount::new(1000_usize)).bench_local(|| (0..1000).map(|_| rng.sample::<f64, _>(rand_distr::StandardNormal)).sum::<f64>());
+    bencher.counter(ItemsCount::new(1000_usize)).bench_local(|| {
+        (0..1000)
+            .map(|_| rng.sample::<f64, _>(rand_distr::StandardNormal))
+            .sum::<f64>()
+    });
 }

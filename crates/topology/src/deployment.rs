@@ -36,7 +36,12 @@ impl Deployment {
     ///
     /// # Errors
     /// If `nodes` is zero or `upper` does not exceed `lower`.
-    pub fn uniform<R: Rng + ?Sized>(rng: &mut R, lower: [f64; 2], upper: [f64; 2], nodes: usize) -> Result<Self, Error> {
+    pub fn uniform<R: Rng + ?Sized>(
+        rng: &mut R,
+        lower: [f64; 2],
+        upper: [f64; 2],
+        nodes: usize,
+    ) -> Result<Self, Error> {
         rectangle(lower, upper)?;
         at_least_one("nodes", nodes)?;
         Self::given((0..nodes).map(|_| draw(rng, lower, upper)).collect())
@@ -51,10 +56,19 @@ impl Deployment {
         at_least_one("counts", counts[0])?;
         at_least_one("counts", counts[1])?;
         let at = |axis: usize, i: usize| {
-            let share = if counts[axis] == 1 { 0.5 } else { i as f64 / (counts[axis] - 1) as f64 };
+            let share = if counts[axis] == 1 {
+                0.5
+            } else {
+                i as f64 / (counts[axis] - 1) as f64
+            };
             lower[axis] + share * (upper[axis] - lower[axis])
         };
-        Self::given((0..counts[1]).flat_map(|j| (0..counts[0]).map(move |i| (i, j))).map(|(i, j)| Vector2::new(at(0, i), at(1, j))).collect())
+        Self::given(
+            (0..counts[1])
+                .flat_map(|j| (0..counts[0]).map(move |i| (i, j)))
+                .map(|(i, j)| Vector2::new(at(0, i), at(1, j)))
+                .collect(),
+        )
     }
 
     /// A grid of `counts` cells with one node uniformly in the middle part of each: `jitter` = 1 fills the cell, 0 is the grid
@@ -73,7 +87,10 @@ impl Deployment {
         at_least_one("counts", counts[0])?;
         at_least_one("counts", counts[1])?;
         within("jitter", jitter, 0.0, 1.0)?;
-        let step = [(upper[0] - lower[0]) / counts[0] as f64, (upper[1] - lower[1]) / counts[1] as f64];
+        let step = [
+            (upper[0] - lower[0]) / counts[0] as f64,
+            (upper[1] - lower[1]) / counts[1] as f64,
+        ];
         let mut positions = Vec::with_capacity(counts[0] * counts[1]);
         for j in 0..counts[1] {
             for i in 0..counts[0] {

@@ -83,7 +83,11 @@ impl Graph {
     /// If `node` does not exist.
     pub(crate) fn check(&self, node: usize) -> Result<(), Error> {
         let nodes = self.len();
-        if node < nodes { Ok(()) } else { Err(Error::NoSuchNode { node, nodes }) }
+        if node < nodes {
+            Ok(())
+        } else {
+            Err(Error::NoSuchNode { node, nodes })
+        }
     }
 }
 
@@ -135,7 +139,10 @@ impl Cells {
 
     fn of(&self, position: &Vector2<f64>) -> [usize; 2] {
         let scaled = (position - self.lower) / self.size;
-        [(scaled.x as usize).min(self.counts[0] - 1), (scaled.y as usize).min(self.counts[1] - 1)]
+        [
+            (scaled.x as usize).min(self.counts[0] - 1),
+            (scaled.y as usize).min(self.counts[1] - 1),
+        ]
     }
 
     fn index(&self, cell: [usize; 2]) -> usize {

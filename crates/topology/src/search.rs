@@ -23,7 +23,10 @@ impl Hops {
 
     /// Hops to `node`, or `None` where no route leads.
     pub fn distance(&self, node: usize) -> Option<usize> {
-        self.distances.get(node).filter(|d| **d != UNREACHED).map(|d| *d as usize)
+        self.distances
+            .get(node)
+            .filter(|d| **d != UNREACHED)
+            .map(|d| *d as usize)
     }
 
     /// The next node from `node` towards the root; `None` at the root and where no route leads.
@@ -99,8 +102,10 @@ impl Graph {
         for at in 0..hops.order.len() {
             let node = hops.order[at] as usize;
             let nearer = hops.distances[node].checked_sub(1);
-            if let Some(parent) =
-                self.neighbours(node).iter().find(|other| Some(hops.distances[**other as usize]) == nearer)
+            if let Some(parent) = self
+                .neighbours(node)
+                .iter()
+                .find(|other| Some(hops.distances[**other as usize]) == nearer)
             {
                 hops.parents[node] = *parent;
             }

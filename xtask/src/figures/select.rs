@@ -45,6 +45,17 @@ pub(super) fn figures(patterns: &[String]) -> Result<Vec<&'static dyn AnyFigure>
         .collect())
 }
 
+/// Every `n`-th figure, beginning with the `i`-th, of a shard `i/n`.
+pub(super) fn shard(figures: Vec<&'static dyn AnyFigure>, text: &str) -> Result<Vec<&'static dyn AnyFigure>, Error> {
+    let number = |text: &str| text.trim().parse::<usize>().ok();
+    let (i, n) = text
+        .split_once('/')
+        .and_then(|(i, n)| Some((number(i)?, number(n)?)))
+        .filter(|(i, n)| (1..=*n).contains(i))
+        .ok_or_else(|| Error::BadShard { text: text.to_owned() })?;
+    Ok(figures.into_iter().skip(i - 1).step_by(n).collect())
+}
+
 fn has(figure: &dyn AnyFigure, parameter: &str) -> bool {
     figure.parameters().iter().any(|own| own.name == parameter)
 }

@@ -1,80 +1,77 @@
 //! The table at the end.
 
-use super::Finished;
-use super::write::Directory;
-use fewbits_experiments::{Claim, Verdict};
+use super::record::Record;
+use fewbits_experiments::Verdict;
+use serde_json::json;
+use std::fmt::Write;
+use std::path::Path;
 use std::time::Duration;
 
-/// Prints what was made and where to look; whether everything held.
-pub(super) fn print(finished: &[Finished], out: &Directory, elapsed: Duration) -> bool {
-    let width = finished
-        .iter()
-        .map(|f| f.figure.about().id.len())
-        .max()
-        .unwrap_or(0)
-        .max(6);
-    println!(
-        "{:width$}  {:>6}  {:>6}  {:>6}  {:>7}  {:>8}",
+/// What was made and where to look, as text.
+pub(super) fn text(records: &[Record], folder: &Path, elapsed: Duration) -> String {
+    let width = records.iter().map(|r| r.id.len()).max().unwrap_or(0).max(6);
+    let mut page = format!(
+        "{:width$}  {:>6}  {:>6}  {:>6}  {:>7}  {:>8}\n",
         "figure", "rows", "pass", "fail", "skipped", "time/s"
     );
-    let (mut totals, mut broken) = ([0; 3], 0);
-    for Finished {
-        figure,
-        result,
-        elapsed,
-    } in finished
-    {
-        let id = figure.about().id;
-        match result {
-            Ok(outcome) => {
-                let counts = count(&outcome.claims);
-                for (total, count) in totals.iter_mut().zip(counts) {
-                    *total += count;
-                }
-                let [pass, fail, skipped] = counts;
-                let rows = outcome.tables.main.len();
-                let seconds = elapsed.as_secs_f64();
-                println!("{id:width$}  {rows:>6}  {pass:>6}  {fail:>6}  {skipped:>7}  {seconds:>8.2}");
-            }
-            Err(error) => {
-                broken += 1;
-                println!("{id:width$}  failed: {error}");
-            }
+    for r in records {
+        let counts = [Verdict::Pass, Verdict::Fail, Verdict::Skipped].map(|v| r.count(v));
+        let [pass, fail, skipped] = counts;
+        let _ = match &r.error {
+            Some(error) => writeln!(page, "{:width$}  failed: {error}", r.id),
+            None => writeln!(
+                page,
+                "{:width$}  {:>6}  {pass:>6}  {fail:>6}  {skipped:>7}  {:>8.2}",
+                r.id, r.rows, r.wall_time_s
+            ),
+        };
+    }
+    for r in records {
+        for c in r.claims.iter().filter(|c| c.verdict == Verdict::Fail) {
+            let (measured, expected) = (c.measured(), c.expectation());
+            let _ =
+                writeln!(page, "FAIL {} {}: {} (measured {measured}, expected {expected})", r.id, c.id, c.statement);
         }
     }
-    for Finished { figure, result, .. } in finished {
-        let Ok(outcome) = result else { continue };
-        for claim in outcome.claims.iter().filter(|claim| claim.verdict == Verdict::Fail) {
-            let tolerance = claim.tolerance.map_or(String::new(), |t| format!(" +- {t}"));
-            println!(
-                "FAIL {} {}: {} (measured {}, expected {}{tolerance})",
-                figure.about().id,
-                claim.id,
-                claim.statement,
-                claim.value,
-                claim.expected
-            );
-        }
-    }
-    let [pass, fail, skipped] = totals;
-    println!(
-        "\n{} figures in {:.1} s: {pass} claims hold, {fail} fail, {skipped} skipped{}.",
-        finished.len(),
+    let total = |verdict| records.iter().map(|r| r.count(verdict)).sum::<usize>();
+    let broken = records.iter().filter(|r| r.error.is_some()).count();
+    let broken = if broken > 0 {
+        format!("; {broken} figures could not be made")
+    } else {
+        String::new()
+    };
+    let _ = writeln!(
+        page,
+        "\n{} figures in {:.1} s: {} claims hold, {} fail, {} skipped{broken}.",
+        records.len(),
         elapsed.as_secs_f64(),
-        if broken > 0 {
-            format!("; {broken} figures could not be made")
-        } else {
-            String::new()
-        }
+        total(Verdict::Pass),
+        total(Verdict::Fail),
+        total(Verdict::Skipped),
     );
-    println!(
+    let _ = writeln!(
+        page,
         "CSV, JSON and SVG are in {}; open {} to look at them.",
-        out.path().display(),
-        out.path().join("index.html").display()
+        folder.display(),
+        folder.join("index.html").display()
     );
-    fail == 0 && broken == 0
+    page
 }
 
-fn count(claims: &[Claim]) -> [usize; 3] {
-    [Verdict::Pass, Verdict::Fail, Verdict::Skipped].map(|v| claims.iter().filter(|c| c.verdict == v).count())
+/// The same for programs.
+pub(super) fn json(records: &[Record], folder: &Path, elapsed: Duration) -> String {
+    let figure = |r: &Record| {
+        let failing: Vec<_> = r.claims.iter().filter(|c| c.verdict == Verdict::Fail).collect();
+        json!({
+            "id": r.id, "rows": r.rows, "pass": r.count(Verdict::Pass), "fail": r.count(Verdict::Fail),
+            "skipped": r.count(Verdict::Skipped), "wall_time_s": r.wall_time_s, "error": r.error, "failing": failing,
+        })
+    };
+    let figures: Vec<_> = records.iter().map(figure).collect();
+    let good = records.iter().all(Record::good);
+    let folder = folder.display().to_string();
+    format!(
+        "{:#}\n",
+        json!({ "good": good, "out": folder, "wall_time_s": elapsed.as_secs_f64(), "figures": figures })
+    )
 }

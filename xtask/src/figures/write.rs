@@ -1,10 +1,10 @@
 //! Files: each is written under a temporary name and then renamed, so that none is ever half-written.
 
-use super::{Error, Options, draw};
-use fewbits_experiments::{About, Outcome, Table};
+use super::record::Record;
+use super::{Error, draw};
+use fewbits_experiments::{Outcome, Table};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// The output directory.
 pub(super) struct Directory {
@@ -42,58 +42,64 @@ impl Directory {
                 Error::Write { path, source }
             })
     }
+
+    /// Removes what an earlier run left of a figure.
+    fn clear(&self, id: &str) {
+        let Ok(earlier) = Record::read_one(&self.path, id) else {
+            return;
+        };
+        for name in earlier.files.iter().chain([&format!("{id}.json")]) {
+            // A file that is gone already is as good.
+            let _ = std::fs::remove_file(self.path.join(name));
+        }
+    }
 }
 
-/// Writes all files of one figure.
+/// Writes the files of one figure, its record last: there is no CSV without its JSON. The record as it was written.
 pub(super) fn figure(
     out: &Directory,
-    about: About,
-    outcome: &Outcome,
-    elapsed: Duration,
-    options: &Options,
-) -> Result<(), Error> {
-    let id = about.id;
-    let tables = std::iter::once((format!("{id}.csv"), &outcome.tables.main))
-        .chain(
-            outcome
-                .tables
-                .further
-                .iter()
-                .map(|(name, table)| (format!("{id}-{name}.csv"), table)),
-        )
-        .collect::<Vec<_>>();
-    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
-    for (name, table) in &tables {
+    mut record: Record,
+    outcome: Option<&Outcome>,
+    plots: bool,
+) -> Result<Record, Error> {
+    out.clear(&record.id);
+    let done = outcome
+        .map_or(Ok(()), |outcome| tables_and_plot(out, &mut record, outcome, plots))
+        .and_then(|()| {
+            let document = json!(record);
+            out.write(&format!("{}.json", record.id), format!("{document:#}\n").as_bytes())
+        });
+    if done.is_err() {
+        for name in &record.files {
+            let _ = std::fs::remove_file(out.path().join(name));
+        }
+    }
+    done.map(|()| record)
+}
+
+fn tables_and_plot(out: &Directory, record: &mut Record, outcome: &Outcome, plots: bool) -> Result<(), Error> {
+    let id = record.id.clone();
+    let main = (format!("{id}.csv"), &outcome.tables.main);
+    let further = outcome
+        .tables
+        .further
+        .iter()
+        .map(|(name, table)| (format!("{id}-{name}.csv"), table));
+    for (name, table) in std::iter::once(main).chain(further) {
         let csv = to_csv(table).map_err(|error| Error::Write {
-            path: out.path().join(name),
+            path: out.path().join(&name),
             source: std::io::Error::other(error),
         })?;
-        files.push((name.clone(), csv));
+        record.columns.insert(name.clone(), json!(table.columns()));
+        record.files.push(name.clone());
+        out.write(&name, &csv)?;
     }
-    if !options.no_plots {
-        files.push((format!("{id}.svg"), draw::to_svg(id, &outcome.plot)?.into_bytes()));
+    if plots {
+        let name = format!("{id}.svg");
+        record.files.push(name.clone());
+        out.write(&name, draw::to_svg(&id, &outcome.plot)?.as_bytes())?;
     }
-    let columns: serde_json::Map<_, _> = tables
-        .iter()
-        .map(|(name, table)| (name.clone(), json!(table.columns())))
-        .collect();
-    let document = json!({
-        "id": id,
-        "title": about.title,
-        "caption": about.caption,
-        "source": about.source,
-        "parameters": outcome.parameters,
-        "seed": options.seed,
-        "trials": outcome.parameters.get("trials"),
-        "quick": options.quick,
-        "version": env!("CARGO_PKG_VERSION"),
-        "wall_time_s": elapsed.as_secs_f64(),
-        "files": files.iter().map(|(name, _)| name).collect::<Vec<_>>(),
-        "columns": columns,
-        "claims": outcome.claims,
-    });
-    files.push((format!("{id}.json"), format!("{document:#}\n").into_bytes()));
-    files.iter().try_for_each(|(name, content)| out.write(name, content))
+    Ok(())
 }
 
 fn to_csv(table: &Table) -> Result<Vec<u8>, csv::Error> {

@@ -1,17 +1,16 @@
 //! Every entry of the reference values, computed by an independent program.
 
-use fewbits_cfwmd::assumed_density::ScalarSilence;
+use crate::Silence;
 use fewbits_cfwmd::ellipsoid::Ellipsoid;
 use fewbits_cfwmd::information::{Direction, divergence};
 use fewbits_cfwmd::rule::{OwnRecursion, OwnStep, cross_covariance_step};
-use fewbits_cfwmd::silence::SilentFactor;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_cfwmd::trigger::StochasticTrigger;
-use fewbits_core::Gaussian;
+use fewbits_core::{Factor, Gaussian};
 use fewbits_filters::kalman;
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d};
 use fewbits_numerics::normal;
-use nalgebra::{Matrix2, SVector, Vector2};
+use nalgebra::{Matrix2, SVector, Vector1, Vector2};
 use serde_json::Value;
 
 /// Monte-Carlo entries are met by the figures of the experiments crate, claim by claim, at the papers' trial counts.
@@ -111,9 +110,15 @@ fn compute(name: &str, inputs: &Value) -> Option<Vec<f64>> {
             out
         }
         "logcens" => vec![
-            SilentFactor::new(number("c"), number("r"), 0.0)
-                .unwrap()
-                .log_probability(number("mu")),
+            Silence {
+                centre: 0.0,
+                half_width: number("c"),
+                noise_variance: number("r"),
+                loss: 0.0,
+                count: 1,
+            }
+            .factor()
+            .log_likelihood(&Vector1::new(number("mu"))),
         ],
         "trunc" => {
             let (mu, sd) = (number("mu"), number("v").sqrt());
@@ -168,7 +173,7 @@ fn compute(name: &str, inputs: &Value) -> Option<Vec<f64>> {
             vec![sensor.amplitude_at(number("x"), number("y")), slope[0], slope[1]]
         }
         "censpost" => {
-            let silence = ScalarSilence {
+            let silence = Silence {
                 centre: number("yhat"),
                 half_width: number("c"),
                 noise_variance: number("r"),
@@ -176,7 +181,7 @@ fn compute(name: &str, inputs: &Value) -> Option<Vec<f64>> {
                 count: inputs["n_mis"].as_u64().unwrap() as usize,
             };
             let after = silence.moments(number("m"), number("p")).unwrap();
-            vec![after.mean, after.variance]
+            vec![after.mean[0], after.covariance[0]]
         }
         "hanY" => vec![
             StochasticTrigger::for_rate(number("rate"), number("s"))

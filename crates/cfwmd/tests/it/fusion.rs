@@ -1,47 +1,41 @@
 //! Fusion with feedback: the Gaussian, the particle and the Rao-Blackwellised centre against each other and exact limits.
 
 use fewbits_cfwmd::Error;
-use fewbits_cfwmd::network::Network;
-use fewbits_cfwmd::particle::{HeardScalars, HeardVectors};
+use fewbits_cfwmd::network::{Network, gather};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::likelihood::{Heard, ScalarLikelihood};
-use fewbits_core::message::Cell;
-use fewbits_core::{Gaussian, Likelihood, Observation};
-use fewbits_densities::Particles;
-use fewbits_filters::{ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
+use fewbits_core::factor::{Constant, InCell, Scalar, Value};
+use fewbits_core::{Belief, Cell, Dynamics, Factor, Gaussian, Likelihood, Link, Observation, Observed, Sensing};
+use fewbits_densities::{GaussianCloud, Particles};
+use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix2, Matrix4, SVector, Vector1, Vector2, Vector4};
+
+type Sensors<const M: usize> = Network<LinearSensor<2, M>, 2, M>;
 
 fn prior() -> Gaussian<2> {
     Gaussian::new(Vector2::new(1.0, 10.0), Matrix2::new(3.0, 1.0, 1.0, 2.0)).unwrap()
 }
 
-fn scalar_network(loss: f64, count: usize) -> Network<2, 1> {
+fn scalar_network(loss: f64, count: usize) -> Sensors<1> {
     let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
     let eta = Budget::new(1.0, count).unwrap().threshold(1).unwrap();
-    Network::new(vec![sensor; count], eta, loss).unwrap()
+    Network::new(vec![sensor; count], eta, Link::lossy(loss).unwrap()).unwrap()
 }
 
-fn vector_network(loss: f64) -> Network<2, 2> {
+fn vector_network(loss: f64) -> Sensors<2> {
     let sensor = LinearSensor::new(Matrix2::identity(), Matrix2::new(2.0, 0.0, 0.0, 4.0)).unwrap();
-    Network::new(vec![sensor; 2], Budget::new(1.0, 2).unwrap().threshold(2).unwrap(), loss).unwrap()
-}
-
-fn rules<const M: usize>(network: &Network<2, M>, belief: &Gaussian<2>) -> Vec<CensoringRule<M>> {
-    (0..network.len())
-        .map(|i| network.rule_under(i, belief.covariance()).unwrap())
-        .collect()
+    Network::new(vec![sensor; 2], Budget::new(1.0, 2).unwrap().threshold(2).unwrap(), Link::lossy(loss).unwrap()).unwrap()
 }
 
 /// Exact posterior moments by weighting a huge fixed cloud: the law of large numbers as the referee.
 fn referee(belief: &Gaussian<2>, likelihood: &impl Likelihood<2>) -> (Particles<2>, f64) {
     let mut rng = Stream::new(77).fast_rng();
-    let mut cloud = Particles::from_draws(200_000, || belief.sample(&mut rng).unwrap()).unwrap();
+    let mut cloud = Particles::from_draws(200_000, || belief.sample(&mut rng)).unwrap();
     let log_likelihood = ParticleFilter::default()
-        .update(likelihood, &mut cloud)
+        .update(&mut cloud, likelihood)
         .unwrap()
         .log_likelihood;
     (cloud, log_likelihood)
@@ -61,31 +55,28 @@ fn one_gaussian_update_has_the_exact_moments() {
     let belief = prior();
     let broadcast = belief.mean() + Vector2::new(0.4, -0.2);
     for loss in [0.0, 0.3] {
-        // All silent sensors of a scalar network are heard exactly, together.
+        // All silent sensors of a scalar network are observations exactly, together.
         let network = scalar_network(loss, 4);
-        let rules = rules(&network, &belief);
-        let heard = [
-            Observation::Silent,
+        let rules = network.rules_under(&belief).unwrap();
+        let observations = [
+            Observation::Nothing,
             Observation::Received(Vector1::new(6.0)),
-            Observation::Silent,
-            Observation::Lost,
+            Observation::Nothing,
+            Observation::Erased,
         ];
-        let (ours, info) = network.fuse(&belief, &rules, &broadcast, &heard).unwrap();
-        let mut likelihood = HeardScalars::new();
-        network
-            .hear(&rules, &broadcast, &heard, 200_000, &mut likelihood)
-            .unwrap();
+        let (ours, info) = network.fuse(&belief, &rules, &broadcast, &observations).unwrap();
+        let likelihood = network.likelihood(&rules, &broadcast, &observations).unwrap();
         let (cloud, evidence) = referee(&belief, &likelihood);
         assert_close(&ours, info.log_likelihood, &cloud, evidence);
         assert_eq!(info.received, 1);
 
         // One silent vector sensor is exact; a second one meets a belief that is no longer quite Gaussian.
         let network = vector_network(loss);
-        let rules = self::rules(&network, &belief);
-        for other in [Observation::Lost, Observation::Received(Vector2::new(5.0, 12.0))] {
-            let heard = [Observation::Silent, other];
-            let (ours, info) = network.fuse(&belief, &rules, &broadcast, &heard).unwrap();
-            let likelihood = HeardVectors::new(&network, &rules, &broadcast, &heard).unwrap();
+        let rules = network.rules_under(&belief).unwrap();
+        for other in [Observation::Erased, Observation::Received(Vector2::new(5.0, 12.0))] {
+            let observations = [Observation::Nothing, other];
+            let (ours, info) = network.fuse(&belief, &rules, &broadcast, &observations).unwrap();
+            let likelihood = network.likelihood(&rules, &broadcast, &observations).unwrap();
             let (cloud, evidence) = referee(&belief, &likelihood);
             assert_close(&ours, info.log_likelihood, &cloud, evidence);
         }
@@ -96,28 +87,25 @@ fn one_gaussian_update_has_the_exact_moments() {
 fn the_joint_likelihood_is_the_product_of_the_single_ones() {
     let belief = prior();
     let network = scalar_network(0.1, 5);
-    let rules = rules(&network, &belief);
-    let heard = [
-        Observation::Silent,
+    let rules = network.rules_under(&belief).unwrap();
+    let observations = [
+        Observation::Nothing,
         Observation::Received(Vector1::new(-3.0)),
-        Observation::Silent,
+        Observation::Nothing,
         Observation::Received(Vector1::new(6.5)),
-        Observation::Lost,
+        Observation::Erased,
     ];
-    let mut likelihood = HeardScalars::new();
-    network
-        .hear(&rules, belief.mean(), &heard, 1000, &mut likelihood)
-        .unwrap();
+    let likelihood = network.likelihood(&rules, belief.mean(), &observations).unwrap();
     let c = rules[0].half_width();
     let cell = Cell::new(1.0 - c, 1.0 + c).unwrap();
-    let single: Vec<_> = heard
+    let link = Link::lossy(0.1).unwrap();
+    let single: Vec<(Scalar, f64)> = observations
         .iter()
         .map(|o| match o {
-            Observation::Received(z) => Heard::Value(z[0]),
-            Observation::Silent => Heard::Silence { cell, loss: 0.1 },
-            Observation::Lost => Heard::Lost,
+            Observation::Received(z) => (Value::scalar(z[0], 1.0).unwrap().into(), 0.9_f64.ln()),
+            Observation::Nothing => (InCell::silence(cell, 1.0, &link).unwrap().into(), 0.0),
+            Observation::Erased => (Constant::ONE.into(), 0.0),
         })
-        .map(|h| ScalarLikelihood::new(Vector2::new(1.0, 0.0), 1.0, h).unwrap())
         .collect();
     let x: Vec<f64> = (0..1000).map(|i| i as f64 * 0.02 - 9.0).collect();
     let v = vec![3.0; 1000];
@@ -125,24 +113,26 @@ fn the_joint_likelihood_is_the_product_of_the_single_ones() {
     likelihood.add_log_likelihoods([&x, &v], &mut ours);
     for (i, ours) in ours.iter().enumerate() {
         let state = Vector2::new(x[i], 3.0);
-        let product: f64 = single.iter().map(|s| s.log_likelihood(&state)).sum();
+        let m = Vector1::new(x[i]);
+        let product: f64 = single.iter().map(|(s, scale)| s.log_likelihood(&m) + scale).sum();
         assert!((ours - product).abs() < 1e-8 * product.abs().max(1.0), "{}: {ours} {product}", x[i]);
         assert!((likelihood.log_likelihood(&state) - product).abs() < 1e-9 * product.abs().max(1.0));
     }
 }
 
 #[test]
-fn a_cloud_hears_power_sensors_as_single_states_do() {
-    let mut likelihood = HeardScalars::new();
+fn a_cloud_is_weighed_as_single_states_are() {
     let sensor = |x, y| ReceivedPower::<4>::new(Vector2::new(x, y), [0, 2], 1000.0, 1.0, 2.0, 1.0).unwrap();
-    likelihood
-        .values(&sensor(-10.0, -10.0), [9.0, 9.4].into_iter())
-        .unwrap();
-    likelihood.silence(&sensor(0.0, 0.0), 3.0, 0.8, 0.0, 1, 600).unwrap();
-    likelihood.silence(&sensor(10.0, 0.0), 1.0, 2.5, 0.2, 2, 600).unwrap();
+    let sensors = vec![sensor(-10.0, -10.0), sensor(0.0, 0.0), sensor(10.0, 0.0), sensor(0.0, 0.0)];
+    let network = Network::new(sensors, 0.8, Link::lossy(0.2).unwrap()).unwrap();
     let mut rng = Stream::new(3).fast_rng();
     let belief = Gaussian::new(Vector4::new(-8.0, 2.0, -8.0, 2.0), Matrix4::identity() * 4.0).unwrap();
-    let cloud = Particles::from_draws(600, || belief.sample(&mut rng).unwrap()).unwrap();
+    let rules = network.rules_under(&belief).unwrap();
+    let mut observations = [Observation::Nothing; 4];
+    observations[0] = Observation::Received(Vector1::new(25.0));
+    let likelihood = network.likelihood(&rules, belief.mean(), &observations).unwrap();
+    assert_eq!(likelihood.len(), 3);
+    let cloud = Particles::from_draws(600, || belief.sample(&mut rng)).unwrap();
     let mut ours = vec![0.0; 600];
     likelihood.add_log_likelihoods(cloud.columns(), &mut ours);
     for (i, ours) in ours.iter().enumerate() {
@@ -164,44 +154,35 @@ fn the_three_centres_agree_over_a_run() {
     let mut gaussian = start;
     let mut rng = Stream::new(10).fast_rng();
     let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5));
-    let (mut workspace, mut likelihood) = (Workspace::default(), HeardScalars::new());
+    let mut workspace = Workspace::default();
     let mut cloud = Particles::from_draws(30_000, || *start.mean()).unwrap();
-    let mut rao = RaoBlackwellised::new(&start, 3_000).unwrap();
+    let (mixture, mut clouds) = (RaoBlackwellised::new(filter), CloudWorkspace::default());
+    let mut rao = GaussianCloud::agreed(&start, 3_000).unwrap();
     let (mut squares, mut lowest) = ([0.0; 2], f64::INFINITY);
     for _ in 0..20 {
-        truth = fewbits_core::Dynamics::propagate(&dynamics, &mut truth_rng, &truth);
+        truth = dynamics.propagate(&mut truth_rng, &truth);
         let step = recursion.advance(&dynamics, &sensor, start.mean()).unwrap();
         let rules = vec![CensoringRule::new(&step.innovation_covariance, network.threshold()).unwrap(); 2];
         let predicted = kalman::predict(&dynamics, &gaussian);
         let broadcast = *predicted.mean();
-        let heard: Vec<_> = (0..2)
-            .map(|_| fewbits_core::Sensing::sample(&sensor, &mut truth_rng, &truth))
-            .map(|z| {
-                if rules[0].speaks(&(z - sensor.matrix() * broadcast)) {
-                    Observation::Received(z)
-                } else {
-                    Observation::Silent
-                }
-            })
-            .collect();
-        gaussian = network.fuse(&predicted, &rules, &broadcast, &heard).unwrap().0;
+        let measurements: Vec<_> = (0..2).map(|_| sensor.sample(&mut truth_rng, &truth)).collect();
+        let (observations, _) = network.transmit(&mut rng, &rules, &broadcast, &measurements).unwrap();
+        gaussian = network.fuse(&predicted, &rules, &broadcast, &observations).unwrap().0;
 
-        network
-            .hear(&rules, &broadcast, &heard, cloud.len(), &mut likelihood)
-            .unwrap();
+        let likelihood = network.likelihood(&rules, &broadcast, &observations).unwrap();
         filter
-            .step_in_place(&mut rng, &dynamics, &likelihood, &mut cloud, &mut workspace)
+            .step_in_place(&mut rng, &dynamics, &mut cloud, &likelihood, &mut workspace)
             .unwrap();
 
-        rao.predict(&mut rng, &filter, &dynamics, &mut workspace).unwrap();
+        mixture.predict(&mut rng, &dynamics, &mut rao, &mut clouds).unwrap();
         let c = rules[0].half_width();
         let cell = Cell::new(broadcast[0] - c, broadcast[0] + c).unwrap();
-        for observation in &heard {
-            let what = match observation {
-                Observation::Received(z) => Heard::Value(z[0]),
-                _ => Heard::Silence { cell, loss: 0.0 },
+        for observation in &observations {
+            let what: Scalar = match observation {
+                Observation::Received(z) => Value::scalar(z[0], 1.0).unwrap().into(),
+                _ => InCell::certain(cell, 1.0).unwrap().into(),
             };
-            rao.update(&mut rng, &sensor, &what).unwrap();
+            mixture.update(&mut rng, &mut rao, &Observed::new(sensor, what), &mut clouds).unwrap();
         }
         let exact = rao.gaussian();
         let scale = exact.standard_deviations();
@@ -222,20 +203,21 @@ fn the_three_centres_agree_over_a_run() {
 fn all_send_is_the_kalman_filter() {
     let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
     let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
-    let network = Network::new(vec![sensor; 2], Budget::new(2.0, 2).unwrap().threshold(1).unwrap(), 0.0).unwrap();
+    let network = Network::new(vec![sensor; 2], Budget::new(2.0, 2).unwrap().threshold(1).unwrap(), Link::PERFECT).unwrap();
     let mut ours = Gaussian::known(Vector2::new(0.0, 10.0)).unwrap();
     let mut exact = ours;
     for k in 0..20 {
         let z = [10.0 * k as f64, 10.5 * k as f64];
         let predicted = kalman::predict(&dynamics, &ours);
-        let rules = rules(&network, &predicted);
-        let heard = z.map(|z| Observation::Received(Vector1::new(z)));
-        ours = network.fuse(&predicted, &rules, predicted.mean(), &heard).unwrap().0;
+        let rules = network.rules_under(&predicted).unwrap();
+        let observations = z.map(|z| Observation::Received(Vector1::new(z)));
+        ours = network.fuse(&predicted, &rules, predicted.mean(), &observations).unwrap().0;
         exact = kalman::predict(&dynamics, &exact);
         for z in z {
             exact = kalman::update(&sensor, &exact, &Vector1::new(z)).unwrap().0;
         }
-        assert_eq!(ours, exact);
+        assert!((ours.mean() - exact.mean()).amax() < 1e-13 * exact.mean().amax().max(1.0));
+        assert!((ours.covariance() - exact.covariance()).amax() < 1e-13);
     }
     assert!((ours.standard_deviations()[0] - 0.669_070_886_207).abs() < 1e-11);
 }
@@ -246,7 +228,7 @@ fn silence_makes_the_belief_sharper_and_moves_it_to_the_prediction() {
     let belief = prior();
     let broadcast = belief.mean() - Vector2::new(2.0, 0.0);
     let (after, _) = network
-        .fuse(&belief, &rules(&network, &belief), &broadcast, &[Observation::Silent; 4])
+        .fuse(&belief, &network.rules_under(&belief).unwrap(), &broadcast, &[Observation::Nothing; 4])
         .unwrap();
     assert!(after.covariance()[(0, 0)] < belief.covariance()[(0, 0)]);
     assert!(after.mean()[0] < belief.mean()[0] && after.mean()[0] > broadcast[0]);
@@ -256,30 +238,30 @@ fn silence_makes_the_belief_sharper_and_moves_it_to_the_prediction() {
 fn bad_steps_are_typed_errors_and_leave_the_belief() {
     let network = scalar_network(0.0, 2);
     let belief = prior();
-    let rules = rules(&network, &belief);
-    let fuse = |heard: &[Observation<SVector<f64, 1>>]| network.fuse(&belief, &rules, belief.mean(), heard);
+    let rules = network.rules_under(&belief).unwrap();
+    let fuse = |observations: &[Observation<SVector<f64, 1>>]| network.fuse(&belief, &rules, belief.mean(), observations);
     let value = |z: f64| Observation::Received(Vector1::new(z));
-    assert_eq!(fuse(&[Observation::Silent]).unwrap_err(), Error::ObservationCount { heard: 1, sensors: 2 });
+    assert_eq!(fuse(&[Observation::Nothing]).unwrap_err(), Error::ObservationCount { observations: 1, sensors: 2 });
     assert!(matches!(fuse(&[value(1.1), value(9.0)]).unwrap_err(), Error::ProtocolViolation { sensor: 0, .. }));
-    assert!(matches!(fuse(&[value(9.0), value(f64::NAN)]).unwrap_err(), Error::Argument(_)));
-    assert!(fuse(&[Observation::Silent, Observation::Silent]).is_ok());
-    assert!(fuse(&[Observation::Lost, Observation::Lost]).unwrap().0 == belief);
+    assert!(matches!(fuse(&[value(9.0), value(f64::NAN)]).unwrap_err(), Error::Core(_)));
+    assert!(fuse(&[Observation::Nothing, Observation::Nothing]).is_ok());
+    assert!(fuse(&[Observation::Erased, Observation::Erased]).unwrap().0 == belief);
 
-    let always = Network::new(network.sensors().to_vec(), 0.0, 0.0).unwrap();
-    let rules = self::rules(&always, &belief);
-    let silent = always.fuse(&belief, &rules, belief.mean(), &[value(1.0), Observation::Silent]);
-    assert_eq!(silent.unwrap_err(), Error::ImpossibleSilence { sensor: 1 });
+    let always = Network::new(network.sensors().to_vec(), 0.0, Link::PERFECT).unwrap();
+    let rules = always.rules_under(&belief).unwrap();
+    let silent = always.fuse(&belief, &rules, belief.mean(), &[value(1.0), Observation::Nothing]);
+    assert_eq!(silent.unwrap_err(), Error::IMPOSSIBLE);
     assert!(
         always
             .fuse(&belief, &rules[..1], belief.mean(), &[value(1.0), value(2.0)])
             .is_err()
     );
 
-    assert!(Network::<2, 1>::new(vec![], 1.0, 0.0).is_err());
-    for (eta, loss) in [(-1.0, 0.0), (f64::NAN, 0.0), (1.0, 1.0), (1.0, -0.1), (1.0, f64::NAN)] {
-        assert!(Network::new(network.sensors().to_vec(), eta, loss).is_err());
+    assert!(Sensors::<1>::new(vec![], 1.0, Link::PERFECT).is_err());
+    for eta in [-1.0, f64::NAN, f64::INFINITY] {
+        assert!(Network::new(network.sensors().to_vec(), eta, Link::PERFECT).is_err());
     }
-    assert!(network.rule_under(2, belief.covariance()).is_err());
+    assert!(network.rule_under(2, &belief).is_err());
     assert!(CensoringRule::scalar(0.0, 1.0).is_err() && CensoringRule::scalar(1.0, -1.0).is_err());
 }
 
@@ -316,11 +298,38 @@ fn the_rate_is_met_without_feedback_of_any_kind() {
     let mut rng = Stream::new(6).fast_rng();
     let rate: Moments = (0..20_000)
         .map(|_| {
-            let truth = start.sample(&mut rng).unwrap();
-            let state = fewbits_core::Dynamics::propagate(&dynamics, &mut rng, &truth);
-            let z = fewbits_core::Sensing::sample(&sensor, &mut rng, &state);
-            f64::from(u8::from(rule.speaks(&z)))
+            let truth = start.sample(&mut rng);
+            let state = dynamics.propagate(&mut rng, &truth);
+            let z = sensor.sample(&mut rng, &state);
+            f64::from(u8::from(rule.sends(&z)))
         })
         .collect();
     assert!(rate.estimate().z_score(0.3).abs() < 4.0, "{:?}", rate.estimate());
+}
+
+#[test]
+fn a_step_is_gathered_by_sensor() {
+    let value = Vector1::new(2.0);
+    let nothing = Observation::Nothing;
+    assert_eq!(gather(3, [(2, value)]).unwrap(), [nothing, nothing, Observation::Received(value)]);
+    assert_eq!(gather::<1>(2, []).unwrap(), [nothing; 2]);
+    assert_eq!(gather(2, [(2, value)]), Err(Error::UnknownSensor { sensor: 2, sensors: 2 }));
+    assert_eq!(gather(2, [(1, value), (1, value)]), Err(Error::ReportedTwice { sensor: 1 }));
+    assert!(gather(1, [(0, Vector1::new(f64::INFINITY))]).is_err());
+}
+
+/// A known start and rank-one process noise: the measured components of the first step are one number.
+#[test]
+fn a_singular_vector_prediction_is_updated_in_the_direction_it_has() {
+    let dynamics = constant_velocity_1d(1.0, 1.0).unwrap();
+    let network = vector_network(0.0);
+    let predicted = kalman::predict(&dynamics, &Gaussian::known(Vector2::new(0.0, 10.0)).unwrap());
+    let rules = network.rules_under(&predicted).unwrap();
+    let nothing = [Observation::Nothing, Observation::Erased];
+    let (ours, info) = network.fuse(&predicted, &rules, predicted.mean(), &nothing).unwrap();
+    // The same with a prior that is barely regular.
+    let regular = Gaussian::new(*predicted.mean(), predicted.covariance() + Matrix2::identity() * 1e-9).unwrap();
+    let (near, other) = network.fuse(&regular, &rules, predicted.mean(), &nothing).unwrap();
+    assert!((ours.covariance() - near.covariance()).amax() < 1e-7 && ours.covariance()[(1, 1)] < 0.95);
+    assert!((info.log_likelihood - other.log_likelihood).abs() < 1e-7);
 }

@@ -10,6 +10,7 @@ use crate::sign::Sign;
 use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_numerics::normal;
 use nalgebra::SVector;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// `p(observation | m) = floor + share P(m + n in cell)`, `n ~ N(0, r)`.
@@ -19,8 +20,9 @@ use serde::{Deserialize, Serialize};
 /// | sign bit over a link with loss `l` and crossover `e` | a half-line | `(1 - l) e` | `(1 - l)(1 - 2 e)` |
 /// | cell of a quantizer, perfect link | the cell | 0 | 1 |
 /// | nothing from a censoring sensor, loss `l` | region of silence | `l` | `1 - l` |
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Numbers", into = "Numbers")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Numbers", into = "Numbers"))]
 pub struct InCell {
     cell: Cell,
     variance: f64,
@@ -30,6 +32,7 @@ pub struct InCell {
     log_share: f64,
 }
 
+#[cfg(feature = "serde")]
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
@@ -39,6 +42,7 @@ struct Numbers {
     share: f64,
 }
 
+#[cfg(feature = "serde")]
 impl From<InCell> for Numbers {
     fn from(factor: InCell) -> Self {
         Self {
@@ -50,6 +54,7 @@ impl From<InCell> for Numbers {
     }
 }
 
+#[cfg(feature = "serde")]
 impl TryFrom<Numbers> for InCell {
     type Error = ArgumentError;
 

@@ -8,6 +8,7 @@ use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, all_finite, positive};
 use fewbits_numerics::normal;
 use nalgebra::SVector;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// `p(observation | m) = sum_i p_i P(m + n in cell i)`, `n ~ N(0, r)`: a symbol through any discrete channel, a bit of a binary
@@ -15,8 +16,9 @@ use serde::{Deserialize, Serialize};
 ///
 /// The cells are `[e_{i-1}, e_i)` between increasing edges, the first and the last unbounded; `p_i` is the probability of the
 /// observation given that the measurement lies in cell `i`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Numbers", into = "Numbers")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Numbers", into = "Numbers"))]
 pub struct Partition {
     edges: Vec<f64>,
     given_cell: Vec<f64>,
@@ -24,7 +26,8 @@ pub struct Partition {
     variance: f64,
 }
 
-#[derive(Clone, Serialize, Deserialize)]
+#[cfg(feature = "serde")]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
     edges: Vec<f64>,
@@ -32,6 +35,7 @@ struct Numbers {
     noise_variance: f64,
 }
 
+#[cfg(feature = "serde")]
 impl From<Partition> for Numbers {
     fn from(factor: Partition) -> Self {
         Self {
@@ -42,6 +46,7 @@ impl From<Partition> for Numbers {
     }
 }
 
+#[cfg(feature = "serde")]
 impl TryFrom<Numbers> for Partition {
     type Error = ArgumentError;
 

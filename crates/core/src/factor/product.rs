@@ -7,12 +7,14 @@ use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, at_least_one};
 use nalgebra::SVector;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// The same observation `count` times, by sensors that share the noise-free measurement: `p(observation | m)^count`. Silences
 /// and sign bits of identical sensors are fused exactly and together, at a cost that does not grow with their number.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Repeated {
     factor: Scalar,
     count: usize,
@@ -54,7 +56,8 @@ impl Factor<1> for Repeated {
 }
 
 /// Independent observations of one measurement: log likelihoods add.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Product {
     factors: Vec<Repeated>,
 }

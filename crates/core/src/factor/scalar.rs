@@ -7,11 +7,13 @@ use crate::columns::Columns;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use nalgebra::SVector;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// An observation of the same probability under every measurement: a loss, a random silence.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(transparent))]
 pub struct Constant {
     probability: f64,
 }
@@ -46,8 +48,9 @@ impl<const M: usize> Factor<M> for Constant {
 }
 
 /// Any factor of a scalar measurement in Gaussian noise.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Scalar {
     /// The measurement itself.

@@ -46,7 +46,11 @@ impl RateControl {
     ///
     /// # Errors
     /// If there is no number of components, one is 0 or above 63, or the estimate does not fit the format.
-    pub fn table<const D: usize>(&self, estimate: &KernelEstimate<D>, format: &WireFormat<D>) -> Result<Vec<Rated<D>>, Error> {
+    pub fn table<const D: usize>(
+        &self,
+        estimate: &KernelEstimate<D>,
+        format: &WireFormat<D>,
+    ) -> Result<Vec<Rated<D>>, Error> {
         at_least_one("components", self.components.len())?;
         let target = CubatureTarget::new(estimate, self.cubature);
         let mut rated = Vec::new();
@@ -66,12 +70,19 @@ impl RateControl {
     ///
     /// # Errors
     /// As [`table`](Self::table), or if nothing fits the budget.
-    pub fn fit<const D: usize>(&self, estimate: &KernelEstimate<D>, format: &WireFormat<D>, budget: usize) -> Result<Rated<D>, Error> {
+    pub fn fit<const D: usize>(
+        &self,
+        estimate: &KernelEstimate<D>,
+        format: &WireFormat<D>,
+        budget: usize,
+    ) -> Result<Rated<D>, Error> {
         let table = self.table(estimate, format)?;
         let shortest = table.iter().map(|r| r.bits).min().unwrap_or(0);
         let within = table.into_iter().filter(|r| r.bits <= budget);
         within
             .min_by(|a, b| a.kl.total_cmp(&b.kl).then(a.bits.cmp(&b.bits)))
-            .ok_or_else(|| ArgumentError::new("budget", format!("{budget} bits"), format!("at least {shortest} bits")).into())
+            .ok_or_else(|| {
+                ArgumentError::new("budget", format!("{budget} bits"), format!("at least {shortest} bits")).into()
+            })
     }
 }

@@ -1,7 +1,7 @@
 //! The order and the laws of a message's numbers, walked alike by quantiser, encoder and decoder.
 
-use super::range::{LARGEST, Law, Reader, Writer};
 use super::WireFormat;
+use super::range::{LARGEST, Law, Reader, Writer};
 use crate::matrix::Factored;
 use crate::{Component, Mixture};
 use fewbits_core::CodecError;
@@ -42,7 +42,10 @@ pub(super) struct Replay<'a> {
 
 impl Symbols for Replay<'_> {
     fn next(&mut self, law: &Law, _: Option<f64>) -> Result<i64, CodecError> {
-        let n = *self.symbols.next().ok_or_else(|| invalid("format", "another than the message's"))?;
+        let n = *self
+            .symbols
+            .next()
+            .ok_or_else(|| invalid("format", "another than the message's"))?;
         self.writer.write(law, n)?;
         Ok(n)
     }
@@ -88,7 +91,8 @@ pub(super) fn walk<const D: usize>(
     format: &WireFormat<D>,
     target: Option<(&Mixture<D>, usize)>,
 ) -> Result<Mixture<D>, CodecError> {
-    let mut order: Vec<&Component<D>> = target.map_or(Vec::new(), |(m, _)| m.components().iter().filter(|c| c.weight() > 0.0).collect());
+    let mut order: Vec<&Component<D>> =
+        target.map_or(Vec::new(), |(m, _)| m.components().iter().filter(|c| c.weight() > 0.0).collect());
     order.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
     let k = symbols.next(&Law::Uniform { count: 64 }, target.map(|_| order.len() as f64))?;
     if k == 0 {
@@ -101,12 +105,17 @@ pub(super) fn walk<const D: usize>(
     } else {
         0
     };
-    let r = format.resolutions.get(choice as usize).copied().ok_or_else(|| invalid("resolution", choice))?;
+    let r = format
+        .resolutions
+        .get(choice as usize)
+        .copied()
+        .ok_or_else(|| invalid("resolution", choice))?;
 
     let overall = match target {
         None => None,
         Some((mixture, _)) => {
-            let factor = Factored::new("covariance", &mixture.covariance()).map_err(|_| invalid("covariance", "singular"))?;
+            let factor =
+                Factored::new("covariance", &mixture.covariance()).map_err(|_| invalid("covariance", "singular"))?;
             Some((mixture.mean(), factor))
         }
     };
@@ -283,7 +292,11 @@ fn triangular<const D: usize>(a: &SMatrix<f64, D, D>, b: &SMatrix<f64, D, D>) ->
     SMatrix::from_fn(|i, j| (j..=i).map(|k| a[(i, k)] * b[(k, j)]).sum())
 }
 
-fn component<const D: usize>(weight: f64, mean: SVector<f64, D>, lower: SMatrix<f64, D, D>) -> Result<Component<D>, CodecError> {
+fn component<const D: usize>(
+    weight: f64,
+    mean: SVector<f64, D>,
+    lower: SMatrix<f64, D, D>,
+) -> Result<Component<D>, CodecError> {
     Component::new(weight, mean, lower * lower.transpose()).map_err(|error| invalid("component", error))
 }
 

@@ -9,7 +9,10 @@ use nalgebra::{Matrix1, SVector, Vector1};
 fn obeys_the_laws<const D: usize>(belief: &impl Density<D>, seed: u64) {
     let mut rng = Stream::new(seed).rng();
     laws::belief::samples_have_the_moments(belief, &mut rng, 100_000).unwrap();
-    let wide = Gaussian::new(belief.mean(), belief.covariance() * 2.5).unwrap().factored().unwrap();
+    let wide = Gaussian::new(belief.mean(), belief.covariance() * 2.5)
+        .unwrap()
+        .factored()
+        .unwrap();
     laws::belief::density_integrates_to_one(belief, &wide, &mut rng, 20_000).unwrap();
 }
 
@@ -78,7 +81,10 @@ fn an_estimate_is_its_mixture() {
 #[test]
 fn densities_stay_numbers_everywhere() {
     let mixture = d1().to_mixture().unwrap();
-    let far = [vec![0.0, 1e160, 1e300, -1e200, f64::MAX], vec![0.0, 1e160, 0.0, 1e300, f64::MAX]];
+    let far = [
+        vec![0.0, 1e160, 1e300, -1e200, f64::MAX],
+        vec![0.0, 1e160, 0.0, 1e300, f64::MAX],
+    ];
     let columns = [far[0].as_slice(), far[1].as_slice()];
     let mut logs = [0.0; 5];
     mixture.log_pdf_columns(columns, &mut logs);
@@ -98,7 +104,9 @@ fn marginals_and_affine_images_have_the_moments_they_must() {
     assert!((marginal.mean()[0] - belief.mean()[2]).abs() < 1e-14);
     assert!((marginal.covariance()[(0, 1)] - belief.covariance()[(2, 0)]).abs() < 1e-13);
     assert!(belief.marginal([4]).is_err() && belief.marginal([1, 1]).is_err());
-    let image = belief.affine(&nalgebra::SMatrix::<f64, 1, 4>::from([[1.0], [2.0], [0.0], [-1.0]]), &Vector1::new(3.0)).unwrap();
+    let image = belief
+        .affine(&nalgebra::SMatrix::<f64, 1, 4>::from([[1.0], [2.0], [0.0], [-1.0]]), &Vector1::new(3.0))
+        .unwrap();
     let m = belief.mean();
     assert!((image.mean()[0] - (m[0] + 2.0 * m[1] - m[3] + 3.0)).abs() < 1e-13);
 }
@@ -162,7 +170,9 @@ fn storage_keeps_every_bit_and_checks() {
     let text = serde_json::to_string(&belief).unwrap();
     assert_eq!(serde_json::from_str::<Mixture<2>>(&text).unwrap(), belief);
     assert!(serde_json::from_str::<Mixture<3>>(&text).is_err());
-    assert!(serde_json::from_str::<Mixture<1>>(r#"{"weights":[-1.0],"means":[[0.0]],"covariances":[[[1.0]]]}"#).is_err());
+    assert!(
+        serde_json::from_str::<Mixture<1>>(r#"{"weights":[-1.0],"means":[[0.0]],"covariances":[[[1.0]]]}"#).is_err()
+    );
     let estimate = d1();
     let text = serde_json::to_string(&estimate).unwrap();
     let restored: KernelEstimate<2> = serde_json::from_str(&text).unwrap();
@@ -171,7 +181,12 @@ fn storage_keeps_every_bit_and_checks() {
 
 #[test]
 fn bad_mixtures_are_refused_by_name() {
-    let new = |w, m, v| Component::new(w, Vector1::new(m), Matrix1::new(v)).map(|_| ()).unwrap_err().to_string();
+    let new = |w, m, v| {
+        Component::new(w, Vector1::new(m), Matrix1::new(v))
+            .map(|_| ())
+            .unwrap_err()
+            .to_string()
+    };
     assert!(new(-1.0, 0.0, 1.0).contains("weight"));
     assert!(new(1.0, f64::INFINITY, 1.0).contains("mean"));
     assert!(new(1.0, 0.0, 0.0).contains("covariance"));

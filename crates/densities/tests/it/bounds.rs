@@ -1,13 +1,17 @@
 //! Relations between the error measures, on random laws.
 
-use fewbits_densities::divergence::{discrete, kl_chain_corrected, kl_chain_printed, kl_from_dr, kl_from_dr_hoeffding, kl_from_ml, l1_from_dr};
+use fewbits_densities::divergence::{
+    discrete, kl_chain_corrected, kl_chain_printed, kl_from_dr, kl_from_dr_hoeffding, kl_from_ml, l1_from_dr,
+};
 use fewbits_monte_carlo::Stream;
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
 
 /// A random law on a few points, some of them nearly empty.
 fn law<R: Rng>(rng: &mut R, points: usize) -> Vec<f64> {
-    let raw: Vec<f64> = (0..points).map(|_| 10.0_f64.powf(-rng.random_range(0.0..3.0))).collect();
+    let raw: Vec<f64> = (0..points)
+        .map(|_| 10.0_f64.powf(-rng.random_range(0.0..3.0)))
+        .collect();
     let total: f64 = raw.iter().sum();
     raw.iter().map(|x| x / total).collect()
 }

@@ -6,7 +6,9 @@ use fewbits_densities::divergence::{self, discrete, kl_centred_normals};
 use fewbits_densities::merge::{MergeCost, merge};
 use fewbits_densities::plug_in::{node_errors, plug_in};
 use fewbits_densities::quadrature::{QuadratureGrid, integrated};
-use fewbits_densities::{Component, Criterion, Cubature, KernelEstimate, Mixture, NodeErrors, Particles, Split, Tree, refine};
+use fewbits_densities::{
+    Component, Criterion, Cubature, KernelEstimate, Mixture, NodeErrors, Particles, Split, Tree, refine,
+};
 use nalgebra::{Matrix1, Vector1};
 use serde_json::Value;
 
@@ -18,11 +20,19 @@ impl Fixtures {
     }
 
     fn entry(&self, id: &str) -> &Value {
-        self.0.iter().find(|e| e["id"] == id).unwrap_or_else(|| panic!("no fixture {id}"))
+        self.0
+            .iter()
+            .find(|e| e["id"] == id)
+            .unwrap_or_else(|| panic!("no fixture {id}"))
     }
 
     fn numbers(&self, id: &str, key: &str) -> Vec<f64> {
-        self.entry(id)["inputs"][key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+        self.entry(id)["inputs"][key]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|v| v.as_f64().unwrap())
+            .collect()
     }
 
     fn check(&self, id: &str, found: f64) {
@@ -204,7 +214,9 @@ fn one_bit_splits_an_innocent_error() {
                 out.iter_mut().for_each(|l| *l -= shift);
             }
         };
-        grid(from, to).integrate(shifted(&p0, shift_p), shifted(&p1, shift_q)).l1
+        grid(from, to)
+            .integrate(shifted(&p0, shift_p), shifted(&p1, shift_q))
+            .l1
     };
     f.check("fig3.paper.L1_prior", l1(0.0, 0.0, -0.5, 1.5));
     f.check("fig3.paper.P_y1", above(&p0));

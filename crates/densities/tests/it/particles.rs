@@ -1,8 +1,6 @@
 //! Particles against sums written out by hand.
 
-
-
-
+use fewbits_core::Error as CoreError;
 use fewbits_densities::{Error, Particles};
 use proptest::prelude::*;
 
@@ -20,7 +18,7 @@ proptest! {
         let total: f64 = logs.iter().map(|l| l.exp()).sum();
         let belief = Particles::new([x.clone(), y.clone()], &logs);
         if total == 0.0 {
-            prop_assert!(matches!(belief, Err(Error::Degenerate { .. })), "{belief:?}");
+            prop_assert!(matches!(belief, Err(Error::Core(CoreError::Impossible))), "{belief:?}");
             return Ok(());
         }
         let mut belief = belief.unwrap();
@@ -61,7 +59,7 @@ fn a_failed_reweighing_keeps_the_belief() {
     let before = belief.clone();
     for bad in [[f64::NEG_INFINITY; 2], [f64::NAN, 0.0], [f64::INFINITY, 0.0]] {
         let result = belief.reweigh(|_, log_weights| log_weights.copy_from_slice(&bad));
-        assert!(matches!(result, Err(Error::Degenerate { .. })));
+        assert!(matches!(result, Err(Error::Core(CoreError::Impossible))));
         assert_eq!(belief, before);
         assert!((belief.weights()[1] - 0.75).abs() < 1e-15);
         assert!((belief.effective_sample_size() - 1.6).abs() < 1e-14);
@@ -78,11 +76,11 @@ fn log_weights_far_below_underflow_still_count() {
 fn bad_particles_are_refused() {
     let refused = |columns: [Vec<f64>; 1], logs: Vec<f64>| Particles::new(columns, &logs).unwrap_err().to_string();
     assert!(refused([vec![]], vec![]).contains("at least 1"));
-    assert!(refused([vec![1.0]], vec![0.0, 0.0]).contains("one a particle"));
+    assert!(refused([vec![1.0]], vec![0.0, 0.0]).contains("one per particle"));
     assert!(refused([vec![f64::NAN]], vec![0.0]).contains("columns"));
     assert!(refused([vec![1.0]], vec![f64::NAN]).contains("log_weights"));
     assert!(refused([vec![1.0]], vec![f64::INFINITY]).contains("log_weights"));
-    assert!(refused([vec![1.0]], vec![f64::NEG_INFINITY]).contains("degenerate"));
+    assert!(refused([vec![1.0]], vec![f64::NEG_INFINITY]).contains("impossible"));
 }
 
 #[test]

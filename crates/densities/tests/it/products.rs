@@ -7,7 +7,10 @@ use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, SVector, Vector1};
 
 fn line(means: &[f64], variance: f64, weights: &[f64]) -> Mixture<1> {
-    let parts = means.iter().zip(weights).map(|(m, w)| Component::new(*w, Vector1::new(*m), Matrix1::new(variance)).unwrap());
+    let parts = means
+        .iter()
+        .zip(weights)
+        .map(|(m, w)| Component::new(*w, Vector1::new(*m), Matrix1::new(variance)).unwrap());
     Mixture::new(parts.collect()).unwrap()
 }
 
@@ -25,8 +28,18 @@ fn case_c() -> [Mixture<2>; 2] {
     let a = [0.3, 0.1, 0.2];
     let b = [0.5, -0.1, 0.4];
     [
-        Mixture::new(vec![lobe(0.4, [0.0, 0.0], a), lobe(0.4, [1.0, 0.5], a), lobe(0.2, [2.0, 1.0], a)]).unwrap(),
-        Mixture::new(vec![lobe(0.2, [0.3, 0.2], b), lobe(0.5, [1.2, 0.2], b), lobe(0.3, [1.5, 1.5], b)]).unwrap(),
+        Mixture::new(vec![
+            lobe(0.4, [0.0, 0.0], a),
+            lobe(0.4, [1.0, 0.5], a),
+            lobe(0.2, [2.0, 1.0], a),
+        ])
+        .unwrap(),
+        Mixture::new(vec![
+            lobe(0.2, [0.3, 0.2], b),
+            lobe(0.5, [1.2, 0.2], b),
+            lobe(0.3, [1.5, 1.5], b),
+        ])
+        .unwrap(),
     ]
 }
 
@@ -41,7 +54,11 @@ fn enumeration_meets_the_reference_values() {
     let belief = exact(&[&a, &b]).unwrap().belief;
     assert!((belief.mean() - SVector::from([0.922_865_8, 0.450_029_3])).amax() < 1e-7);
     let covariance = belief.covariance();
-    for (found, expected) in [(covariance[(0, 0)], 0.417_746_7), (covariance[(0, 1)], 0.161_001_2), (covariance[(1, 1)], 0.202_292_3)] {
+    for (found, expected) in [
+        (covariance[(0, 0)], 0.417_746_7),
+        (covariance[(0, 1)], 0.161_001_2),
+        (covariance[(1, 1)], 0.202_292_3),
+    ] {
         assert!((found - expected).abs() < 1e-7);
     }
 }
@@ -73,10 +90,17 @@ fn label_laws(factors: &[Mixture<1>; 3], sweeps: usize) -> (Vec<f64>, Vec<f64>, 
     let labels = |s: usize| [s % 3, s / 3 % 3, s / 9];
     let part = |l: usize, b: usize| &factors[l].components()[b];
     let term = |s: usize| {
-        let chosen: Vec<Mixture<1>> =
-            labels(s).iter().enumerate().map(|(l, b)| Mixture::single(&part(l, *b).gaussian()).unwrap()).collect();
+        let chosen: Vec<Mixture<1>> = labels(s)
+            .iter()
+            .enumerate()
+            .map(|(l, b)| Mixture::single(&part(l, *b).gaussian()).unwrap())
+            .collect();
         let product = exact(&chosen.iter().collect::<Vec<_>>()).unwrap();
-        let weight: f64 = labels(s).iter().enumerate().map(|(l, b)| part(l, *b).weight()).product();
+        let weight: f64 = labels(s)
+            .iter()
+            .enumerate()
+            .map(|(l, b)| part(l, *b).weight())
+            .product();
         (weight * product.log_normaliser.exp(), product.belief.mean()[0], weight)
     };
     let terms: Vec<(f64, f64, f64)> = (0..27).map(term).collect();
@@ -106,7 +130,13 @@ fn gibbs_sweeps_have_the_law_of_their_chain() {
     let mut rng = Stream::new(32).rng();
     let n = 50_000;
     // Total variation between chain and product after some sweeps, from the message-passing spec.
-    for (sweeps, variation) in [(0, 0.526_71), (1, 0.161_73), (2, 0.047_38), (5, 0.005_98), (10, 0.000_175)] {
+    for (sweeps, variation) in [
+        (0, 0.526_71),
+        (1, 0.161_73),
+        (2, 0.047_38),
+        (5, 0.005_98),
+        (10, 0.000_175),
+    ] {
         let (law, truth, means) = label_laws(&factors, sweeps);
         let distance = 0.5 * law.iter().zip(&truth).map(|(a, b)| (a - b).abs()).sum::<f64>();
         assert!((distance - variation).abs() < 5e-6, "{sweeps}: {distance}");
@@ -121,7 +151,9 @@ fn gibbs_sweeps_have_the_law_of_their_chain() {
         assert!((below - belief.cdf(x)).abs() < 4.0 * (0.25 / n as f64).sqrt(), "{x}");
     }
     let single = gibbs(&mut rng, &views[..1], n, 5).unwrap();
-    assert!((single.mean()[0] - factors[0].mean()[0]).abs() < 4.0 * (factors[0].covariance()[(0, 0)] / n as f64).sqrt());
+    assert!(
+        (single.mean()[0] - factors[0].mean()[0]).abs() < 4.0 * (factors[0].covariance()[(0, 0)] / n as f64).sqrt()
+    );
 }
 
 #[test]

@@ -6,7 +6,9 @@ use fewbits_densities::merge::{MergeCost, merge};
 use fewbits_densities::plug_in::{cubature, plug_in};
 use fewbits_densities::quadrature::integrated;
 use fewbits_densities::tree::{At, Axis};
-use fewbits_densities::{Bandwidth, Criterion, Cubature, KernelEstimate, NodeErrors, Particles, Reduction, Split, Tree, refine};
+use fewbits_densities::{
+    Bandwidth, Criterion, Cubature, KernelEstimate, NodeErrors, Particles, Reduction, Split, Tree, refine,
+};
 use fewbits_monte_carlo::Stream;
 use nalgebra::Matrix2;
 use proptest::prelude::*;
@@ -15,7 +17,9 @@ const CRITERIA: [Criterion; 4] = [Criterion::Ml, Criterion::Kl, Criterion::L1, C
 
 fn all_splits() -> Vec<Split> {
     let axes = [Axis::Widest, Axis::Principal, Axis::Alternating];
-    axes.iter().flat_map(|axis| [At::CountMedian, At::WeightMedian].map(|at| Split { axis: *axis, at })).collect()
+    axes.iter()
+        .flat_map(|axis| [At::CountMedian, At::WeightMedian].map(|at| Split { axis: *axis, at }))
+        .collect()
 }
 
 /// The smallest bound over every cut with at most `m` nodes, by brute force.
@@ -31,7 +35,11 @@ fn brute_force(tree: &Tree<2>, errors: &NodeErrors, m: usize) -> f64 {
         }
         all
     }
-    cuts(tree, 0, m).iter().filter(|c| c.len() <= m).map(|c| errors.bound(c)).fold(f64::INFINITY, f64::min)
+    cuts(tree, 0, m)
+        .iter()
+        .filter(|c| c.len() <= m)
+        .map(|c| errors.bound(c))
+        .fold(f64::INFINITY, f64::min)
 }
 
 proptest! {
@@ -91,9 +99,16 @@ fn nothing_depends_on_the_unit() {
         Reduction::SingleGaussian,
         Reduction::paper(Criterion::Ml),
         Reduction::paper(Criterion::Kl),
-        Reduction::Optimal { split: Split::PRINCIPAL, criterion: Criterion::L1 },
-        Reduction::Merging { cost: MergeCost::Salmond },
-        Reduction::Merging { cost: MergeCost::Williams },
+        Reduction::Optimal {
+            split: Split::PRINCIPAL,
+            criterion: Criterion::L1,
+        },
+        Reduction::Merging {
+            cost: MergeCost::Salmond,
+        },
+        Reduction::Merging {
+            cost: MergeCost::Williams,
+        },
         Reduction::default(),
     ];
     for reduction in reductions {
@@ -126,7 +141,9 @@ fn the_pipeline_is_well_below_the_cut_of_the_paper() {
 #[test]
 fn refinement_lowers_its_own_estimate_at_every_step_and_keeps_to_its_floor() {
     let estimate = crescent(7, 120, 1.0);
-    let mut mixture = Reduction::Pipeline { cut: 40, iterations: 0 }.reduce(&estimate, 20).unwrap();
+    let mut mixture = Reduction::Pipeline { cut: 40, iterations: 0 }
+        .reduce(&estimate, 20)
+        .unwrap();
     let mut last = f64::INFINITY;
     for _ in 0..30 {
         let kl = cubature(&estimate, &mixture, Cubature::GaussHermite).kl_plugin;
@@ -186,7 +203,9 @@ fn coincident_particles_and_wild_weights_do_no_harm() {
                 for m in [1, 5, 300] {
                     let q = Reduction::Greedy { split, criterion }.reduce(estimate, m).unwrap();
                     assert!(plug_in(estimate, &q).kl_plugin.is_finite());
-                    Reduction::Optimal { split, criterion }.reduce(estimate, m.min(20)).unwrap();
+                    Reduction::Optimal { split, criterion }
+                        .reduce(estimate, m.min(20))
+                        .unwrap();
                 }
             }
         }

@@ -23,7 +23,10 @@ fn golden() -> Mixture<2> {
 fn the_bytes_of_format_one() {
     assert_eq!(FORMAT, 1);
     let format = WireFormat::around_origin(1.0, 0.25).unwrap();
-    let bits = CodedMixture::new(&golden(), &format, 0).unwrap().to_bits(&format).unwrap();
+    let bits = CodedMixture::new(&golden(), &format, 0)
+        .unwrap()
+        .to_bits(&format)
+        .unwrap();
     let hex: String = bits.bytes().iter().map(|b| format!("{b:02x}")).collect();
     assert_eq!((bits.bits(), hex.as_str()), (100, "0dd7ed83a1a39e43d6ccca0360"));
 }
@@ -103,7 +106,10 @@ fn decoding_is_total() {
     let good: Vec<BitString> = (0..8)
         .map(|k| {
             let mixture = random_mixture::<2, _>(&mut rng, k + 1, 1.0);
-            CodedMixture::new(&mixture, &format, k % 3).unwrap().to_bits(&format).unwrap()
+            CodedMixture::new(&mixture, &format, k % 3)
+                .unwrap()
+                .to_bits(&format)
+                .unwrap()
         })
         .collect();
     let mut decoded = 0;
@@ -130,7 +136,13 @@ fn decoding_is_total() {
             assert!(message.mixture().len() <= 63);
             let used = bits.bits() - reader.remaining();
             assert_eq!(message.to_bits(&format).unwrap().bits(), used);
-            assert!(message.mixture().components().iter().all(|c| c.log_determinant().is_finite()));
+            assert!(
+                message
+                    .mixture()
+                    .components()
+                    .iter()
+                    .all(|c| c.log_determinant().is_finite())
+            );
         }
     }
     assert!(decoded > 1000, "{decoded}");
@@ -173,7 +185,12 @@ fn extremes_are_carried_or_refused_by_name() {
     assert!(refused(one(25.0, 1.0)).contains("range of the format"));
     assert!(refused(one(0.0, 1e-8)).contains("range of the format"));
     assert!(refused(one(0.0, 1e8)).contains("range of the format"));
-    let many = Mixture::new((0..64).map(|i| lobe(1.0, [f64::from(i) * 0.1, 0.0], [1.0, 0.0, 1.0])).collect()).unwrap();
+    let many = Mixture::new(
+        (0..64)
+            .map(|i| lobe(1.0, [f64::from(i) * 0.1, 0.0], [1.0, 0.0, 1.0]))
+            .collect(),
+    )
+    .unwrap();
     assert!(refused(many).contains("63"));
     assert!(CodedMixture::new(&golden(), &format, 1).is_err());
     assert!(WireFormat::<2>::around_origin(1.0, 0.0).is_err() && WireFormat::<2>::around_origin(0.0, 0.2).is_err());
@@ -204,7 +221,10 @@ fn rate_control_keeps_the_budget_and_uses_it() {
     }
     let refusal = control.fit(&estimate, &format, 20).unwrap_err().to_string();
     assert!(refusal.contains("budget") && refusal.contains("at least"), "{refusal}");
-    let none = RateControl { components: vec![], ..control };
+    let none = RateControl {
+        components: vec![],
+        ..control
+    };
     assert!(none.fit(&estimate, &format, 300).is_err());
     assert_eq!(none.reduction, Reduction::default());
 }

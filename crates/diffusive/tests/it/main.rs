@@ -1,1 +1,3 @@
-//! x
+//! Tests of the search for a diffusive source.
+
+mod fixtures;

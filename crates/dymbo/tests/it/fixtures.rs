@@ -3,15 +3,17 @@
 //! The deterministic ones are computed here and compared within their tolerance. Those that carry a standard error are
 //! Monte-Carlo results; the figures reproduce them, and this test only makes sure that none is forgotten.
 
-use fewbits_core::{Encoder, Gaussian, Observation, Sign};
+use fewbits_core::factor::{Factor, InCell};
+use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
 use fewbits_dymbo::chain::{self, TransientStep};
-use fewbits_dymbo::vector::SignFilter;
 use fewbits_dymbo::{
-    CountFusion, DymboFilter, FineMessage, FineSensor, Initialisation, MultibitFilter, OneBitSensor, ParallelFilter,
-    ScalarPlant, ThresholdRule, bit_update, cell_update, expected_bit_information, first_message_mse,
-    first_message_value, iterated, skew_normal, steady, tree,
+    CountFusion, DymboFilter, Initialisation, MultibitFilter, Multiple, ParallelFilter, RoundedSample, ScalarFilter,
+    ScalarPlant, SignFilter, filtered_variance, first_message_mse, first_message_value, iterated, sign_bit,
+    skew_normal, steady, tree,
 };
-use fewbits_filters::{Grid, PointMass, PointMassFilter, kalman, scalar_fixed_lag_variance, steady_state};
+use fewbits_filters::{
+    Grid, PointMass, PointMassFilter, assumed_density, kalman, scalar_fixed_lag_variance, steady_state,
+};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
 use fewbits_quantizers::lloyd_max::gaussian_table;
 use nalgebra::{Matrix2, Vector2};
@@ -114,17 +116,16 @@ fn compute(entry: &Entry<'_>) -> Option<Vec<f64>> {
             )
         }
         "bit_update" => {
-            let prior = Gaussian::scalar(entry.number("mu"), entry.number("P")).unwrap();
             let bit = Sign::try_from(entry.number("b") as i32).unwrap();
-            let (r, threshold, eps) = (entry.number("sigma2"), entry.number("tau"), entry.number("eps"));
-            Some(moments(&bit_update(&prior, r, bit, threshold, eps).unwrap().0))
+            let link = Link::flipping(entry.number("eps")).unwrap();
+            let factor = InCell::sign(bit, entry.number("tau"), entry.number("sigma2"), &link).unwrap();
+            Some(posterior(entry, &factor))
         }
         "cell_update" => {
-            let prior = Gaussian::scalar(entry.number("mu"), entry.number("P")).unwrap();
             let cell = fewbits_core::Cell::new(entry.number("lo"), entry.number("hi")).unwrap();
-            Some(moments(&cell_update(&prior, entry.number("sigma2"), &cell).unwrap().0))
+            Some(posterior(entry, &InCell::certain(cell, entry.number("sigma2")).unwrap()))
         }
-        "eta" => Some(vec![expected_bit_information(entry.number("z"), 0.0).unwrap()]),
+        "eta" => Some(vec![sign_bit::expected_information(entry.number("z"), &Link::PERFECT).unwrap()]),
         "lloyd_max" => {
             let quantizer = gaussian_table(entry.number("bits") as usize).unwrap();
             if entry.ends("tables") {
@@ -152,13 +153,19 @@ fn compute(entry: &Entry<'_>) -> Option<Vec<f64>> {
             }])
         }
         "bsc" => {
-            let (plant, eps) = (entry.plant(), entry.number("eps"));
+            let actual = Link::flipping(entry.number("eps")).unwrap();
+            let aware = DymboFilter::new(entry.plant()).with_link(actual);
+            let naive = DymboFilter::new(entry.plant());
             Some(vec![if entry.ends("riccati") {
-                let c = DymboFilter::new(plant).with_crossover(eps).unwrap().information();
-                plant.steady_state(c).unwrap().filtered_variance
+                entry
+                    .plant()
+                    .steady_state(aware.information())
+                    .unwrap()
+                    .filtered_variance
+            } else if entry.ends("naive_mse") {
+                chain::crossover_mse(&naive, &actual).unwrap()
             } else {
-                let assumed = if entry.ends("naive_mse") { 0.0 } else { eps };
-                chain::crossover_mse(&plant, assumed, eps).unwrap()
+                chain::dymbo_mse(&aware).unwrap()
             }])
         }
         "prop1b" => {
@@ -169,7 +176,8 @@ fn compute(entry: &Entry<'_>) -> Option<Vec<f64>> {
         "prior_init" => {
             let plant = entry.plant();
             let prior = Gaussian::scalar(0.0, plant.dynamics().stationary_variance().unwrap()).unwrap();
-            let value = first_message_value(&plant, &FineSensor::new(entry.number("tau")).unwrap(), &prior).unwrap();
+            let scheme = RoundedSample::new(plant.measurement_variance(), entry.number("tau")).unwrap();
+            let value = first_message_value(&scheme, &prior).unwrap();
             Some(vec![value.expected_variance, value.entropy_bits])
         }
         "sensors" => sensors_entry(entry),
@@ -187,15 +195,18 @@ fn compute(entry: &Entry<'_>) -> Option<Vec<f64>> {
             Some([of(FRAC_2_PI), of(1.0)].concat())
         }
         "erasure" if entry.ends("bound") => {
-            let bound = steady::erasure_bound(&entry.plant(), entry.number("p_erasure")).unwrap();
+            let link = Link::lossy(entry.number("p_erasure")).unwrap();
+            let bound = steady::erasure_bound(&entry.plant(), &link).unwrap();
             Some(vec![bound.filtered_variance])
         }
         _ => None,
     }
 }
 
-fn moments(belief: &Gaussian<1>) -> Vec<f64> {
-    vec![belief.mean()[0], belief.covariance()[0]]
+fn posterior(entry: &Entry<'_>, factor: &InCell) -> Vec<f64> {
+    let prior = Gaussian::scalar(entry.number("mu"), entry.number("P")).unwrap();
+    let after = factor.tilted(&prior).unwrap();
+    vec![after.mean[0], after.covariance[0]]
 }
 
 fn steady_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
@@ -206,12 +217,9 @@ fn steady_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         "kf_pred" => kf.predicted_variance,
         "dymbo_filt" => dymbo.filtered_variance,
         "dymbo_pred" => dymbo.predicted_variance,
-        "dymbo_gain" => {
-            let predicted = Gaussian::scalar(0.0, dymbo.predicted_variance).unwrap();
-            DymboFilter::new(plant).update(&predicted, Sign::Above).0.mean()[0]
-        }
+        "dymbo_gain" => DymboFilter::new(plant).steady_step().unwrap(),
         "loss_riccati" => steady::loss(&plant).unwrap(),
-        "dymbo_true_mse" => chain::dymbo_mse(&plant).unwrap(),
+        "dymbo_true_mse" => chain::dymbo_mse(&DymboFilter::new(plant)).unwrap(),
         "loss_true" => chain::true_loss(&plant).unwrap(),
         _ => return None,
     }])
@@ -227,17 +235,10 @@ fn loss_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         "a_at_2_g1" => return steady::coefficient_at_loss(2.0, 1.0).unwrap().map(|a| vec![a]),
         // The approach to the limit is of first order in sqrt(gamma).
         "a1_gamma_to_0" => steady::loss(&at(1.0, 1e-26)),
-        "true_gamma_at_2_a1" => {
-            let root = steady::crossing(2.0, (0.8, 1.0), |g| chain::true_loss(&at(1.0, g))).unwrap();
-            return root.map(|g| vec![g]);
-        }
-        "true_a_at_2_g1" => {
-            let root = steady::crossing(2.0, (0.95, 1.0), |a| chain::true_loss(&at(a, 1.0))).unwrap();
-            return root.map(|a| vec![a]);
-        }
+        "true_gamma_at_2_a1" => return chain::noise_ratio_at_loss(2.0, 1.0).unwrap().map(|g| vec![g]),
+        "true_a_at_2_g1" => return chain::coefficient_at_loss(2.0, 1.0).unwrap().map(|a| vec![a]),
         "static_parameter" => {
-            let plant = ScalarPlant::new(1.0, 0.0, 1.0).unwrap();
-            let after = |c: f64| (0..entry.number("n") as usize).fold(1.0, |m, _| plant.filtered_variance(m, c));
+            let after = |c: f64| (0..entry.number("n") as usize).fold(1.0, |m, _| filtered_variance(m, 1.0, c));
             Ok(after(FRAC_2_PI) / after(1.0))
         }
         _ => return None,
@@ -286,15 +287,14 @@ fn fig5_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
 
 fn prop2_entry(entry: &Entry<'_>) -> Vec<f64> {
     let (sigma, tau) = (entry.number("sigma"), entry.number("tau"));
-    let plant = ScalarPlant::new(0.9, 0.5, sigma * sigma).unwrap();
-    let sensor = FineSensor::new(tau).unwrap();
-    let at = |theta: f64| first_message_mse(&plant, &sensor, &Gaussian::scalar(theta, 0.0).unwrap());
+    let scheme = RoundedSample::new(sigma * sigma, tau).unwrap();
+    let at = |theta: f64| first_message_mse(&scheme, &Gaussian::scalar(theta, 0.0).unwrap());
     if entry.inputs["theta"].is_null() {
         let start = Initialisation::Fine {
-            sensor,
-            message: FineMessage(0),
+            scheme,
+            message: Multiple(0),
         };
-        let tight = start.belief(&plant).unwrap().covariance()[0];
+        let tight = start.belief().unwrap().covariance()[0];
         vec![at(0.5 * tau), tight, (sigma + 0.5 * tau).powi(2)]
     } else {
         vec![at(entry.number("theta"))]
@@ -334,31 +334,37 @@ fn regress_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         }
         return Some(means);
     }
-    let rule = if part.starts_with("eq14") {
-        ThresholdRule::PreviousEstimate
-    } else {
-        ThresholdRule::Prediction
-    };
-    let filter = DymboFilter::new(plant).with_threshold_rule(rule);
-    let sensor = FineSensor::new(entry.number("tau")).unwrap();
-    let message = sensor.encode(&x[0], &());
-    let mut belief = filter.init(&Initialisation::Fine { sensor, message }).unwrap();
-    let sigma = plant.measurement_variance().sqrt();
-    let cell = sensor.cell(message).unwrap();
+    // Equation (14) as printed: the threshold is the previous estimate; the update stays exact.
+    let printed = part.starts_with("eq14");
+    let (filter, r) = (DymboFilter::new(plant), plant.measurement_variance());
+    let scheme = RoundedSample::new(r, entry.number("tau")).unwrap();
+    let message = scheme.round(x[0]).unwrap();
+    let mut belief = Initialisation::Fine { scheme, message }.belief().unwrap();
+    let first = scheme
+        .factor(&(), &Observation::Received(message), &Link::PERFECT)
+        .unwrap();
     let exact = PointMassFilter::new(plant.dynamics(), Grid::symmetric(16.0, 0.05).unwrap()).unwrap();
-    let mut density = PointMass::new(*exact.grid(), |theta| cell.log_probability(theta, sigma)).unwrap();
+    let mut density = PointMass::new(*exact.grid(), |theta| first.log_likelihood(&[theta].into())).unwrap();
     let (mut bits, mut means, mut exact_moments) = (vec![], vec![belief.mean()[0]], vec![]);
     for sample in &x[1..] {
-        let threshold = filter.threshold(&belief);
-        let bit = OneBitSensor.encode(sample, &threshold);
-        belief = filter.step(&belief, Observation::Received(bit)).unwrap().0;
+        let threshold = if printed {
+            belief.mean()[0]
+        } else {
+            filter.threshold(&belief)
+        };
+        let bit = Sign::of(*sample, threshold).unwrap();
+        let factor = InCell::sign(bit, threshold, r, &Link::PERFECT).unwrap();
+        belief = if printed {
+            let predicted = filter.predict(&belief);
+            assumed_density::update(&predicted, &[[1.0]].into(), &factor).unwrap().0
+        } else {
+            filter.step(&belief, &Observation::Received(bit)).unwrap().0
+        };
         bits.push(bit.value());
         means.push(belief.mean()[0]);
         if part.starts_with("exact") {
             density = exact.predict(&density).unwrap();
-            let log_likelihood =
-                |theta: f64| fewbits_numerics::normal::log_cdf(bit.value() * (theta - threshold) / sigma);
-            density.update(log_likelihood).unwrap();
+            density.update(|theta| factor.log_probability(theta)).unwrap();
             exact_moments.push((density.mean(), density.variance()));
         }
     }

@@ -5,6 +5,7 @@
 mod example;
 
 use example::{analyse, few_bits, fit, full_precision, read_column, rms_difference};
+use fewbits_dymbo::ScalarFilter;
 use std::path::Path;
 
 fn samples() -> Vec<f64> {
@@ -42,7 +43,7 @@ fn every_bit_brings_the_estimate_closer() {
     assert!(deviations[0] > 1.5 * deviations[1] && deviations[1] > 1.5 * deviations[2], "{deviations:?}");
     // In the steady state the squared deviation is the loss in variance.
     let kalman = report.fit.plant.steady_state(1.0).unwrap().filtered_variance;
-    for (bits, deviation, spent) in &report.rows {
+    for (bits, deviation, held_out, spent) in &report.rows {
         let filter = fewbits_dymbo::MultibitFilter::new(report.fit.plant, *bits).unwrap();
         let own = report
             .fit
@@ -53,8 +54,21 @@ fn every_bit_brings_the_estimate_closer() {
         let ratio = deviation / (own - kalman).sqrt();
         assert!((0.7..1.4).contains(&ratio), "{bits} bits: {ratio}");
         assert_eq!(*spent, 16 + bits * 299);
+        // Prediction of the unseen half: worse than with every sample in full, better than by the mean.
+        let [kalman, last, mean] = report.reference_errors;
+        assert!(kalman < *held_out && *held_out < mean && kalman < last, "{bits} bits: {held_out} {kalman}");
     }
     assert!(report.to_string().contains("bits spent"));
+}
+
+/// Regression: a clock column was fitted to the bound of gamma without a word.
+#[test]
+fn a_fit_on_a_bound_says_so() {
+    let clock: Vec<f64> = (0..200).map(f64::from).collect();
+    let report = analyse(&clock).unwrap();
+    assert!(report.fit.on_bounds.iter().any(|bound| bound.contains("gamma")), "{report}");
+    assert!(report.to_string().contains("warning"));
+    assert!(fit(&samples()).unwrap().on_bounds.is_empty());
 }
 
 #[test]

@@ -2,14 +2,13 @@
 
 use super::case::Case;
 use super::ensemble::{Ensemble, Part, agrees, beats, ordered_at_every_step, value};
-use super::linear::{Scheme, Setting, run};
+use super::linear::{Method, Scheme, Setting, run};
 use super::scalar::{printed_rates, rate_plot, rate_table};
 use crate::error::Error;
 use crate::legacy::claim::Claim;
 use crate::legacy::{About, Context};
 use crate::legacy::{Table, Tables};
 use crate::plot::Plot;
-use fewbits_cfwmd::no_feedback::NoFeedback;
 use fewbits_cfwmd::rule::Weighing;
 
 /// The two acceleration variances: the one that fits the printed table, and the one the text states.
@@ -245,20 +244,20 @@ impl Case for Fig6 {
     }
 
     fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        let joint = Scheme::Blind(NoFeedback::AssumedDensity);
+        let joint = Scheme::NoFeedback(Method::Joint);
         let schemes = [
             ("all", Scheme::All),
             ("CFwMD", joint),
-            ("CFoMD", Scheme::Blind(NoFeedback::Ignore)),
+            ("CFoMD", Scheme::NoFeedback(Method::Ignored)),
             ("random", Scheme::Random),
         ];
-        let suffixed = [("CFwMD 4", joint), ("CFoMD 4", Scheme::Blind(NoFeedback::Ignore))];
+        let suffixed = [("CFwMD 4", joint), ("CFoMD 4", Scheme::NoFeedback(Method::Ignored))];
         let mut all = both(context, setting, &schemes, &suffixed)?;
         let few = Setting {
             trials: setting.trials.min(PARTICLE_TRIALS),
             ..setting.clone()
         };
-        let exact = Scheme::Blind(NoFeedback::RaoBlackwell(setting.particles as usize));
+        let exact = Scheme::NoFeedback(Method::Imputed(setting.particles as usize));
         all.extend(both(
             context,
             &few,

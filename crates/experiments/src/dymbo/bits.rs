@@ -1,43 +1,92 @@
 //! How many bits a sample are worth sending.
 
-use super::common::{bad, kalman_variance, not_empty, pairs, plant};
-use crate::legacy::claim::not_decreasing;
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use fewbits_dymbo::{MultibitFilter, chain, iterated};
+use super::common::{Plant, plants};
+use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
+use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain, iterated};
+use garde::Validate;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::FRAC_2_PI;
 
-const ID: &str = "dymbo-bits";
-
-/// Plants as pairs, and word lengths.
-#[derive(Serialize, Deserialize)]
+/// Plants and word lengths.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Parameters {
-    a: Vec<f64>,
-    gamma: Vec<f64>,
+pub struct Parameters {
+    /// Plants, `a:gamma`.
+    #[garde(length(min = 1), dive)]
+    plants: Vec<Plant>,
+    /// Bits a sample.
+    #[garde(length(min = 1), inner(range(min = 1, max = 8)))]
     bits: Vec<usize>,
 }
 
 impl Default for Parameters {
     fn default() -> Self {
         Self {
-            a: vec![0.9],
-            gamma: vec![0.5, 0.05],
+            plants: plants([(0.9, 0.5), (0.9, 0.05)]),
             bits: (1..=8).collect(),
         }
     }
 }
 
-pub(super) struct WordLength;
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Errors of the filters.
+    words: Vec<Row>,
+    /// Several bits about one sample.
+    successive: Vec<Successive>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    #[serde(flatten)]
+    plant: Plant,
+    /// Word length.
+    bits: usize,
+    /// Information of a word against the sample.
+    c: f64,
+    /// Predicted steady variance.
+    #[schemars(extend("unit" = "sigma^2"))]
+    riccati: f64,
+    /// Exact steady mean squared error.
+    #[schemars(extend("unit" = "sigma^2"))]
+    exact_mse: f64,
+    /// Exact error over the Kalman filter's.
+    loss: f64,
+    /// Predicted variance over the Kalman filter's.
+    riccati_loss: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Successive {
+    /// Bits about the same sample.
+    bits: usize,
+    /// 1 - c of the Lloyd-Max word.
+    batch: f64,
+    /// 1 - c with thresholds at exact means.
+    exact_tree: f64,
+    /// 1 - c promised by assuming normal densities, (1 - 2/pi)^m.
+    claimed: f64,
+    /// 1 - c true of its levels.
+    own_levels: f64,
+    /// 1 - c true of its cells.
+    centroids: f64,
+    /// Words that no sample causes.
+    empty_words: usize,
+}
+
+/// Loss against word length.
+pub struct WordLength;
 
 impl Figure for WordLength {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
-            id: ID,
+            id: "dymbo-bits",
             title: "Bits a sample",
             caption: "Loss against the Kalman filter when each sample sends a word of the innovation's Lloyd-Max quantizer: predicted \
                       (lines) and exact (points). Two bits leave 15 % and three 4 %. Right: what is lost of one sample, 1 - c, by \
@@ -46,185 +95,101 @@ impl Figure for WordLength {
         }
     }
 
-    fn check(&self, p: &Parameters) -> Result<(), Error> {
-        not_empty(ID, "bits", &p.bits)?;
-        if let Some(bits) = p.bits.iter().find(|bits| !(1..=8).contains(*bits)) {
-            return Err(bad(ID, "bits", bits, "word lengths from 1 to 8"));
-        }
-        pairs(ID, &p.a, &p.gamma)?
-            .into_iter()
-            .try_for_each(|(a, g)| plant(ID, a, g).map(drop))
-    }
-
-    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("a", "", "plant coefficient"),
-            column("gamma", "", "process variance over measurement variance"),
-            column("bits", "", "word length"),
-            column("c", "", "information of a word against the sample"),
-            column("riccati", "sigma^2", "predicted steady variance"),
-            column("exact_mse", "sigma^2", "exact steady mean squared error"),
-            column("loss", "", "exact error over the Kalman filter's"),
-            column("riccati_loss", "", "predicted variance over the Kalman filter's"),
-        ]);
-        let plants = pairs(ID, &p.a, &p.gamma)?;
-        let cases: Vec<_> = plants
-            .iter()
-            .flat_map(|at| p.bits.iter().map(move |bits| (*at, *bits)))
-            .collect();
-        let rows: Vec<_> = cases
-            .par_iter()
-            .map(|&((a, gamma), bits)| {
-                let plant = plant(ID, a, gamma)?;
-                let filter = MultibitFilter::new(plant, bits)?;
-                let kalman = kalman_variance(&plant)?;
-                let c = filter.information();
-                let riccati = plant.steady_state(c)?.filtered_variance;
-                let exact = chain::multibit_mse(&filter)?;
-                Ok(row![a, gamma, bits, c, riccati, exact, exact / kalman, riccati / kalman])
-            })
-            .collect::<Result<_, Error>>()?;
-        rows.into_iter().try_for_each(|row| table.push(row))?;
-
-        let mut successive = Table::new([
-            column("bits", "", "bits about the same sample"),
-            column("batch", "", "1 - c of the Lloyd-Max word"),
-            column("exact_tree", "", "1 - c with thresholds at exact means"),
-            column("claimed", "", "1 - c promised by assuming normal densities, (1 - 2/pi)^m"),
-            column("own_levels", "", "1 - c true of its levels"),
-            column("centroids", "", "1 - c true of its cells"),
-            column("empty_words", "", "words that no sample causes"),
-        ]);
-        let any = plant(ID, 0.9, 0.5)?;
-        for bits in 1..=5 {
-            let assumed = iterated::normal_assumption_information(bits)?;
-            let batch = MultibitFilter::new(any, bits)?.information();
-            successive.push(row![
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
+        let cases: Vec<_> = p.plants.iter().flat_map(|at| p.bits.iter().map(move |bits| (*at, *bits))).collect();
+        let row = |&(plant, bits): &(Plant, usize)| {
+            let filter = MultibitFilter::new(plant.model()?, bits)?;
+            let (kalman, c) = (plant.kalman_variance()?, filter.information());
+            let riccati = plant.model()?.steady_state(c)?.filtered_variance;
+            let exact_mse = chain::multibit_mse(&filter)?;
+            Ok(Row {
+                plant,
                 bits,
-                1.0 - batch,
-                1.0 - iterated::exact_tree_information(bits)?,
-                1.0 - assumed.claimed,
-                1.0 - assumed.with_own_levels,
-                1.0 - assumed.with_centroids,
-                assumed.empty_words,
-            ])?;
-        }
-        Ok(Tables::from(table).with("successive", successive))
+                c,
+                riccati,
+                exact_mse,
+                loss: exact_mse / kalman,
+                riccati_loss: riccati / kalman,
+            })
+        };
+        let any = Plant { a: 0.9, gamma: 0.5 }.model()?;
+        let successive = |bits: usize| {
+            let assumed = iterated::normal_assumption_information(bits)?;
+            Ok(Successive {
+                bits,
+                batch: 1.0 - MultibitFilter::new(any, bits)?.information(),
+                exact_tree: 1.0 - iterated::exact_tree_information(bits)?,
+                claimed: 1.0 - assumed.claimed,
+                own_levels: 1.0 - assumed.with_own_levels,
+                centroids: 1.0 - assumed.with_centroids,
+                empty_words: assumed.empty_words,
+            })
+        };
+        Ok(Rows {
+            words: cases.par_iter().map(row).collect::<Result<_, Error>>()?,
+            successive: (1..=5).map(successive).collect::<Result<_, Error>>()?,
+        })
     }
 
-    fn claims(&self, p: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let mut claims = Vec::new();
-        for (a, gamma) in pairs(ID, &p.a, &p.gamma)? {
-            let losses = tables.main.only("a", a)?.only("gamma", gamma)?.numbers("loss")?;
-            let statement = format!("a = {a}, gamma = {gamma}: every bit helps");
-            claims.push(Claim::never(format!("falls-{a}-{gamma}"), statement, not_decreasing(&losses)).at_defaults());
+    fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        for curve in rows.words.chunks(p.bits.len()) {
+            let plant = curve[0].plant;
+            let what = format!("{}: every bit helps", plant.title());
+            let losses = curve.iter().map(|r| r.loss);
+            claims.decreasing(format!("falls-{}-{}", plant.a, plant.gamma), what, losses).at_defaults();
         }
-        let information = [
-            FRAC_2_PI,
-            0.882518152171,
-            0.965452239211,
-            0.990498991992,
-            0.997495331644,
-            0.999355760335,
+        let key = |r: &Row| format!("{} {}", r.plant, r.bits);
+        let first = rows.words.iter().filter(|r| Some(&r.plant) == p.plants.first());
+        claims.references("information", "information of a word of bits", first, |r| (r.bits.to_string(), r.c));
+        claims.references("loss", "exact loss at a, gamma, bits", &rows.words, |r| (key(r), r.loss));
+        claims.references("mse", "exact error at a, gamma, bits", &rows.words, |r| (key(r), r.exact_mse));
+        let longer = rows.words.iter().filter(|r| r.bits > 1);
+        let what = "from two bits on the prediction is exact to 0.03 %";
+        claims.all("riccati", what, longer, |r| (r.exact_mse / r.riccati - 1.0).abs() <= 3e-4).at_defaults();
+        let rows = &rows.successive;
+        let columns: [(&str, fn(&Successive) -> f64); 4] = [
+            ("claimed", |r| r.claimed),
+            ("own-levels", |r| r.own_levels),
+            ("centroids", |r| r.centroids),
+            ("exact-tree", |r| r.exact_tree),
         ];
-        let first = tables.main.only("gamma", 0.5)?;
-        let coefficients = first.points("bits", "c")?;
-        for ((bits, c), expected) in coefficients.iter().zip(information) {
-            let statement = format!("information of {bits} bits");
-            claims.push(Claim::near(format!("c-{bits}"), statement, *c, expected, 1e-11).at_defaults());
+        for (name, of) in columns {
+            let what = format!("successive bits, {name}: information of bits");
+            claims.references(name, &what, rows, |r| (r.bits.to_string(), 1.0 - of(r)));
         }
-        let eight = coefficients.iter().find(|p| p.0 == 8.0).map_or(f64::NAN, |p| p.1);
-        claims.push(Claim::near("c-8", "information of 8 bits", eight, 0.999958814917, 1e-11).at_defaults());
-        for (gamma, losses, digits) in [
-            (0.5, [1.5597, 1.1461, 1.0404, 1.0109], 5e-5),
-            (0.05, [1.1800, 1.0508, 1.0143, 1.0039], 5e-5),
-        ] {
-            let rows = tables.main.only("gamma", gamma)?;
-            for ((bits, loss), expected) in rows.points("bits", "loss")?.into_iter().zip(losses) {
-                let statement = format!("gamma = {gamma}: loss with {bits} bits");
-                claims
-                    .push(Claim::near(format!("loss-{gamma}-{bits}"), statement, loss, expected, digits).at_defaults());
-            }
-            let gaps = rows.points("riccati", "exact_mse")?.into_iter().skip(1);
-            let off = gaps
-                .filter(|(riccati, exact)| (exact / riccati - 1.0).abs() > 3e-4)
-                .count();
-            let statement = format!("gamma = {gamma}: from two bits on the prediction is exact to 0.03 %");
-            claims.push(Claim::never(format!("riccati-{gamma}"), statement, off).at_defaults());
-        }
-        for ((bits, exact), expected) in first
-            .points("bits", "exact_mse")?
-            .into_iter()
-            .zip([0.729566, 0.536116, 0.486661, 0.472875])
-        {
-            let statement = format!("gamma = 0.5: exact error with {bits} bits");
-            claims.push(Claim::near(format!("mse-{bits}"), statement, exact, expected, 5e-7).at_defaults());
-        }
-        claims.extend(successive_claims(tables.named("successive")?)?);
-        Ok(claims)
+        let what = "the Lloyd-Max word loses less at every length from two bits";
+        claims.all("batch-wins", what, rows.iter().filter(|r| r.bits > 1), |r| r.batch < r.exact_tree);
+        let empty = rows.last().map(|r| r.empty_words as f64);
+        claims.above("empty", "at five bits some successive words never occur", empty, 0.0);
     }
 
-    fn plot(&self, p: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let (x, y) = (
-            Axis::linear("bits a sample").between(0.7, 8.3),
-            Axis::log("error over the Kalman filter's, minus 1"),
-        );
-        let mut left = Panel::new("Loss against word length", x, y);
-        for (i, (a, gamma)) in pairs(ID, &p.a, &p.gamma)?.into_iter().enumerate() {
-            let rows = tables.main.only("a", a)?.only("gamma", gamma)?;
-            let over = |name: &str| -> Result<Vec<(f64, f64)>, Error> {
-                Ok(rows
-                    .points("bits", name)?
-                    .into_iter()
-                    .map(|(b, loss)| (b, loss - 1.0))
-                    .collect())
-            };
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let x = Axis::linear("bits a sample").between(0.7, 8.3);
+        let mut left = Panel::new("Loss against word length", x, Axis::log("error over the Kalman filter's, minus 1"));
+        for (i, curve) in rows.words.chunks(p.bits.len()).enumerate() {
+            let title = curve[0].plant.title();
+            let over = |of: fn(&Row) -> f64| points(curve, |r| (r.bits as f64, of(r) - 1.0));
             left = left
-                .with(Layer::line(format!("predicted, a = {a}, gamma = {gamma}"), over("riccati_loss")?).coloured(i))
-                .with(Layer::points(format!("exact, a = {a}, gamma = {gamma}"), over("loss")?).coloured(i));
+                .with(Layer::line(format!("predicted, {title}"), over(|r| r.riccati_loss)).coloured(i))
+                .with(Layer::points(format!("exact, {title}"), over(|r| r.loss)).coloured(i));
         }
-        let rows = tables.named("successive")?;
-        let right = Panel::new(
-            "Bits about one sample",
-            Axis::linear("bits").between(0.7, 5.3),
-            Axis::log("fraction of the information lost, 1 - c"),
-        )
-        .with(Layer::line("Lloyd-Max word", rows.points("bits", "batch")?).coloured(2))
-        .with(Layer::points("successive, exact means", rows.points("bits", "exact_tree")?).coloured(3))
-        .with(Layer::dashed("successive, as claimed", rows.points("bits", "claimed")?).coloured(4))
-        .with(
-            Layer::points("successive, its own levels", rows.points("bits", "own_levels")?)
-                .coloured(4)
-                .marked(Marker::Cross),
-        )
-        .with(
-            Layer::points("successive, centroids", rows.points("bits", "centroids")?)
-                .coloured(5)
-                .marked(Marker::Triangle),
-        )
-        .legend(Legend::BottomLeft);
-        Ok(Plot::grid(2, vec![left, right]))
+        let curve = |of: fn(&Successive) -> f64| points(&rows.successive, |r| (r.bits as f64, of(r)));
+        let (x, y) = (Axis::linear("bits").between(0.7, 5.3), Axis::log("fraction of the information lost, 1 - c"));
+        let right = Panel::new("Bits about one sample", x, y)
+            .with(Layer::line("Lloyd-Max word", curve(|r| r.batch)).coloured(2))
+            .with(Layer::points("successive, exact means", curve(|r| r.exact_tree)).coloured(3))
+            .with(Layer::dashed("successive, as claimed", curve(|r| r.claimed)).coloured(4))
+            .with(
+                Layer::points("successive, its own levels", curve(|r| r.own_levels))
+                    .coloured(4)
+                    .marked(Marker::Cross),
+            )
+            .with(
+                Layer::points("successive, centroids", curve(|r| r.centroids))
+                    .coloured(5)
+                    .marked(Marker::Triangle),
+            )
+            .legend(Legend::BottomLeft);
+        Plot::grid(2, vec![left, right])
     }
-}
-
-fn successive_claims(rows: &Table) -> Result<Vec<Claim>, Error> {
-    let mut claims = Vec::new();
-    let columns: [(&str, [f64; 3]); 4] = [
-        ("claimed", [0.86795, 0.95202, 0.98256]),
-        ("own_levels", [0.86954, 0.94104, 0.96803]),
-        ("centroids", [0.87492, 0.95343, 0.97806]),
-        ("exact_tree", [0.87492, 0.95809, 0.98613]),
-    ];
-    for (name, expected) in columns {
-        for ((bits, lost), c) in rows.points("bits", name)?.into_iter().skip(1).zip(expected) {
-            let statement = format!("successive bits, {name}: information of {bits}");
-            claims.push(Claim::near(format!("{name}-{bits}"), statement, 1.0 - lost, c, 6e-6));
-        }
-    }
-    let (batch, tree) = (rows.numbers("batch")?, rows.numbers("exact_tree")?);
-    let worse = batch.iter().zip(&tree).skip(1).filter(|(b, t)| b >= t).count();
-    claims.push(Claim::never("batch-wins", "the Lloyd-Max word loses less at every length from two bits", worse));
-    let empty = rows.points("bits", "empty_words")?.last().map_or(f64::NAN, |p| p.1);
-    claims.push(Claim::above("empty", "at five bits some successive words never occur", empty, 0.0));
-    Ok(claims)
 }

@@ -1,28 +1,41 @@
 //! Convergence from the first message: simulated, exact and predicted.
 
-use super::common::{LONGEST_RUN, bad, dymbo_steady, kalman_variance, nearest, not_empty, stationary_plant};
-use crate::legacy::claim::largest;
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
-use fewbits_core::{Dynamics, Encoder, Gaussian, Observation, Sensing};
+use super::common::{Plant, each, plants};
+use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure, Measured};
+use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Sensing, Sign};
 use fewbits_dymbo::chain::first_message_transient;
-use fewbits_dymbo::{DymboFilter, FineSensor, Initialisation, OneBitSensor, ScalarPlant, first_message_value};
+use fewbits_dymbo::{
+    DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance, first_message_value,
+};
 use fewbits_filters::kalman;
 use fewbits_monte_carlo::{Moments, Stream};
+use garde::Validate;
 use nalgebra::Vector1;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
 
 const ID: &str = "dymbo-fig5";
 
-/// The plants, the resolution of the first message in noise deviations, and the effort.
-#[derive(Serialize, Deserialize)]
+/// The plants, the resolution of the first message, and the effort.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Parameters {
+pub struct Parameters {
+    /// Plant coefficient; the state starts from its stationary law.
+    #[garde(range(min = -0.999_999, max = 0.999_999))]
     a: f64,
+    /// Process variances over measurement variance.
+    #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
     gamma: Vec<f64>,
+    /// Resolution of the first message in noise deviations.
+    #[garde(range(min = 1e-3, max = 100.0))]
     tau: f64,
+    /// Steps after the first message.
+    #[garde(range(min = 1, max = 10_000))]
     steps: usize,
+    /// Simulated runs.
+    #[garde(range(min = 2, max = 100_000_000))]
     trials: u64,
 }
 
@@ -38,39 +51,70 @@ impl Default for Parameters {
     }
 }
 
-pub(super) struct Convergence;
-
-/// Sums over trials, one entry a step.
-#[derive(Clone)]
-struct Sums {
-    kalman: Vec<Moments>,
-    dymbo: Vec<Moments>,
-    informed: Vec<Moments>,
-    informed_nees: Vec<Moments>,
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Errors and variances.
+    errors: Vec<Row>,
+    /// One run.
+    path: Vec<Point>,
 }
 
-impl Sums {
-    fn new(steps: usize) -> Self {
-        let empty = || vec![Moments::default(); steps + 1];
-        Self {
-            kalman: empty(),
-            dymbo: empty(),
-            informed: empty(),
-            informed_nees: empty(),
-        }
-    }
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    #[serde(flatten)]
+    plant: Plant,
+    /// Step.
+    n: usize,
+    /// Simulated runs.
+    trials: u64,
+    /// Variance computed by the Kalman filter, which is exact.
+    #[schemars(extend("unit" = "sigma^2"))]
+    kf_pred: f64,
+    /// Mean squared error of the Kalman filter.
+    #[schemars(extend("unit" = "sigma^2"))]
+    kf_mse: Measured,
+    /// Variance computed by the sign-bit filter.
+    #[schemars(extend("unit" = "sigma^2"))]
+    dymbo_pred: f64,
+    /// Mean squared error of the sign-bit filter.
+    #[schemars(extend("unit" = "sigma^2"))]
+    dymbo_mse: Measured,
+    /// Exact mean squared error, by the error chain.
+    #[schemars(extend("unit" = "sigma^2"))]
+    dymbo_exact: f64,
+    /// Steady variance of the sign-bit filter.
+    #[schemars(extend("unit" = "sigma^2"))]
+    dymbo_minf: f64,
+    /// Steady variance of the Kalman filter.
+    #[schemars(extend("unit" = "sigma^2"))]
+    kf_minf: f64,
+    /// Squared error over computed variance, sign-bit filter.
+    nees: Measured,
+    /// Mean squared error when the stationary prior is used at n = 0.
+    #[schemars(extend("unit" = "sigma^2"))]
+    informed_mse: Measured,
+    /// Its squared error over computed variance.
+    informed_nees: Measured,
+}
 
-    fn merge(&mut self, other: &Self) {
-        let both = [
-            (&mut self.kalman, &other.kalman),
-            (&mut self.dymbo, &other.dymbo),
-            (&mut self.informed, &other.informed),
-            (&mut self.informed_nees, &other.informed_nees),
-        ];
-        for (mine, theirs) in both {
-            mine.iter_mut().zip(theirs).for_each(|(m, t)| m.merge(t));
-        }
-    }
+#[derive(Serialize, JsonSchema)]
+struct Point {
+    #[serde(flatten)]
+    plant: Plant,
+    /// Step.
+    n: usize,
+    /// State.
+    #[schemars(extend("unit" = "sigma"))]
+    theta: f64,
+    /// Estimate of the Kalman filter.
+    #[schemars(extend("unit" = "sigma"))]
+    kf: f64,
+    /// Estimate of the sign-bit filter.
+    #[schemars(extend("unit" = "sigma"))]
+    dymbo: f64,
+    /// Bit received; none at the first message.
+    bit: Option<f64>,
 }
 
 /// Truth and the three estimates at one step.
@@ -93,34 +137,33 @@ fn simulate(
 ) -> Result<(), fewbits_dymbo::Error> {
     let mut rng = stream.fast_rng();
     let filter = DymboFilter::new(*plant);
-    let sensor = FineSensor::new(p.tau)?;
-    let mut state = prior.sample(&mut rng)?;
+    let scheme = RoundedSample::new(plant.measurement_variance(), p.tau)?;
+    let mut state = prior.sample(&mut rng);
     let sample = plant.sensor().sample(&mut rng, &state)[0];
-    let message = sensor.encode(&sample, &());
+    let message = scheme.round(sample)?;
     let mut step = Step {
         truth: state[0],
         kalman: Gaussian::scalar(sample, plant.measurement_variance())?,
-        dymbo: filter.init(&Initialisation::Fine { sensor, message })?,
-        informed: filter.init(&Initialisation::FineWithPrior {
-            sensor,
+        dymbo: Initialisation::Fine { scheme, message }.belief()?,
+        informed: Initialisation::FineWithPrior {
+            scheme,
             message,
             prior: *prior,
-        })?,
+        }
+        .belief()?,
         bit: None,
     };
     see(0, &step);
     for n in 1..=p.steps {
         state = plant.dynamics().propagate(&mut rng, &state);
         let sample = plant.sensor().sample(&mut rng, &state)[0];
-        let hear = |belief: &Gaussian<1>| OneBitSensor.encode(&sample, &filter.threshold(belief));
-        let bit = hear(&step.dymbo);
+        let ask = |belief: &Gaussian<1>| Sign::of(sample, filter.threshold(belief));
+        let (bit, informed) = (ask(&step.dymbo)?, ask(&step.informed)?);
         step = Step {
             truth: state[0],
             kalman: kalman::step(plant.dynamics(), plant.sensor(), &step.kalman, &Vector1::new(sample))?.0,
-            dymbo: filter.step(&step.dymbo, Observation::Received(bit))?.0,
-            informed: filter
-                .step(&step.informed, Observation::Received(hear(&step.informed)))?
-                .0,
+            dymbo: filter.step(&step.dymbo, &Observation::Received(bit))?.0,
+            informed: filter.step(&step.informed, &Observation::Received(informed))?.0,
             bit: Some(bit.value()),
         };
         see(n, &step);
@@ -128,8 +171,12 @@ fn simulate(
     Ok(())
 }
 
+/// Exact and predicted curves, and the first run.
+pub struct Convergence;
+
 impl Figure for Convergence {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
@@ -143,316 +190,193 @@ impl Figure for Convergence {
         }
     }
 
-    fn check(&self, p: &Parameters) -> Result<(), Error> {
-        not_empty(ID, "gamma", &p.gamma)?;
-        FineSensor::new(p.tau)?;
-        if p.steps > LONGEST_RUN {
-            return Err(bad(ID, "steps", p.steps, "at most 10000"));
-        }
-        p.gamma
-            .iter()
-            .try_for_each(|gamma| stationary_plant(ID, p.a, *gamma).map(drop))
-    }
-
     fn quicken(&self, p: &mut Parameters) {
         p.trials = 5_000;
     }
 
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("gamma", "", "process variance over measurement variance"),
-            column("n", "", "step"),
-            column("trials", "", "simulated runs"),
-            column("kf_pred", "sigma^2", "variance computed by the Kalman filter, which is exact"),
-            column("kf_mse", "sigma^2", "mean squared error of the Kalman filter"),
-            column("kf_se", "sigma^2", "its standard error"),
-            column("dymbo_pred", "sigma^2", "variance computed by the sign-bit filter"),
-            column("dymbo_mse", "sigma^2", "mean squared error of the sign-bit filter"),
-            column("dymbo_se", "sigma^2", "its standard error"),
-            column("dymbo_exact", "sigma^2", "exact mean squared error, by the error chain"),
-            column("dymbo_minf", "sigma^2", "steady variance of the sign-bit filter"),
-            column("kf_minf", "sigma^2", "steady variance of the Kalman filter"),
-            column("nees", "", "squared error over computed variance, sign-bit filter"),
-            column("nees_se", "", "its standard error"),
-            column("informed_mse", "sigma^2", "mean squared error when the stationary prior is used at n = 0"),
-            column("informed_se", "sigma^2", "its standard error"),
-            column("informed_nees", "", "its squared error over computed variance"),
-            column("informed_nees_se", "", "standard error of that"),
-        ]);
-        let mut path = Table::new([
-            column("gamma", "", "process variance over measurement variance"),
-            column("n", "", "step"),
-            column("theta", "sigma", "state"),
-            column("kf", "sigma", "estimate of the Kalman filter"),
-            column("dymbo", "sigma", "estimate of the sign-bit filter"),
-            column("bit", "", "bit heard"),
-        ]);
-        for &gamma in &p.gamma {
-            let (plant, variance) = stationary_plant(ID, p.a, gamma)?;
-            let prior = Gaussian::scalar(0.0, variance)?;
-            let run = context.monte_carlo(context.stream(ID).named(&format!("{gamma}")), p.trials);
-            let sums = run.fold(
-                || Sums::new(p.steps),
-                |sums, trial| {
-                    simulate(&plant, &prior, p, trial.stream, |n, step| {
-                        let squared = |belief: &Gaussian<1>| (belief.mean()[0] - step.truth).powi(2);
-                        sums.kalman[n].add(squared(&step.kalman));
-                        sums.dymbo[n].add(squared(&step.dymbo));
-                        sums.informed[n].add(squared(&step.informed));
-                        sums.informed_nees[n].add(squared(&step.informed) / step.informed.covariance()[0]);
-                    })
-                },
-                |total, part| total.merge(&part),
-            )?;
-            let transient = first_message_transient(&plant, p.tau, 1.0 + p.tau * p.tau / 12.0, p.steps)?;
-            let (dymbo_limit, kalman_limit) = (dymbo_steady(&plant)?.filtered_variance, kalman_variance(&plant)?);
-            let mut kalman_variance = 1.0;
-            for (n, exact) in transient.iter().enumerate() {
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let plants = each(p.a, &p.gamma);
+        let models = plants
+            .iter()
+            .map(|plant| Ok((*plant, plant.model()?, plant.stationary()?)))
+            .collect::<Result<Vec<_>, Error>>()?;
+        let name = |at: &(Plant, _, _)| at.0.gamma.to_string();
+        let empty = |_: &_| vec![[Moments::default(); 4]; p.steps + 1];
+        let sums = context.sweep(ID, p.trials, &models, name, empty, |(_, model, prior), sums, trial| {
+            simulate(model, prior, p, trial.stream, |n, step| {
+                let squared = |belief: &Gaussian<1>| (belief.mean()[0] - step.truth).powi(2);
+                sums[n][0].add(squared(&step.kalman));
+                sums[n][1].add(squared(&step.dymbo));
+                sums[n][2].add(squared(&step.informed));
+                sums[n][3].add(squared(&step.informed) / step.informed.covariance()[0]);
+            })
+        })?;
+        let (mut errors, mut path) = (Vec::new(), Vec::new());
+        for ((plant, model, prior), sums) in models.iter().zip(&sums) {
+            let transient = first_message_transient(model, p.tau, 1.0 + p.tau * p.tau / 12.0, p.steps)?;
+            let mut kf_pred = 1.0;
+            for (n, (exact, sums)) in transient.iter().zip(sums).enumerate() {
                 if n > 0 {
-                    kalman_variance = plant.filtered_variance(plant.dynamics().predict_variance(kalman_variance), 1.0);
+                    kf_pred = filtered_variance(model.dynamics().predict_variance(kf_pred), 1.0, 1.0);
                 }
-                let m = exact.filtered_variance;
-                let (kf, dymbo, informed) = (sums.kalman[n], sums.dymbo[n], sums.informed[n]);
-                table.push(row![
-                    gamma,
+                let dymbo_mse = Measured::mean(&sums[1]);
+                errors.push(Row {
+                    plant: *plant,
                     n,
-                    p.trials,
-                    kalman_variance,
-                    kf.mean(),
-                    kf.standard_error(),
-                    m,
-                    dymbo.mean(),
-                    dymbo.standard_error(),
-                    exact.mse,
-                    dymbo_limit,
-                    kalman_limit,
-                    dymbo.mean() / m,
-                    dymbo.standard_error() / m,
-                    informed.mean(),
-                    informed.standard_error(),
-                    sums.informed_nees[n].mean(),
-                    sums.informed_nees[n].standard_error(),
-                ])?;
+                    trials: p.trials,
+                    kf_pred,
+                    kf_mse: Measured::mean(&sums[0]),
+                    dymbo_pred: exact.filtered_variance,
+                    dymbo_mse,
+                    dymbo_exact: exact.mse,
+                    dymbo_minf: plant.sign_bit_variance()?,
+                    kf_minf: plant.kalman_variance()?,
+                    nees: Measured {
+                        value: dymbo_mse.value / exact.filtered_variance,
+                        standard_error: dymbo_mse.standard_error.map(|se| se / exact.filtered_variance),
+                    },
+                    informed_mse: Measured::mean(&sums[2]),
+                    informed_nees: Measured::mean(&sums[3]),
+                });
             }
+            let run = context.monte_carlo(context.stream(ID).named(&plant.gamma.to_string()), p.trials);
             run.single(0, |trial| {
-                let mut rows = Vec::new();
-                simulate(&plant, &prior, p, trial.stream, |n, step| {
-                    rows.push(row![
-                        gamma,
+                simulate(model, prior, p, trial.stream, |n, step| {
+                    path.push(Point {
+                        plant: *plant,
                         n,
-                        step.truth,
-                        step.kalman.mean()[0],
-                        step.dymbo.mean()[0],
-                        step.bit
-                    ]);
-                })?;
-                Ok::<_, fewbits_dymbo::Error>(rows)
-            })?
-            .into_iter()
-            .try_for_each(|row| path.push(row))?;
+                        theta: step.truth,
+                        kf: step.kalman.mean()[0],
+                        dymbo: step.dymbo.mean()[0],
+                        bit: step.bit,
+                    });
+                })
+            })?;
         }
-        Ok(Tables::from(table).with("path", path))
+        Ok(Rows { errors, path })
     }
 
-    fn claims(&self, p: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let mut claims = Vec::new();
-        for &gamma in &p.gamma {
-            let rows = tables.main.only("gamma", gamma)?;
-            let worst = |value: &str, error: &str, truth: &[f64]| -> Result<f64, Error> {
-                let (values, errors) = (rows.numbers(value)?, rows.numbers(error)?);
-                let z = values
-                    .iter()
-                    .zip(&errors)
-                    .zip(truth)
-                    .map(|((v, e), t)| ((v - t) / e).abs());
-                Ok(largest(z))
-            };
-            let (exact, pred) = (rows.numbers("dymbo_exact")?, rows.numbers("dymbo_pred")?);
-            let kalman = rows.numbers("kf_pred")?;
-            let mut z_claim = |id: &str, what: &str, z: f64| {
-                let statement = format!("gamma = {gamma}: {what}, worst step in standard errors");
-                claims.push(Claim::below(format!("{id}-{gamma}"), statement, z, 4.5));
-            };
-            z_claim(
-                "dymbo-exact",
-                "simulated sign-bit error against the error chain",
-                worst("dymbo_mse", "dymbo_se", &exact)?,
-            );
-            z_claim("kf-exact", "simulated Kalman error against its variance", worst("kf_mse", "kf_se", &kalman)?);
-            z_claim(
-                "informed-consistent",
-                "normalised error of the prior-aware start against 1.002",
-                worst("informed_nees", "informed_nees_se", &vec![1.002; exact.len()])? - 1.0,
-            );
-            let nees: Vec<f64> = exact.iter().zip(&pred).map(|(e, m)| e / m).collect();
-            let outside = nees.iter().filter(|n| !(0.9995..=1.0030).contains(*n)).count();
-            let statement = format!("gamma = {gamma}: exact normalised error within [0.9995, 1.0030] at every step");
-            claims.push(Claim::never(format!("consistent-{gamma}"), statement, outside).at_defaults());
-            let late: Vec<f64> = rows.numbers("dymbo_mse")?.split_off(30.min(p.steps));
-            let average = late.iter().sum::<f64>() / late.len() as f64;
-            let limit = rows.numbers("dymbo_minf")?[0];
-            let statement =
-                format!("gamma = {gamma}: simulated error over n >= 30 is the predicted steady variance within 2 %");
-            claims.push(Claim::near_relative(format!("steady-{gamma}"), statement, average, limit, 0.02).at_defaults());
+    fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let rows = &rows.errors;
+        let what = "simulated sign-bit error against the error chain, worst step";
+        claims.all_within("dymbo-exact", what, rows, |r| (r.dymbo_mse, r.dymbo_exact), 4.5);
+        let what = "simulated Kalman error against its variance, worst step";
+        claims.all_within("kf-exact", what, rows, |r| (r.kf_mse, r.kf_pred), 4.5);
+        let steady = |nees: f64| (0.9995..=1.0030).contains(&nees);
+        let what = "exact normalised error within [0.9995, 1.0030] at every step";
+        claims.all("consistent", what, rows, |r| steady(r.dymbo_exact / r.dymbo_pred)).at_defaults();
+        let what = "normalised error of the prior-aware start within 4.5 standard errors of the same interval";
+        claims
+            .all("informed-consistent", what, rows, |r| {
+                let slack = 4.5 * r.informed_nees.standard_error.unwrap_or(0.0);
+                (0.9995 - slack..=1.0030 + slack).contains(&r.informed_nees.value)
+            })
+            .at_defaults();
+        for curve in rows.chunks(p.steps + 1) {
+            let gamma = curve[0].plant.gamma;
+            let late: Moments = curve.iter().skip(30).map(|r| r.dymbo_mse.value / r.dymbo_minf).collect();
+            let what = format!("gamma = {gamma}: simulated error over n >= 30 is the predicted steady variance within 2 %");
+            claims.near(format!("steady-{gamma}"), what, late.mean(), 1.0, 0.02).at_defaults();
         }
-        claims.extend(number_claims(tables)?);
-        claims.extend(start_claims()?);
-        Ok(claims)
+        let key = |r: &Row| format!("{} {}", r.plant, r.n);
+        claims.references("exact", "exact sign-bit error at a, gamma, n", rows, |r| (key(r), r.dymbo_exact));
+        claims.references("kalman", "Kalman variance at a, gamma, n", rows, |r| (key(r), r.kf_pred));
+        let what = "error when the prior is used at a, gamma, n";
+        claims.references("informed", what, rows, |r| (key(r), r.informed_mse));
+
+        let curves = || rows.chunks(p.steps + 1);
+        // The Kalman filter settles on its own variance, the sign-bit filter on its own exact error.
+        let settled = |curve: &[Row], value: fn(&Row) -> f64, limit: Option<f64>| {
+            let limit = limit?;
+            curve.iter().position(|r| value(r) <= 1.05 * limit).map(|n| n as f64)
+        };
+        let what = "E12: steps of the sign-bit filter to within 5 % of its level, a, gamma";
+        claims.references("steps-dymbo", what, curves(), |c| {
+            let level = c.last().map(|r| r.dymbo_exact);
+            (c[0].plant.to_string(), settled(c, |r| r.dymbo_exact, level))
+        });
+        let what = "E12: steps of the Kalman filter to within 5 % of its level, a, gamma";
+        claims.references("steps-kf", what, curves(), |c| {
+            let level = c.last().map(|r| r.kf_minf);
+            (c[0].plant.to_string(), settled(c, |r| r.kf_pred, level))
+        });
+        let ratios: [(&str, &str, fn(&Row) -> f64); 2] = [
+            ("exact", "exact errors", |r| r.dymbo_exact / r.kf_pred),
+            ("computed", "computed variances", |r| r.dymbo_pred / r.kf_pred),
+        ];
+        for (id, of, ratio) in ratios {
+            let peak = |c: &[Row]| c.iter().map(ratio).fold(0.0, f64::max);
+            let what = format!("the ratio of {of} peaks at n = 2");
+            claims
+                .all(format!("peak-at-{id}"), what, curves(), |c| c.get(2).is_some_and(|r| ratio(r) == peak(c)))
+                .at_defaults();
+            let what = format!("the ratio of {of} at its peak, a, gamma");
+            claims.references(&format!("peak-{id}"), &what, curves(), |c| (c[0].plant.to_string(), peak(c)));
+        }
+        starts(claims);
     }
 
-    fn plot(&self, p: &Parameters, tables: &Tables) -> Result<Plot, Error> {
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let mut panels = Vec::new();
-        for &gamma in &p.gamma {
-            let rows = tables.main.only("gamma", gamma)?;
-            let title = format!("a = {}, gamma = {gamma}", p.a);
-            let points = |value: &str, error: &str| -> Result<Layer, Error> {
-                let label = match value {
-                    "kf_mse" => "Kalman, simulated",
-                    "dymbo_mse" => "sign bit, simulated",
-                    _ => "sign bit with prior, simulated",
-                };
-                Ok(Layer::points(label, rows.points("n", value)?).with_errors(rows.numbers(error)?))
-            };
+        for curve in rows.errors.chunks(p.steps + 1) {
+            let line = |of: fn(&Row) -> f64| points(curve, |r| (r.n as f64, of(r)));
+            let marks = |label: &str, of: fn(&Row) -> Measured| Layer::measured(label, curve, |r| (r.n as f64, of(r)));
+            let (x, y) = (Axis::linear("step n"), Axis::log("mean squared error / sigma^2"));
             panels.push(
-                Panel::new(title, Axis::linear("step n"), Axis::log("mean squared error / sigma^2"))
-                    .with(Layer::line("Kalman, exact", rows.points("n", "kf_pred")?).coloured(0))
-                    .with(points("kf_mse", "kf_se")?.coloured(0).marked(Marker::Square))
-                    .with(Layer::line("sign bit, exact", rows.points("n", "dymbo_exact")?).coloured(1))
-                    .with(points("dymbo_mse", "dymbo_se")?.coloured(1))
+                Panel::new(curve[0].plant.title(), x, y)
+                    .with(Layer::line("Kalman, exact", line(|r| r.kf_pred)).coloured(0))
+                    .with(marks("Kalman, simulated", |r| r.kf_mse).coloured(0).marked(Marker::Square))
+                    .with(Layer::line("sign bit, exact", line(|r| r.dymbo_exact)).coloured(1))
+                    .with(marks("sign bit, simulated", |r| r.dymbo_mse).coloured(1))
                     .with(
-                        points("informed_mse", "informed_se")?
+                        marks("sign bit with prior, simulated", |r| r.informed_mse)
                             .coloured(2)
                             .marked(Marker::Triangle),
                     )
-                    .with(Layer::dashed("sign bit, steady", rows.points("n", "dymbo_minf")?).coloured(3)),
+                    .with(Layer::dashed("sign bit, steady", line(|r| r.dymbo_minf)).coloured(3)),
             );
         }
-        for &gamma in &p.gamma {
-            let rows = tables.named("path")?.only("gamma", gamma)?;
+        for path in rows.path.chunks(p.steps + 1) {
+            let line = |of: fn(&Point) -> f64| points(path, |r| (r.n as f64, of(r)));
+            let title = format!("One run, gamma = {}", path[0].plant.gamma);
             panels.push(
-                Panel::new(format!("One run, gamma = {gamma}"), Axis::linear("step n"), Axis::linear("state / sigma"))
-                    .with(Layer::line("state", rows.points("n", "theta")?).coloured(4))
-                    .with(Layer::dashed("Kalman", rows.points("n", "kf")?).coloured(0))
-                    .with(Layer::line("sign bit", rows.points("n", "dymbo")?).coloured(1))
+                Panel::new(title, Axis::linear("step n"), Axis::linear("state / sigma"))
+                    .with(Layer::line("state", line(|r| r.theta)).coloured(4))
+                    .with(Layer::dashed("Kalman", line(|r| r.kf)).coloured(0))
+                    .with(Layer::line("sign bit", line(|r| r.dymbo)).coloured(1))
                     .legend(Legend::TopRight),
             );
         }
-        Ok(Plot::grid(p.gamma.len().min(2), panels))
+        Plot::grid(p.gamma.len().min(2), panels)
     }
-}
-
-/// The printed and recomputed numbers at the default plants.
-fn number_claims(tables: &Tables) -> Result<Vec<Claim>, Error> {
-    let mut claims = Vec::new();
-    let expected = [
-        (
-            0.5,
-            [1.083333, 0.869244, 0.786614, 0.753234, 0.739463, 0.733723, 0.731316],
-            [1.0, 0.567100, 0.489627, 0.472740, 0.468910],
-            [0.768, 0.745, 0.735, 0.730],
-            (3, 2),
-            (1.6066, 1.604),
-        ),
-        (
-            0.05,
-            [1.083333, 0.643182, 0.439305, 0.331496, 0.269643, 0.232307, 0.209032],
-            [1.0, 0.462366, 0.298007, 0.225638, 0.188817],
-            [0.2117, 0.1964, 0.1856, 0.1790],
-            (10, 8),
-            (1.4741, 1.473),
-        ),
-    ];
-    for (gamma, exact, kalman, informed, steps, peaks) in expected {
-        let rows = tables.main.only("gamma", gamma)?;
-        let column = |name: &str| rows.points("n", name);
-        let (own, kf) = (column("dymbo_exact")?, column("kf_pred")?);
-        let mut compare = |id: &str, points: &[(f64, f64)], expected: &[f64], tolerance: f64| {
-            for (n, value) in expected.iter().enumerate() {
-                let statement = format!("gamma = {gamma}: {id} at n = {n}");
-                let at = nearest(points, n as f64);
-                claims.push(Claim::near(format!("{id}-{gamma}-{n}"), statement, at, *value, tolerance).at_defaults());
-            }
-        };
-        compare("exact sign-bit error", &own, &exact, 1e-6);
-        compare("Kalman variance", &kf, &kalman, 1e-6);
-        for ((n, value), expected) in column("informed_mse")?.into_iter().zip(informed) {
-            let error = nearest(&column("informed_se")?, n);
-            let statement = format!("gamma = {gamma}: error at n = {n} when the prior is used");
-            let claim = Claim::near(format!("informed-{gamma}-{n}"), statement, value, expected, 4.5 * error + 5e-4);
-            claims.push(claim.at_defaults());
-        }
-        for (who, points, limit, wanted) in [
-            ("sign-bit", &own, "dymbo_minf", steps.0),
-            ("Kalman", &kf, "kf_minf", steps.1),
-        ] {
-            // The Kalman filter settles on its own variance, the sign-bit filter on its own exact error.
-            let limit = if who == "Kalman" {
-                rows.numbers(limit)?.first().copied()
-            } else {
-                points.last().map(|p| p.1)
-            };
-            let limit = limit.unwrap_or(f64::NAN);
-            let first = points
-                .iter()
-                .position(|p| p.1 <= 1.05 * limit)
-                .map_or(f64::NAN, |n| n as f64);
-            let statement = format!("E12, gamma = {gamma}: steps of the {who} filter to within 5 % of its level");
-            claims
-                .push(Claim::near(format!("steps-{who}-{gamma}"), statement, first, wanted as f64, 0.0).at_defaults());
-        }
-        for (what, points, peak) in [
-            ("exact errors", &own, peaks.0),
-            ("computed variances", &column("dymbo_pred")?, peaks.1),
-        ] {
-            let ratios: Vec<(f64, f64)> = points.iter().zip(&kf).map(|(d, k)| (d.0, d.1 / k.1)).collect();
-            let top = ratios
-                .iter()
-                .copied()
-                .max_by(|p, q| p.1.total_cmp(&q.1))
-                .unwrap_or((f64::NAN, f64::NAN));
-            let statement = format!("gamma = {gamma}: the ratio of {what} peaks at n = 2");
-            let id = what.replace(' ', "-");
-            claims.push(Claim::near(format!("peak-at-{id}-{gamma}"), statement, top.0, 2.0, 0.0).at_defaults());
-            let statement = format!("gamma = {gamma}: the ratio of {what} at its peak");
-            claims.push(Claim::near(format!("peak-{id}-{gamma}"), statement, top.1, peak, 5e-4).at_defaults());
-        }
-    }
-    Ok(claims)
 }
 
 /// What the start is worth, from closed forms.
-fn start_claims() -> Result<Vec<Claim>, Error> {
-    let mut claims = Vec::new();
-    for (gamma, start, dymbo_steps, kalman_steps) in [
-        (0.5, 1e2, 8, 3),
-        (0.05, 1e2, 15, 9),
-        (0.5, 1e4, 12, 3),
-        (0.05, 1e4, 19, 9),
-    ] {
-        let plant = ScalarPlant::with_noise_ratio(0.9, gamma)?;
-        for (who, c, expected) in [("sign-bit", FRAC_2_PI, dymbo_steps), ("Kalman", 1.0, kalman_steps)] {
-            let limit = plant.steady_state(c)?.filtered_variance;
-            let (mut m, mut n) = (start, 0);
-            while m > 1.05 * limit && n < 100 {
-                m = plant.filtered_variance(plant.dynamics().predict_variance(m), c);
-                n += 1;
-            }
-            let id = format!("cold-{who}-{gamma}-{start}");
-            let statement =
-                format!("gamma = {gamma}: steps of the {who} filter from a prior variance of {start} alone");
-            claims.push(Claim::near(id, statement, f64::from(n), f64::from(expected), 0.0));
-        }
+fn starts(claims: &mut Claims) {
+    let paper = plants([(0.9, 0.5), (0.9, 0.05)]);
+    for (who, c) in [("sign-bit", FRAC_2_PI), ("Kalman", 1.0)] {
+        let steps = |plant: &Plant, start: f64| {
+            let model = plant.model().ok()?;
+            let limit = model.steady_state(c).ok()?.filtered_variance;
+            let next = |m: &f64| Some(filtered_variance(model.dynamics().predict_variance(*m), 1.0, c));
+            let path = std::iter::successors(Some(start), next).take(100);
+            Some(path.take_while(|m| *m > 1.05 * limit).count() as f64)
+        };
+        let cases = paper.iter().flat_map(|plant| [(plant, 1e2), (plant, 1e4)]);
+        let what = format!("steps of the {who} filter from a prior variance alone, at a, gamma, variance");
+        claims.references(&format!("cold-{who}"), &what, cases, |(plant, start)| {
+            (format!("{plant} {start}"), steps(plant, start))
+        });
     }
-    for (gamma, expected, bits) in [(0.5, 0.767414, 2.99), (0.05, 0.211726, 2.26)] {
-        let (plant, variance) = stationary_plant(ID, 0.9, gamma)?;
-        let value = first_message_value(&plant, &FineSensor::new(1.0)?, &Gaussian::scalar(0.0, variance)?)?;
-        let statement = format!("E13, gamma = {gamma}: mean variance after first message and prior together");
-        claims.push(Claim::near(format!("e13-{gamma}"), statement, value.expected_variance, expected, 1e-6));
-        let statement = format!("gamma = {gamma}: entropy of the first message in bits");
-        claims.push(Claim::near(format!("entropy-{gamma}"), statement, value.entropy_bits, bits, 5e-3));
-    }
-    let (_, stationary) = stationary_plant(ID, 0.9, 0.05)?;
-    let statement = "E13: at gamma = 0.05 the first message without the prior is worse than the prior alone";
-    claims.push(Claim::below("e13-worse", statement, stationary, 13.0 / 12.0));
-    Ok(claims)
+    let value = |plant: &Plant| {
+        let scheme = RoundedSample::new(1.0, 1.0).ok()?;
+        first_message_value(&scheme, &plant.stationary().ok()?).ok()
+    };
+    let what = "E13: mean variance after first message and prior together, at a, gamma";
+    claims.references("e13", what, &paper, |p| (p.to_string(), value(p).map(|v| v.expected_variance)));
+    let what = "entropy of the first message in bits, at a, gamma";
+    claims.references("entropy", what, &paper, |p| (p.to_string(), value(p).map(|v| v.entropy_bits)));
+    let prior = paper.last().and_then(|plant| plant.stationary().ok());
+    let what = "E13: at gamma = 0.05 the prior alone is better than the first message alone, 13/12";
+    claims.below("e13-worse", what, prior.map(|prior| prior.covariance()[0]), 13.0 / 12.0);
 }

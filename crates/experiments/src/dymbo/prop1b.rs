@@ -1,22 +1,24 @@
 //! How normal the posterior of one bit is.
 
-use super::common::{bad, not_empty};
-use crate::legacy::claim::not_decreasing;
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use fewbits_core::{Gaussian, Sign};
-use fewbits_dymbo::bit_update;
+use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
+use fewbits_core::factor::{Factor, InCell};
+use fewbits_core::{Gaussian, Link, Sign};
 use fewbits_dymbo::skew_normal::{distance_from_normal, posterior_density};
 use fewbits_numerics::normal::log_pdf_with;
+use garde::Validate;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-const ID: &str = "dymbo-prop1b";
-
 /// Noise deviations, and that of the prior.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Parameters {
+pub struct Parameters {
+    /// Measurement noise deviations.
+    #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
     sigma: Vec<f64>,
+    /// Prior deviation.
+    #[garde(range(min = 1e-6, max = 1e6))]
     sigma_theta: f64,
 }
 
@@ -29,14 +31,52 @@ impl Default for Parameters {
     }
 }
 
-pub(super) struct PosteriorShape;
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Distance against noise.
+    distances: Vec<Distance>,
+    /// Densities at the smallest noise.
+    densities: Vec<Density>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Distance {
+    /// Measurement noise deviation.
+    sigma: f64,
+    /// Largest difference of the densities.
+    #[schemars(extend("unit" = "1/unit"))]
+    distance: f64,
+    /// Distance times prior deviation times (sigma/prior deviation)^3.
+    cubed: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Density {
+    /// State.
+    #[schemars(extend("unit" = "unit"))]
+    theta: f64,
+    /// Posterior after a +1 at the prior mean.
+    #[schemars(extend("unit" = "1/unit"))]
+    exact: f64,
+    /// Normal density of the same moments.
+    #[schemars(extend("unit" = "1/unit"))]
+    normal: f64,
+    /// Density before.
+    #[schemars(extend("unit" = "1/unit"))]
+    prior: f64,
+}
+
+/// Proposition 1(b).
+pub struct PosteriorShape;
 
 impl Figure for PosteriorShape {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
-            id: ID,
+            id: "dymbo-prop1b",
             title: "The posterior of one bit is nearly normal",
             caption: "Largest difference between the exact posterior density after one bit, which is skew-normal, and the normal \
                       density of the same mean and variance. It falls with the cube of the noise (Proposition 1b, restated: E11). \
@@ -45,92 +85,58 @@ impl Figure for PosteriorShape {
         }
     }
 
-    fn check(&self, p: &Parameters) -> Result<(), Error> {
-        not_empty(ID, "sigma", &p.sigma)?;
-        for (name, value) in p
-            .sigma
-            .iter()
-            .map(|s| ("sigma", *s))
-            .chain([("sigma_theta", p.sigma_theta)])
-        {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(bad(ID, name, value, "a finite number above 0"));
-            }
-        }
-        Ok(())
-    }
-
-    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("sigma", "", "measurement noise deviation"),
-            column("distance", "1/unit", "largest difference of the densities"),
-            column("cubed", "", "distance times prior deviation times (sigma/prior deviation)^3"),
-        ]);
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let prior = Gaussian::scalar(0.0, p.sigma_theta * p.sigma_theta)?;
-        for &sigma in &p.sigma {
+        let row = |sigma: &f64| {
             let distance = distance_from_normal(prior.covariance()[0], sigma * sigma)?;
-            let ratio = sigma / p.sigma_theta;
-            table.push(row![sigma, distance, distance * p.sigma_theta * ratio.powi(3)])?;
-        }
-        let mut densities = Table::new([
-            column("theta", "unit", "state"),
-            column("exact", "1/unit", "posterior after a +1 at the prior mean"),
-            column("normal", "1/unit", "normal density of the same moments"),
-            column("prior", "1/unit", "density before"),
-        ]);
-        let noise = p.sigma.iter().copied().fold(f64::INFINITY, f64::min).powi(2);
-        let (posterior, _) = bit_update(&prior, noise, Sign::Above, 0.0, 0.0)?;
-        let pdf = |x: f64, belief: &Gaussian<1>| log_pdf_with(x, belief.mean()[0], belief.covariance()[0]).exp();
-        for i in -150..=200 {
-            let theta = p.sigma_theta * f64::from(i) / 50.0;
-            let exact = posterior_density(theta, &prior, noise, Sign::Above);
-            densities.push(row![theta, exact, pdf(theta, &posterior), pdf(theta, &prior)])?;
-        }
-        Ok(Tables::from(table).with("densities", densities))
-    }
-
-    fn claims(&self, _: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let distances = tables.main.numbers("distance")?;
-        let falls = "the posterior becomes normal as the noise grows";
-        let mut claims = vec![Claim::never("converges", falls, not_decreasing(&distances)).at_defaults()];
-        let expected = [
-            1.637705785e-2,
-            2.3852864e-3,
-            3.090157e-4,
-            3.896153e-5,
-            4.880716e-6,
-            6.104214e-7,
-        ];
-        for ((sigma, distance), value) in tables.main.points("sigma", "distance")?.into_iter().zip(expected) {
-            let statement = format!("largest difference at sigma = {sigma}");
-            claims.push(Claim::near(format!("distance-{sigma}"), statement, distance, value, 1e-9).at_defaults());
-        }
-        let last = distances.len() - 1;
-        let ratio = if last > 0 {
-            distances[last - 1] / distances[last]
-        } else {
-            f64::NAN
+            let cubed = distance * p.sigma_theta * (sigma / p.sigma_theta).powi(3);
+            Ok(Distance {
+                sigma: *sigma,
+                distance,
+                cubed,
+            })
         };
-        let statement = "twice the noise, an eighth of the difference";
-        claims.push(Claim::near("cubic", statement, ratio, 8.0, 0.01).at_defaults());
-        let constant = tables.main.numbers("cubed")?[last];
-        claims.push(Claim::near("constant", "constant of the cubic law", constant, 0.0200, 5e-5).at_defaults());
-        Ok(claims)
+        let noise = p.sigma.iter().copied().fold(f64::INFINITY, f64::min).powi(2);
+        let after = InCell::sign(Sign::Above, 0.0, noise, &Link::PERFECT)?.tilted(&prior)?;
+        let density = |i: i32| {
+            let theta = p.sigma_theta * f64::from(i) / 50.0;
+            Density {
+                theta,
+                exact: posterior_density(theta, &prior, noise, Sign::Above),
+                normal: log_pdf_with(theta, after.mean[0], after.covariance[0]).exp(),
+                prior: log_pdf_with(theta, 0.0, prior.covariance()[0]).exp(),
+            }
+        };
+        Ok(Rows {
+            distances: p.sigma.iter().map(row).collect::<Result<_, Error>>()?,
+            densities: (-150..=200).map(density).collect(),
+        })
     }
 
-    fn plot(&self, p: &Parameters, tables: &Tables) -> Result<Plot, Error> {
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let rows = &rows.distances;
+        let what = "the posterior becomes normal as the noise grows";
+        claims.decreasing("converges", what, rows.iter().map(|r| r.distance)).at_defaults();
+        claims.references("distance", "largest difference at sigma", rows, |r| (r.sigma.to_string(), r.distance));
+        let ratio = rows.windows(2).last().map(|w| w[0].distance / w[1].distance);
+        claims.near("cubic", "twice the noise, an eighth of the difference", ratio, 8.0, 0.01).at_defaults();
+        let constant = rows.last().map(|r| r.cubed);
+        claims.near("constant", "constant of the cubic law", constant, 0.0200, 5e-5).at_defaults();
+    }
+
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let law = |sigma: f64| (sigma, 0.02 / p.sigma_theta * (p.sigma_theta / sigma).powi(3));
         let x = Axis::log("measurement noise deviation sigma");
         let distance = Panel::new("Distance from normal", x, Axis::log("largest density difference"))
             .with(Layer::dashed("0.02 / sigma^3", p.sigma.iter().map(|s| law(*s)).collect()).coloured(1))
-            .with(Layer::points("exact", tables.main.points("sigma", "distance")?).coloured(0));
-        let rows = tables.named("densities")?;
+            .with(Layer::points("exact", points(&rows.distances, |r| (r.sigma, r.distance))).coloured(0));
+        let curve = |of: fn(&Density) -> f64| points(&rows.densities, |r| (r.theta, of(r)));
         let title = "Densities at the smallest noise";
-        let densities = Panel::new(title, Axis::linear("theta"), Axis::linear("density"))
-            .with(Layer::dashed("prior", rows.points("theta", "prior")?).coloured(2))
-            .with(Layer::line("exact posterior", rows.points("theta", "exact")?).coloured(0))
-            .with(Layer::dashed("normal, same moments", rows.points("theta", "normal")?).coloured(1))
+        let densities = Panel::new(title, Axis::linear("state"), Axis::linear("density"))
+            .with(Layer::dashed("prior", curve(|r| r.prior)).coloured(2))
+            .with(Layer::line("exact posterior", curve(|r| r.exact)).coloured(0))
+            .with(Layer::dashed("normal, same moments", curve(|r| r.normal)).coloured(1))
             .legend(Legend::TopLeft);
-        Ok(Plot::grid(2, vec![distance, densities]))
+        Plot::grid(2, vec![distance, densities])
     }
 }

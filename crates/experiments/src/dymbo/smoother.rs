@@ -1,32 +1,38 @@
 //! Smoothing the sign-bit filter's output.
 
-use super::common::{bad, dymbo_steady, not_empty, pairs, plant};
-use super::referee::{BURN, Scheme, Twin, exact_filter};
-use crate::legacy::claim::largest;
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot};
-use fewbits_dymbo::ScalarPlant;
-use fewbits_filters::{PointMassFilter, scalar_fixed_lag_variance, smoother::smooth_step};
-use fewbits_monte_carlo::{Moments, Stream};
+use super::common::{Plant, plants};
+use super::gap::BURN;
+use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure, Measured};
+use fewbits_dymbo::gap::{Twin, exact_filter};
+use fewbits_dymbo::{DymboFilter, ScalarFilter};
+use fewbits_filters::scalar_fixed_lag_variance;
+use fewbits_monte_carlo::Moments;
+use garde::Validate;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-smoother";
 
-/// Plants as pairs, lags, and the effort.
-#[derive(Serialize, Deserialize)]
+/// Plants, lags, and the effort.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Parameters {
-    a: Vec<f64>,
-    gamma: Vec<f64>,
+pub struct Parameters {
+    /// Plants, `a:gamma`.
+    #[garde(length(min = 1), dive)]
+    plants: Vec<Plant>,
+    /// Steps between the state and the last bit.
+    #[garde(length(min = 1), inner(range(max = 200)))]
     lag: Vec<usize>,
+    /// Simulated runs of ten smoothed states.
+    #[garde(range(min = 2, max = 10_000_000))]
     trials: u64,
 }
 
 impl Default for Parameters {
     fn default() -> Self {
         Self {
-            a: vec![0.9, 0.9, 0.99],
-            gamma: vec![0.5, 0.05, 1.0],
+            plants: plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0)]),
             lag: vec![0, 1, 2, 3, 4, 5, 10, 20],
             trials: 400,
         }
@@ -38,52 +44,37 @@ const ANCHORS: usize = 10;
 /// Steps between them.
 const STRIDE: usize = 4;
 
-pub(super) struct Smoothing;
-
-/// For each lag the mean over the anchors of one run of the exact smoothed variance, and of the squared distance of the
-/// Rauch-Tung-Striebel estimate from the exact smoothed mean.
-fn one_run(
-    plant: &ScalarPlant,
-    exact: &PointMassFilter,
-    lags: &[usize],
-    stream: Stream,
-) -> Result<Vec<(f64, f64)>, fewbits_dymbo::Error> {
-    let longest = lags.iter().copied().max().unwrap_or(0);
-    let mut twin = Twin::new(plant, &Scheme::Bit { crossover: 0.0 }, exact, stream.fast_rng())?;
-    for _ in 0..BURN {
-        twin.step()?;
-    }
-    let mut beliefs = vec![twin.belief];
-    let mut densities = vec![twin.density.clone()];
-    let mut likelihoods = Vec::new();
-    for n in 1..=(ANCHORS - 1) * STRIDE + longest {
-        twin.step()?;
-        beliefs.push(twin.belief);
-        likelihoods.push(twin.likelihood.clone());
-        densities.push(if n % STRIDE == 0 {
-            twin.density.clone()
-        } else {
-            densities[0].clone()
-        });
-    }
-    let mut sums = vec![(0.0, 0.0); lags.len()];
-    for anchor in (0..ANCHORS).map(|i| i * STRIDE) {
-        for (sum, &lag) in sums.iter_mut().zip(lags) {
-            let now = anchor + lag;
-            let mut estimate = beliefs[now];
-            for n in (anchor..now).rev() {
-                estimate = smooth_step(plant.dynamics(), &beliefs[n], &estimate)?;
-            }
-            let truth = exact.smooth(&densities[anchor], &likelihoods[anchor..now])?;
-            sum.0 += truth.variance() / ANCHORS as f64;
-            sum.1 += (truth.mean() - estimate.mean()[0]).powi(2) / ANCHORS as f64;
-        }
-    }
-    Ok(sums)
+#[derive(Serialize, JsonSchema)]
+pub struct Row {
+    #[serde(flatten)]
+    plant: Plant,
+    /// Steps between the state and the last bit.
+    lag: usize,
+    /// Simulated runs of ten smoothed states.
+    trials: u64,
+    /// Steady variance computed by the sign-bit smoother.
+    #[schemars(extend("unit" = "sigma^2"))]
+    predicted: f64,
+    /// Steady variance of the unquantized smoother.
+    #[schemars(extend("unit" = "sigma^2"))]
+    kalman: f64,
+    /// Mean squared error of the sign-bit smoother.
+    #[schemars(extend("unit" = "sigma^2"))]
+    rts_mse: Measured,
+    /// Mean squared error of the exact smoother of the same bits.
+    #[schemars(extend("unit" = "sigma^2"))]
+    exact_mse: Measured,
+    /// Mean squared distance of the two smoothed estimates.
+    #[schemars(extend("unit" = "sigma^2"))]
+    excess: Measured,
 }
+
+/// Errors against the lag.
+pub struct Smoothing;
 
 impl Figure for Smoothing {
     type Parameters = Parameters;
+    type Tables = Vec<Row>;
 
     fn about(&self) -> About {
         About {
@@ -96,149 +87,90 @@ impl Figure for Smoothing {
         }
     }
 
-    fn check(&self, p: &Parameters) -> Result<(), Error> {
-        not_empty(ID, "lag", &p.lag)?;
-        if let Some(lag) = p.lag.iter().find(|lag| **lag > 200) {
-            return Err(bad(ID, "lag", lag, "lags up to 200"));
-        }
-        pairs(ID, &p.a, &p.gamma)?
-            .into_iter()
-            .try_for_each(|(a, g)| plant(ID, a, g).map(drop))
-    }
-
     fn quicken(&self, p: &mut Parameters) {
         p.trials = 20;
     }
 
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("a", "", "plant coefficient"),
-            column("gamma", "", "process variance over measurement variance"),
-            column("lag", "", "steps between the state and the last bit"),
-            column("trials", "", "simulated runs of ten smoothed states"),
-            column("predicted", "sigma^2", "steady variance computed by the sign-bit smoother"),
-            column("kalman", "sigma^2", "steady variance of the unquantized smoother"),
-            column("rts_mse", "sigma^2", "mean squared error of the sign-bit smoother"),
-            column("rts_se", "sigma^2", "its standard error"),
-            column("exact_mse", "sigma^2", "mean squared error of the exact smoother of the same bits"),
-            column("exact_se", "sigma^2", "its standard error"),
-            column("excess", "sigma^2", "mean squared distance of the two smoothed estimates"),
-            column("excess_se", "sigma^2", "its standard error"),
-        ]);
-        for (a, gamma) in pairs(ID, &p.a, &p.gamma)? {
-            let plant = plant(ID, a, gamma)?;
-            let longest = p.lag.iter().copied().max().unwrap_or(0);
-            let exact = exact_filter(&plant, BURN + ANCHORS * STRIDE + longest)?;
-            let run = context.monte_carlo(context.stream(ID).named(&format!("{a} {gamma}")), p.trials);
-            let runs = run.run(|trial| one_run(&plant, &exact, &p.lag, trial.stream))?;
-            let (dymbo, kalman) = (dymbo_steady(&plant)?, plant.steady_state(1.0)?);
-            for (i, &lag) in p.lag.iter().enumerate() {
-                // The exact variance is the error of the exact smoother, free of the noise of one realised error.
-                let best: Moments = runs.iter().map(|run| run[i].0).collect();
-                let excess: Moments = runs.iter().map(|run| run[i].1).collect();
-                let smoothed: Moments = runs.iter().map(|run| run[i].0 + run[i].1).collect();
-                table.push(row![
-                    a,
-                    gamma,
-                    lag,
-                    p.trials,
-                    scalar_fixed_lag_variance(a, &dymbo, lag),
-                    scalar_fixed_lag_variance(a, &kalman, lag),
-                    smoothed.mean(),
-                    smoothed.standard_error(),
-                    best.mean(),
-                    best.standard_error(),
-                    excess.mean(),
-                    excess.standard_error(),
-                ])?;
-            }
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        let longest = p.lag.iter().copied().max().unwrap_or(0);
+        let mut rows = Vec::new();
+        for &plant in &p.plants {
+            let model = plant.model()?;
+            let filter = DymboFilter::new(model);
+            let exact = exact_filter(&model, BURN + ANCHORS * STRIDE + longest)?;
+            let stream = context.stream(ID).named(&plant.to_string());
+            let empty = || vec![[Moments::default(); 3]; p.lag.len()];
+            let sums = context.tally(stream, p.trials, empty, |sums, trial| {
+                let mut rng = trial.stream.fast_rng();
+                let mut twin = Twin::new(&mut rng, filter, &exact)?;
+                (0..BURN).try_for_each(|_| twin.step(&mut rng))?;
+                let gaps = twin.smoothed(&mut rng, &p.lag, ANCHORS, STRIDE)?;
+                for (sums, gap) in sums.iter_mut().zip(gaps) {
+                    // The exact variance is the error of the exact smoother, free of the noise of one realised error.
+                    sums[0].add(gap.exact_variance + gap.excess);
+                    sums[1].add(gap.exact_variance);
+                    sums[2].add(gap.excess);
+                }
+                Ok::<_, fewbits_dymbo::Error>(())
+            })?;
+            let (own, kalman) = (model.steady_state(filter.information())?, model.steady_state(1.0)?);
+            rows.extend(p.lag.iter().zip(sums).map(|(&lag, sums)| Row {
+                plant,
+                lag,
+                trials: p.trials,
+                predicted: scalar_fixed_lag_variance(plant.a, &own, lag),
+                kalman: scalar_fixed_lag_variance(plant.a, &kalman, lag),
+                rts_mse: Measured::mean(&sums[0]),
+                exact_mse: Measured::mean(&sums[1]),
+                excess: Measured::mean(&sums[2]),
+            }));
         }
-        Ok(table.into())
+        Ok(rows)
     }
 
-    fn claims(&self, _: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let mut claims = Vec::new();
-        let entry = |a: f64, gamma: f64, lag: usize, name: &str| -> Result<f64, Error> {
-            let rows = tables.main.only("a", a)?.only("gamma", gamma)?.only("lag", lag)?;
-            Ok(rows.numbers(name)?.first().copied().unwrap_or(f64::NAN))
-        };
-        // Errors with the standard errors of an independent simulation.
-        for (a, gamma, lag, rts, exact, error) in [
-            (0.9, 0.5, 1, 0.599460, 0.599260, 4.9e-4),
-            (0.9, 0.5, 2, 0.552483, 0.552086, 5.2e-4),
-            (0.9, 0.5, 5, 0.527125, 0.526414, 5.2e-4),
-            (0.9, 0.5, 20, 0.525673, 0.524937, 5.2e-4),
-            (0.9, 0.05, 1, 0.154459, 0.154458, 1.2e-5),
-            (0.9, 0.05, 5, 0.135655, 0.135653, 1.5e-5),
-            (0.9, 0.05, 20, 0.131343, 0.131340, 1.5e-5),
-            (0.99, 1.0, 1, 0.962036, 0.959706, 1.9e-3),
-            (0.99, 1.0, 20, 0.827644, 0.820008, 2.0e-3),
-        ] {
-            for (who, value) in [("rts", rts), ("exact", exact)] {
-                let tolerance = 4.5 * entry(a, gamma, lag, &format!("{who}_se"))?.hypot(error);
-                let statement = format!("a = {a}, gamma = {gamma}, lag {lag}: error of the {who} smoother");
-                let found = entry(a, gamma, lag, &format!("{who}_mse"))?;
-                claims.push(
-                    Claim::near(format!("{who}-{a}-{gamma}-{lag}"), statement, found, value, tolerance).at_defaults(),
-                );
-            }
-        }
+    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let key = |r: &Row| format!("{} {}", r.plant, r.lag);
+        claims.references("rts", "error of the smoother at a, gamma, lag", rows, |r| (key(r), r.rts_mse));
+        claims.references("exact", "error of the exact smoother at a, gamma, lag", rows, |r| (key(r), r.exact_mse));
+        let what = "predicted variance at a, gamma, lag";
+        claims.references("predicted", what, rows, |r| (key(r), r.predicted));
+        let at = |gamma: f64, lag: usize| rows.iter().find(|r| r.plant == Plant { a: 0.9, gamma } && r.lag == lag);
         for (gamma, lag, saving) in [(0.5, 5, 0.28), (0.05, 20, 0.21)] {
-            let saved = 1.0 - entry(0.9, gamma, lag, "rts_mse")? / entry(0.9, gamma, 0, "rts_mse")?;
-            let statement = format!("gamma = {gamma}: a lag of {lag} saves this share of the filter's error");
-            claims.push(Claim::near(format!("saves-{gamma}"), statement, saved, saving, 0.01).at_defaults());
+            let saved = at(gamma, lag).zip(at(gamma, 0)).map(|(r, now)| 1.0 - r.rts_mse.value / now.rts_mse.value);
+            let what = format!("gamma = {gamma}: a lag of {lag} saves this share of the filter's error");
+            claims.near(format!("saves-{gamma}"), what, saved, saving, 0.01).at_defaults();
         }
-        let rows = tables.main.only("gamma", 0.5)?;
-        let shares = rows
-            .numbers("excess")?
-            .into_iter()
-            .zip(rows.numbers("excess_se")?)
-            .zip(rows.numbers("exact_mse")?);
-        let gap = largest(shares.map(|((excess, error), exact)| (excess - 4.5 * error) / exact));
-        let statement = "gamma = 0.5: within 0.14 % of the exact smoother at every lag, less 4.5 standard errors";
-        claims.push(Claim::at_most("near-exact", statement, gap, 1.45e-3).at_defaults());
-        let analog = entry(0.9, 0.05, 0, "kalman")?;
-        let beaten = entry(0.9, 0.05, 4, "rts_mse")? + 4.5 * entry(0.9, 0.05, 4, "rts_se")?;
-        let statement = "gamma = 0.05: from lag 4 the sign-bit smoother beats the unquantized filter";
-        claims.push(Claim::below("beats-analog", statement, beaten, analog).at_defaults());
-        for (lag, value) in [(4, 0.137882), (3, 0.141305)] {
-            let statement = format!("gamma = 0.05: predicted variance at lag {lag}");
-            claims.push(
-                Claim::near(format!("predicted-{lag}"), statement, entry(0.9, 0.05, lag, "predicted")?, value, 6e-7)
-                    .at_defaults(),
-            );
-        }
-        Ok(claims)
+        let slow = rows.iter().filter(|r| r.plant.gamma == 0.5);
+        let what = "gamma = 0.5: within 0.14 % of the exact smoother at every lag, less 4.5 standard errors";
+        claims
+            .all("near-exact", what, slow, |r| {
+                r.excess.value - 4.5 * r.excess.standard_error.unwrap_or(0.0) <= 1.45e-3 * r.exact_mse.value
+            })
+            .at_defaults();
+        let difference = at(0.05, 4).zip(at(0.05, 0)).map(|(r, now)| Measured {
+            value: r.rts_mse.value - now.kalman,
+            ..r.rts_mse
+        });
+        let what = "gamma = 0.05: from lag 4 the sign-bit smoother beats the unquantized filter";
+        claims.less("beats-analog", what, difference, 4.5).at_defaults();
     }
 
-    fn plot(&self, p: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let mut panels = Vec::new();
-        for (a, gamma) in pairs(ID, &p.a, &p.gamma)? {
-            let rows = tables.main.only("a", a)?.only("gamma", gamma)?;
-            let filter = rows.only("lag", 0.0)?.numbers("kalman")?.first().copied();
-            let analog = filter.map(|m| {
-                rows.numbers("lag")
-                    .map(|lags| lags.into_iter().map(|lag| (lag, m)).collect())
-            });
-            let mut panel =
-                Panel::new(format!("a = {a}, gamma = {gamma}"), Axis::linear("lag"), Axis::linear("error / sigma^2"))
-                    .with(Layer::line("sign bit, predicted", rows.points("lag", "predicted")?).coloured(0))
-                    .with(
-                        Layer::points("sign bit", rows.points("lag", "rts_mse")?)
-                            .with_errors(rows.numbers("rts_se")?)
-                            .coloured(0),
-                    )
-                    .with(
-                        Layer::points("exact smoother", rows.points("lag", "exact_mse")?)
-                            .coloured(1)
-                            .marked(Marker::Cross),
-                    )
-                    .with(Layer::line("unquantized smoother", rows.points("lag", "kalman")?).coloured(2));
-            if let Some(points) = analog {
-                panel = panel.with(Layer::dashed("unquantized filter", points?).coloured(3));
-            }
-            panels.push(panel);
-        }
-        Ok(Plot::grid(panels.len().min(2), panels))
+    fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
+        let panel = |rows: &[Row]| {
+            let curve = |of: fn(&Row) -> f64| points(rows, |r| (r.lag as f64, of(r)));
+            let filter = rows[0].plant.kalman_variance().ok();
+            Panel::new(rows[0].plant.title(), Axis::linear("lag"), Axis::linear("error / sigma^2"))
+                .with(Layer::line("sign bit, predicted", curve(|r| r.predicted)).coloured(0))
+                .with(Layer::measured("sign bit", rows, |r| (r.lag as f64, r.rts_mse)).coloured(0))
+                .with(
+                    Layer::measured("exact smoother", rows, |r| (r.lag as f64, r.exact_mse))
+                        .coloured(1)
+                        .marked(Marker::Cross),
+                )
+                .with(Layer::line("unquantized smoother", curve(|r| r.kalman)).coloured(2))
+                .with(Layer::dashed("unquantized filter", points(rows, |r| (r.lag as f64, filter))).coloured(3))
+        };
+        let panels: Vec<Panel> = rows.chunks(p.lag.len()).map(panel).collect();
+        Plot::grid(panels.len().min(2), panels)
     }
 }

@@ -1,35 +1,57 @@
 //! Where the threshold belongs, and what an unstable plant does.
 
-use super::common::{LONGEST_RUN, bad, pairs, stationary_plant};
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use fewbits_core::{Dynamics, Encoder, Gaussian, Observation, Sensing};
-use fewbits_dymbo::{DymboFilter, FineSensor, Initialisation, OneBitSensor, ScalarPlant, ThresholdRule};
+use super::common::{Plant, plants};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::{About, Claims, Context, Error, Figure, Measured};
+use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Scheme, Sensing, Sign};
+use fewbits_dymbo::{DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant};
+use fewbits_filters::assumed_density;
 use fewbits_monte_carlo::{Estimate, Moments, Stream};
-use nalgebra::Vector1;
+use garde::Validate;
+use nalgebra::{Matrix1, Vector1};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-threshold";
 
-/// Plants as pairs, the length of runs, and the unstable plant.
-#[derive(Serialize, Deserialize)]
+/// Plants, the length of runs, and the unstable plant.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Parameters {
-    a: Vec<f64>,
-    gamma: Vec<f64>,
+pub struct Parameters {
+    /// Plants, `a:gamma`; the state starts from its stationary law.
+    #[garde(length(min = 1), inner(custom(stationary)), dive)]
+    plants: Vec<Plant>,
+    /// Steps of a run that are measured.
+    #[garde(range(min = 1, max = 10_000))]
     steps: u64,
+    /// Steps before them.
+    #[garde(range(max = 10_000))]
     burn: u64,
+    /// Simulated runs.
+    #[garde(range(min = 2, max = 100_000_000))]
     trials: u64,
+    /// Coefficient of the unstable plant.
+    #[garde(range(min = -3.0, max = 3.0))]
     unstable_a: f64,
+    /// Its process variance over measurement variance.
+    #[garde(range(min = 1e-6, max = 1e3))]
     unstable_gamma: f64,
+    /// Simulated runs of it.
+    #[garde(range(min = 2, max = 100_000_000))]
     unstable_trials: u64,
+}
+
+fn stationary(plant: &Plant, _: &()) -> garde::Result {
+    if plant.a.abs() < 1.0 {
+        return Ok(());
+    }
+    Err(garde::Error::new("a must be above -1 and below 1"))
 }
 
 impl Default for Parameters {
     fn default() -> Self {
         Self {
-            a: vec![0.9, 0.9, -0.9],
-            gamma: vec![0.5, 0.05, 0.5],
+            plants: plants([(0.9, 0.5), (0.9, 0.05), (-0.9, 0.5)]),
             steps: 1000,
             burn: 100,
             trials: 6_000,
@@ -40,45 +62,85 @@ impl Default for Parameters {
     }
 }
 
-pub(super) struct ThresholdPlace;
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Errors of the three rules.
+    rules: Vec<Row>,
+    /// Runs of an unstable plant that escape.
+    unstable: Vec<Unstable>,
+}
 
-/// The three schemes, in the order of the table.
-const RULES: [&str; 3] = ["prediction", "eq14", "eq14_exact"];
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    #[serde(flatten)]
+    plant: Plant,
+    /// Place of the threshold.
+    rule: &'static str,
+    /// Simulated runs.
+    trials: u64,
+    /// Mean squared error.
+    #[schemars(extend("unit" = "sigma^2"))]
+    mse: Measured,
+    /// Relative excess over the prediction rule, same noise.
+    excess: Measured,
+    /// Squared error over computed variance.
+    nees: Measured,
+}
 
-/// Time averages of one run: squared error for each rule, and normalised for the first and last.
+#[derive(Serialize, JsonSchema)]
+struct Unstable {
+    /// Plant coefficient.
+    a: f64,
+    /// Process variance over measurement variance.
+    gamma: f64,
+    /// Simulated runs.
+    trials: u64,
+    /// Fraction of runs whose error exceeds 50 within 500 steps.
+    escaped: Measured,
+    /// Steady variance that the filter computes meanwhile.
+    #[schemars(extend("unit" = "sigma^2"))]
+    riccati: Option<f64>,
+}
+
+/// The three rules, in the order of the table, and their names in the plot.
+const RULES: [(&str, &str); 3] = [
+    ("prediction", "at the prediction"),
+    ("eq14", "equation (14) as printed"),
+    ("eq14_exact", "equation (14), exact update"),
+];
+
+/// Time averages of one run: squared error for each rule, plain and normalised.
 fn one_run(
     plant: &ScalarPlant,
-    variance: f64,
+    start: &Gaussian<1>,
     p: &Parameters,
     stream: Stream,
-) -> Result<([f64; 3], [f64; 3]), fewbits_dymbo::Error> {
+) -> Result<[[f64; 3]; 2], fewbits_dymbo::Error> {
     let mut rng = stream.fast_rng();
-    let prediction = DymboFilter::new(*plant);
-    let literal = prediction.with_threshold_rule(ThresholdRule::PreviousEstimate);
-    let start = Gaussian::scalar(0.0, variance)?;
-    let mut state = start.sample(&mut rng)?;
-    let mut beliefs = [start; 3];
-    let (mut squared, mut normalised) = ([0.0; 3], [0.0; 3]);
+    let filter = DymboFilter::new(*plant);
+    let mut state = start.sample(&mut rng);
+    let mut beliefs = [*start; 3];
+    let mut sums = [[0.0; 3]; 2];
     for n in 0..p.burn + p.steps {
         state = plant.dynamics().propagate(&mut rng, &state);
         let sample = plant.sensor().sample(&mut rng, &state)[0];
-        let bit = OneBitSensor.encode(&sample, &prediction.threshold(&beliefs[0]));
-        beliefs[0] = prediction.step(&beliefs[0], Observation::Received(bit))?.0;
+        let ask = |threshold: f64| Ok::<_, fewbits_dymbo::Error>(Observation::Received(Sign::of(sample, threshold)?));
+        beliefs[0] = filter.step(&beliefs[0], &ask(filter.threshold(&beliefs[0]))?)?.0;
         // Equation (14) as printed: the threshold is the old estimate, the update that of a bit at the prediction.
-        let bit = OneBitSensor.encode(&sample, &literal.threshold(&beliefs[1]));
-        beliefs[1] = prediction.update(&prediction.predict(&beliefs[1]), bit).0;
-        let bit = OneBitSensor.encode(&sample, &literal.threshold(&beliefs[2]));
-        beliefs[2] = literal.step(&beliefs[2], Observation::Received(bit))?.0;
+        beliefs[1] = filter.step(&beliefs[1], &ask(beliefs[1].mean()[0])?)?.0;
+        let old = beliefs[2].mean()[0];
+        let factor = filter.scheme().factor(&old, &ask(old)?, filter.link())?;
+        beliefs[2] = assumed_density::update(&filter.predict(&beliefs[2]), &Matrix1::identity(), &factor)?.0;
         if n >= p.burn {
             for (i, belief) in beliefs.iter().enumerate() {
-                let error = belief.mean()[0] - state[0];
-                squared[i] += error * error;
-                normalised[i] += error * error / belief.covariance()[0];
+                let squared = (belief.mean()[0] - state[0]).powi(2);
+                sums[0][i] += squared;
+                sums[1][i] += squared / belief.covariance()[0];
             }
         }
     }
-    let average = |sums: [f64; 3]| sums.map(|sum| sum / p.steps as f64);
-    Ok((average(squared), average(normalised)))
+    Ok(sums.map(|sums| sums.map(|sum| sum / p.steps as f64)))
 }
 
 /// Excess of `b` over `a` relative to `a`, from paired runs.
@@ -104,10 +166,10 @@ const UNSTABLE_STEPS: usize = 500;
 fn escapes(plant: &ScalarPlant, stream: Stream) -> Result<bool, fewbits_dymbo::Error> {
     let mut rng = stream.fast_rng();
     let filter = DymboFilter::new(*plant);
-    let sensor = FineSensor::new(1.0)?;
+    let scheme = RoundedSample::new(plant.measurement_variance(), 1.0)?;
     let mut error = Vector1::new(0.0);
-    let message = sensor.encode(&plant.sensor().sample(&mut rng, &error)[0], &());
-    let mut belief = filter.init(&Initialisation::Fine { sensor, message })?;
+    let message = scheme.round(plant.sensor().sample(&mut rng, &error)[0])?;
+    let mut belief = Initialisation::Fine { scheme, message }.belief()?;
     for _ in 0..UNSTABLE_STEPS {
         error -= belief.mean();
         belief = Gaussian::from_trusted_parts(Vector1::zeros(), *belief.covariance());
@@ -116,14 +178,17 @@ fn escapes(plant: &ScalarPlant, stream: Stream) -> Result<bool, fewbits_dymbo::E
         }
         error = plant.dynamics().propagate(&mut rng, &error);
         let sample = plant.sensor().sample(&mut rng, &error)[0];
-        let bit = OneBitSensor.encode(&sample, &filter.threshold(&belief));
-        belief = filter.step(&belief, Observation::Received(bit))?.0;
+        belief = filter.exchange(&mut rng, &belief, sample)?.0;
     }
     Ok((error - belief.mean())[0].abs() > LOST)
 }
 
+/// Errors of the three rules.
+pub struct ThresholdPlace;
+
 impl Figure for ThresholdPlace {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
@@ -137,183 +202,68 @@ impl Figure for ThresholdPlace {
         }
     }
 
-    fn check(&self, p: &Parameters) -> Result<(), Error> {
-        if !(1..=LONGEST_RUN).contains(&(p.steps as usize)) {
-            return Err(bad(ID, "steps", p.steps, "a number from 1 to 10000"));
-        }
-        ScalarPlant::new_unstable(p.unstable_a, p.unstable_gamma, 1.0)?;
-        pairs(ID, &p.a, &p.gamma)?
-            .into_iter()
-            .try_for_each(|(a, g)| stationary_plant(ID, a, g).map(drop))
-    }
-
     fn quicken(&self, p: &mut Parameters) {
         (p.trials, p.unstable_trials) = (200, 2_000);
     }
 
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("a", "", "plant coefficient"),
-            column("gamma", "", "process variance over measurement variance"),
-            column("rule", "", "place of the threshold"),
-            column("trials", "", "simulated runs"),
-            column("mse", "sigma^2", "mean squared error"),
-            column("se", "sigma^2", "its standard error"),
-            column("excess", "", "relative excess over the prediction rule, same noise"),
-            column("excess_se", "", "its standard error"),
-            column("nees", "", "squared error over computed variance"),
-            column("nees_se", "", "its standard error"),
-        ]);
-        for (a, gamma) in pairs(ID, &p.a, &p.gamma)? {
-            let (plant, variance) = stationary_plant(ID, a, gamma)?;
-            let stream = context.stream(ID).named(&format!("{a} {gamma}"));
-            let runs = context
-                .monte_carlo(stream, p.trials)
-                .run(|trial| one_run(&plant, variance, p, trial.stream))?;
-            let column = |i: usize| runs.iter().map(|run| run.0[i]).collect::<Vec<f64>>();
-            let reference = column(0);
-            for (i, rule) in RULES.into_iter().enumerate() {
-                let squared: Moments = column(i).into_iter().collect();
-                let normalised: Moments = runs.iter().map(|run| run.1[i]).collect();
-                let excess = relative(&reference, &column(i));
-                table.push(row![
-                    a,
-                    gamma,
-                    rule,
-                    p.trials,
-                    squared.mean(),
-                    squared.standard_error(),
-                    excess.value,
-                    excess.standard_error,
-                    normalised.mean(),
-                    normalised.standard_error(),
-                ])?;
-            }
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let mut rules = Vec::new();
+        for &plant in &p.plants {
+            let (model, start) = (plant.model()?, plant.stationary()?);
+            let run = context.monte_carlo(context.stream(ID).named(&plant.to_string()), p.trials);
+            let runs = run.run(|trial| one_run(&model, &start, p, trial.stream))?;
+            let of = |what: usize, rule: usize| runs.iter().map(|run| run[what][rule]).collect::<Vec<f64>>();
+            rules.extend(RULES.iter().enumerate().map(|(i, (rule, _))| Row {
+                plant,
+                rule,
+                trials: p.trials,
+                mse: Measured::mean(&of(0, i).into_iter().collect()),
+                excess: relative(&of(0, 0), &of(0, i)).into(),
+                nees: Measured::mean(&of(1, i).into_iter().collect()),
+            }));
         }
         let wild = ScalarPlant::new_unstable(p.unstable_a, p.unstable_gamma, 1.0)?;
-        let run = context.monte_carlo(context.stream(ID).named("unstable"), p.unstable_trials);
-        let escaped: Moments = run
-            .run(|trial| escapes(&wild, trial.stream))?
-            .into_iter()
-            .map(f64::from)
-            .collect();
-        let mut unstable = Table::new([
-            column("a", "", "plant coefficient"),
-            column("gamma", "", "process variance over measurement variance"),
-            column("trials", "", "simulated runs"),
-            column("escaped", "", "fraction of runs whose error exceeds 50 within 500 steps"),
-            column("se", "", "its standard error"),
-            column("riccati", "sigma^2", "steady variance that the filter computes meanwhile"),
-        ]);
-        let riccati = wild
-            .steady_state(std::f64::consts::FRAC_2_PI)
-            .map(|s| s.filtered_variance)
-            .ok();
-        unstable.push(row![
-            p.unstable_a,
-            p.unstable_gamma,
-            p.unstable_trials,
-            escaped.mean(),
-            escaped.standard_error(),
-            riccati
-        ])?;
-        Ok(Tables::from(table).with("unstable", unstable))
+        let stream = context.stream(ID).named("unstable");
+        let escaped = context.tally(stream, p.unstable_trials, Moments::default, |sum, trial| {
+            sum.add(f64::from(escapes(&wild, trial.stream)?));
+            Ok::<_, fewbits_dymbo::Error>(())
+        })?;
+        let steady = wild.steady_state(DymboFilter::new(wild).information());
+        let unstable = vec![Unstable {
+            a: p.unstable_a,
+            gamma: p.unstable_gamma,
+            trials: p.unstable_trials,
+            escaped: Measured::mean(&escaped),
+            riccati: steady.map(|steady| steady.filtered_variance).ok(),
+        }];
+        Ok(Rows { rules, unstable })
     }
 
-    fn claims(&self, _: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let mut claims = Vec::new();
-        // Mean squared error and relative excess with the standard errors of an independent simulation.
-        let expected = [
-            (
-                0.9,
-                0.5,
-                [(0.729566, 0.0), (0.73932, 3.0e-4), (0.73099, 2.9e-4)],
-                [(0.01298, 2.2e-4), (0.00156, 2.6e-4)],
-            ),
-            (
-                0.9,
-                0.05,
-                [(0.166517, 0.0), (0.16677, 9e-5), (0.16661, 9e-5)],
-                [(9.6e-4, 1.0e-4), (2.1e-5, 1.15e-4)],
-            ),
-            (-0.9, 0.5, [(0.729566, 0.0), (38.431, 0.0144), (1.29894, 8e-4)], [(51.69, 0.02), (0.7810, 1e-3)]),
-        ];
-        for (a, gamma, errors, excesses) in expected {
-            let rows = tables.main.only("a", a)?.only("gamma", gamma)?;
-            let entry = |rule: &str, name: &str| -> Result<f64, Error> {
-                Ok(rows
-                    .only("rule", rule)?
-                    .numbers(name)?
-                    .first()
-                    .copied()
-                    .unwrap_or(f64::NAN))
-            };
-            for (rule, (value, error)) in RULES.into_iter().zip(errors) {
-                let tolerance = 4.5 * entry(rule, "se")?.hypot(error);
-                let statement = format!("a = {a}, gamma = {gamma}: mean squared error with the {rule} rule");
-                let claim =
-                    Claim::near(format!("mse-{a}-{gamma}-{rule}"), statement, entry(rule, "mse")?, value, tolerance);
-                claims.push(claim.at_defaults());
-            }
-            for (rule, (value, error)) in RULES.into_iter().skip(1).zip(excesses) {
-                let tolerance = 4.5 * entry(rule, "excess_se")?.hypot(error);
-                let statement = format!("E1, a = {a}, gamma = {gamma}: relative excess of the {rule} rule");
-                let claim = Claim::near(
-                    format!("excess-{a}-{gamma}-{rule}"),
-                    statement,
-                    entry(rule, "excess")?,
-                    value,
-                    tolerance,
-                );
-                claims.push(claim.at_defaults());
-            }
-            let value = if gamma < 0.1 { 1.00005 } else { 1.0023 };
-            let tolerance = 4.5 * entry("prediction", "nees_se")?;
-            let statement = format!("a = {a}, gamma = {gamma}: normalised error with the prediction rule");
-            let claim =
-                Claim::near(format!("nees-{a}-{gamma}"), statement, entry("prediction", "nees")?, value, tolerance);
-            claims.push(claim.at_defaults());
-        }
-        let unstable = tables.named("unstable")?;
-        let (fraction, error) = (unstable.numbers("escaped")?[0], unstable.numbers("se")?[0]);
-        let statement = "at a = 1.2, gamma = 0.5 a tenth of the runs escapes within 500 steps";
-        claims.push(Claim::near("unstable", statement, fraction, 0.10615, 4.5 * error.hypot(0.00154)).at_defaults());
-        let riccati = unstable.points("escaped", "riccati")?.first().map_or(f64::NAN, |p| p.1);
-        let statement = "while the computed variance stays finite";
-        claims.push(Claim::near("unstable-riccati", statement, riccati, 1.3246, 5e-5).at_defaults());
-        Ok(claims)
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let key = |r: &Row| format!("{} {}", r.plant, r.rule);
+        claims.references("mse", "mean squared error at a, gamma, rule", &rows.rules, |r| (key(r), r.mse));
+        let what = "E1: relative excess over the prediction rule at a, gamma, rule";
+        claims.references("excess", what, &rows.rules, |r| (key(r), r.excess));
+        let right = rows.rules.iter().filter(|r| r.rule == "prediction");
+        let what = "normalised error with the prediction rule at a, gamma";
+        claims.references("nees", what, right, |r| (r.plant.to_string(), r.nees));
+        let plant = |r: &Unstable| format!("{} {}", r.a, r.gamma);
+        let what = "share of the runs that escape within 500 steps at a, gamma";
+        claims.references("escaped", what, &rows.unstable, |r| (plant(r), r.escaped));
+        let what = "while the computed variance stays finite, at a, gamma";
+        claims.references("riccati", what, &rows.unstable, |r| (plant(r), r.riccati));
     }
 
-    fn plot(&self, p: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let plants = pairs(ID, &p.a, &p.gamma)?;
-        let names = plants
-            .iter()
-            .enumerate()
-            .map(|(i, (a, g))| (i as f64, format!("a = {a}, gamma = {g}")));
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let names = p.plants.iter().enumerate().map(|(i, plant)| (i as f64, plant.title()));
         let x = Axis::linear("plant")
             .named(names)
-            .between(-0.6, plants.len() as f64 - 0.4);
+            .between(-0.6, p.plants.len() as f64 - 0.4);
         let mut panel = Panel::new("Place of the threshold", x, Axis::log("mean squared error / sigma^2"));
-        let labels = [
-            "at the prediction",
-            "equation (14) as printed",
-            "equation (14), exact update",
-        ];
-        for (r, (rule, label)) in RULES.into_iter().zip(labels).enumerate() {
-            let rows = tables.main.only("rule", rule)?;
-            let shift = 0.2 * (r as f64 - 1.0);
-            let points = rows
-                .numbers("mse")?
-                .into_iter()
-                .enumerate()
-                .map(|(i, mse)| (i as f64 + shift, mse))
-                .collect();
-            panel = panel.with(
-                Layer::points(label, points)
-                    .with_errors(rows.numbers("se")?)
-                    .coloured(r),
-            );
+        for (i, (rule, label)) in RULES.into_iter().enumerate() {
+            let (those, shift) = (rows.rules.iter().filter(|r| r.rule == rule).enumerate(), 0.2 * (i as f64 - 1.0));
+            panel = panel.with(Layer::measured(label, those, |(at, r)| (at as f64 + shift, r.mse)).coloured(i));
         }
-        Ok(Plot::of(panel.legend(crate::plot::Legend::TopLeft)))
+        Plot::of(panel.legend(Legend::TopLeft))
     }
 }

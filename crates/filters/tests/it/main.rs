@@ -3,6 +3,8 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used)]
 
+mod closed_loop;
+mod failure;
 mod particle;
 mod rao_blackwell;
 mod resample;

@@ -1,11 +1,10 @@
 //! Particle filters against the exact Kalman and grid filters.
 
-use fewbits_core::likelihood::{Heard, ScalarLikelihood};
-use fewbits_core::message::{Cell, Sign};
-use fewbits_core::{Dynamics, Gaussian, Likelihood};
-use fewbits_densities::Particles;
+use fewbits_core::factor::{Constant, InCell, Scalar, Value};
+use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
-    Error, Grid, OptimalProposal, ParticleFilter, PointMass, PointMassFilter, Resampling, Schedule, Workspace, kalman,
+    Grid, OptimalProposal, ParticleFilter, Particles, PointMass, PointMassFilter, Resampling, Schedule, Workspace,
+    kalman,
 };
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -27,11 +26,11 @@ fn scene(steps: usize) -> Scene {
     let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 2.0).unwrap();
     let prior = Gaussian::new(Vector2::new(0.0, 1.0), Matrix2::new(1.0, 0.2, 0.2, 0.5)).unwrap();
     let mut rng = Stream::new(11).rng();
-    let mut state = prior.sample(&mut rng).unwrap();
+    let mut state = prior.sample(&mut rng);
     let measurements = (0..steps)
         .map(|_| {
             state = dynamics.propagate(&mut rng, &state);
-            fewbits_core::Sensing::sample(&sensor, &mut rng, &state)[0]
+            sensor.sample(&mut rng, &state)[0]
         })
         .collect();
     Scene {
@@ -54,12 +53,12 @@ impl Scene {
         (belief, log_likelihood)
     }
 
-    fn value(&self, z: f64) -> ScalarLikelihood<2> {
-        ScalarLikelihood::new(self.sensor.direction(), self.sensor.noise_variance().sqrt(), Heard::Value(z)).unwrap()
+    fn value(&self, z: f64) -> Observed<LinearSensor<2, 1>, Value<1>, 1> {
+        Observed::new(self.sensor, Value::scalar(z, self.sensor.noise_variance()).unwrap())
     }
 
     fn start(&self, count: usize, rng: &mut Pcg64Mcg) -> Particles<2> {
-        Particles::from_draws(count, || self.prior.sample(rng).unwrap()).unwrap()
+        Particles::from_belief(rng, &self.prior, count).unwrap()
     }
 }
 
@@ -77,14 +76,14 @@ fn run(scene: &Scene, kind: Kind, filter: ParticleFilter, count: usize, stream: 
     let mut workspace = Workspace::default();
     let mut log_likelihood = 0.0;
     for z in &scene.measurements {
-        let heard = scene.value(*z);
+        let observed = scene.value(*z);
         let info = match kind {
-            Kind::Bootstrap => filter.step_in_place(&mut rng, &scene.dynamics, &heard, &mut belief, &mut workspace),
+            Kind::Bootstrap => filter.step_in_place(&mut rng, &scene.dynamics, &mut belief, &observed, &mut workspace),
             Kind::Guided => {
                 let proposal = OptimalProposal::new(&scene.dynamics, &scene.sensor, SVector::from([*z])).unwrap();
                 filter.guided_step(&mut rng, &proposal, &mut belief, &mut workspace)
             }
-            Kind::Auxiliary => filter.auxiliary_step(&mut rng, &scene.dynamics, &heard, &mut belief, &mut workspace),
+            Kind::Auxiliary => filter.auxiliary_step(&mut rng, &scene.dynamics, &mut belief, &observed, &mut workspace),
         }
         .unwrap();
         log_likelihood += info.log_likelihood;
@@ -147,28 +146,27 @@ fn the_likelihood_estimate_is_unbiased_for_every_law() {
     }
 }
 
-/// Anything heard of a scalar state, through the same filter.
-fn against_the_grid(heard_at: impl Fn(usize) -> Heard) {
+/// Anything observed of a scalar state, through the same filter.
+fn against_the_grid(observed_at: impl Fn(usize) -> Scalar) {
     let dynamics = Ar1::new(0.9, 0.6).unwrap();
     let likelihoods: Vec<_> = (0..8)
-        .map(|k| ScalarLikelihood::new(SVector::from([1.0]), 0.7, heard_at(k)).unwrap())
+        .map(|k| Observed::new(LinearSensor::direct(NOISE).unwrap(), observed_at(k)))
         .collect();
     let grid = Grid::new(-12.0, 12.0, 0.02).unwrap();
     let referee = PointMassFilter::new(&dynamics, grid).unwrap();
     let mut exact = PointMass::normal(grid, 0.0, 3.0).unwrap();
     let mut evidence = 0.0;
     for likelihood in &likelihoods {
-        exact = referee.predict(&exact).unwrap();
-        evidence += exact
-            .update(|x| likelihood.log_likelihood(&SVector::from([x])))
-            .unwrap();
+        let (next, increment) = referee.step(&exact, likelihood).unwrap();
+        exact = next;
+        evidence += increment;
     }
     let filter = ParticleFilter::default();
     let mut moments = <(Moments, Moments, Moments)>::default();
     for repeat in 0..10 {
         let mut rng = Stream::new(21).indexed(repeat).fast_rng();
         let prior = Gaussian::scalar(0.0, 3.0).unwrap();
-        let mut belief = Particles::from_draws(4000, || prior.sample(&mut rng).unwrap()).unwrap();
+        let mut belief = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
         let mut total = 0.0;
         for likelihood in &likelihoods {
             let (next, info) = filter.step(&mut rng, &dynamics, &belief, likelihood).unwrap();
@@ -189,45 +187,38 @@ fn against_the_grid(heard_at: impl Fn(usize) -> Heard) {
     }
 }
 
+/// Variance of the scalar measurements.
+const NOISE: f64 = 0.49;
+
 #[test]
 fn sign_bits_through_a_noisy_link_run_through_the_filter() {
-    against_the_grid(|k| Heard::Bit {
-        sign: if k % 3 == 0 { Sign::Below } else { Sign::Above },
-        threshold: 0.3 * k as f64 - 1.0,
-        crossover: 0.1,
+    let link = Link::flipping(0.1).unwrap();
+    against_the_grid(|k| {
+        let sign = if k % 3 == 0 { Sign::Below } else { Sign::Above };
+        InCell::sign(sign, 0.3 * k as f64 - 1.0, NOISE, &link).unwrap().into()
     });
 }
 
 #[test]
 fn quantizer_cells_run_through_the_filter() {
-    against_the_grid(|k| Heard::Cell(Cell::new(k as f64 * 0.4 - 1.0, k as f64 * 0.4 - 0.2).unwrap()));
+    against_the_grid(|k| {
+        let cell = Cell::new(k as f64 * 0.4 - 1.0, k as f64 * 0.4 - 0.2).unwrap();
+        InCell::certain(cell, NOISE).unwrap().into()
+    });
 }
 
 #[test]
 fn censored_silence_and_loss_run_through_the_filter() {
     against_the_grid(|k| match k % 4 {
-        0 => Heard::Value(1.0),
-        1 => Heard::Lost,
-        _ => Heard::Silence {
-            cell: Cell::new(-0.2, 1.6).unwrap(),
-            loss: 0.2 * (k % 2) as f64,
-        },
-    });
-}
-
-#[test]
-fn an_impossible_message_keeps_the_belief() {
-    struct Never;
-    impl Likelihood<1> for Never {
-        fn log_likelihood(&self, _: &SVector<f64, 1>) -> f64 {
-            f64::NEG_INFINITY
+        0 => Value::scalar(1.0, NOISE).unwrap().into(),
+        1 => Constant::ONE.into(),
+        _ => {
+            let link = Link::lossy(0.2 * (k % 2) as f64).unwrap();
+            InCell::silence(Cell::new(-0.2, 1.6).unwrap(), NOISE, &link)
+                .unwrap()
+                .into()
         }
-    }
-    let mut belief = Particles::uniform([vec![1.0, 2.0, 4.0]]).unwrap();
-    let before = belief.clone();
-    let refused = ParticleFilter::default().update(&Never, &mut belief);
-    assert!(matches!(refused, Err(Error::Density(_))), "{refused:?}");
-    assert_eq!(belief, before);
+    });
 }
 
 #[test]

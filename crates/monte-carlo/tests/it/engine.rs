@@ -62,13 +62,22 @@ fn a_failing_trial_can_be_run_again_alone() {
             }
         })
         .unwrap_err();
-    let MonteCarloError::Trial { index, stream, source } = error else {
+    let MonteCarloError::Trial { index, stream, message } = error else {
         panic!("not a failed trial")
     };
     let alone = run.single(index, |t| Ok::<_, Infallible>(draw(t))).unwrap();
-    assert_eq!(source, format!("drew {alone}"));
+    assert_eq!(message, format!("drew {alone}"));
     assert_eq!(stream, run.trial(index).stream);
     assert!((0..index).all(|i| draw(run.trial(i)) >= 0.05), "the first failing trial is reported");
+}
+
+#[test]
+fn errors_of_any_type_and_panics_stay_with_their_trial() {
+    let run = MonteCarlo::new(Stream::new(4), 100);
+    let boxed = run.run(|t| if t.index == 70 { Err::<(), Box<dyn std::error::Error>>("no luck".into()) } else { Ok(()) });
+    assert!(matches!(boxed, Err(MonteCarloError::Trial { index: 70, ref message, .. }) if message == "no luck"));
+    let panicked = run.run(|t| if t.index == 7 { panic!("trial {}", t.index) } else { Ok::<_, Infallible>(()) });
+    assert!(matches!(panicked, Err(MonteCarloError::Panicked { index: 7, ref message, .. }) if message == "trial 7"));
 }
 
 #[test]

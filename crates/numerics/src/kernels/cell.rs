@@ -7,7 +7,7 @@
 //!
 //! All three are computed and one is kept: that is what lets the sweep run in vector registers.
 
-use super::elementary::{exp_sum, half_square, ln_corrected};
+use super::elementary::{exp_sum, half_square, ln_corrected, select};
 use super::tail::scaled_tail;
 
 const INV_SQRT_2PI: f64 = 0.398_942_280_401_432_7;
@@ -55,11 +55,11 @@ fn series(middle: f64, half_width: f64) -> f64 {
 #[inline(always)]
 fn parts(a: f64, b: f64) -> Parts {
     let leans_right = a + b > 0.0;
-    let (lower, upper) = if leans_right { (-b, -a) } else { (a, b) };
+    let (lower, upper) = (select(leans_right, -b, a), select(leans_right, -a, b));
     let (width, sum) = (upper - lower, lower + upper);
     let middle = 0.5 * sum;
     // |middle| = -middle here, and 1 where that is less.
-    let steepness = if middle < -1.0 { -middle } else { 1.0 };
+    let steepness = select(middle < -1.0, -middle, 1.0);
     let narrow = width * steepness < NARROW;
     let left = upper <= 0.0;
     // Two-sum: what rounding took from the middle matters once its square is in the exponent.
@@ -69,31 +69,19 @@ fn parts(a: f64, b: f64) -> Parts {
     let (near, far) = (scaled_tail(upper.abs()), scaled_tail(lower.abs()));
     let (lower_high, lower_low) = half_square(lower);
     let (upper_high, upper_low) = half_square(upper);
-    let far_decay = if left {
-        exp_sum(0.5 * width * sum, 0.0)
-    } else {
-        exp_sum(-lower_high, -lower_low)
-    };
+    let far_decay = exp_sum(select(left, 0.5 * width * sum, -lower_high), select(left, 0.0, -lower_low));
     let near_decay = exp_sum(-upper_high, -upper_low);
     let outside = far * far_decay + near * near_decay;
     let rest = 1.0 - outside;
-    let (wide, wide_lost) = if left {
-        (near - far * far_decay, 0.0)
-    } else {
-        (rest, (1.0 - rest) - outside)
-    };
-    let (wide_high, wide_low) = if left { (upper_high, upper_low) } else { (0.0, 0.0) };
+    let wide = select(left, near - far * far_decay, rest);
+    let wide_lost = select(left, 0.0, (1.0 - rest) - outside);
     let (middle_high, middle_low) = half_square(middle);
     let thin = INV_SQRT_2PI * width * series(middle, 0.5 * width);
     Parts {
-        mass: if narrow { thin } else { wide },
-        lost: if narrow { 0.0 } else { wide_lost },
-        high: if narrow { middle_high } else { wide_high },
-        low: if narrow {
-            middle_low + middle * middle_lost
-        } else {
-            wide_low
-        },
+        mass: select(narrow, thin, wide),
+        lost: select(narrow, 0.0, wide_lost),
+        high: select(narrow, middle_high, select(left, upper_high, 0.0)),
+        low: select(narrow, middle_low + middle * middle_lost, select(left, upper_low, 0.0)),
     }
 }
 
@@ -101,9 +89,9 @@ fn parts(a: f64, b: f64) -> Parts {
 #[inline(always)]
 pub fn log_interval(a: f64, b: f64) -> f64 {
     let Parts { mass, lost, high, low } = parts(a, b);
-    let low = if high == f64::INFINITY { 0.0 } else { low };
+    let low = select(high == f64::INFINITY, 0.0, low);
     let value = ln_corrected(mass, lost * (2.0 - mass)) - (high + low);
-    if a >= b { f64::NEG_INFINITY } else { value }
+    select(a >= b, f64::NEG_INFINITY, value)
 }
 
 /// `Phi(b) - Phi(a)`: within ten units in the last place for cells given exactly; 0 for `a >= b`.
@@ -116,5 +104,5 @@ pub fn interval(a: f64, b: f64) -> f64 {
         low,
     } = parts(a, b);
     let value = mass * exp_sum(-high, -low);
-    if a >= b { 0.0 } else { value }
+    select(a >= b, 0.0, value)
 }

@@ -29,18 +29,32 @@ const EXP: [f64; 10] = [
     2.510_526_023_051_927_8e-8,
 ];
 
-/// Horner's scheme on even and odd powers apart: two short chains run side by side.
+/// `yes` or `no`, both computed: a branch here would be copied into what follows and double the work of a sweep.
+#[inline(always)]
+pub(crate) fn select(condition: bool, yes: f64, no: f64) -> f64 {
+    std::hint::select_unpredictable(condition, yes, no)
+}
+
+/// Horner's scheme on four interleaved parts: short chains that run side by side, for a sweep is as slow as its longest chain.
 #[inline(always)]
 pub(crate) fn polynomial<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
     let square = x * x;
-    let (mut even, mut odd) = (0.0, 0.0);
-    for pair in (0..N.div_ceil(2)).rev() {
-        even = even * square + coefficients[2 * pair];
-        if 2 * pair + 1 < N {
-            odd = odd * square + coefficients[2 * pair + 1];
+    let fourth = square * square;
+    let at = |i: usize| if i < N { coefficients[i] } else { 0.0 };
+    let last = 4 * ((N - 1) / 4);
+    let mut part = [at(last), at(last + 1), at(last + 2), at(last + 3)];
+    for i in (0..last / 4).rev() {
+        for k in 0..4 {
+            // The last group may be short: nothing is multiplied by its zeros.
+            let high = if i == last / 4 - 1 && last + k >= N {
+                0.0
+            } else {
+                part[k] * fourth
+            };
+            part[k] = high + at(4 * i + k);
         }
     }
-    odd * x + even
+    (part[0] + part[1] * x) + square * (part[2] + part[3] * x)
 }
 
 /// `2^n` for whole `n` in `-1022..=1023`.
@@ -53,14 +67,14 @@ fn power_of_two(n: f64) -> f64 {
 #[inline(always)]
 pub(crate) fn exp_sum(high: f64, low: f64) -> f64 {
     // At the ends `low` may be the difference of two infinities.
-    let (x, low) = if high < LOWEST { (LOWEST, 0.0) } else { (high, low) };
-    let (x, low) = if x > HIGHEST { (HIGHEST, 0.0) } else { (x, low) };
+    let (below, above) = (high < LOWEST, high > HIGHEST);
+    let x = select(above, HIGHEST, select(below, LOWEST, high));
+    let low = select(above | below, 0.0, low);
     let n = (x * LOG2_E + ROUNDER) - ROUNDER;
     let r = (x - n * LN_2_HIGH) - (n * LN_2_LOW - low);
     let fraction = 1.0 + (r + r * r * polynomial(&EXP, r));
     // Two factors: the result may be subnormal, or its power of two beyond the range while it is not.
-    let first = if n < -1021.0 { -1021.0 } else { n };
-    let first = if first > 1023.0 { 1023.0 } else { first };
+    let first = select(n > 1023.0, 1023.0, select(n < -1021.0, -1021.0, n));
     fraction * power_of_two(first) * power_of_two(n - first)
 }
 
@@ -107,13 +121,9 @@ const LN: [f64; 7] = [
 #[inline(always)]
 pub(crate) fn ln_corrected(x: f64, correction: f64) -> f64 {
     let small = x < f64::MIN_POSITIVE;
-    let scaled = if small { x * TWO_54 } else { x };
+    let scaled = select(small, x * TWO_54, x);
     let shifted = scaled.to_bits().wrapping_add(ONE - SQRT_HALF);
-    let bias = if small {
-        4_503_599_627_370_496.0 + 1_077.0
-    } else {
-        4_503_599_627_370_496.0 + 1_023.0
-    };
+    let bias = select(small, 4_503_599_627_370_496.0 + 1_077.0, 4_503_599_627_370_496.0 + 1_023.0);
     let exponent = f64::from_bits((shifted >> 52) | INTEGER) - bias;
     let f = f64::from_bits((shifted & MANTISSA).wrapping_add(SQRT_HALF)) - 1.0;
     let s = f / (2.0 + f);
@@ -121,9 +131,9 @@ pub(crate) fn ln_corrected(x: f64, correction: f64) -> f64 {
     let series = square * polynomial(&LN, square);
     let half = 0.5 * f * f;
     let value = exponent * LN_2_HIGH - ((half - (s * (half + series) + (exponent * LN_2_LOW + correction))) - f);
-    let value = if x < f64::INFINITY { value } else { x };
-    let value = if x > 0.0 { value } else { f64::NAN };
-    if x == 0.0 { f64::NEG_INFINITY } else { value }
+    let value = select(x < f64::INFINITY, value, x);
+    let value = select(x > 0.0, value, f64::NAN);
+    select(x == 0.0, f64::NEG_INFINITY, value)
 }
 
 /// `ln(x)`: within one unit in the last place; `-inf` at zero, NaN below.

@@ -16,6 +16,7 @@
 //! | [`inverse_mills`] | in place | 8 |
 //! | [`interval`], [`log_interval`] | in place of the lower edges | 10, 8 |
 //! | [`sum`], [`dot`], [`largest`], [`log_sum_exp`] | a number | as a sum in eight lanes |
+//! | [`StandardNormals`], [`fill_standard_normals`] | independent draws, exact in law | |
 //! | [`exp_minus`] | weights from log weights, with their sum and sum of squares | 1 each |
 //!
 //! The bounds are measured against values with 40 digits, in `tests/it/kernels.rs`: tails, subnormal numbers, infinities and
@@ -38,12 +39,14 @@
 
 pub(crate) mod cell;
 pub(crate) mod elementary;
+mod normals;
 mod reduce;
 pub(crate) mod tail;
 
+pub use normals::{StandardNormals, fill_standard_normals};
 pub use reduce::{ExpSums, dot, exp_minus, largest, log_sum_exp, sum, weighted_covariance};
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::Arch;
 
 /// The functions of the slices one element at a time: no branches, no calls, always inlined. For loops under [`vectorised`];
 /// elsewhere [`normal`](crate::normal) has the same functions under the same names.
@@ -57,7 +60,7 @@ pub mod scalar {
 ///
 /// `work` is a loop over slices that calls [`scalar`] functions; give the closure `#[inline(always)]`.
 #[inline(always)]
-pub fn vectorised<W: NullaryFnOnce>(work: W) -> W::Output {
+pub fn vectorised<R>(work: impl FnOnce() -> R) -> R {
     Arch::new().dispatch(work)
 }
 

@@ -6,6 +6,9 @@ use super::vectorised;
 /// Lanes of every reduction, whatever the machine: the order of additions is part of the result.
 const LANES: usize = 8;
 
+/// Elements of a block; a multiple of [`LANES`].
+const BLOCK: usize = 512;
+
 /// Adds the lanes in a fixed tree.
 #[inline(always)]
 fn folded(lane: [f64; LANES]) -> f64 {
@@ -109,23 +112,22 @@ pub fn exp_minus(logs: &[f64], offset: f64, out: &mut [f64]) -> ExpSums {
         #[inline(always)]
         || {
             let count = logs.len().min(out.len());
-            let whole = count - count % LANES;
             let (mut lane, mut square) = ([0.0; LANES], [0.0; LANES]);
-            for (j, (out, log)) in out[whole..count].iter_mut().zip(&logs[whole..count]).enumerate() {
-                let e = elementary::exp(log - offset);
-                *out = e;
-                lane[j] = e;
-                square[j] = e * e;
-            }
-            let chunks = out[..whole]
-                .chunks_exact_mut(LANES)
-                .zip(logs[..whole].chunks_exact(LANES));
-            for (out, logs) in chunks {
-                for j in 0..LANES {
-                    let e = elementary::exp(logs[j] - offset);
-                    out[j] = e;
+            // In blocks that stay in the nearest cache: a loop that only exponentiates, then one that only adds.
+            for (out, logs) in out[..count].chunks_mut(BLOCK).zip(logs[..count].chunks(BLOCK)) {
+                for (out, log) in out.iter_mut().zip(logs) {
+                    *out = elementary::exp(log - offset);
+                }
+                let chunks = out.chunks_exact(LANES);
+                for (j, e) in chunks.remainder().iter().enumerate() {
                     lane[j] += e;
                     square[j] += e * e;
+                }
+                for chunk in chunks {
+                    for j in 0..LANES {
+                        lane[j] += chunk[j];
+                        square[j] += chunk[j] * chunk[j];
+                    }
                 }
             }
             ExpSums {

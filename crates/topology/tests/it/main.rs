@@ -8,7 +8,14 @@ use rand_pcg::rand_core::SeedableRng;
 
 fn brute(positions: &[Vector2<f64>], range: f64) -> Vec<Vec<u32>> {
     let close = |i: usize, j: usize| i != j && (positions[i] - positions[j]).norm_squared() <= range * range;
-    (0..positions.len()).map(|i| (0..positions.len()).filter(|j| close(i, *j)).map(|j| j as u32).collect()).collect()
+    (0..positions.len())
+        .map(|i| {
+            (0..positions.len())
+                .filter(|j| close(i, *j))
+                .map(|j| j as u32)
+                .collect()
+        })
+        .collect()
 }
 
 proptest! {

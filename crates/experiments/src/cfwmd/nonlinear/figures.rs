@@ -1,6 +1,6 @@
 //! The figures and the table of the nonlinear example.
 
-use super::{FOUR, Field, HEARD, Named, Scheme, World, every, run};
+use super::{FOUR, Field, FUSED, Named, Scheme, World, every, run};
 use crate::cfwmd::case::{Case, by_budget};
 use crate::cfwmd::ensemble::{Ensemble, Part, agrees, beats, summary_table, value};
 use crate::cfwmd::scalar::{printed_rates, rate_plot, rate_table};
@@ -316,7 +316,7 @@ impl Case for Fig10 {
     }
 
     fn simulate(setting: &Field, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        run(context, setting, &every(&HEARD, &setting.messages))
+        run(context, setting, &every(&FUSED, &setting.messages))
     }
 
     fn pairs() -> Vec<(&'static str, &'static str)> {
@@ -369,7 +369,7 @@ impl Case for Table3 {
     }
 
     fn simulate(setting: &Field, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        let mut all = run(context, setting, &every(&HEARD, &setting.messages))?;
+        let mut all = run(context, setting, &every(&FUSED, &setting.messages))?;
         let drawn = Field {
             drawn_start: true,
             particles: setting.particles.min(1000),

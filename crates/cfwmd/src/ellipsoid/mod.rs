@@ -1,0 +1,111 @@
+//! The region of silence of a vector sensor: an ellipsoid, and a Gaussian inside it.
+
+mod inside;
+mod quadrature;
+
+pub use inside::{EllipsoidMoments, GaussianInEllipsoid};
+pub(crate) use inside::symmetric_eigen;
+
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, non_negative};
+use nalgebra::{Cholesky, SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+/// The region of silence `nu' S^-1 nu < eta` of an innovation of `M` components.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers<M>", into = "Numbers<M>")]
+pub struct Ellipsoid<const M: usize> {
+    /// `L` with `S = L L'`.
+    lower: SMatrix<f64, M, M>,
+    innovation_covariance: SMatrix<f64, M, M>,
+    threshold: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers<const M: usize> {
+    innovation_covariance: SMatrix<f64, M, M>,
+    threshold: f64,
+}
+
+impl<const M: usize> From<Ellipsoid<M>> for Numbers<M> {
+    fn from(region: Ellipsoid<M>) -> Self {
+        Self {
+            innovation_covariance: region.innovation_covariance,
+            threshold: region.threshold,
+        }
+    }
+}
+
+impl<const M: usize> TryFrom<Numbers<M>> for Ellipsoid<M> {
+    type Error = ArgumentError;
+
+    fn try_from(numbers: Numbers<M>) -> Result<Self, ArgumentError> {
+        Self::new(&numbers.innovation_covariance, numbers.threshold)
+    }
+}
+
+impl<const M: usize> Ellipsoid<M> {
+    /// The region for innovation covariance `S` (positive definite) and threshold `eta >= 0`.
+    ///
+    /// # Errors
+    /// If an entry is not finite, `S` is not positive definite or the threshold is negative.
+    pub fn new(innovation_covariance: &SMatrix<f64, M, M>, threshold: f64) -> Result<Self, ArgumentError> {
+        all_finite("innovation_covariance", innovation_covariance.as_slice())?;
+        let factor = Cholesky::new(*innovation_covariance).ok_or_else(|| {
+            ArgumentError::new(
+                "innovation_covariance",
+                format!("{innovation_covariance:?}"),
+                "a positive definite matrix",
+            )
+        })?;
+        Ok(Self {
+            lower: factor.unpack(),
+            innovation_covariance: *innovation_covariance,
+            threshold: non_negative("threshold", threshold)?,
+        })
+    }
+
+    /// `S`.
+    pub fn innovation_covariance(&self) -> &SMatrix<f64, M, M> {
+        &self.innovation_covariance
+    }
+
+    /// `eta`.
+    pub fn threshold(&self) -> f64 {
+        self.threshold
+    }
+
+    /// `nu' S^-1 nu`, the normalised innovation squared.
+    #[inline]
+    pub fn statistic(&self, innovation: &SVector<f64, M>) -> f64 {
+        match self.lower.solve_lower_triangular(innovation) {
+            Some(white) => white.norm_squared(),
+            None => f64::INFINITY,
+        }
+    }
+
+    /// A point of the ellipsoid from one of the unit ball.
+    pub fn from_ball(&self, point: &SVector<f64, M>) -> SVector<f64, M> {
+        self.lower * point * self.threshold.sqrt()
+    }
+
+    /// `ln` of the ellipsoid's volume, `ln det(S)/2 + M/2 ln(eta) + ln V_M` with `V_M = V_{M-2} 2 pi/M` of the unit ball.
+    pub fn log_volume(&self) -> f64 {
+        let log_determinant: f64 = self.lower.diagonal().iter().map(|d| d.ln()).sum();
+        let (mut ball, mut dimension) = if M % 2 == 1 { (2.0, 1) } else { (1.0, 0) };
+        while dimension < M {
+            dimension += 2;
+            ball *= std::f64::consts::TAU / dimension as f64;
+        }
+        log_determinant + 0.5 * M as f64 * self.threshold.ln() + f64::ln(ball)
+    }
+
+    /// Prepares probabilities and moments of `N(mu, V)` inside the region, for any `mu`. `V` may be singular.
+    ///
+    /// # Errors
+    /// If an entry of `V` is not finite or an eigenvalue negative beyond rounding.
+    pub fn under(&self, covariance: &SMatrix<f64, M, M>) -> Result<GaussianInEllipsoid<M>, ArgumentError> {
+        GaussianInEllipsoid::new(&self.lower, self.threshold, covariance)
+    }
+}

@@ -1,0 +1,205 @@
+//! The exact fusion centre without feedback: withheld measurements are imputed, the rest is Gaussian.
+
+use super::{advance, check};
+use crate::Error;
+use crate::network::{FusionInfo, Network};
+use crate::rule::{CensoringRule, OwnRecursion};
+use fewbits_core::{FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observation};
+use fewbits_densities::GaussianCloud;
+use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule};
+use fewbits_numerics::normal;
+use nalgebra::SVector;
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+
+/// Log weight of a particle for which a sensor sent what it should have withheld: finite, so that the filter survives a
+/// report that contradicts all of them.
+const VIOLATION: f64 = -1e5;
+
+/// Given every measurement, sent or not, the central Kalman filter and each sensor's own are deterministic. A particle is the
+/// central mean and, beside it, every sensor's estimate under the measurements imputed to it; all share one covariance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImputedBelief<const D: usize> {
+    own: Vec<OwnRecursion<D>>,
+    /// Side rows: `D` numbers per sensor.
+    cloud: GaussianCloud<D>,
+    violations: usize,
+}
+
+impl<const D: usize> ImputedBelief<D> {
+    /// `particles` particles that start from the belief all `sensors` start from.
+    ///
+    /// # Errors
+    /// If there is no particle or no sensor.
+    pub fn new(start: &Gaussian<D>, sensors: usize, particles: usize) -> Result<Self, Error> {
+        let mut cloud = GaussianCloud::agreed(start, particles)?;
+        let side = (0..particles * sensors * D).map(|c| start.mean()[c % D]).collect();
+        *cloud.means_mut() = cloud.means().clone().with_side(side)?;
+        Ok(Self {
+            own: vec![OwnRecursion::new(start); sensors],
+            cloud,
+            violations: 0,
+        })
+    }
+
+    /// Mean and covariance of the state.
+    pub fn state(&self) -> Gaussian<D> {
+        self.cloud.gaussian()
+    }
+
+    /// The particles.
+    pub fn cloud(&self) -> &GaussianCloud<D> {
+        &self.cloud
+    }
+
+    /// Number of received values so far that the rule would have withheld under every particle.
+    pub fn violations(&self) -> usize {
+        self.violations
+    }
+}
+
+/// One step: predict, then one observation per sensor, those received first.
+///
+/// ```text
+/// resample systematically below half the effective sample size
+/// predict: xc = F xc, xhat_i = F xhat_i;  P = F P F' + Q
+/// received z of i:  w *= N(z; H xc, S);  w *= 1{|z - H xhat_i| >= threshold};  Kalman update of xc, own update of xhat_i
+/// nothing from i:   z ~ N(H xc, S) where |z - H xhat_i| < threshold, w *= P(there);  the same updates with that z
+/// erased:           z ~ N(H xc, S);  the same updates
+/// ```
+/// Scalar measurements are drawn from their conditional law; vector ones uniformly in the ellipsoid and weighted. With loss the
+/// law of what did not arrive is `N(z) (loss + (1 - loss) 1{inside})`.
+///
+/// # Errors
+/// [`Error::ObservationCount`]; if a value is not finite; [`fewbits_core::Error::Impossible`].
+pub fn step<S, R, const D: usize, const M: usize>(
+    rng: &mut R,
+    network: &Network<S, D, M>,
+    dynamics: &impl LinearDynamics<D>,
+    belief: &ImputedBelief<D>,
+    observations: &[Observation<SVector<f64, M>>],
+) -> Result<(ImputedBelief<D>, FusionInfo), Error>
+where
+    S: LinearSensing<D, M> + Clone + PartialEq,
+    R: Rng + ?Sized,
+{
+    check(network, observations)?;
+    let (mut next, mut info) = (belief.clone(), FusionInfo::default());
+    let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5)));
+    filter.predict(rng, dynamics, &mut next.cloud, &mut CloudWorkspace::default())?;
+    for estimate in next.cloud.means_mut().parts_mut().1.chunks_exact_mut(D) {
+        let moved = dynamics.transition() * SVector::<f64, D>::from_column_slice(estimate);
+        estimate.copy_from_slice(moved.as_slice());
+    }
+    let steps = advance(&mut next.own, network, dynamics)?;
+    let loss = network.link().loss();
+    let mut log_weights = vec![0.0; next.cloud.means().len()];
+    let sensors = || network.sensors().iter().zip(&steps).zip(observations).enumerate();
+    for received in [true, false] {
+        for (i, ((sensor, (step, rule)), observation)) in sensors().filter(|s| s.1.1.received().is_some() == received) {
+            let mut contradicted = 0;
+            filter.impute(rng, &mut next.cloud, sensor, &mut log_weights, |rng, innovation, central, side| {
+                let own = &mut side[i * D..(i + 1) * D];
+                let predicted = sensor.matrix() * SVector::<f64, D>::from_column_slice(own);
+                let (z, log_weight) = match observation {
+                    Observation::Received(z) => {
+                        let clash = rule.statistic(&(z - predicted)) < rule.threshold() * (1.0 - 1e-9);
+                        contradicted += usize::from(clash);
+                        (*z, innovation.log_pdf(&(z - central)) + if clash { VIOLATION } else { 0.0 })
+                    }
+                    Observation::Nothing => impute(rng, innovation, rule, loss, central, &predicted),
+                    Observation::Erased => (central + noise(rng, innovation), 0.0),
+                };
+                let moved = step.gain * (z - predicted);
+                own.iter_mut().zip(moved.iter()).for_each(|(x, step)| *x += step);
+                (z, log_weight)
+            })?;
+            info.received += usize::from(received);
+            next.violations += usize::from(received && contradicted == log_weights.len());
+        }
+    }
+    let increment = next.cloud.means_mut().reweigh(|_, logs| {
+        logs.iter_mut().zip(&log_weights).for_each(|(log, increment)| *log += increment);
+    })?;
+    info.log_likelihood = increment + info.received as f64 * (-loss).ln_1p();
+    Ok((next, info))
+}
+
+fn noise<const M: usize, R: Rng + ?Sized>(rng: &mut R, innovation: &FactoredGaussian<M>) -> SVector<f64, M> {
+    innovation.lower() * SVector::<f64, M>::from_fn(|_, _| rng.sample(StandardNormal))
+}
+
+/// A measurement that did not arrive, `z ~ q`, with `ln (N(z; central, S) (loss + (1 - loss) 1{inside}) / q(z))`.
+fn impute<const M: usize, R: Rng + ?Sized>(
+    rng: &mut R,
+    innovation: &FactoredGaussian<M>,
+    rule: &CensoringRule<M>,
+    loss: f64,
+    central: &SVector<f64, M>,
+    own: &SVector<f64, M>,
+) -> (SVector<f64, M>, f64) {
+    if M == 1 {
+        let (z, log_weight) = impute_scalar(rng, innovation.lower()[(0, 0)], rule.interval(own[0]), loss, central[0]);
+        return (SVector::repeat(z), log_weight);
+    }
+    let region = rule.region();
+    // Where everything is sent, only the link can be to blame.
+    let share = if region.threshold() == 0.0 { 1.0 } else { loss };
+    let anywhere = share > 0.0 && rng.random::<f64>() < share;
+    let z = if anywhere {
+        central + noise(rng, innovation)
+    } else {
+        own + region.from_ball(&in_unit_ball(rng))
+    };
+    let inside = region.statistic(&(z - own)) < region.threshold();
+    let log_density = innovation.log_pdf(&(z - central));
+    let log_target = log_density + if inside { 0.0 } else { loss.ln() };
+    // Proposal share N(z) + (1 - share) U(z), U uniform in the ellipsoid.
+    let (normal_part, uniform_part) = (share.ln() + log_density, (1.0 - share).ln() - region.log_volume());
+    let log_proposal = match (inside, share > 0.0) {
+        (true, false) => uniform_part,
+        (false, _) => normal_part,
+        (true, true) => {
+            let largest = normal_part.max(uniform_part);
+            largest + ((normal_part - largest).exp() + (uniform_part - largest).exp()).ln()
+        }
+    };
+    (z, if log_target == f64::NEG_INFINITY { log_target } else { log_target - log_proposal })
+}
+
+/// From the conditional law itself: truncated to the interval, or outside it and lost.
+fn impute_scalar<R: Rng + ?Sized>(
+    rng: &mut R,
+    deviation: f64,
+    interval: (f64, f64),
+    loss: f64,
+    central: f64,
+) -> (f64, f64) {
+    let (low, high) = ((interval.0 - central) / deviation, (interval.1 - central) / deviation);
+    let inside = normal::log_interval(low, high);
+    let share = inside.exp();
+    let total = loss + (1.0 - loss) * share;
+    let log_weight = if loss == 0.0 { inside } else { total.ln() };
+    let u = if loss == 0.0 { 0.0 } else { rng.random::<f64>() * total };
+    let (from, to) = if loss == 0.0 || u < share {
+        (low, high)
+    } else if (u - share) / loss < normal::cdf(low) {
+        // The rest is loss times the mass outside.
+        (f64::NEG_INFINITY, low)
+    } else {
+        (high, f64::INFINITY)
+    };
+    // Only an interval of no width is refused: nothing can lie in it.
+    normal::sample_truncated(rng, from, to).map_or((central, f64::NEG_INFINITY), |x| (central + deviation * x, log_weight))
+}
+
+/// A point uniform in the unit ball: a random direction at radius `U^(1/M)`.
+fn in_unit_ball<const M: usize, R: Rng + ?Sized>(rng: &mut R) -> SVector<f64, M> {
+    loop {
+        let direction = SVector::<f64, M>::from_fn(|_, _| rng.sample(StandardNormal));
+        let length = direction.norm();
+        if length > 0.0 {
+            return direction * (rng.random::<f64>().powf(1.0 / M as f64) / length);
+        }
+    }
+}

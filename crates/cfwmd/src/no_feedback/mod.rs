@@ -1,0 +1,190 @@
+//! Fusion without feedback: each sensor compares its measurement with the prediction of its own Kalman filter.
+//!
+//! The fusion centre does not know those predictions, so silence and even a received value say something about them too. The
+//! belief is joint, over the state and every sensor's own estimate; given all observations it is what makes silence
+//! informative. The paper averages the silent factor over estimates drawn independently of the past instead; that factor is
+//! one constant for every state, cancels in the normalisation and leaves the filter that ignores silence (erratum
+//! `cfwmd-2`).
+//!
+//! | estimator | item |
+//! |---|---|
+//! | joint Gaussian belief with exact moments after each observation: the default, as accurate as the next in every case measured | [`joint`] |
+//! | exact as the number of particles grows: withheld measurements imputed, the rest Gaussian | [`imputing`] |
+//! | silence ignored (the paper's CFoMD) | [`Network::fuse_received`] |
+
+pub mod imputing;
+pub mod joint;
+
+pub use imputing::ImputedBelief;
+pub use joint::JointBelief;
+
+use crate::Error;
+use crate::censored::Censored;
+use crate::network::Network;
+use crate::rule::{CensoringRule, OwnRecursion, OwnStep};
+use crate::scheme::{Censoring, send_if};
+use fewbits_core::{Gaussian, LinearDynamics, LinearSensing, Link, NumberFormat, Observation, Scheme, Sensing};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, non_negative};
+use nalgebra::{SMatrix, SVector};
+use rand::Rng;
+
+/// A sensor in one slot that compares its measurement with its own filter's prediction, and updates its filter with the
+/// measurement whether it reports or not (as it travels, if it does).
+///
+/// What only the sensor knows, its estimate, is its `State`. The factor is that of a receiver that supposes
+/// [`start`](Scheme::start) for it: one that does not know the estimate carries it in its belief, as [`joint`] and
+/// [`imputing`] do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LocalCensoring<S, const D: usize, const M: usize> {
+    scheme: Censoring<S, D, M>,
+    sensing: S,
+    transition: SMatrix<f64, D, D>,
+    gain: SMatrix<f64, D, M>,
+    supposed: SVector<f64, D>,
+}
+
+impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> Scheme<M> for LocalCensoring<S, D, M> {
+    /// The sensor's estimate after the last slot.
+    type State = SVector<f64, D>;
+    type Feedback = ();
+    type Report = SVector<f64, M>;
+    type Factor = Censored<M>;
+
+    fn start(&self) -> SVector<f64, D> {
+        self.supposed
+    }
+
+    fn feedback_format(&self) {}
+
+    fn report_format(&self) -> NumberFormat {
+        self.scheme.report_format()
+    }
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        state: &mut SVector<f64, D>,
+        measurement: &SVector<f64, M>,
+        (): &(),
+    ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
+        let predicted = self.transition * *state;
+        let prediction = self.sensing.mean(&predicted);
+        let report = send_if(self.scheme.rule(), measurement, &prediction, &self.scheme.report_format())?;
+        *state = predicted + self.gain * (report.unwrap_or(*measurement) - prediction);
+        Ok(report)
+    }
+
+    fn factor(
+        &self,
+        (): &(),
+        observation: &Observation<SVector<f64, M>>,
+        link: &Link,
+    ) -> Result<Censored<M>, fewbits_core::Error> {
+        self.scheme.factor(&(self.transition * self.supposed), observation, link)
+    }
+}
+
+/// A sensor with its own filter, from slot to slot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LocalSensor<S, const D: usize, const M: usize> {
+    sensing: S,
+    threshold: f64,
+    format: NumberFormat,
+    own: OwnRecursion<D>,
+    estimate: SVector<f64, D>,
+}
+
+impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> LocalSensor<S, D, M> {
+    /// A sensor that starts from the common belief.
+    ///
+    /// # Errors
+    /// If the threshold is negative, or the format one of a few levels (the centre must follow the sensor's filter exactly).
+    pub fn new(sensing: S, threshold: f64, format: NumberFormat, start: &Gaussian<D>) -> Result<Self, Error> {
+        non_negative("threshold", threshold)?;
+        if matches!(format, NumberFormat::Fixed(_)) {
+            return Err(ArgumentError::new("format", format!("{format:?}"), "floating point").into());
+        }
+        Ok(Self {
+            sensing,
+            threshold,
+            format,
+            own: OwnRecursion::new(start),
+            estimate: *start.mean(),
+        })
+    }
+
+    /// The sensor's own estimate of the state.
+    pub fn estimate(&self) -> &SVector<f64, D> {
+        &self.estimate
+    }
+
+    /// The scheme of the next slot, and the sensor's recursion after it.
+    ///
+    /// # Errors
+    /// If an innovation covariance is not positive definite.
+    pub fn next_slot(
+        &self,
+        dynamics: &impl LinearDynamics<D>,
+    ) -> Result<(LocalCensoring<S, D, M>, OwnRecursion<D>), Error> {
+        let mut own = self.own;
+        let step = own.advance(dynamics, &self.sensing, &self.estimate)?;
+        let rule = CensoringRule::new(&step.innovation_covariance, self.threshold)?;
+        let slot = LocalCensoring {
+            scheme: Censoring::new(self.sensing.clone(), rule, self.format)?,
+            sensing: self.sensing.clone(),
+            transition: *dynamics.transition(),
+            gain: step.gain,
+            supposed: self.estimate,
+        };
+        Ok((slot, own))
+    }
+
+    /// Takes one measurement, updates its own filter with it and reports what the rule lets it report.
+    ///
+    /// # Errors
+    /// If the measurement is not finite; the sensor is then as it was.
+    pub fn step<R: Rng + ?Sized>(
+        &mut self,
+        rng: &mut R,
+        dynamics: &impl LinearDynamics<D>,
+        measurement: &SVector<f64, M>,
+    ) -> Result<Option<SVector<f64, M>>, Error> {
+        let (slot, own) = self.next_slot(dynamics)?;
+        let report = slot.encode(rng, &mut self.estimate, measurement, &())?;
+        self.own = own;
+        Ok(report)
+    }
+}
+
+/// Rules and gains of all sensors' own filters in one step.
+fn advance<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
+    recursions: &mut [OwnRecursion<D>],
+    network: &Network<S, D, M>,
+    dynamics: &impl LinearDynamics<D>,
+) -> Result<Vec<(OwnStep<D, M>, CensoringRule<M>)>, Error> {
+    let each = recursions.iter_mut().zip(network.sensors()).map(|(recursion, sensor)| {
+        let step = recursion.advance(dynamics, sensor, &SVector::zeros())?;
+        let rule = CensoringRule::new(&step.innovation_covariance, network.threshold())?;
+        Ok((step, rule))
+    });
+    each.collect()
+}
+
+/// Refuses observations of the wrong number or with values that are not finite.
+fn check<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>(
+    network: &Network<S, D, M>,
+    observations: &[Observation<SVector<f64, M>>],
+) -> Result<(), Error> {
+    let (observed, sensors) = (observations.len(), network.sensors().len());
+    if observed != sensors {
+        return Err(Error::ObservationCount {
+            observations: observed,
+            sensors,
+        });
+    }
+    for value in observations.iter().filter_map(|o| o.received()) {
+        all_finite("report", value.as_slice())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,263 @@
+//! Censoring sensors with feedback, both halves: the sensor's, and what its reports and its silence mean.
+
+use crate::Error;
+use crate::censored::{Censored, as_core};
+use crate::rule::CensoringRule;
+use fewbits_core::{
+    BitReader, BitWriter, CodecError, Gaussian, Link, Message, NumberFormat, Observation, Scheme, Sensing,
+};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, non_negative};
+use fewbits_numerics::linalg::symmetrised;
+use nalgebra::{SMatrix, SVector};
+use rand::Rng;
+
+/// A sensor that compares its measurement with the broadcast state prediction, under a rule that both ends know: the rule of
+/// this slot comes from the sensor's own covariance recursion (the paper's CFwMD) or from a schedule.
+///
+/// It decides on the measurement as it was taken; what it sends is rounded to the format. Both ends use the broadcast as it
+/// travelled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Censoring<S, const D: usize, const M: usize> {
+    sensing: S,
+    rule: CensoringRule<M>,
+    format: NumberFormat,
+}
+
+impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
+    /// The scheme of one sensor in one slot.
+    ///
+    /// # Errors
+    /// If `format` is one of a few levels and the measurement a vector: the cell of a rounded vector, cut by an ellipsoid, has
+    /// no closed form.
+    pub fn new(sensing: S, rule: CensoringRule<M>, format: NumberFormat) -> Result<Self, Error> {
+        if M > 1 && matches!(format, NumberFormat::Fixed(_)) {
+            return Err(ArgumentError::new("format", format!("{format:?}"), "floating point for vectors").into());
+        }
+        Ok(Self { sensing, rule, format })
+    }
+
+    /// The rule of this slot.
+    pub fn rule(&self) -> &CensoringRule<M> {
+        &self.rule
+    }
+
+    /// The factor of `count` identical sensors from which nothing arrived (one, for vectors).
+    ///
+    /// # Errors
+    /// If the broadcast is not finite.
+    pub fn silence(&self, broadcast: &SVector<f64, D>, link: &Link, count: usize) -> Result<Censored<M>, Error> {
+        let prediction = self.sensing.mean(broadcast);
+        let noise = self.sensing.noise_covariance_at(broadcast);
+        Ok(Censored::silence(&self.rule, &prediction, &noise, link, count)?)
+    }
+
+    /// The factor of a received value; `sensor` is named if the rule would not have sent it.
+    ///
+    /// # Errors
+    /// If a number is not finite, the value violates the rule ([`Error::ProtocolViolation`]), or bits may be inverted on the
+    /// way: a value wants a checksum, and a report that fails it is [`Observation::Erased`].
+    pub fn received(
+        &self,
+        sensor: usize,
+        broadcast: &SVector<f64, D>,
+        value: &SVector<f64, M>,
+        link: &Link,
+    ) -> Result<Censored<M>, Error> {
+        all_finite("report", value.as_slice())?;
+        fewbits_numerics::error::within("crossover", link.crossover(), 0.0, 0.0)?;
+        let (prediction, arrival) = (self.sensing.mean(broadcast), 1.0 - link.loss());
+        all_finite("prediction", prediction.as_slice())?;
+        let noise = self.sensing.noise_covariance_at(broadcast);
+        if let NumberFormat::Fixed(levels) = &self.format {
+            let factor = Censored::level(value[0], levels, &self.rule, prediction[0], noise[(0, 0)], arrival);
+            let innovation = value - prediction;
+            return factor.or_else(|_| {
+                self.rule.check(sensor, &innovation, &SVector::zeros())?;
+                Err(Error::IMPOSSIBLE)
+            });
+        }
+        // Half the spacing of single precision.
+        let share = if self.format == NumberFormat::Single { 6e-8 } else { 0.0 };
+        self.rule.check(sensor, &(value - prediction), &value.map(|z| z.abs() * share))?;
+        Ok(Censored::value(value, &noise, arrival)?)
+    }
+}
+
+impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S, D, M> {
+    type State = ();
+    /// The state prediction of the fusion centre.
+    type Feedback = SVector<f64, D>;
+    type Report = SVector<f64, M>;
+    type Factor = Censored<M>;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn report_format(&self) -> NumberFormat {
+        self.format
+    }
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        (): &mut (),
+        measurement: &SVector<f64, M>,
+        broadcast: &SVector<f64, D>,
+    ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
+        let prediction = self.sensing.mean(broadcast);
+        all_finite("prediction", prediction.as_slice())?;
+        send_if(&self.rule, measurement, &prediction, &self.format)
+    }
+
+    fn factor(
+        &self,
+        broadcast: &SVector<f64, D>,
+        observation: &Observation<SVector<f64, M>>,
+        link: &Link,
+    ) -> Result<Censored<M>, fewbits_core::Error> {
+        match observation {
+            Observation::Received(value) => self.received(0, broadcast, value, link),
+            Observation::Nothing => self.silence(broadcast, link, 1),
+            Observation::Erased => Ok(Censored::constant(1.0)?),
+        }
+        .map_err(as_core)
+    }
+}
+
+/// The rounded measurement, if the rule sends it.
+pub(crate) fn send_if<const M: usize>(
+    rule: &CensoringRule<M>,
+    measurement: &SVector<f64, M>,
+    prediction: &SVector<f64, M>,
+    format: &NumberFormat,
+) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
+    all_finite("measurement", measurement.as_slice())?;
+    if !rule.sends(&(measurement - prediction)) {
+        return Ok(None);
+    }
+    let mut report = *measurement;
+    for z in report.iter_mut() {
+        *z = format.rounded(*z)?;
+    }
+    Ok(Some(report))
+}
+
+/// The fusion centre's prediction with its covariance, as it is broadcast: `D + D (D + 1)/2` numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction<const D: usize>(pub Gaussian<D>);
+
+impl<const D: usize> Message for Prediction<D> {
+    type Format = NumberFormat;
+
+    fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
+        self.0.mean().iter().try_for_each(|x| format.write(*x, writer))?;
+        (0..D).try_for_each(|i| (0..=i).try_for_each(|j| format.write(self.0.covariance()[(i, j)], writer)))
+    }
+
+    fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        let mut mean = SVector::<f64, D>::zeros();
+        for x in mean.iter_mut() {
+            *x = format.read(reader)?;
+        }
+        let mut covariance = SMatrix::<f64, D, D>::zeros();
+        for i in 0..D {
+            for j in 0..=i {
+                covariance[(i, j)] = format.read(reader)?;
+                covariance[(j, i)] = covariance[(i, j)];
+            }
+        }
+        Gaussian::new(mean, covariance).map(Self).map_err(|error| CodecError::Invalid {
+            what: "covariance",
+            value: error.value,
+            expected: "a positive semidefinite matrix",
+        })
+    }
+}
+
+/// A sensor that is also told the covariance of the prediction and weighs its innovation with `S = R + H P H'` (the paper's
+/// CFwMD2): the message budget is met, at the price of a covariance in every broadcast.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CovarianceFeedback<S, const D: usize, const M: usize> {
+    sensing: S,
+    threshold: f64,
+    format: NumberFormat,
+}
+
+impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> CovarianceFeedback<S, D, M> {
+    /// The scheme with threshold `eta >= 0`.
+    ///
+    /// # Errors
+    /// If the threshold is negative; as [`Censoring::new`].
+    pub fn new(sensing: S, threshold: f64, format: NumberFormat) -> Result<Self, Error> {
+        let unit = CensoringRule::new(&SMatrix::identity(), non_negative("threshold", threshold)?)?;
+        Censoring::new(sensing.clone(), unit, format)?;
+        Ok(Self {
+            sensing,
+            threshold,
+            format,
+        })
+    }
+
+    /// What the sensor does under this broadcast.
+    ///
+    /// # Errors
+    /// If `R + H P H'` is not positive definite.
+    pub fn under(&self, broadcast: &Prediction<D>) -> Result<Censoring<S, D, M>, Error> {
+        let rule = rule_under(&self.sensing, &broadcast.0, self.threshold)?;
+        Censoring::new(self.sensing.clone(), rule, self.format)
+    }
+}
+
+/// The rule with `S = R + H P H'`, the sensing linearised at the belief's mean.
+pub(crate) fn rule_under<const D: usize, const M: usize>(
+    sensing: &impl Sensing<D, M>,
+    predicted: &Gaussian<D>,
+    threshold: f64,
+) -> Result<CensoringRule<M>, Error> {
+    let matrix = sensing.jacobian(predicted.mean());
+    let noise = sensing.noise_covariance_at(predicted.mean());
+    let innovation = matrix * predicted.covariance() * matrix.transpose() + noise;
+    CensoringRule::new(&symmetrised(&innovation), threshold)
+}
+
+impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Scheme<M> for CovarianceFeedback<S, D, M> {
+    type State = ();
+    type Feedback = Prediction<D>;
+    type Report = SVector<f64, M>;
+    type Factor = Censored<M>;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn report_format(&self) -> NumberFormat {
+        self.format
+    }
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        (): &mut (),
+        measurement: &SVector<f64, M>,
+        broadcast: &Prediction<D>,
+    ) -> Result<Option<SVector<f64, M>>, fewbits_core::Error> {
+        let sensor = self.under(broadcast).map_err(as_core)?;
+        sensor.encode(rng, &mut (), measurement, broadcast.0.mean())
+    }
+
+    fn factor(
+        &self,
+        broadcast: &Prediction<D>,
+        observation: &Observation<SVector<f64, M>>,
+        link: &Link,
+    ) -> Result<Censored<M>, fewbits_core::Error> {
+        let sensor = self.under(broadcast).map_err(as_core)?;
+        sensor.factor(broadcast.0.mean(), observation, link)
+    }
+}

@@ -1,0 +1,314 @@
+//! What travels, as bits.
+
+use crate::posterior::PositionBelief;
+use crate::project::Travelling;
+use crate::{Error, Record};
+use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
+use fewbits_densities::{Component, Lpg, Mixture};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::within;
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+/// How samples travel: evenly spaced levels, `step` noise standard deviations apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SampleCode {
+    /// Bits of a sample.
+    pub bits: u32,
+    /// Spacing of the levels in noise standard deviations.
+    pub step: f64,
+}
+
+/// Levels below zero, in parts of all levels: samples scatter around zero far from the source.
+const BELOW: f64 = 1.0 / 16.0;
+
+/// How beliefs and records are encoded. Positions of nodes are known everywhere: a node travels as its index.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Wire {
+    /// Numbers of a belief.
+    pub numbers: NumberFormat,
+    /// Samples of raw records: quantised, or double precision.
+    pub samples: Option<SampleCode>,
+    /// Bits of a node's index.
+    pub index_bits: u32,
+}
+
+impl Default for Wire {
+    /// Single precision, unquantised samples, 9 bits for one of 512 nodes.
+    fn default() -> Self {
+        Self {
+            numbers: NumberFormat::Single,
+            samples: None,
+            index_bits: 9,
+        }
+    }
+}
+
+impl Wire {
+    /// The format of a sample under noise of the given standard deviation.
+    ///
+    /// # Errors
+    /// If the bits are outside 1 to 32 or the step is not positive.
+    pub fn sample_format(&self, noise: f64) -> Result<NumberFormat, Error> {
+        match self.samples {
+            None => Ok(NumberFormat::Double),
+            Some(code) => {
+                within("bits", f64::from(code.bits), 1.0, 32.0)?;
+                let step = code.step * noise;
+                let levels = (1_u64 << code.bits) as f64 - 1.0;
+                let lower = -(levels * BELOW).round() * step;
+                Ok(NumberFormat::fixed(lower, lower + levels * step, code.bits)?)
+            }
+        }
+    }
+
+    /// The record as it arrives: samples rounded, their noise widened by that of rounding, `step^2 / 12`.
+    ///
+    /// # Errors
+    /// As [`Wire::sample_format`].
+    pub fn quantised(&self, record: Record) -> Result<Record, Error> {
+        let Some(code) = self.samples else { return Ok(record) };
+        let format = self.sample_format(record.noise())?;
+        let samples = record.samples().iter().map(|y| format.rounded(*y)).collect::<Result<Vec<_>, _>>()?;
+        let noise = record.noise() * (1.0 + code.step * code.step / 12.0).sqrt();
+        Record::new(record.sensor(), record.node(), samples, noise)
+    }
+}
+
+/// What one node sends to the next.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Packet {
+    /// Indices and samples of all nodes so far.
+    Raw {
+        /// One entry a node: index and samples.
+        records: Vec<(usize, Vec<f64>)>,
+        /// Standard deviation of the noise, known everywhere.
+        noise: f64,
+    },
+    /// A belief of numbers in the order: weights (all but the last), means, lower Cholesky factors, coefficients.
+    Belief {
+        /// Number of components.
+        components: usize,
+        /// Degree of the polynomials, for polynomial Gaussians.
+        degree: Option<usize>,
+        /// Whether the rate is the third coordinate.
+        with_rate: bool,
+        /// The numbers.
+        numbers: Vec<f64>,
+    },
+}
+
+/// Components and degrees fit into this many bits.
+const COUNT_BITS: u32 = 5;
+/// The most records of a message.
+const RECORD_COUNT_BITS: u32 = 10;
+
+impl Packet {
+    /// The message that carries a belief, or all records if there is none.
+    ///
+    /// # Errors
+    /// If a number does not fit the format.
+    pub fn new(
+        belief: Option<&Travelling>,
+        records: &[Record],
+        nodes: &[usize],
+        wire: &Wire,
+    ) -> Result<Self, Error> {
+        let round = |numbers: Vec<f64>| -> Result<Vec<f64>, ArgumentError> {
+            numbers.into_iter().map(|x| wire.numbers.rounded(x)).collect()
+        };
+        Ok(match belief {
+            None => Self::Raw {
+                records: nodes.iter().zip(records).map(|(node, r)| (*node, r.samples().to_vec())).collect(),
+                noise: records.first().map_or(1.0, |r| r.sensor().noise()),
+            },
+            Some(Travelling::WithRate(mixture)) => Self::Belief {
+                components: mixture.len(),
+                degree: None,
+                with_rate: true,
+                numbers: round(numbers_of(mixture.components()))?,
+            },
+            Some(Travelling::Position(PositionBelief::Mixture(mixture))) => Self::Belief {
+                components: mixture.len(),
+                degree: None,
+                with_rate: false,
+                numbers: round(numbers_of(mixture.components()))?,
+            },
+            Some(Travelling::Position(PositionBelief::Lpg(lpg))) => {
+                let mut numbers = Vec::new();
+                lpg.gaussians().for_each(|c| push_gaussian(c, &mut numbers));
+                lpg.coefficients().for_each(|list| numbers.extend_from_slice(list));
+                Self::Belief {
+                    components: lpg.gaussians().count(),
+                    degree: Some(lpg.degree()),
+                    with_rate: false,
+                    numbers: round(numbers)?,
+                }
+            }
+        })
+    }
+
+    /// The belief that a packet of numbers holds; `None` for raw records.
+    ///
+    /// # Errors
+    /// If the numbers are no belief.
+    pub fn belief(&self) -> Result<Option<Travelling>, Error> {
+        let Self::Belief { components, degree, with_rate, numbers } = self else { return Ok(None) };
+        let count = *components;
+        if *with_rate {
+            return Ok(Some(Travelling::WithRate(mixture_of::<3>(count, numbers)?)));
+        }
+        let position = match degree {
+            None => PositionBelief::Mixture(mixture_of::<2>(count, numbers)?),
+            Some(degree) => {
+                let gaussians: Vec<_> = numbers
+                    .chunks(5)
+                    .take(count)
+                    .map(|chunk| read_gaussian::<2>(1.0, chunk))
+                    .collect::<Result<_, _>>()?;
+                let size = (degree + 1) * (degree + 2) / 2;
+                let lists: Vec<Vec<f64>> =
+                    numbers.get(5 * count..).unwrap_or_default().chunks(size).map(<[f64]>::to_vec).collect();
+                PositionBelief::Lpg(Lpg::new(&gaussians, *degree, &lists)?)
+            }
+        };
+        Ok(Some(Travelling::Position(position)))
+    }
+
+    /// Length of the message in bits.
+    ///
+    /// # Errors
+    /// If it cannot be encoded.
+    pub fn bits(&self, wire: &Wire) -> Result<usize, Error> {
+        Ok(self.to_bits(&Contract { wire: *wire, noise: self.noise(), samples: self.samples() })?.bits())
+    }
+
+    fn noise(&self) -> f64 {
+        match self {
+            Self::Raw { noise, .. } => *noise,
+            Self::Belief { .. } => 1.0,
+        }
+    }
+
+    fn samples(&self) -> usize {
+        match self {
+            Self::Raw { records, .. } => records.first().map_or(0, |r| r.1.len()),
+            Self::Belief { .. } => 0,
+        }
+    }
+}
+
+/// What both ends of a link agreed on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contract {
+    /// The encoding.
+    pub wire: Wire,
+    /// Standard deviation of the sensors' noise.
+    pub noise: f64,
+    /// Samples a node takes.
+    pub samples: usize,
+}
+
+impl Message for Packet {
+    type Format = Contract;
+
+    /// One bit for the kind. Raw: the number of records (10 bits), and of each its index and samples. Belief: components and degree
+    /// (5 bits each, 31 for none), one bit for the rate, and the numbers.
+    fn encode(&self, format: &Contract, writer: &mut BitWriter) -> Result<(), CodecError> {
+        match self {
+            Self::Raw { records, .. } => {
+                writer.write_bit(false);
+                writer.write(records.len() as u64, RECORD_COUNT_BITS)?;
+                let code = format.wire.sample_format(format.noise).map_err(invalid)?;
+                for (node, samples) in records {
+                    writer.write(*node as u64, format.wire.index_bits)?;
+                    for sample in samples {
+                        code.write(*sample, writer)?;
+                    }
+                }
+            }
+            Self::Belief { components, degree, with_rate, numbers } => {
+                writer.write_bit(true);
+                writer.write(*components as u64, COUNT_BITS)?;
+                writer.write(degree.map_or(31, |d| d as u64), COUNT_BITS)?;
+                writer.write_bit(*with_rate);
+                for number in numbers {
+                    format.wire.numbers.write(*number, writer)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn decode(format: &Contract, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        if !reader.read_bit()? {
+            let count = reader.read(RECORD_COUNT_BITS)? as usize;
+            let code = format.wire.sample_format(format.noise).map_err(invalid)?;
+            let mut records = Vec::new();
+            for _ in 0..count {
+                let node = reader.read(format.wire.index_bits)? as usize;
+                let samples = (0..format.samples).map(|_| code.read(reader)).collect::<Result<_, _>>()?;
+                records.push((node, samples));
+            }
+            return Ok(Self::Raw { records, noise: format.noise });
+        }
+        let components = reader.read(COUNT_BITS)? as usize;
+        let degree = Some(reader.read(COUNT_BITS)? as usize).filter(|d| *d != 31);
+        let with_rate = reader.read_bit()?;
+        let count = match (degree, with_rate) {
+            (Some(d), _) => components * (5 + (d + 1) * (d + 2) / 2),
+            (None, true) => (components * 10).saturating_sub(1),
+            (None, false) => (components * 6).saturating_sub(1),
+        };
+        let numbers = (0..count).map(|_| format.wire.numbers.read(reader)).collect::<Result<_, _>>()?;
+        Ok(Self::Belief { components, degree, with_rate, numbers })
+    }
+}
+
+fn invalid(error: Error) -> CodecError {
+    CodecError::Invalid {
+        what: "wire format",
+        value: error.to_string(),
+        expected: "a valid sample code",
+    }
+}
+
+fn numbers_of<const D: usize>(components: &[Component<D>]) -> Vec<f64> {
+    let mut numbers: Vec<f64> = components.iter().skip(1).map(Component::weight).collect();
+    components.iter().for_each(|c| push_gaussian(c, &mut numbers));
+    numbers
+}
+
+fn push_gaussian<const D: usize>(c: &Component<D>, numbers: &mut Vec<f64>) {
+    numbers.extend(c.mean().iter());
+    let lower = c.cholesky_factor();
+    for i in 0..D {
+        numbers.extend((0..=i).map(|j| lower[(i, j)]));
+    }
+}
+
+fn read_gaussian<const D: usize>(weight: f64, numbers: &[f64]) -> Result<Component<D>, Error> {
+    let missing = || ArgumentError::new("numbers", numbers.len(), "more numbers");
+    let mut rest = numbers.iter().copied();
+    let mut next = || rest.next().ok_or_else(missing);
+    let mut mean = SVector::<f64, D>::zeros();
+    for m in mean.iter_mut() {
+        *m = next()?;
+    }
+    let mut lower = SMatrix::<f64, D, D>::zeros();
+    for i in 0..D {
+        for j in 0..=i {
+            lower[(i, j)] = next()?;
+        }
+    }
+    Ok(Component::new(weight, mean, lower * lower.transpose())?)
+}
+
+fn mixture_of<const D: usize>(count: usize, numbers: &[f64]) -> Result<Mixture<D>, Error> {
+    let size = D + D * (D + 1) / 2;
+    let (weights, gaussians) = numbers.split_at(count.saturating_sub(1).min(numbers.len()));
+    let first = 1.0 - weights.iter().sum::<f64>();
+    let all = std::iter::once(first.max(0.0)).chain(weights.iter().copied());
+    let parts = all.take(count).zip(gaussians.chunks(size)).map(|(w, chunk)| read_gaussian::<D>(w, chunk));
+    Ok(Mixture::new(parts.collect::<Result<_, _>>()?)?)
+}

@@ -1,0 +1,146 @@
+//! Which node is asked next.
+
+use crate::information::{fisher_information, half_log_det_plus_one};
+use crate::posterior::Posterior;
+use crate::{Error, RateModel, SourceSensor};
+use fewbits_core::Gaussian;
+use fewbits_densities::{Clump, Clumps};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
+use serde::{Deserialize, Serialize};
+
+/// How the next node is chosen among candidates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Rule {
+    /// The largest mutual information of samples and (position, rate), by its Gaussian bound `(1/2) ln det(I + Cov / sigma^2)`.
+    #[default]
+    MutualInformation,
+    /// The smallest posterior Cramer-Rao bound (equations 40 to 44, conditional on the belief): the expected Fisher information is
+    /// added to that of the belief, and the rate eliminated by a Schur complement afterwards.
+    CramerRao,
+    /// The smallest Mahalanobis distance to the estimate (equation 45). Can lock on nodes that tell nothing new.
+    Mahalanobis,
+    /// The smallest determinant of the covariance after samples that the estimate predicts.
+    Covariance,
+}
+
+/// Clumps that stand for the belief.
+const CLUMPS: usize = 96;
+
+/// A belief, ready to score candidates.
+#[derive(Debug, Clone)]
+pub struct Selector {
+    rule: Rule,
+    clumps: Clumps<3>,
+    estimate: Gaussian<2>,
+    precision: Matrix2<f64>,
+}
+
+impl Selector {
+    /// A selector for a posterior and the Gaussian that summarises what travels on.
+    ///
+    /// # Errors
+    /// If the covariance of the estimate is singular.
+    pub fn new(rule: Rule, posterior: &Posterior, estimate: &Gaussian<2>, rate: &RateModel) -> Result<Self, Error> {
+        Ok(Self {
+            rule,
+            clumps: posterior.clumps_with_rate(rate.typical(), if rule == Rule::Mahalanobis { 1 } else { CLUMPS })?,
+            precision: estimate.cholesky()?.inverse(),
+            estimate: *estimate,
+        })
+    }
+
+    /// The best of the candidates, the first among equals; `None` of none.
+    pub fn best(&self, sensor: &SourceSensor, candidates: &[(usize, Vector2<f64>)]) -> Option<usize> {
+        let mut best: Option<(f64, usize)> = None;
+        for (index, node) in candidates {
+            let score = self.score(sensor, node);
+            if best.is_none_or(|(highest, _)| score > highest) {
+                best = Some((score, *index));
+            }
+        }
+        best.map(|(_, index)| index)
+    }
+
+    /// How good a node is: the larger the better.
+    pub fn score(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
+        match self.rule {
+            Rule::Mahalanobis => {
+                let d = node - self.estimate.mean();
+                -d.dot(&(self.precision * d))
+            }
+            Rule::MutualInformation => self.information(sensor, node),
+            Rule::CramerRao => self.cramer_rao(sensor, node),
+            Rule::Covariance => -self.covariance(sensor, node).ln(),
+        }
+    }
+
+    fn information(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
+        let samples = sensor.instants().len();
+        let mut mean = DVector::zeros(samples);
+        let mut second = DMatrix::zeros(samples, samples);
+        for clump in self.clumps.clumps() {
+            let a = self.predicted(sensor, node, clump);
+            let rate = clump.mean[2];
+            mean.axpy(clump.weight * rate, &a, 1.0);
+            second.ger(clump.weight * (rate * rate + clump.covariance[(2, 2)]), &a, &a, 1.0);
+        }
+        second.ger(-1.0, &mean, &mean, 1.0);
+        half_log_det_plus_one(second)
+    }
+
+    /// Responses in units of the noise.
+    fn predicted(&self, sensor: &SourceSensor, node: &Vector2<f64>, clump: &Clump<3>) -> DVector<f64> {
+        let offset = node - Vector2::new(clump.mean[0], clump.mean[1]);
+        let noise = sensor.noise();
+        DVector::from_iterator(sensor.instants().len(), (0..sensor.instants().len()).map(|j| sensor.response(j, &offset) / noise))
+    }
+
+    fn cramer_rao(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
+        let mut information = Matrix3::zeros();
+        for clump in self.clumps.clumps() {
+            let at = Vector2::new(clump.mean[0], clump.mean[1]);
+            information += fisher_information(sensor, node, &at, clump.mean[2]) * clump.weight;
+        }
+        let covariance = self.clumps.covariance();
+        if covariance[(2, 2)] > 0.0 {
+            let Some(prior) = covariance.cholesky() else { return f64::NEG_INFINITY };
+            let total = prior.inverse() + information;
+            let cross = Vector2::new(total[(0, 2)], total[(1, 2)]);
+            let position = total.fixed_view::<2, 2>(0, 0) - cross * cross.transpose() / total[(2, 2)];
+            position.determinant().ln()
+        } else {
+            (self.precision + information.fixed_view::<2, 2>(0, 0)).determinant().ln()
+        }
+    }
+
+    /// Determinant of the covariance of the position after the samples that the estimate predicts.
+    fn covariance(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
+        let samples = sensor.instants().len();
+        let offset = node - self.estimate.mean();
+        let rate = self.clumps.mean()[2];
+        let predicted = DVector::from_iterator(samples, (0..samples).map(|j| rate * sensor.response(j, &offset) / sensor.noise()));
+        let mut logs = Vec::with_capacity(self.clumps.clumps().len());
+        for clump in self.clumps.clumps() {
+            let a = self.predicted(sensor, node, clump);
+            let residual = &predicted - &a * clump.mean[2];
+            let along = a.dot(&residual);
+            let spread = 1.0 + clump.covariance[(2, 2)] * a.norm_squared();
+            let squared = residual.norm_squared() - clump.covariance[(2, 2)] * along * along / spread;
+            logs.push(clump.weight.ln() - 0.5 * squared - 0.5 * spread.ln());
+        }
+        let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = logs.iter().map(|log| (log - best).exp()).collect();
+        let total: f64 = weights.iter().sum();
+        let position = |clump: &Clump<3>| Vector2::new(clump.mean[0], clump.mean[1]) - self.estimate.mean();
+        let parts = || self.clumps.clumps().iter().zip(&weights);
+        let mean: Vector2<f64> = parts().map(|(c, w)| position(c) * (*w / total)).sum();
+        let covariance: Matrix2<f64> = parts()
+            .map(|(c, w)| {
+                let d = position(c) - mean;
+                (d * d.transpose() + c.covariance.fixed_view::<2, 2>(0, 0)) * (*w / total)
+            })
+            .sum();
+        covariance.determinant().max(f64::MIN_POSITIVE)
+    }
+}

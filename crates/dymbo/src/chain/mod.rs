@@ -1,0 +1,250 @@
+//! The exact mean squared error of every scalar filter of this crate, without Monte Carlo.
+//!
+//! With the threshold at the prediction, what the sensor says depends on the state only through the prediction error
+//! `e = theta - prediction`. So the error is a Markov chain of its own, whatever the state does:
+//!
+//! ```text
+//! message j with probability p_j(e)          sign bit: Phi(e/sigma); word: a cell; K sensors: a count or a string
+//! filtered error  e - d_j                    d_j: the filter's correction
+//! next error      a (e - d_j) + u,  u ~ N(0, sigma_u^2)
+//! ```
+//!
+//! Its density is smooth, so the trapezoid rule on a uniform grid of a few hundred points is exact to about `1e-12`; the
+//! shift by `d_j` is evaluated inside the normal kernel and never interpolated.
+//!
+//! ```
+//! use fewbits_dymbo::{chain, DymboFilter, ScalarPlant};
+//! let plant = ScalarPlant::new(0.9, 0.5, 1.0)?;
+//! let exact = chain::dymbo_mse(&DymboFilter::new(plant))?;
+//! assert!((exact - 0.729_565_800_136).abs() < 1e-10);
+//! # Ok::<(), fewbits_dymbo::Error>(())
+//! ```
+
+mod law;
+mod stationary;
+mod transient;
+
+pub use law::MessageLaw;
+pub use stationary::{
+    StationaryError, coefficient_at_loss, crossover_mse, dymbo_mse, multibit_mse, noise_ratio_at_loss, parallel_mse,
+    sequential_mse, stationary, true_loss,
+};
+pub use transient::{TransientStep, first_message_transient};
+
+use crate::{Error, ScalarPlant};
+use fewbits_filters::Grid;
+use fewbits_numerics::error::{ArgumentError, positive};
+use fewbits_numerics::normal::{self, INV_SQRT_2PI};
+use std::f64::consts::FRAC_2_PI;
+
+/// Grid spacing as a share of the smaller of the two noise deviations.
+const SPACING: f64 = 0.4;
+/// Half width of the grid in deviations of the predicted error.
+const WIDTH: f64 = 14.0;
+/// Deviations beyond which the kernel is below rounding.
+const REACH: f64 = 8.6;
+/// More points than this are refused: the plant has next to no process noise, and the chain next to no end.
+const MOST_POINTS: f64 = 40_000.0;
+/// A density at the edge of the grid above this share of its peak asks for a wider grid.
+const EDGE: f64 = 1e-13;
+/// Change of the density, in total mass, at which the power iteration has settled.
+const SETTLED: f64 = 1e-14;
+/// Power iterations after which a chain is given up ...
+const MOST_STEPS: usize = 200_000;
+/// ... or these multiplications.
+const MOST_WORK: f64 = 2e10;
+/// Most normal kernels of one transition: grid points times messages.
+const MOST_KERNELS: f64 = 2e7;
+
+/// The density of the prediction error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorChain {
+    plant: ScalarPlant,
+    grid: Grid,
+    density: Vec<f64>,
+}
+
+impl ErrorChain {
+    fn grid(plant: &ScalarPlant, half_width: f64) -> Result<Grid, Error> {
+        let finest = positive("process_variance", plant.process_variance())?
+            .min(plant.measurement_variance())
+            .sqrt();
+        let spacing = SPACING * finest;
+        if 2.0 * half_width / spacing > MOST_POINTS {
+            let expected = "enough process noise for a grid of at most 40000 points";
+            return Err(ArgumentError::new("process_variance", plant.process_variance(), expected).into());
+        }
+        Ok(Grid::symmetric(half_width, spacing)?)
+    }
+
+    /// The chain after one prediction from a normal filtered error of variance `filtered_variance`.
+    ///
+    /// # Errors
+    /// No process noise: the chain then has no density on a grid.
+    pub fn from_normal(plant: &ScalarPlant, filtered_variance: f64) -> Result<Self, Error> {
+        let variance = plant.dynamics().predict_variance(filtered_variance);
+        let grid = Self::grid(plant, WIDTH * variance.max(plant.process_variance()).sqrt())?;
+        let density = grid
+            .nodes()
+            .map(|e| normal::log_pdf_with(e, 0.0, variance).exp())
+            .collect();
+        Ok(Self {
+            plant: *plant,
+            grid,
+            density,
+        })
+    }
+
+    /// The chain at `n = 1` after a first message of the given resolution about a state of unknown place: the error of the
+    /// rounded sample has density `[Phi((e + tau/2)/sigma) - Phi((e - tau/2)/sigma)]/tau`.
+    ///
+    /// # Errors
+    /// No process noise, a resolution that is not positive.
+    pub fn from_first_message(plant: &ScalarPlant, resolution: f64) -> Result<Self, Error> {
+        let tau = positive("resolution", resolution)?;
+        let sigma = plant.measurement_variance().sqrt();
+        let start_width = 0.5 * tau + 9.0 * sigma;
+        let a = plant.coefficient().abs();
+        let steady = plant.steady_state(FRAC_2_PI)?.predicted_variance;
+        let width = (WIDTH * steady.sqrt()).max(a * start_width + 9.0 * plant.process_variance().sqrt());
+        let grid = Self::grid(plant, width)?;
+        let mut chain = Self {
+            plant: *plant,
+            grid,
+            density: vec![0.0; grid.points()],
+        };
+        let from = Self::grid(plant, start_width)?;
+        for e in from.nodes() {
+            let mass = from.spacing() * normal::interval((e - 0.5 * tau) / sigma, (e + 0.5 * tau) / sigma) / tau;
+            chain.add_kernel(plant.coefficient() * e, mass);
+        }
+        Ok(chain)
+    }
+
+    /// Adds `mass` spread by the process noise around `centre`.
+    fn add_kernel(&mut self, centre: f64, mass: f64) {
+        let deviation = self.plant.process_variance().sqrt();
+        let scale = mass * INV_SQRT_2PI / deviation;
+        let reached = self
+            .grid
+            .indices_within(centre - REACH * deviation, centre + REACH * deviation);
+        for i in reached {
+            let z = (self.grid.node(i) - centre) / deviation;
+            self.density[i] += scale * (-0.5 * z * z).exp();
+        }
+    }
+
+    /// `E e^2` before the message.
+    pub fn predicted_mse(&self) -> f64 {
+        let sum: f64 = self.grid.nodes().zip(&self.density).map(|(e, p)| e * e * p).sum();
+        sum * self.grid.spacing()
+    }
+
+    /// `E (e - d)^power` after the message.
+    pub fn filtered_moment(&self, law: &MessageLaw, power: i32) -> f64 {
+        let sum: f64 = self
+            .grid
+            .nodes()
+            .zip(&self.density)
+            .map(|(e, p)| {
+                p * law
+                    .messages(e)
+                    .map(|(probability, d)| probability * (e - d).powi(power))
+                    .sum::<f64>()
+            })
+            .sum();
+        sum * self.grid.spacing()
+    }
+
+    /// Mean squared error after the message.
+    pub fn filtered_mse(&self, law: &MessageLaw) -> f64 {
+        self.filtered_moment(law, 2)
+    }
+
+    /// Sends a message and predicts: the density of the next prediction error.
+    pub fn advance(&mut self, law: &MessageLaw) {
+        let mut next = Self {
+            density: vec![0.0; self.density.len()],
+            ..*self
+        };
+        for (e, p) in self.grid.nodes().zip(&self.density) {
+            for (probability, correction) in law.messages(e) {
+                let mass = p * self.grid.spacing() * probability;
+                next.add_kernel(self.plant.coefficient() * (e - correction), mass);
+            }
+        }
+        self.density = next.density;
+    }
+
+    /// The transition of [`ErrorChain::advance`] as a matrix: for each node its first successor and their weights.
+    fn transition(&self, law: &MessageLaw) -> Vec<(usize, Vec<f64>)> {
+        let mut column = Self {
+            density: vec![0.0; self.density.len()],
+            ..*self
+        };
+        let unit = self.grid.spacing();
+        let deviation = self.plant.process_variance().sqrt();
+        let a = self.plant.coefficient();
+        self.grid
+            .nodes()
+            .map(|e| {
+                let (mut first, mut end) = (self.grid.points(), 0);
+                for (probability, correction) in law.messages(e) {
+                    let centre = a * (e - correction);
+                    column.add_kernel(centre, unit * probability);
+                    let reached = self
+                        .grid
+                        .indices_within(centre - REACH * deviation, centre + REACH * deviation);
+                    if !reached.is_empty() {
+                        (first, end) = (first.min(reached.start), end.max(reached.end));
+                    }
+                }
+                let first = first.min(end);
+                let weights = column.density[first..end].to_vec();
+                column.density[first..end].fill(0.0);
+                (first, weights)
+            })
+            .collect()
+    }
+
+    /// Iterates one law until the density settles.
+    fn settle(&mut self, law: &MessageLaw) -> Result<(), Error> {
+        let kernels = self.density.len() as f64 * law.corrections().len() as f64;
+        if kernels > MOST_KERNELS {
+            let expected = "a plant and messages whose chain has at most 2e7 kernels (points times messages)";
+            return Err(ArgumentError::new("law", format!("{kernels} kernels"), expected).into());
+        }
+        let transition = self.transition(law);
+        let weights: usize = transition.iter().map(|(_, weights)| weights.len()).sum();
+        let most_steps = MOST_STEPS.min((MOST_WORK / weights as f64) as usize);
+        let mut next = vec![0.0; self.density.len()];
+        for _ in 0..most_steps {
+            next.fill(0.0);
+            for ((first, weights), p) in transition.iter().zip(&self.density) {
+                for (n, w) in next[*first..].iter_mut().zip(weights) {
+                    *n += w * p;
+                }
+            }
+            let total = next.iter().sum::<f64>() * self.grid.spacing();
+            let mut change = 0.0;
+            for (n, p) in next.iter_mut().zip(&self.density) {
+                *n /= total;
+                change += (*n - p).abs();
+            }
+            std::mem::swap(&mut self.density, &mut next);
+            if change * self.grid.spacing() <= SETTLED * (self.density.len() as f64).sqrt() {
+                return Ok(());
+            }
+        }
+        Err(Error::NotConverged {
+            what: "the error chain",
+            iterations: most_steps,
+        })
+    }
+
+    fn spills(&self) -> bool {
+        let peak = self.density.iter().copied().fold(0.0, f64::max);
+        let ends = [self.density.first(), self.density.last()];
+        ends.into_iter().flatten().any(|p| *p > EDGE * peak)
+    }
+}

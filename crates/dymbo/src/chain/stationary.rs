@@ -1,0 +1,214 @@
+//! What the error settles to.
+
+use super::{ErrorChain, MessageLaw};
+use crate::{DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, steady};
+use fewbits_core::Link;
+use std::f64::consts::FRAC_2_PI;
+
+/// What the error settles to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct StationaryError {
+    /// Mean squared error before a message.
+    pub predicted_mse: f64,
+    /// Mean squared error after a message.
+    pub filtered_mse: f64,
+    /// `E e^4/(E e^2)^2` after a message: 3 for a normal error.
+    pub kurtosis: f64,
+}
+
+/// The stationary error under one law of messages, e.g. that at the filter's steady predicted variance.
+///
+/// # Errors
+/// A plant with `|a| > 1` (the chain has no stationary law) or without process noise; [`Error::NotConverged`].
+pub fn stationary(plant: &ScalarPlant, law: &MessageLaw) -> Result<StationaryError, Error> {
+    let coefficient = plant.coefficient();
+    if coefficient.abs() > 1.0 {
+        return Err(Error::UnstablePlant { coefficient });
+    }
+    let largest = law.corrections().iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+    // A rough normal start; the width follows the density if this guess is too small.
+    let mut guess = plant.steady_state(FRAC_2_PI)?.filtered_variance.max(largest * largest);
+    loop {
+        let mut chain = ErrorChain::from_normal(plant, guess)?;
+        chain.settle(law)?;
+        if !chain.spills() {
+            let filtered_mse = chain.filtered_mse(law);
+            return Ok(StationaryError {
+                predicted_mse: chain.predicted_mse(),
+                filtered_mse,
+                kurtosis: chain.filtered_moment(law, 4) / (filtered_mse * filtered_mse),
+            });
+        }
+        guess = 4.0 * guess + plant.process_variance();
+    }
+}
+
+/// Exact stationary mean squared error of the Dymbo filter over its own link, when every bit arrives.
+///
+/// # Errors
+/// As [`stationary`].
+pub fn dymbo_mse(filter: &DymboFilter) -> Result<f64, Error> {
+    crossover_mse(filter, filter.link())
+}
+
+/// The same when the link is `actual` and not what the filter believes.
+///
+/// # Errors
+/// As [`stationary`].
+pub fn crossover_mse(filter: &DymboFilter, actual: &Link) -> Result<f64, Error> {
+    let p = filter.plant().steady_state(filter.information())?.predicted_variance;
+    Ok(stationary(filter.plant(), &MessageLaw::bit(filter, p, actual)?)?.filtered_mse)
+}
+
+/// Exact stationary mean squared error of the filter for words of several bits.
+///
+/// # Errors
+/// As [`stationary`].
+pub fn multibit_mse(filter: &MultibitFilter) -> Result<f64, Error> {
+    let p = filter.plant().steady_state(filter.information())?.predicted_variance;
+    Ok(stationary(filter.plant(), &MessageLaw::word(filter, p)?)?.filtered_mse)
+}
+
+/// Exact stationary mean squared error of several sensors that answer at once, and the average variance that the filter
+/// computes.
+///
+/// # Errors
+/// As [`stationary`].
+pub fn parallel_mse(filter: &ParallelFilter) -> Result<(f64, f64), Error> {
+    let settled = steady::settle(filter.plant(), filter.link(), |p| filter.table(p).1)?;
+    let law = MessageLaw::count(filter, settled.predicted_variance)?;
+    Ok((stationary(filter.plant(), &law)?.filtered_mse, settled.filtered_variance))
+}
+
+/// Exact stationary mean squared error of several sensors that answer one after the other.
+///
+/// # Errors
+/// As [`stationary`]; if there are more than 12 sensors.
+pub fn sequential_mse(plant: &ScalarPlant, sensors: usize) -> Result<f64, Error> {
+    let p = steady::sequential_steady_state(plant, sensors)?.predicted_variance;
+    Ok(stationary(plant, &MessageLaw::sequence(plant, p, sensors)?)?.filtered_mse)
+}
+
+/// Exact stationary error over the Kalman filter's: what [`steady::loss`] predicts.
+///
+/// # Errors
+/// As [`stationary`].
+pub fn true_loss(plant: &ScalarPlant) -> Result<f64, Error> {
+    Ok(dymbo_mse(&DymboFilter::new(*plant))? / plant.steady_state(1.0)?.filtered_variance)
+}
+
+/// The true loss exceeds the predicted one by at most 1.2 % within `|a| <= 1`; its crossings lie just below.
+const CLOSE: f64 = 0.9;
+
+/// The noise ratio at which [`true_loss`] reaches `level` for the given coefficient; `None` where it does not within 10 %
+/// below [`steady::noise_ratio_at_loss`].
+///
+/// # Errors
+/// As [`steady::noise_ratio_at_loss`] and [`stationary`].
+pub fn noise_ratio_at_loss(level: f64, coefficient: f64) -> Result<Option<f64>, Error> {
+    let Some(predicted) = steady::noise_ratio_at_loss(level, coefficient)? else {
+        return Ok(None);
+    };
+    let at = |log: f64| true_loss(&ScalarPlant::with_noise_ratio(coefficient, log.exp())?);
+    let root = steady::crossing(level, ((CLOSE * predicted).ln(), predicted.ln()), at)?;
+    Ok(root.map(f64::exp))
+}
+
+/// The coefficient at which [`true_loss`] reaches `level` for the given noise ratio; `None` where it does not within 10 %
+/// below [`steady::coefficient_at_loss`].
+///
+/// # Errors
+/// As [`steady::coefficient_at_loss`] and [`stationary`].
+pub fn coefficient_at_loss(level: f64, noise_ratio: f64) -> Result<Option<f64>, Error> {
+    let Some(predicted) = steady::coefficient_at_loss(level, noise_ratio)? else {
+        return Ok(None);
+    };
+    let at = |a: f64| true_loss(&ScalarPlant::with_noise_ratio(a, noise_ratio)?);
+    steady::crossing(level, (CLOSE * predicted, predicted), at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        coefficient_at_loss, crossover_mse, dymbo_mse, multibit_mse, noise_ratio_at_loss, parallel_mse, sequential_mse,
+        stationary, true_loss,
+    };
+    use crate::chain::{ErrorChain, MessageLaw};
+    use crate::{CountFusion, DymboFilter, Error, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant};
+    use fewbits_core::Link;
+
+    fn plant() -> ScalarPlant {
+        ScalarPlant::new(0.9, 0.5, 1.0).unwrap()
+    }
+
+    #[test]
+    fn all_roads_lead_to_one_bit() {
+        let dymbo = dymbo_mse(&DymboFilter::new(plant())).unwrap();
+        let one_word = multibit_mse(&MultibitFilter::new(plant(), 1).unwrap()).unwrap();
+        let one_count = parallel_mse(&ParallelFilter::new(plant(), 1, CountFusion::Linear).unwrap())
+            .unwrap()
+            .0;
+        let one_string = sequential_mse(&plant(), 1).unwrap();
+        for other in [one_word, one_count, one_string] {
+            assert!((dymbo - other).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_filter_that_ignores_its_bits_has_the_plants_variance_and_scaling_holds() {
+        let filter = DymboFilter::new(plant()).with_link(Link::flipping(0.5).unwrap());
+        let ignorant = crossover_mse(&filter, &Link::PERFECT).unwrap();
+        let alone = plant().dynamics().stationary_variance().unwrap();
+        assert!((ignorant - alone).abs() < 1e-10);
+        let unit = dymbo_mse(&DymboFilter::new(plant())).unwrap();
+        for scale in [1e-8, 9.0, 1e8] {
+            let scaled = DymboFilter::new(ScalarPlant::new(-0.9, 0.5 * scale, scale).unwrap());
+            assert!((dymbo_mse(&scaled).unwrap() / scale - unit).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn true_losses_lie_on_their_contours() {
+        let gamma = noise_ratio_at_loss(2.0, 0.95).unwrap().unwrap();
+        assert!((true_loss(&ScalarPlant::with_noise_ratio(0.95, gamma).unwrap()).unwrap() - 2.0).abs() < 1e-11);
+        assert_eq!(noise_ratio_at_loss(1.2, 1.0), Ok(None));
+        assert_eq!(coefficient_at_loss(2.0, 0.5), Ok(None));
+    }
+
+    #[test]
+    fn the_transient_forgets_its_start() {
+        let filter = DymboFilter::new(plant());
+        let steady = plant().steady_state(filter.information()).unwrap();
+        let law = MessageLaw::bit(&filter, steady.predicted_variance, &Link::PERFECT).unwrap();
+        let mut chain = ErrorChain::from_first_message(&plant(), 1.0).unwrap();
+        for _ in 0..60 {
+            chain.advance(&law);
+        }
+        assert!((chain.filtered_mse(&law) - stationary(&plant(), &law).unwrap().filtered_mse).abs() < 1e-11);
+    }
+
+    #[test]
+    fn refuses_chains_without_end() {
+        let mse = |a: f64, q: f64| dymbo_mse(&DymboFilter::new(ScalarPlant::new_unstable(a, q, 1.0).unwrap()));
+        assert!(matches!(mse(0.9, 0.0), Err(Error::Argument(_))));
+        assert!(matches!(mse(1.2, 0.5), Err(Error::UnstablePlant { .. })));
+        assert!(matches!(mse(1.0, 1e-16), Err(Error::Argument(_))));
+        // Next to no noise, but a short memory: bits bring nothing, the stationary variance is left.
+        assert!((mse(0.9, 1e-16).unwrap() / (1e-16 / 0.19) - 1.0).abs() < 1e-6);
+    }
+
+    /// Regression: three sensors at a = -3 ran for hours.
+    #[test]
+    fn work_is_bounded() {
+        let start = std::time::Instant::now();
+        let wild = ScalarPlant::new_unstable(-3.0, 0.5, 1.0).unwrap();
+        for fusion in [CountFusion::Linear, CountFusion::Exact] {
+            let filter = ParallelFilter::new(wild, 3, fusion).unwrap();
+            assert!(matches!(parallel_mse(&filter), Err(Error::UnstablePlant { .. })));
+        }
+        let slow = ScalarPlant::new(1.0, 1e-6, 1.0).unwrap();
+        let many = ParallelFilter::new(slow, 300, CountFusion::Linear).unwrap();
+        assert!(parallel_mse(&many).is_err() && start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
+    }
+}

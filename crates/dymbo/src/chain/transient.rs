@@ -1,0 +1,53 @@
+//! How the error goes from the first message to its steady state.
+
+use super::{ErrorChain, MessageLaw};
+use crate::{DymboFilter, Error, ScalarPlant};
+use fewbits_core::Link;
+use fewbits_numerics::error::non_negative;
+use std::f64::consts::FRAC_2_PI;
+
+/// One step of a transient: what the filter computes and what is true.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct TransientStep {
+    /// Predicted variance `P` of the filter; at the first message its filtered one.
+    pub predicted_variance: f64,
+    /// Filtered variance `M` of the filter.
+    pub filtered_variance: f64,
+    /// Exact mean squared error.
+    pub mse: f64,
+}
+
+/// Variances and exact errors of the Dymbo filter for `n = 0..=steps` after a first message of the given resolution about a
+/// state of unknown place, when the filter starts from `initial_variance` (`sigma^2 + tau^2/12` is right).
+///
+/// # Errors
+/// As [`ErrorChain::from_first_message`]; a negative variance.
+pub fn first_message_transient(
+    plant: &ScalarPlant,
+    resolution: f64,
+    initial_variance: f64,
+    steps: usize,
+) -> Result<Vec<TransientStep>, Error> {
+    non_negative("initial_variance", initial_variance)?;
+    let mut chain = ErrorChain::from_first_message(plant, resolution)?;
+    let filter = DymboFilter::new(*plant);
+    let mut filtered_variance = initial_variance;
+    let mut transient = vec![TransientStep {
+        predicted_variance: initial_variance,
+        filtered_variance,
+        mse: plant.measurement_variance() + resolution * resolution / 12.0,
+    }];
+    for _ in 0..steps {
+        let predicted_variance = plant.dynamics().predict_variance(filtered_variance);
+        filtered_variance = crate::filtered_variance(predicted_variance, plant.measurement_variance(), FRAC_2_PI);
+        let law = MessageLaw::bit(&filter, predicted_variance, &Link::PERFECT)?;
+        transient.push(TransientStep {
+            predicted_variance,
+            filtered_variance,
+            mse: chain.filtered_mse(&law),
+        });
+        chain.advance(&law);
+    }
+    Ok(transient)
+}

@@ -1,0 +1,421 @@
+//! How the filter starts: a belief, a finely rounded first sample, or both.
+
+use crate::Error;
+use crate::plant::scalar;
+use crate::sign_bit::missing_probability;
+use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
+use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Message, Observation, Scheme};
+use fewbits_numerics::error::{ArgumentError, finite, positive, within};
+use fewbits_numerics::normal;
+use nalgebra::Vector1;
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+/// The first message: which multiple of the resolution is nearest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Multiple(pub i64);
+
+impl Message for Multiple {
+    /// Word length in bits; the multiple travels in two's complement.
+    type Format = u32;
+
+    fn encode(&self, bits: &u32, writer: &mut BitWriter) -> Result<(), CodecError> {
+        let spare = 64_u32
+            .checked_sub(*bits)
+            .ok_or(CodecError::FieldTooWide { width: *bits })?;
+        let word = (self.0 as u64).checked_shl(spare).unwrap_or(0);
+        if (word as i64).checked_shr(spare).unwrap_or(0) != self.0 {
+            return Err(CodecError::ValueTooLarge {
+                value: self.0.unsigned_abs(),
+                width: *bits,
+            });
+        }
+        writer.write(word.checked_shr(spare).unwrap_or(0), *bits)
+    }
+
+    fn decode(bits: &u32, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        let word = reader.read(*bits)?;
+        // `read` has refused words above 64 bits.
+        let spare = 64 - *bits;
+        Ok(Self(
+            (word.checked_shl(spare).unwrap_or(0) as i64)
+                .checked_shr(spare)
+                .unwrap_or(0),
+        ))
+    }
+}
+
+/// A sensor that reports its sample rounded to a multiple of the resolution `tau`, halves away from zero, in a word of fixed
+/// length. Multiples beyond the word saturate, so the outermost cells are unbounded.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers", into = "Numbers")]
+pub struct RoundedSample {
+    noise_variance: f64,
+    resolution: f64,
+    bits: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    noise_variance: f64,
+    resolution: f64,
+    bits: u32,
+}
+
+impl From<RoundedSample> for Numbers {
+    fn from(scheme: RoundedSample) -> Self {
+        Self {
+            noise_variance: scheme.noise_variance,
+            resolution: scheme.resolution,
+            bits: scheme.bits,
+        }
+    }
+}
+
+impl TryFrom<Numbers> for RoundedSample {
+    type Error = Error;
+
+    fn try_from(numbers: Numbers) -> Result<Self, Error> {
+        Self::new(numbers.noise_variance, numbers.resolution)?.with_bits(numbers.bits)
+    }
+}
+
+/// Longest word whose cells are enumerated, as a link that inverts bits asks for.
+const LONGEST_NOISY: u32 = 12;
+
+impl RoundedSample {
+    /// A sensor with measurement variance `sigma^2 > 0`, resolution `tau > 0` in measurement units and words of 16 bits.
+    ///
+    /// # Errors
+    /// If one is not positive.
+    pub fn new(noise_variance: f64, resolution: f64) -> Result<Self, Error> {
+        Ok(Self {
+            noise_variance: positive("noise_variance", noise_variance)?,
+            resolution: positive("resolution", resolution)?,
+            bits: 16,
+        })
+    }
+
+    /// The same with words of 1 to 32 bits.
+    ///
+    /// # Errors
+    /// Any other word length.
+    pub fn with_bits(self, bits: u32) -> Result<Self, Error> {
+        within("bits", f64::from(bits), 1.0, 32.0)?;
+        Ok(Self { bits, ..self })
+    }
+
+    /// `tau`.
+    pub fn resolution(&self) -> f64 {
+        self.resolution
+    }
+
+    /// Word length: the format of the reports.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// Smallest and largest multiple.
+    fn range(&self) -> (i64, i64) {
+        let half = 1_i64 << (self.bits - 1);
+        (-half, half - 1)
+    }
+
+    /// The multiple for a measurement.
+    ///
+    /// # Errors
+    /// If the measurement is not finite.
+    pub fn round(&self, measurement: f64) -> Result<Multiple, ArgumentError> {
+        let (least, most) = self.range();
+        let multiple = (finite("measurement", measurement)? / self.resolution).round() as i64;
+        Ok(Multiple(multiple.clamp(least, most)))
+    }
+
+    /// The value that a multiple stands for.
+    #[inline]
+    pub fn value(&self, multiple: Multiple) -> f64 {
+        self.resolution * multiple.0 as f64
+    }
+
+    /// The cell of samples that a multiple stands for.
+    ///
+    /// # Errors
+    /// If the multiple does not fit the word, or is so large that neighbouring cells coincide.
+    pub fn cell(&self, multiple: Multiple) -> Result<Cell, ArgumentError> {
+        let (least, most) = self.range();
+        if !(least..=most).contains(&multiple.0) {
+            return Err(ArgumentError::new("multiple", multiple.0, format!("a number from {least} to {most}")));
+        }
+        let edge = |offset: f64| self.resolution * (multiple.0 as f64 + offset);
+        let lower = if multiple.0 == least {
+            f64::NEG_INFINITY
+        } else {
+            edge(-0.5)
+        };
+        let upper = if multiple.0 == most { f64::INFINITY } else { edge(0.5) };
+        Cell::new(lower, upper)
+    }
+}
+
+impl Scheme<1> for RoundedSample {
+    type State = ();
+    type Feedback = ();
+    type Report = Multiple;
+    type Factor = Scalar;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) {}
+
+    fn report_format(&self) -> u32 {
+        self.bits
+    }
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        (): &(),
+    ) -> Result<Option<Multiple>, fewbits_core::Error> {
+        Ok(Some(self.round(measurement[0])?))
+    }
+
+    /// Over a link that inverts bits, words of up to 12 bits.
+    fn factor(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
+        let Observation::Received(multiple) = observation else {
+            return Ok(Constant::new(missing_probability(observation, link).unwrap_or(1.0))?.into());
+        };
+        let (cell, arrives) = (self.cell(*multiple)?, 1.0 - link.loss());
+        if link.crossover() == 0.0 {
+            return Ok(InCell::new(cell, self.noise_variance, 0.0, arrives)?.into());
+        }
+        if self.bits > LONGEST_NOISY {
+            let expected = "words of at most 12 bits over a link that inverts bits";
+            return Err(ArgumentError::new("bits", self.bits, expected).into());
+        }
+        let (least, most) = self.range();
+        let edges = (least..most).map(|k| self.resolution * (k as f64 + 0.5)).collect();
+        let mask = (1_u64 << self.bits) - 1;
+        let word = |k: i64| k as u64 & mask;
+        let sent = |k: i64| arrives * link.word_probability(word(k), word(multiple.0), self.bits);
+        Ok(Partition::new(edges, (least..=most).map(sent).collect(), self.noise_variance)?.into())
+    }
+}
+
+/// The three ways to start.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Initialisation {
+    /// A belief about the state, and no message yet. If it is about `theta(-1)`, the first bit is that of `n = 0`.
+    Prior(Gaussian<1>),
+    /// A first message of resolution `tau` and no other knowledge: `theta_hat(0) = m(0)`, variance `sigma^2 + tau^2/12`.
+    ///
+    /// The bound of Proposition 2, `(sigma + tau/2)^2`, is no variance to start from: it is up to twice too large and makes
+    /// the filter over-cautious (erratum E7).
+    Fine {
+        /// The sensor that sent it.
+        scheme: RoundedSample,
+        /// The message.
+        message: Multiple,
+    },
+    /// A first message that meets a prior for `theta(0)`. Where the prior is real information, this is far better than
+    /// [`Initialisation::Fine`]: at `a = 0.9`, `gamma = 0.05` the message alone is worse than the prior alone.
+    FineWithPrior {
+        /// The sensor that sent it.
+        scheme: RoundedSample,
+        /// The message.
+        message: Multiple,
+        /// The belief about `theta(0)` before the message.
+        prior: Gaussian<1>,
+    },
+}
+
+impl Initialisation {
+    /// The belief to start from.
+    ///
+    /// # Errors
+    /// [`fewbits_core::Error::Impossible`] if message and prior exclude each other to the last digit.
+    pub fn belief(&self) -> Result<Gaussian<1>, Error> {
+        match self {
+            Self::Prior(belief) => Ok(*belief),
+            Self::Fine { scheme, message } => {
+                let tau = scheme.resolution;
+                let variance = scheme.noise_variance + tau * tau / 12.0;
+                Ok(scalar(finite("message", scheme.value(*message))?, variance))
+            }
+            Self::FineWithPrior { scheme, message, prior } => {
+                let factor = scheme.factor(&(), &Observation::Received(*message), &Link::PERFECT)?;
+                let posterior = factor.tilted(prior)?;
+                Ok(scalar(posterior.mean[0], posterior.covariance[0]))
+            }
+        }
+    }
+}
+
+/// What a fine first message brings on average, and what it costs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FirstMessageValue {
+    /// `E var(theta(0) | m(0))` in state units squared.
+    pub expected_variance: f64,
+    /// Entropy of the message in bits, the price of an ideal code for it.
+    pub entropy_bits: f64,
+}
+
+/// Cells are counted out to this many standard deviations of the sample; the rest has probability below 1e-32.
+const REACH: f64 = 12.0;
+/// More cells than this are not a first message but a measurement.
+const MOST_CELLS: f64 = 1e6;
+
+/// Averages the prior-aware first message over all messages.
+///
+/// # Errors
+/// If more than a million cells are within reach of the prior.
+pub fn first_message_value(scheme: &RoundedSample, prior: &Gaussian<1>) -> Result<FirstMessageValue, Error> {
+    let (r, tau) = (scheme.noise_variance, scheme.resolution);
+    let reach = REACH * (prior.covariance()[0] + r).sqrt() + tau;
+    if reach / tau > MOST_CELLS {
+        return Err(ArgumentError::new("resolution", tau, "at most a million cells within the prior").into());
+    }
+    let mean = prior.mean()[0];
+    let mut value = FirstMessageValue {
+        expected_variance: 0.0,
+        entropy_bits: 0.0,
+    };
+    for k in scheme.round(mean - reach)?.0..=scheme.round(mean + reach)?.0 {
+        let posterior = InCell::certain(scheme.cell(Multiple(k))?, r)?.tilted(prior)?;
+        let probability = posterior.log_evidence.exp();
+        value.expected_variance += probability * posterior.covariance[0];
+        value.entropy_bits -= probability * posterior.log_evidence / std::f64::consts::LN_2;
+    }
+    Ok(value)
+}
+
+/// Below this ratio of resolution to the sample's standard deviation the Fourier series of the error converges fast.
+const SERIES_RATIO: f64 = 6.0;
+
+/// Exact `E (m(0) - theta)^2` of a fine first message over `theta ~ N(mean, variance)`; variance 0 fixes `theta = mean`. The
+/// word must be long enough for the sample.
+///
+/// With `q_k = exp(-2 pi^2 k^2 (sigma^2 + variance)/tau^2)` it is
+/// `sigma^2 + tau^2/12 + sum_k (-1)^k cos(2 pi k mean/tau) q_k [4 sigma^2 + tau^2/(pi k)^2]`, largest at `mean = tau/2`. Coarse
+/// resolutions are summed cell by cell instead.
+pub fn first_message_mse(scheme: &RoundedSample, theta: &Gaussian<1>) -> f64 {
+    let (r, tau) = (scheme.noise_variance, scheme.resolution);
+    let (mean, spread) = (theta.mean()[0], theta.covariance()[0]);
+    let total = r + spread;
+    if tau < SERIES_RATIO * total.sqrt() {
+        let pi = std::f64::consts::PI;
+        let term = |k: i32| {
+            let k = f64::from(k);
+            let decay = (-2.0 * (pi * k).powi(2) * total / (tau * tau)).exp();
+            let sign = if k % 2.0 == 0.0 { 1.0 } else { -1.0 };
+            sign * (2.0 * pi * k * mean / tau).cos() * decay * (4.0 * r + (tau / (pi * k)).powi(2))
+        };
+        // At the largest ratio the ninth term has decayed to exp(-44).
+        return r + tau * tau / 12.0 + (1..=9).map(term).sum::<f64>();
+    }
+    // theta given x is normal around mean + rho (x - mean) with variance rho r; average the rest over each cell.
+    let rho = spread / total;
+    let deviation = total.sqrt();
+    let reach = REACH * deviation + tau;
+    let multiple = |x: f64| (x / tau).round() as i64;
+    let cells = multiple(mean - reach)..=multiple(mean + reach);
+    let between: f64 = cells
+        .filter_map(|k| {
+            let value = tau * k as f64;
+            let (low, high) = ((value - 0.5 * tau - mean) / deviation, (value + 0.5 * tau - mean) / deviation);
+            let moments = normal::truncated_moments(low, high).ok()?;
+            let offset = value - mean - rho * deviation * moments.mean;
+            Some(normal::interval(low, high) * (offset * offset + rho * rho * total * moments.variance))
+        })
+        .sum();
+    between + rho * r
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Initialisation, Multiple, RoundedSample, first_message_mse, first_message_value};
+    use fewbits_core::laws::message::round_trip;
+    use fewbits_core::{Gaussian, Link, Message, Observation, Scheme};
+    use fewbits_numerics::normal;
+    use fewbits_numerics::quadrature::gauss_legendre;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn multiples_round_trip(multiple in -2048_i64..2048) {
+            prop_assert_eq!(round_trip(&Multiple(multiple), &12).unwrap(), 12);
+            prop_assert_eq!(Multiple(multiple).to_bits(&11).is_ok(), (-1024..1024).contains(&multiple));
+            let scheme = RoundedSample::new(1.0, 0.25).unwrap();
+            prop_assert_eq!(scheme.round(scheme.value(Multiple(multiple))), Ok(Multiple(multiple)));
+        }
+    }
+
+    #[test]
+    fn halves_round_away_from_zero_and_words_saturate() {
+        let scheme = RoundedSample::new(1.0, 1.0).unwrap();
+        assert_eq!((scheme.round(0.5), scheme.round(-0.5)), (Ok(Multiple(1)), Ok(Multiple(-1))));
+        assert_eq!((scheme.round(1e9), scheme.round(-1e9)), (Ok(Multiple(32767)), Ok(Multiple(-32768))));
+        assert_eq!(scheme.cell(Multiple(32767)).unwrap().upper(), f64::INFINITY);
+        assert!(scheme.cell(Multiple(32768)).is_err() && scheme.round(f64::NAN).is_err());
+        assert!(RoundedSample::new(1.0, 0.0).is_err() && RoundedSample::new(1.0, f64::NAN).is_err());
+        assert!(scheme.with_bits(0).is_err() && scheme.with_bits(33).is_err());
+        let received = Observation::Received(Multiple(0));
+        assert!(scheme.factor(&(), &received, &Link::flipping(0.1).unwrap()).is_err());
+        assert!(Multiple(0).to_bits(&65).is_err());
+        assert_eq!(Multiple(i64::MIN).to_bits(&64).unwrap().bits(), 64);
+        assert_eq!(Multiple(0).to_bits(&0).unwrap().bits(), 0);
+        let json = serde_json::to_string(&scheme).unwrap();
+        assert_eq!(serde_json::from_str::<RoundedSample>(&json).unwrap(), scheme);
+        assert!(serde_json::from_str::<RoundedSample>(&json.replace("16", "40")).is_err());
+    }
+
+    #[test]
+    fn mse_is_the_sum_over_cells_on_both_branches() {
+        for (sigma, tau, theta) in [
+            (1.0, 2.0, 0.3),
+            (1.0, 5.9, 2.0),
+            (1.0, 6.1, 2.0),
+            (0.5, 12.0, 6.0),
+            (2.0, 0.1, 0.02),
+        ] {
+            let scheme = RoundedSample::new(sigma * sigma, tau).unwrap();
+            let direct: f64 = (-600..=600)
+                .map(|k| {
+                    let value = tau * f64::from(k);
+                    let p = normal::interval((value - 0.5 * tau - theta) / sigma, (value + 0.5 * tau - theta) / sigma);
+                    p * (value - theta) * (value - theta)
+                })
+                .sum();
+            let known = Gaussian::scalar(theta, 0.0).unwrap();
+            assert!((first_message_mse(&scheme, &known) - direct).abs() < 1e-11 * direct, "{sigma} {tau} {theta}");
+            let spread = Gaussian::scalar(theta, 0.7).unwrap();
+            let averaged = gauss_legendre::<64>().composite(theta - 7.0, theta + 7.0, 8, |t| {
+                let here = Gaussian::scalar(t, 0.0).unwrap();
+                normal::log_pdf_with(t, theta, 0.7).exp() * first_message_mse(&scheme, &here)
+            });
+            let closed = first_message_mse(&scheme, &spread);
+            assert!((closed - averaged).abs() < 1e-9 * averaged, "{closed} {averaged}");
+        }
+    }
+
+    #[test]
+    fn a_prior_can_only_help() {
+        let scheme = RoundedSample::new(1.0, 1.0).unwrap();
+        let prior = Gaussian::scalar(0.0, 0.05 / 0.19).unwrap();
+        let value = first_message_value(&scheme, &prior).unwrap();
+        assert!(value.expected_variance < prior.covariance()[0]);
+        let message = Multiple(1);
+        let alone = Initialisation::Fine { scheme, message }.belief().unwrap();
+        let both = Initialisation::FineWithPrior { scheme, message, prior }
+            .belief()
+            .unwrap();
+        assert!(both.covariance()[0] < prior.covariance()[0] && alone.covariance()[0] > prior.covariance()[0]);
+        assert_eq!(Initialisation::Prior(prior).belief().unwrap(), prior);
+        let fine = RoundedSample::new(1.0, 1e-9).unwrap();
+        assert!(first_message_value(&fine, &prior).is_err());
+    }
+}

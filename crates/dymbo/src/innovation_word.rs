@@ -1,0 +1,245 @@
+//! Several bits a sample: the cell of the normalised innovation.
+
+use crate::Error;
+use crate::sign_bit::missing_probability;
+use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
+use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Link, Message, NumberFormat, Observation, Scheme};
+use fewbits_numerics::error::{ArgumentError, finite, positive};
+use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};
+use nalgebra::Vector1;
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+/// What the fusion centre broadcasts to sensors that report several bits.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Prediction {
+    /// Predicted measurement.
+    pub mean: f64,
+    /// Standard deviation of the innovation, `sqrt(P + sigma^2)`.
+    pub deviation: f64,
+}
+
+impl Message for Prediction {
+    type Format = NumberFormat;
+
+    fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
+        format.write(self.mean, writer)?;
+        format.write(self.deviation, writer)
+    }
+
+    fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        let mean = format.read(reader)?;
+        Ok(Self {
+            mean,
+            deviation: format.read(reader)?,
+        })
+    }
+}
+
+/// Index of a quantizer cell, counted from the lowest: the number of breakpoints at or below the normalised innovation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct CellIndex(pub u16);
+
+impl Message for CellIndex {
+    /// Word length in bits.
+    type Format = u32;
+
+    fn encode(&self, bits: &u32, writer: &mut BitWriter) -> Result<(), CodecError> {
+        writer.write(u64::from(self.0), *bits)
+    }
+
+    fn decode(bits: &u32, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        let index = reader.read(*bits)?;
+        u16::try_from(index).map(Self).map_err(|_| CodecError::Invalid {
+            what: "cell index",
+            value: index.to_string(),
+            expected: "at most 65535",
+        })
+    }
+}
+
+/// A sensor that reports the cell of its normalised innovation in the Lloyd-Max quantizer of the standard normal density.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers", into = "Numbers")]
+pub struct InnovationWord {
+    noise_variance: f64,
+    bits: u32,
+    quantizer: &'static LloydMax,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    noise_variance: f64,
+    bits: u32,
+}
+
+impl From<InnovationWord> for Numbers {
+    fn from(word: InnovationWord) -> Self {
+        Self {
+            noise_variance: word.noise_variance,
+            bits: word.bits,
+        }
+    }
+}
+
+impl TryFrom<Numbers> for InnovationWord {
+    type Error = Error;
+
+    fn try_from(numbers: Numbers) -> Result<Self, Error> {
+        Self::new(numbers.noise_variance, numbers.bits as usize)
+    }
+}
+
+impl InnovationWord {
+    /// A sensor with measurement variance `sigma^2 > 0` and words of 1 to 8 bits.
+    ///
+    /// # Errors
+    /// If the variance is not positive, or for any other word length.
+    pub fn new(noise_variance: f64, bits: usize) -> Result<Self, Error> {
+        Ok(Self {
+            noise_variance: positive("noise_variance", noise_variance)?,
+            quantizer: gaussian_table(bits)?,
+            bits: bits as u32,
+        })
+    }
+
+    /// Word length: the format of the reports.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// The quantizer of the normalised innovation.
+    pub fn quantizer(&self) -> &'static LloydMax {
+        self.quantizer
+    }
+
+    /// The word for a measurement.
+    ///
+    /// # Errors
+    /// If a number is not finite, or the deviation is not positive.
+    #[inline]
+    pub fn word(&self, measurement: f64, prediction: &Prediction) -> Result<CellIndex, ArgumentError> {
+        let scale = positive("deviation", prediction.deviation)?;
+        let offset = finite("measurement", measurement)? - finite("prediction", prediction.mean)?;
+        let below = self
+            .quantizer
+            .breakpoints()
+            .partition_point(|edge| *edge <= offset / scale);
+        Ok(CellIndex(below as u16))
+    }
+
+    /// The cell of a word, in measurement units around a prediction.
+    ///
+    /// # Errors
+    /// If the index is beyond the last cell, the prediction is none, or is so large that rounding closes the cell.
+    pub fn cell(&self, index: CellIndex, prediction: &Prediction) -> Result<Cell, ArgumentError> {
+        let (edges, at) = (self.edges(prediction)?, self.index(index)?);
+        let lower = if at == 0 { f64::NEG_INFINITY } else { edges[at - 1] };
+        Cell::new(lower, edges.get(at).copied().unwrap_or(f64::INFINITY))
+    }
+
+    /// The place of a word in the quantizer's tables.
+    pub(crate) fn index(&self, index: CellIndex) -> Result<usize, ArgumentError> {
+        let at = usize::from(index.0);
+        if at < self.quantizer.centroids().len() {
+            return Ok(at);
+        }
+        Err(ArgumentError::new("index", index.0, format!("a cell index below {}", 1 << self.bits)))
+    }
+
+    fn edges(&self, prediction: &Prediction) -> Result<Vec<f64>, ArgumentError> {
+        finite("prediction", prediction.mean)?;
+        positive("deviation", prediction.deviation)?;
+        let edges = self.quantizer.breakpoints().iter();
+        Ok(edges.map(|z| prediction.mean + prediction.deviation * z).collect())
+    }
+}
+
+impl Scheme<1> for InnovationWord {
+    type State = ();
+    type Feedback = Prediction;
+    type Report = CellIndex;
+    type Factor = Scalar;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn report_format(&self) -> u32 {
+        self.bits
+    }
+
+    #[inline]
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        prediction: &Prediction,
+    ) -> Result<Option<CellIndex>, fewbits_core::Error> {
+        Ok(Some(self.word(measurement[0], prediction)?))
+    }
+
+    fn factor(
+        &self,
+        prediction: &Prediction,
+        observation: &Observation<CellIndex>,
+        link: &Link,
+    ) -> Result<Scalar, fewbits_core::Error> {
+        let edges = self.edges(prediction)?;
+        let Observation::Received(word) = observation else {
+            return Ok(Constant::new(missing_probability(observation, link).unwrap_or(1.0))?.into());
+        };
+        let arrives = 1.0 - link.loss();
+        if link.crossover() == 0.0 {
+            let cell = self.cell(*word, prediction)?;
+            return Ok(InCell::new(cell, self.noise_variance, 0.0, arrives)?.into());
+        }
+        let received = self.index(*word)? as u64;
+        let sent = (0..=edges.len() as u64).map(|i| arrives * link.word_probability(i, received, self.bits));
+        Ok(Partition::new(edges, sent.collect(), self.noise_variance)?.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CellIndex, InnovationWord, Prediction};
+    use fewbits_core::laws::message::round_trip;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn words_keep_their_length(bits in 1_usize..=8, x in -20.0..20.0_f64, mean in -5.0..5.0_f64, deviation in 0.1..4.0_f64) {
+            let scheme = InnovationWord::new(1.0, bits).unwrap();
+            let prediction = Prediction { mean, deviation };
+            let word = scheme.word(x, &prediction).unwrap();
+            prop_assert_eq!(round_trip(&word, &scheme.bits()).unwrap(), bits);
+            let cell = scheme.cell(word, &prediction).unwrap();
+            // Rounding of the two maps may part at an edge.
+            prop_assert!(cell.lower() <= x + 1e-12 && x <= cell.upper() + 1e-12);
+            let centroid = scheme.quantizer().centroids()[usize::from(word.0)];
+            prop_assert!(cell.contains(mean + deviation * centroid));
+        }
+    }
+
+    #[test]
+    fn one_bit_words_are_sign_bits() {
+        let scheme = InnovationWord::new(1.0, 1).unwrap();
+        let prediction = Prediction {
+            mean: 1.0,
+            deviation: 2.0,
+        };
+        assert_eq!(scheme.word(1.0, &prediction), Ok(CellIndex(1)));
+        assert_eq!(scheme.word(0.999, &prediction), Ok(CellIndex(0)));
+        assert!(scheme.cell(CellIndex(2), &prediction).is_err());
+        assert!(InnovationWord::new(1.0, 0).is_err() && InnovationWord::new(1.0, 9).is_err());
+        let json = serde_json::to_string(&scheme).unwrap();
+        assert_eq!(serde_json::from_str::<InnovationWord>(&json).unwrap(), scheme);
+        assert!(serde_json::from_str::<InnovationWord>(&json.replace('1', "9")).is_err());
+    }
+}

@@ -1,0 +1,190 @@
+//! One bit a sample: is it at or above the broadcast threshold?
+
+use crate::{Error, ScalarPlant};
+use fewbits_core::factor::{Constant, InCell, Scalar};
+use fewbits_core::{Link, NumberFormat, Observation, Scheme, Sign};
+use fewbits_numerics::error::{ArgumentError, finite, positive};
+use fewbits_numerics::normal;
+use nalgebra::Vector1;
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_2_PI;
+
+/// A sensor that reports whether its sample reached the broadcast threshold.
+///
+/// Any threshold will do; that of the Dymbo filter is the prediction `a theta_hat(n-1)` of the present state, the best one
+/// for a single step ([`expected_information`]). Equation (14) of the paper prints `theta_hat(n-1)` (erratum E1).
+///
+/// ```
+/// use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme, Sign};
+/// use fewbits_dymbo::SignBit;
+/// let scheme = SignBit::new(1.0)?;
+/// let bit = Sign::of(0.7, 0.0)?;                       // at the sensor: one bit
+/// let factor = scheme.factor(&0.0, &Observation::Received(bit), &Link::PERFECT)?;
+/// let posterior = factor.tilted(&Gaussian::scalar(0.0, 1.0)?)?;
+/// assert!((posterior.mean[0] - std::f64::consts::PI.sqrt().recip()).abs() < 1e-14);
+/// # Ok::<(), fewbits_dymbo::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Numbers")]
+pub struct SignBit {
+    noise_variance: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    noise_variance: f64,
+}
+
+impl TryFrom<Numbers> for SignBit {
+    type Error = Error;
+
+    fn try_from(numbers: Numbers) -> Result<Self, Error> {
+        Self::new(numbers.noise_variance)
+    }
+}
+
+impl SignBit {
+    /// A sensor with measurement variance `sigma^2 > 0`.
+    ///
+    /// # Errors
+    /// If the variance is not positive.
+    pub fn new(noise_variance: f64) -> Result<Self, Error> {
+        Ok(Self {
+            noise_variance: positive("noise_variance", noise_variance)?,
+        })
+    }
+
+    /// The sensor of a plant.
+    pub(crate) fn of(plant: &ScalarPlant) -> Self {
+        Self {
+            noise_variance: plant.measurement_variance(),
+        }
+    }
+
+    /// `sigma^2`.
+    pub fn noise_variance(&self) -> f64 {
+        self.noise_variance
+    }
+}
+
+impl Scheme<1> for SignBit {
+    type State = ();
+    type Feedback = f64;
+    type Report = Sign;
+    type Factor = Scalar;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn report_format(&self) {}
+
+    #[inline]
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        threshold: &f64,
+    ) -> Result<Option<Sign>, fewbits_core::Error> {
+        Ok(Some(Sign::of(measurement[0], *threshold)?))
+    }
+
+    fn factor(
+        &self,
+        threshold: &f64,
+        observation: &Observation<Sign>,
+        link: &Link,
+    ) -> Result<Scalar, fewbits_core::Error> {
+        finite("threshold", *threshold)?;
+        match observation {
+            Observation::Received(bit) => Ok(InCell::sign(*bit, *threshold, self.noise_variance, link)?.into()),
+            missing => Ok(Constant::new(missing_probability(missing, link).unwrap_or(1.0))?.into()),
+        }
+    }
+}
+
+/// Probability of an observation without a report, by sensors that always report: the link's loss, or 1 for a report that is
+/// known to be lost. `None` if a report was received.
+pub(crate) fn missing_probability<R>(observation: &Observation<R>, link: &Link) -> Option<f64> {
+    match observation {
+        Observation::Received(_) => None,
+        Observation::Nothing => Some(link.loss()),
+        Observation::Erased => Some(1.0),
+    }
+}
+
+/// Fraction of a full measurement's information that a bit at the prediction brings when it arrives:
+/// `(2/pi)(1 - 2 eps)^2` with the link's crossover `eps`.
+pub fn information(link: &Link) -> f64 {
+    let clean = 1.0 - 2.0 * link.crossover();
+    FRAC_2_PI * clean * clean
+}
+
+/// The same averaged over both bits when the threshold lies `offset` innovation standard deviations from the prediction:
+/// `(1 - 2 eps)^2 phi(z)^2/(p_+ p_-)`. Largest at `offset = 0`: thresholding at the prediction is the best single step.
+///
+/// # Errors
+/// If the offset is not finite.
+pub fn expected_information(offset: f64, link: &Link) -> Result<f64, ArgumentError> {
+    let (z, eps) = (finite("offset", offset)?, link.crossover());
+    if eps == 0.0 {
+        return Ok(normal::inverse_mills(z) * normal::inverse_mills(-z));
+    }
+    let clean = 1.0 - 2.0 * eps;
+    let received = |z: f64| eps + clean * normal::cdf(z);
+    let slope = clean * normal::pdf(z);
+    Ok(slope * slope / (received(z) * received(-z)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SignBit, expected_information};
+    use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme, Sign};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_two_bits_average_to_the_expected_information(z in -3.0..3.0_f64, eps in 0.0..0.5_f64) {
+            let (prior, link) = (Gaussian::scalar(0.0, 3.0).unwrap(), Link::flipping(eps).unwrap());
+            let mean: f64 = [Sign::Above, Sign::Below]
+                .into_iter()
+                .map(|bit| SignBit::new(1.0).unwrap().factor(&(2.0 * z), &Observation::Received(bit), &link).unwrap())
+                .map(|factor| factor.tilted(&prior).unwrap())
+                // P - c P^2/(P + r) with P = 3, r = 1.
+                .map(|after| after.log_evidence.exp() * (3.0 - after.covariance[0]) * 4.0 / 9.0)
+                .sum();
+            prop_assert!((mean - expected_information(z, &link).unwrap()).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn far_thresholds_keep_their_digits() {
+        // lambda (lambda + zeta) exceeds 1 here if formed naively.
+        let threshold = 1e5 * 2.0_f64.sqrt();
+        let factor = SignBit::new(1.0)
+            .unwrap()
+            .factor(&threshold, &Observation::Received(Sign::Above), &Link::PERFECT)
+            .unwrap();
+        let variance = factor.tilted(&Gaussian::scalar(0.0, 1.0).unwrap()).unwrap().covariance[0];
+        assert!((0.5..0.5 + 1e-9).contains(&variance));
+    }
+
+    #[test]
+    fn refuses_what_is_no_number() {
+        assert!(SignBit::new(0.0).is_err() && expected_information(f64::NAN, &Link::PERFECT).is_err());
+        let scheme = SignBit::new(1.0).unwrap();
+        for observation in [
+            Observation::Received(Sign::Above),
+            Observation::Nothing,
+            Observation::Erased,
+        ] {
+            assert!(scheme.factor(&f64::NAN, &observation, &Link::PERFECT).is_err());
+        }
+        assert!(serde_json::from_str::<SignBit>(r#"{"noise_variance":-1.0}"#).is_err());
+    }
+}

@@ -1,0 +1,129 @@
+//! Bytes until the threshold is reached.
+
+use super::common::{B, Scheme, Settings, Track, fraction, median, tracks};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use fewbits_diffusive::Form;
+use fewbits_diffusive::message::{SampleCode, Wire};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+#[derive(Serialize, JsonSchema)]
+pub struct Row {
+    /// What travels.
+    scheme: &'static str,
+    /// Share of the searches that reach the threshold.
+    reach: Measured,
+    /// Median nodes of those that do.
+    nodes_median: Option<Measured>,
+    /// Median size of all messages together, over all hops.
+    #[schemars(extend("unit" = "bytes"))]
+    bytes_median: Option<Measured>,
+    /// The same for every node after the first.
+    #[schemars(extend("unit" = "bytes"))]
+    bytes_per_message: Option<f64>,
+    /// Median distance of estimate and source at the end.
+    #[schemars(extend("unit" = "m"))]
+    final_err_median: Option<Measured>,
+    /// Share of the searches that end more than a metre off.
+    wrong: Measured,
+}
+
+fn schemes() -> Vec<Scheme> {
+    let nine_bits = Wire {
+        samples: Some(SampleCode { bits: 9, step: 1.0 }),
+        ..Wire::default()
+    };
+    let six_bits = Wire {
+        samples: Some(SampleCode { bits: 6, step: 8.0 }),
+        ..Wire::default()
+    };
+    vec![
+        Scheme::new("raw-64-bit", B).up_to(30),
+        Scheme::new("raw-9-bit", B).up_to(30).wired(nine_bits),
+        Scheme::new("raw-6-bit", B).up_to(30).wired(six_bits),
+        Scheme::new("gmm-4", B).of(Form::Mixture(4)),
+        Scheme::new("gaussian-9", B).of(Form::Gaussian),
+        Scheme::new("gaussian known rate", B).of(Form::Gaussian).known(),
+        Scheme::new("gmm-4 known rate", B).of(Form::Mixture(4)).known(),
+        Scheme::new("lpg-2x5 known rate", B).of(Form::Lpg { components: 2, degree: 5 }).known(),
+    ]
+}
+
+/// Bytes to the threshold.
+pub struct Bytes;
+
+impl Figure for Bytes {
+    type Parameters = Settings;
+    type Tables = Vec<Row>;
+
+    fn about(&self) -> About {
+        About {
+            id: "diffusive-bytes",
+            title: "Bytes to the threshold",
+            caption: "What all messages of a search cost together (example B, numbers in single precision, messages of raw \
+                      records grow with every node): on a short route the samples themselves, quantised to the noise, are the \
+                      cheapest message and lose nothing.",
+            source: "",
+        }
+    }
+
+    fn quicken(&self, p: &mut Settings) {
+        p.trials = 8;
+    }
+
+    fn cost(&self, p: &Settings) -> Cost {
+        Cost {
+            seconds: p.trials as f64,
+            bytes: p.trials as f64 * 2e4,
+        }
+    }
+
+    fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        let schemes = schemes();
+        let all = tracks(context, "diffusive-chains", p, &schemes)?;
+        let row = |(i, scheme): (usize, &Scheme)| {
+            let own: Vec<&Track> = all.iter().map(|tracks| &tracks[i]).collect();
+            let reached: Vec<&&Track> = own.iter().filter(|t| t.converged()).collect();
+            let over = |f: fn(&Track) -> f64| -> Vec<f64> { reached.iter().map(|t| f(t)).collect() };
+            let finals: Vec<f64> = own.iter().map(|t| t.final_error()).collect();
+            let each = over(|t| t.bits as f64 / 8.0 / (t.nodes() as f64 - 1.0).max(1.0));
+            Row {
+                scheme: scheme.name,
+                reach: fraction(reached.len(), own.len()),
+                nodes_median: median(&over(|t| t.nodes() as f64)),
+                bytes_median: median(&over(|t| t.bits as f64 / 8.0)),
+                bytes_per_message: median(&each).map(|m| m.value),
+                final_err_median: median(&finals),
+                wrong: fraction(own.iter().filter(|t| t.final_error() > 1.0).count(), own.len()),
+            }
+        };
+        Ok(schemes.iter().enumerate().map(row).collect())
+    }
+
+    fn claims(&self, _: &Settings, rows: &Vec<Row>, claims: &mut Claims) {
+        let none = Measured { value: f64::NAN, standard_error: None };
+        claims.references("nodes_median", "median nodes to the threshold", rows, |r| (r.scheme.to_owned(), r.nodes_median.unwrap_or(none)));
+        claims.references("reach", "share that reaches the threshold", rows, |r| (r.scheme.to_owned(), r.reach));
+        let find = |name: &str| rows.iter().find(|r| r.scheme == name);
+        let bytes = |name: &str| find(name).and_then(|r| r.bytes_median).map(|m| m.value);
+        for other in ["gmm-4", "gaussian-9", "lpg-2x5 known rate"] {
+            let ratio = bytes("raw-9-bit").zip(bytes(other)).map(|(raw, other)| raw / other);
+            let what = format!("samples of nine bits cost less than a third of {other}");
+            claims.below(format!("raw-is-cheapest/{}", other.replace(' ', "-")), what, ratio, 1.0 / 3.0).at_full_trials();
+        }
+        let nodes = |name: &str| find(name).and_then(|r| r.nodes_median).map(|m| m.value);
+        let more = nodes("raw-9-bit").zip(nodes("raw-64-bit")).map(|(a, b)| a - b);
+        claims.at_most("quantising-is-free", "nine bits a sample need no more nodes than exact samples", more, 0.0).at_full_trials();
+    }
+
+    fn plot(&self, _: &Settings, rows: &Vec<Row>) -> Plot {
+        let mut panel = Panel::new("Cost and accuracy", Axis::log("bytes of all messages (median)"), Axis::log("error at the end (m, median)"))
+            .legend(Legend::Outside);
+        for row in rows {
+            let place = row.bytes_median.zip(row.final_err_median).map(|(b, e)| (b.value, e.value));
+            panel = panel.with(Layer::points(row.scheme, place.into_iter().collect()));
+        }
+        Plot::of(panel)
+    }
+}

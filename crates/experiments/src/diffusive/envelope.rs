@@ -1,0 +1,232 @@
+//! The area above a threshold, with credible bands.
+
+use super::common::{ALARM, B, DIFFUSIVITY, RATE, Scheme, Settings, fraction, median, trials};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use fewbits_diffusive::{Envelope as Area, SourceLikelihood};
+use fewbits_models::diffusion::contour_radius;
+use garde::Validate;
+use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of the envelope.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Random deployments.
+    #[garde(range(min = 1, max = 100_000))]
+    trials: u64,
+    /// Nodes that have sampled.
+    #[garde(range(min = 1, max = 20))]
+    nodes: usize,
+    /// Time of the envelope after the release began, s.
+    #[garde(range(min = 1.0, max = 1e5))]
+    time: f64,
+    /// Threshold of the concentration, kg/m^3.
+    #[garde(range(min = 1e-8, max = 1.0))]
+    threshold: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            trials: 200,
+            nodes: 3,
+            time: 100.0,
+            threshold: 1e-4,
+        }
+    }
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// The band of the first deployment, direction by direction, seen from the alarm node.
+    band: Vec<Band>,
+    /// How often the band holds the truth.
+    coverage: Vec<Coverage>,
+    /// Probability that the threshold is exceeded, on a grid, first deployment.
+    exceedance: Vec<Exceedance>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Band {
+    /// Time.
+    #[schemars(extend("unit" = "s"))]
+    t: f64,
+    /// Threshold.
+    #[schemars(extend("unit" = "kg/m^3"))]
+    c_star: f64,
+    /// Direction from the alarm node.
+    #[schemars(extend("unit" = "deg"))]
+    direction_deg: f64,
+    /// How far the area reaches: 5 per cent quantile.
+    #[schemars(extend("unit" = "m"))]
+    r05: f64,
+    /// Median.
+    #[schemars(extend("unit" = "m"))]
+    r50: f64,
+    /// 95 per cent quantile.
+    #[schemars(extend("unit" = "m"))]
+    r95: f64,
+    /// The truth.
+    #[schemars(extend("unit" = "m"))]
+    truth: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Coverage {
+    /// Which edge.
+    edge: &'static str,
+    /// Share of the deployments whose 90 per cent band holds the true edge.
+    coverage: Measured,
+    /// Median width of the band.
+    #[schemars(extend("unit" = "m"))]
+    width_median: Measured,
+    /// True radius about the source.
+    #[schemars(extend("unit" = "m"))]
+    radius: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Exceedance {
+    /// Place.
+    #[schemars(extend("unit" = "m"))]
+    x: f64,
+    /// Place.
+    #[schemars(extend("unit" = "m"))]
+    y: f64,
+    /// Probability that the concentration exceeds the threshold.
+    p_exceed: f64,
+}
+
+/// The envelope.
+pub struct Envelope;
+
+impl Parameters {
+    fn area(&self, trial: fewbits_monte_carlo::Trial) -> Result<Option<Area>, Error> {
+        let settings = Settings::default();
+        let endless = super::common::Example { threshold: 1e-300, ..B };
+        let outcome = Scheme::new("exact", endless).up_to(self.nodes).run(&settings, trial)?;
+        let Some(posterior) = outcome.posterior else { return Ok(None) };
+        let likelihood = SourceLikelihood::new(outcome.records, settings.joint()?).map_err(Error::failed)?;
+        Area::new(&posterior, &likelihood).map(Some).map_err(Error::failed)
+    }
+}
+
+const GRID: usize = 50;
+
+impl Figure for Envelope {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "diffusive-envelope",
+            title: "The area above a threshold",
+            caption: "Where the concentration on the ground exceeds 1e-4 kg/m^3 after 100 s, as a belief of three nodes sees it \
+                      (example B, rate unknown): probability of exceedance, and how often the 90 per cent band of the eastern \
+                      edge holds the true edge.",
+            source: "",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = 8;
+    }
+
+    fn cost(&self, p: &Parameters) -> Cost {
+        Cost {
+            seconds: p.trials as f64 * 0.1,
+            bytes: 1e6,
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let radius = contour_radius(RATE, p.threshold, p.time, DIFFUSIVITY).map_err(Error::failed)?;
+        let source = B.source();
+        let edges = [("east", 0.0), ("north", 90.0_f64)];
+        let all = trials(context, "diffusive-chains", p.trials, |trial| {
+            let Some(area) = p.area(trial)? else { return Ok(None) };
+            let quantile = |angle: f64, level| area.reach(&Vector2::zeros(), angle.to_radians(), p.time, p.threshold, level);
+            let bands = edges.map(|(_, angle)| Ok((quantile(angle, 0.05)?, quantile(angle, 0.95)?)));
+            let bands = bands.into_iter().collect::<Result<Vec<_>, fewbits_diffusive::Error>>().map_err(Error::failed)?;
+            Ok(Some(bands))
+        })?;
+        let known: Vec<&Vec<(f64, f64)>> = all.iter().flatten().collect();
+        let coverage = edges.iter().enumerate().filter_map(|(i, (edge, angle))| {
+            let truth = radius + source.x * angle.to_radians().cos() + source.y * angle.to_radians().sin();
+            let hits = known.iter().filter(|bands| (bands[i].0..=bands[i].1).contains(&truth)).count();
+            let widths: Vec<f64> = known.iter().map(|bands| bands[i].1 - bands[i].0).collect();
+            Some(Coverage {
+                edge,
+                coverage: fraction(hits, known.len()),
+                width_median: median(&widths)?,
+                radius,
+            })
+        });
+        let coverage = coverage.collect();
+        let first = p.area(context.monte_carlo(context.stream("diffusive-chains"), 1).trial(0))?;
+        let (mut band, mut exceedance) = (Vec::new(), Vec::new());
+        if let Some(area) = first {
+            let origin = Vector2::from(ALARM);
+            for direction in (0..360).step_by(15) {
+                context.check()?;
+                let angle = f64::from(direction).to_radians();
+                let at = |level| area.reach(&origin, angle, p.time, p.threshold, level).map_err(Error::failed);
+                band.push(Band {
+                    t: p.time,
+                    c_star: p.threshold,
+                    direction_deg: f64::from(direction),
+                    r05: at(0.05)?,
+                    r50: at(0.5)?,
+                    r95: at(0.95)?,
+                    truth: radius + (source - origin).dot(&Vector2::new(angle.cos(), angle.sin())),
+                });
+            }
+            for j in 0..GRID {
+                for i in 0..GRID {
+                    let place = Vector2::new(i as f64 + 0.5, j as f64 + 0.5) * (100.0 / GRID as f64);
+                    let p_exceed = area.exceedance(&place, p.time, p.threshold).map_err(Error::failed)?;
+                    exceedance.push(Exceedance { x: place.x, y: place.y, p_exceed });
+                }
+            }
+        }
+        Ok(Rows { band, coverage, exceedance })
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        claims.references("coverage", "coverage of the 90 per cent band", rows.coverage.iter(), |c| (c.edge.to_owned(), c.coverage));
+        claims.references("radius", "true radius", rows.coverage.iter(), |c| (c.edge.to_owned(), c.radius));
+        claims.references("width", "median width of the band", rows.coverage.iter(), |c| (c.edge.to_owned(), c.width_median));
+        claims.all("ordered", "quantiles are ordered", &rows.band, |b| b.r05 <= b.r50 && b.r50 <= b.r95);
+        claims.all("probabilities", "exceedances are probabilities", &rows.exceedance, |e| (0.0..=1.0 + 1e-9).contains(&e.p_exceed));
+        for c in &rows.coverage {
+            let what = format!("nine bands in ten hold the true edge: {}", c.edge);
+            claims.within(format!("calibrated/{}", c.edge), what, c.coverage, 0.9, 4.0).at_full_trials();
+        }
+    }
+
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let at = |i: usize| (i as f64 + 0.5) * (100.0 / GRID as f64);
+        let centres: Vec<f64> = (0..GRID).map(at).collect();
+        let values = rows.exceedance.chunks(GRID).map(|row| row.iter().map(|e| e.p_exceed).collect()).collect();
+        let radius = rows.coverage.first().map_or(0.0, |c| c.radius);
+        let circle = (0..=72).map(|i| {
+            let angle = f64::from(i * 5).to_radians();
+            (B.source[0] + radius * angle.cos(), B.source[1] + radius * angle.sin())
+        });
+        let map = Panel::new("Probability of exceedance", Axis::linear("x (m)").between(0.0, 100.0), Axis::linear("y (m)").between(0.0, 100.0))
+            .with(Layer::heat("P(c > threshold)", centres.clone(), centres, values))
+            .with(Layer::dashed("true edge", circle.collect()).coloured(3))
+            .legend(Legend::Outside);
+        let of = |f: fn(&Band) -> f64| rows.band.iter().map(|b| (b.direction_deg, f(b))).collect::<Vec<_>>();
+        let limits = rows.band.iter().map(|b| (b.direction_deg, b.r05, b.r95)).collect();
+        let band = Panel::new(format!("Reach from the alarm node after {} s", p.time), Axis::linear("direction (deg)"), Axis::linear("reach (m)"))
+            .with(Layer::band("90 % band", limits).coloured(0))
+            .with(Layer::line("median", of(|b| b.r50)).coloured(0))
+            .with(Layer::dashed("truth", of(|b| b.truth)).coloured(3));
+        Plot::grid(2, vec![map, band])
+    }
+}

@@ -1,0 +1,35 @@
+//! A diffusive source, found by a belief that walks the network: figures and tables.
+
+mod beliefs;
+mod bytes;
+mod chains;
+mod common;
+mod envelope;
+mod route;
+mod selection;
+mod table1;
+mod unknowns;
+
+use crate::AnyFigure;
+
+/// The figures of this system, in the order of the publication.
+pub fn figures() -> Vec<&'static dyn AnyFigure> {
+    vec![
+        &route::Trace,
+        &route::Route,
+        &chains::FIG3,
+        &chains::FIG4,
+        &beliefs::True,
+        &beliefs::Approximated,
+        &chains::FIG7,
+        &chains::FIG8,
+        &chains::FIG9,
+        &chains::FIG10,
+        &table1::Table1,
+        &beliefs::Divergences,
+        &bytes::Bytes,
+        &envelope::Envelope,
+        &selection::Selection,
+        &unknowns::Unknowns,
+    ]
+}

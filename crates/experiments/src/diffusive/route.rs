@@ -1,0 +1,302 @@
+//! Figures 1 and 2: one search, event by event and on the map.
+
+use super::common::{A, ALARM, Network, Scheme, Settings};
+use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
+use crate::{About, Claims, Context, Error, Figure};
+use fewbits_densities::ellipse;
+use fewbits_diffusive::{Form, Outcome, Rule};
+use fewbits_monte_carlo::Trial;
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Which deployment is shown.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Number of the random deployment.
+    #[garde(range(max = 1_000_000))]
+    deployment: u64,
+    /// Deployed nodes.
+    #[garde(range(min = 2, max = 100_000))]
+    nodes: usize,
+    /// Radio range, m.
+    #[garde(range(min = 1.0, max = 1000.0))]
+    range: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            deployment: 0,
+            nodes: 300,
+            range: 15.0,
+        }
+    }
+}
+
+impl Parameters {
+    fn settings(&self) -> Settings {
+        Settings {
+            nodes: self.nodes,
+            ..Settings::default()
+        }
+    }
+
+    fn trial(&self, context: &Context<'_>) -> Trial {
+        context.monte_carlo(context.stream("diffusive-chains"), 1).trial(self.deployment)
+    }
+
+    fn search(&self, scheme: &Scheme, context: &Context<'_>) -> Result<Outcome, Error> {
+        scheme.run(&self.settings(), self.trial(context))
+    }
+
+    fn network(&self, context: &Context<'_>) -> Result<Network, Error> {
+        Network::draw(self.trial(context).stream, self.nodes, self.range)
+    }
+}
+
+/// What happens at a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum Event {
+    /// The belief arrives.
+    Receive,
+    /// The node samples.
+    Sample,
+    /// Belief times likelihood, projected.
+    Update,
+    /// The determinant is compared with the threshold.
+    Test,
+    /// The next node is chosen.
+    Select,
+    /// The belief is sent on.
+    Send,
+    /// The search ends.
+    Stop,
+}
+
+#[derive(Serialize, JsonSchema)]
+pub struct TraceRow {
+    /// Nodes that have sampled, this one included.
+    step: usize,
+    /// The node.
+    node: usize,
+    /// What happens.
+    event: Event,
+    /// Bytes that travel.
+    #[schemars(extend("unit" = "bytes"))]
+    bytes: f64,
+    /// Decimal logarithm of the determinant, where it is tested.
+    log10_determinant: Option<f64>,
+}
+
+/// Figure 1: the flow chart, as the trace of one search.
+pub struct Trace;
+
+impl Figure for Trace {
+    type Parameters = Parameters;
+    type Tables = Vec<TraceRow>;
+
+    fn about(&self) -> About {
+        About {
+            id: "diffusive-fig1",
+            title: "One search, event by event",
+            caption: "The paper's flow chart as what happens in one search of example B's kind: receive, sample, update, test, \
+                      select, send. A mixture of four Gaussians over position and rate travels.",
+            source: "Zhao and Nehorai 2007, Fig. 1",
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<TraceRow>, Error> {
+        let scheme = Scheme::new("gmm-4", A).at(p.range).of(Form::Mixture(4)).by(Rule::MutualInformation);
+        let outcome = p.search(&scheme, context)?;
+        let mut rows = Vec::new();
+        for (i, step) in outcome.steps.iter().enumerate() {
+            let mut push = |event, bytes, log10_determinant| {
+                rows.push(TraceRow {
+                    step: i + 1,
+                    node: step.node,
+                    event,
+                    bytes,
+                    log10_determinant,
+                });
+            };
+            if i > 0 {
+                push(Event::Receive, step.bits as f64 / 8.0, None);
+            }
+            push(Event::Sample, 0.0, None);
+            push(Event::Update, 0.0, None);
+            push(Event::Test, 0.0, Some(step.log10_determinant));
+            match outcome.steps.get(i + 1) {
+                Some(next) => {
+                    push(Event::Select, 0.0, None);
+                    push(Event::Send, next.bits as f64 / 8.0, None);
+                }
+                None => push(Event::Stop, 0.0, None),
+            }
+        }
+        Ok(rows)
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Vec<TraceRow>, claims: &mut Claims) {
+        let count = |event| rows.iter().filter(|r| r.event == event).count();
+        let balance = count(Event::Send) as f64 - count(Event::Receive) as f64;
+        claims.near("delivered", "what is sent is received", balance, 0.0, 0.0);
+        claims.near("one-end", "the search ends once", count(Event::Stop) as f64, 1.0, 0.0);
+        let last = rows.iter().filter_map(|r| r.log10_determinant).next_back();
+        claims.below("sharp", "the last determinant is below the threshold", last, A.threshold.log10()).at_defaults();
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Vec<TraceRow>) -> Plot {
+        let tests = rows.iter().filter_map(|r| Some((r.step as f64, r.log10_determinant?))).collect();
+        let mut total = 0.0;
+        let bytes = rows
+            .iter()
+            .filter(|r| r.event == Event::Receive)
+            .map(|r| {
+                total += r.bytes;
+                (r.step as f64, total)
+            })
+            .collect();
+        let determinant = Panel::new("Test", Axis::linear("nodes"), Axis::linear("log10 det of the covariance (m^4)"));
+        let sent = Panel::new("Messages", Axis::linear("nodes"), Axis::linear("bytes so far")).legend(Legend::TopLeft);
+        Plot::grid(
+            2,
+            vec![
+                determinant.with(Layer::points("after each node", tests)),
+                sent.with(Layer::points("received", bytes)),
+            ],
+        )
+    }
+}
+
+/// Tables of Figure 2.
+#[derive(Serialize, JsonSchema)]
+pub struct RouteRows {
+    /// The nodes visited.
+    route: Vec<RouteRow>,
+    /// All deployed nodes.
+    field: Vec<Place>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct RouteRow {
+    /// Number of the random deployment.
+    deployment: u64,
+    /// Nodes that have sampled, this one included.
+    step: usize,
+    /// The node.
+    node: usize,
+    /// Its position.
+    #[schemars(extend("unit" = "m"))]
+    x: f64,
+    /// Its position.
+    #[schemars(extend("unit" = "m"))]
+    y: f64,
+    /// Hops from the node before.
+    hop: usize,
+    /// Estimate of the source.
+    #[schemars(extend("unit" = "m"))]
+    estimate_x: f64,
+    /// Estimate of the source.
+    #[schemars(extend("unit" = "m"))]
+    estimate_y: f64,
+    /// Variance of x.
+    #[schemars(extend("unit" = "m^2"))]
+    variance_x: f64,
+    /// Covariance of x and y.
+    #[schemars(extend("unit" = "m^2"))]
+    covariance_xy: f64,
+    /// Variance of y.
+    #[schemars(extend("unit" = "m^2"))]
+    variance_y: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Place {
+    /// Position.
+    #[schemars(extend("unit" = "m"))]
+    x: f64,
+    /// Position.
+    #[schemars(extend("unit" = "m"))]
+    y: f64,
+}
+
+/// Figure 2: the route over the field.
+pub struct Route;
+
+impl Figure for Route {
+    type Parameters = Parameters;
+    type Tables = RouteRows;
+
+    fn about(&self) -> About {
+        About {
+            id: "diffusive-fig2",
+            title: "The route of one search",
+            caption: "Nodes visited in one random deployment, example A, with 90 per cent ellipses of the belief after each \
+                      node. The belief is exact; the next node is the one nearest to the estimate in Mahalanobis distance.",
+            source: "Zhao and Nehorai 2007, Fig. 2",
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<RouteRows, Error> {
+        let outcome = p.search(&Scheme::new("exact", A).at(p.range), context)?;
+        let network = p.network(context)?;
+        let positions = network.deployment.positions();
+        let route = outcome.steps.iter().enumerate().map(|(i, step)| {
+            let c = step.estimate.covariance();
+            RouteRow {
+                deployment: p.deployment,
+                step: i + 1,
+                node: step.node,
+                x: positions[step.node].x,
+                y: positions[step.node].y,
+                hop: step.hops,
+                estimate_x: step.estimate.mean().x,
+                estimate_y: step.estimate.mean().y,
+                variance_x: c[(0, 0)],
+                covariance_xy: c[(0, 1)],
+                variance_y: c[(1, 1)],
+            }
+        });
+        Ok(RouteRows {
+            route: route.collect(),
+            field: positions.iter().map(|place| Place { x: place.x, y: place.y }).collect(),
+        })
+    }
+
+    fn claims(&self, p: &Parameters, rows: &RouteRows, claims: &mut Claims) {
+        let last = rows.route.last().map(|r| (r.x - A.source[0]).hypot(r.y - A.source[1]));
+        claims.at_most("ends-near", "the route ends within 15 m of the source", last, 15.0).at_defaults();
+        let error = rows.route.last().map(|r| (r.estimate_x - A.source[0]).hypot(r.estimate_y - A.source[1]));
+        claims.at_most("estimate", "the estimate is within 0.2 m of the source", error, 0.2).at_defaults();
+        let first = rows.route.first().map(|r| (r.x - ALARM[0]).hypot(r.y - ALARM[1]));
+        claims.near("starts", "the route starts at the alarm node", first, 0.0, 1e-9);
+        claims.all("in-range", "no hop is longer than the range", rows.route.windows(2), |pair| {
+            (pair[0].x - pair[1].x).hypot(pair[0].y - pair[1].y) <= p.range * pair[1].hop as f64 + 1e-9
+        });
+    }
+
+    fn plot(&self, _: &Parameters, rows: &RouteRows) -> Plot {
+        let axis = |label: &str| Axis::linear(label).between(0.0, 100.0);
+        let mut panel = Panel::new("Route and belief", axis("x (m)"), axis("y (m)")).legend(Legend::Outside);
+        panel = panel.with(Layer::points("deployed", rows.field.iter().map(|p| (p.x, p.y)).collect()).coloured(7));
+        for r in &rows.route {
+            let covariance = nalgebra::Matrix2::new(r.variance_x, r.covariance_xy, r.covariance_xy, r.variance_y);
+            let belief = fewbits_core::Gaussian::new(nalgebra::Vector2::new(r.estimate_x, r.estimate_y), covariance);
+            if let Ok(Ok(outline)) = belief.map(|b| ellipse(&b, 0.9, 90)) {
+                let mut closed: Vec<(f64, f64)> = outline.iter().map(|p| (p[0], p[1])).collect();
+                closed.extend(closed.first().copied());
+                let label = if r.step == 1 { "90 % of the belief" } else { "" };
+                panel = panel.with(Layer::dashed(label, closed).coloured(1));
+            }
+        }
+        let route: Vec<_> = rows.route.iter().map(|r| (r.x, r.y)).collect();
+        panel = panel
+            .with(Layer::line("", route.clone()).coloured(0))
+            .with(Layer::points("visited", route).coloured(0).marked(Marker::Square))
+            .with(Layer::points("source", vec![A.source.into()]).coloured(3).marked(Marker::Triangle));
+        Plot::of(panel)
+    }
+}

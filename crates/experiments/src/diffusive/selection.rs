@@ -1,0 +1,269 @@
+//! Rules that choose the next node: how well they rank it, and what that saves.
+
+use super::common::{A, B, Scheme, Settings, Network, fraction, tracks, trials};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use fewbits_diffusive::information::Predictions;
+use fewbits_diffusive::{Rule, Selector};
+use fewbits_monte_carlo::Moments;
+use garde::Validate;
+use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of the comparison.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Random deployments of the searches.
+    #[garde(range(min = 1, max = 100_000))]
+    trials: u64,
+    /// Random deployments in which candidates are ranked.
+    #[garde(range(min = 1, max = 10_000))]
+    ranking_trials: u64,
+    /// Support points of the exact mutual information.
+    #[garde(range(min = 10, max = 2_000))]
+    points: usize,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            trials: 200,
+            ranking_trials: 24,
+            points: 120,
+        }
+    }
+}
+
+/// Both tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Searches with the exact belief, by rule.
+    searches: Vec<Search>,
+    /// How rules rank the neighbours after three nodes, against the exact mutual information.
+    rankings: Vec<Ranking>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Search {
+    /// Example and range.
+    setting: &'static str,
+    /// Rule.
+    rule: &'static str,
+    /// Share of the searches that reach the threshold within 30 nodes.
+    reach: Measured,
+    /// Mean nodes of those that do.
+    nodes_mean: Measured,
+    /// Share of all searches that end more than a metre off.
+    wrong: Measured,
+}
+
+impl Search {
+    fn key(&self) -> String {
+        format!("{} {}", self.setting, self.rule)
+    }
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Ranking {
+    /// Rule.
+    rule: &'static str,
+    /// Mean rank correlation with the exact mutual information.
+    rank_correlation: Measured,
+    /// Information lost by taking the rule's best instead of the best.
+    #[schemars(extend("unit" = "nats"))]
+    lost: Measured,
+    /// Mean of rule minus exact information, for rules that are in nats.
+    #[schemars(extend("unit" = "nats"))]
+    bias: Option<f64>,
+}
+
+const RULES: [&str; 7] = [
+    "gaussian bound",
+    "pairwise lower",
+    "pairwise upper",
+    "cramer-rao",
+    "covariance",
+    "nearest",
+    "mahalanobis",
+];
+
+fn schemes() -> Vec<(&'static str, &'static str, Scheme)> {
+    let mut all = Vec::new();
+    for (setting, example, range) in [("B15", B, 15.0), ("A15", A, 15.0), ("A10", A, 10.0)] {
+        for (name, rule) in [("information", Rule::MutualInformation), ("mahalanobis", Rule::Mahalanobis)] {
+            all.push((setting, name, Scheme::new(name, example).at(range).by(rule).up_to(30)));
+        }
+    }
+    all
+}
+
+/// The comparison of rules.
+pub struct Selection;
+
+impl Figure for Selection {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "diffusive-selection",
+            title: "Choosing the next node",
+            caption: "Left: mean nodes to the threshold with the exact belief, by mutual information (its Gaussian bound) and by \
+                      Mahalanobis distance. Right: how rules rank the neighbours after three nodes of example B, as rank \
+                      correlation with the exact mutual information.",
+            source: "",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = 8;
+        p.ranking_trials = 2;
+    }
+
+    fn cost(&self, p: &Parameters) -> Cost {
+        Cost {
+            seconds: p.trials as f64 * 0.3 + p.ranking_trials as f64 * (p.points as f64).powi(2) * 4e-4,
+            bytes: 1e7,
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let settings = Settings {
+            trials: p.trials,
+            ..Settings::default()
+        };
+        let schemes = schemes();
+        let plain: Vec<Scheme> = schemes.iter().map(|s| s.2).collect();
+        let all = tracks(context, "diffusive-chains", &settings, &plain)?;
+        let mut searches = Vec::new();
+        for (i, (setting, rule, _)) in schemes.iter().enumerate() {
+            let own: Vec<_> = all.iter().map(|tracks| &tracks[i]).collect();
+            let nodes: Moments = own.iter().filter(|t| t.converged()).map(|t| t.nodes() as f64).collect();
+            searches.push(Search {
+                setting,
+                rule,
+                reach: fraction(own.iter().filter(|t| t.converged()).count(), own.len()),
+                nodes_mean: Measured::mean(&nodes),
+                wrong: fraction(own.iter().filter(|t| t.final_error() > 1.0).count(), own.len()),
+            });
+        }
+        let ranked = trials(context, "diffusive-chains", p.ranking_trials, |trial| rank(p, &settings, trial))?;
+        let mut rankings = Vec::new();
+        for (r, rule) in RULES.iter().enumerate() {
+            let of = |k: usize| -> Moments { ranked.iter().flatten().map(|trial| trial[r][k]).collect() };
+            rankings.push(Ranking {
+                rule,
+                rank_correlation: Measured::mean(&of(0)),
+                lost: Measured::mean(&of(1)),
+                bias: (r < 3).then(|| of(2).mean()),
+            });
+        }
+        Ok(Rows { searches, rankings })
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        claims.references("nodes_mean", "mean nodes to the threshold", rows.searches.iter(), |s| (s.key(), s.nodes_mean));
+        claims.references("reach", "share that reaches the threshold", rows.searches.iter(), |s| (s.key(), s.reach));
+        let reach = |key: &str| rows.searches.iter().find(|s| s.key() == key).map(|s| s.reach.value);
+        for setting in ["B15", "A15", "A10"] {
+            let gap = reach(&format!("{setting} information")).zip(reach(&format!("{setting} mahalanobis"))).map(|(a, b)| a - b);
+            let what = format!("information reaches the threshold at least as often as Mahalanobis: {setting}");
+            claims.at_least(format!("no-stall/{setting}"), what, gap, 0.0).at_full_trials();
+        }
+        let rank = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).map(|r| r.rank_correlation.value);
+        claims.at_least("bound-ranks", "the Gaussian bound ranks as the exact information does", rank("gaussian bound"), 0.98).at_full_trials();
+        let gap = rank("gaussian bound").zip(rank("mahalanobis")).map(|(a, b)| a - b);
+        claims.above("mahalanobis-does-not", "Mahalanobis distance ranks far worse", gap, 0.2).at_full_trials();
+        let bias = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).and_then(|r| r.bias);
+        claims.at_most("lower", "the lower bound is below the exact information on average", bias("pairwise lower"), 1e-6);
+        claims.at_least("upper", "the upper bound is above it on average", bias("pairwise upper"), -1e-6);
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let names = rows.searches.iter().step_by(2).enumerate().map(|(i, s)| (i as f64, s.setting.to_owned()));
+        let mut nodes = Panel::new("Nodes to the threshold", Axis::linear("example and range (m)").named(names), Axis::linear("mean nodes"))
+            .legend(Legend::TopLeft);
+        for (c, rule) in ["information", "mahalanobis"].into_iter().enumerate() {
+            let of = rows.searches.iter().filter(|s| s.rule == rule).enumerate();
+            nodes = nodes.with(Layer::measured(rule, of, |(i, s)| (i as f64 + 0.1 * (c as f64 - 0.5), s.nodes_mean)).coloured(c));
+        }
+        let names = rows.rankings.iter().enumerate().map(|(i, r)| (i as f64, r.rule.to_owned()));
+        let ranks = Panel::new("Ranking", Axis::linear("rule").named(names), Axis::linear("rank correlation with exact information"))
+            .with(Layer::measured("", rows.rankings.iter().enumerate(), |(i, r)| (i as f64, r.rank_correlation)));
+        Plot::grid(2, vec![nodes, ranks])
+    }
+}
+
+/// Of every rule: rank correlation, information lost, bias; none if the search had no candidates.
+fn rank(p: &Parameters, settings: &Settings, trial: fewbits_monte_carlo::Trial) -> Result<Option<Vec<[f64; 3]>>, Error> {
+    let endless = super::common::Example { threshold: 1e-300, ..B };
+    let scheme = Scheme::new("exact", endless).up_to(3);
+    let outcome = scheme.run(settings, trial)?;
+    let (Some(posterior), Some(last)) = (&outcome.posterior, outcome.steps.last()) else { return Ok(None) };
+    let network = Network::draw(trial.stream, settings.nodes, scheme.range)?;
+    let sensor = B.sensor(false)?;
+    let rate = settings.joint()?;
+    let visited: Vec<usize> = outcome.steps.iter().map(|s| s.node).collect();
+    let places: Vec<Vector2<f64>> = network
+        .graph
+        .neighbours(last.node)
+        .iter()
+        .filter(|node| !visited.contains(&(**node as usize)))
+        .map(|node| network.deployment.positions()[*node as usize])
+        .collect();
+    if places.len() < 4 {
+        return Ok(None);
+    }
+    let clumps = posterior.clumps_with_rate(1.0, p.points).map_err(Error::failed)?;
+    let weights: Vec<f64> = clumps.clumps().iter().map(|c| c.weight).collect();
+    let total: f64 = weights.iter().sum();
+    let weights: Vec<f64> = weights.iter().map(|w| w / total).collect();
+    let mut exact = Vec::new();
+    let mut scores: Vec<Vec<f64>> = vec![Vec::new(); RULES.len()];
+    let selector = |rule| Selector::new(rule, posterior, &last.estimate, &rate).map_err(Error::failed);
+    let others = [selector(Rule::CramerRao)?, selector(Rule::Covariance)?, selector(Rule::Mahalanobis)?];
+    for place in &places {
+        let means: Vec<Vec<f64>> = clumps
+            .clumps()
+            .iter()
+            .map(|c| sensor.responses(place, &Vector2::new(c.mean[0], c.mean[1])).iter().map(|a| a * c.mean[2]).collect())
+            .collect();
+        let predictions = Predictions::new(&means, &weights, sensor.noise())?;
+        let bounds = predictions.pairwise_bounds();
+        exact.push(predictions.exact());
+        scores[0].push(predictions.gaussian_bound());
+        scores[1].push(bounds.lower);
+        scores[2].push(bounds.upper);
+        scores[3].push(others[0].score(&sensor, place));
+        scores[4].push(others[1].score(&sensor, place));
+        scores[5].push(-(place - last.estimate.mean()).norm());
+        scores[6].push(others[2].score(&sensor, place));
+    }
+    let best = exact.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    Ok(Some(
+        scores
+            .iter()
+            .map(|own| {
+                let chosen = own.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(i, _)| i);
+                let bias = own.iter().zip(&exact).map(|(a, b)| a - b).sum::<f64>() / exact.len() as f64;
+                [correlation(&ranks(own), &ranks(&exact)), best - exact[chosen], bias]
+            })
+            .collect(),
+    ))
+}
+
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let below = |x: f64| values.iter().filter(|v| **v < x).count() as f64 + 0.5 * values.iter().filter(|v| **v == x).count() as f64;
+    values.iter().map(|x| below(*x)).collect()
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let cross: f64 = a.iter().zip(b).map(|(x, y)| (x - ma) * (y - mb)).sum();
+    let own = |v: &[f64], m: f64| v.iter().map(|x| (x - m).powi(2)).sum::<f64>();
+    let scale = (own(a, ma) * own(b, mb)).sqrt();
+    if scale > 0.0 { cross / scale } else { 0.0 }
+}

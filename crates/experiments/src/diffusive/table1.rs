@@ -1,0 +1,177 @@
+//! Table I: Hermite polynomials of two variables.
+
+use crate::plot::{Axis, Layer, Panel, Plot};
+use crate::{About, Claims, Context, Error, Figure};
+use fewbits_densities::hermite::{gaussian_moment, hermite_terms, multi_indices};
+use garde::Validate;
+use nalgebra::{Matrix2, Vector2};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The covariance at which the table is evaluated.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Variance of the first coordinate.
+    #[garde(range(min = 0.01, max = 100.0))]
+    variance1: f64,
+    /// Variance of the second coordinate.
+    #[garde(range(min = 0.01, max = 100.0))]
+    variance2: f64,
+    /// Correlation.
+    #[garde(range(min = -0.99, max = 0.99))]
+    correlation: f64,
+    /// Highest degree.
+    #[garde(range(min = 1, max = 8))]
+    degree: usize,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            variance1: 2.0,
+            variance2: 0.5,
+            correlation: 0.7,
+            degree: 4,
+        }
+    }
+}
+
+impl Parameters {
+    fn precision(&self) -> Result<Matrix2<f64>, Error> {
+        let cross = self.correlation * (self.variance1 * self.variance2).sqrt();
+        let covariance = Matrix2::new(self.variance1, cross, cross, self.variance2);
+        covariance.try_inverse().ok_or(Error::Table("the covariance is singular".to_owned()))
+    }
+}
+
+/// Both tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// The monomials of every polynomial.
+    monomials: Vec<Monomial>,
+    /// The mean of every polynomial under the Gaussian, which must be zero.
+    means: Vec<Mean>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Monomial {
+    /// First index.
+    nu1: usize,
+    /// Second index.
+    nu2: usize,
+    /// Powers of z1 and z2.
+    monomial: String,
+    /// Its coefficient.
+    coef: f64,
+    /// The coefficient as printed, where the entry is misprinted.
+    printed: Option<f64>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Mean {
+    /// First index.
+    nu1: usize,
+    /// Second index.
+    nu2: usize,
+    /// Mean of the recursion's polynomial under the Gaussian.
+    mean: f64,
+    /// Mean of the printed polynomial, where it is misprinted.
+    printed: Option<f64>,
+}
+
+/// The misprinted entries as printed: He40 with a constant `3 w11`, He22 with `w11 z1 z2` in place of `w11 z2^2`.
+fn printed(nu: [usize; 2], w: &Matrix2<f64>) -> Option<Vec<([usize; 2], f64)>> {
+    let (w11, w12, w22) = (w[(0, 0)], w[(0, 1)], w[(1, 1)]);
+    match nu {
+        [4, 0] => Some(vec![([4, 0], 1.0), ([2, 0], -6.0 * w11), ([0, 0], 3.0 * w11)]),
+        [2, 2] => Some(vec![
+            ([2, 2], 1.0),
+            ([2, 0], -w22),
+            ([1, 1], -w11 - 4.0 * w12),
+            ([0, 0], w11 * w22 + 2.0 * w12 * w12),
+        ]),
+        _ => None,
+    }
+}
+
+/// Sizes of the misprints' means at the default covariance, by hand: `3 w11 - 3 w11^2` and `w11 w22 - w11 w12`.
+const MISPRINT_40: f64 = 0.057_67;
+const MISPRINT_22: f64 = 5.190_31;
+
+/// Table I.
+pub struct Table1;
+
+impl Figure for Table1 {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "diffusive-table1",
+            title: "Hermite polynomials of two variables",
+            caption: "The polynomials He_nu(z; W) by the recursion, with the two misprinted entries of the paper's table beside \
+                      them. Every polynomial but the first has mean zero under the Gaussian; the misprints do not.",
+            source: "Zhao and Nehorai 2007, Table I",
+        }
+    }
+
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
+        let w = p.precision()?;
+        let mean_of = |terms: &[([usize; 2], f64)]| -> Result<f64, Error> {
+            let parts = terms.iter().map(|(power, c)| {
+                gaussian_moment(*power, &Vector2::zeros(), &w).map(|moment| c * moment).map_err(Error::failed)
+            });
+            parts.sum()
+        };
+        let (mut monomials, mut means) = (Vec::new(), Vec::new());
+        for nu in multi_indices::<2>(p.degree).map_err(Error::failed)? {
+            let terms = hermite_terms(nu, &w).map_err(Error::failed)?;
+            let misprint = printed(nu, &w);
+            let mut powers: Vec<[usize; 2]> = terms.iter().map(|t| t.0).collect();
+            powers.extend(misprint.iter().flatten().map(|t| t.0).filter(|power| !terms.iter().any(|t| t.0 == *power)));
+            let value = |list: &[([usize; 2], f64)], power| list.iter().find(|t| t.0 == power).map_or(0.0, |t| t.1);
+            for power in powers {
+                monomials.push(Monomial {
+                    nu1: nu[0],
+                    nu2: nu[1],
+                    monomial: format!("z1^{} z2^{}", power[0], power[1]),
+                    coef: value(&terms, power),
+                    printed: misprint.as_ref().map(|list| value(list, power)),
+                });
+            }
+            means.push(Mean {
+                nu1: nu[0],
+                nu2: nu[1],
+                mean: mean_of(&terms)?,
+                printed: misprint.map(|list| mean_of(&list)).transpose()?,
+            });
+        }
+        Ok(Rows { monomials, means })
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let what = "every polynomial but the first has mean zero";
+        claims.all("zero-mean", what, rows.means.iter().filter(|m| m.nu1 + m.nu2 > 0), |m| m.mean.abs() < 1e-10);
+        let misprint = |nu1, nu2| rows.means.iter().find(|m| (m.nu1, m.nu2) == (nu1, nu2)).and_then(|m| m.printed);
+        for (nu, id, reference) in [((4, 0), "he40", MISPRINT_40), ((2, 2), "he22", MISPRINT_22)] {
+            let what = "the printed entry has another mean and is a misprint (errata diffusive-3)";
+            let value = misprint(nu.0, nu.1).map(f64::abs);
+            claims.near(format!("misprint/{id}"), what, value, reference, 0.01).at_defaults();
+        }
+        let count = rows.means.len() as f64;
+        claims.near("complete", "fifteen polynomials up to degree four", count, 15.0, 0.0).at_defaults();
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let bars = |value: fn(&Mean) -> Option<f64>| -> Vec<(f64, f64)> {
+            rows.means.iter().enumerate().filter_map(|(i, m)| Some((i as f64, value(m)?))).collect()
+        };
+        let names = rows.means.iter().enumerate().map(|(i, m)| (i as f64, format!("{}{}", m.nu1, m.nu2)));
+        Plot::of(
+            Panel::new("Mean under the Gaussian", Axis::linear("index nu").named(names), Axis::linear("mean"))
+                .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))
+                .with(Layer::points("by the recursion", bars(|m| Some(m.mean))).coloured(0)),
+        )
+    }
+}

@@ -1,0 +1,225 @@
+//! What else could be unknown, and what the model of the rate does to the estimate.
+
+use super::common::{B, Settings, search_box, trials};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use fewbits_core::{Belief, Gaussian};
+use fewbits_densities::CellOptions;
+use fewbits_diffusive::information::{Unknown, fisher_information_of};
+use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLikelihood};
+use fewbits_monte_carlo::Moments;
+use garde::Validate;
+use nalgebra::{Matrix2, Vector2};
+use rand::RngExt;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of both tables.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Random layouts about the source for the comparison of rate models.
+    #[garde(range(min = 1, max = 10_000))]
+    trials: u64,
+    /// Nodes of a layout.
+    #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
+    nodes: Vec<usize>,
+    /// Radius of a layout, m.
+    #[garde(range(min = 1.0, max = 1000.0))]
+    radius: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            trials: 200,
+            nodes: vec![6, 20],
+            radius: 25.0,
+        }
+    }
+}
+
+/// Both tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Cramer-Rao bounds with more and more unknowns.
+    bounds: Vec<Bound>,
+    /// Bias and width of the posterior of noise-free samples, by what is assumed of the rate.
+    models: Vec<Model>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Bound {
+    /// What is unknown besides the position.
+    unknown: &'static str,
+    /// Standard deviation of x at the bound.
+    #[schemars(extend("unit" = "m"))]
+    sd_x: f64,
+    /// Standard deviation of the rate at the bound.
+    #[schemars(extend("unit" = "kg/s"))]
+    sd_rate: Option<f64>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Model {
+    /// What is assumed of the rate.
+    model: &'static str,
+    /// Nodes.
+    nodes: usize,
+    /// Distance of posterior mean and source, although the samples are free of noise.
+    #[schemars(extend("unit" = "m"))]
+    bias: Measured,
+    /// Fourth root of the determinant of the covariance.
+    #[schemars(extend("unit" = "m"))]
+    width: Measured,
+    /// Bias in units of the width.
+    bias_in_widths: Measured,
+}
+
+impl Model {
+    fn key(&self) -> String {
+        format!("{} {}", self.model, self.nodes)
+    }
+}
+
+/// Six nodes about the source of example B.
+const NODES: [[f64; 2]; 6] = [[58.0, 55.0], [70.0, 52.0], [60.0, 42.0], [66.0, 46.0], [55.0, 48.0], [63.0, 58.0]];
+
+fn models() -> Result<[(&'static str, RateModel); 3], Error> {
+    let range = RateRange::new(0.5, 1.5)?;
+    Ok([
+        ("sample-wise", RateModel::SampleWise(range)),
+        ("node-wise", RateModel::NodeWise(range)),
+        ("joint", RateModel::Joint(range)),
+    ])
+}
+
+/// What else could be unknown.
+pub struct Unknowns;
+
+impl Figure for Unknowns {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "diffusive-unknowns",
+            title: "What else is unknown",
+            caption: "Left: the Cramer-Rao bound of x for six nodes of example B with more and more unknowns. Right: posterior \
+                      means of noise-free samples by what is assumed of the rate. Redrawing the rate for every sample, as the \
+                      paper's equations (13) and (18) do, pushes the source away and stays wrong however many nodes there are.",
+            source: "",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = 4;
+    }
+
+    fn cost(&self, p: &Parameters) -> Cost {
+        Cost {
+            seconds: p.trials as f64 * p.nodes.iter().sum::<usize>() as f64 * 0.02,
+            bytes: 1e6,
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let sensor = B.sensor(false)?;
+        let source = B.source();
+        let nodes: Vec<Vector2<f64>> = NODES.iter().map(|n| Vector2::from(*n)).collect();
+        let mut bounds = Vec::new();
+        let mut unknowns = vec![Unknown::X, Unknown::Y];
+        for (name, next) in [
+            ("nothing", None),
+            ("rate", Some(Unknown::Rate)),
+            ("+ diffusivity", Some(Unknown::Diffusivity)),
+            ("+ start", Some(Unknown::Start)),
+            ("+ bias", Some(Unknown::Bias)),
+        ] {
+            unknowns.extend(next);
+            let information = fisher_information_of(&unknowns, &sensor, &nodes, &source, 1.0).map_err(Error::failed)?;
+            // Rows of very different units: factor with the diagonal scaled to one.
+            let scale = information.diagonal().map(|d| d.sqrt().recip());
+            let scaled = nalgebra::DMatrix::from_fn(unknowns.len(), unknowns.len(), |i, j| information[(i, j)] * scale[i] * scale[j]);
+            let Some(factor) = scaled.cholesky() else {
+                return Err(Error::Table("the information is singular".to_owned()));
+            };
+            let variance = |i: usize| factor.inverse()[(i, i)] * scale[i] * scale[i];
+            bounds.push(Bound {
+                unknown: name,
+                sd_x: variance(0).sqrt(),
+                sd_rate: (unknowns.len() > 2).then(|| variance(2).sqrt()),
+            });
+        }
+        let mut rows = Vec::new();
+        for count in &p.nodes {
+            let kinds = models()?;
+            let all = trials(context, "diffusive-layouts", p.trials, |trial| {
+                let mut rng = trial.stream.rng();
+                let mut draw = || -> Result<Record, Error> {
+                    let angle = std::f64::consts::TAU * rng.random::<f64>();
+                    let rho = p.radius * rng.random::<f64>().sqrt();
+                    let node = source + Vector2::new(angle.cos(), angle.sin()) * rho.max(3.0);
+                    let clean: Vec<f64> = sensor.responses(&node, &source).iter().map(|a| a + sensor.bias()).collect();
+                    sensor.record(&node, &clean).map_err(Error::failed)
+                };
+                let records = (0..*count).map(|_| draw()).collect::<Result<Vec<_>, _>>()?;
+                let variance = Settings::default().prior_sd.powi(2);
+                let prior = Prior::Exact(Gaussian::new(*records[0].node(), Matrix2::identity() * variance)?);
+                kinds
+                    .iter()
+                    .map(|(_, model)| {
+                        let likelihood = SourceLikelihood::new(records.clone(), *model).map_err(Error::failed)?;
+                        let posterior = Posterior::new(&prior, &likelihood, &search_box(), None, &CellOptions::default())
+                            .map_err(Error::failed)?;
+                        let width = posterior.cells.covariance().determinant().powf(0.25);
+                        Ok(((posterior.cells.mean() - source).norm(), width))
+                    })
+                    .collect::<Result<Vec<_>, Error>>()
+            })?;
+            for (k, (model, _)) in kinds.iter().enumerate() {
+                let of = |f: fn(&(f64, f64)) -> f64| -> Measured {
+                    let values: Vec<f64> = all.iter().map(|trial| f(&trial[k])).collect();
+                    super::common::median(&values).unwrap_or_else(|| Measured::mean(&Moments::default()))
+                };
+                rows.push(Model {
+                    model,
+                    nodes: *count,
+                    bias: of(|v| v.0),
+                    width: of(|v| v.1),
+                    bias_in_widths: of(|v| v.0 / v.1),
+                });
+            }
+        }
+        Ok(Rows { bounds, models: rows })
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        claims.increasing("more-unknowns", "every further unknown widens the bound", rows.bounds.iter().map(|b| b.sd_x));
+        let first = rows.bounds.first().map(|b| b.sd_x);
+        claims.near("position-only", "with the position alone unknown the bound of x is about 0.04 m", first, 0.041, 0.015).at_defaults();
+        let bias = |key: &str| rows.models.iter().find(|m| m.key() == key);
+        let what = "a rate for each sample is metres off without any noise (errata diffusive-2)";
+        claims.above("sample-wise-is-biased", what, bias("sample-wise 20").map(|m| m.bias.value), 1.0).at_defaults().at_full_trials();
+        let what = "and many widths off: it is inconsistent";
+        claims.above("sample-wise-is-inconsistent", what, bias("sample-wise 20").map(|m| m.bias_in_widths.value), 2.0).at_defaults().at_full_trials();
+        let what = "one joint rate is right";
+        claims.below("joint-is-right", what, bias("joint 20").map(|m| m.bias.value), 0.01).at_defaults().at_full_trials();
+        let order = ["sample-wise 20", "node-wise 20", "joint 20"].map(|key| bias(key).map(|m| m.width.value));
+        claims.decreasing("sharper", "what is assumed shared sharpens the posterior", order).at_defaults().at_full_trials();
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let names = rows.bounds.iter().enumerate().map(|(i, b)| (i as f64, b.unknown.to_owned()));
+        let bound = Panel::new("Bound of x", Axis::linear("unknown besides the position").named(names), Axis::linear("standard deviation (m)"))
+            .with(Layer::bars("", rows.bounds.iter().enumerate().map(|(i, b)| (i as f64, b.sd_x)).collect(), 0.6));
+        let mut bias = Panel::new("Noise-free samples", Axis::linear("nodes"), Axis::log("median distance to the source (m)")).legend(Legend::Outside);
+        for (c, model) in ["sample-wise", "node-wise", "joint"].into_iter().enumerate() {
+            let of = || rows.models.iter().filter(|m| m.model == model);
+            bias = bias
+                .with(Layer::points(model, of().map(|m| (m.nodes as f64, m.bias.value)).collect()).coloured(c))
+                .with(Layer::dashed(format!("{model}: width"), of().map(|m| (m.nodes as f64, m.width.value)).collect()).coloured(c));
+        }
+        Plot::grid(2, vec![bound, bias])
+    }
+}

@@ -1,0 +1,126 @@
+//! Law of every filter: what is impossible is an error of one name, and leaves the belief as it was, to the last bit.
+
+use fewbits_core::factor::{Constant, InCell, Scalar};
+use fewbits_core::{Cell, Error as CoreError, Gaussian, Likelihood, Observed};
+use fewbits_filters::{
+    CloudWorkspace, Error, GaussianCloud, Grid, ParticleFilter, Particles, PlaneFilter, PointMass, PointMassFilter,
+    Proposal, RaoBlackwellised, Resampling, Schedule, Workspace, assumed_density,
+};
+use fewbits_models::{Ar1, LinearGaussian, LinearSensor};
+use fewbits_monte_carlo::Stream;
+use nalgebra::{Matrix2, SVector, Vector1, Vector2};
+use rand::Rng;
+
+fn impossible<T: std::fmt::Debug>(result: Result<T, impl Into<Error>>) {
+    let error = result.map_err(Into::into);
+    assert!(matches!(error, Err(Error::Core(CoreError::Impossible))), "{error:?}");
+}
+
+fn direct<const D: usize>() -> LinearSensor<D, 1> {
+    LinearSensor::scalar(SVector::from_fn(|d, _| f64::from(u8::from(d == 0))), 1.0).unwrap()
+}
+
+/// Impossible everywhere: as a constant, and as a cell that no number reaches.
+fn nevers<const D: usize>() -> [Observed<LinearSensor<D, 1>, Scalar, 1>; 2] {
+    let cell = Cell::new(1e200, 2e200).unwrap();
+    [
+        Observed::new(direct(), Constant::new(0.0).unwrap().into()),
+        Observed::new(direct(), InCell::certain(cell, 1.0).unwrap().into()),
+    ]
+}
+
+/// Weighted, so that resampling would show.
+fn cloud() -> Particles<1> {
+    let logs: Vec<f64> = (0..50).map(|i| -0.1 * f64::from(i)).collect();
+    Particles::new([(0..50).map(f64::from).collect()], &logs)
+        .unwrap()
+        .with_side((0..100).map(f64::from).collect())
+        .unwrap()
+}
+
+#[test]
+fn particle_filters() {
+    struct Nowhere;
+    impl Proposal<1> for Nowhere {
+        fn propose<R: Rng + ?Sized>(&self, _: &mut R, state: &Vector1<f64>) -> (Vector1<f64>, f64) {
+            (state * 2.0, f64::NEG_INFINITY)
+        }
+    }
+    struct NotANumber;
+    impl Likelihood<1> for NotANumber {
+        fn log_likelihood(&self, state: &Vector1<f64>) -> f64 {
+            if state[0] > 10.0 { f64::NAN } else { 0.0 }
+        }
+    }
+    let dynamics = Ar1::new(0.9, 1.0).unwrap();
+    let mut rng = Stream::new(1).fast_rng();
+    let before = cloud();
+    let mut belief = before.clone();
+    let mut workspace = Workspace::default();
+    for schedule in [Schedule::Always, Schedule::Below(0.9), Schedule::Never] {
+        let filter = ParticleFilter::new(Resampling::Systematic, schedule);
+        for never in &nevers::<1>() {
+            impossible(filter.update(&mut belief, never));
+            impossible(filter.step(&mut rng, &dynamics, &belief, never));
+            impossible(filter.step_in_place(&mut rng, &dynamics, &mut belief, never, &mut workspace));
+            impossible(filter.auxiliary_step(&mut rng, &dynamics, &mut belief, never, &mut workspace));
+        }
+        impossible(filter.update(&mut belief, &NotANumber));
+        impossible(filter.guided_step(&mut rng, &Nowhere, &mut belief, &mut workspace));
+        assert_eq!(belief, before);
+        assert_eq!(belief.weights(), before.weights());
+        assert_eq!(belief.effective_sample_size(), before.effective_sample_size());
+    }
+}
+
+#[test]
+fn the_rao_blackwellised_filter() {
+    let dynamics = Ar1::new(0.9, 1.0).unwrap();
+    let mut rng = Stream::new(1).fast_rng();
+    let before = GaussianCloud::new(cloud(), [[2.0]].into()).unwrap();
+    let (mut belief, mut workspace) = (before.clone(), CloudWorkspace::default());
+    let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.9)));
+    for never in &nevers::<1>() {
+        impossible(filter.update(&mut rng, &mut belief, never, &mut workspace));
+        impossible(filter.step(&mut rng, &dynamics, &belief, never));
+        impossible(filter.step_in_place(&mut rng, &dynamics, &mut belief, never, &mut workspace));
+        assert_eq!(belief, before);
+        assert_eq!(belief.means().weights(), before.means().weights());
+    }
+}
+
+#[test]
+fn the_grid_filters() {
+    let grid = Grid::symmetric(10.0, 0.25).unwrap();
+    let filter = PointMassFilter::new(&Ar1::new(0.9, 1.0).unwrap(), grid).unwrap();
+    let before = PointMass::normal(grid, 0.3, 2.0).unwrap();
+    let mut belief = before.clone();
+    for never in &nevers::<1>() {
+        impossible(filter.step(&belief, never));
+        impossible(belief.update(never));
+    }
+    impossible(belief.update_with(|_| f64::NAN));
+    impossible(belief.reweight(&vec![0.0; grid.points()]));
+    assert_eq!(belief, before);
+
+    let dynamics = LinearGaussian::with_covariance(Matrix2::identity() * 0.9, Matrix2::identity()).unwrap();
+    let filter = PlaneFilter::new(&dynamics, 0.6).unwrap();
+    let before = filter
+        .normal(&Gaussian::new(Vector2::new(1.0, 0.0), Matrix2::identity()).unwrap())
+        .unwrap();
+    let mut belief = before.clone();
+    for never in &nevers::<2>() {
+        impossible(filter.step(&belief, never));
+        impossible(belief.update(never));
+    }
+    assert_eq!(belief, before);
+}
+
+#[test]
+fn the_assumed_density_filter() {
+    let belief = Gaussian::new(Vector2::new(1.0, 0.0), Matrix2::identity()).unwrap();
+    for never in &nevers::<2>() {
+        impossible(assumed_density::update(&belief, never.sensing.matrix(), &never.factor));
+        impossible(assumed_density::update_through(&belief, never));
+    }
+}

@@ -1,0 +1,187 @@
+//! What is on disk about a figure: the content of its JSON, which gallery, summary, `--failed` and `merge` read back.
+
+use super::{Error, Options};
+use fewbits_experiments::{About, Claim, Outcome, Verdict, plain};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value as Json, json};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+use std::sync::LazyLock;
+use std::time::{Duration, SystemTime};
+
+/// One figure as it was made, or why it was not.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Record {
+    pub(super) id: String,
+    pub(super) title: String,
+    pub(super) caption: String,
+    pub(super) source: String,
+    pub(super) parameters: Map<String, Json>,
+    pub(super) seed: u64,
+    pub(super) trials: Option<u64>,
+    #[serde(default)]
+    pub(super) quick: bool,
+    pub(super) version: String,
+    #[serde(default)]
+    pub(super) commit: String,
+    #[serde(default)]
+    pub(super) finished: String,
+    pub(super) wall_time_s: f64,
+    pub(super) files: Vec<String>,
+    #[serde(default)]
+    pub(super) rows: usize,
+    pub(super) columns: Map<String, Json>,
+    pub(super) claims: Vec<Judged>,
+    #[serde(default)]
+    pub(super) error: Option<String>,
+}
+
+/// A claim as it was judged.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Judged {
+    pub(super) id: String,
+    pub(super) statement: String,
+    pub(super) verdict: Verdict,
+    /// None where what the claim speaks of is absent.
+    pub(super) value: Option<f64>,
+    pub(super) expected: Json,
+    pub(super) tolerance: Option<f64>,
+}
+
+impl From<&Claim> for Judged {
+    fn from(claim: &Claim) -> Self {
+        Self {
+            id: claim.id.clone(),
+            statement: claim.statement.clone(),
+            verdict: claim.verdict,
+            value: claim.value.is_finite().then_some(claim.value),
+            expected: json!(claim.expected),
+            tolerance: claim.tolerance,
+        }
+    }
+}
+
+impl Judged {
+    /// What was measured, for a reader.
+    pub(super) fn measured(&self) -> String {
+        self.value.map_or_else(|| "nothing".to_owned(), short)
+    }
+
+    /// What was expected, for a reader.
+    pub(super) fn expectation(&self) -> String {
+        let tolerance = self.tolerance.map_or_else(String::new, |t| format!(" ± {}", short(t)));
+        self.expected
+            .as_f64()
+            .map_or_else(|| plain(&self.expected), |number| short(number) + &tolerance)
+    }
+}
+
+/// The commit that runs, with `+` if files differ from it; empty where there is no repository.
+static COMMIT: LazyLock<String> = LazyLock::new(|| {
+    let git = |arguments: &[&str]| {
+        let run = Command::new("git")
+            .args(arguments)
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .output()
+            .ok()?;
+        run.status
+            .success()
+            .then(|| String::from_utf8_lossy(&run.stdout).trim().to_owned())
+    };
+    let changed = git(&["status", "--porcelain", "--untracked-files=no"]).is_some_and(|s| !s.is_empty());
+    git(&["rev-parse", "--short", "HEAD"]).map_or_else(String::new, |hash| hash + if changed { "+" } else { "" })
+});
+
+impl Record {
+    /// A figure's record without result.
+    pub(super) fn new(about: About, parameters: &Map<String, Json>, elapsed: Duration, options: &Options) -> Self {
+        Self {
+            id: about.id.to_owned(),
+            title: about.title.to_owned(),
+            caption: about.caption.to_owned(),
+            source: about.source.to_owned(),
+            parameters: parameters.clone(),
+            seed: options.seed,
+            trials: parameters.get("trials").and_then(Json::as_u64),
+            quick: options.quick,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            commit: COMMIT.clone(),
+            finished: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+            wall_time_s: elapsed.as_secs_f64(),
+            files: Vec::new(),
+            rows: 0,
+            columns: Map::new(),
+            claims: Vec::new(),
+            error: None,
+        }
+    }
+
+    /// With the claims of an outcome; its files are added as they are written.
+    pub(super) fn with(mut self, outcome: &Outcome) -> Self {
+        self.rows = outcome.tables.main.len();
+        self.claims = outcome.claims.iter().map(Judged::from).collect();
+        self
+    }
+
+    /// With the reason why there is no result.
+    pub(super) fn failed(mut self, error: String) -> Self {
+        self.error = Some(error);
+        self
+    }
+
+    pub(super) fn system(&self) -> &str {
+        self.id.split('-').next().unwrap_or_default()
+    }
+
+    pub(super) fn count(&self, verdict: Verdict) -> usize {
+        self.claims.iter().filter(|c| c.verdict == verdict).count()
+    }
+
+    /// Made, and no claim fails.
+    pub(super) fn good(&self) -> bool {
+        self.error.is_none() && self.count(Verdict::Fail) == 0
+    }
+
+    /// The record of one figure.
+    pub(super) fn read_one(folder: &Path, id: &str) -> std::io::Result<Self> {
+        let text = std::fs::read_to_string(folder.join(format!("{id}.json")))?;
+        Ok(serde_json::from_str(&text)?)
+    }
+
+    /// The records in a directory, by id. What cannot be read as one is left out.
+    pub(super) fn read_all(folder: &Path) -> Result<BTreeMap<String, Self>, Error> {
+        let unreadable = |source| Error::Read {
+            path: folder.to_owned(),
+            source,
+        };
+        let mut records = BTreeMap::new();
+        for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+            let path = entry.map_err(unreadable)?.path();
+            if path.extension().is_some_and(|extension| extension == "json")
+                && let Some(id) = path.file_stem().and_then(|stem| stem.to_str())
+                && let Ok(record) = Self::read_one(folder, id)
+            {
+                records.insert(record.id.clone(), record);
+            }
+        }
+        Ok(records)
+    }
+}
+
+/// A number with enough digits to read and no more.
+pub(super) fn short(number: f64) -> String {
+    if number == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-3..1e6).contains(&number.abs()) {
+        return format!("{number:.2e}");
+    }
+    let decimals = (6 - number.abs().log10().floor() as i32 - 1).clamp(0, 8) as usize;
+    let text = format!("{number:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
