@@ -329,15 +329,19 @@ where
             Scheme::Lossy { loss, modelled } => {
                 self.gaussian(&mut track, Weighing::OwnFilter, loss, if modelled { loss } else { 0.0 })?;
             }
-            Scheme::NoFeedback(method) => self.no_feedback(&mut track, method).map_err(failed)?,
+            Scheme::NoFeedback(method) => self.no_feedback(&mut track, method, &self.network(0.0)?).map_err(failed)?,
             Scheme::Particles(count, weighing) => self.particles(&mut track, count, weighing)?,
             special => Measured::special(self, special, track)?,
         }
         Ok(record)
     }
 
-    fn no_feedback(&self, track: &mut Track<'_, M>, method: Method) -> Result<(), fewbits_cfwmd::Error> {
-        let network = self.network(0.0)?;
+    fn no_feedback(
+        &self,
+        track: &mut Track<'_, M>,
+        method: Method,
+        network: &Sensors<M>,
+    ) -> Result<(), fewbits_cfwmd::Error> {
         let mut rng = track.stream.named("particles").fast_rng();
         let mut belief = self.start;
         let mut gaussian = JointBelief::new(&self.start, self.sensors)?;
@@ -352,11 +356,11 @@ where
                         .0;
                 }
                 Method::Joint => {
-                    gaussian = joint::step(&network, &self.dynamics, &gaussian, observations)?.0;
+                    gaussian = joint::step(network, &self.dynamics, &gaussian, observations)?.0;
                     belief = gaussian.state();
                 }
                 Method::Imputed(_) => {
-                    imputed = imputing::step(&mut rng, &network, &self.dynamics, &imputed, observations)?.0;
+                    imputed = imputing::step(&mut rng, network, &self.dynamics, &imputed, observations)?.0;
                     belief = imputed.state();
                 }
             }

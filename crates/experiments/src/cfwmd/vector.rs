@@ -67,13 +67,13 @@ impl Case for Fig4 {
         let schemes = [
             ("all", Scheme::All),
             ("random", Scheme::Random),
-            ("CFoMD", Scheme::Deaf),
+            ("CFoMD", Scheme::Ignored),
             ("CFwMD", own),
         ];
         let suffixed = [
             ("all 4", Scheme::All),
             ("random 4", Scheme::Random),
-            ("CFoMD 4", Scheme::Deaf),
+            ("CFoMD 4", Scheme::Ignored),
             ("CFwMD 4", own),
         ];
         let mut all = both(context, setting, &schemes, &suffixed)?;

@@ -283,12 +283,7 @@ pub(super) fn trials<T: Send>(
     count: u64,
     trial: impl Fn(Trial) -> Result<T, Error> + Sync,
 ) -> Result<Vec<T>, Error> {
-    use fewbits_monte_carlo::MonteCarloError;
-    match context.monte_carlo(context.stream(experiment), count).run(trial) {
-        Ok(all) => Ok(all),
-        Err(MonteCarloError::Trial { source, .. }) => Err(source),
-        Err(_) => Err(Error::Cancelled),
-    }
+    Ok(context.monte_carlo(context.stream(experiment), count).run(trial)?)
 }
 
 /// The quantile of unsorted values; none of none.

@@ -19,7 +19,7 @@ const ID: &str = "dymbo-threshold";
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// Plants, `a:gamma`; the state starts from its stationary law.
-    #[garde(length(min = 1), inner(custom(stationary)), dive)]
+    #[garde(length(min = 1), inner(custom(stationary)))]
     plants: Vec<Plant>,
     /// Steps of a run that are measured.
     #[garde(range(min = 1, max = 10_000))]
@@ -42,6 +42,7 @@ pub struct Parameters {
 }
 
 fn stationary(plant: &Plant, _: &()) -> garde::Result {
+    plant.validate().map_err(|report| garde::Error::new(report))?;
     if plant.a.abs() < 1.0 {
         return Ok(());
     }
