@@ -4,8 +4,7 @@ use crate::matrix::Factored;
 use crate::{Bandwidth, Component, Error, Mixture, Particles};
 use fewbits_core::Columns;
 use fewbits_numerics::error::at_least_one;
-use fewbits_numerics::kernels::exp_minus;
-use fewbits_numerics::kernels::{dot, sum};
+use fewbits_numerics::kernels::{scalar, sum, vectorised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -115,41 +114,24 @@ impl<const D: usize> KernelEstimate<D> {
     /// point.
     pub fn log_pdf_columns(&self, columns: Columns<'_, D>, out: &mut [f64]) {
         let points = whitened(&self.factor, &self.origin, &columns, 0..out.len());
-        let n = self.len();
         let weights = self.particles.weights();
         let offset = self.factor.half_log_det + D as f64 * LN_SQRT_2PI;
-        let mut logs = vec![0.0; n];
-        let mut kernels = vec![0.0; n];
+        let white = self.white.each_ref().map(Vec::as_slice);
         for (p, out) in out.iter_mut().enumerate() {
             let z: [f64; D] = std::array::from_fn(|d| points[d][p]);
-            half_squares(&self.white, &z, 0, &mut logs);
-            let nearest = fewbits_numerics::kernels::largest(&logs);
-            if nearest == f64::NEG_INFINITY {
-                *out = f64::NEG_INFINITY;
-                continue;
-            }
-            exp_minus(&logs, nearest, &mut kernels);
-            *out = dot(weights, &kernels).ln() + nearest - offset;
+            *out = log_kernel_sum(&white, weights, &z) - offset;
         }
     }
 
     /// `ln p` at every centre. Half the kernels of [`log_pdf_columns`](Self::log_pdf_columns): they are symmetric.
     pub fn log_pdf_at_centres(&self) -> Vec<f64> {
-        let n = self.len();
         let weights = self.particles.weights();
         let mut sums = weights.to_vec();
-        let (mut logs, mut kernels) = (vec![0.0; n], vec![0.0; n]);
-        for i in 0..n {
+        for i in 0..self.len() {
             let z: [f64; D] = std::array::from_fn(|d| self.white[d][i]);
-            let rest = n - i - 1;
-            half_squares(&self.white, &z, i + 1, &mut logs[..rest]);
-            exp_minus(&logs[..rest], 0.0, &mut kernels[..rest]);
-            sums[i] += dot(&weights[i + 1..], &kernels[..rest]);
-            let w = weights[i];
-            sums[i + 1..]
-                .iter_mut()
-                .zip(&kernels)
-                .for_each(|(sum, k)| *sum += w * k);
+            let rest: [&[f64]; D] = self.white.each_ref().map(|c| &c[i + 1..]);
+            let across = cross_sums(&rest, &weights[i + 1..], &z, weights[i], &mut sums[i + 1..]);
+            sums[i] += across;
         }
         let offset = self.factor.half_log_det + D as f64 * LN_SQRT_2PI;
         sums.iter().map(|s| s.ln() - offset).collect()
@@ -187,7 +169,7 @@ impl<const D: usize> KernelEstimate<D> {
 /// Indices of `count` systematic draws from `weights`: index `i` comes up `count w_i` times, rounded up or down.
 pub(crate) fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<usize> {
     let offset: f64 = rng.random();
-    let total = sum(weights);
+    let total: f64 = sum(weights);
     let mut i = 0;
     let mut cumulative = weights.first().copied().unwrap_or(0.0);
     (0..count)
@@ -212,28 +194,121 @@ pub(crate) fn whitened<const D: usize>(
     std::array::from_fn(|i| {
         range
             .clone()
-            .map(|k| {
-                (0..=i)
-                    .map(|j| factor.whitener[(i, j)] * (columns[j][k] - origin[j]))
-                    .sum()
-            })
+            .map(|k| (0..=i).map(|j| factor.whitener[(i, j)] * (columns[j][k] - origin[j])).sum())
             .collect()
     })
 }
 
-/// Writes `-|z - z_j|^2 / 2` for the points `j = from..` to `out`.
-#[inline]
-pub(crate) fn half_squares<const D: usize>(white: &[Vec<f64>; D], z: &[f64; D], from: usize, out: &mut [f64]) {
-    let n = out.len();
+/// Centres per block: what a block needs stays in the first-level cache.
+const BLOCK: usize = 256;
+/// Lanes of the sums over kernels.
+const LANES: usize = 8;
+
+/// Writes `|z - z_j|^2 / 2` of a block of centres from `from` on.
+#[inline(always)]
+fn half_squares<const D: usize>(white: &[&[f64]; D], z: &[f64; D], from: usize, out: &mut [f64]) {
     out.fill(0.0);
     for d in 0..D {
-        let column = &white[d][from..from + n];
         let zd = z[d];
-        for (out, x) in out.iter_mut().zip(column) {
+        for (out, x) in out.iter_mut().zip(&white[d][from..]) {
             let gap = x - zd;
-            *out -= 0.5 * gap * gap;
+            *out += 0.5 * gap * gap;
         }
     }
+}
+
+/// Smallest of a block and the given.
+#[inline(always)]
+fn smallest(start: f64, values: &[f64]) -> f64 {
+    let mut lane = [start; LANES];
+    let chunks = values.chunks_exact(LANES);
+    for (l, x) in lane.iter_mut().zip(chunks.remainder()) {
+        *l = if *x < *l { *x } else { *l };
+    }
+    for chunk in chunks {
+        for j in 0..LANES {
+            lane[j] = if chunk[j] < lane[j] { chunk[j] } else { lane[j] };
+        }
+    }
+    lane.iter().fold(start, |m, x| if *x < m { *x } else { m })
+}
+
+/// Adds `w_j k_j` to the lanes.
+#[inline(always)]
+fn add_products(lane: &mut [f64; LANES], weights: &[f64], kernels: &[f64]) {
+    let (weights, kernels) = (weights.chunks_exact(LANES), kernels.chunks_exact(LANES));
+    let rest = weights.remainder().iter().zip(kernels.remainder());
+    lane.iter_mut().zip(rest).for_each(|(l, (w, k))| *l += w * k);
+    for (w, k) in weights.zip(kernels) {
+        for j in 0..LANES {
+            lane[j] += w[j] * k[j];
+        }
+    }
+}
+
+/// Adds the lanes in a fixed order.
+#[inline(always)]
+fn folded(lane: &[f64; LANES]) -> f64 {
+    ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]))
+}
+
+/// `ln sum_j w_j exp(-|z - z_j|^2/2)`, in the log domain: the nearest centre of a block is taken out before exponentials.
+fn log_kernel_sum<const D: usize>(white: &[&[f64]; D], weights: &[f64], z: &[f64; D]) -> f64 {
+    vectorised(
+        #[inline(always)]
+        || {
+            let mut buffer = [0.0; BLOCK];
+            let mut nearest = f64::INFINITY;
+            let mut total = 0.0;
+            for (block, weights) in weights.chunks(BLOCK).enumerate() {
+                let squares = &mut buffer[..weights.len()];
+                half_squares(white, z, block * BLOCK, squares);
+                let closest = smallest(f64::INFINITY, squares);
+                if closest < nearest {
+                    // Nothing was added yet, or what was is rescaled.
+                    total *= (closest - nearest).exp();
+                    nearest = closest;
+                }
+                if nearest == f64::INFINITY {
+                    continue;
+                }
+                for x in squares.iter_mut() {
+                    *x = scalar::exp(nearest - *x);
+                }
+                let mut lane = [0.0; LANES];
+                add_products(&mut lane, weights, squares);
+                total += folded(&lane);
+            }
+            if nearest == f64::INFINITY { f64::NEG_INFINITY } else { total.ln() - nearest }
+        },
+    )
+}
+
+/// `sum_j w_j k_j` with `k_j = exp(-|z - z_j|^2/2)`; adds `weight k_j` to `sums[j]`: both halves of a symmetric kernel matrix.
+pub(crate) fn cross_sums<const D: usize>(
+    white: &[&[f64]; D],
+    weights: &[f64],
+    z: &[f64; D],
+    weight: f64,
+    sums: &mut [f64],
+) -> f64 {
+    vectorised(
+        #[inline(always)]
+        || {
+            let mut buffer = [0.0; BLOCK];
+            let mut lane = [0.0; LANES];
+            for (block, (weights, sums)) in weights.chunks(BLOCK).zip(sums.chunks_mut(BLOCK)).enumerate() {
+                let kernels = &mut buffer[..weights.len()];
+                half_squares(white, z, block * BLOCK, kernels);
+                for (x, sum) in kernels.iter_mut().zip(sums) {
+                    *x = scalar::exp(-*x);
+                    *sum += weight * *x;
+                }
+                add_products(&mut lane, weights, kernels);
+            }
+            folded(&lane)
+        },
+    )
 }
 
 /// The plain form in which an estimate is stored.
@@ -247,9 +322,7 @@ struct Stored<const D: usize> {
 impl<const D: usize> From<KernelEstimate<D>> for Stored<D> {
     fn from(estimate: KernelEstimate<D>) -> Self {
         Self {
-            kernel: (0..D)
-                .map(|i| estimate.kernel.row(i).iter().copied().collect())
-                .collect(),
+            kernel: (0..D).map(|i| estimate.kernel.row(i).iter().copied().collect()).collect(),
             particles: estimate.particles,
         }
     }
@@ -260,12 +333,7 @@ impl<const D: usize> TryFrom<Stored<D>> for KernelEstimate<D> {
 
     fn try_from(stored: Stored<D>) -> Result<Self, Error> {
         if stored.kernel.len() != D || stored.kernel.iter().any(|row| row.len() != D) {
-            return Err(fewbits_numerics::ArgumentError::new(
-                "kernel",
-                "of another shape",
-                format!("{D} by {D} numbers"),
-            )
-            .into());
+            return Err(fewbits_numerics::ArgumentError::new("kernel", "of another shape", format!("{D} by {D} numbers")).into());
         }
         let kernel = SMatrix::from_fn(|i, j| stored.kernel[i][j]);
         Self::new(stored.particles, kernel)

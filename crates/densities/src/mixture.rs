@@ -1,11 +1,11 @@
 //! Gaussian mixtures with full covariances.
 
-use crate::matrix::Factored;
+use crate::matrix::{Factored, log_forms};
 use crate::{Error, Particles};
 use fewbits_core::{Columns, Gaussian};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, non_negative};
-use fewbits_numerics::kernels::exp_minus;
+use fewbits_numerics::kernels::{scalar, vectorised};
 use fewbits_numerics::normal::{self, LN_SQRT_2PI};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -77,6 +77,15 @@ impl<const D: usize> Component<D> {
     #[inline]
     pub fn log_pdf(&self, x: &SVector<f64, D>) -> f64 {
         -0.5 * self.factor.squared(&(x - self.mean)) - self.factor.half_log_det - D as f64 * LN_SQRT_2PI
+    }
+
+    /// Writes `ln w + ln N(x; mean, covariance)` of every point.
+    fn log_terms(&self, columns: &Columns<'_, D>, out: &mut [f64]) {
+        let offset = self.weight.ln() - self.factor.half_log_det - D as f64 * LN_SQRT_2PI;
+        vectorised(
+            #[inline(always)]
+            || log_forms(&self.factor, &self.mean, offset, columns, out),
+        );
     }
 
     fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> SVector<f64, D> {
@@ -180,59 +189,20 @@ impl<const D: usize> Mixture<D> {
                 sum += (term - largest).exp();
             }
         }
-        if largest == f64::NEG_INFINITY {
-            largest
-        } else {
-            largest + sum.ln()
-        }
+        if largest == f64::NEG_INFINITY { largest } else { largest + sum.ln() }
     }
 
     /// Writes `ln p` of every point of `columns` to `out`; points beyond the end of `out` are passed over.
     pub fn log_pdf_columns(&self, columns: Columns<'_, D>, out: &mut [f64]) {
         let kept: Vec<&Component<D>> = self.components.iter().filter(|c| c.weight > 0.0).collect();
         let mut terms = vec![0.0; kept.len() * BLOCK];
-        let mut exponentials = [0.0; BLOCK];
-        let mut largest = [0.0; BLOCK];
         for (block, out) in out.chunks_mut(BLOCK).enumerate() {
-            let n = out.len();
             let from = block * BLOCK;
-            largest.fill(f64::NEG_INFINITY);
+            let columns: [&[f64]; D] = columns.each_ref().map(|c| &c[from..from + out.len()]);
             for (c, row) in kept.iter().zip(terms.chunks_mut(BLOCK)) {
-                let offset = c.weight.ln() - c.factor.half_log_det - D as f64 * LN_SQRT_2PI;
-                row[..n].fill(0.0);
-                for i in 0..D {
-                    let w: [f64; D] = std::array::from_fn(|j| if j <= i { c.factor.whitener[(i, j)] } else { 0.0 });
-                    for k in 0..n {
-                        let mut z = 0.0;
-                        for j in 0..=i {
-                            z += w[j] * (columns[j][from + k] - c.mean[j]);
-                        }
-                        row[k] += z * z;
-                    }
-                }
-                for k in 0..n {
-                    row[k] = offset - 0.5 * row[k];
-                    largest[k] = if row[k] > largest[k] { row[k] } else { largest[k] };
-                }
+                c.log_terms(&columns, &mut row[..out.len()]);
             }
-            out.fill(0.0);
-            for row in terms.chunks_mut(BLOCK) {
-                for k in 0..n {
-                    // A point beyond every component leaves `-inf` in all rows.
-                    row[k] = if largest[k] == f64::NEG_INFINITY {
-                        f64::NEG_INFINITY
-                    } else {
-                        row[k] - largest[k]
-                    };
-                }
-                exp_minus(&row[..n], 0.0, &mut exponentials[..n]);
-                for k in 0..n {
-                    out[k] += exponentials[k];
-                }
-            }
-            for k in 0..n {
-                out[k] = largest[k] + out[k].ln();
-            }
+            log_sum_rows(&terms, out);
         }
     }
 
@@ -307,17 +277,37 @@ impl<const D: usize> Mixture<D> {
     ///
     /// # Errors
     /// If the image of a component is singular or not finite.
-    pub fn affine<const K: usize>(
-        &self,
-        matrix: &SMatrix<f64, K, D>,
-        shift: &SVector<f64, K>,
-    ) -> Result<Mixture<K>, Error> {
-        let components = self
-            .components
-            .iter()
-            .map(|c| Component::new(c.weight, matrix * c.mean + shift, matrix * c.covariance * matrix.transpose()));
+    pub fn affine<const K: usize>(&self, matrix: &SMatrix<f64, K, D>, shift: &SVector<f64, K>) -> Result<Mixture<K>, Error> {
+        let components = self.components.iter().map(|c| {
+            Component::new(c.weight, matrix * c.mean + shift, matrix * c.covariance * matrix.transpose())
+        });
         Mixture::new(components.collect::<Result<_, _>>()?)
     }
+}
+
+/// Writes `ln sum exp` over the rows of `terms` (each [`BLOCK`] long) to `out`; `-inf` where every row is.
+fn log_sum_rows(terms: &[f64], out: &mut [f64]) {
+    vectorised(
+        #[inline(always)]
+        || {
+            let n = out.len();
+            let mut largest = [f64::MIN; BLOCK];
+            let mut total = [0.0; BLOCK];
+            for row in terms.chunks_exact(BLOCK) {
+                for (l, x) in largest[..n].iter_mut().zip(row) {
+                    *l = if *x > *l { *x } else { *l };
+                }
+            }
+            for row in terms.chunks_exact(BLOCK) {
+                for ((t, x), l) in total[..n].iter_mut().zip(row).zip(&largest) {
+                    *t += scalar::exp(x - l);
+                }
+            }
+            for ((out, t), l) in out.iter_mut().zip(&total).zip(&largest) {
+                *out = l + scalar::ln(*t);
+            }
+        },
+    );
 }
 
 impl Mixture<1> {

@@ -1,9 +1,8 @@
 //! Errors of a kernel estimate's approximations, estimated at its centres or around them.
 
-use crate::kernel::half_squares;
 use crate::matrix::Factored;
+use crate::kernel::cross_sums;
 use crate::{Error, KernelEstimate, Mixture, Tree};
-use fewbits_numerics::kernels::exp_minus;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -48,9 +47,7 @@ pub fn plug_in<const D: usize>(p: &KernelEstimate<D>, q: &Mixture<D>) -> PlugIn 
     let mut other = vec![0.0; p.len()];
     q.log_pdf_columns(p.particles().columns(), &mut other);
     let weights = p.particles().weights();
-    let ratios = (0..p.len())
-        .filter(|i| weights[*i] > 0.0)
-        .map(|i| (weights[i], own[i] - other[i]));
+    let ratios = (0..p.len()).filter(|i| weights[*i] > 0.0).map(|i| (weights[i], own[i] - other[i]));
     PlugIn::of(ratios)
 }
 
@@ -146,7 +143,6 @@ impl<const D: usize> CubatureTarget<D> {
 /// Kernels between two points are summed where their paths meet, so all nodes together cost `n^2/2` kernels, as the root alone.
 pub fn node_errors<const D: usize>(estimate: &KernelEstimate<D>, tree: &Tree<D>) -> Result<Vec<PlugIn>, Error> {
     let order = tree.order();
-    let n = order.len();
     let weight: Vec<f64> = order.iter().map(|i| estimate.particles().weights()[*i]).collect();
     let white: [Vec<f64>; D] = std::array::from_fn(|d| order.iter().map(|i| estimate.white()[d][*i]).collect());
     let centres: [Vec<f64>; D] = std::array::from_fn(|d| {
@@ -155,22 +151,18 @@ pub fn node_errors<const D: usize>(estimate: &KernelEstimate<D>, tree: &Tree<D>)
     });
     // Kernel sums within the node that is being looked at; children before parents.
     let mut sums = weight.clone();
-    let (mut logs, mut kernels) = (vec![0.0; n], vec![0.0; n]);
     let mut errors = vec![PlugIn::default(); tree.nodes().len()];
     for (index, node) in tree.nodes().iter().enumerate().rev() {
         let Some([_, right]) = node.children else {
             continue;
         };
         let middle = tree.nodes()[right].range.start;
-        let width = node.range.end - middle;
-        for i in node.range.start..middle {
+        let (left, right) = (node.range.start..middle, middle..node.range.end);
+        let across: [&[f64]; D] = white.each_ref().map(|c| &c[right.clone()]);
+        for i in left {
             let z: [f64; D] = std::array::from_fn(|d| white[d][i]);
-            half_squares(&white, &z, middle, &mut logs[..width]);
-            exp_minus(&logs[..width], 0.0, &mut kernels[..width]);
-            sums[i] += fewbits_numerics::kernels::dot(&weight[middle..node.range.end], &kernels[..width]);
-            let w = weight[i];
-            let across = &mut sums[middle..node.range.end];
-            across.iter_mut().zip(&kernels).for_each(|(sum, k)| *sum += w * k);
+            let kernels = cross_sums(&across, &weight[right.clone()], &z, weight[i], &mut sums[right.clone()]);
+            sums[i] += kernels;
         }
         let factor = Factored::new("node covariance", &node.covariance)?;
         // ln p = ln(sum / w) - ln det L_H and ln q = -q/2 - ln det L_S, both less the same constant.

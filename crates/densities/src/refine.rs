@@ -1,9 +1,8 @@
 //! Expectation-maximisation towards a kernel estimate, with a floor under the covariances.
 
-use crate::matrix::{Factored, eigen};
+use crate::matrix::{Factored, eigen, log_forms};
 use crate::{Component, Cubature, Error, KernelEstimate, Mixture};
-use fewbits_numerics::kernels::exp_minus;
-use fewbits_numerics::kernels::sum;
+use fewbits_numerics::kernels::{dot, scalar, sum, vectorised, weighted_covariance};
 use nalgebra::{SMatrix, SVector};
 
 /// Improves a mixture as an approximation of a kernel estimate by `iterations` steps of expectation-maximisation over the
@@ -64,15 +63,9 @@ impl<const D: usize> Points<D> {
         let offsets = rule.points::<D>();
         let white = estimate.white();
         let columns = std::array::from_fn(|d| {
-            offsets
-                .iter()
-                .flat_map(|(z, _)| kept.iter().map(move |i| white[d][*i] + z[d]))
-                .collect()
+            offsets.iter().flat_map(|(z, _)| kept.iter().map(move |i| white[d][*i] + z[d])).collect()
         });
-        let weights = offsets
-            .iter()
-            .flat_map(|(_, share)| kept.iter().map(move |i| weights[*i] * share))
-            .collect();
+        let weights = offsets.iter().flat_map(|(_, share)| kept.iter().map(move |i| weights[*i] * share)).collect();
         Self { columns, weights }
     }
 
@@ -98,6 +91,20 @@ impl<const D: usize> Part<D> {
             factor: Factored::new("covariance", &covariance)?,
         })
     }
+
+    /// Writes `ln w + ln N(y; mean, covariance)` of every point, a constant left out, and keeps the largest.
+    fn log_terms(&self, columns: &[&[f64]; D], row: &mut [f64], largest: &mut [f64]) {
+        let offset = self.weight.ln() - self.factor.half_log_det;
+        vectorised(
+            #[inline(always)]
+            || {
+                log_forms(&self.factor, &self.mean, offset, columns, row);
+                for (largest, x) in largest.iter_mut().zip(row.iter()) {
+                    *largest = if *x > *largest { *x } else { *largest };
+                }
+            },
+        );
+    }
 }
 
 /// One step. `shares` is room for the responsibilities, one row per part.
@@ -110,40 +117,30 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Part<D>>, shares: &m
     let mut logs = vec![0.0; BLOCK * k];
     for from in (0..n).step_by(BLOCK) {
         let m = BLOCK.min(n - from);
+        let columns: [&[f64]; D] = points.columns.each_ref().map(|c| &c[from..from + m]);
         largest.fill(f64::NEG_INFINITY);
         for (part, row) in parts.iter().zip(logs.chunks_mut(BLOCK)) {
-            let offset = part.weight.ln() - part.factor.half_log_det;
-            row[..m].fill(offset);
-            for i in 0..D {
-                let w: [f64; D] = std::array::from_fn(|j| if j <= i { part.factor.whitener[(i, j)] } else { 0.0 });
-                let columns: [&[f64]; D] = std::array::from_fn(|j| &points.columns[j][from..from + m]);
-                for p in 0..m {
-                    let mut z = 0.0;
-                    for j in 0..D {
-                        z += w[j] * (columns[j][p] - part.mean[j]);
+            part.log_terms(&columns, &mut row[..m], &mut largest[..m]);
+        }
+        vectorised(
+            #[inline(always)]
+            || {
+                total[..m].fill(0.0);
+                for (row, shares) in logs.chunks_exact(BLOCK).zip(shares.chunks_mut(n)) {
+                    let shares = &mut shares[from..from + m];
+                    for ((share, x), largest) in shares.iter_mut().zip(row).zip(&largest) {
+                        *share = scalar::exp(x - largest);
                     }
-                    row[p] -= 0.5 * z * z;
+                    total.iter_mut().zip(shares.iter()).for_each(|(t, s)| *t += s);
                 }
-            }
-            for (largest, x) in largest[..m].iter_mut().zip(row.iter()) {
-                *largest = if *x > *largest { *x } else { *largest };
-            }
-        }
-        total[..m].fill(0.0);
-        for (row, shares) in logs.chunks_mut(BLOCK).zip(shares.chunks_mut(n)) {
-            row[..m].iter_mut().zip(&largest).for_each(|(x, l)| *x -= l);
-            exp_minus(&row[..m], 0.0, &mut shares[from..from + m]);
-            total[..m]
-                .iter_mut()
-                .zip(&shares[from..from + m])
-                .for_each(|(t, s)| *t += s);
-        }
-        for (total, weight) in total[..m].iter_mut().zip(&points.weights[from..]) {
-            *total = weight / *total;
-        }
-        for shares in shares.chunks_mut(n).take(k) {
-            shares[from..from + m].iter_mut().zip(&total).for_each(|(s, t)| *s *= t);
-        }
+                for (total, weight) in total[..m].iter_mut().zip(&points.weights[from..]) {
+                    *total = weight / *total;
+                }
+                for shares in shares.chunks_mut(n).take(k) {
+                    shares[from..from + m].iter_mut().zip(&total).for_each(|(s, t)| *s *= t);
+                }
+            },
+        );
     }
     let mut next = Vec::with_capacity(k);
     for share in shares.chunks(n).take(k) {
@@ -158,12 +155,11 @@ fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Part<D>>, shares: &m
 
 /// Moments of the points under the given shares, with the eigenvalue floor.
 fn moments<const D: usize>(points: &Points<D>, share: &[f64], weight: f64) -> Result<Part<D>, Error> {
-    let mean = SVector::<f64, D>::from_fn(|d, _| fewbits_numerics::kernels::dot(share, &points.columns[d]) / weight);
+    let mean = SVector::<f64, D>::from_fn(|d, _| dot(share, &points.columns[d]) / weight);
     let mut covariance = SMatrix::<f64, D, D>::zeros();
     for a in 0..D {
         for b in 0..=a {
-            let (x, y) = (&points.columns[a][..share.len()], &points.columns[b][..share.len()]);
-            let entry = fewbits_numerics::kernels::weighted_covariance(share, (x, mean[a]), (y, mean[b]));
+            let entry = weighted_covariance(share, (&points.columns[a], mean[a]), (&points.columns[b], mean[b]));
             covariance[(a, b)] = entry / weight;
             covariance[(b, a)] = entry / weight;
         }

@@ -112,6 +112,24 @@ wrapped!(
     fewbits_sensor_assignment
 );
 
+impl From<fewbits_handoff::Error> for Error {
+    fn from(error: fewbits_handoff::Error) -> Self {
+        match error {
+            fewbits_handoff::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
+impl From<fewbits_densities::Error> for Error {
+    fn from(error: fewbits_densities::Error) -> Self {
+        match error {
+            fewbits_densities::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
 impl From<fewbits_dymbo::Error> for Error {
     fn from(error: fewbits_dymbo::Error) -> Self {
         Self::failed(error)

@@ -19,6 +19,7 @@ pub mod diffusive;
 pub mod dymbo;
 mod error;
 mod figure;
+pub mod handoff;
 pub mod legacy;
 mod measured;
 pub mod mi;
@@ -46,6 +47,7 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         assign::figures(),
         cfwmd::figures(),
         diffusive::figures(),
+        handoff::figures(),
     ]
     .concat()
 }

@@ -176,7 +176,7 @@ impl<const D: usize> Message for CodedMixture<D> {
             mixture,
         };
         let mut writer = BitWriter::new();
-        message.encode(format, &mut writer)?;
+        source.reader.canonical.finish(&mut writer)?;
         let canonical = writer.finish();
         let mut expected = BitReader::new(&canonical);
         if reader.remaining() < canonical.bits() {

@@ -1,8 +1,7 @@
 //! Symbols through a range coder, ended to the bit.
 
-use super::table::Table;
+use super::table::{Found, Table};
 use constriction::UnwrapInfallible;
-use constriction::stream::model::EncoderModel;
 use constriction::stream::queue::{EncoderSituation, RangeDecoder, RangeEncoder};
 use constriction::stream::{Decode, Encode};
 use fewbits_core::{BitReader, BitWriter, CodecError};
@@ -63,9 +62,7 @@ impl Writer {
     }
 
     fn put(&mut self, table: Table, index: u32) -> Result<(), CodecError> {
-        self.encoder
-            .encode_symbol(index, table)
-            .map_err(|_| out_of_range("symbol", index))
+        self.encoder.encode_symbol(index, table).map_err(|_| out_of_range("symbol", index))
     }
 
     fn uniform(&mut self, value: u64, bits: u32) -> Result<(), CodecError> {
@@ -83,10 +80,7 @@ impl Writer {
         match *law {
             Law::Uniform { count } => {
                 let (top, low) = digits(count);
-                let value = u64::try_from(n)
-                    .ok()
-                    .filter(|v| *v < count)
-                    .ok_or_else(|| out_of_range("symbol", n))?;
+                let value = u64::try_from(n).ok().filter(|v| *v < count).ok_or_else(|| out_of_range("symbol", n))?;
                 if top > 1 {
                     self.put(Table::Uniform { count: top }, (value >> low) as u32)?;
                 }
@@ -131,11 +125,7 @@ impl Writer {
             writer.write(u64::from(word), 32)?;
         }
         if let EncoderSituation::Inverted(count, first) = situation {
-            let (first, rest) = if point >= WHOLE {
-                (first.wrapping_add(1), 0)
-            } else {
-                (first, u32::MAX)
-            };
+            let (first, rest) = if point >= WHOLE { (first.wrapping_add(1), 0) } else { (first, u32::MAX) };
             writer.write(u64::from(first), 32)?;
             for _ in 1..count.get() {
                 writer.write(u64::from(rest), 32)?;
@@ -163,6 +153,8 @@ pub(super) struct Reader {
     available: usize,
     /// Bits that the symbols so far took at least.
     spent: usize,
+    /// The code of the symbols so far.
+    pub(super) canonical: Writer,
 }
 
 impl Reader {
@@ -179,25 +171,24 @@ impl Reader {
             decoder: RangeDecoder::from_compressed(words).unwrap_infallible(),
             available: bits,
             spent: 0,
+            canonical: Writer::new(),
         })
     }
 
     fn get(&mut self, table: Table) -> Result<u32, CodecError> {
-        let index = self
-            .decoder
-            .decode_symbol(table)
-            .map_err(|_| out_of_range("code word", "past the last symbol"))?;
+        let found = Found {
+            table: Some(&table),
+            ..Found::default()
+        };
+        let index = self.decoder.decode_symbol(&found).map_err(|_| out_of_range("code word", "past the last symbol"))?;
+        let (_, _, frequency) = found.place.get().ok_or_else(|| out_of_range("symbol", index))?;
+        // What the encoder would write for the same symbols.
+        self.canonical.encoder.encode_symbol(index, &found).map_err(|_| out_of_range("symbol", index))?;
         // A symbol of frequency 2^k to 2^(k+1) takes over 15 - k bits. Beyond the end there is nothing left to decode.
-        let (_, frequency) = table
-            .left_cumulative_and_probability(index)
-            .ok_or_else(|| out_of_range("symbol", index))?;
         self.spent += 15_usize.saturating_sub(frequency.ilog2() as usize);
         if self.spent > self.available {
             let requested = (self.spent - self.available) as u32;
-            return Err(CodecError::EndOfMessage {
-                requested,
-                available: 0,
-            });
+            return Err(CodecError::EndOfMessage { requested, available: 0 });
         }
         Ok(index)
     }
@@ -217,17 +208,9 @@ impl Reader {
         match *law {
             Law::Uniform { count } => {
                 let (top, low) = digits(count);
-                let head = if top > 1 {
-                    u64::from(self.get(Table::Uniform { count: top })?)
-                } else {
-                    0
-                };
+                let head = if top > 1 { u64::from(self.get(Table::Uniform { count: top })?) } else { 0 };
                 let value = head << low | self.uniform(low)?;
-                if value < count {
-                    Ok(value as i64)
-                } else {
-                    Err(out_of_range("symbol", value))
-                }
+                if value < count { Ok(value as i64) } else { Err(out_of_range("symbol", value)) }
             }
             Law::Logistic { location, scale } => {
                 let (table, low) = Law::table(location, scale).ok_or_else(|| out_of_range("scale", scale))?;
@@ -261,15 +244,10 @@ mod tests {
             for _ in 0..rng.random_range(1..30) {
                 let law = if rng.random() {
                     let width = rng.random_range(1..40);
-                    Law::Uniform {
-                        count: rng.random_range(1..1 << width),
-                    }
+                    Law::Uniform { count: rng.random_range(1..1 << width) }
                 } else {
                     let scale = 10.0_f64.powf(rng.random_range(-2.0..6.0));
-                    Law::Logistic {
-                        location: rng.random_range(-3.0..3.0) * scale,
-                        scale,
-                    }
+                    Law::Logistic { location: rng.random_range(-3.0..3.0) * scale, scale }
                 };
                 let n = match law {
                     Law::Uniform { count } => {
@@ -281,11 +259,7 @@ mod tests {
                         let n = (location + scale * (u / (1.0 - u)).ln()).round();
                         let cdf = |x: f64| 1.0 / (1.0 + (-(x - location) / scale).exp());
                         information += -(cdf(n + 0.5) - cdf(n - 0.5)).log2() + 0.3;
-                        if round % 7 == 0 {
-                            rng.random_range(-1 << 31..1 << 31)
-                        } else {
-                            n as i64
-                        }
+                        if round % 7 == 0 { rng.random_range(-1 << 31..1 << 31) } else { n as i64 }
                     }
                 };
                 symbols.push((law, n));

@@ -1,0 +1,151 @@
+//! Figure 3: one bit turns a small error into the largest.
+
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
+use fewbits_core::Columns;
+use fewbits_densities::quadrature::QuadratureGrid;
+use fewbits_densities::{Component, Mixture};
+use garde::Validate;
+use nalgebra::{Matrix1, Vector1};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Mass of the small lobe.
+    #[garde(range(min = 1e-6, max = 0.5))]
+    mass: f64,
+    /// Centre of the small lobe of the first density.
+    #[garde(range(min = 0.6, max = 0.9))]
+    lobe: f64,
+    /// Centre of the small lobe of the second.
+    #[garde(range(min = 0.6, max = 0.9))]
+    moved_lobe: f64,
+    /// The measurement tells whether the state is above this.
+    #[garde(range(min = 0.3, max = 0.6))]
+    threshold: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            mass: 0.1,
+            lobe: 0.65,
+            moved_lobe: 0.85,
+            threshold: 0.5,
+        }
+    }
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// The two densities.
+    densities: Vec<Density>,
+    /// L1 before and after the measurement.
+    l1: Vec<Distance>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Density {
+    /// State.
+    x: f64,
+    /// First density.
+    p0: f64,
+    /// Second density.
+    p1: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Distance {
+    /// When: prior, y0, y1 (given the measurement), expected.
+    when: &'static str,
+    /// Probability of the case under the first density.
+    probability: f64,
+    /// L1 of the two densities.
+    l1: f64,
+}
+
+impl Rows {
+    fn l1(&self, when: &str) -> Option<f64> {
+        self.l1.iter().find(|d| d.when == when).map(|d| d.l1)
+    }
+}
+
+/// Figure 3.
+pub struct Fig3;
+
+impl Figure for Fig3 {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "handoff-fig3",
+            title: "One bit turns a small error into the largest",
+            caption: "Two densities that differ in where a lobe of a tenth of the mass lies: L1 0.2. A bit that points at the lobe \
+                      makes them disjoint, L1 2; it comes with probability 0.1, so the expected error has not grown.",
+            source: "compressed particle filter, Section 4, Figure 3",
+        }
+    }
+
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
+        let lobe = |w: f64, m: f64, s: f64| Component::new(w, Vector1::new(m), Matrix1::new(s * s));
+        let with = |m| Mixture::new(vec![lobe(1.0 - p.mass, 0.25, 0.05)?, lobe(p.mass, m, 0.025)?]);
+        let (p0, p1) = (with(p.lobe)?, with(p.moved_lobe)?);
+        let mut densities = Vec::new();
+        for i in 0..=400 {
+            let x = 0.0025 * f64::from(i);
+            let value = |m: &Mixture<1>| m.log_pdf(&Vector1::new(x)).exp();
+            densities.push(Density { x, p0: value(&p0), p1: value(&p1) });
+        }
+        // L1 over an interval of the densities divided by their masses there.
+        let distance = |from: f64, to: f64, mass: [f64; 2]| -> Result<f64, Error> {
+            let over = |m: &Mixture<1>, mass: f64, x: Columns<'_, 1>, out: &mut [f64]| {
+                m.log_pdf_columns(x, out);
+                out.iter_mut().for_each(|l| *l -= mass.ln());
+            };
+            let grid = QuadratureGrid::new([from], [to], [2e-5])?;
+            Ok(grid.integrate(|x, out| over(&p0, mass[0], x, out), |x, out| over(&p1, mass[1], x, out)).l1)
+        };
+        let below = [p0.cdf(p.threshold), p1.cdf(p.threshold)];
+        let above = below.map(|b| 1.0 - b);
+        let prior = distance(-0.5, 1.5, [1.0; 2])?;
+        let (y0, y1) = (distance(-0.5, p.threshold, below)?, distance(p.threshold, 1.5, above)?);
+        let row = |when, probability, l1| Distance { when, probability, l1 };
+        let expected = below[0] * y0 + above[0] * y1;
+        let l1 = vec![
+            row("prior", 1.0, prior),
+            row("y0", below[0], y0),
+            row("y1", above[0], y1),
+            row("expected", 1.0, expected),
+        ];
+        Ok(Rows { densities, l1 })
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        claims.references("l1", "L1", &rows.l1, |d| (d.when.to_owned(), d.l1));
+        claims.references("probability", "probability", &rows.l1, |d| (d.when.to_owned(), d.probability));
+        let gap = rows.l1("expected").zip(rows.l1("prior")).map(|(e, p)| e - 2.0 * p);
+        claims.at_most("twice", "the expected L1 is at most twice the prior's", gap, 0.0);
+        claims.above("largest", "one answer leaves the largest L1 there is, nearly 2", rows.l1("y1"), 1.999).at_defaults();
+    }
+
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let density = Panel::new("Two densities", Axis::linear("state x"), Axis::linear("density"))
+            .with(Layer::line("p0", points(&rows.densities, |d| (d.x, d.p0))))
+            .with(Layer::line("p1", points(&rows.densities, |d| (d.x, d.p1))))
+            .with(Layer::dashed("threshold", vec![(p.threshold, 0.0), (p.threshold, 7.0)]));
+        let names = rows.l1.iter().enumerate().map(|(i, d)| (i as f64, d.when.to_owned()));
+        let bars = rows.l1.iter().enumerate().map(|(i, d)| (i as f64, d.l1)).collect();
+        let distance = Panel::new(
+            "Error before and after the bit",
+            Axis::linear("").named(names).between(-0.6, 3.6),
+            Axis::linear("L1").between(0.0, 2.1),
+        )
+        .with(Layer::bars("", bars, 0.6));
+        Plot::grid(2, vec![density, distance])
+    }
+}

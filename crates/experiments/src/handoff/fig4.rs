@@ -1,0 +1,138 @@
+//! Figure 4: the field, the target's way, the leaders.
+
+use super::world::{STAND_OFF, STEP, World};
+use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Sensors in the field.
+    #[garde(range(min = 5, max = 10_000))]
+    sensors: usize,
+    /// Steps.
+    #[garde(range(min = 2, max = 1000))]
+    steps: usize,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self { sensors: 25, steps: 10 }
+    }
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// The target and who leads.
+    track: Vec<Step>,
+    /// The sensors.
+    sensors: Vec<Sensor>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Step {
+    /// Time.
+    t: usize,
+    /// Position of the target.
+    #[schemars(extend("unit" = "r0"))]
+    x: f64,
+    /// Position of the target.
+    #[schemars(extend("unit" = "r0"))]
+    y: f64,
+    /// The leader; nobody leads at time 0.
+    leader: Option<usize>,
+    /// Its position.
+    #[schemars(extend("unit" = "r0"))]
+    leader_x: Option<f64>,
+    /// Its position.
+    #[schemars(extend("unit" = "r0"))]
+    leader_y: Option<f64>,
+    /// Its distance from the target.
+    #[schemars(extend("unit" = "r0"))]
+    distance: Option<f64>,
+    /// What it read.
+    reading: Option<f64>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Sensor {
+    /// Number.
+    sensor: usize,
+    /// Position.
+    #[schemars(extend("unit" = "r0"))]
+    x: f64,
+    /// Position.
+    #[schemars(extend("unit" = "r0"))]
+    y: f64,
+}
+
+/// Figure 4.
+pub struct Fig4;
+
+impl Figure for Fig4 {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "handoff-fig4",
+            title: "The field, the target and its leaders",
+            caption: "One world: the target steps to the right, turning up to 45 degrees; at every step the nearest sensor that did \
+                      not just lead, and is not too near, measures and takes over the belief.",
+            source: "compressed particle filter, Section 6, Figure 4",
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let world = World::draw(&mut context.stream("handoff-fig4").rng(), p.sensors, p.steps, 0.05)?;
+        let step = |t: usize| {
+            let position = world.track[t];
+            let leader = t.checked_sub(1).map(|k| world.leaders[k]);
+            let at = leader.map(|i| world.sensors[i]);
+            Step {
+                t,
+                x: position[0],
+                y: position[1],
+                leader,
+                leader_x: at.map(|s| s[0]),
+                leader_y: at.map(|s| s[1]),
+                distance: at.map(|s| (s - position).norm()),
+                reading: t.checked_sub(1).map(|k| world.readings[k].value),
+            }
+        };
+        let place = |(sensor, s): (usize, &super::world::Point)| Sensor { sensor, x: s[0], y: s[1] };
+        Ok(Rows {
+            track: (0..=p.steps).map(step).collect(),
+            sensors: world.sensors.iter().enumerate().map(place).collect(),
+        })
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        claims.all("changes", "the leader changes at every step", rows.track[1..].windows(2), |w| w[0].leader != w[1].leader);
+        let what = "no leader is nearer than 0.7 steps";
+        claims.all("stand-off", what, rows.track.iter().filter_map(|s| s.distance), |d| d >= STAND_OFF * STEP);
+        let what = "every step goes forward by 0.7 to 1.1 lengths";
+        claims.all("forward", what, rows.track.windows(2), |w| (0.7..=1.1).contains(&(w[1].x - w[0].x)));
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let track = points(&rows.track, |s| (s.x, s.y));
+        let links = rows.track.iter().filter_map(|s| Some(Layer::dashed("", vec![(s.x, s.y), (s.leader_x?, s.leader_y?)]).coloured(2)));
+        let leads: Vec<(f64, f64)> = rows.track.iter().filter_map(|s| Some((s.leader_x?, s.leader_y?))).collect();
+        let names = rows.track.iter().filter_map(|s| Some((s.leader_x?, s.leader_y? + 0.35, s.t.to_string()))).collect();
+        let panel = Panel::new("One world", Axis::linear("x / r0"), Axis::linear("y / r0"))
+            .with(Layer::points("sensors", points(&rows.sensors, |s| (s.x, s.y))).marked(Marker::Cross).coloured(3))
+            .with_all(links)
+            .with(Layer::line("target", track.clone()).coloured(0))
+            .with(Layer::points("", track).coloured(0))
+            .with(Layer::points("leaders, with their times", leads).marked(Marker::Square).coloured(1))
+            .with(Layer::texts(names))
+            .legend(Legend::Outside);
+        Plot::of(panel)
+    }
+}

@@ -1,0 +1,169 @@
+//! What the figures share: settings, filters, references.
+
+use super::world::{Point, START, Walk, World};
+use crate::Error;
+use fewbits_core::Gaussian;
+use fewbits_densities::{Bandwidth, Component, Criterion, KernelEstimate, Mixture, PaperReductions, Particles, Reduction, SampleSize, cut};
+use fewbits_handoff::{HandoffFilter, StepError, Whole};
+use fewbits_monte_carlo::Stream;
+use nalgebra::SMatrix;
+use rand::Rng;
+use rand::RngExt;
+
+/// Particles of a filter.
+pub(super) const PARTICLES: usize = 500;
+/// Particles of a reference filter.
+pub(super) const REFERENCE: usize = 2000;
+/// Sensors in the field.
+pub(super) const SENSORS: usize = 25;
+/// Steps of a world.
+pub(super) const STEPS: usize = 10;
+/// Variance of a reading.
+pub(super) const VARIANCE: f64 = 0.05;
+
+/// How estimates are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Smoothing {
+    /// Silverman's rule with the number of particles, trimmed at 0.01.
+    Silverman,
+    /// One and a half times Silverman's rule with the effective number, trimmed at 0.5: what shows the printed curves.
+    Preset,
+}
+
+impl Smoothing {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Silverman => "silverman",
+            Self::Preset => "preset",
+        }
+    }
+
+    /// The filter of the paper under this smoothing.
+    pub(super) fn filter(self, particles: usize) -> Result<HandoffFilter<Whole>, Error> {
+        let filter = HandoffFilter::of_paper(particles, Whole)?;
+        Ok(match self {
+            Self::Silverman => filter,
+            Self::Preset => HandoffFilter {
+                trim: 0.5,
+                bandwidth: Bandwidth {
+                    factor: 1.5,
+                    size: SampleSize::Effective,
+                    ..Bandwidth::default()
+                },
+                ..filter
+            },
+        })
+    }
+}
+
+/// What all filters know at time 0.
+pub(super) fn prior() -> Result<Mixture<2>, Error> {
+    let gaussian = Gaussian::new(Point::zeros(), SMatrix::identity() * (START * START))?;
+    Ok(Mixture::single(&gaussian)?)
+}
+
+/// The world of one trial.
+pub(super) fn world(stream: Stream) -> Result<World, Error> {
+    World::draw(&mut stream.named("world").rng(), SENSORS, STEPS, VARIANCE)
+}
+
+/// The KD-tree cut of an estimate under one of the paper's criteria, and its plug-in errors.
+pub(super) fn paper_cut(estimate: &KernelEstimate<2>, criterion: usize, components: usize) -> Result<(Mixture<2>, StepError), Error> {
+    let reductions = PaperReductions::new(estimate)?;
+    let sent = cut::greedy(&reductions.tree, &reductions.errors[criterion], components)?.mixture(&reductions.tree)?;
+    let error = StepError::plug_in(estimate, &sent);
+    Ok((sent, error))
+}
+
+/// The paper's criteria in the order of [`paper_cut`].
+pub(super) const CRITERIA: [(&str, Criterion); 3] = [("ml", Criterion::Ml), ("kl", Criterion::Kl), ("l1", Criterion::L1)];
+
+/// The Gaussian of the same moments.
+pub(super) fn single(estimate: &KernelEstimate<2>) -> Result<Mixture<2>, Error> {
+    Ok(Reduction::SingleGaussian.reduce(estimate, 1)?)
+}
+
+/// A plain particle filter: systematic resampling, propagation, weights.
+pub(super) fn plain_step<R: Rng + ?Sized>(rng: &mut R, particles: &mut Particles<2>, reading: &super::world::Reading) -> Result<(), Error> {
+    use fewbits_core::{Dynamics, Likelihood};
+    let count = particles.len();
+    let offset: f64 = rng.random();
+    let (mut ancestors, mut cumulative, mut i) = (Vec::with_capacity(count), particles.weights()[0], 0);
+    for k in 0..count {
+        while (k as f64 + offset) / count as f64 >= cumulative && i + 1 < count {
+            i += 1;
+            cumulative += particles.weights()[i];
+        }
+        ancestors.push(i as u32);
+    }
+    particles.select(&ancestors)?;
+    Walk.propagate_columns(rng, particles.columns_mut());
+    particles.reweigh(|states, logs| reading.add_log_likelihoods(states, logs))?;
+    Ok(())
+}
+
+/// Posteriors of an uncompressed filter at the given times of a world.
+pub(super) fn posteriors(stream: Stream, times: &[usize]) -> Result<Vec<KernelEstimate<2>>, Error> {
+    let world = world(stream)?;
+    let filter = Smoothing::Silverman.filter(PARTICLES)?;
+    let mut rng = stream.named("filter").fast_rng();
+    let mut particles = prior()?.sample_systematic(&mut rng, PARTICLES)?;
+    let mut kept = Vec::new();
+    for (k, reading) in world.readings.iter().enumerate() {
+        plain_step(&mut rng, &mut particles, reading)?;
+        if times.contains(&(k + 1)) {
+            kept.push(filter.estimate(&particles)?);
+        }
+    }
+    Ok(kept)
+}
+
+/// A mixture whose every number was sent as a 32-bit float.
+pub(super) fn as_f32(mixture: &Mixture<2>) -> Result<Mixture<2>, Error> {
+    let short = |x: f64| f64::from(x as f32);
+    let components = mixture.components().iter().map(|c| Component::new(short(c.weight()), c.mean().map(short), c.covariance().map(short)));
+    Ok(Mixture::new(components.collect::<Result<_, _>>()?)?)
+}
+
+/// KL of an estimate to several mixtures by quadrature, the estimate's own density computed once.
+pub(super) struct Truth {
+    columns: [Vec<f64>; 2],
+    log_p: Vec<f64>,
+    cell: f64,
+}
+
+impl Truth {
+    /// A grid over everything within 6 kernel widths of a particle, in steps of 0.4 kernel widths.
+    pub(super) fn new(p: &KernelEstimate<2>) -> Self {
+        let widths = [p.kernel()[(0, 0)].sqrt(), p.kernel()[(1, 1)].sqrt()];
+        let columns = p.particles().columns();
+        let axis = |d: usize| {
+            let low = columns[d].iter().fold(f64::INFINITY, |m, x| m.min(*x)) - 6.0 * widths[d];
+            let high = columns[d].iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x)) + 6.0 * widths[d];
+            let count = ((high - low) / (0.4 * widths[d])).ceil();
+            (low, (high - low) / count, count as usize + 1)
+        };
+        let ((x0, dx, nx), (y0, dy, ny)) = (axis(0), axis(1));
+        let mut grid = [Vec::with_capacity(nx * ny), Vec::with_capacity(nx * ny)];
+        for i in 0..nx {
+            for j in 0..ny {
+                grid[0].push(x0 + i as f64 * dx);
+                grid[1].push(y0 + j as f64 * dy);
+            }
+        }
+        let mut log_p = vec![0.0; nx * ny];
+        p.log_pdf_columns([&grid[0], &grid[1]], &mut log_p);
+        Self {
+            columns: grid,
+            log_p,
+            cell: dx * dy,
+        }
+    }
+
+    pub(super) fn kl(&self, q: &Mixture<2>) -> f64 {
+        let mut log_q = vec![0.0; self.log_p.len()];
+        q.log_pdf_columns([&self.columns[0], &self.columns[1]], &mut log_q);
+        let terms = self.log_p.iter().zip(&log_q).filter(|(p, _)| **p > -700.0);
+        terms.map(|(p, q)| p.exp() * (p - q)).sum::<f64>() * self.cell
+    }
+}

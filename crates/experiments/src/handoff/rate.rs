@@ -1,0 +1,181 @@
+//! KL against bits.
+
+use super::filters::{Truth, as_f32, posteriors};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use fewbits_core::Message;
+use fewbits_densities::wire::{CodedMixture, WireFormat};
+use fewbits_densities::{Bandwidth, Criterion, KernelEstimate, Mixture, Reduction};
+use fewbits_monte_carlo::Moments;
+use garde::Validate;
+use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Components.
+    #[garde(length(min = 1), inner(range(min = 1, max = 60)))]
+    components: Vec<usize>,
+    /// Resolutions: quantiser steps in standard deviations.
+    #[garde(length(min = 1), inner(range(min = 0.01, max = 1.0)))]
+    resolution: Vec<f64>,
+    /// Worlds, of three beliefs each.
+    #[garde(range(min = 2, max = 10_000))]
+    trials: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            components: vec![1, 3, 5, 10],
+            resolution: vec![0.5, 0.35, 0.25, 0.15],
+            trials: 12,
+        }
+    }
+}
+
+/// One kind of message.
+#[derive(Serialize, JsonSchema)]
+pub struct Row {
+    /// What is sent: coded, f32 (mixture parameters as floats), coded-kd (a cut by KL, coded), particles (f32, resampled).
+    message: &'static str,
+    /// Components, or particles.
+    size: usize,
+    /// Quantiser step in standard deviations, if coded.
+    resolution: Option<f64>,
+    /// Mean length.
+    #[schemars(extend("unit" = "bit"))]
+    bits: Measured,
+    /// KL from the estimate to what the receiver knows.
+    #[schemars(extend("unit" = "nat"))]
+    kl: Measured,
+}
+
+/// Bits against error.
+pub struct Rate;
+
+fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
+    rows.iter().find(|r| r.message == message && r.size == size && r.resolution == resolution)
+}
+
+impl Figure for Rate {
+    type Parameters = Parameters;
+    type Tables = Vec<Row>;
+
+    fn about(&self) -> About {
+        About {
+            id: "handoff-rate",
+            title: "What bits buy",
+            caption: "KL from the estimate to what the receiver decodes against the length of the message. Coded mixtures need a \
+                      seventh of the bits of their parameters as floats, and a hundredth of those of particles.",
+            source: "our own comparison",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = 2;
+    }
+
+    fn cost(&self, p: &Parameters) -> Cost {
+        Cost {
+            seconds: p.trials as f64,
+            bytes: 1e6 * p.trials as f64,
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        // A message format has at most 16 resolutions of which one is chosen in the message; here both ends agree on it.
+        let single: Vec<WireFormat<2>> = p
+            .resolution
+            .iter()
+            .map(|r| WireFormat::new(Vector2::zeros(), 20.0, 1.0, &[*r]))
+            .collect::<Result<_, _>>()?;
+        let coded = |mixture: &Mixture<2>, format: &WireFormat<2>, truth: &Truth| -> Result<[f64; 2], Error> {
+            let message = CodedMixture::new(mixture, format, 0)?;
+            let bits = message.to_bits(format).map_err(Error::failed)?.bits();
+            Ok([bits as f64, truth.kl(message.mixture())])
+        };
+        let one = |it: fewbits_monte_carlo::Trial| -> Result<Vec<[f64; 2]>, Error> {
+            let mut sums: Vec<[f64; 2]> = Vec::new();
+            let estimates = posteriors(it.stream, &[2, 5, 8])?;
+            for estimate in &estimates {
+                let truth = Truth::new(estimate);
+                let mut all = Vec::new();
+                for m in &p.components {
+                    let best = Reduction::default().reduce(estimate, *m)?;
+                    let cut = Reduction::paper(Criterion::Kl).reduce(estimate, *m)?;
+                    all.push([32.0 * (6.0 * best.len() as f64 - 1.0), truth.kl(&as_f32(&best)?)]);
+                    for format in &single {
+                        all.push(coded(&best, format, &truth)?);
+                        all.push(coded(&cut, format, &truth)?);
+                    }
+                }
+                for n in [100, 500] {
+                    let mut rng = it.stream.named("particles").indexed(n).fast_rng();
+                    let sample = estimate.sample_systematic(&mut rng, n as usize)?;
+                    let received = Bandwidth::default().kernel(&sample)?;
+                    let shrunk = Bandwidth::default().shrunk(&sample, &received)?;
+                    let received = KernelEstimate::new(shrunk, received)?.to_mixture()?;
+                    all.push([64.0 * n as f64, truth.kl(&received)]);
+                }
+                sums.resize(all.len(), [0.0; 2]);
+                let share = 1.0 / estimates.len() as f64;
+                sums.iter_mut().zip(&all).for_each(|(s, a)| (0..2).for_each(|k| s[k] += a[k] * share));
+            }
+            Ok(sums)
+        };
+        let runs = context.monte_carlo(context.stream("handoff-rate"), p.trials).run(one)?;
+        let mut keys = Vec::new();
+        for m in &p.components {
+            keys.push(("f32", *m, None));
+            for r in &p.resolution {
+                keys.push(("coded", *m, Some(*r)));
+                keys.push(("coded-kd", *m, Some(*r)));
+            }
+        }
+        keys.extend([("particles", 100, None), ("particles", 500, None)]);
+        let rows = keys.into_iter().enumerate().map(|(i, (message, size, resolution))| {
+            let of = |k: usize| Measured::mean(&runs.iter().map(|run| run[i][k]).collect::<Moments>());
+            Row { message, size, resolution, bits: of(0), kl: of(1) }
+        });
+        Ok(rows.collect())
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let key = |r: &Row| {
+            let resolution = r.resolution.map_or(String::new(), |r| format!("-r{r}"));
+            format!("{}-{}{resolution}", r.message, r.size)
+        };
+        claims.references("bits", "length", rows, |r| (key(r), r.bits.value));
+        claims.references("kl", "KL", rows, |r| (key(r), r.kl));
+        let share = find(rows, "coded", 5, Some(0.25)).zip(find(rows, "f32", 5, None)).map(|(c, f)| c.bits.value / f.bits.value);
+        claims.at_most("sixth", "five coded components take at most a sixth of the bits of floats", share, 1.0 / 6.0).at_defaults();
+        let share = find(rows, "coded", 10, Some(0.15)).zip(find(rows, "particles", 500, None)).map(|(c, f)| c.bits.value / f.bits.value);
+        claims.at_most("hundredth", "ten take at most a hundredth of the bits of 500 particles", share, 0.01).at_defaults();
+        let gap = find(rows, "coded", 10, Some(0.15)).zip(find(rows, "particles", 100, None)).map(|(c, f)| c.kl.value - f.kl.value);
+        claims.below("particles", "and lose less than 100 particles", gap, 0.0).at_full_trials().at_defaults();
+        for m in [3, 5, 10] {
+            let by = [0.35, 0.25, 0.15].map(|r| find(rows, "coded", m, Some(r)).map(|r| r.kl.value));
+            claims.decreasing(format!("finer-m{m}"), "finer steps lose less", by).at_full_trials().at_defaults();
+            let gap = find(rows, "coded", m, Some(0.15)).zip(find(rows, "coded-kd", m, Some(0.15))).map(|(a, b)| a.kl.value - b.kl.value);
+            claims.below(format!("pipeline-m{m}"), "at the same bits the pipeline loses less than the paper's cut", gap, 0.0).at_full_trials().at_defaults();
+        }
+    }
+
+    fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
+        let of = |message: &'static str, size: usize| {
+            points(rows.iter().filter(move |r| r.message == message && r.size == size), |r| (r.bits.value, r.kl.value))
+        };
+        let all = |message: &'static str| points(rows.iter().filter(move |r| r.message == message), |r| (r.bits.value, r.kl.value));
+        let layers = p.components.iter().enumerate().map(|(i, m)| Layer::line(format!("coded, {m} components"), of("coded", *m)).coloured(i));
+        let panel = Panel::new("One belief", Axis::log("message / bit"), Axis::log("KL / nat"))
+            .with_all(layers)
+            .with(Layer::dashed("mixture as floats", all("f32")).coloured(5))
+            .with(Layer::points("particles as floats", all("particles")).coloured(6))
+            .legend(Legend::Outside);
+        Plot::of(panel)
+    }
+}

@@ -1,0 +1,207 @@
+//! KL against components for every reduction.
+
+use super::filters::{Truth, posteriors};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use fewbits_densities::merge::{MergeCost, merge};
+use fewbits_densities::tree::{At, Axis as SplitAxis};
+use fewbits_densities::{Criterion, KernelEstimate, Mixture, Reduction, Split};
+use fewbits_monte_carlo::Moments;
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Components.
+    #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
+    components: Vec<usize>,
+    /// Worlds, of three beliefs each.
+    #[garde(range(min = 2, max = 10_000))]
+    trials: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            components: vec![3, 5, 10, 20],
+            trials: 10,
+        }
+    }
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Errors.
+    errors: Vec<Row>,
+    /// What the methods cost.
+    #[schemars(extend("volatile" = true))]
+    cost: Vec<Time>,
+}
+
+/// One method.
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    /// Method.
+    method: &'static str,
+    /// The most components.
+    components: usize,
+    /// KL from the estimate to the mixture, by quadrature.
+    #[schemars(extend("unit" = "nat"))]
+    kl: Measured,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Time {
+    /// Method.
+    method: &'static str,
+    /// The most components.
+    components: usize,
+    /// Time of one reduction, the mean of all.
+    #[schemars(extend("unit" = "ms"))]
+    milliseconds: f64,
+}
+
+/// The methods by name.
+fn methods() -> Vec<(&'static str, Method)> {
+    let split = |axis, at| Split { axis, at };
+    let greedy = |split, criterion| Method::Plain(Reduction::Greedy { split, criterion });
+    let (widest, count) = (SplitAxis::Widest, At::CountMedian);
+    vec![
+        ("kd ml", greedy(Split::KD, Criterion::Ml)),
+        ("kd l1", greedy(Split::KD, Criterion::L1)),
+        ("kd kl", greedy(Split::KD, Criterion::Kl)),
+        ("kd kl optimal", Method::Plain(Reduction::Optimal { split: Split::KD, criterion: Criterion::Kl })),
+        ("kd closed form", greedy(split(widest, count), Criterion::LogDeterminant)),
+        ("principal kl", greedy(Split::PRINCIPAL, Criterion::Kl)),
+        ("principal closed form", greedy(Split::PRINCIPAL, Criterion::LogDeterminant)),
+        ("alternating kl", greedy(split(SplitAxis::Alternating, count), Criterion::Kl)),
+        ("runnalls", Method::Plain(Reduction::Merging { cost: MergeCost::Runnalls })),
+        ("salmond", Method::Plain(Reduction::Merging { cost: MergeCost::Salmond })),
+        ("williams from 30", Method::Williams),
+        ("pipeline 0", Method::Plain(Reduction::Pipeline { cut: 60, iterations: 0 })),
+        ("pipeline 15", Method::Plain(Reduction::default())),
+        ("pipeline 40", Method::Plain(Reduction::Pipeline { cut: 60, iterations: 40 })),
+    ]
+}
+
+enum Method {
+    Plain(Reduction),
+    Williams,
+}
+
+impl Method {
+    fn reduce(&self, estimate: &KernelEstimate<2>, components: usize) -> Result<Mixture<2>, Error> {
+        Ok(match self {
+            Self::Plain(reduction) => reduction.reduce(estimate, components)?,
+            Self::Williams => {
+                let coarse = Reduction::Merging { cost: MergeCost::Runnalls }.reduce(estimate, 30.max(components))?;
+                merge(&coarse, components, MergeCost::Williams)?.mixture
+            }
+        })
+    }
+}
+
+/// The comparison of reductions.
+pub struct Reductions;
+
+impl Rows {
+    fn kl(&self, method: &str, components: usize) -> Option<f64> {
+        self.errors.iter().find(|r| r.method == method && r.components == components).map(|r| r.kl.value)
+    }
+}
+
+impl Figure for Reductions {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "handoff-reduction",
+            title: "What a reduction loses",
+            caption: "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
+                      2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.",
+            source: "our own comparison",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = 2;
+    }
+
+    fn measures_time(&self) -> bool {
+        true
+    }
+
+    fn cost(&self, p: &Parameters) -> Cost {
+        Cost {
+            seconds: 2.0 * p.trials as f64,
+            bytes: 1e6 * p.trials as f64,
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let methods = methods();
+        let one = |it: fewbits_monte_carlo::Trial| -> Result<Vec<(f64, f64)>, Error> {
+            let mut all = vec![(0.0, 0.0); methods.len() * p.components.len()];
+            let estimates = posteriors(it.stream, &[2, 5, 8])?;
+            for estimate in &estimates {
+                let truth = Truth::new(estimate);
+                for (m, (_, method)) in methods.iter().enumerate() {
+                    for (c, components) in p.components.iter().enumerate() {
+                        let start = Instant::now();
+                        let mixture = method.reduce(estimate, *components)?;
+                        let time = start.elapsed().as_secs_f64() * 1e3;
+                        let cell = &mut all[m * p.components.len() + c];
+                        cell.0 += truth.kl(&mixture) / estimates.len() as f64;
+                        cell.1 += time / estimates.len() as f64;
+                    }
+                }
+            }
+            Ok(all)
+        };
+        let runs = context.monte_carlo(context.stream("handoff-reduction"), p.trials).run(one)?;
+        let (mut errors, mut cost) = (Vec::new(), Vec::new());
+        for (m, (method, _)) in methods.iter().enumerate() {
+            for (c, components) in p.components.iter().enumerate() {
+                let at = m * p.components.len() + c;
+                let kl: Moments = runs.iter().map(|run| run[at].0).collect();
+                let milliseconds = runs.iter().map(|run| run[at].1).collect::<Moments>().mean();
+                errors.push(Row { method, components: *components, kl: (&kl).into() });
+                cost.push(Time { method, components: *components, milliseconds });
+            }
+        }
+        Ok(Rows { errors, cost })
+    }
+
+    fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        claims.references("kl", "KL", &rows.errors, |r| (format!("{}-m{}", r.method, r.components), r.kl));
+        for m in p.components.iter().filter(|m| **m >= 3) {
+            let ratio = rows.kl("pipeline 15", *m).zip(rows.kl("kd kl", *m)).map(|(a, b)| a / b);
+            let what = "the recommended pipeline loses at most 0.65 of what the paper's cut does";
+            claims.at_most(format!("pipeline-m{m}"), what, ratio, 0.65).at_full_trials().at_defaults();
+            let gap = rows.kl("kd kl", *m).zip(rows.kl("kd ml", *m)).map(|(a, b)| a - b);
+            claims.below(format!("ml-worst-m{m}"), "cuts by ML lose more than cuts by KL", gap, 0.0).at_full_trials().at_defaults();
+            let gap = rows.kl("principal kl", *m).zip(rows.kl("alternating kl", *m)).map(|(a, b)| a - b);
+            let what = "alternating axes lose more than principal axes";
+            claims.below(format!("alternating-m{m}"), what, gap, 0.0).at_full_trials().at_defaults();
+        }
+        let more = p.components.iter().map(|m| rows.kl("pipeline 15", *m));
+        claims.decreasing("more", "more components lose less", more).at_full_trials().at_defaults();
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let layers = methods().into_iter().enumerate().map(|(i, (method, _))| {
+            let of = rows.errors.iter().filter(|r| r.method == method);
+            Layer::line(method, of.map(|r| (r.components as f64, r.kl.value)).collect()).coloured(i)
+        });
+        let panel = Panel::new("KL of the reduced mixture", Axis::log("components M"), Axis::log("KL / nat"))
+            .with_all(layers)
+            .legend(Legend::Outside);
+        Plot::of(panel)
+    }
+}
