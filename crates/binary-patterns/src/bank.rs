@@ -239,7 +239,13 @@ impl Bank {
     pub(crate) fn blurs(&self) -> Vec<Blur> {
         self.groups
             .iter()
-            .flat_map(|g| g.sensor.quantizer.breakpoints().iter().map(|&t| (t, g.sensor.noise_std)))
+            .flat_map(|g| {
+                g.sensor
+                    .quantizer
+                    .breakpoints()
+                    .iter()
+                    .map(|&t| (t, g.sensor.noise_std))
+            })
             .collect()
     }
 

@@ -82,7 +82,10 @@ impl LookupTable {
     /// # Errors
     /// If the number of observations is not the number of sensors.
     pub fn decode(&self, observations: &[Observation<Bit>]) -> Result<f64, Error> {
-        let bits: Vec<bool> = observations.iter().filter_map(|o| o.received().map(|bit| bit.0)).collect();
+        let bits: Vec<bool> = observations
+            .iter()
+            .filter_map(|o| o.received().map(|bit| bit.0))
+            .collect();
         if bits.len() == observations.len() {
             return self.estimate(&bits);
         }
@@ -92,7 +95,11 @@ impl LookupTable {
         }
         let nodes = self.bank.fine_nodes();
         let mut score = vec![0.0; nodes.len()];
-        for (n, bit) in observations.iter().enumerate().filter_map(|(n, o)| o.received().map(|bit| (n, bit.0))) {
+        for (n, bit) in observations
+            .iter()
+            .enumerate()
+            .filter_map(|(n, o)| o.received().map(|bit| (n, bit.0)))
+        {
             let sensor = self.bank.sensor(n);
             for (s, x) in score.iter_mut().zip(&nodes.x) {
                 *s += sensor.log_probabilities(*x)[usize::from(bit)];
@@ -297,7 +304,11 @@ impl Bank {
                             joint[0] += w * p0;
                             joint[1] += w * p1;
                         }
-                        let scale = if scaling == Scaling::Conditional { cell.mass.max(FLOOR) } else { 1.0 };
+                        let scale = if scaling == Scaling::Conditional {
+                            cell.mass.max(FLOOR)
+                        } else {
+                            1.0
+                        };
                         joint.map(|p| log(p / scale))
                     })
                     .collect()

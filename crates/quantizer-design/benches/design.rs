@@ -49,7 +49,12 @@ fn encode_and_write(bencher: Bencher) {
 #[divan::bench]
 fn decode_nine(bencher: Bencher) {
     let decoder = MmseDecoder::new(&System::identical(nine(), lloyd(4)).unwrap(), 220).unwrap();
-    bencher.bench(|| decoder.decode_symbols(black_box(&[0, 1, 2, 3, 3, 2, 1, 2, 2])).unwrap().mean);
+    bencher.bench(|| {
+        decoder
+            .decode_symbols(black_box(&[0, 1, 2, 3, 3, 2, 1, 2, 2]))
+            .unwrap()
+            .mean
+    });
 }
 
 /// Information, gradient and Hessian of two sensors.

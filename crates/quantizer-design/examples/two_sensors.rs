@@ -16,7 +16,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("no code of as many bits is below {:.6}", report.ceo_bound.unwrap_or(0.0));
     println!("certificate: {:?}", report.certificate);
 
-    let sent = best.quantizers().iter().map(|q| q.encode(0.9)).collect::<Result<Vec<_>, _>>()?;
+    let sent = best
+        .quantizers()
+        .iter()
+        .map(|q| q.encode(0.9))
+        .collect::<Result<Vec<_>, _>>()?;
     let decoder = MmseDecoder::new(&best.system, 16)?;
     let both = [sent[0], sent[1]].map(|level| Observation::Received(Symbol(level)));
     println!("both received: {:?}", decoder.decode(&both)?);

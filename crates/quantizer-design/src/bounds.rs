@@ -246,7 +246,10 @@ impl Ceo {
             bound += weight * value;
             slope += gradient * weight;
         }
-        bound + (0..n).map(|i| f64::max(-slope[i] * r[i], slope[i] * (self.rate[i] - r[i]))).sum::<f64>()
+        bound
+            + (0..n)
+                .map(|i| f64::max(-slope[i] * r[i], slope[i] * (self.rate[i] - r[i])))
+                .sum::<f64>()
     }
 
     /// Change of the logarithmic barrier from one point to another, formed from ratios so that nothing cancels.
@@ -384,7 +387,9 @@ mod tests {
             (vec![0.3, 2.0, 5.0, 0.01], vec![12.0, 0.01, 1.0, 0.5]),
         ] {
             match ceo(1.0, &variances, &bits) {
-                Ok(bound) => assert!(bound.gap <= 1e-6 && bound.distortion > 0.0 && bound.distortion < 1.0, "{bound:?}"),
+                Ok(bound) => {
+                    assert!(bound.gap <= 1e-6 && bound.distortion > 0.0 && bound.distortion < 1.0, "{bound:?}")
+                }
                 Err(error) => assert!(matches!(error, Error::NotConverged { .. }), "{error}"),
             }
         }

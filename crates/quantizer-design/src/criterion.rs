@@ -229,7 +229,11 @@ impl Scored {
 
     /// What the sums over outcomes start from, as far as designs see it; see also [`Scored::offset`].
     pub(crate) fn constant(&self, scene: &Scene) -> f64 {
-        if self.kind == Kind::Explained { -scene.variance } else { 0.0 }
+        if self.kind == Kind::Explained {
+            -scene.variance
+        } else {
+            0.0
+        }
     }
 
     /// What is added to a value for the outside only, since beside it small changes lose their digits: the prior's entropy.

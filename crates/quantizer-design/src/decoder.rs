@@ -91,7 +91,9 @@ impl MmseDecoder {
             });
         }
         let scene = system.scene();
-        let allowed = system.clone().with_outcome_limit(system.outcome_limit().max(limit as u64));
+        let allowed = system
+            .clone()
+            .with_outcome_limit(system.outcome_limit().max(limit as u64));
         let reports = Reports::of(&allowed)?;
         let needed = system.outcomes().saturating_mul(scene.values().len() as u64);
         let entries = if needed <= ENTRY_LIMIT {
@@ -221,7 +223,11 @@ fn posterior(scene: &Scene, likelihood: &[f64]) -> [f64; 3] {
     let off = terms().map(|((w, q), x)| w * q * (x - scene.mean)).sum::<f64>() / mass;
     let mean = scene.mean + off;
     let spread = |x: f64| (x - scene.mean - off) * (x - scene.mean - off);
-    [mass, mean, terms().map(|((w, q), x)| w * q * spread(*x)).sum::<f64>() / mass]
+    [
+        mass,
+        mean,
+        terms().map(|((w, q), x)| w * q * spread(*x)).sum::<f64>() / mass,
+    ]
 }
 
 /// The randomised Neyman-Pearson test between two values of the unknown on the joint outcome.
@@ -320,14 +326,22 @@ mod tests {
             let others = System::identical(scene.subset(&[0, 1]).unwrap(), q).unwrap();
             let exact = MmseDecoder::new(&others, 10).unwrap().decode_symbols(&[3, 1]).unwrap();
             for missing in [Observation::Erased, Observation::Nothing] {
-                let seen = [Observation::Received(Symbol(3)), missing, Observation::Received(Symbol(1))];
+                let seen = [
+                    Observation::Received(Symbol(3)),
+                    missing,
+                    Observation::Received(Symbol(1)),
+                ];
                 let found = decoder.decode(&seen).unwrap();
                 assert!((found.mean - exact.mean).abs() < 1e-12 && (found.variance - exact.variance).abs() < 1e-12);
                 assert!(decoder.decode(&seen[..2]).is_err());
             }
             let nothing = decoder.decode(&[Observation::Erased; 3]).unwrap();
             assert!(nothing.mean.abs() < 1e-13 && (nothing.variance - 1.0).abs() < 1e-12);
-            let bad = [Observation::Received(Symbol(4)), Observation::Erased, Observation::Erased];
+            let bad = [
+                Observation::Received(Symbol(4)),
+                Observation::Erased,
+                Observation::Erased,
+            ];
             assert!(decoder.decode(&bad).is_err());
         }
     }

@@ -32,4 +32,5 @@ impl System {
             gradient: found.gradient * sense,
             hessian: found.hessian * sense,
         })
-    }}
+    }
+}

@@ -62,9 +62,9 @@ mod newton;
 mod problem;
 
 pub use criterion::Criterion;
+pub use derivatives::Derivatives;
 pub use error::Error;
 pub use fewbits_quantizers::{Channel, Labelling, Quantizer, Symbol, lloyd_max, quantizer};
-pub use derivatives::Derivatives;
 pub use newton::{AtSaddle, Certificate, Newton};
 pub use scene::{Noise, Prior, Scene};
 pub use system::{SensorGroup, System};

@@ -54,7 +54,6 @@ impl Objective for Problem<'_> {
     }
 }
 
-
 impl<'a> Problem<'a> {
     /// The criterion over the breakpoints of the groups `active` (increasing, may be empty).
     pub(crate) fn new(system: &'a System, criterion: Criterion, active: &[usize]) -> Result<Self, Error> {

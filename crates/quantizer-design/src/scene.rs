@@ -127,7 +127,13 @@ impl Prior {
                 // About the first value, so that an offset shared by all costs no digit.
                 let first = values.first().copied().unwrap_or(0.0);
                 let total: f64 = probabilities.iter().sum();
-                first + values.iter().zip(probabilities).map(|(x, p)| p * (x - first)).sum::<f64>() / total
+                first
+                    + values
+                        .iter()
+                        .zip(probabilities)
+                        .map(|(x, p)| p * (x - first))
+                        .sum::<f64>()
+                        / total
             }
         }
     }
@@ -413,7 +419,11 @@ impl Scene {
         };
         let mean = prior.mean();
         let mut scene = Self {
-            variance: values.iter().zip(&weights).map(|(x, w)| w * (x - mean) * (x - mean)).sum(),
+            variance: values
+                .iter()
+                .zip(&weights)
+                .map(|(x, w)| w * (x - mean) * (x - mean))
+                .sum(),
             mean,
             base: values.clone(),
             factor: vec![0.0; values.len()],
@@ -685,7 +695,8 @@ mod tests {
 
     #[test]
     fn stored_scenes_are_checked_when_restored() {
-        let scene = Scene::new(Prior::binary(1.0, 0.3).unwrap(), Noise::equicorrelated(&[1.0; 2], 0.4).unwrap()).unwrap();
+        let scene =
+            Scene::new(Prior::binary(1.0, 0.3).unwrap(), Noise::equicorrelated(&[1.0; 2], 0.4).unwrap()).unwrap();
         let json = serde_json::to_string(&scene).unwrap();
         assert_eq!(serde_json::from_str::<Scene>(&json).unwrap(), scene);
         assert!(serde_json::from_str::<Prior>(r#"{"gaussian":{"deviation":-1}}"#).is_err());

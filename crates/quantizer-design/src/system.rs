@@ -3,10 +3,10 @@
 use crate::compositions::count;
 use crate::error::{Error, refuse};
 use crate::scene::Scene;
-use fewbits_quantizers::lloyd_max;
-use serde::{Deserialize, Serialize};
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
+use fewbits_quantizers::lloyd_max;
+use serde::{Deserialize, Serialize};
 
 /// Most joint outcomes a computation may enumerate unless told otherwise.
 pub const OUTCOME_LIMIT: u64 = 1 << 20;
@@ -262,7 +262,11 @@ impl System {
         self.scene
             .values
             .iter()
-            .map(|x| Ok(group.channel.received(&group.quantizer.level_probabilities(*x, deviation)?)?))
+            .map(|x| {
+                Ok(group
+                    .channel
+                    .received(&group.quantizer.level_probabilities(*x, deviation)?)?)
+            })
             .collect()
     }
 

@@ -1,8 +1,8 @@
 //! The joint outcome table of a system, for inspection and for decisions.
 
 use crate::compositions::rank;
-use crate::error::{Error, refuse};
 use crate::criterion::most_probable;
+use crate::error::{Error, refuse};
 use crate::law::Reports;
 use crate::scene::Scene;
 use crate::system::System;

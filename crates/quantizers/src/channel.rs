@@ -25,7 +25,11 @@ pub struct Channel {
 impl From<Channel> for Vec<Vec<f64>> {
     /// The rows, one per received symbol.
     fn from(channel: Channel) -> Self {
-        channel.transition.chunks_exact(channel.inputs).map(<[f64]>::to_vec).collect()
+        channel
+            .transition
+            .chunks_exact(channel.inputs)
+            .map(<[f64]>::to_vec)
+            .collect()
     }
 }
 
@@ -211,7 +215,9 @@ impl Channel {
             return refuse("levels", format!("{} probabilities", levels.len()), format!("{}", self.inputs));
         }
         let rows = self.transition.chunks_exact(self.inputs);
-        Ok(rows.map(|row| row.iter().zip(levels).map(|(c, p)| c * p).sum()).collect())
+        Ok(rows
+            .map(|row| row.iter().zip(levels).map(|(c, p)| c * p).sum())
+            .collect())
     }
 
     /// Whether the channel is the identity.

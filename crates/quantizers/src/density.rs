@@ -380,11 +380,14 @@ mod tests {
         let (low, high) = density.extent();
         for w in edges.windows(2) {
             let (a, b) = (w[0].max(low), w[1].min(high));
-            let numeric = |f: &dyn Fn(f64) -> f64| {
-                gauss_legendre::<64>().composite(a, b, 40, |x| f(x) * density.pdf(x))
-            };
+            let numeric =
+                |f: &dyn Fn(f64) -> f64| gauss_legendre::<64>().composite(a, b, 40, |x| f(x) * density.pdf(x));
             let cell = density.cell(w[0], w[1]);
-            let centroid = if w[0].is_finite() { w[0] + cell.from_lower } else { w[1] - cell.to_upper };
+            let centroid = if w[0].is_finite() {
+                w[0] + cell.from_lower
+            } else {
+                w[1] - cell.to_upper
+            };
             assert!((numeric(&|_| 1.0) - cell.mass).abs() < 1e-13);
             assert!((numeric(&|x| x) / cell.mass - centroid).abs() < 1e-11 * (high - low));
             let cost = density.squared_error(w[0], w[1], 0.3);

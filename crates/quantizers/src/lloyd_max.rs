@@ -453,8 +453,7 @@ mod tests {
         for levels in [64, 256, 1000, 1024, 2047, 2048, 3000, 4096] {
             let q = gaussian(levels).unwrap();
             assert!(violation(&Normal::STANDARD, q.breakpoints()) < 1e-14, "{levels}");
-            let ratio =
-                (levels * levels) as f64 * q.mean_squared_error() / (3f64.sqrt() * std::f64::consts::FRAC_PI_2);
+            let ratio = (levels * levels) as f64 * q.mean_squared_error() / (3f64.sqrt() * std::f64::consts::FRAC_PI_2);
             assert!(ratio > last && ratio < 1.0, "{levels}: {ratio}");
             last = ratio;
         }
@@ -464,7 +463,14 @@ mod tests {
     #[test]
     fn a_density_far_from_zero_has_the_quantizer_of_one_at_zero() {
         let four = gaussian(4).unwrap();
-        for (mean, deviation) in [(1e4, 1.0), (1e7, 1.0), (-3e3, 1.0), (1e7, 1e-4), (0.0, 1e-4), (0.0, 1e4)] {
+        for (mean, deviation) in [
+            (1e4, 1.0),
+            (1e7, 1.0),
+            (-3e3, 1.0),
+            (1e7, 1e-4),
+            (0.0, 1e-4),
+            (0.0, 1e4),
+        ] {
             let q = design(&Normal::with_deviation(mean, deviation).unwrap(), 4).unwrap();
             let scaled = q.mean_squared_error() / (deviation * deviation);
             assert!((scaled - 0.117_481_847_829).abs() < 1e-12, "{mean}: {scaled}");
@@ -472,7 +478,14 @@ mod tests {
                 assert!((a - mean - deviation * b).abs() <= 1e-12 * deviation + 1e-15 * mean.abs());
             }
         }
-        assert!((design(&Normal::with_deviation(1e4, 1.0).unwrap(), 8).unwrap().breakpoints()[3] - 1e4).abs() < 1e-11);
+        assert!(
+            (design(&Normal::with_deviation(1e4, 1.0).unwrap(), 8)
+                .unwrap()
+                .breakpoints()[3]
+                - 1e4)
+                .abs()
+                < 1e-11
+        );
         for levels in 2..=64 {
             let q = design(&Normal::with_deviation(3e3, 1.0).unwrap(), levels).unwrap();
             let exact = gaussian(levels).unwrap().mean_squared_error();
@@ -527,7 +540,10 @@ mod tests {
         let q = gaussian(8).unwrap();
         let json = serde_json::to_string(&q).unwrap();
         assert_eq!(serde_json::from_str::<LloydMax>(&json).unwrap(), q);
-        for (from, to) in [("\"centroids\":[-", "\"centroids\":["), ("\"mean_squared_error\":", "\"mean_squared_error\":-")] {
+        for (from, to) in [
+            ("\"centroids\":[-", "\"centroids\":["),
+            ("\"mean_squared_error\":", "\"mean_squared_error\":-"),
+        ] {
             assert!(serde_json::from_str::<LloydMax>(&json.replacen(from, to, 1)).is_err());
         }
     }

@@ -380,7 +380,10 @@ mod tests {
     /// Labels 1, 0, 1 and their mirror image's 0, 1, 0 name one quantizer.
     #[test]
     fn folded_cells_and_their_mirror_image_have_one_canonical_form() {
-        for (labels, b) in [(vec![1, 0, 1], vec![-1.4, 1.2]), (vec![0, 1, 2, 0], vec![-1.0, 0.2, 2.0])] {
+        for (labels, b) in [
+            (vec![1, 0, 1], vec![-1.4, 1.2]),
+            (vec![0, 1, 2, 0], vec![-1.0, 0.2, 2.0]),
+        ] {
             for scale in [1e-4, 1.0, 1e4] {
                 let b = b.iter().map(|x| scale * x).collect();
                 let folded = Quantizer::with_labels(b, labels.clone()).unwrap();

@@ -121,12 +121,7 @@ impl Scheme<1> for QuantizingSensor {
         Ok(Some(Symbol(self.quantizer.encode(measurement[0])?)))
     }
 
-    fn factor(
-        &self,
-        (): &(),
-        observation: &Observation<Symbol>,
-        link: &Link,
-    ) -> Result<Scalar, fewbits_core::Error> {
+    fn factor(&self, (): &(), observation: &Observation<Symbol>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
         let symbol = match observation {
             Observation::Received(symbol) => *symbol,
             Observation::Nothing => return Ok(Constant::new(link.loss())?.into()),

@@ -274,7 +274,11 @@ mod tests {
                 previous ^= index >> at & 1;
                 value = 2 * value + previous;
             }
-            let left = if value == 0 { -1.3 } else { grid.breakpoints()[value - 1] };
+            let left = if value == 0 {
+                -1.3
+            } else {
+                grid.breakpoints()[value - 1]
+            };
             let centre = left + 1.3 / 16.0;
             exact += w
                 .iter()

@@ -1,7 +1,7 @@
 //! The Bayesian Cramer-Rao bound with the best weight function.
 
-use crate::{Bank, Error};
 use crate::source::{Blur, Kind};
+use crate::{Bank, Error};
 use std::f64::consts::PI;
 
 /// Intervals of the coarsest grid, and more for each threshold.

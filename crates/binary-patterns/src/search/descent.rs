@@ -333,7 +333,11 @@ mod tests {
             let start = vec![3, 5, 2, 3, 5, 2];
             let found = descent.run(&[start], 6, full).unwrap();
             assert_relative_eq!(found.mse, exact.mse, max_relative = 1e-10);
-            let chosen: Vec<u32> = found.patterns(&grid).iter().map(|p| p.as_ref().unwrap().mask().unwrap()).collect();
+            let chosen: Vec<u32> = found
+                .patterns(&grid)
+                .iter()
+                .map(|p| p.as_ref().unwrap().mask().unwrap())
+                .collect();
             assert_eq!(chosen, found.choice.iter().map(|&c| c as u32 + 1).collect::<Vec<_>>());
         }
     }

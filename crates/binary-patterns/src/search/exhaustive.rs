@@ -4,8 +4,8 @@ use super::outcomes::{Outcomes, SEARCH_PANEL};
 use crate::Error;
 use crate::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::count::{full_rank_multisets, multisets};
-use crate::source::noise_in_range;
 use crate::linear::{Span, check_mask, flips_under_reflection, grid_bits};
+use crate::source::noise_in_range;
 use crate::source::{Blur, Nodes};
 use crate::{Bank, Grid, Mask, PatternSensor, Source, linear_pattern};
 use fewbits_numerics::error::at_least_one;
@@ -253,7 +253,12 @@ impl<'a> Walk<'a> {
     fn new(search: &'a LinearSearch, keep: usize) -> Result<Self, Error> {
         let folded = search.grid.is_symmetric();
         let reach = search.source.reach();
-        let blurs: Vec<Blur> = search.grid.breakpoints().iter().map(|&t| (t, search.noise_std)).collect();
+        let blurs: Vec<Blur> = search
+            .grid
+            .breakpoints()
+            .iter()
+            .map(|&t| (t, search.noise_std))
+            .collect();
         let from = if folded { 0.0 } else { -reach };
         let nodes = Nodes::adapted(&search.source, from, reach, &blurs, SEARCH_PANEL, gauss_legendre::<8>());
         let kinds = search.forced.len();

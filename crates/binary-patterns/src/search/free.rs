@@ -5,14 +5,14 @@ use super::outcomes::{SEARCH_PANEL, scattered};
 use crate::Error;
 use crate::bank::IMPOSSIBLE;
 use crate::decoder::moments;
-use crate::source::Nodes;
 use crate::linear::grid_bits;
+use crate::source::Nodes;
 use crate::{Bank, BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source};
-use serde::{Deserialize, Serialize};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, non_negative};
 use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::gauss_legendre;
+use serde::{Deserialize, Serialize};
 
 /// Most sensors: the outcome tree of distinct sensors has `2^N` leaves.
 const MAX_SENSORS: usize = 16;
@@ -43,7 +43,12 @@ pub struct FreeDesign {
 /// # Errors
 /// If there is no sensor or more than 16, a noise is below `1e-4` of the source's reach, `starts` is 0, or `jitter` is
 /// negative or not finite.
-pub fn free_breakpoints(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: usize) -> Result<FreeDesign, Error> {
+pub fn free_breakpoints(
+    source: &Source,
+    sensors: &[PatternSensor],
+    jitter: f64,
+    starts: usize,
+) -> Result<FreeDesign, Error> {
     at_least_one("sensors", sensors.len())?;
     at_least_one("starts", starts)?;
     non_negative("jitter", jitter)?;
@@ -56,10 +61,17 @@ pub fn free_breakpoints(source: &Source, sensors: &[PatternSensor], jitter: f64,
     }
     // In the source's own unit, so that no step or tolerance knows another.
     let unit = source.scale();
-    let scaled = sensors.iter().map(|s| rescaled(s, 1.0 / unit)).collect::<Result<Vec<_>, _>>()?;
+    let scaled = sensors
+        .iter()
+        .map(|s| rescaled(s, 1.0 / unit))
+        .collect::<Result<Vec<_>, _>>()?;
     let found = from_starts(&source.rescaled(1.0 / unit)?, &scaled, jitter, starts)?;
     Ok(FreeDesign {
-        sensors: found.sensors.iter().map(|s| rescaled(s, unit)).collect::<Result<_, _>>()?,
+        sensors: found
+            .sensors
+            .iter()
+            .map(|s| rescaled(s, unit))
+            .collect::<Result<_, _>>()?,
         mse: unit * unit * found.mse,
     })
 }
@@ -183,7 +195,10 @@ struct OutcomeTree {
 
 impl OutcomeTree {
     fn new(source: &Source, sensors: &[PatternSensor]) -> Self {
-        let finest = sensors.iter().map(PatternSensor::noise_std).fold(f64::INFINITY, f64::min);
+        let finest = sensors
+            .iter()
+            .map(PatternSensor::noise_std)
+            .fold(f64::INFINITY, f64::min);
         let nodes = source.nodes(SEARCH_PANEL * finest, gauss_legendre::<8>());
         let row = || vec![0.0; nodes.len()];
         let pairs = || sensors.iter().map(|_| [row(), row()]).collect();

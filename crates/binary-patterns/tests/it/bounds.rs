@@ -1,6 +1,8 @@
 //! Orderings that must hold for every bank of one-bit sensors.
 
-use fewbits_binary_patterns::bounds::{centralised_bound, network_rate_distortion, printed_crlb, optimal_weight_van_trees};
+use fewbits_binary_patterns::bounds::{
+    centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb,
+};
 use fewbits_binary_patterns::search::free_breakpoints;
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, Grid, PatternSensor, Source};
 use proptest::prelude::*;

@@ -4,7 +4,7 @@ use fewbits_binary_patterns::baselines::{
     AdaptiveErrors, AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound,
 };
 use fewbits_binary_patterns::bounds::{
-    centralised_bound, network_rate_distortion, printed_crlb, remote_distortion, optimal_weight_van_trees,
+    centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
 };
 use fewbits_binary_patterns::search::{LinearSearch, MaskSet, by_information, free_breakpoints};
 use fewbits_binary_patterns::{
@@ -203,7 +203,9 @@ fn table_5_1() {
                 best.mse
             }
             "t51.printed.crlb" => printed_crlb(&printed).unwrap(),
-            "t51.best.vt" => optimal_weight_van_trees(&bank(uniform(), &grid(3), &masks_of(&e.inputs["masks"]), 18.2)).unwrap(),
+            "t51.best.vt" => {
+                optimal_weight_van_trees(&bank(uniform(), &grid(3), &masks_of(&e.inputs["masks"]), 18.2)).unwrap()
+            }
             // A simulation of t51.best.mmse: the exact value must lie within its four standard errors.
             "t51.best.mmse.mc" => {
                 let exact = search.best().unwrap().mse;

@@ -5,8 +5,8 @@
 //! this.
 
 use crate::criterion::{Criterion, LOG_FLOOR};
-use crate::moments::{Table, moments};
 use crate::error::{Error, refuse};
+use crate::moments::{Table, moments};
 use crate::scene::Scene;
 use crate::system::{SensorGroup, System};
 use fewbits_quantizers::Channel;

@@ -42,7 +42,11 @@ pub struct Report {
 impl Report {
     /// Squared error over the tightest bound there is: 1 would be perfect.
     pub fn excess(&self) -> Option<f64> {
-        let tightest = self.ceo_bound.into_iter().chain(self.estimator_bound).reduce(f64::max)?;
+        let tightest = self
+            .ceo_bound
+            .into_iter()
+            .chain(self.estimator_bound)
+            .reduce(f64::max)?;
         Some(self.mean_squared_error / tightest)
     }
 }
@@ -61,9 +65,16 @@ impl Design {
                 let variances: Vec<f64> = (0..scene.sensors()).map(|n| scene.noise().sd(n).powi(2)).collect();
                 let mut bits = vec![0.0; scene.sensors()];
                 for group in system.groups() {
-                    group.sensors().iter().for_each(|n| bits[*n] = (group.quantizer().levels() as f64).log2());
+                    group
+                        .sensors()
+                        .iter()
+                        .for_each(|n| bits[*n] = (group.quantizer().levels() as f64).log2());
                 }
-                if clear { Some(bounds::ceo(sd * sd, &variances, &bits)?.lower()) } else { None }
+                if clear {
+                    Some(bounds::ceo(sd * sd, &variances, &bits)?.lower())
+                } else {
+                    None
+                }
             }
             _ => None,
         };
@@ -156,7 +167,11 @@ fn for_estimation(scene: &Scene, levels: usize) -> Result<Design, Error> {
     };
     let folded = discover(&best.system, criterion, &settings)?;
     // Folded cells are harder to build: they must be worth it.
-    Ok(if folded.value < best.value * (1.0 - 1e-6) { folded } else { best })
+    Ok(if folded.value < best.value * (1.0 - 1e-6) {
+        folded
+    } else {
+        best
+    })
 }
 
 fn for_decision(scene: &Scene, levels: usize) -> Result<Design, Error> {

@@ -11,11 +11,11 @@ use crate::error::{Error, refuse};
 use crate::newton::Newton;
 use crate::scene::Scene;
 use crate::system::{SensorGroup, System};
-use serde::{Deserialize, Serialize};
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Labelling;
 use fewbits_quantizers::Quantizer;
 use fewbits_quantizers::lloyd_max;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 

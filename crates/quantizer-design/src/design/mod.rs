@@ -12,8 +12,8 @@ mod separation;
 mod symmetry;
 
 pub use alternating::{AllowedCells, Alternated, Alternating, alternate, alternating_step};
-pub use dynamic_programme::{MAX_CANDIDATES, best_contiguous};
 pub use cyclic::cyclic;
+pub use dynamic_programme::{MAX_CANDIDATES, best_contiguous};
 pub use front::{Report, design};
 pub use index_assignment::{Words, WordsDesign, assign_words, word_classes};
 pub use joint::{Design, greedy, joint, multi_start, optimise_groups, random_starts};

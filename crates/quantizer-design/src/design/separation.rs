@@ -1,11 +1,11 @@
 //! Quantizers that keep two hypotheses apart, one sensor at a time (Poor and Thomas).
 
 use crate::criterion::{Criterion, LOG_FLOOR};
+use crate::derivatives::Derivatives;
 use crate::error::{Error, refuse};
 use crate::newton::{Newton, Objective, climb};
 use crate::problem::Problem;
 use crate::scene::{Noise, Prior, Scene};
-use crate::derivatives::Derivatives;
 use crate::system::System;
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;

@@ -4,8 +4,7 @@ use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::design::{self, Discovery, Separation};
 use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::{
-    Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, bounds,
-    lloyd_max,
+    Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, bounds, lloyd_max,
 };
 use proptest::prelude::*;
 
@@ -57,7 +56,8 @@ fn grouped() -> impl Strategy<Value = System> {
             Noise::independent(&[sd, sd, sd, 0.8])
         };
         let scene = Scene::new(prior, noise.unwrap()).unwrap();
-        let three = SensorGroup::new(Quantizer::new(a).unwrap(), Channel::symbol_erasure(3, loss).unwrap(), vec![0, 1, 2]);
+        let three =
+            SensorGroup::new(Quantizer::new(a).unwrap(), Channel::symbol_erasure(3, loss).unwrap(), vec![0, 1, 2]);
         let one = SensorGroup::new(Quantizer::new(b).unwrap(), Channel::ideal(2).unwrap(), vec![3]);
         System::new(scene, vec![three.unwrap(), one.unwrap()]).unwrap()
     })

@@ -179,7 +179,14 @@ fn ceo(entry: &Entry) {
         }
         None => (numbers(s2), numbers(rate)),
     };
-    close(entry, "D", bounds::ceo(number(&entry.inputs["sx2"]), &s2, &rate).unwrap().distortion, number(&entry.value));
+    close(
+        entry,
+        "D",
+        bounds::ceo(number(&entry.inputs["sx2"]), &s2, &rate)
+            .unwrap()
+            .distortion,
+        number(&entry.value),
+    );
 }
 
 fn van_trees(entry: &Entry) {

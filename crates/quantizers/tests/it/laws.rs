@@ -31,11 +31,17 @@ fn symbols(sensor: &QuantizingSensor) -> impl Iterator<Item = Symbol> + use<> {
 
 fn points(sensor: &QuantizingSensor) -> Vec<Scalar> {
     let s = sensor.noise_variance().sqrt();
-    [-60.0, -4.0, -0.3, 0.0, 1.1, 5.0, 1e9].map(|m| Scalar::from([m * s])).to_vec()
+    [-60.0, -4.0, -0.3, 0.0, 1.1, 5.0, 1e9]
+        .map(|m| Scalar::from([m * s]))
+        .to_vec()
 }
 
 fn links() -> [Link; 3] {
-    [Link::PERFECT, Link::new(0.2, 0.1).unwrap(), Link::flipping(0.5).unwrap()]
+    [
+        Link::PERFECT,
+        Link::new(0.2, 0.1).unwrap(),
+        Link::flipping(0.5).unwrap(),
+    ]
 }
 
 #[test]
@@ -95,7 +101,11 @@ fn a_symbol_through_any_channel_is_a_lawful_factor() {
 fn a_failed_measurement_is_an_error_and_not_a_level() {
     let sensor = &sensors()[0];
     let mut rng = Stream::new(1).rng();
-    assert!(sensor.encode(&mut rng, &mut (), &Scalar::from([f64::NAN]), &()).is_err());
+    assert!(
+        sensor
+            .encode(&mut rng, &mut (), &Scalar::from([f64::NAN]), &())
+            .is_err()
+    );
     assert!(QuantizingSensor::new(sensor.quantizer().clone(), Labelling::gray(8).unwrap(), 1.0).is_err());
     assert!(QuantizingSensor::new(sensor.quantizer().clone(), Labelling::gray(4).unwrap(), f64::NAN).is_err());
     let json = serde_json::to_string(sensor).unwrap();
