@@ -1,26 +1,32 @@
 //! `binary-fig5-6`: equation 5.13 for three sets of patterns, and why it misleads.
 
-use super::{Scene, check_sweep, crossing, each, sweep};
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use super::{Ratios, Scene, crossing, each, not_below};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure, reference};
 use fewbits_binary_patterns::bounds::printed_crlb;
 use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
+use garde::Validate;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-6`.
 pub struct PrintedBounds;
 
 /// Parameters of `binary-fig5-6`.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// Bits, and sensors.
+    #[garde(length(min = 1, max = 4), inner(range(min = 1, max = 5)))]
     bits: Vec<usize>,
     /// First signal-to-noise ratio, dB.
+    #[garde(range(min = -60.0, max = 60.0))]
     from_db: f64,
     /// Last signal-to-noise ratio, dB.
+    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
     to_db: f64,
     /// Step, dB.
+    #[garde(range(min = 0.01, max = 60.0))]
     step_db: f64,
 }
 
@@ -50,27 +56,75 @@ fn masks(kind: Kind, bits: usize) -> Result<Vec<Mask>, Error> {
     }
 }
 
-/// Equation 5.13 and the exact error.
-fn values(kind: Kind, bits: usize, snr: f64) -> Result<(f64, f64), Error> {
-    let bank = Scene::uniform(bits, snr)?.bank(&masks(kind, bits)?)?;
-    Ok((printed_crlb(&bank).map_err(Error::failed)?, bank.mmse().map_err(Error::failed)?))
+/// Equation 5.13.
+fn printed(kind: Kind, bits: usize, snr: f64) -> Result<f64, Error> {
+    printed_crlb(&Scene::uniform(bits, snr)?.bank(&masks(kind, bits)?)?).map_err(Error::failed)
 }
 
-fn difference(a: Kind, b: Kind, bits: usize, low: f64, high: f64) -> Result<f64, Error> {
-    let crlb = |kind, snr| -> Result<f64, Error> {
-        printed_crlb(&Scene::uniform(bits, snr)?.bank(&masks(kind, bits)?)?).map_err(Error::failed)
+fn exact(kind: Kind, bits: usize, snr: f64) -> Result<f64, Error> {
+    Scene::uniform(bits, snr)?.mmse(&masks(kind, bits)?)
+}
+
+/// Where two sets have the same value, near where the thesis's curves cross.
+fn meet(a: Kind, b: Kind, bits: usize, name: &str) -> Result<Option<f64>, Error> {
+    let Some(about) = reference::value(&format!("binary-fig5-6/crossing/{name} {bits} bits")) else {
+        return Ok(None);
     };
-    crossing(low, high, |snr| Ok(crlb(a, snr)? - crlb(b, snr)?))
+    let difference = |snr| Ok(printed(a, bits, snr)? - printed(b, bits, snr)?);
+    crossing(about - 3.0, about + 3.0, difference).map(Some)
 }
 
-/// Where the thesis's curves cross: bits, fixed with Gray, Gray with natural.
-const CROSSINGS: [(usize, f64, f64); 2] = [
-    (3, 4.973_374_255_046_639_5, 14.507_565_706_259_713),
-    (4, 6.916_634_482_651_003, 19.415_692_206_934_086),
-];
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Values and errors.
+    sets: Vec<Row>,
+    /// Crossings of equation 5.13.
+    crossings: Vec<Crossing>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    /// Bits B and sensors N.
+    bits: usize,
+    /// Signal-to-noise ratio.
+    #[schemars(extend("unit" = "dB"))]
+    snr_db: f64,
+    /// Equation 5.13, all thresholds at zero.
+    #[schemars(extend("unit" = "V^2"))]
+    crlb_fixed: f64,
+    /// Equation 5.13, natural patterns.
+    #[schemars(extend("unit" = "V^2"))]
+    crlb_natural: f64,
+    /// Equation 5.13, Gray patterns.
+    #[schemars(extend("unit" = "V^2"))]
+    crlb_gray: f64,
+    /// Exact error, all thresholds at zero.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_fixed: f64,
+    /// Exact error, natural patterns.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_natural: f64,
+    /// Exact error, Gray patterns.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_gray: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Crossing {
+    /// Bits B and sensors N.
+    bits: usize,
+    /// Where fixed and Gray cross.
+    #[schemars(extend("unit" = "dB"))]
+    fixed_gray_db: Option<f64>,
+    /// Where Gray and natural cross.
+    #[schemars(extend("unit" = "dB"))]
+    gray_natural_db: Option<f64>,
+}
 
 impl Figure for PrintedBounds {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
@@ -83,104 +137,85 @@ impl Figure for PrintedBounds {
         }
     }
 
-    fn check(&self, p: &Parameters) -> Result<(), Error> {
-        check_sweep("binary-fig5-6", p.from_db, p.to_db, p.step_db)
-    }
-
     fn quicken(&self, p: &mut Parameters) {
         p.step_db = 2.0;
     }
 
-    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("bits", "", "bits B and sensors N"),
-            column("snr_db", "dB", "signal-to-noise ratio"),
-            column("crlb_fixed", "V^2", "equation 5.13, all thresholds at zero"),
-            column("crlb_natural", "V^2", "equation 5.13, natural patterns"),
-            column("crlb_gray", "V^2", "equation 5.13, Gray patterns"),
-            column("mse_fixed", "V^2", "exact error, all thresholds at zero"),
-            column("mse_natural", "V^2", "exact error, natural patterns"),
-            column("mse_gray", "V^2", "exact error, Gray patterns"),
-        ]);
-        let mut crossings = Table::new([
-            column("bits", "", "bits B and sensors N"),
-            column("fixed_gray_db", "dB", "where fixed and Gray cross"),
-            column("gray_natural_db", "dB", "where Gray and natural cross"),
-        ]);
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
+        let (mut sets, mut crossings) = (Vec::new(), Vec::new());
         for &bits in &p.bits {
-            let points = sweep(p.from_db, p.to_db, p.step_db);
-            let rows = each(&points, |snr| {
-                Ok([
-                    values(Kind::Fixed, bits, snr)?,
-                    values(Kind::Natural, bits, snr)?,
-                    values(Kind::Gray, bits, snr)?,
-                ])
-            })?;
-            for (snr, [f, n, g]) in points.iter().zip(rows) {
-                table.push(row![bits, *snr, f.0, n.0, g.0, f.1, n.1, g.1])?;
-            }
-            if let Some((_, first, second)) = CROSSINGS.iter().find(|c| c.0 == bits) {
-                crossings.push(row![
+            let ratios = Ratios {
+                from_db: p.from_db,
+                to_db: p.to_db,
+                step_db: p.step_db,
+            };
+            sets.extend(each(&ratios.points(), |snr_db| {
+                Ok(Row {
                     bits,
-                    difference(Kind::Fixed, Kind::Gray, bits, first - 3.0, first + 3.0)?,
-                    difference(Kind::Gray, Kind::Natural, bits, second - 3.0, second + 3.0)?
-                ])?;
+                    snr_db,
+                    crlb_fixed: printed(Kind::Fixed, bits, snr_db)?,
+                    crlb_natural: printed(Kind::Natural, bits, snr_db)?,
+                    crlb_gray: printed(Kind::Gray, bits, snr_db)?,
+                    mse_fixed: exact(Kind::Fixed, bits, snr_db)?,
+                    mse_natural: exact(Kind::Natural, bits, snr_db)?,
+                    mse_gray: exact(Kind::Gray, bits, snr_db)?,
+                })
+            })?);
+            let fixed_gray_db = meet(Kind::Fixed, Kind::Gray, bits, "fixed-gray")?;
+            let gray_natural_db = meet(Kind::Gray, Kind::Natural, bits, "gray-natural")?;
+            if fixed_gray_db.is_some() {
+                crossings.push(Crossing {
+                    bits,
+                    fixed_gray_db,
+                    gray_natural_db,
+                });
             }
         }
-        Ok(Tables::from(table).with("crossings", crossings))
+        Ok(Rows { sets, crossings })
     }
 
-    fn claims(&self, p: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let mut claims = Vec::new();
-        let crossings = tables.named("crossings")?;
-        for (bits, fixed_gray, gray_natural) in CROSSINGS.iter().filter(|c| p.bits.contains(&c.0)) {
-            let own = crossings.only("bits", *bits)?;
-            claims.push(Claim::near(
-                format!("fixed-below-b{bits}"),
-                format!("with {bits} bits, the fixed threshold has the lowest value below {fixed_gray:.3} dB"),
-                own.numbers("fixed_gray_db")?[0],
-                *fixed_gray,
-                1e-3,
-            ));
-            claims.push(Claim::near(
-                format!("natural-above-b{bits}"),
-                format!("with {bits} bits, natural patterns have the lowest value above {gray_natural:.3} dB"),
-                own.numbers("gray_natural_db")?[0],
-                *gray_natural,
-                1e-3,
-            ));
-            let rows = tables.main.only("bits", *bits)?;
-            let (snr, natural, gray) =
-                (rows.numbers("snr_db")?, rows.numbers("mse_natural")?, rows.numbers("mse_gray")?);
-            let broken = (0..snr.len())
-                .filter(|&i| snr[i] > *gray_natural && natural[i] <= gray[i])
-                .count();
-            claims.push(Claim::never(
-                format!("contradiction-b{bits}"),
-                "where the formula prefers natural patterns, Gray patterns have the smaller error",
-                broken,
-            ));
-        }
-        Ok(claims)
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let what = "the fixed threshold has the lowest value below, natural patterns above the crossing";
+        let crossings = rows.crossings.iter().flat_map(|c| {
+            [("fixed-gray", c.fixed_gray_db), ("gray-natural", c.gray_natural_db)]
+                .map(|(name, at)| (format!("{name} {} bits", c.bits), at))
+        });
+        claims.references("crossing", what, crossings, |crossing| crossing);
+        let natural = |bits: usize| {
+            rows.crossings
+                .iter()
+                .find(|c| c.bits == bits)
+                .and_then(|c| c.gray_natural_db)
+        };
+        let beyond = rows
+            .sets
+            .iter()
+            .filter(|r| natural(r.bits).is_some_and(|at| r.snr_db > at));
+        let what = "where the formula prefers natural patterns, Gray patterns have the smaller error";
+        claims.all("contradiction", what, beyond, |r| r.crlb_natural < r.crlb_gray && r.mse_gray < r.mse_natural);
     }
 
-    fn plot(&self, p: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let mut panels = Vec::new();
-        for &bits in &p.bits {
-            let rows = tables.main.only("bits", bits)?;
-            for (kind, title) in [("crlb", "Equation 5.13"), ("mse", "Exact error")] {
-                let mut panel = Panel::new(
-                    format!("{title}, N = B = {bits}"),
-                    Axis::linear("signal-to-noise ratio / dB"),
-                    Axis::log("V^2"),
-                );
-                for (colour, set) in ["fixed", "natural", "gray"].into_iter().enumerate() {
-                    let points = rows.points("snr_db", &format!("{kind}_{set}"))?;
-                    panel = panel.with(Layer::line(set, points).coloured(colour));
-                }
-                panels.push(panel.legend(Legend::TopRight));
-            }
-        }
-        Ok(Plot::grid(2, panels))
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        type Column = fn(&Row) -> f64;
+        let kinds: [(&str, &str, [Column; 3]); 2] = [
+            ("Equation 5.13", "value / V²", [|r| r.crlb_fixed, |r| r.crlb_natural, |r| r.crlb_gray]),
+            ("Exact error", "mean squared error / V²", [|r| r.mse_fixed, |r| r.mse_natural, |r| r.mse_gray]),
+        ];
+        let panels = p.bits.iter().flat_map(|&bits| {
+            kinds.map(|(title, axis, columns)| {
+                let curves = ["fixed threshold", "natural patterns", "Gray patterns"]
+                    .into_iter()
+                    .zip(columns)
+                    .enumerate();
+                let own = || rows.sets.iter().filter(move |r| r.bits == bits);
+                let x = Axis::linear("signal-to-noise ratio / dB");
+                Panel::new(format!("{title}, {bits} sensors of {bits} bits"), x, Axis::log(axis)).with_all(
+                    curves.map(|(i, (label, value))| {
+                        Layer::line(label, points(own(), |r| (r.snr_db, value(r)))).coloured(i)
+                    }),
+                )
+            })
+        });
+        Plot::grid(2, panels.collect())
     }
 }

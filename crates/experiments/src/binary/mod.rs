@@ -22,16 +22,16 @@ use rayon::prelude::*;
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
-        &Old(patterns::Clipping),
-        &Old(patterns::Natural),
-        &Old(patterns::Gray),
-        &Old(patterns::Extra),
-        &Old(patterns::Response),
-        &Old(crlb::PrintedBounds),
+        &patterns::Clipping,
+        &patterns::Natural,
+        &patterns::Gray,
+        &patterns::Extra,
+        &patterns::Response,
+        &crlb::PrintedBounds,
         &Old(table5_1::Table),
         &Old(optimum::Optimum),
         &Old(decoders::Decoders),
-        &Old(gaussian::GaussianSource),
+        &gaussian::GaussianSource,
         &Old(table5_2::Table),
         &Old(feedback::Feedback),
         &Old(beyond::Beyond),
@@ -90,6 +90,28 @@ impl Scene {
     /// Exact error of the posterior mean.
     fn mmse(&self, masks: &[Mask]) -> Result<f64, Error> {
         self.bank(masks)?.mmse().map_err(Error::failed)
+    }
+}
+
+/// Signal-to-noise ratios `from, from + step, ..., to`.
+struct Ratios {
+    from_db: f64,
+    to_db: f64,
+    step_db: f64,
+}
+
+impl Ratios {
+    fn points(&self) -> Vec<f64> {
+        sweep(self.from_db, self.to_db, self.step_db)
+    }
+}
+
+/// Refuses the end of a sweep below its beginning.
+fn not_below(from: f64, to: f64) -> garde::Result {
+    if to >= from {
+        Ok(())
+    } else {
+        Err(garde::Error::new(format!("lower than from_db, {from}")))
     }
 }
 

@@ -1,27 +1,41 @@
 //! `binary-fig5-2` to `binary-fig5-5` and `binary-figB-1`: the grid, its patterns, and what noise makes of one.
 
 use super::{Scene, pattern, pattern_panel};
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
 use fewbits_binary_patterns::{
-    BinaryQuantizer, Grid, Mask, Pattern, Source, check_separation, generator_matrix, gray_basis, natural_basis,
+    BinaryQuantizer, Grid, Mask, Pattern, check_separation, generator_matrix, gray_basis, natural_basis,
 };
+use garde::Validate;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-2`.
 pub struct Clipping;
 
 /// Parameters of `binary-fig5-2`.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct ClippingParameters {
     /// Bits of the cell index.
+    #[garde(range(min = 1, max = 4))]
     bits: usize,
     /// Signal-to-noise ratio at which both readings are compared, dB.
+    #[garde(range(min = -60.0, max = 60.0))]
     snr_db: f64,
-    /// Masks of the sensors that are compared.
+    /// Masks of the sensors that are compared, below 2^bits.
+    #[garde(length(min = 1, max = 10), inner(range(min = 1, max = 15)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
     masks: Vec<Mask>,
+}
+
+/// Refuses a mask of more digits than there are bits.
+fn fits(mask: Mask, bits: usize) -> garde::Result {
+    if u64::from(mask) < 1 << bits {
+        Ok(())
+    } else {
+        Err(garde::Error::new(format!("not below 2^{bits}")))
+    }
 }
 
 impl Default for ClippingParameters {
@@ -34,8 +48,38 @@ impl Default for ClippingParameters {
     }
 }
 
+/// The tables of `binary-fig5-2`.
+#[derive(Serialize, JsonSchema)]
+pub struct Clipped {
+    /// Cells along the axis.
+    cells: Vec<Cell>,
+    /// What the rule costs.
+    errors: Vec<Rule>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Cell {
+    /// Measurement.
+    #[schemars(extend("unit" = "V"))]
+    y: f64,
+    /// Cell of the measurement, from 1.
+    cell: usize,
+    /// The same with the printed sides of the clipping rule.
+    cell_swapped: usize,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Rule {
+    /// Clipping rule.
+    rule: &'static str,
+    /// Exact error of the posterior mean.
+    #[schemars(extend("unit" = "V^2"))]
+    mse: f64,
+}
+
 impl Figure for Clipping {
     type Parameters = ClippingParameters;
+    type Tables = Clipped;
 
     fn about(&self) -> About {
         About {
@@ -47,162 +91,146 @@ impl Figure for Clipping {
         }
     }
 
-    fn run(&self, p: &ClippingParameters, _: &Context<'_>) -> Result<Tables, Error> {
+    fn run(&self, p: &ClippingParameters, _: &Context<'_>) -> Result<Clipped, Error> {
         let grid = Grid::uniform(1.0, p.bits).map_err(Error::failed)?;
-        let cells = grid.cells();
-        let mut table = Table::new([
-            column("y", "V", "measurement"),
-            column("cell", "", "cell of the measurement, from 1"),
-            column("cell_swapped", "", "the same with the printed sides of the clipping rule"),
-        ]);
-        for i in -150..=150 {
+        let count = grid.cells();
+        let place = |i: i32| {
             let y = f64::from(i) / 100.0;
             let cell = grid.locate(y).map_err(Error::failed)?;
-            let swapped = if y < -1.0 {
-                cells - 1
-            } else if y > 1.0 {
-                0
-            } else {
-                cell
+            let swapped = match y {
+                y if y < -1.0 => count - 1,
+                y if y > 1.0 => 0,
+                _ => cell,
             };
-            table.push(row![y, cell + 1, swapped + 1])?;
-        }
-        let mut errors = Table::new([
-            column("rule", "", "clipping rule"),
-            column("mse", "V^2", "exact error of the posterior mean with these masks"),
-        ]);
+            Ok(Cell {
+                y,
+                cell: cell + 1,
+                cell_swapped: swapped + 1,
+            })
+        };
+        let cells = (-150..=150).map(place).collect::<Result<_, Error>>()?;
         let scene = Scene::uniform(p.bits, p.snr_db)?;
-        errors.push(row!["nearest outer cell", scene.mmse(&p.masks)?])?;
+        let all = scene.search(p.masks.len())?.ranking().map_err(Error::failed)?;
+        let own = scene.mmse(&p.masks)?;
         // The swapped rule is a pattern over a grid with two more cells, which carry the opposite end's bit.
-        let mut edges = vec![-1.0];
-        edges.extend(grid.breakpoints());
-        edges.push(1.0);
+        let edges = [-1.0]
+            .into_iter()
+            .chain(grid.breakpoints().iter().copied())
+            .chain([1.0])
+            .collect();
         let wide = Scene {
             grid: Grid::from_breakpoints(edges).map_err(Error::failed)?,
             ..scene
         };
-        let swapped_mse = |masks: &[Mask]| -> Result<f64, Error> {
-            let patterns = masks
-                .iter()
-                .map(|&mask| {
-                    let inner = pattern(mask, p.bits)?;
-                    let mut bits = vec![inner.bits()[cells - 1]];
-                    bits.extend(inner.bits());
-                    bits.push(inner.bits()[0]);
-                    Pattern::new(bits).map_err(Error::failed)
-                })
-                .collect::<Result<Vec<_>, _>>()?;
+        let swapped = |masks: &[Mask]| -> Result<f64, Error> {
+            let turned = |&mask: &Mask| {
+                let inner = pattern(mask, p.bits)?;
+                let mut bits = vec![inner.bits()[count - 1]];
+                bits.extend(inner.bits());
+                bits.push(inner.bits()[0]);
+                Pattern::new(bits).map_err(Error::failed)
+            };
+            let patterns = masks.iter().map(turned).collect::<Result<Vec<_>, _>>()?;
             wide.pattern_bank(&patterns)?.mmse().map_err(Error::failed)
         };
-        errors.push(row!["sides swapped", swapped_mse(&p.masks)?])?;
-        let all = Scene::uniform(p.bits, p.snr_db)?
-            .search(p.masks.len())?
-            .ranking()
-            .map_err(Error::failed)?;
         let best = all
             .par_iter()
-            .map(|set| swapped_mse(&set.masks))
+            .map(|set| swapped(&set.masks))
             .collect::<Result<Vec<_>, _>>()?;
-        errors.push(row![
-            "sides swapped, best masks for that",
-            crate::legacy::claim::smallest(best)
-        ])?;
-        Ok(Tables::from(table).with("errors", errors))
+        let errors = vec![
+            Rule {
+                rule: "nearest outer cell",
+                mse: own,
+            },
+            Rule {
+                rule: "sides swapped",
+                mse: swapped(&p.masks)?,
+            },
+            Rule {
+                rule: "sides swapped, best masks for that",
+                mse: best.into_iter().fold(f64::INFINITY, f64::min),
+            },
+        ];
+        Ok(Clipped { cells, errors })
     }
 
-    fn claims(&self, _: &ClippingParameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let cells = tables.main.numbers("cell")?;
-        let errors = tables.named("errors")?.numbers("mse")?;
-        Ok(vec![
-            Claim::never(
-                "monotone",
-                "the cell never decreases with the measurement",
-                cells.windows(2).filter(|w| w[1] < w[0]).count(),
-            ),
-            Claim::near_relative(
-                "optimum",
-                "the best eight patterns at 18.2 dB",
-                errors[0],
-                0.003_119_112_724_490_280_5,
-                1e-8,
-            )
-            .at_defaults(),
-            Claim::near(
-                "swapped",
-                "with the printed sides even the best masks are thirteen times worse (erratum binary-1)",
-                errors[2],
-                0.0409,
-                5e-4,
-            )
-            .at_defaults(),
-        ])
+    fn claims(&self, _: &ClippingParameters, tables: &Clipped, claims: &mut Claims) {
+        let what = "the cell never decreases with the measurement";
+        claims.all("monotone", what, tables.cells.windows(2), |w| w[1].cell >= w[0].cell);
+        let what = "the best eight patterns at 18.2 dB; with the printed sides even the best masks are thirteen times worse (erratum \
+                    binary-1)";
+        claims.references("mse", what, &tables.errors, |r| (r.rule.to_owned(), r.mse));
     }
 
-    fn plot(&self, p: &ClippingParameters, tables: &Tables) -> Result<Plot, Error> {
-        let top = (1u32 << p.bits) as f64;
-        Ok(Plot::of(
-            Panel::new(
-                "Cell of a measurement",
-                Axis::linear("measurement y / V"),
-                Axis::linear("cell").between(0.0, top + 2.8),
-            )
-            .with(Layer::dashed("sides as printed", tables.main.points("y", "cell_swapped")?).coloured(1))
-            .with(Layer::line("nearest outer cell", tables.main.points("y", "cell")?).coloured(0))
-            .legend(Legend::TopLeft),
-        ))
+    fn plot(&self, _: &ClippingParameters, tables: &Clipped) -> Plot {
+        let curve = |cell: fn(&Cell) -> usize| points(&tables.cells, |c| (c.y, cell(c) as f64));
+        let panel = Panel::new("Cell of a measurement", Axis::linear("measurement y / V"), Axis::linear("cell"));
+        Plot::of(
+            panel
+                .with(Layer::dashed("sides as printed", curve(|c| c.cell_swapped)).coloured(1))
+                .with(Layer::line("nearest outer cell", curve(|c| c.cell)).coloured(0)),
+        )
     }
 }
 
-fn bits_table(rows: &[(String, Mask)], bits: usize) -> Result<Table, Error> {
-    let mut table = Table::new([
-        column("pattern", "", "name"),
-        column("mask", "", "which natural patterns are XORed, the first the most significant digit"),
-        column("l", "", "cell, from 1"),
-        column("bit", "", "bit sent from the cell"),
-    ]);
+/// A bit of a pattern.
+#[derive(Serialize, JsonSchema)]
+pub struct Bit {
+    /// Name.
+    pattern: String,
+    /// Which natural patterns are XORed, the first the most significant digit.
+    mask: Mask,
+    /// Cell, from 1.
+    l: usize,
+    /// Bit sent from the cell.
+    bit: u32,
+}
+
+fn bits_of(rows: impl IntoIterator<Item = (String, Mask)>, bits: usize) -> Result<Vec<Bit>, Error> {
+    let mut table = Vec::new();
     for (name, mask) in rows {
-        for (l, bit) in pattern(*mask, bits)?.bits().iter().enumerate() {
-            table.push(row![name.as_str(), *mask, l + 1, u32::from(*bit)])?;
+        for (l, bit) in pattern(mask, bits)?.bits().iter().enumerate() {
+            table.push(Bit {
+                pattern: name.clone(),
+                mask,
+                l: l + 1,
+                bit: u32::from(*bit),
+            });
         }
     }
     Ok(table)
 }
 
-fn bits_plot(title: &str, rows: &[(String, Mask)], bits: usize) -> Result<Plot, Error> {
-    let named = rows
-        .iter()
-        .map(|(name, mask)| Ok((name.clone(), pattern(*mask, bits)?)))
-        .collect::<Result<Vec<_>, Error>>()?;
-    Ok(Plot::of(pattern_panel(title, &named)))
+/// Names and bits of the patterns of a table.
+fn strings(table: &[Bit]) -> Vec<(&str, String)> {
+    let digits = |chunk: &[Bit]| chunk.iter().map(|b| b.bit.to_string()).collect::<String>();
+    table
+        .chunk_by(|a, b| a.pattern == b.pattern)
+        .map(|chunk| (chunk[0].pattern.as_str(), digits(chunk)))
+        .collect()
 }
 
-/// The bits of the table as strings, pattern after pattern.
-fn strings(tables: &Tables, bits: usize) -> Result<Vec<String>, Error> {
-    let digits = tables.main.texts("bit")?;
-    Ok(digits.chunks(1 << bits).map(|c| c.concat()).collect())
+fn bits_plot(title: &str, table: &[Bit]) -> Plot {
+    let parsed = |(name, digits): (&str, String)| Some((name.to_owned(), digits.parse().ok()?));
+    Plot::of(pattern_panel(title, &strings(table).into_iter().filter_map(parsed).collect::<Vec<_>>()))
 }
 
-fn mismatches(ours: &[String], printed: &[&str]) -> usize {
-    ours.len().abs_diff(printed.len()) + ours.iter().zip(printed).filter(|(a, b)| a != b).count()
-}
-
-fn check_bits(figure: &'static str, bits: usize) -> Result<(), Error> {
-    if (1..=8).contains(&bits) {
-        return Ok(());
-    }
-    Err(Error::BadParameter {
-        figure,
-        name: "bits".into(),
-        value: bits.to_string(),
-        expected: "1 to 8".into(),
-    })
+/// Claims that the patterns are the printed ones.
+fn claim_printed(claims: &mut Claims, what: &str, table: &[Bit], printed: &[&str]) {
+    let ours = strings(table);
+    claims
+        .all("bits", what, printed.iter().enumerate(), |(i, bits)| {
+            ours.get(i).is_some_and(|(_, own)| own == bits)
+        })
+        .at_defaults();
 }
 
 /// Parameters of the pattern pictures.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct BitsParameters {
     /// Bits of the cell index.
+    #[garde(range(min = 1, max = 8))]
     bits: usize,
 }
 
@@ -212,20 +240,20 @@ impl Default for BitsParameters {
     }
 }
 
+/// Numbers patterns after their kind.
+fn numbered(kind: &str, masks: Vec<Mask>) -> impl Iterator<Item = (String, Mask)> {
+    masks
+        .into_iter()
+        .enumerate()
+        .map(move |(b, mask)| (format!("{kind}{}", b + 1), mask))
+}
+
 /// `binary-fig5-3`.
 pub struct Natural;
 
-fn natural_rows(bits: usize) -> Result<Vec<(String, Mask)>, Error> {
-    let masks = natural_basis(bits).map_err(Error::failed)?;
-    Ok(masks
-        .into_iter()
-        .enumerate()
-        .map(|(b, mask)| (format!("N{}", b + 1), mask))
-        .collect())
-}
-
 impl Figure for Natural {
     type Parameters = BitsParameters;
+    type Tables = Vec<Bit>;
 
     fn about(&self) -> About {
         About {
@@ -236,46 +264,31 @@ impl Figure for Natural {
         }
     }
 
-    fn check(&self, p: &BitsParameters) -> Result<(), Error> {
-        check_bits("binary-fig5-3", p.bits)
+    fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
+        bits_of(numbered("N", natural_basis(p.bits).map_err(Error::failed)?), p.bits)
     }
 
-    fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Tables, Error> {
-        Ok(bits_table(&natural_rows(p.bits)?, p.bits)?.into())
-    }
-
-    fn claims(&self, p: &BitsParameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let ours = strings(tables, p.bits)?;
+    fn claims(&self, _: &BitsParameters, table: &Vec<Bit>, claims: &mut Claims) {
         let printed = [
             "0000000011111111",
             "0000111100001111",
             "0011001100110011",
             "0101010101010101",
         ];
-        Ok(vec![
-            Claim::never("bits", "the patterns are those printed", mismatches(&ours, &printed)).at_defaults(),
-        ])
+        claim_printed(claims, "the patterns are those printed", table, &printed);
     }
 
-    fn plot(&self, p: &BitsParameters, _: &Tables) -> Result<Plot, Error> {
-        bits_plot("Natural patterns", &natural_rows(p.bits)?, p.bits)
+    fn plot(&self, _: &BitsParameters, table: &Vec<Bit>) -> Plot {
+        bits_plot("Natural patterns", table)
     }
 }
 
 /// `binary-fig5-4`.
 pub struct Gray;
 
-fn gray_rows(bits: usize) -> Result<Vec<(String, Mask)>, Error> {
-    let masks = gray_basis(bits).map_err(Error::failed)?;
-    Ok(masks
-        .into_iter()
-        .enumerate()
-        .map(|(b, mask)| (format!("G{}", b + 1), mask))
-        .collect())
-}
-
 impl Figure for Gray {
     type Parameters = BitsParameters;
+    type Tables = Vec<Bit>;
 
     fn about(&self) -> About {
         About {
@@ -287,38 +300,28 @@ impl Figure for Gray {
         }
     }
 
-    fn check(&self, p: &BitsParameters) -> Result<(), Error> {
-        check_bits("binary-fig5-4", p.bits)
+    fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
+        bits_of(numbered("G", gray_basis(p.bits).map_err(Error::failed)?), p.bits)
     }
 
-    fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Tables, Error> {
-        Ok(bits_table(&gray_rows(p.bits)?, p.bits)?.into())
-    }
-
-    fn claims(&self, p: &BitsParameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let ours = strings(tables, p.bits)?;
+    fn claims(&self, p: &BitsParameters, table: &Vec<Bit>, claims: &mut Claims) {
         let printed = [
             "0000000011111111",
             "0000111111110000",
             "0011110000111100",
             "0110011001100110",
         ];
-        let rows = generator_matrix(&gray_basis(p.bits).map_err(Error::failed)?, p.bits).map_err(Error::failed)?;
-        let distances = rows
-            .windows(2)
-            .map(|w| w[0].iter().zip(&w[1]).filter(|(a, b)| a != b).count());
-        Ok(vec![
-            Claim::never("bits", "the patterns are those printed", mismatches(&ours, &printed)).at_defaults(),
-            Claim::never(
-                "adjacent",
-                "neighbouring cells differ in exactly one bit",
-                distances.filter(|d| *d != 1).count(),
-            ),
-        ])
+        claim_printed(claims, "the patterns are those printed", table, &printed);
+        let matrix = gray_basis(p.bits)
+            .and_then(|basis| generator_matrix(&basis, p.bits))
+            .unwrap_or_default();
+        let what = "neighbouring cells differ in exactly one bit";
+        claims
+            .all("adjacent", what, matrix.windows(2), |w| w[0].iter().zip(&w[1]).filter(|(a, b)| a != b).count() == 1);
     }
 
-    fn plot(&self, p: &BitsParameters, _: &Tables) -> Result<Plot, Error> {
-        bits_plot("Gray patterns", &gray_rows(p.bits)?, p.bits)
+    fn plot(&self, _: &BitsParameters, table: &Vec<Bit>) -> Plot {
+        bits_plot("Gray patterns", table)
     }
 }
 
@@ -326,12 +329,14 @@ impl Figure for Gray {
 pub struct Extra;
 
 /// Parameters of `binary-fig5-5`.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct ExtraParameters {
     /// Bits of the cell index.
+    #[garde(range(min = 1, max = 8))]
     bits: usize,
-    /// Masks beyond the Gray basis.
+    /// Masks beyond the Gray basis, below 2^bits.
+    #[garde(length(min = 1, max = 20), inner(range(min = 1, max = 255)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
     extra: Vec<Mask>,
 }
 
@@ -344,14 +349,9 @@ impl Default for ExtraParameters {
     }
 }
 
-impl ExtraParameters {
-    fn rows(&self) -> Vec<(String, Mask)> {
-        self.extra.iter().map(|&mask| (format!("mask {mask}"), mask)).collect()
-    }
-}
-
 impl Figure for Extra {
     type Parameters = ExtraParameters;
+    type Tables = Vec<Bit>;
 
     fn about(&self) -> About {
         About {
@@ -363,48 +363,29 @@ impl Figure for Extra {
         }
     }
 
-    fn check(&self, p: &ExtraParameters) -> Result<(), Error> {
-        check_bits("binary-fig5-5", p.bits)
+    fn run(&self, p: &ExtraParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
+        bits_of(p.extra.iter().map(|&mask| (format!("mask {mask}"), mask)), p.bits)
     }
 
-    fn run(&self, p: &ExtraParameters, _: &Context<'_>) -> Result<Tables, Error> {
-        Ok(bits_table(&p.rows(), p.bits)?.into())
-    }
-
-    fn claims(&self, p: &ExtraParameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let ours = strings(tables, p.bits)?;
+    fn claims(&self, p: &ExtraParameters, table: &Vec<Bit>, claims: &mut Claims) {
         let printed = ["0011110011000011", "0101101001011010", "0110011010011001"];
-        let mut masks = gray_basis(p.bits).map_err(Error::failed)?;
-        masks.extend(&p.extra);
-        let all = masks
-            .iter()
-            .map(|&mask| pattern(mask, p.bits))
-            .collect::<Result<Vec<_>, _>>()?;
+        claim_printed(claims, "the patterns are columns 5 to 7 of matrix (5.6)", table, &printed);
+        let masks = gray_basis(p.bits)
+            .unwrap_or_default()
+            .into_iter()
+            .chain(p.extra.iter().copied());
+        let all: Option<Vec<Pattern>> = masks.map(|mask| pattern(mask, p.bits).ok()).collect();
+        let what = "with the Gray basis they separate all cells";
+        claims.all("separating", what, all, |patterns| check_separation(&patterns).is_ok());
         // Independent over GF(2), yet two cells carry the same column: footnote 2 of the thesis holds for linear patterns only.
-        let counterexample = ["00001111", "00110000", "01000000"]
-            .iter()
-            .map(|text| text.parse::<Pattern>())
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(Error::failed)?;
-        Ok(vec![
-            Claim::never("bits", "the patterns are columns 5 to 7 of matrix (5.6)", mismatches(&ours, &printed))
-                .at_defaults(),
-            Claim::never(
-                "separating",
-                "with the Gray basis they separate all cells",
-                usize::from(check_separation(&all).is_err()),
-            ),
-            Claim::at_least(
-                "independence",
-                "independent patterns that are not linear need not separate the cells (erratum binary-3)",
-                f64::from(u8::from(check_separation(&counterexample).is_err())),
-                1.0,
-            ),
-        ])
+        let texts = ["00001111", "00110000", "01000000"];
+        let counterexample: Option<Vec<Pattern>> = texts.iter().map(|text| text.parse().ok()).collect();
+        let what = "independent patterns that are not linear need not separate the cells (erratum binary-3)";
+        claims.all("independence", what, counterexample, |patterns| check_separation(&patterns).is_err());
     }
 
-    fn plot(&self, p: &ExtraParameters, _: &Tables) -> Result<Plot, Error> {
-        bits_plot("Further linear patterns", &p.rows(), p.bits)
+    fn plot(&self, _: &ExtraParameters, table: &Vec<Bit>) -> Plot {
+        bits_plot("Further linear patterns", table)
     }
 }
 
@@ -412,12 +393,14 @@ impl Figure for Extra {
 pub struct Response;
 
 /// Parameters of `binary-figB-1`.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct ResponseParameters {
-    /// Where the bit changes, in units of V.
+    /// Where the bit changes, in units of V, increasing.
+    #[garde(length(min = 1, max = 100), inner(range(min = -10.0, max = 10.0)))]
     thresholds: Vec<f64>,
     /// Noise standard deviation, in units of V.
+    #[garde(range(min = 1e-6, max = 1e3))]
     noise_std: f64,
 }
 
@@ -430,8 +413,23 @@ impl Default for ResponseParameters {
     }
 }
 
+#[derive(Serialize, JsonSchema)]
+pub struct Answer {
+    /// Source.
+    #[schemars(extend("unit" = "V"))]
+    x: f64,
+    /// Bit without noise.
+    bit: u32,
+    /// Probability of a 1.
+    p1: f64,
+    /// Fisher information about x in the bit.
+    #[schemars(extend("unit" = "1/V^2"))]
+    information: f64,
+}
+
 impl Figure for Response {
     type Parameters = ResponseParameters;
+    type Tables = Vec<Answer>;
 
     fn about(&self) -> About {
         About {
@@ -443,60 +441,39 @@ impl Figure for Response {
         }
     }
 
-    fn run(&self, p: &ResponseParameters, _: &Context<'_>) -> Result<Tables, Error> {
+    fn run(&self, p: &ResponseParameters, _: &Context<'_>) -> Result<Vec<Answer>, Error> {
         let quantizer = BinaryQuantizer::new(p.thresholds.clone()).map_err(Error::failed)?;
-        let noise = fewbits_numerics::error::positive("noise_std", p.noise_std)?;
-        // Only checks that the source the axis stands for exists.
-        Source::uniform(1.0).map_err(Error::failed)?;
-        let mut table = Table::new([
-            column("x", "V", "source"),
-            column("bit", "", "bit without noise"),
-            column("p1", "", "probability of a 1"),
-            column("information", "1/V^2", "Fisher information about x in the bit"),
-        ]);
-        for i in 0..=800 {
+        let at = |i: i32| {
             let x = -1.0 + f64::from(i) / 400.0;
-            let bit = u32::from(quantizer.encode(x).map_err(Error::failed)?);
-            let p1 = quantizer.probabilities(x, noise)[1];
-            table.push(row![x, bit, p1, quantizer.fisher_information(x, noise)])?;
-        }
-        Ok(table.into())
+            Ok(Answer {
+                x,
+                bit: u32::from(quantizer.encode(x).map_err(Error::failed)?),
+                p1: quantizer.probabilities(x, p.noise_std)[1],
+                information: quantizer.fisher_information(x, p.noise_std),
+            })
+        };
+        (0..=800).map(at).collect()
     }
 
-    fn claims(&self, p: &ResponseParameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let p1 = tables.main.points("x", "p1")?;
-        let at_edges = p.thresholds.iter().map(|t| {
-            let nearest = p1.iter().min_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
-            nearest.map_or(1.0, |point| (point.1 - 0.5).abs())
-        });
-        Ok(vec![
-            Claim::at_most(
-                "half",
-                "at an edge far from the others both bits are equally likely",
-                crate::legacy::claim::largest(at_edges),
-                2e-3,
-            )
-            .at_defaults(),
-            Claim::never(
-                "probabilities",
-                "all values are probabilities",
-                p1.iter().filter(|v| !(0.0..=1.0).contains(&v.1)).count(),
-            ),
-        ])
+    fn claims(&self, p: &ResponseParameters, rows: &Vec<Answer>, claims: &mut Claims) {
+        let what = "at an edge far from the others both bits are equally likely";
+        claims
+            .all("half", what, &p.thresholds, |t| {
+                let nearest = rows.iter().min_by(|a, b| (a.x - *t).abs().total_cmp(&(b.x - *t).abs()));
+                nearest.is_some_and(|r| (r.p1 - 0.5).abs() <= 2e-3)
+            })
+            .at_defaults();
+        claims.all("probabilities", "all values are probabilities", rows, |r| (0.0..=1.0).contains(&r.p1));
     }
 
-    fn plot(&self, _: &ResponseParameters, tables: &Tables) -> Result<Plot, Error> {
-        let x = || Axis::linear("x / V");
-        Ok(Plot::grid(
-            2,
-            vec![
-                Panel::new("Probability of a 1", x(), Axis::linear("P(1|x)").between(-0.05, 1.25))
-                    .with(Layer::dashed("without noise", tables.main.points("x", "bit")?).coloured(7))
-                    .with(Layer::line("with noise", tables.main.points("x", "p1")?).coloured(0)),
-                Panel::new("Information in the bit", x(), Axis::linear("Fisher information / V^-2"))
-                    .with(Layer::line("", tables.main.points("x", "information")?).coloured(1))
-                    .legend(Legend::Hidden),
-            ],
-        ))
+    fn plot(&self, _: &ResponseParameters, rows: &Vec<Answer>) -> Plot {
+        let x = || Axis::linear("source x / V");
+        let probability = Panel::new("Probability of a 1", x(), Axis::linear("P(1 | x)"))
+            .with(Layer::dashed("without noise", points(rows, |r| (r.x, f64::from(r.bit)))).coloured(7))
+            .with(Layer::line("with noise", points(rows, |r| (r.x, r.p1))).coloured(0));
+        let information = Panel::new("Information in the bit", x(), Axis::linear("Fisher information / V⁻²"))
+            .with(Layer::line("", points(rows, |r| (r.x, r.information))).coloured(1))
+            .legend(Legend::Hidden);
+        Plot::grid(2, vec![probability, information])
     }
 }
