@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 
 /// Steady variances of a scalar filter, in state units squared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct ScalarSteadyState {
     /// Variance `P` before a message.
     pub predicted_variance: f64,
@@ -54,7 +53,6 @@ pub fn scalar_steady_state(
 
 /// Steady covariances of a vector filter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct SteadyState<const D: usize> {
     /// Covariance before a measurement: the stabilising root of the discrete algebraic Riccati equation.
     pub predicted_covariance: SMatrix<f64, D, D>,
