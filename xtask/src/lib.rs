@@ -8,6 +8,7 @@
 //!
 //! No mathematics here: an experiment computes, this crate writes and draws.
 
+pub mod alone;
 pub mod bench;
 pub mod figures;
 pub mod tidy;

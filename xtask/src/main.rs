@@ -18,6 +18,8 @@ enum Task {
     Figures(xtask::figures::Options),
     /// Run the benchmarks and print each as a multiple of its unit.
     Bench(xtask::bench::Options),
+    /// Build every crate as a user would depend on it, outside the workspace, and run its examples.
+    Alone(xtask::alone::Options),
     /// Check the house rules.
     Tidy,
 }
@@ -27,6 +29,9 @@ fn main() -> ExitCode {
     let done = match Cli::parse().task {
         Task::Figures(options) => xtask::figures::run(&options).map_err(|error| error.to_string()),
         Task::Bench(options) => xtask::bench::run(&options)
+            .map(ended)
+            .map_err(|error| error.to_string()),
+        Task::Alone(options) => xtask::alone::run(&options)
             .map(ended)
             .map_err(|error| error.to_string()),
         Task::Tidy => xtask::tidy::run().map(ended).map_err(|error| error.to_string()),

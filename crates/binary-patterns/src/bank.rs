@@ -1,12 +1,13 @@
-//! A source heard through a bank of one-bit sensors, and the exact enumeration of what it may say.
+//! A source observed through a bank of one-bit sensors, and the exact enumeration of what they may report.
 
 use super::BinaryQuantizer;
-use super::grid::noise_in_range;
+use super::source::noise_in_range;
 use super::source::{Blur, Nodes, Source};
 use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::quadrature::gauss_legendre;
+use serde::{Deserialize, Serialize};
 
 /// Most outcomes that may be enumerated.
 pub const MAX_OUTCOMES: u128 = 1 << 26;
@@ -17,14 +18,40 @@ pub const IMPOSSIBLE: f64 = 1e-290;
 /// Panel width in noise standard deviations; with twelve nodes the integrals are good to `1e-12`.
 const PANEL: f64 = 2.0;
 
-/// One sensor: what it measures is `Y = X + N(0, noise_std^2)`, what it says is the bit of its quantizer.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sensor {
+/// One sensor: what it measures is `Y = X + N(0, noise_std^2)`, what it reports is the bit of its quantizer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredSensor", into = "StoredSensor")]
+pub struct PatternSensor {
     quantizer: BinaryQuantizer,
     noise_std: f64,
 }
 
-impl Sensor {
+/// The stored form of a sensor.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredSensor {
+    quantizer: BinaryQuantizer,
+    noise_std: f64,
+}
+
+impl From<PatternSensor> for StoredSensor {
+    fn from(sensor: PatternSensor) -> Self {
+        Self {
+            quantizer: sensor.quantizer,
+            noise_std: sensor.noise_std,
+        }
+    }
+}
+
+impl TryFrom<StoredSensor> for PatternSensor {
+    type Error = Error;
+
+    fn try_from(stored: StoredSensor) -> Result<Self, Error> {
+        Self::new(stored.quantizer, stored.noise_std)
+    }
+}
+
+impl PatternSensor {
     /// A sensor from its quantizer and the standard deviation (not the variance) of its noise.
     ///
     /// # Errors
@@ -60,23 +87,49 @@ impl Sensor {
     }
 }
 
-/// A source and the sensors that hear it, their noises independent.
+/// A source and the sensors that measure it, their noises independent.
 ///
-/// Sensors with equal quantizer and noise are exchangeable: only how many of them say 1 matters. The bank groups them, so
+/// Sensors with equal quantizer and noise are exchangeable: only how many of them report 1 matters. The bank groups them, so
 /// that fifty sensors in three groups of 17, 16 and 17 have 5508 outcomes instead of `2^50`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredBank", into = "StoredBank")]
 pub struct Bank {
     source: Source,
-    groups: Vec<Group>,
-    /// Group of each sensor, in the order given.
+    groups: Vec<Exchangeable>,
+    /// Exchangeable of each sensor, in the order given.
     membership: Vec<usize>,
 }
 
 /// Exchangeable sensors.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Group {
-    pub sensor: Sensor,
+pub(crate) struct Exchangeable {
+    pub sensor: PatternSensor,
     pub count: usize,
+}
+
+/// The stored form of a bank.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredBank {
+    source: Source,
+    sensors: Vec<PatternSensor>,
+}
+
+impl From<Bank> for StoredBank {
+    fn from(bank: Bank) -> Self {
+        Self {
+            source: bank.source,
+            sensors: (0..bank.sensors()).map(|n| bank.sensor(n).clone()).collect(),
+        }
+    }
+}
+
+impl TryFrom<StoredBank> for Bank {
+    type Error = Error;
+
+    fn try_from(stored: StoredBank) -> Result<Self, Error> {
+        Self::new(stored.source, stored.sensors)
+    }
 }
 
 impl Bank {
@@ -84,15 +137,15 @@ impl Bank {
     ///
     /// # Errors
     /// If there is no sensor.
-    pub fn new(source: Source, sensors: Vec<Sensor>) -> Result<Self, Error> {
+    pub fn new(source: Source, sensors: Vec<PatternSensor>) -> Result<Self, Error> {
         at_least_one("sensors", sensors.len())?;
-        let mut groups: Vec<Group> = Vec::new();
+        let mut groups: Vec<Exchangeable> = Vec::new();
         let mut membership = Vec::with_capacity(sensors.len());
         for sensor in sensors {
             let group = match groups.iter().position(|g| g.sensor == sensor) {
                 Some(at) => at,
                 None => {
-                    groups.push(Group { sensor, count: 0 });
+                    groups.push(Exchangeable { sensor, count: 0 });
                     groups.len() - 1
                 }
             };
@@ -113,7 +166,7 @@ impl Bank {
     pub fn homogeneous(source: Source, quantizers: Vec<BinaryQuantizer>, noise_std: f64) -> Result<Self, Error> {
         let sensors = quantizers
             .into_iter()
-            .map(|quantizer| Sensor::new(quantizer, noise_std))
+            .map(|quantizer| PatternSensor::new(quantizer, noise_std))
             .collect::<Result<_, _>>()?;
         Self::new(source, sensors)
     }
@@ -128,7 +181,12 @@ impl Bank {
         self.membership.len()
     }
 
-    pub(crate) fn groups(&self) -> &[Group] {
+    /// Sensor `n`, which must be there.
+    pub(crate) fn sensor(&self, n: usize) -> &PatternSensor {
+        &self.groups[self.membership[n]].sensor
+    }
+
+    pub(crate) fn groups(&self) -> &[Exchangeable] {
         &self.groups
     }
 
@@ -181,7 +239,7 @@ impl Bank {
     pub(crate) fn blurs(&self) -> Vec<Blur> {
         self.groups
             .iter()
-            .flat_map(|g| g.sensor.quantizer.thresholds().iter().map(|&t| (t, g.sensor.noise_std)))
+            .flat_map(|g| g.sensor.quantizer.breakpoints().iter().map(|&t| (t, g.sensor.noise_std)))
             .collect()
     }
 
@@ -253,7 +311,7 @@ pub(crate) struct CountTable {
 const LOG_COUNT: usize = 60;
 
 impl CountTable {
-    pub fn new(sensor: &Sensor, count: usize, nodes: &Nodes) -> Self {
+    pub fn new(sensor: &PatternSensor, count: usize, nodes: &Nodes) -> Self {
         let p: Vec<[f64; 2]> = nodes.x.iter().map(|&x| sensor.probabilities(x)).collect();
         Self::from_probabilities(&p, count)
     }
@@ -338,7 +396,7 @@ mod tests {
         let source = Source::uniform(1.0).unwrap();
         assert!(Bank::new(source, vec![]).is_err());
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(Sensor::new(sign(), bad).is_err());
+            assert!(PatternSensor::new(sign(), bad).is_err());
         }
         let distinct = (0..27)
             .map(|i| BinaryQuantizer::new(vec![f64::from(i)]).unwrap())

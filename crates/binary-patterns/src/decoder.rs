@@ -2,8 +2,11 @@
 
 use super::bank::{Bank, IMPOSSIBLE};
 use super::source::Nodes;
-use super::{Grid, continuous_map};
+use super::{Bit, Grid, continuous_map};
 use crate::Error;
+use fewbits_core::Observation;
+use fewbits_numerics::ArgumentError;
+use serde::{Deserialize, Serialize};
 
 /// Probabilities below this are taken as this when their logarithm is multiplied by a count that may be zero.
 const FLOOR: f64 = 1e-300;
@@ -31,13 +34,76 @@ pub enum Decoder<'a> {
 }
 
 /// Estimates for every outcome of a bank.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredTable", into = "StoredTable")]
 pub struct LookupTable {
     bank: Bank,
     estimates: Vec<f64>,
 }
 
+/// The stored form of a table.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredTable {
+    bank: Bank,
+    estimates: Vec<f64>,
+}
+
+impl From<LookupTable> for StoredTable {
+    fn from(table: LookupTable) -> Self {
+        Self {
+            bank: table.bank,
+            estimates: table.estimates,
+        }
+    }
+}
+
+impl TryFrom<StoredTable> for LookupTable {
+    type Error = Error;
+
+    fn try_from(stored: StoredTable) -> Result<Self, Error> {
+        fewbits_numerics::error::all_finite("estimates", &stored.estimates)?;
+        let outcomes = stored.bank.checked_outcomes()?;
+        if stored.estimates.len() != outcomes {
+            let given = format!("{} estimates", stored.estimates.len());
+            return Err(ArgumentError::new("estimates", given, format!("{outcomes}, one per outcome")).into());
+        }
+        Ok(Self {
+            bank: stored.bank,
+            estimates: stored.estimates,
+        })
+    }
+}
+
 impl LookupTable {
+    /// The estimate from one observation per sensor. Where a bit is missing (these sensors always report, so that nothing
+    /// received, like an erasure, says nothing) it is the posterior mean given the others, whatever the table's decoder.
+    ///
+    /// # Errors
+    /// If the number of observations is not the number of sensors.
+    pub fn decode(&self, observations: &[Observation<Bit>]) -> Result<f64, Error> {
+        let bits: Vec<bool> = observations.iter().filter_map(|o| o.received().map(|bit| bit.0)).collect();
+        if bits.len() == observations.len() {
+            return self.estimate(&bits);
+        }
+        if observations.len() != self.bank.sensors() {
+            let given = format!("{} observations", observations.len());
+            return Err(ArgumentError::new("observations", given, format!("{}", self.bank.sensors())).into());
+        }
+        let nodes = self.bank.fine_nodes();
+        let mut score = vec![0.0; nodes.len()];
+        for (n, bit) in observations.iter().enumerate().filter_map(|(n, o)| o.received().map(|bit| (n, bit.0))) {
+            let sensor = self.bank.sensor(n);
+            for (s, x) in score.iter_mut().zip(&nodes.x) {
+                *s += sensor.log_probabilities(*x)[usize::from(bit)];
+            }
+        }
+        let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let w: Vec<f64> = score.iter().zip(&nodes.w).map(|(s, w)| w * (s - best).exp()).collect();
+        let (mass, first) = moments(&w, &nodes.x);
+        Ok(if mass > 0.0 { first / mass } else { 0.0 })
+    }
+
     /// The estimate for one bit a sensor.
     ///
     /// # Errors
@@ -100,8 +166,8 @@ impl Bank {
         let outcomes = self.checked_outcomes()?;
         let estimates = match decoder {
             Decoder::Mmse => self.posterior_means(outcomes),
-            Decoder::DiscreteMap(grid) => self.division_map(grid, outcomes, true),
-            Decoder::PrintedDiscreteMap(grid) => self.division_map(grid, outcomes, false),
+            Decoder::DiscreteMap(grid) => self.division_map(grid, outcomes, Scaling::Conditional),
+            Decoder::PrintedDiscreteMap(grid) => self.division_map(grid, outcomes, Scaling::Printed),
             Decoder::ExactDivisionMap(grid) => self.exact_division_map(grid, outcomes),
             Decoder::ContinuousMap => continuous_map::estimates(self, outcomes),
         };
@@ -215,7 +281,7 @@ impl Bank {
             .collect()
     }
 
-    fn division_map(&self, grid: &Grid, outcomes: usize, conditional: bool) -> Vec<f64> {
+    fn division_map(&self, grid: &Grid, outcomes: usize, scaling: Scaling) -> Vec<f64> {
         let cells = self.cells(grid);
         let log = |p: f64| p.max(FLOOR).ln();
         let logs: Vec<Vec<[f64; 2]>> = self
@@ -231,7 +297,7 @@ impl Bank {
                             joint[0] += w * p0;
                             joint[1] += w * p1;
                         }
-                        let scale = if conditional { cell.mass.max(FLOOR) } else { 1.0 };
+                        let scale = if scaling == Scaling::Conditional { cell.mass.max(FLOOR) } else { 1.0 };
                         joint.map(|p| log(p / scale))
                     })
                     .collect()
@@ -274,6 +340,15 @@ impl Bank {
     }
 }
 
+/// What equation 5.10 multiplies.
+#[derive(Clone, Copy, PartialEq)]
+enum Scaling {
+    /// Probabilities given the cell.
+    Conditional,
+    /// Joint ones, as printed.
+    Printed,
+}
+
 /// A cell of the grid within the support.
 struct Cell {
     nodes: Nodes,
@@ -298,4 +373,32 @@ pub(crate) fn moments(w: &[f64], x: &[f64]) -> (f64, f64) {
 /// `sum w (x - estimate)^2`.
 pub(crate) fn squared_error(w: &[f64], x: &[f64], estimate: f64) -> f64 {
     w.iter().zip(x).map(|(w, x)| w * (x - estimate) * (x - estimate)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BinaryQuantizer, Source};
+
+    #[test]
+    fn a_missing_bit_leaves_the_posterior_of_the_others() {
+        let q = |b: &[f64]| BinaryQuantizer::new(b.to_vec()).unwrap();
+        let all = vec![q(&[0.0]), q(&[-0.5, 0.5]), q(&[0.25])];
+        let bank = |quantizers: Vec<BinaryQuantizer>| {
+            Bank::homogeneous(Source::uniform(1.0).unwrap(), quantizers, 0.2).unwrap()
+        };
+        let table = bank(all.clone()).table(Decoder::Mmse).unwrap();
+        let others = bank(all[..2].to_vec()).table(Decoder::Mmse).unwrap();
+        for bits in [[false, true], [true, true], [true, false]] {
+            let mut seen = bits.map(|b| Observation::Received(Bit(b))).to_vec();
+            seen.push(Observation::Erased);
+            assert!((table.decode(&seen).unwrap() - others.estimate(&bits).unwrap()).abs() < 1e-12);
+            assert!(table.decode(&seen[..2]).is_err());
+            seen[2] = Observation::Received(Bit(true));
+            let full = [bits[0], bits[1], true];
+            assert_eq!(table.decode(&seen).unwrap(), table.estimate(&full).unwrap());
+        }
+        let json = serde_json::to_string(&table).unwrap();
+        assert_eq!(serde_json::from_str::<LookupTable>(&json).unwrap(), table);
+    }
 }

@@ -12,6 +12,16 @@ pub enum Error {
     /// A Lloyd-Max quantizer was refused.
     #[error(transparent)]
     Quantizer(fewbits_quantizers::Error),
+    /// An iteration stopped at its limit before its tolerance was met.
+    #[error("{algorithm} did not converge in {iterations} iterations: the last change was {change:e}")]
+    NotConverged {
+        /// Which iteration.
+        algorithm: &'static str,
+        /// Iterations spent.
+        iterations: usize,
+        /// Size of the last change, in the units of the stop rule.
+        change: f64,
+    },
     /// A pattern whose bit is the same in every cell tells nothing.
     #[error("the pattern gives the same bit in all {cells} cells: expected at least one 0 and one 1")]
     ConstantPattern {
@@ -67,6 +77,17 @@ impl From<fewbits_quantizers::Error> for Error {
         match error {
             fewbits_quantizers::Error::Argument(argument) => Self::Argument(argument),
             other => Self::Quantizer(other),
+        }
+    }
+}
+
+impl From<Error> for fewbits_core::Error {
+    /// What a scheme reports; only arguments can be at fault there.
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Argument(argument) => Self::Argument(argument),
+            Error::Quantizer(error) => error.into(),
+            other => ArgumentError::new("pattern", other, "a usable pattern").into(),
         }
     }
 }

@@ -1,10 +1,10 @@
 //! Division of the measurement axis into cells.
 
-use super::quantizer::{cell_of, increasing};
-use super::source::{Kind, Source};
+use crate::source::{Kind, Source};
 use crate::Error;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::finite;
+use fewbits_quantizers::quantizer::{cell_of, check_increasing};
+use serde::{Deserialize, Serialize};
 
 /// Most bits a cell index may take.
 pub const MAX_BITS: usize = 16;
@@ -16,9 +16,24 @@ pub const MAX_EIGHT_LEVEL_EDGES: [f64; 7] = [-1.748, -1.05, -0.5006, 0.0, 0.5006
 ///
 /// For a bounded source the infinite outer cells are the clipping rule: a measurement below `-V` counts as `-V`, one above
 /// `V` as `V` (the thesis, section 5.2, prints the two sides swapped; erratum `binary-1`).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Grid {
-    edges: Vec<f64>,
+    breakpoints: Vec<f64>,
+}
+
+impl TryFrom<Vec<f64>> for Grid {
+    type Error = Error;
+
+    fn try_from(breakpoints: Vec<f64>) -> Result<Self, Error> {
+        Self::from_breakpoints(breakpoints)
+    }
+}
+
+impl From<Grid> for Vec<f64> {
+    fn from(grid: Grid) -> Self {
+        grid.breakpoints
+    }
 }
 
 impl Grid {
@@ -30,22 +45,22 @@ impl Grid {
         let half_width = fewbits_numerics::error::positive("half_width", half_width)?;
         let cells = 1usize << bits_in_range(bits)?;
         // Symmetric by construction: the edge in the middle is exactly zero.
-        let edges = (1..cells)
+        let breakpoints = (1..cells)
             .map(|l| half_width * (2.0 * l as f64 - cells as f64) / cells as f64)
             .collect();
-        Ok(Self { edges })
+        Ok(Self { breakpoints })
     }
 
     /// From any strictly increasing finite interior edges, at least one.
     ///
     /// # Errors
     /// If the edges are empty, not finite or not strictly increasing.
-    pub fn from_edges(edges: Vec<f64>) -> Result<Self, Error> {
-        if edges.is_empty() {
-            return Err(ArgumentError::new("edges", "empty", "at least one edge").into());
+    pub fn from_breakpoints(breakpoints: Vec<f64>) -> Result<Self, Error> {
+        if breakpoints.is_empty() {
+            return Err(ArgumentError::new("breakpoints", "empty", "at least one breakpoint").into());
         }
-        increasing("edges", &edges)?;
-        Ok(Self { edges })
+        check_increasing(&breakpoints)?;
+        Ok(Self { breakpoints })
     }
 
     /// `2^bits` cells of the Lloyd-Max quantizer of `N(0, std^2)`.
@@ -55,7 +70,7 @@ impl Grid {
     pub fn lloyd_max(std: f64, bits: usize) -> Result<Self, Error> {
         let std = fewbits_numerics::error::positive("std", std)?;
         let table = fewbits_quantizers::lloyd_max::gaussian_table(bits_in_range(bits)?)?;
-        Self::from_edges(table.breakpoints().iter().map(|t| t * std).collect())
+        Self::from_breakpoints(table.breakpoints().iter().map(|t| t * std).collect())
     }
 
     /// The eight-cell Gaussian grid with the printed four digits ([`MAX_EIGHT_LEVEL_EDGES`]), for reproductions.
@@ -64,17 +79,17 @@ impl Grid {
     /// If `std` is not positive and finite.
     pub fn printed_gaussian(std: f64) -> Result<Self, Error> {
         let std = fewbits_numerics::error::positive("std", std)?;
-        Self::from_edges(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * std).collect())
+        Self::from_breakpoints(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * std).collect())
     }
 
     /// The interior edges.
-    pub fn edges(&self) -> &[f64] {
-        &self.edges
+    pub fn breakpoints(&self) -> &[f64] {
+        &self.breakpoints
     }
 
     /// Number of cells `L`.
     pub fn cells(&self) -> usize {
-        self.edges.len() + 1
+        self.breakpoints.len() + 1
     }
 
     /// Bits of a cell index, if `L` is a power of two.
@@ -89,14 +104,14 @@ impl Grid {
     /// # Errors
     /// If the measurement is NaN.
     pub fn locate(&self, measurement: f64) -> Result<usize, Error> {
-        cell_of(&self.edges, measurement)
+        Ok(cell_of(&self.breakpoints, measurement)?)
     }
 
     /// True if `t_l = -t_{L-l}` throughout.
     pub fn is_symmetric(&self) -> bool {
-        self.edges
+        self.breakpoints
             .iter()
-            .zip(self.edges.iter().rev())
+            .zip(self.breakpoints.iter().rev())
             .all(|(a, b)| a + b == 0.0)
     }
 
@@ -106,9 +121,9 @@ impl Grid {
         let low = if cell == 0 {
             -reach
         } else {
-            self.edges[cell - 1].max(-reach)
+            self.breakpoints[cell - 1].max(-reach)
         };
-        let high = self.edges.get(cell).copied().unwrap_or(reach).min(reach);
+        let high = self.breakpoints.get(cell).copied().unwrap_or(reach).min(reach);
         (low < high).then_some((low, high))
     }
 
@@ -143,12 +158,6 @@ pub(crate) fn bits_in_range(bits: usize) -> Result<usize, Error> {
     }
 }
 
-/// Noise standard deviations are checked once, here.
-pub(crate) fn noise_in_range(noise_std: f64) -> Result<f64, Error> {
-    finite("noise_std", noise_std)?;
-    Ok(fewbits_numerics::error::positive("noise_std", noise_std)?)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,7 +168,7 @@ mod tests {
         let grid = Grid::uniform(0.7, 4).unwrap();
         assert_eq!((grid.cells(), grid.bits()), (16, Some(4)));
         assert!(grid.is_symmetric());
-        assert_relative_eq!(grid.edges()[0], -0.7 + 1.4 / 16.0, max_relative = 1e-14);
+        assert_relative_eq!(grid.breakpoints()[0], -0.7 + 1.4 / 16.0, max_relative = 1e-14);
     }
 
     #[test]
@@ -195,8 +204,8 @@ mod tests {
         assert!(Grid::uniform(1.0, 0).is_err());
         assert!(Grid::uniform(1.0, 17).is_err());
         assert!(Grid::uniform(f64::NAN, 3).is_err());
-        assert!(Grid::from_edges(vec![]).is_err());
-        assert!(Grid::from_edges(vec![0.0, 0.0]).is_err());
-        assert!(Grid::from_edges(vec![f64::NEG_INFINITY, 0.0]).is_err());
+        assert!(Grid::from_breakpoints(vec![]).is_err());
+        assert!(Grid::from_breakpoints(vec![0.0, 0.0]).is_err());
+        assert!(Grid::from_breakpoints(vec![f64::NEG_INFINITY, 0.0]).is_err());
     }
 }

@@ -19,14 +19,14 @@
 //! let best = search.best()?;                                   // of 2702 sets
 //! assert_eq!(best.masks, [2, 2, 3, 3, 3, 3, 4, 6]);
 //! let bank = search.bank(&best.masks)?;
-//! assert!(bounds::van_trees(&bank) < best.mse);
+//! assert!(bounds::optimal_weight_van_trees(&bank)? < best.mse);
 //! let table = bank.table(Decoder::Mmse)?;                      // what the fusion centre stores
 //! assert!(table.estimate(&[true; 8])?.abs() < 1.0);
 //! # Ok::<(), fewbits_binary_patterns::Error>(())
 //! ```
 //!
 //! Source: Movaghati, thesis, section 2.3, chapter 5 and appendix B; errata are numbered as in `docs/errata.md`. Not here: random
-//! numbers, channels with errors, sources that are not symmetric about zero.
+//! numbers, sources that are not symmetric about zero.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -39,18 +39,18 @@ mod decoder;
 mod error;
 mod grid;
 mod linear;
-mod message;
+mod report;
 mod pattern;
 mod quantizer;
 pub mod search;
 mod source;
 
-pub use bank::{Bank, IMPOSSIBLE, MAX_OUTCOMES, Sensor};
+pub use bank::{Bank, IMPOSSIBLE, MAX_OUTCOMES, PatternSensor};
 pub use decoder::{Decoder, LookupTable, MAX_TABLE_SENSORS};
 pub use error::Error;
 pub use grid::{Grid, MAX_BITS, MAX_EIGHT_LEVEL_EDGES};
 pub use linear::{Mask, check_mask, generator_matrix, gray_basis, linear_pattern, mask_of, natural_basis, rank};
-pub use message::{Bit, HeardBit};
+pub use report::Bit;
 pub use pattern::{Pattern, check_separation};
 pub use quantizer::BinaryQuantizer;
 pub use source::{Blur, Nodes, Source};

@@ -32,6 +32,21 @@ pub fn linear_pattern(mask: Mask, bits: usize) -> Result<Pattern, Error> {
     Pattern::new((0..1u32 << bits).map(|l| (l & mask).count_ones() % 2 == 1).collect())
 }
 
+impl Pattern {
+    /// The linear pattern of a mask over `2^bits` cells; [`Pattern::mask`] is the way back.
+    ///
+    /// # Errors
+    /// As [`check_mask`].
+    pub fn linear(mask: Mask, bits: usize) -> Result<Self, Error> {
+        linear_pattern(mask, bits)
+    }
+
+    /// The mask of the pattern, if it is linear.
+    pub fn mask(&self) -> Option<Mask> {
+        mask_of(self)
+    }
+}
+
 /// Masks of the natural binary code, most significant digit first: `{4, 2, 1}` for three bits.
 ///
 /// # Errors
@@ -171,6 +186,14 @@ mod tests {
         // Table 5.2 prints this one, which is no XOR of natural patterns.
         assert_eq!(mask_of(&"10001110".parse().unwrap()), None);
         assert_eq!(mask_of(&"010".parse().unwrap()), None);
+        let grid = Grid::uniform(0.3, 4).unwrap();
+        for mask in 1..16 {
+            let pattern = Pattern::linear(mask, 4).unwrap();
+            assert_eq!(pattern.mask(), Some(mask));
+            assert_eq!(Pattern::of(&pattern.on(&grid).unwrap(), &grid), Some(pattern));
+        }
+        let off = crate::BinaryQuantizer::new(vec![0.01]).unwrap();
+        assert_eq!(Pattern::of(&off, &grid), None);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::{BinaryQuantizer, Grid};
 use crate::Error;
 use fewbits_numerics::ArgumentError;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
@@ -17,7 +18,8 @@ use std::str::FromStr;
 /// assert_eq!(pattern.to_string(), "00111100");
 /// # Ok::<(), fewbits_binary_patterns::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct Pattern {
     bits: Vec<bool>,
 }
@@ -61,7 +63,7 @@ impl Pattern {
         let thresholds = self
             .bits
             .windows(2)
-            .zip(grid.edges())
+            .zip(grid.breakpoints())
             .filter(|(pair, _)| pair[0] != pair[1])
             .map(|(_, &edge)| edge)
             .collect();
@@ -90,6 +92,35 @@ impl Pattern {
                 bits: (0..cells).rev().map(|at| word >> at & 1 == 1).collect(),
             })
             .collect())
+    }
+}
+
+impl Pattern {
+    /// The pattern over `grid` that makes this quantizer, if all its breakpoints are the grid's (to `1e-9` of its extent).
+    pub fn of(quantizer: &BinaryQuantizer, grid: &Grid) -> Option<Self> {
+        let edges = grid.breakpoints();
+        let slack = 1e-9 * edges.iter().fold(0.0, |m, e| f64::max(m, e.abs()));
+        let places = quantizer
+            .breakpoints()
+            .iter()
+            .map(|b| edges.iter().position(|e| (e - b).abs() <= slack))
+            .collect::<Option<Vec<_>>>()?;
+        let bit = |cell: usize| places.iter().filter(|at| **at < cell).count() % 2 == 1;
+        Self::new((0..grid.cells()).map(bit).collect()).ok()
+    }
+}
+
+impl TryFrom<String> for Pattern {
+    type Error = Error;
+
+    fn try_from(text: String) -> Result<Self, Error> {
+        text.parse()
+    }
+}
+
+impl From<Pattern> for String {
+    fn from(pattern: Pattern) -> Self {
+        pattern.to_string()
     }
 }
 
@@ -166,7 +197,7 @@ mod tests {
     #[test]
     fn runs_merge_into_thresholds() {
         let grid = Grid::uniform(1.0, 2).unwrap();
-        assert_eq!(pattern("0110").on(&grid).unwrap().thresholds(), [-0.5, 0.5]);
+        assert_eq!(pattern("0110").on(&grid).unwrap().breakpoints(), [-0.5, 0.5]);
         assert_eq!(pattern("01100110").on(&grid), Err(Error::PatternLength { pattern: 8, grid: 4 }));
     }
 

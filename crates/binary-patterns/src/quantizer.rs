@@ -1,49 +1,52 @@
-//! The sensor's half: thresholds that turn a measurement into one bit.
+//! The sensor's half: breakpoints that turn a measurement into one bit.
 
 use crate::Error;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::all_finite;
 use fewbits_numerics::normal::{interval, log_interval, pdf};
+use fewbits_quantizers::Quantizer;
+use fewbits_quantizers::quantizer::{cell_of, check_increasing};
+use serde::{Deserialize, Serialize};
 
 /// Beyond this many standard deviations a normal tail is below the smallest double.
 const VANISHED: f64 = 39.0;
 
-/// A one-bit quantizer: the bit is 0 below the first threshold and changes at each threshold.
+/// A one-bit quantizer: the bit is 0 below the first breakpoint and changes at each breakpoint.
 ///
 /// Every one-bit quantizer of a scalar has this form up to the name of its two outputs, whatever [`Pattern`] it came from.
 ///
 /// [`Pattern`]: super::Pattern
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct BinaryQuantizer {
-    thresholds: Vec<f64>,
+    breakpoints: Vec<f64>,
 }
 
 impl BinaryQuantizer {
-    /// From strictly increasing finite thresholds, at least one.
+    /// From strictly increasing finite breakpoints, at least one.
     ///
     /// # Errors
-    /// If there is no threshold, one is not finite, or they do not increase strictly.
-    pub fn new(thresholds: Vec<f64>) -> Result<Self, Error> {
-        if thresholds.is_empty() {
-            return Err(ArgumentError::new("thresholds", "empty", "at least one threshold").into());
+    /// If there is no breakpoint, one is not finite, or they do not increase strictly.
+    pub fn new(breakpoints: Vec<f64>) -> Result<Self, Error> {
+        if breakpoints.is_empty() {
+            return Err(ArgumentError::new("breakpoints", "empty", "at least one breakpoint").into());
         }
-        increasing("thresholds", &thresholds)?;
-        Ok(Self { thresholds })
+        check_increasing(&breakpoints)?;
+        Ok(Self { breakpoints })
     }
 
-    /// The thresholds, increasing.
-    pub fn thresholds(&self) -> &[f64] {
-        &self.thresholds
+    /// The breakpoints, increasing.
+    pub fn breakpoints(&self) -> &[f64] {
+        &self.breakpoints
     }
 
-    /// The bit of a measurement: the parity of the number of thresholds at or below it.
+    /// The bit of a measurement: the parity of the number of breakpoints at or below it.
     ///
     /// Infinite measurements fall into the outermost cells.
     ///
     /// # Errors
     /// If the measurement is NaN.
     pub fn encode(&self, measurement: f64) -> Result<bool, Error> {
-        Ok(cell_of(&self.thresholds, measurement)? % 2 == 1)
+        Ok(cell_of(&self.breakpoints, measurement)? % 2 == 1)
     }
 
     /// `[P(0|x), P(1|x)]` for the measurement `Y = x + N(0, noise_std^2)`.
@@ -74,11 +77,11 @@ impl BinaryQuantizer {
         [largest[0] + sum[0].ln(), largest[1] + sum[1].ln()]
     }
 
-    /// `dP(1|x)/dx`, the sum of `+-phi((t - x)/s)/s` over the thresholds.
+    /// `dP(1|x)/dx`, the sum of `+-phi((t - x)/s)/s` over the breakpoints.
     pub fn slope(&self, x: f64, noise_std: f64) -> f64 {
         let mut sign = 1.0;
         let mut slope = 0.0;
-        for &t in &self.thresholds {
+        for &t in &self.breakpoints {
             slope += sign * pdf((t - x) / noise_std);
             sign = -sign;
         }
@@ -97,7 +100,7 @@ impl BinaryQuantizer {
     fn for_cells(&self, x: f64, noise_std: f64, mut visit: impl FnMut(usize, f64, f64)) {
         let mut low = f64::NEG_INFINITY;
         let mut bit = 0;
-        for &t in &self.thresholds {
+        for &t in &self.breakpoints {
             let high = (t - x) / noise_std;
             visit(bit, low, high);
             bit ^= 1;
@@ -107,26 +110,28 @@ impl BinaryQuantizer {
     }
 }
 
-/// Strictly increasing finite numbers.
-pub(crate) fn increasing(name: &'static str, values: &[f64]) -> Result<(), Error> {
-    all_finite(name, values)?;
-    match values.windows(2).position(|w| w[0] >= w[1]) {
-        None => Ok(()),
-        Some(at) => Err(ArgumentError::new(
-            name,
-            format!("{} followed by {} at index {}", values[at], values[at + 1], at + 1),
-            "strictly increasing numbers",
-        )
-        .into()),
+impl TryFrom<Vec<f64>> for BinaryQuantizer {
+    type Error = Error;
+
+    fn try_from(breakpoints: Vec<f64>) -> Result<Self, Error> {
+        Self::new(breakpoints)
     }
 }
 
-/// Number of edges at or below `y`.
-pub(crate) fn cell_of(edges: &[f64], y: f64) -> Result<usize, Error> {
-    if y.is_nan() {
-        return Err(ArgumentError::new("measurement", y, "a number").into());
+impl From<BinaryQuantizer> for Vec<f64> {
+    fn from(quantizer: BinaryQuantizer) -> Self {
+        quantizer.breakpoints
     }
-    Ok(edges.partition_point(|&edge| edge <= y))
+}
+
+impl TryFrom<&BinaryQuantizer> for Quantizer {
+    type Error = Error;
+
+    /// The same cells with their bits as levels.
+    fn try_from(binary: &BinaryQuantizer) -> Result<Self, Error> {
+        let labels = (0..=binary.breakpoints.len()).map(|cell| cell % 2).collect();
+        Ok(Self::with_labels(binary.breakpoints.clone(), labels)?)
+    }
 }
 
 #[cfg(test)]

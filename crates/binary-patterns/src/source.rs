@@ -5,17 +5,37 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
 use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::Rule;
+use serde::{Deserialize, Serialize};
 
 /// A Gaussian source is integrated over this many standard deviations to either side; the rest is below `1e-18`.
 const GAUSSIAN_REACH: f64 = 9.0;
 
 /// A zero-mean scalar source `X`, symmetric about zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Kind", into = "Kind")]
 pub struct Source {
     kind: Kind,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+impl From<Source> for Kind {
+    fn from(source: Source) -> Self {
+        source.kind
+    }
+}
+
+impl TryFrom<Kind> for Source {
+    type Error = Error;
+
+    fn try_from(kind: Kind) -> Result<Self, Error> {
+        match kind {
+            Kind::Uniform { half_width } => Self::uniform(half_width),
+            Kind::Gaussian { std } => Self::gaussian(std),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(crate) enum Kind {
     Uniform { half_width: f64 },
     Gaussian { std: f64 },
@@ -46,6 +66,26 @@ impl Source {
 
     pub(crate) fn kind(&self) -> Kind {
         self.kind
+    }
+
+    /// The source's own unit: `V`, or the standard deviation.
+    pub fn scale(&self) -> f64 {
+        match self.kind {
+            Kind::Uniform { half_width } => half_width,
+            Kind::Gaussian { std } => std,
+        }
+    }
+
+    /// The source of `factor * X`.
+    ///
+    /// # Errors
+    /// If `factor` is not a positive number.
+    pub fn rescaled(&self, factor: f64) -> Result<Self, Error> {
+        let scale = factor * self.scale();
+        match self.kind {
+            Kind::Uniform { .. } => Self::uniform(scale),
+            Kind::Gaussian { .. } => Self::gaussian(scale),
+        }
     }
 
     /// Variance: `V^2/3` for the uniform source.
@@ -106,7 +146,7 @@ impl Source {
 
     /// Refuses noise too small for an even grid of nodes to resolve.
     pub(crate) fn resolvable(&self, noise_std: f64) -> Result<f64, Error> {
-        let noise_std = super::grid::noise_in_range(noise_std)?;
+        let noise_std = noise_in_range(noise_std)?;
         let least = FINEST * self.reach();
         if noise_std >= least {
             return Ok(noise_std);
@@ -192,6 +232,12 @@ impl Nodes {
     pub fn expectation(&self, f: impl Fn(f64) -> f64) -> f64 {
         self.x.iter().zip(&self.w).map(|(&x, &w)| w * f(x)).sum()
     }
+}
+
+/// Noise standard deviations are checked once, here.
+pub(crate) fn noise_in_range(noise_std: f64) -> Result<f64, Error> {
+    finite("noise_std", noise_std)?;
+    Ok(positive("noise_std", noise_std)?)
 }
 
 #[cfg(test)]

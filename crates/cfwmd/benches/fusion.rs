@@ -1,23 +1,22 @@
 //! One step of fusion, Gaussian against particles, and the silent factors, against a standard normal draw.
 //!
-//! Read the medians: `particles_1000 / gaussian`, averaged over what is heard (none silent in a quarter of the steps, one in
-//! half, two in a quarter), is at least 15. The allocation columns are zero but for the quadrature rule at first use.
+//! Read the medians: `particles_1000 / gaussian`, averaged over what is observed (none silent in a quarter of the steps, one in
+//! half, two in a quarter), is at least 15.
 
 #![allow(clippy::unwrap_used)]
 
 use divan::{AllocProfiler, Bencher, black_box};
+use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::ellipsoid::Ellipsoid;
 use fewbits_cfwmd::network::Network;
-use fewbits_cfwmd::particle::HeardScalars;
 use fewbits_cfwmd::rule::CensoringRule;
-use fewbits_cfwmd::silence::{SilentFactor, SilentTable};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Gaussian, Observation};
+use fewbits_core::{Factor, Gaussian, Link, Observation};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Workspace, kalman};
-use fewbits_models::{LinearSensor, constant_velocity_1d};
+use fewbits_models::{LinearSensor, ScalarSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
-use nalgebra::{Matrix2, Vector1, Vector2};
+use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
@@ -35,20 +34,20 @@ fn standard_normal(bencher: Bencher<'_, '_>) {
     bencher.bench_local(|| rng.sample::<f64, _>(StandardNormal));
 }
 
-fn network() -> (Network<2, 1>, Vec<CensoringRule<1>>) {
+fn network() -> (Network<ScalarSensor<2>, 2, 1>, Vec<CensoringRule<1>>) {
     let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
     let threshold = Budget::new(1.0, 2).unwrap().threshold(1).unwrap();
-    let network = Network::new(vec![sensor; 2], threshold, 0.0).unwrap();
+    let network = Network::new(vec![sensor; 2], threshold, Link::PERFECT).unwrap();
     let rule = CensoringRule::scalar(6.854, threshold).unwrap();
     (network, vec![rule; 2])
 }
 
-/// What a step may hear: two values, one, or none.
-fn heard(silent: usize) -> [Observation<Vector1<f64>>; 2] {
+/// What a step may observe: two values, one, or none.
+fn observed(silent: usize) -> [Observation<Vector1<f64>>; 2] {
     let value = Observation::Received(Vector1::new(3.5));
     [
-        if silent > 1 { Observation::Silent } else { value },
-        if silent > 0 { Observation::Silent } else { value },
+        if silent > 1 { Observation::Nothing } else { value },
+        if silent > 0 { Observation::Nothing } else { value },
     ]
 }
 
@@ -57,10 +56,12 @@ fn gaussian(bencher: Bencher<'_, '_>, silent: usize) {
     let (network, rules) = network();
     let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
     let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(0.6, 0.4, 0.4, 2.0)).unwrap();
-    let heard = heard(silent);
+    let observations = observed(silent);
     bencher.bench_local(|| {
         let predicted = kalman::predict(&dynamics, black_box(&belief));
-        network.fuse(&predicted, &rules, &Vector2::zeros(), &heard).unwrap()
+        network
+            .fuse(&predicted, &rules, &Vector2::zeros(), &observations)
+            .unwrap()
     });
 }
 
@@ -70,33 +71,30 @@ fn particles_1000(bencher: Bencher<'_, '_>, silent: usize) {
     let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
     let belief = Gaussian::new(Vector2::zeros(), Matrix2::new(0.6, 0.4, 0.4, 2.0)).unwrap();
     let mut rng = Stream::new(2).fast_rng();
-    let start = Particles::from_draws(1000, || belief.sample(&mut rng).unwrap()).unwrap();
+    let start = Particles::from_belief(&mut rng, &belief, 1000).unwrap();
     let (filter, mut workspace) = (ParticleFilter::default(), Workspace::default());
-    let (mut cloud, mut likelihood) = (start.clone(), HeardScalars::new());
-    let heard = heard(silent);
+    let mut cloud = start.clone();
+    let observations = observed(silent);
     let mut step = || {
         cloud.clone_from(&start);
         filter.predict(&mut rng, &dynamics, &mut cloud, &mut workspace).unwrap();
-        network
-            .hear(&rules, &Vector2::zeros(), &heard, 1000, &mut likelihood)
-            .unwrap();
-        filter.update(&likelihood, &mut cloud).unwrap();
+        let likelihood = network.likelihood(&rules, &Vector2::zeros(), &observations).unwrap();
+        filter.update(&mut cloud, &likelihood).unwrap();
         cloud.mean()
     };
     step();
     bencher.bench_local(step);
 }
 
-/// A thousand exact scalar factors, and the same from the table (its construction included).
-#[divan::bench(args = [false, true])]
-fn scalar_factors_1000(bencher: Bencher<'_, '_>, tabulated: bool) {
-    let factor = SilentFactor::new(1.8, 1.0, 0.0).unwrap();
-    let values: Vec<f64> = (0..1000).map(|i| i as f64 * 0.006 - 3.0).collect();
-    let mut table = SilentTable::new(factor, 1000);
+/// A thousand scalar factors of silence in one sweep.
+#[divan::bench]
+fn scalar_factors_1000(bencher: Bencher<'_, '_>) {
+    let rule = CensoringRule::scalar(1.8 * 1.8, 1.0).unwrap();
+    let factor = Censored::silence(&rule, &Vector1::zeros(), &Matrix1::new(1.0), &Link::PERFECT, 1).unwrap();
+    let values: Vec<f64> = (0..1000).map(|i| f64::from(i) * 0.006 - 3.0).collect();
     let mut sums = vec![0.0; 1000];
     bencher.bench_local(|| {
-        table.prepare(factor, if tabulated { 1000 } else { 0 });
-        table.add(1.0, 0.0, &values, &mut sums);
+        factor.add_log_likelihoods(&[&values], &mut sums);
         sums[7]
     });
 }

@@ -230,7 +230,11 @@ impl<const M: usize> Censored<M> {
             }
             (Ok(one), Err(_)) | (Err(_), Ok(one)) => InCell::new(one, noise_variance, 0.0, arrival)?.into(),
             (Err(_), Err(_)) => {
-                return Err(ArgumentError::new("report", value, format!("a level of a measurement outside ({low}, {high})")));
+                return Err(ArgumentError::new(
+                    "report",
+                    value,
+                    format!("a level of a measurement outside ({low}, {high})"),
+                ));
             }
         };
         Self::scalar(factor, 1)

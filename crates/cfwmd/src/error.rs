@@ -79,8 +79,6 @@ impl From<fewbits_filters::Error> for Error {
         match error {
             fewbits_filters::Error::Core(error) => Self::Core(error),
             fewbits_filters::Error::Argument(error) => error.into(),
-            fewbits_filters::Error::Impossible
-            | fewbits_filters::Error::Density(fewbits_densities::Error::Degenerate { .. }) => Self::IMPOSSIBLE,
             other => Self::Filter(other),
         }
     }

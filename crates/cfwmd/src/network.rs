@@ -263,7 +263,9 @@ pub fn gather<const M: usize>(
 ) -> Result<Vec<Observation<SVector<f64, M>>>, Error> {
     let mut observations = vec![Observation::Nothing; sensors];
     for (sensor, value) in reports {
-        let slot = observations.get_mut(sensor).ok_or(Error::UnknownSensor { sensor, sensors })?;
+        let slot = observations
+            .get_mut(sensor)
+            .ok_or(Error::UnknownSensor { sensor, sensors })?;
         if slot.received().is_some() {
             return Err(Error::ReportedTwice { sensor });
         }

@@ -96,7 +96,10 @@ impl<const M: usize> CensoringRule<M> {
         let statistic = self.statistic(innovation);
         let slack: f64 = (0..M)
             .filter(|j| rounding[*j] > 0.0)
-            .map(|j| self.statistic(&SVector::from_fn(|i, _| if i == j { rounding[j] } else { 0.0 })).sqrt())
+            .map(|j| {
+                self.statistic(&SVector::from_fn(|i, _| if i == j { rounding[j] } else { 0.0 }))
+                    .sqrt()
+            })
             .sum();
         if (statistic.sqrt() + slack).powi(2) < self.threshold() * (1.0 - 1e-9) {
             return Err(Error::ProtocolViolation {

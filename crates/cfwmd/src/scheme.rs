@@ -79,7 +79,8 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         }
         // Half the spacing of single precision.
         let share = if self.format == NumberFormat::Single { 6e-8 } else { 0.0 };
-        self.rule.check(sensor, &(value - prediction), &value.map(|z| z.abs() * share))?;
+        self.rule
+            .check(sensor, &(value - prediction), &value.map(|z| z.abs() * share))?;
         Ok(Censored::value(value, &noise, arrival)?)
     }
 }
@@ -170,11 +171,13 @@ impl<const D: usize> Message for Prediction<D> {
                 covariance[(j, i)] = covariance[(i, j)];
             }
         }
-        Gaussian::new(mean, covariance).map(Self).map_err(|error| CodecError::Invalid {
-            what: "covariance",
-            value: error.value,
-            expected: "a positive semidefinite matrix",
-        })
+        Gaussian::new(mean, covariance)
+            .map(Self)
+            .map_err(|error| CodecError::Invalid {
+                what: "covariance",
+                value: error.value,
+                expected: "a positive semidefinite matrix",
+            })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Weighted Gaussians that share one covariance.
 
-use crate::particles::Cumulative;
+use crate::weights::Cumulative;
 use crate::{Error, Particles};
 use fewbits_core::columns::{count, set_state, state_at};
 use fewbits_core::{Belief, ColumnsMut, Gaussian};

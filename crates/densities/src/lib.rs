@@ -56,6 +56,7 @@ mod reduce;
 mod refine;
 mod stored;
 pub mod tree;
+mod weights;
 pub mod wire;
 
 pub use bandwidth::{Bandwidth, Rule, SampleSize, Shape};

@@ -2,12 +2,13 @@
 
 use crate::Error;
 use crate::stored::StoredParticles;
+use crate::weights::{Cumulative, gather_rows, normalise};
 use fewbits_core::{Belief, Columns, ColumnsMut};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one};
-use fewbits_numerics::kernels::{dot, exp_minus, largest, sum, weighted_covariance};
+use fewbits_numerics::kernels::{dot, weighted_covariance};
 use nalgebra::{SMatrix, SVector};
-use rand::{Rng, RngExt};
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// A belief `sum_i w_i delta(x - x_i)` over `R^D`, always normalised.
@@ -252,20 +253,22 @@ impl<const D: usize> Particles<D> {
             return Err(ArgumentError::new("log_weights", format!("{} numbers", log_weights.len()), expected).into());
         }
         let (mut logs, mut weights) = (log_weights.to_vec(), vec![0.0; log_weights.len()]);
-        normalise(&mut logs, &mut weights)?;
+        let (_, effective_sample_size) = normalise(&mut logs, &mut weights)?;
         self.select(ancestors)?;
         (self.log_weights, self.weights) = (logs, weights);
-        self.effective_sample_size = 1.0 / dot(&self.weights, &self.weights);
+        self.effective_sample_size = effective_sample_size;
         Ok(())
     }
 
     fn check(&self, ancestors: &[u32]) -> Result<(), Error> {
         at_least_one("ancestors", ancestors.len())?;
         let count = self.len();
-        match ancestors.iter().find(|a| **a as usize >= count) {
-            Some(bad) => Err(ArgumentError::new("ancestors", bad, format!("indices below {count}")).into()),
-            None => Ok(()),
+        // A maximum runs in vector registers, a search does not.
+        let largest = ancestors.iter().fold(0, |largest: u32, a| largest.max(*a));
+        if largest as usize >= count {
+            return Err(ArgumentError::new("ancestors", largest, format!("indices below {count}")).into());
         }
+        Ok(())
     }
 
     /// Gives all particles the same weight.
@@ -358,61 +361,15 @@ impl<const D: usize> Belief<D> for Particles<D> {
     }
 }
 
-/// Running sums of weights, for draws in proportion to them.
-pub(crate) struct Cumulative {
-    sums: Vec<f64>,
-    last: usize,
-}
-
-impl Cumulative {
-    pub(crate) fn new(weights: &[f64]) -> Self {
-        let mut total = 0.0;
-        let mut sum = |w: &f64| {
-            total += w;
-            total
-        };
-        Self {
-            sums: weights.iter().map(&mut sum).collect(),
-            last: weights.iter().rposition(|w| *w > 0.0).unwrap_or(0),
-        }
-    }
-
-    /// An index of positive weight.
-    pub(crate) fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
-        let point = rng.random::<f64>() * self.sums.last().copied().unwrap_or(0.0);
-        self.sums.partition_point(|sum| *sum <= point).min(self.last)
-    }
-}
-
-/// Copies the chosen rows.
-fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut Vec<f64>) {
-    if width > 0 {
-        for a in chosen {
-            let start = *a as usize * width;
-            out.extend_from_slice(&rows[start..start + width]);
-        }
-    }
-}
-
-/// Normalises log weights and writes their exponentials; returns `ln sum exp` and the effective
-/// sample size. On failure `weights` is as it was.
-fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error> {
-    let largest = largest(logs);
-    // Without `+inf`, which `largest` would show, the sum is NaN if and only if a weight is.
-    if !largest.is_finite() || sum(logs).is_nan() {
-        return Err(Error::IMPOSSIBLE);
-    }
-    let sums = exp_minus(logs, largest, weights);
-    let log_sum = largest + sums.sum.ln();
-    let scale = 1.0 / sums.sum;
-    weights.iter_mut().for_each(|w| *w *= scale);
-    logs.iter_mut().for_each(|w| *w -= log_sum);
-    Ok((log_sum, sums.sum * sums.sum / sums.sum_of_squares))
-}
-
 impl<const D: usize> From<Particles<D>> for StoredParticles {
     fn from(belief: Particles<D>) -> Self {
-        Self::new(belief.columns.into(), belief.weights, &belief.log_weights, belief.side)
+        Self::new(
+            belief.columns.into(),
+            belief.weights,
+            &belief.log_weights,
+            belief.effective_sample_size,
+            belief.side,
+        )
     }
 }
 
@@ -420,7 +377,7 @@ impl<const D: usize> TryFrom<StoredParticles> for Particles<D> {
     type Error = Error;
 
     fn try_from(stored: StoredParticles) -> Result<Self, Error> {
-        let (columns, weights, log_weights, side) = stored.parts()?;
+        let (columns, weights, log_weights, effective, side) = stored.parts()?;
         let columns = columns.try_into().map_err(|columns: Vec<Vec<f64>>| {
             ArgumentError::new("columns", format!("{} columns", columns.len()), format!("{D} columns"))
         })?;
@@ -429,7 +386,7 @@ impl<const D: usize> TryFrom<StoredParticles> for Particles<D> {
         if weights.windows(2).all(|pair| pair[0] == pair[1]) {
             belief.equalise(weights.len());
         } else {
-            belief.effective_sample_size = 1.0 / dot(&weights, &weights);
+            belief.effective_sample_size = effective.unwrap_or(belief.effective_sample_size);
             (belief.weights, belief.log_weights) = (weights, log_weights);
         }
         Ok(belief)

@@ -1,8 +1,8 @@
 //! A density over the plane.
 
 use crate::Error;
-use crate::particles::Cumulative;
 use crate::point_mass::{TRIANGULAR_VARIANCE, absorb, check_density, triangular};
+use crate::weights::Cumulative;
 use fewbits_core::columns::{count, set_state};
 use fewbits_core::{Belief, ColumnsMut, Density, Gaussian, Likelihood};
 use fewbits_numerics::error::{ArgumentError, all_finite};

@@ -1,6 +1,6 @@
 //! A density on a line.
 
-use crate::particles::Cumulative;
+use crate::weights::Cumulative;
 use crate::{Error, Grid};
 use fewbits_core::{Belief, ColumnsMut, Density, Likelihood};
 use fewbits_numerics::error::{ArgumentError, finite, positive};

@@ -12,16 +12,25 @@ pub(crate) struct StoredParticles {
     weights: Vec<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     log_weights: Vec<Option<f64>>,
+    /// As it was summed, so that a filter resumes to the last bit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    effective_sample_size: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     side: Vec<f64>,
 }
 
-/// Columns, weights, log weights, side rows.
-type Parts = (Vec<Vec<f64>>, Vec<f64>, Vec<f64>, Vec<f64>);
+/// Columns, weights, log weights, effective sample size, side rows.
+type Parts = (Vec<Vec<f64>>, Vec<f64>, Vec<f64>, Option<f64>, Vec<f64>);
 
 impl StoredParticles {
     /// Equal weights need no logarithms.
-    pub(crate) fn new(columns: Vec<Vec<f64>>, weights: Vec<f64>, log_weights: &[f64], side: Vec<f64>) -> Self {
+    pub(crate) fn new(
+        columns: Vec<Vec<f64>>,
+        weights: Vec<f64>,
+        log_weights: &[f64],
+        effective_sample_size: f64,
+        side: Vec<f64>,
+    ) -> Self {
         let equal = log_weights.windows(2).all(|pair| pair[0] == pair[1]);
         let stored = |w: &f64| w.is_finite().then_some(*w);
         Self {
@@ -32,6 +41,7 @@ impl StoredParticles {
             } else {
                 log_weights.iter().map(stored).collect()
             },
+            effective_sample_size: (!equal).then_some(effective_sample_size),
             side,
         }
     }
@@ -52,6 +62,13 @@ impl StoredParticles {
             let text = format!("{} numbers", log_weights.len());
             return Err(ArgumentError::new("log_weights", text, "the logarithms of the weights").into());
         }
-        Ok((self.columns, self.weights, log_weights, self.side))
+        let effective = 1.0 / self.weights.iter().map(|w| w * w).sum::<f64>();
+        if let Some(bad) = self
+            .effective_sample_size
+            .filter(|n| !((n / effective - 1.0).abs() <= 1e-9))
+        {
+            return Err(ArgumentError::new("effective_sample_size", bad, format!("{effective}")).into());
+        }
+        Ok((self.columns, self.weights, log_weights, self.effective_sample_size, self.side))
     }
 }

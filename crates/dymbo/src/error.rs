@@ -71,6 +71,12 @@ impl From<fewbits_models::Error> for Error {
     }
 }
 
+impl From<fewbits_densities::Error> for Error {
+    fn from(error: fewbits_densities::Error) -> Self {
+        fewbits_filters::Error::from(error).into()
+    }
+}
+
 impl From<fewbits_filters::Error> for Error {
     fn from(error: fewbits_filters::Error) -> Self {
         match error {

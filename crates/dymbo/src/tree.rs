@@ -95,7 +95,7 @@ impl Walk {
             let mut exact = ahead.clone();
             let r = self.filter.plant().measurement_variance();
             let factor = InCell::sign(bit, threshold, r, &Link::PERFECT)?;
-            let log_evidence = exact.update(|x| factor.log_probability(x))?;
+            let log_evidence = exact.update_with(|x| factor.log_probability(x))?;
             let weight = if first { 1.0 } else { weight * log_evidence.exp() };
             let posterior = self.filter.update(&predicted, &Observation::Received(bit))?.0;
             let distance = posterior.mean()[0] - exact.mean();

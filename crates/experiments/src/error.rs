@@ -90,41 +90,27 @@ impl From<fewbits_monte_carlo::MonteCarloError> for Error {
     }
 }
 
-impl From<fewbits_quantizers::Error> for Error {
-    fn from(error: fewbits_quantizers::Error) -> Self {
-        match error {
-            fewbits_quantizers::Error::Argument(argument) => Self::Argument(argument),
-            other => Self::failed(other),
-        }
-    }
+/// An argument refused further down keeps its name; any other error of a crate below is wrapped.
+macro_rules! wrapped {
+    ($($library:ident),+) => {
+        $(impl From<$library::Error> for Error {
+            fn from(error: $library::Error) -> Self {
+                match error {
+                    $library::Error::Argument(argument) => Self::Argument(argument),
+                    other => Self::failed(other),
+                }
+            }
+        })+
+    };
 }
-
-impl From<fewbits_quantizer_design::Error> for Error {
-    fn from(error: fewbits_quantizer_design::Error) -> Self {
-        match error {
-            fewbits_quantizer_design::Error::Argument(argument) => Self::Argument(argument),
-            other => Self::failed(other),
-        }
-    }
-}
-
-impl From<fewbits_binary_patterns::Error> for Error {
-    fn from(error: fewbits_binary_patterns::Error) -> Self {
-        match error {
-            fewbits_binary_patterns::Error::Argument(argument) => Self::Argument(argument),
-            other => Self::failed(other),
-        }
-    }
-}
-
-impl From<fewbits_sensor_assignment::Error> for Error {
-    fn from(error: fewbits_sensor_assignment::Error) -> Self {
-        match error {
-            fewbits_sensor_assignment::Error::Argument(argument) => Self::Argument(argument),
-            other => Self::failed(other),
-        }
-    }
-}
+wrapped!(
+    fewbits_binary_patterns,
+    fewbits_core,
+    fewbits_models,
+    fewbits_quantizer_design,
+    fewbits_quantizers,
+    fewbits_sensor_assignment
+);
 
 impl From<fewbits_dymbo::Error> for Error {
     fn from(error: fewbits_dymbo::Error) -> Self {

@@ -42,7 +42,7 @@ macro_rules! systems {
         ]);
     };
 }
-systems!["mi", "diffusive"];
+systems!["assign", "diffusive", "dymbo", "mi"];
 
 fn of(key: &str) -> Result<&'static [Reference], String> {
     let system = key.split('-').next().unwrap_or_default();

@@ -42,6 +42,7 @@ pub mod extended_kalman;
 mod guided;
 pub mod kalman;
 mod linalg;
+mod moved;
 mod particle;
 mod plane;
 mod point_mass;

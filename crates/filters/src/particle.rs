@@ -98,7 +98,7 @@ impl ParticleFilter {
     ) -> Result<(), Error> {
         workspace.ancestors.resize(count, 0);
         self.resampling
-            .ancestors(rng, belief.weights(), &mut workspace.ancestors)?;
+            .ancestors_of_normalised(rng, belief.weights(), &mut workspace.ancestors);
         Ok(belief.select(&workspace.ancestors)?)
     }
 
@@ -176,7 +176,8 @@ impl ParticleFilter {
         let next = next.get_or_insert_with(|| belief.clone());
         if self.schedule.is_due(belief.effective_sample_size(), belief.len()) {
             ancestors.resize(belief.len(), 0);
-            self.resampling.ancestors(rng, belief.weights(), ancestors)?;
+            self.resampling
+                .ancestors_of_normalised(rng, belief.weights(), ancestors);
             next.select_from(belief, ancestors)?;
         } else {
             next.clone_from(belief);
@@ -248,7 +249,7 @@ impl ParticleFilter {
         next.clone_from(belief);
         let first = next.reweigh(|_, log_weights| add(log_weights, logs))?;
         ancestors.resize(belief.len(), 0);
-        self.resampling.ancestors(rng, next.weights(), ancestors)?;
+        self.resampling.ancestors_of_normalised(rng, next.weights(), ancestors);
         next.select_from(belief, ancestors)?;
         dynamics.propagate_columns(rng, next.columns_mut());
         let info = weigh(next, |states, log_weights| {

@@ -1,5 +1,6 @@
 //! The exact filter of a two-dimensional linear state, on a lattice that follows the belief.
 
+use crate::moved::Moved;
 use crate::{Error, kalman};
 use fewbits_core::{Gaussian, Likelihood, LinearDynamics};
 use fewbits_densities::PlaneMass;
@@ -30,14 +31,24 @@ const NEGLIGIBLE: f64 = 1e-14;
 /// assert!(belief.mean()[0] > 0.3 && belief.covariance()[(0, 0)] < 1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// Where the noise is singular, or narrower than the lattice, [`PlaneFilter::with_basis`] evaluates the moved density between
+/// the nodes instead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaneFilter<F> {
     dynamics: F,
-    /// `L` times the spacing.
     basis: Matrix2<f64>,
-    /// `L^-1 A L`.
-    transition: Matrix2<f64>,
-    spacing: f64,
+    kernel: Kernel,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Kernel {
+    /// The basis is `L` times the spacing; `transition` is `L^-1 A L`.
+    White {
+        transition: Matrix2<f64>,
+        spacing: f64,
+    },
+    Moved(Moved),
 }
 
 impl<F: LinearDynamics<2> + Clone> PlaneFilter<F> {
@@ -54,8 +65,23 @@ impl<F: LinearDynamics<2> + Clone> PlaneFilter<F> {
         Ok(Self {
             dynamics: dynamics.clone(),
             basis: colour * spacing,
-            transition: transition.ok_or_else(refuse)?,
-            spacing,
+            kernel: Kernel::White {
+                transition: transition.ok_or_else(refuse)?,
+                spacing,
+            },
+        })
+    }
+
+    /// The filter for any process noise, singular or zero, on a lattice of the given basis (state units). Its steps should be
+    /// at most a quarter of the narrowest belief's deviation in any direction: the density is then interpolated to about 1e-7.
+    ///
+    /// # Errors
+    /// If the basis or the transition is singular.
+    pub fn with_basis(dynamics: &F, basis: Matrix2<f64>) -> Result<Self, Error> {
+        Ok(Self {
+            dynamics: dynamics.clone(),
+            kernel: Kernel::Moved(Moved::new(dynamics, &basis)?),
+            basis,
         })
     }
 
@@ -78,38 +104,30 @@ impl<F: LinearDynamics<2> + Clone> PlaneFilter<F> {
         }
         let peak = belief.density().iter().copied().fold(0.0, f64::max);
         let reached = kalman::predict(&self.dynamics, &belief.moments());
-        Ok(PlaneMass::covering(&self.basis, &reached, |lattice, density| {
-            let (first, size) = (lattice.first(), lattice.size());
-            let (mut rows, mut columns) = (Vec::new(), Vec::new());
-            for (n, &mass) in belief.nodes().zip(belief.density()) {
-                if mass <= NEGLIGIBLE * peak {
-                    continue;
-                }
-                let centre = self.transition * (n * self.spacing);
-                let top = self.kernel(centre[0], first[0], size[0], &mut rows);
-                let left = self.kernel(centre[1], first[1], size[1], &mut columns);
-                for (i, row) in rows.iter().enumerate() {
-                    let start = (top + i) * size[1] + left;
-                    let weight = mass * row;
-                    for (p, column) in density[start..start + columns.len()].iter_mut().zip(&columns) {
-                        *p += weight * column;
+        match &self.kernel {
+            Kernel::Moved(moved) => moved.predict(&self.basis, belief, &reached),
+            Kernel::White { transition, spacing } => {
+                Ok(PlaneMass::covering(&self.basis, &reached, |lattice, density| {
+                    let (first, size) = (lattice.first(), lattice.size());
+                    let (mut rows, mut columns) = (Vec::new(), Vec::new());
+                    for (n, &mass) in belief.nodes().zip(belief.density()) {
+                        if mass <= NEGLIGIBLE * peak {
+                            continue;
+                        }
+                        let centre = transition * (n * *spacing);
+                        let top = white(*spacing, centre[0], first[0], size[0], &mut rows);
+                        let left = white(*spacing, centre[1], first[1], size[1], &mut columns);
+                        for (i, row) in rows.iter().enumerate() {
+                            let start = (top + i) * size[1] + left;
+                            let weight = mass * row;
+                            for (p, column) in density[start..start + columns.len()].iter_mut().zip(&columns) {
+                                *p += weight * column;
+                            }
+                        }
                     }
-                }
+                })?)
             }
-        })?)
-    }
-
-    /// Fills `weights` with the kernel around `centre` along one axis; returns the index of its first node.
-    fn kernel(&self, centre: f64, first: i64, size: usize, weights: &mut Vec<f64>) -> usize {
-        let index = |y: f64| y / self.spacing - first as f64;
-        let low = index(centre - KERNEL_REACH).ceil().max(0.0) as usize;
-        let high = (index(centre + KERNEL_REACH).floor() + 1.0).max(0.0) as usize;
-        weights.clear();
-        weights.extend((low..high.min(size)).map(|i| {
-            let z = self.spacing * (first + i as i64) as f64 - centre;
-            (-0.5 * z * z).exp()
-        }));
-        low.min(size)
+        }
     }
 
     /// One step: [`predict`](Self::predict), then Bayes' rule. Returns the new belief and `ln p(observed | past)`.
@@ -125,6 +143,19 @@ impl<F: LinearDynamics<2> + Clone> PlaneFilter<F> {
         let log_likelihood = next.update(observed)?;
         Ok((next, log_likelihood))
     }
+}
+
+/// Fills `weights` with the white kernel around `centre` along one axis; returns the index of its first node.
+fn white(spacing: f64, centre: f64, first: i64, size: usize, weights: &mut Vec<f64>) -> usize {
+    let index = |y: f64| y / spacing - first as f64;
+    let low = index(centre - KERNEL_REACH).ceil().max(0.0) as usize;
+    let high = (index(centre + KERNEL_REACH).floor() + 1.0).max(0.0) as usize;
+    weights.clear();
+    weights.extend((low..high.min(size)).map(|i| {
+        let z = spacing * (first + i as i64) as f64 - centre;
+        (-0.5 * z * z).exp()
+    }));
+    low.min(size)
 }
 
 #[cfg(test)]
@@ -158,6 +189,37 @@ mod tests {
         let before = exact.clone();
         assert_eq!(exact.update_with(|_| f64::NEG_INFINITY).map_err(Error::from), Err(Error::IMPOSSIBLE));
         assert_eq!(exact, before);
+    }
+
+    /// Issue: the plane filter refused constant velocity, whose noise has rank one.
+    #[test]
+    fn rank_one_noise_and_none_agree_with_kalman() {
+        for (variance, scale) in [(0.3, 1.0), (0.0, 1.0), (0.02, 1e-3)] {
+            let dynamics = constant_velocity_1d(0.8, variance * scale * scale).unwrap();
+            let sensor = ScalarSensor::scalar(Vector2::new(1.0, 0.2), 4.0 * scale * scale).unwrap();
+            let filter = PlaneFilter::with_basis(&dynamics, Matrix2::new(0.2, 0.0, 0.0, 0.15) * scale).unwrap();
+            let covariance = Matrix2::new(2.0, 0.3, 0.3, 1.0) * (scale * scale);
+            let mut belief = Gaussian::new(Vector2::new(1.0, -2.0) * scale, covariance).unwrap();
+            let mut exact = filter.normal(&belief).unwrap();
+            for z in [0.5, -1.5] {
+                let (next, info) = kalman::step(&dynamics, &sensor, &belief, &Vector1::new(z * scale)).unwrap();
+                belief = next;
+                let observed = Observed::new(sensor, Value::scalar(z * scale, 4.0 * scale * scale).unwrap());
+                let (after, log_likelihood) = filter.step(&exact, &observed).unwrap();
+                exact = after;
+                let off = log_likelihood - info.log_likelihood;
+                assert!(off.abs() < 1e-6, "{variance}: {off}");
+                assert!((Belief::mean(&exact) - belief.mean()).amax() < 1e-6 * scale);
+                assert!((Belief::covariance(&exact) - belief.covariance()).amax() < 1e-6 * scale * scale);
+            }
+        }
+        let dynamics = constant_velocity_1d(0.8, 0.0).unwrap();
+        assert!(PlaneFilter::with_basis(&dynamics, Matrix2::zeros()).is_err());
+        let coarse = PlaneFilter::with_basis(&dynamics, Matrix2::identity() * 2.0).unwrap();
+        let narrow = coarse
+            .normal(&Gaussian::new(Vector2::new(0.3, 0.7), Matrix2::identity() * 0.2).unwrap())
+            .unwrap();
+        assert!(coarse.predict(&narrow).is_err(), "a density between the nodes is an error, not a wrong answer");
     }
 
     #[test]

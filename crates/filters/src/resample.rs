@@ -56,8 +56,24 @@ impl Resampling {
         ancestors: &mut [u32],
     ) -> Result<(), ArgumentError> {
         let (total, last) = check(weights)?;
+        // Weights so small or large that their shares leave the range of numbers are scaled first.
+        let range = 1e-290..1e290;
+        if !range.contains(&total) {
+            let largest = weights.iter().copied().fold(0.0, f64::max);
+            let scaled: Vec<f64> = weights.iter().map(|w| w / largest).collect();
+            let (total, last) = check(&scaled)?;
+            self.ancestors_unchecked(rng, &scaled, total, last, ancestors);
+            return Ok(());
+        }
         self.ancestors_unchecked(rng, weights, total, last, ancestors);
         Ok(())
+    }
+
+    /// The same for the weights of [`Particles`](fewbits_densities::Particles), which are checked and normalised already.
+    pub(crate) fn ancestors_of_normalised<R: Rng + ?Sized>(self, rng: &mut R, weights: &[f64], ancestors: &mut [u32]) {
+        if let Some(last) = weights.iter().rposition(|w| *w > 0.0) {
+            self.ancestors_unchecked(rng, weights, sum(weights), last, ancestors);
+        }
     }
 
     /// The same for weights known to be non-negative with the sum `total`, the last positive one at `last`.
@@ -197,7 +213,7 @@ pub enum Schedule {
     /// After every weighting.
     #[default]
     Always,
-    /// When the effective sample size falls below this fraction of the number of particles.
+    /// When the effective sample size falls below this fraction of the number of particles; NaN is always due.
     Below(f64),
     /// Never: sequential importance sampling.
     Never,
@@ -205,10 +221,12 @@ pub enum Schedule {
 
 impl Schedule {
     /// Whether particles of this effective sample size are due.
+    #[expect(clippy::neg_cmp_op_on_partial_ord, reason = "NaN must be due")]
     pub fn is_due(self, effective_sample_size: f64, particles: usize) -> bool {
         match self {
             Self::Always => true,
-            Self::Below(fraction) => effective_sample_size < fraction * particles as f64,
+            // Not `<`: a threshold that is no number must not switch resampling off.
+            Self::Below(fraction) => !(effective_sample_size >= fraction * particles as f64),
             Self::Never => false,
         }
     }

@@ -115,7 +115,7 @@ pub fn scalar_fixed_lag_variance(coefficient: f64, steady: &crate::ScalarSteadyS
 
 #[cfg(test)]
 mod tests {
-    use super::{FixedLagSmoother, scalar_fixed_lag_variance, smooth};
+    use super::{FixedLagSmoother, scalar_fixed_lag_variance, smooth, smooth_step};
     use crate::{kalman, scalar_steady_state};
     use fewbits_core::{Dynamics, Gaussian, Sensing};
     use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
@@ -183,6 +183,24 @@ mod tests {
                 assert!((belief.mean() - mean.fixed_rows::<2>(2 * n)).amax() < 1e-10);
                 assert!((belief.covariance() - covariance.fixed_view::<2, 2>(2 * n, 2 * n)).amax() < 1e-10);
             }
+        }
+    }
+
+    /// Issue: the gain came from the Cholesky factor of a rounding pivot. A known velocity and an unknown start, without
+    /// noise, are one number: the smoothed start is the smoothed end moved back.
+    #[test]
+    fn a_singular_prediction_is_smoothed_within_its_range() {
+        for (step, scale) in [(0.7, 1.0), (0.7, 1e-4), (0.3, 1e4), (1.1, 1e-9)] {
+            let still = constant_velocity_1d(step, 0.0).unwrap();
+            let direction = Vector2::new(1.0, 0.6);
+            let filtered = Gaussian::new(direction * scale, direction * direction.transpose() * scale * scale).unwrap();
+            let ahead = still.transition() * direction;
+            let next =
+                Gaussian::new(ahead * (2.0 * scale), ahead * ahead.transpose() * (0.25 * scale * scale)).unwrap();
+            let smoothed = smooth_step(&still, &filtered, &next).unwrap();
+            assert!((smoothed.mean() - direction * (2.0 * scale)).amax() < 1e-9 * scale);
+            let expected = direction * direction.transpose() * (0.25 * scale * scale);
+            assert!((smoothed.covariance() - expected).amax() < 1e-9 * scale * scale);
         }
     }
 

@@ -5,9 +5,11 @@ use fewbits_core::{LinearDynamics, LinearSensing};
 use fewbits_numerics::error::{finite, non_negative, positive, within};
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{Cholesky, Const, DimMin, SMatrix};
+use serde::{Deserialize, Serialize};
 
 /// Steady variances of a scalar filter, in state units squared.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ScalarSteadyState {
     /// Variance `P` before a message.
     pub predicted_variance: f64,
@@ -51,7 +53,8 @@ pub fn scalar_steady_state(
 }
 
 /// Steady covariances of a vector filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SteadyState<const D: usize> {
     /// Covariance before a measurement: the stabilising root of the discrete algebraic Riccati equation.
     pub predicted_covariance: SMatrix<f64, D, D>,
@@ -63,8 +66,11 @@ pub struct SteadyState<const D: usize> {
 const DOUBLINGS: usize = 60;
 /// Relative change below which the doubling has settled.
 const SETTLED: f64 = 1e-15;
+/// Relative difference below which two starts have come to the same end.
+const AGREED: f64 = 1e-9;
 
-/// The steady state of the Kalman filter, by structure-preserving doubling.
+/// The steady state of the Kalman filter, by structure-preserving doubling, from a start at which every mode is uncertain: an
+/// unstable mode settles at its stabilising root even where no noise excites it.
 ///
 /// ```text
 /// A = F',  G = H' R^-1 H,  P = Q
@@ -72,11 +78,13 @@ const SETTLED: f64 = 1e-15;
 ///         P = P + A' P W^-1 A
 ///         G = G + A W^-1 G A'
 ///         A = A W^-1 A
-/// until P settles                       (k rounds equal 2^k Riccati steps)
+///         X = P + A' S (I + G S)^-1 A           (the recursion from S after 2^k steps)
+/// until X settles, from S and from 4 S
 /// ```
 ///
 /// # Errors
-/// [`Error::NoSteadyState`] if the recursion diverges or does not settle.
+/// [`Error::NoSteadyState`] if the recursion diverges, does not settle, or settles where it started (an unobserved mode that
+/// does not decay).
 pub fn steady_state<const D: usize, const M: usize>(
     dynamics: &impl LinearDynamics<D>,
     sensing: &impl LinearSensing<D, M>,
@@ -89,33 +97,71 @@ where
     let mut a = dynamics.transition().transpose();
     let mut g = matrix.transpose() * noise.solve(matrix);
     let mut p = *dynamics.noise_covariance();
-    let mut settled = false;
-    for _ in 0..DOUBLINGS {
-        let w = (SMatrix::<f64, D, D>::identity() + g * p).lu();
+    let start = uncertain(&g, &p);
+    let identity = SMatrix::<f64, D, D>::identity();
+    let mut before = [SMatrix::<f64, D, D>::repeat(f64::INFINITY); 2];
+    let mut settled = None;
+    for round in 0..DOUBLINGS {
+        let w = (identity + g * p).lu();
         let (Some(w_a), Some(w_g)) = (w.solve(&a), w.solve(&g)) else {
             return Err(Error::NoSteadyState);
         };
-        let increment = a.transpose() * p * w_a;
+        p = symmetrised(&(p + a.transpose() * p * w_a));
         g = symmetrised(&(g + a * w_g * a.transpose()));
         a *= w_a;
-        p = symmetrised(&(p + increment));
-        if !p.amax().is_finite() {
+        let reached = [start, start * 4.0].map(|s| {
+            let from_start = (identity + g * s).lu().solve(&a);
+            from_start.map(|x| symmetrised(&(p + a.transpose() * s * x)))
+        });
+        let [Some(low), Some(high)] = reached else {
+            return Err(Error::NoSteadyState);
+        };
+        if !(low.amax().is_finite() && high.amax().is_finite()) {
             return Err(Error::NoSteadyState);
         }
-        settled = increment.amax() <= SETTLED * p.amax();
-        if settled {
+        // Relative to each pair of coordinates.
+        let close = |x: &SMatrix<f64, D, D>, y: &SMatrix<f64, D, D>, tolerance: f64, floor: f64| {
+            let root = |k: usize| high[(k, k)].max(start[(k, k)] * floor).sqrt();
+            (0..D).all(|i| (0..D).all(|j| (x[(i, j)] - y[(i, j)]).abs() <= tolerance * root(i) * root(j)))
+        };
+        // A mode on the unit circle without noise decays like 1/n: after 2^60 steps it counts as gone.
+        let vanished = round + 1 == DOUBLINGS && close(&low, &before[0], AGREED, 1.0);
+        if vanished || close(&low, &before[0], SETTLED, SETTLED) && close(&high, &before[1], SETTLED, SETTLED) {
+            let floor = if vanished { 1.0 } else { SETTLED };
+            settled = close(&low, &high, AGREED, floor).then_some(low);
             break;
         }
+        before = [low, high];
     }
-    if !settled {
-        return Err(Error::NoSteadyState);
-    }
+    let p = settled.ok_or(Error::NoSteadyState)?;
     let cross = p * matrix.transpose();
     let innovation = Cholesky::new(matrix * cross + sensing.noise_covariance()).ok_or(Error::SingularInnovation)?;
     Ok(SteadyState {
         predicted_covariance: p,
         filtered_covariance: symmetrised(&(p - cross * innovation.solve(&cross.transpose()))),
     })
+}
+
+/// A covariance that is certain of nothing, in the units of the problem: noise plus what one measurement resolves.
+fn uncertain<const D: usize>(
+    information: &SMatrix<f64, D, D>,
+    process_noise: &SMatrix<f64, D, D>,
+) -> SMatrix<f64, D, D> {
+    let variance = |i: usize| {
+        let resolved = 1.0 / information[(i, i)];
+        process_noise[(i, i)] + if resolved.is_finite() { resolved } else { 0.0 }
+    };
+    let largest = (0..D).map(variance).fold(0.0, f64::max);
+    let known = |i: usize| {
+        if variance(i) > 0.0 {
+            variance(i)
+        } else if largest > 0.0 {
+            largest
+        } else {
+            1.0
+        }
+    };
+    SMatrix::from_diagonal(&nalgebra::SVector::<f64, D>::from_fn(|i, _| known(i)))
 }
 
 #[cfg(test)]
@@ -149,6 +195,29 @@ mod tests {
         assert_eq!(scalar_steady_state(2.0, 1.0, 1.0, 0.6), Err(Error::NoSteadyState));
         // Unstable, but a perfect link holds it.
         assert!(scalar_steady_state(2.0, 1.0, 1.0, 1.0).is_ok());
+    }
+
+    /// Issue: the recursion settled at zero for a mode that is unstable and not excited, and took an unobserved one for steady.
+    #[test]
+    fn an_unstable_mode_without_noise_settles_at_its_stabilising_root() {
+        for scale in [1e-4, 1.0, 1e4] {
+            let r = scale * scale;
+            let steady =
+                steady_state(&Ar1::new_unstable(2.0, 0.0).unwrap(), &LinearSensor::direct(r).unwrap()).unwrap();
+            assert!((steady.predicted_covariance[0] / r - 3.0).abs() < 1e-12);
+            let closed = scalar_steady_state(2.0, 0.0, r, 1.0).unwrap();
+            assert!((closed.predicted_variance / r - 3.0).abs() < 1e-12);
+        }
+        for transition in [Matrix2::new(1.1, 0.0, 0.0, 0.5), Matrix2::new(1.0, 0.0, 0.0, 0.5)] {
+            let still = LinearGaussian::with_covariance(transition, Matrix2::new(0.0, 0.0, 0.0, 1.0)).unwrap();
+            let blind = LinearSensor::scalar([0.0, 1.0].into(), 1.0).unwrap();
+            assert_eq!(steady_state(&still, &blind), Err(Error::NoSteadyState));
+            let seeing = LinearSensor::scalar([1.0, 0.0].into(), 1.0).unwrap();
+            let steady = steady_state(&still, &seeing).unwrap();
+            let stabilising = transition[(0, 0)].powi(2) - 1.0;
+            assert!((steady.predicted_covariance[(0, 0)] - stabilising).abs() < 1e-9);
+            assert!((steady.predicted_covariance[(1, 1)] - 1.0 / 0.75).abs() < 1e-12);
+        }
     }
 
     #[test]

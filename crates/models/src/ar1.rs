@@ -1,17 +1,45 @@
 //! The first-order autoregression.
 
 use crate::{Error, LinearGaussian};
-use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics};
+use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::error::{finite, non_negative};
+use fewbits_numerics::kernels::StandardNormals;
 use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
 
 /// `x(n) = a x(n-1) + u(n)`, `u ~ N(0, q)`: a scalar that decays towards zero and is pushed by white noise.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Parameters", into = "Parameters")]
 pub struct Ar1 {
     transition: Matrix1<f64>,
     noise_covariance: Matrix1<f64>,
+}
+
+/// The stored form, checked when it is read.
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Ar1", deny_unknown_fields)]
+struct Parameters {
+    coefficient: f64,
+    noise_variance: f64,
+}
+
+impl From<Ar1> for Parameters {
+    fn from(model: Ar1) -> Self {
+        Self {
+            coefficient: model.coefficient(),
+            noise_variance: model.noise_variance(),
+        }
+    }
+}
+
+impl TryFrom<Parameters> for Ar1 {
+    type Error = Error;
+
+    fn try_from(stored: Parameters) -> Result<Self, Error> {
+        Self::new_unstable(stored.coefficient, stored.noise_variance)
+    }
 }
 
 impl Ar1 {
@@ -28,7 +56,7 @@ impl Ar1 {
     }
 
     /// The same for any finite coefficient. The name is the opt-in: a state that grows without bound is beyond most
-    /// estimators that hear only a few bits.
+    /// estimators that receive only a few bits.
     ///
     /// # Errors
     /// A coefficient that is not finite, a negative variance.
@@ -80,6 +108,18 @@ impl Dynamics<1> for Ar1 {
     fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector1<f64>) -> Vector1<f64> {
         let normal: f64 = StandardNormal.sample(rng);
         Vector1::new(self.coefficient() * state[0] + self.noise_variance().sqrt() * normal)
+    }
+
+    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, [states]: ColumnsMut<'_, 1>) {
+        const BLOCK: usize = 128;
+        let (mut normals, mut draws) = (StandardNormals::new(rng), [0.0; BLOCK]);
+        let (coefficient, deviation) = (self.coefficient(), self.noise_variance().sqrt());
+        for states in states.chunks_mut(BLOCK) {
+            normals.fill(&mut draws[..states.len()]);
+            for (x, z) in states.iter_mut().zip(&draws) {
+                *x = coefficient * *x + deviation * z;
+            }
+        }
     }
 }
 

@@ -48,3 +48,4 @@ pub use error::Error;
 pub use linear_gaussian::LinearGaussian;
 pub use linear_sensor::{LinearSensor, ScalarSensor};
 pub use received_power::ReceivedPower;
+pub use {nalgebra, rand};

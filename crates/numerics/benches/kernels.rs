@@ -15,7 +15,9 @@ fn main() {
 
 fn normals(scale: f64) -> Vec<f64> {
     let mut rng = Pcg64Mcg::seed_from_u64(1);
-    (0..COUNT).map(|_| scale * rng.sample::<f64, _>(StandardNormal)).collect()
+    (0..COUNT)
+        .map(|_| scale * rng.sample::<f64, _>(StandardNormal))
+        .collect()
 }
 
 #[divan::bench]
@@ -26,6 +28,16 @@ fn standard_normal_unit(bencher: Bencher) {
         for z in &mut out {
             *z = rng.sample(StandardNormal);
         }
+        black_box(&out);
+    });
+}
+
+#[divan::bench]
+fn standard_normals_block(bencher: Bencher) {
+    let mut rng = Pcg64Mcg::seed_from_u64(1);
+    let mut out = vec![0.0; COUNT];
+    bencher.counter(ItemsCount::new(COUNT)).bench_local(|| {
+        kernels::fill_standard_normals(&mut rng, &mut out);
         black_box(&out);
     });
 }
@@ -66,7 +78,11 @@ fn log_cdf(bencher: Bencher) {
 
 #[divan::bench]
 fn log_cdf_scalar(bencher: Bencher) {
-    let one_by_one = |values: &mut [f64]| values.iter_mut().for_each(|x| *x = fewbits_numerics::normal::log_cdf(*x));
+    let one_by_one = |values: &mut [f64]| {
+        values
+            .iter_mut()
+            .for_each(|x| *x = fewbits_numerics::normal::log_cdf(*x))
+    };
     in_place(bencher, one_by_one, normals(3.0));
 }
 
@@ -87,7 +103,9 @@ thread_local! {
 #[divan::bench]
 fn log_interval_scalar(bencher: Bencher) {
     let one_by_one = |values: &mut [f64]| {
-        values.iter_mut().for_each(|x| *x = fewbits_numerics::normal::log_interval(*x, *x + 0.8));
+        values
+            .iter_mut()
+            .for_each(|x| *x = fewbits_numerics::normal::log_interval(*x, *x + 0.8));
     };
     in_place(bencher, one_by_one, normals(3.0));
 }
@@ -96,11 +114,15 @@ fn log_interval_scalar(bencher: Bencher) {
 fn exp_minus(bencher: Bencher) {
     let logs = normals(20.0);
     let mut out = vec![0.0; COUNT];
-    bencher.counter(ItemsCount::new(COUNT)).bench_local(|| black_box(kernels::exp_minus(&logs, 3.0, &mut out)));
+    bencher
+        .counter(ItemsCount::new(COUNT))
+        .bench_local(|| black_box(kernels::exp_minus(&logs, 3.0, &mut out)));
 }
 
 #[divan::bench]
 fn log_sum_exp(bencher: Bencher) {
     let logs = normals(20.0);
-    bencher.counter(ItemsCount::new(COUNT)).bench_local(|| black_box(kernels::log_sum_exp(&logs)));
+    bencher
+        .counter(ItemsCount::new(COUNT))
+        .bench_local(|| black_box(kernels::log_sum_exp(&logs)));
 }

@@ -41,7 +41,7 @@ fn encode_and_write(bencher: Bencher) {
     let mut writer = BitWriter::with_capacity(8);
     bencher.bench_local(|| {
         writer.clear();
-        Symbol(quantizer.encode(black_box(0.3))).encode(&labelling, &mut writer)
+        Symbol(quantizer.encode(black_box(0.3)).unwrap()).encode(&labelling, &mut writer)
     });
 }
 
@@ -49,7 +49,7 @@ fn encode_and_write(bencher: Bencher) {
 #[divan::bench]
 fn decode_nine(bencher: Bencher) {
     let decoder = MmseDecoder::new(&System::identical(nine(), lloyd(4)).unwrap(), 220).unwrap();
-    bencher.bench(|| decoder.decode(black_box(&[0, 1, 2, 3, 3, 2, 1, 2, 2])).unwrap().mean);
+    bencher.bench(|| decoder.decode_symbols(black_box(&[0, 1, 2, 3, 3, 2, 1, 2, 2])).unwrap().mean);
 }
 
 /// Information, gradient and Hessian of two sensors.

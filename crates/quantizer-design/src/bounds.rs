@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | remote distortion-rate (2.15) | any code of one noisy source, any block length | [`remote_distortion_rate`] |
 //! | quadratic Gaussian CEO | any codes at separate sensors with independent noise | [`ceo`] |
-//! | van Trees | these quantizers, any estimator | [`van_trees`] |
+//! | Bayesian Cramer-Rao (van Trees, constant weight) | these quantizers, any estimator | [`bayesian_cramer_rao`] |
 //!
 //! The Cramer-Rao bound `1 / J(x)` concerns unbiased estimators of a fixed `x`. The posterior mean is biased towards the prior
 //! and beats it; for a random unknown the van Trees inequality takes its place.
@@ -27,8 +27,8 @@ pub fn remote_distortion_rate(prior_variance: f64, noise_variance: f64, bits: f6
     let sx2 = fewbits_numerics::error::positive("prior_variance", prior_variance)?;
     let s2 = fewbits_numerics::error::positive("noise_variance", noise_variance)?;
     let bits = fewbits_numerics::error::non_negative("bits", bits)?;
-    let told = -(-2.0 * std::f64::consts::LN_2 * bits).exp_m1();
-    Ok(sx2 - sx2 * sx2 / (sx2 + s2) * told)
+    // The error of the noise alone plus what is left of the rest: no difference, so no digit is lost.
+    Ok(sx2 / (sx2 + s2) * (s2 + sx2 * (-2.0 * bits).exp2()))
 }
 
 /// Fisher information about `x` in the received symbols at each value of the scene, for independent noise.
@@ -78,14 +78,14 @@ pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
 ///
 /// # Errors
 /// [`Error::Argument`] if the noise is correlated or the prior is not Gaussian.
-pub fn van_trees(system: &System) -> Result<f64, Error> {
+pub fn bayesian_cramer_rao(system: &System) -> Result<f64, Error> {
     match system.scene().prior() {
         Prior::Gaussian { sd } => Ok(1.0 / (mean_fisher_information(system)? + 1.0 / (sd * sd))),
         Prior::Discrete { .. } => refuse("prior", "a discrete prior", "a smooth prior for the van Trees bound"),
     }
 }
 
-/// Least mean squared error of the quadratic Gaussian CEO problem: sensor `n` sees `X + W_n`, independent noise of variance
+/// Least mean squared error of the quadratic Gaussian CEO problem: sensor `n` measures `X + W_n`, independent noise of variance
 /// `noise_variances[n]`, and may spend `bits[n]` a sample.
 ///
 /// `D` is achievable if and only if rates `r_n >= 0` (what each sensor says about its own noise) exist with, for every subset
@@ -96,12 +96,13 @@ pub fn van_trees(system: &System) -> Result<f64, Error> {
 /// ```
 ///
 /// All subsets are kept: with unequal noise the sum-rate constraint alone gives a wrong value. The largest `ln(1/D)` is a
-/// concave maximin problem in `r`, solved here by a logarithmic barrier to about 1e-12.
+/// concave maximin problem in `r`, solved here by a logarithmic barrier; the point reached is feasible, and weak duality bounds
+/// how far from the optimum it can be ([`CeoBound::gap`]).
 ///
 /// # Errors
 /// If the lengths differ, there are none or more than 12 sensors, a variance is not positive or a rate is negative;
-/// [`Error::NotConverged`] if the barrier method stalls.
-pub fn ceo(prior_variance: f64, noise_variances: &[f64], bits: &[f64]) -> Result<f64, Error> {
+/// [`Error::NotConverged`] if the barrier method ends with a gap above 1e-6.
+pub fn ceo(prior_variance: f64, noise_variances: &[f64], bits: &[f64]) -> Result<CeoBound, Error> {
     fewbits_numerics::error::positive("prior_variance", prior_variance)?;
     for s2 in noise_variances {
         fewbits_numerics::error::positive("noise_variance", *s2)?;
@@ -117,14 +118,49 @@ pub fn ceo(prior_variance: f64, noise_variances: &[f64], bits: &[f64]) -> Result
     // A sensor without a budget says nothing.
     let speaking: Vec<usize> = (0..n).filter(|i| bits[*i] > 0.0).collect();
     if speaking.is_empty() {
-        return Ok(prior_variance);
+        return Ok(CeoBound {
+            distortion: prior_variance,
+            gap: 0.0,
+        });
     }
     let problem = Ceo {
         // In units of the prior variance.
         precision: speaking.iter().map(|i| prior_variance / noise_variances[*i]).collect(),
         rate: speaking.iter().map(|i| bits[*i] * std::f64::consts::LN_2).collect(),
     };
-    Ok(prior_variance * (-problem.solve()?).exp())
+    let (tau, above) = problem.solve()?;
+    let bound = CeoBound {
+        distortion: prior_variance * (-tau).exp(),
+        gap: (above - tau).max(0.0),
+    };
+    if bound.gap <= LARGEST_GAP {
+        Ok(bound)
+    } else {
+        Err(Error::NotConverged {
+            algorithm: "CEO barrier",
+            iterations: 0,
+            change: bound.gap,
+        })
+    }
+}
+
+/// Largest relative gap of a CEO bound that is returned.
+const LARGEST_GAP: f64 = 1e-6;
+
+/// The least distortion of a CEO problem, with a certificate of how well it is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CeoBound {
+    /// A distortion that codes can attain.
+    pub distortion: f64,
+    /// No codes can attain less than `distortion * exp(-gap)`; proved by weak duality.
+    pub gap: f64,
+}
+
+impl CeoBound {
+    /// The largest distortion that is proved to be out of reach.
+    pub fn lower(&self) -> f64 {
+        self.distortion * (-self.gap).exp()
+    }
 }
 
 struct Ceo {
@@ -160,11 +196,13 @@ impl Ceo {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// The largest `tau` below all constraints for some `r >= 0`.
-    fn solve(&self) -> Result<f64, Error> {
+    /// The largest `tau` below all constraints for some `r >= 0`, and a proved upper bound on it.
+    fn solve(&self) -> Result<(f64, f64), Error> {
         let n = self.rate.len();
         let mut r: Vec<f64> = self.rate.iter().map(|r| 0.5 * r).collect();
         let mut tau = self.least(&r) - 1.0;
+        // Late on the path the slacks have few digits left, and with them the duals: the best certificate may come before.
+        let mut above = f64::INFINITY;
         // One nat of slack a constraint at first; small factors keep every point near the central path, away from which the
         // curved constraints allow tiny steps only.
         let mut weight = (1u64 << n) as f64;
@@ -191,9 +229,24 @@ impl Ceo {
                     break;
                 }
             }
+            above = above.min(self.upper(&r, tau));
         }
-        // The last point is feasible; its slack is no more than rounding and the barrier's share.
-        Ok(self.least(&r))
+        Ok((self.least(&r), above))
+    }
+
+    /// Weak duality: for any weights of the constraints that sum to one, no `r` has all of them above the largest value of
+    /// their weighted sum, which being concave is below its tangent at `r`. No rate above a sensor's budget is of use.
+    fn upper(&self, r: &[f64], tau: f64) -> f64 {
+        let n = r.len();
+        let subsets = || (0..1usize << n).map(|subset| self.constraint(subset, r));
+        let total: f64 = subsets().map(|c| 1.0 / (c.0 - tau)).sum();
+        let (mut bound, mut slope) = (0.0, DVector::zeros(n));
+        for (value, gradient, ..) in subsets() {
+            let weight = 1.0 / (value - tau) / total;
+            bound += weight * value;
+            slope += gradient * weight;
+        }
+        bound + (0..n).map(|i| f64::max(-slope[i] * r[i], slope[i] * (self.rate[i] - r[i]))).sum::<f64>()
     }
 
     /// Change of the logarithmic barrier from one point to another, formed from ratios so that nothing cancels.
@@ -277,24 +330,26 @@ mod tests {
             (5, 4.0, 0.4),
             (1, 1.0, 3.0),
         ] {
-            let found = ceo(2.0, &vec![2.0 / snr; n], &vec![bits; n]).unwrap();
+            let bound = ceo(2.0, &vec![2.0 / snr; n], &vec![bits; n]).unwrap();
+            assert!(bound.gap < 1e-6 && bound.lower() <= bound.distortion, "{bound:?}");
+            let found = bound.distortion;
             assert!((found / 2.0 - symmetric(n as f64, snr, bits)).abs() < 1e-11, "{n} {found}");
         }
     }
 
     #[test]
     fn one_sensor_is_the_remote_source() {
-        let one = ceo(1.0, &[0.5], &[2.0]).unwrap();
+        let one = ceo(1.0, &[0.5], &[2.0]).unwrap().distortion;
         assert!((one - remote_distortion_rate(1.0, 0.5, 2.0).unwrap()).abs() < 1e-11);
         // A silent sensor does not matter.
-        assert!((ceo(1.0, &[0.5, 0.1], &[2.0, 0.0]).unwrap() - one).abs() < 1e-15);
-        assert_eq!(ceo(1.0, &[0.5], &[0.0]).unwrap(), 1.0);
+        assert!((ceo(1.0, &[0.5, 0.1], &[2.0, 0.0]).unwrap().distortion - one).abs() < 1e-15);
+        assert_eq!(ceo(1.0, &[0.5], &[0.0]).unwrap().distortion, 1.0);
     }
 
     #[test]
     fn a_weak_sensor_with_a_large_budget_is_bound_by_its_own_rate() {
         // An unlimited budget leaves only the other's constraint: the bound lies between the extremes.
-        let [poor, rich] = [1.0, 12.0].map(|b| ceo(1.0, &[1.0, 0.5], &[b, 2.0]).unwrap());
+        let [poor, rich] = [1.0, 12.0].map(|b| ceo(1.0, &[1.0, 0.5], &[b, 2.0]).unwrap().distortion);
         assert!(rich < poor && rich > 1.0 / (1.0 + 1.0 + 2.0));
     }
 
@@ -305,6 +360,34 @@ mod tests {
         let system = System::ideal(scene, vec![Quantizer::new(fine).unwrap()]).unwrap();
         let j = mean_fisher_information(&system).unwrap();
         assert!(j < 1.0 && j > 0.9999, "{j}");
+    }
+
+    #[test]
+    fn a_remote_source_in_almost_no_noise_keeps_its_digits() {
+        for (noise, bits, exact) in [
+            (1e-12_f64, 30.0, 1e-12 + 2f64.powi(-60)),
+            (1e-17, 30.0, 1e-17 + 2f64.powi(-60)),
+            (1e-17, 0.0, 1.0),
+        ] {
+            let found = remote_distortion_rate(1.0, noise, bits).unwrap();
+            assert!((found / exact - 1.0).abs() < 1e-11, "{noise} {bits}: {found}");
+        }
+    }
+
+    /// Extreme budgets and noises end with a certified gap or with an error, never silently.
+    #[test]
+    fn every_ceo_bound_carries_its_certificate() {
+        for (variances, bits) in [
+            (vec![1e-6, 1.0, 1e6], vec![0.1, 8.0, 3.0]),
+            (vec![1.0; 6], vec![1e-3; 6]),
+            (vec![1e-9, 1e-9], vec![20.0, 20.0]),
+            (vec![0.3, 2.0, 5.0, 0.01], vec![12.0, 0.01, 1.0, 0.5]),
+        ] {
+            match ceo(1.0, &variances, &bits) {
+                Ok(bound) => assert!(bound.gap <= 1e-6 && bound.distortion > 0.0 && bound.distortion < 1.0, "{bound:?}"),
+                Err(error) => assert!(matches!(error, Error::NotConverged { .. }), "{error}"),
+            }
+        }
     }
 
     #[test]

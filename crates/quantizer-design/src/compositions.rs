@@ -1,4 +1,4 @@
-//! Count vectors: what a group of identical sensors says, up to who said it.
+//! Count vectors: what a group of identical sensors reports, up to who reported it.
 //!
 //! The likelihood of `N` identical sensors depends on how many reported each symbol, so `L^N` outcomes collapse to
 //! `C(N + L - 1, L - 1)` count vectors with multinomial coefficients: 220 instead of 262144 for nine sensors of four levels.
@@ -111,8 +111,8 @@ impl Compositions {
         &self.log_multiplicity
     }
 
-    #[cfg(test)]
-    fn vectors(&self) -> &[Vec<usize>] {
+    /// The top level's vectors, in order of rank.
+    pub(crate) fn vectors(&self) -> &[Vec<usize>] {
         &self.vectors
     }
 

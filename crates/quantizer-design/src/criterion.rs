@@ -2,12 +2,18 @@
 
 use crate::error::{Error, refuse};
 use crate::scene::{Feature, Scene};
+use serde::{Deserialize, Serialize};
 
 /// Below this a probability counts as zero inside a logarithm.
 pub(crate) const LOG_FLOOR: f64 = 1e-300;
 
+/// Up to this many values of the unknown, information is the prior's entropy minus the equivocation, which keeps its digits
+/// where decisions are almost sure.
+const FEW_VALUES: usize = 8;
+
 /// The figure of merit of a system of quantizers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Criterion {
     /// `I(X; T)` in nats, to be maximised.
     MutualInformation,
@@ -33,6 +39,7 @@ impl Criterion {
 ///
 /// | criterion | moments | `psi` |
 /// |---|---|---|
+/// | information, few values of `X` | `q_k` | `sum w q ln(w q / Q)`, subtracted from the prior's entropy |
 /// | information, independent noise | `Q = sum w q` | `-Q ln Q`; the conditional entropy is a sum over sensors |
 /// | information, shared noise | `q_k`, each value of `X` | `sum w q ln(q / Q)` |
 /// | squared error | `Q`, `M = sum w x q` | `M^2 / Q`, subtracted from `E X^2` |
@@ -46,6 +53,7 @@ pub(crate) struct Scored {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
+    Equivocation,
     Entropy,
     Information,
     Explained,
@@ -55,6 +63,9 @@ enum Kind {
 impl Scored {
     pub(crate) fn new(criterion: Criterion, scene: &Scene) -> Result<Self, Error> {
         let (kind, features) = match criterion {
+            Criterion::MutualInformation if scene.is_discrete() && scene.values.len() <= FEW_VALUES => {
+                (Kind::Equivocation, scene.given.clone())
+            }
             Criterion::MutualInformation if scene.is_independent() => (Kind::Entropy, vec![scene.mass.clone()]),
             Criterion::MutualInformation => (Kind::Information, scene.given.clone()),
             Criterion::MeanSquaredError => (Kind::Explained, vec![scene.mass.clone(), scene.moment.clone()]),
@@ -85,6 +96,21 @@ impl Scored {
             Kind::Entropy if m[0] > 0.0 => -m[0] * (m[0].max(LOG_FLOOR).ln() - log_multiplicity),
             Kind::Explained if m[0] > 0.0 => m[1] * (m[1] / m[0]),
             Kind::Entropy | Kind::Explained => 0.0,
+            Kind::Equivocation => {
+                let (best, mass, others) = self.favourite(m);
+                if mass <= 0.0 {
+                    return 0.0;
+                }
+                let rest: f64 = self
+                    .weights
+                    .iter()
+                    .zip(m)
+                    .enumerate()
+                    .filter(|(k, (w, q))| *k != best && *w * *q > 0.0)
+                    .map(|(_, (w, q))| w * q * (w * q / mass).ln())
+                    .sum();
+                rest + (mass - others) * (-others / mass).ln_1p()
+            }
             Kind::Information => {
                 let total = self.total(m);
                 self.weights
@@ -117,6 +143,18 @@ impl Scored {
                 out[0] = -r * r;
                 out[1] = 2.0 * r;
             }
+            Kind::Equivocation => {
+                let (best, mass, others) = self.favourite(m);
+                for (k, ((o, w), q)) in out.iter_mut().zip(&self.weights).zip(m).enumerate() {
+                    *o = if mass <= 0.0 {
+                        0.0
+                    } else if k == best {
+                        w * (-others / mass).ln_1p()
+                    } else {
+                        w * ((w * q).max(LOG_FLOOR) / mass).ln()
+                    };
+                }
+            }
             Kind::Information => {
                 let total = self.total(m).max(LOG_FLOOR);
                 for ((o, w), q) in out.iter_mut().zip(&self.weights).zip(m) {
@@ -146,6 +184,21 @@ impl Scored {
                     out.fill(0.0);
                 }
             }
+            Kind::Equivocation => {
+                let (best, mass, others) = self.favourite(m);
+                let change = self.total(direction);
+                let moved = change - self.weights[best] * direction[best];
+                for (k, (((o, w), q), d)) in out.iter_mut().zip(&self.weights).zip(m).zip(direction).enumerate() {
+                    *o = if mass <= 0.0 || *q <= LOG_FLOOR {
+                        0.0
+                    } else if k == best {
+                        // d/q - change/mass without cancellation where the favourite has all the mass.
+                        w * (d / q * (others / mass) - moved / mass)
+                    } else {
+                        w * (d / q - change / mass)
+                    };
+                }
+            }
             Kind::Information => {
                 let total = self.total(m);
                 let change = self.total(direction);
@@ -163,6 +216,47 @@ impl Scored {
     }
 
     fn best(&self, q: &[f64]) -> usize {
-        crate::table::most_probable(&self.weights, q)
+        most_probable(&self.weights, q)
     }
+
+    /// The most probable value, the mass of the outcome, and what of it belongs to the others.
+    fn favourite(&self, q: &[f64]) -> (usize, f64, f64) {
+        let best = self.best(q);
+        let all = self.weights.iter().zip(q).enumerate();
+        let others: f64 = all.filter(|(k, _)| *k != best).map(|(_, (w, q))| w * q).sum();
+        (best, others + self.weights[best] * q[best], others)
+    }
+
+    /// What the sums over outcomes start from, as far as designs see it; see also [`Scored::offset`].
+    pub(crate) fn constant(&self, scene: &Scene) -> f64 {
+        if self.kind == Kind::Explained { -scene.variance } else { 0.0 }
+    }
+
+    /// What is added to a value for the outside only, since beside it small changes lose their digits: the prior's entropy.
+    pub(crate) fn offset(&self) -> f64 {
+        if self.kind != Kind::Equivocation {
+            return 0.0;
+        }
+        self.weights.iter().filter(|w| **w > 0.0).map(|w| -w * w.ln()).sum()
+    }
+
+    /// The size against which changes of the signed value (without offset) are small or large, whatever the unit.
+    pub(crate) fn unit(&self, value: f64, scene: &Scene) -> f64 {
+        match self.kind {
+            Kind::Equivocation | Kind::Decision => value.abs(),
+            Kind::Entropy | Kind::Information => value.abs().max(1.0),
+            Kind::Explained => value.abs().max(scene.variance),
+        }
+    }
+}
+
+/// Index of the largest `w_k q_k`; the first on ties.
+pub(crate) fn most_probable(weights: &[f64], q: &[f64]) -> usize {
+    let mut best = 0;
+    for k in 1..q.len() {
+        if weights[k] * q[k] > weights[best] * q[best] {
+            best = k;
+        }
+    }
+    best
 }

@@ -2,15 +2,16 @@
 
 use crate::compositions::Compositions;
 use crate::error::Error;
-use crate::moments::Table;
-use crate::system::{Group, System};
+use crate::moments::{Table, moments};
+use crate::scene::Feature;
+use crate::system::{SensorGroup, System};
 use fewbits_numerics::normal;
 
 /// A group whose breakpoints may move.
 #[derive(Debug, Clone)]
 pub(crate) struct Active<'a> {
     pub(crate) index: usize,
-    pub(crate) group: &'a Group,
+    pub(crate) group: &'a SensorGroup,
     pub(crate) compositions: Compositions,
     /// Mean of a sensor's sample at each node, and its standard deviation there.
     pub(crate) means: Vec<f64>,
@@ -92,6 +93,24 @@ impl<'a> Active<'a> {
         symbols
     }
 
+    /// Logarithms of the symbols' probabilities at each node, a row per symbol.
+    fn log_symbols(&self, b: &[f64]) -> Vec<Vec<f64>> {
+        let edge = |i: usize| b.get(i).copied().unwrap_or(f64::INFINITY);
+        let lower = |cell: usize| if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
+        (0..self.compositions.parts())
+            .map(|t| {
+                let law = |m: &f64| {
+                    let cells = (0..=b.len()).map(|cell| {
+                        let inside = normal::log_interval((lower(cell) - m) / self.sd, (edge(cell) - m) / self.sd);
+                        inside + self.group.cell_transition(t, cell).ln()
+                    });
+                    log_sum(&cells.collect::<Vec<_>>())
+                };
+                self.means.iter().map(law).collect()
+            })
+            .collect()
+    }
+
     /// Report probabilities of the whole group, and the symbol probabilities of one sensor.
     pub(crate) fn reports(&self, b: &[f64]) -> (Table, Vec<f64>) {
         let nodes = self.means.len();
@@ -149,4 +168,88 @@ pub(crate) fn negative_entropy(symbols: &[f64], mass: &[f64]) -> f64 {
                 .sum::<f64>()
         })
         .sum()
+}
+
+/// Report probabilities of every group at every node, and the log multiplicity of every joint outcome, first group slowest.
+pub(crate) struct Reports {
+    tables: Vec<Table>,
+    pub(crate) log_multiplicity: Vec<f64>,
+}
+
+impl Reports {
+    pub(crate) fn of(system: &System) -> Result<Self, Error> {
+        system.check_outcomes()?;
+        let mut tables = Vec::with_capacity(system.groups().len());
+        let mut log_multiplicity = vec![0.0];
+        for index in 0..system.groups().len() {
+            let entry = Active::new(system, index)?;
+            tables.push(entry.reports(entry.group.quantizer().breakpoints()).0);
+            log_multiplicity = sums(&log_multiplicity, entry.compositions.log_multiplicity());
+        }
+        Ok(Self {
+            tables,
+            log_multiplicity,
+        })
+    }
+
+    /// The features' moments of every joint outcome.
+    pub(crate) fn moments(&self, features: &[Feature]) -> Vec<f64> {
+        moments(&self.tables.iter().collect::<Vec<_>>(), features)
+    }
+}
+
+/// `ln P(outcome | x_k)` for every joint outcome, outcomes by values: digits where the probabilities themselves underflow.
+pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
+    system.check_outcomes()?;
+    let scene = system.scene();
+    let nodes = scene.nodes();
+    let mut joint = vec![vec![0.0; nodes]];
+    for index in 0..system.groups().len() {
+        let entry = Active::new(system, index)?;
+        let symbols = entry.log_symbols(entry.group.quantizer().breakpoints());
+        let rows: Vec<Vec<f64>> = entry
+            .compositions
+            .vectors()
+            .iter()
+            .zip(entry.compositions.log_multiplicity())
+            .map(|(counts, multiplicity)| {
+                let mut row = vec![*multiplicity; nodes];
+                for (n, symbol) in counts.iter().zip(&symbols).filter(|(n, _)| **n > 0) {
+                    row.iter_mut().zip(symbol).for_each(|(r, s)| *r += *n as f64 * s);
+                }
+                row
+            })
+            .collect();
+        joint = joint
+            .iter()
+            .flat_map(|a| rows.iter().map(move |b| sums_of(a, b)))
+            .collect();
+    }
+    let mut out = Vec::with_capacity(joint.len() * scene.values.len());
+    for row in &joint {
+        for feature in &scene.given {
+            let logs = row[feature.start..].iter().zip(&feature.weights);
+            let terms: Vec<f64> = logs.filter(|(_, w)| **w > 0.0).map(|(l, w)| l + w.ln()).collect();
+            out.push(log_sum(&terms));
+        }
+    }
+    Ok(out)
+}
+
+fn sums_of(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(x, y)| x + y).collect()
+}
+
+/// `ln sum exp`.
+fn log_sum(logs: &[f64]) -> f64 {
+    let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        return largest;
+    }
+    largest + logs.iter().map(|l| (l - largest).exp()).sum::<f64>().ln()
+}
+
+/// All sums of an entry of `a` and an entry of `b`, the latter running faster.
+pub(crate) fn sums(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().flat_map(|x| b.iter().map(move |y| x + y)).collect()
 }

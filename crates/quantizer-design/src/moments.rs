@@ -3,7 +3,7 @@
 use crate::scene::Feature;
 
 /// Functions on the nodes, one a row.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Table {
     pub(crate) values: Vec<f64>,
     pub(crate) nodes: usize,

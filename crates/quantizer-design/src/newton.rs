@@ -1,8 +1,9 @@
 //! Newton's method with a spectrally modified Hessian, for breakpoints that must stay in order.
 
+use crate::derivatives::Derivatives;
 use crate::error::Error;
-use crate::system::Derivatives;
 use nalgebra::{DVector, SymmetricEigen};
+use serde::{Deserialize, Serialize};
 
 /// Curvatures smaller than this share of the largest are replaced by it, so that flat directions take finite steps.
 const CURVATURE_FLOOR: f64 = 1e-10;
@@ -11,11 +12,50 @@ const SLACK: f64 = 1e-15;
 /// Where the predicted gain is below this, relative to the objective, rounding hides it: Newton's quadratic convergence is
 /// trusted and the objective not consulted.
 const HIDDEN_GAIN: f64 = 1e-13;
-/// A Hessian eigenvalue above this marks a saddle.
-pub const SADDLE: f64 = 1e-8;
+/// A curvature above this marks a saddle, one below its negative an optimum; in units of the criterion and the breakpoints'
+/// scale, so that the verdict knows no unit.
+pub const CURVATURE: f64 = 1e-8;
+
+/// What the second derivatives say of a stationary point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Certificate {
+    /// Every change of the breakpoints makes it worse to second order: a local optimum.
+    LocalOptimum,
+    /// Some change neither improves nor worsens it to second order: nothing is proved.
+    Flat,
+    /// Some change improves it to second order.
+    Saddle,
+}
+
+impl Certificate {
+    /// The verdict on a largest curvature (of the criterion signed so that larger is better), given the sizes of the criterion
+    /// and of the breakpoints.
+    pub(crate) fn of(largest_curvature: f64, unit: f64, scale: f64) -> Self {
+        let relative = largest_curvature * scale * scale / unit.max(f64::MIN_POSITIVE);
+        if relative > CURVATURE {
+            Self::Saddle
+        } else if relative < -CURVATURE {
+            Self::LocalOptimum
+        } else {
+            Self::Flat
+        }
+    }
+}
+
+/// What Newton's method does at a saddle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AtSaddle {
+    /// Steps off along the direction of ascent and goes on. Without this a symmetric start stays symmetric.
+    #[default]
+    StepOff,
+    /// Stays, and returns the saddle with its positive curvature.
+    Stay,
+}
 
 /// Stopping and safeguards of a Newton design.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Newton {
     /// Most iterations, escapes from saddles included.
     pub max_iterations: usize,
@@ -23,9 +63,8 @@ pub struct Newton {
     pub tolerance: f64,
     /// No breakpoint moves by more than this times the scale at once.
     pub max_step: f64,
-    /// On arriving at a saddle, step off along its direction of ascent and go on. Without this a symmetric start stays
-    /// symmetric, and the saddle is returned with its positive curvature.
-    pub escape_saddles: bool,
+    /// What to do on arriving at a saddle.
+    pub at_saddle: AtSaddle,
 }
 
 impl Default for Newton {
@@ -34,7 +73,7 @@ impl Default for Newton {
             max_iterations: 300,
             tolerance: 1e-13,
             max_step: 0.3,
-            escape_saddles: true,
+            at_saddle: AtSaddle::StepOff,
         }
     }
 }
@@ -43,7 +82,7 @@ impl Newton {
     /// Stays at the stationary point that the start leads to, be it a saddle.
     pub fn to_nearest_stationary_point() -> Self {
         Self {
-            escape_saddles: false,
+            at_saddle: AtSaddle::Stay,
             ..Self::default()
         }
     }
@@ -55,20 +94,8 @@ pub(crate) trait Objective {
     fn derivatives(&self, b: &[f64]) -> Derivatives;
     /// Lengths of the runs of `b` that must be increasing.
     fn blocks(&self) -> Vec<usize>;
-}
-
-impl Objective for crate::problem::Problem<'_> {
-    fn value(&self, b: &[f64]) -> f64 {
-        self.value(b)
-    }
-
-    fn derivatives(&self, b: &[f64]) -> Derivatives {
-        self.derivatives(b)
-    }
-
-    fn blocks(&self) -> Vec<usize> {
-        self.blocks()
-    }
+    /// The size against which changes of a value are small or large, whatever the unit.
+    fn unit(&self, value: f64) -> f64;
 }
 
 /// Where Newton's method ended.
@@ -77,6 +104,7 @@ pub(crate) struct Stationary {
     pub(crate) point: Vec<f64>,
     pub(crate) value: f64,
     pub(crate) largest_curvature: f64,
+    pub(crate) certificate: Certificate,
     pub(crate) iterations: usize,
     pub(crate) evaluations: usize,
 }
@@ -106,6 +134,7 @@ pub(crate) fn climb(
     for iteration in 1..=newton.max_iterations {
         let here = objective.derivatives(&b);
         evaluations += 1;
+        let unit = objective.unit(here.value);
         let eigen = SymmetricEigen::new(here.hessian);
         let along = eigen.eigenvectors.transpose() * &here.gradient;
         let floor = (CURVATURE_FLOOR * eigen.eigenvalues.amax()).max(f64::MIN_POSITIVE);
@@ -119,12 +148,13 @@ pub(crate) fn climb(
         if longest > newton.max_step * scale {
             step *= newton.max_step * scale / longest;
         }
-        let trusted = longest <= 1e-3 * scale && predicted_gain <= HIDDEN_GAIN * here.value.abs().max(1.0);
+        let trusted = longest <= 1e-3 * scale && predicted_gain <= HIDDEN_GAIN * unit;
         // Rounding in the gradient stops the quadratic decrease before any fixed tolerance on flat objectives.
         let arrived = longest <= newton.tolerance * scale || (trusted && longest >= 0.5 * last_step);
         if arrived {
             let largest_curvature = eigen.eigenvalues.max();
-            if newton.escape_saddles && largest_curvature > SADDLE && escapes < 20 {
+            let certificate = Certificate::of(largest_curvature, unit, scale);
+            if newton.at_saddle == AtSaddle::StepOff && certificate == Certificate::Saddle && escapes < 20 {
                 escapes += 1;
                 last_step = f64::INFINITY;
                 let top = eigen.eigenvectors.column(eigen.eigenvalues.imax());
@@ -136,12 +166,13 @@ pub(crate) fn climb(
                 point: b,
                 value: here.value,
                 largest_curvature,
+                certificate,
                 iterations: iteration,
                 evaluations,
             });
         }
         last_step = longest;
-        let floor = here.value - SLACK * here.value.abs().max(1.0);
+        let floor = here.value - SLACK * unit;
         let mut share = 1.0;
         b = loop {
             let trial: Vec<f64> = b.iter().zip(step.iter()).map(|(b, s)| b + share * s).collect();

@@ -15,11 +15,12 @@
 
 use crate::axis::{Axis, reduce, scatter, slice};
 use crate::criterion::{Criterion, LOG_FLOOR, Scored};
+use crate::derivatives::Derivatives;
 use crate::error::Error;
-use crate::law::{Active, SensorLaw, Slots, negative_entropy};
+use crate::law::{Active, SensorLaw, Slots, negative_entropy, sums};
 use crate::moments::{Table, moments};
-use crate::scene::Feature;
-use crate::system::{Derivatives, System};
+use crate::newton::Objective;
+use crate::system::System;
 use nalgebra::{DMatrix, DVector};
 
 /// A criterion (signed so that larger is better) over the breakpoints of the active groups.
@@ -35,27 +36,24 @@ pub(crate) struct Problem<'a> {
     constant: f64,
 }
 
-/// Report probabilities of every group at every node, and the log multiplicity of every joint outcome.
-pub(crate) struct Reports {
-    tables: Vec<Table>,
-    pub(crate) log_multiplicity: Vec<f64>,
-}
-
-impl Reports {
-    pub(crate) fn of(system: &System) -> Result<Self, Error> {
-        // The reports do not depend on the criterion.
-        let problem = Problem::new(system, Criterion::MeanSquaredError, &[])?;
-        Ok(Self {
-            tables: problem.fixed,
-            log_multiplicity: problem.log_multiplicity,
-        })
+impl Objective for Problem<'_> {
+    fn value(&self, b: &[f64]) -> f64 {
+        self.value(b)
     }
 
-    /// The features' moments of every joint outcome.
-    pub(crate) fn moments(&self, features: &[Feature]) -> Vec<f64> {
-        moments(&self.tables.iter().collect::<Vec<_>>(), features)
+    fn derivatives(&self, b: &[f64]) -> Derivatives {
+        self.derivatives(b)
+    }
+
+    fn blocks(&self) -> Vec<usize> {
+        self.blocks()
+    }
+
+    fn unit(&self, value: f64) -> f64 {
+        self.scored.unit(value, self.system.scene())
     }
 }
+
 
 impl<'a> Problem<'a> {
     /// The criterion over the breakpoints of the groups `active` (increasing, may be empty).
@@ -65,10 +63,7 @@ impl<'a> Problem<'a> {
         let scored = Scored::new(criterion, scene)?;
         let mut fixed = Vec::new();
         let mut log_multiplicity = vec![0.0];
-        let mut constant = match criterion {
-            Criterion::MeanSquaredError => -scene.second_moment,
-            _ => 0.0,
-        };
+        let mut constant = scored.constant(scene);
         let mut chosen = Vec::new();
         for index in 0..system.groups().len() {
             let entry = Active::new(system, index)?;
@@ -192,7 +187,12 @@ impl<'a> Problem<'a> {
 
     /// What does not depend on the active groups.
     pub(crate) fn constant(&self) -> f64 {
-        self.constant
+        self.constant + self.offset()
+    }
+
+    /// What is added to a value for the outside.
+    pub(crate) fn offset(&self) -> f64 {
+        self.scored.offset()
     }
 
     /// Contribution of every cell between two of the edges `-inf, candidates, inf` of the single active sensor, ideal channel:
@@ -464,10 +464,6 @@ enum Slot {
     First,
     Slope,
     Second,
-}
-
-fn sums(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().flat_map(|x| b.iter().map(move |y| x + y)).collect()
 }
 
 fn inner_product(a: &[f64], b: &[f64]) -> f64 {

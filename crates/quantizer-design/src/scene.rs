@@ -11,6 +11,7 @@
 use crate::error::{Error, refuse};
 use fewbits_numerics::normal;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 /// Half-width of the Gaussian prior's rule, in standard deviations.
 const PRIOR_REACH: f64 = 9.0;
@@ -29,7 +30,8 @@ const COVARIANCE_TOLERANCE: f64 = 1e-10;
 const NODE_LIMIT: usize = 1 << 20;
 
 /// Prior of the scalar unknown.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredPrior", into = "StoredPrior")]
 pub enum Prior {
     /// Normal with mean 0 and the given standard deviation.
     #[non_exhaustive]
@@ -45,6 +47,34 @@ pub enum Prior {
         /// Their probabilities.
         probabilities: Vec<f64>,
     },
+}
+
+/// The stored form of a prior.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+enum StoredPrior {
+    Gaussian { deviation: f64 },
+    Discrete { values: Vec<f64>, probabilities: Vec<f64> },
+}
+
+impl From<Prior> for StoredPrior {
+    fn from(prior: Prior) -> Self {
+        match prior {
+            Prior::Gaussian { sd } => Self::Gaussian { deviation: sd },
+            Prior::Discrete { values, probabilities } => Self::Discrete { values, probabilities },
+        }
+    }
+}
+
+impl TryFrom<StoredPrior> for Prior {
+    type Error = Error;
+
+    fn try_from(stored: StoredPrior) -> Result<Self, Error> {
+        match stored {
+            StoredPrior::Gaussian { deviation } => Self::gaussian(deviation),
+            StoredPrior::Discrete { values, probabilities } => Self::discrete(values, probabilities),
+        }
+    }
 }
 
 impl Prior {
@@ -80,11 +110,33 @@ impl Prior {
         Self::discrete(vec![0.0, signal], vec![1.0 - probability, probability])
     }
 
+    /// The prior of `factor * X`.
+    fn rescaled(&self, factor: f64) -> Result<Self, Error> {
+        match self {
+            Self::Gaussian { sd } => Self::gaussian(factor * sd),
+            Self::Discrete { values, probabilities } => {
+                Self::discrete(values.iter().map(|x| factor * x).collect(), probabilities.clone())
+            }
+        }
+    }
+
+    fn mean(&self) -> f64 {
+        match self {
+            Self::Gaussian { .. } => 0.0,
+            Self::Discrete { values, probabilities } => {
+                // About the first value, so that an offset shared by all costs no digit.
+                let first = values.first().copied().unwrap_or(0.0);
+                let total: f64 = probabilities.iter().sum();
+                first + values.iter().zip(probabilities).map(|(x, p)| p * (x - first)).sum::<f64>() / total
+            }
+        }
+    }
+
     fn spread(&self) -> f64 {
         match self {
             Self::Gaussian { sd } => *sd,
             Self::Discrete { values, probabilities } => {
-                let mean: f64 = values.iter().zip(probabilities).map(|(x, p)| p * x).sum();
+                let mean = self.mean();
                 values
                     .iter()
                     .zip(probabilities)
@@ -97,10 +149,36 @@ impl Prior {
 }
 
 /// Additive normal noise of all sensors: `a_n U + d_n V_n`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredNoise", into = "StoredNoise")]
 pub struct Noise {
     loadings: Vec<f64>,
     residuals: Vec<f64>,
+}
+
+/// The stored form of the noise.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredNoise {
+    loadings: Vec<f64>,
+    residual_deviations: Vec<f64>,
+}
+
+impl From<Noise> for StoredNoise {
+    fn from(noise: Noise) -> Self {
+        Self {
+            loadings: noise.loadings,
+            residual_deviations: noise.residuals,
+        }
+    }
+}
+
+impl TryFrom<StoredNoise> for Noise {
+    type Error = Error;
+
+    fn try_from(stored: StoredNoise) -> Result<Self, Error> {
+        Self::one_factor(&stored.loadings, &stored.residual_deviations)
+    }
 }
 
 impl Noise {
@@ -163,20 +241,18 @@ impl Noise {
         for i in 0..n {
             fewbits_numerics::error::positive("variance", matrix[(i, i)])?;
         }
-        let tolerance = COVARIANCE_TOLERANCE * matrix.amax();
         let sds: Vec<f64> = (0..n).map(|i| matrix[(i, i)].sqrt()).collect();
+        // Correlations have no unit: sensors in metres and in nanoseconds are judged alike.
+        let matrix = &DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (sds[i] * sds[j]));
+        let tolerance = COVARIANCE_TOLERANCE;
         if (matrix - matrix.transpose()).amax() > tolerance {
             return refuse("covariance", "not symmetric", "a symmetric matrix");
         }
         if n <= 2 {
-            let rho = if n == 2 {
-                matrix[(0, 1)] / (sds[0] * sds[1])
-            } else {
-                0.0
-            };
+            let rho = if n == 2 { matrix[(0, 1)] } else { 0.0 };
             return Self::equicorrelated(&sds, rho);
         }
-        let loadings = shared_factor(matrix, tolerance);
+        let mut loadings = shared_factor(matrix, tolerance);
         let unsupported = Err(Error::UnsupportedCorrelation { sensors: n });
         let mut residuals = Vec::with_capacity(n);
         for i in 0..n {
@@ -189,8 +265,9 @@ impl Noise {
             if left <= tolerance {
                 return unsupported;
             }
-            residuals.push(left.sqrt());
+            residuals.push(sds[i] * left.sqrt());
         }
+        loadings.iter_mut().zip(&sds).for_each(|(a, s)| *a *= s);
         Self::one_factor(&loadings, &residuals)
     }
 
@@ -214,6 +291,12 @@ impl Noise {
         }
         let pick = |v: &[f64]| -> Vec<f64> { sensors.iter().map(|n| v[*n]).collect() };
         Self::one_factor(&pick(&self.loadings), &pick(&self.residuals))
+    }
+
+    /// The noise in units in which it is `factor` times as large.
+    fn rescaled(&self, factor: f64) -> Result<Self, Error> {
+        let times = |v: &[f64]| -> Vec<f64> { v.iter().map(|x| factor * x).collect() };
+        Self::one_factor(&times(&self.loadings), &times(&self.residuals))
     }
 
     fn is_independent(&self) -> bool {
@@ -265,7 +348,8 @@ pub(crate) struct Feature {
 }
 
 /// Prior and noise on their quadrature nodes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredScene", into = "StoredScene")]
 pub struct Scene {
     prior: Prior,
     noise: Noise,
@@ -277,11 +361,37 @@ pub struct Scene {
     factor: Vec<f64>,
     /// `P(node | x_k)`.
     pub(crate) given: Vec<Feature>,
-    /// Sums over the prior: `sum_k w_k P(node | x_k)` and the same with `w_k x_k`.
+    /// Sums over the prior: `sum_k w_k P(node | x_k)` and the same with `w_k (x_k - mean)`.
     pub(crate) mass: Feature,
     pub(crate) moment: Feature,
-    /// `E[X^2]`.
-    pub(crate) second_moment: f64,
+    /// Prior mean, from which moments are measured, and variance.
+    pub(crate) mean: f64,
+    pub(crate) variance: f64,
+}
+
+/// The stored form of a scene; its nodes are computed again.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredScene {
+    prior: Prior,
+    noise: Noise,
+}
+
+impl From<Scene> for StoredScene {
+    fn from(scene: Scene) -> Self {
+        Self {
+            prior: scene.prior,
+            noise: scene.noise,
+        }
+    }
+}
+
+impl TryFrom<StoredScene> for Scene {
+    type Error = Error;
+
+    fn try_from(stored: StoredScene) -> Result<Self, Error> {
+        Self::new(stored.prior, stored.noise)
+    }
 }
 
 impl Scene {
@@ -301,8 +411,10 @@ impl Scene {
             }
             Prior::Discrete { values, probabilities } => (values.clone(), normalised(probabilities.clone())),
         };
+        let mean = prior.mean();
         let mut scene = Self {
-            second_moment: values.iter().zip(&weights).map(|(x, w)| w * x * x).sum(),
+            variance: values.iter().zip(&weights).map(|(x, w)| w * (x - mean) * (x - mean)).sum(),
+            mean,
             base: values.clone(),
             factor: vec![0.0; values.len()],
             given: (0..values.len())
@@ -332,7 +444,7 @@ impl Scene {
         for ((feature, w), x) in scene.given.iter().zip(&scene.weights).zip(&scene.values) {
             for (i, p) in feature.weights.iter().enumerate() {
                 mass[feature.start + i] += w * p;
-                moment[feature.start + i] += w * x * p;
+                moment[feature.start + i] += w * (x - mean) * p;
             }
         }
         scene.mass.weights = mass;
@@ -357,6 +469,12 @@ impl Scene {
             // Everything depends on s = x + a u alone: one axis of nodes instead of two.
             let step = f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
             let reach = FACTOR_REACH * shared.abs();
+            let one_axis = 2.0 * (PRIOR_REACH * sd + reach) / step;
+            let two_axes = self.values.len() as f64 * 4.0 * FACTOR_REACH;
+            // A faint shared factor blurs less than the nodes of one axis resolve: two axes need fewer.
+            if one_axis > two_axes {
+                return self.resolve_on_two_axes(crowd);
+            }
             self.base = grid(PRIOR_REACH * sd + reach, step)?;
             self.factor = vec![0.0; self.base.len()];
             let base = &self.base;
@@ -372,6 +490,11 @@ impl Scene {
             self.given = self.values.iter().map(row).collect();
             return Ok(());
         }
+        self.resolve_on_two_axes(crowd)
+    }
+
+    fn resolve_on_two_axes(&mut self, crowd: f64) -> Result<(), Error> {
+        let noise = &self.noise;
         let steepest = (0..noise.sensors())
             .map(|n| noise.residuals[n] / noise.loadings[n].abs())
             .fold(f64::INFINITY, f64::min);
@@ -428,9 +551,18 @@ impl Scene {
         self.prior.spread().hypot(self.noise.sd(n))
     }
 
-    /// Mean of sensor `n`'s sample.
+    /// Mean of every sample: the prior's.
     pub fn sample_mean(&self) -> f64 {
-        self.values.iter().zip(&self.weights).map(|(x, w)| w * x).sum()
+        self.mean
+    }
+
+    /// The scene in units in which every number is `factor` times as large.
+    ///
+    /// # Errors
+    /// If `factor` is not a positive number, or a rescaled number is none.
+    pub fn rescaled(&self, factor: f64) -> Result<Self, Error> {
+        fewbits_numerics::error::positive("factor", factor)?;
+        Self::new(self.prior.rescaled(factor)?, self.noise.rescaled(factor)?)
     }
 
     /// The same prior seen by some of the sensors only.
@@ -478,7 +610,7 @@ impl Scene {
 fn grid(reach: f64, step: f64) -> Result<Vec<f64>, Error> {
     let half = (reach / step).floor();
     if !(half.is_finite() && half < NODE_LIMIT as f64 / 2.0) {
-        return too_fine(usize::MAX);
+        return too_fine((2.0 * half).min(1e18) as usize);
     }
     let half = half as i64;
     Ok((-half..=half).map(|i| i as f64 * step).collect())
@@ -541,6 +673,26 @@ mod tests {
     }
 
     #[test]
+    fn a_faint_correlation_takes_few_nodes() {
+        let prior = || Prior::gaussian(1.0).unwrap();
+        let none = Scene::new(prior(), Noise::independent(&[1.0; 2]).unwrap()).unwrap();
+        for rho in [1e-16, 1e-10, 1e-6, 1e-3] {
+            let scene = Scene::new(prior(), Noise::equicorrelated(&[1.0; 2], rho).unwrap()).unwrap();
+            assert!(scene.nodes() < 40 * none.nodes());
+            assert!((scene.mass.weights.iter().sum::<f64>() - 1.0).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn stored_scenes_are_checked_when_restored() {
+        let scene = Scene::new(Prior::binary(1.0, 0.3).unwrap(), Noise::equicorrelated(&[1.0; 2], 0.4).unwrap()).unwrap();
+        let json = serde_json::to_string(&scene).unwrap();
+        assert_eq!(serde_json::from_str::<Scene>(&json).unwrap(), scene);
+        assert!(serde_json::from_str::<Prior>(r#"{"gaussian":{"deviation":-1}}"#).is_err());
+        assert!(serde_json::from_str::<Noise>(r#"{"loadings":[0],"residual_deviations":[0]}"#).is_err());
+    }
+
+    #[test]
     fn weights_are_a_probability_and_have_the_right_variance() {
         for noise in [
             Noise::independent(&[0.3, 1.0]).unwrap(),
@@ -549,7 +701,7 @@ mod tests {
         ] {
             let scene = Scene::new(Prior::gaussian(2.0).unwrap(), noise).unwrap();
             assert!((scene.mass.weights.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-            assert!((scene.second_moment - 4.0).abs() < 1e-12);
+            assert!((scene.variance - 4.0).abs() < 1e-12);
             assert!(scene.moment.weights.iter().sum::<f64>().abs() < 1e-12);
         }
     }

@@ -1,9 +1,10 @@
 //! Several sensors with their quantizers and channels, seen by one fusion centre.
 
 use crate::compositions::count;
-use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
 use crate::scene::Scene;
+use fewbits_quantizers::lloyd_max;
+use serde::{Deserialize, Serialize};
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
 
@@ -11,14 +12,42 @@ use fewbits_quantizers::Quantizer;
 pub const OUTCOME_LIMIT: u64 = 1 << 20;
 
 /// Sensors of one law that share a quantizer design and a channel law.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Group {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredGroup", into = "StoredGroup")]
+pub struct SensorGroup {
     quantizer: Quantizer,
     channel: Channel,
     sensors: Vec<usize>,
 }
 
-impl Group {
+/// The stored form of a group.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredGroup {
+    quantizer: Quantizer,
+    channel: Channel,
+    sensors: Vec<usize>,
+}
+
+impl From<SensorGroup> for StoredGroup {
+    fn from(group: SensorGroup) -> Self {
+        Self {
+            quantizer: group.quantizer,
+            channel: group.channel,
+            sensors: group.sensors,
+        }
+    }
+}
+
+impl TryFrom<StoredGroup> for SensorGroup {
+    type Error = Error;
+
+    fn try_from(stored: StoredGroup) -> Result<Self, Error> {
+        Self::new(stored.quantizer, stored.channel, stored.sensors)
+    }
+}
+
+impl SensorGroup {
     /// The sensors with the given numbers, each with this quantizer, each behind its own copy of the channel.
     ///
     /// # Errors
@@ -58,7 +87,7 @@ impl Group {
         self.channel.probability(t, self.quantizer.labels()[cell])
     }
 
-    /// Different joint reports of the group, up to who said what.
+    /// Different joint reports of the group, up to who reported what.
     pub(crate) fn outcomes(&self) -> u64 {
         count(self.sensors.len(), self.channel.outputs())
     }
@@ -73,11 +102,39 @@ impl Group {
 /// assert!((system.value(Criterion::MeanSquaredError)? - 0.388_458_855_09).abs() < 1e-9);
 /// # Ok::<(), fewbits_quantizer_design::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredSystem", into = "StoredSystem")]
 pub struct System {
     scene: Scene,
-    groups: Vec<Group>,
+    groups: Vec<SensorGroup>,
     outcome_limit: u64,
+}
+
+/// The stored form of a system.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredSystem {
+    scene: Scene,
+    groups: Vec<SensorGroup>,
+    outcome_limit: u64,
+}
+
+impl From<System> for StoredSystem {
+    fn from(system: System) -> Self {
+        Self {
+            scene: system.scene,
+            groups: system.groups,
+            outcome_limit: system.outcome_limit,
+        }
+    }
+}
+
+impl TryFrom<StoredSystem> for System {
+    type Error = Error;
+
+    fn try_from(stored: StoredSystem) -> Result<Self, Error> {
+        Ok(Self::new(stored.scene, stored.groups)?.with_outcome_limit(stored.outcome_limit))
+    }
 }
 
 impl System {
@@ -85,7 +142,7 @@ impl System {
     ///
     /// # Errors
     /// Unless every sensor of the scene is in exactly one group and the sensors of a group have the same noise.
-    pub fn new(scene: Scene, groups: Vec<Group>) -> Result<Self, Error> {
+    pub fn new(scene: Scene, groups: Vec<SensorGroup>) -> Result<Self, Error> {
         let mut seen = vec![false; scene.sensors()];
         for group in &groups {
             for n in &group.sensors {
@@ -120,7 +177,7 @@ impl System {
         }
         let pairs = quantizers.into_iter().zip(channels).enumerate();
         let groups = pairs
-            .map(|(n, (q, c))| Group::new(q, c, vec![n]))
+            .map(|(n, (q, c))| SensorGroup::new(q, c, vec![n]))
             .collect::<Result<_, _>>()?;
         Self::new(scene, groups)
     }
@@ -144,7 +201,69 @@ impl System {
     pub fn identical(scene: Scene, quantizer: Quantizer) -> Result<Self, Error> {
         let sensors = (0..scene.sensors()).collect();
         let channel = Channel::ideal(quantizer.levels())?;
-        Self::new(scene, vec![Group::new(quantizer, channel, sensors)?])
+        Self::new(scene, vec![SensorGroup::new(quantizer, channel, sensors)?])
+    }
+
+    /// The Lloyd-Max quantizer of its own sample for each sensor, received as sent: independent designs, and the usual start.
+    ///
+    /// # Errors
+    /// Unless `levels` is in `2..=4096`.
+    pub fn lloyd_max(scene: Scene, levels: usize) -> Result<Self, Error> {
+        let channel = Channel::ideal(levels)?;
+        Self::lloyd_max_over(scene, &channel)
+    }
+
+    /// As [`System::lloyd_max`], each sensor behind its own copy of the channel, one level per input.
+    ///
+    /// # Errors
+    /// Unless the channel has 2 to 4096 inputs.
+    pub fn lloyd_max_over(scene: Scene, channel: &Channel) -> Result<Self, Error> {
+        let standard = lloyd_max::gaussian(channel.inputs())?;
+        let quantizers = (0..scene.sensors())
+            .map(|n| Ok(Quantizer::from(&standard.affine(scene.sample_mean(), scene.sample_sd(n))?)))
+            .collect::<Result<Vec<_>, Error>>()?;
+        let channels = vec![channel.clone(); scene.sensors()];
+        Self::distinct(scene, quantizers, channels)
+    }
+
+    /// The system in units in which every number of the scene and every breakpoint is `factor` times as large.
+    ///
+    /// # Errors
+    /// If `factor` is not a positive number.
+    pub fn rescaled(&self, factor: f64) -> Result<Self, Error> {
+        let groups = self.groups.iter().map(|g| {
+            let quantizer = g.quantizer.affine(0.0, factor)?;
+            SensorGroup::new(quantizer, g.channel.clone(), g.sensors.clone())
+        });
+        let rescaled = Self::new(self.scene.rescaled(factor)?, groups.collect::<Result<_, _>>()?)?;
+        Ok(rescaled.with_outcome_limit(self.outcome_limit))
+    }
+
+    /// Distribution of the symbol received from one sensor, whatever the unknown.
+    ///
+    /// # Errors
+    /// If there is no such sensor.
+    pub fn symbol_distribution(&self, sensor: usize) -> Result<Vec<f64>, Error> {
+        let per_value = self.symbol_distributions_given_values(sensor)?;
+        let outputs = per_value.first().map_or(0, Vec::len);
+        let mixed = |t: usize| per_value.iter().zip(&self.scene.weights).map(|(p, w)| w * p[t]).sum();
+        Ok((0..outputs).map(mixed).collect())
+    }
+
+    /// Distribution of the symbol received from one sensor for each value of the unknown ([`Scene::values`]).
+    ///
+    /// # Errors
+    /// If there is no such sensor.
+    pub fn symbol_distributions_given_values(&self, sensor: usize) -> Result<Vec<Vec<f64>>, Error> {
+        let Some(group) = self.groups.iter().find(|g| g.sensors.contains(&sensor)) else {
+            return refuse("sensor", sensor, format!("a number below {}", self.scene.sensors()));
+        };
+        let deviation = self.scene.noise().sd(sensor);
+        self.scene
+            .values
+            .iter()
+            .map(|x| Ok(group.channel.received(&group.quantizer.level_probabilities(*x, deviation)?)?))
+            .collect()
     }
 
     /// Allows at most `limit` joint outcomes in any computation (default [`OUTCOME_LIMIT`]).
@@ -159,7 +278,7 @@ impl System {
     }
 
     /// The groups.
-    pub fn groups(&self) -> &[Group] {
+    pub fn groups(&self) -> &[SensorGroup] {
         &self.groups
     }
 
@@ -209,7 +328,7 @@ impl System {
     pub fn with_quantizer(&self, group: usize, quantizer: Quantizer) -> Result<Self, Error> {
         let mut system = self.clone();
         let old = self.group(group)?;
-        system.groups[group] = Group::new(quantizer, old.channel.clone(), old.sensors.clone())?;
+        system.groups[group] = SensorGroup::new(quantizer, old.channel.clone(), old.sensors.clone())?;
         Ok(system)
     }
 
@@ -236,60 +355,23 @@ impl System {
             return refuse("channels", channels.len(), format!("{} channels", self.groups.len()));
         }
         let groups = self.groups.iter().zip(channels);
-        let groups = groups.map(|(g, c)| Group::new(g.quantizer.clone(), c, g.sensors.clone()));
+        let groups = groups.map(|(g, c)| SensorGroup::new(g.quantizer.clone(), c, g.sensors.clone()));
         let rebuilt = Self::new(self.scene.clone(), groups.collect::<Result<_, _>>()?)?;
         Ok(rebuilt.with_outcome_limit(self.outcome_limit))
     }
 
-    pub(crate) fn group(&self, group: usize) -> Result<&Group, Error> {
+    pub(crate) fn group(&self, group: usize) -> Result<&SensorGroup, Error> {
         match self.groups.get(group) {
             Some(g) => Ok(g),
             None => refuse("group", group, format!("a number below {}", self.groups.len())),
         }
     }
-
-    /// Value of a criterion: nats, squared units of the unknown, or a probability. Exact up to quadrature (1e-12).
-    ///
-    /// # Errors
-    /// [`Error::TooLarge`] beyond the outcome limit; [`Error::Argument`] for a Bayes error under a continuous prior.
-    pub fn value(&self, criterion: Criterion) -> Result<f64, Error> {
-        let problem = crate::problem::Problem::new(self, criterion, &[])?;
-        Ok(problem.value(&[]) * criterion.sense())
-    }
-
-    /// Value, gradient and Hessian of a criterion with respect to all breakpoints, group after group.
-    ///
-    /// The Bayes error is smooth between the breakpoints at which a decision changes; its derivatives hold inside such a piece.
-    ///
-    /// # Errors
-    /// As [`System::value`].
-    pub fn derivatives(&self, criterion: Criterion) -> Result<Derivatives, Error> {
-        let all: Vec<usize> = (0..self.groups.len()).collect();
-        let problem = crate::problem::Problem::new(self, criterion, &all)?;
-        let sense = criterion.sense();
-        let found = problem.derivatives(&problem.start());
-        Ok(Derivatives {
-            value: found.value * sense,
-            gradient: found.gradient * sense,
-            hessian: found.hessian * sense,
-        })
-    }
-}
-
-/// A value with its first and second derivatives.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Derivatives {
-    /// The value.
-    pub value: f64,
-    /// First derivatives.
-    pub gradient: nalgebra::DVector<f64>,
-    /// Second derivatives.
-    pub hessian: nalgebra::DMatrix<f64>,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Criterion;
 
     #[test]
     fn systems_that_do_not_fit_are_refused() {

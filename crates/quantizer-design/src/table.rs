@@ -2,23 +2,13 @@
 
 use crate::compositions::rank;
 use crate::error::{Error, refuse};
-use crate::problem::Reports;
+use crate::criterion::most_probable;
+use crate::law::Reports;
 use crate::scene::Scene;
 use crate::system::System;
 
 /// Most entries of a table (outcomes times values of the unknown).
 const ENTRY_LIMIT: u64 = 1 << 25;
-
-/// Index of the largest `w_k q_k`; the first on ties.
-pub(crate) fn most_probable(weights: &[f64], q: &[f64]) -> usize {
-    let mut best = 0;
-    for k in 1..q.len() {
-        if weights[k] * q[k] > weights[best] * q[best] {
-            best = k;
-        }
-    }
-    best
-}
 
 /// Where a joint report stands in the tables of a system: counts within groups, groups in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +29,7 @@ impl Layout {
         }
     }
 
-    /// Number of the outcome in which sensor `n` was heard as `symbols[n]`.
+    /// Number of the outcome in which sensor `n` was received as `symbols[n]`.
     pub(crate) fn index(&self, symbols: &[usize]) -> Result<usize, Error> {
         if symbols.len() != self.sensors {
             return refuse("symbols", format!("{} symbols", symbols.len()), format!("one a sensor, {}", self.sensors));
@@ -109,7 +99,7 @@ impl JointTable {
         self.scene.values()
     }
 
-    /// Outcome in which sensor `n` was heard as symbol `symbols[n]`.
+    /// Outcome in which sensor `n` was received as symbol `symbols[n]`.
     ///
     /// # Errors
     /// If there is not one symbol a sensor, or one is out of range.

@@ -3,14 +3,18 @@
 use crate::error::{Error, refuse};
 use crate::labelling::Labelling;
 use fewbits_numerics::normal;
+use serde::{Deserialize, Serialize};
 
+/// Most entries of a transition matrix.
+const MAX_ENTRIES: u64 = 1 << 24;
 /// Columns may miss one by this much; they are not renormalised.
 const SUM_TOLERANCE: f64 = 1e-9;
 
 /// `P(received = t | sent = z)`, with any number of outputs: a column-stochastic matrix.
 ///
 /// More outputs than inputs describe soft decisions or erasures.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
 pub struct Channel {
     inputs: usize,
     outputs: usize,
@@ -18,11 +22,26 @@ pub struct Channel {
     transition: Vec<f64>,
 }
 
+impl From<Channel> for Vec<Vec<f64>> {
+    /// The rows, one per received symbol.
+    fn from(channel: Channel) -> Self {
+        channel.transition.chunks_exact(channel.inputs).map(<[f64]>::to_vec).collect()
+    }
+}
+
+impl TryFrom<Vec<Vec<f64>>> for Channel {
+    type Error = Error;
+
+    fn try_from(rows: Vec<Vec<f64>>) -> Result<Self, Error> {
+        Self::from_rows(&rows)
+    }
+}
+
 impl Channel {
     /// What is sent is received.
     ///
     /// # Errors
-    /// If `levels < 2`.
+    /// If `levels < 2`; [`Error::TooLarge`] beyond 16 million entries, as for every channel.
     pub fn ideal(levels: usize) -> Result<Self, Error> {
         Self::from_fn(levels, levels, |t, z| if t == z { 1.0 } else { 0.0 })
     }
@@ -46,6 +65,14 @@ impl Channel {
         }
         if outputs == 0 {
             return refuse("rows", "empty", "at least one channel output");
+        }
+        let needed = (inputs as u64).saturating_mul(outputs as u64);
+        if needed > MAX_ENTRIES {
+            return Err(Error::TooLarge {
+                table: "transition matrix of a channel",
+                needed,
+                limit: MAX_ENTRIES,
+            });
         }
         let transition: Vec<f64> = (0..outputs)
             .flat_map(|t| (0..inputs).map(move |z| (t, z)))
@@ -104,7 +131,7 @@ impl Channel {
     /// If `levels < 2` or `erasure` is not in `[0, 1]`.
     pub fn symbol_erasure(levels: usize, erasure: f64) -> Result<Self, Error> {
         fewbits_numerics::error::within("erasure", erasure, 0.0, 1.0)?;
-        Self::from_fn(levels, levels + 1, |t, z| match t {
+        Self::from_fn(levels, levels.saturating_add(1), |t, z| match t {
             t if t == levels => erasure,
             t if t == z => 1.0 - erasure,
             _ => 0.0,
@@ -135,7 +162,7 @@ impl Channel {
     /// If `levels < 2` or `snr` is not a positive number.
     pub fn pulse_amplitude(levels: usize, snr: f64) -> Result<Self, Error> {
         fewbits_numerics::error::positive("snr", snr)?;
-        let half = (3.0 * snr / ((levels * levels) as f64 - 1.0)).sqrt();
+        let half = (3.0 * snr / (levels as f64 * levels as f64 - 1.0)).sqrt();
         Self::from_fn(levels, levels, |t, z| {
             let offset = 2.0 * (t as f64 - z as f64);
             let lower = if t == 0 {
@@ -172,6 +199,19 @@ impl Channel {
         } else {
             0.0
         }
+    }
+
+    /// Distribution of the received symbol when the levels have the given probabilities.
+    ///
+    /// # Errors
+    /// Unless there is one probability per input, in `[0, 1]` and of sum 1.
+    pub fn received(&self, levels: &[f64]) -> Result<Vec<f64>, Error> {
+        fewbits_numerics::error::probabilities("levels", levels)?;
+        if levels.len() != self.inputs {
+            return refuse("levels", format!("{} probabilities", levels.len()), format!("{}", self.inputs));
+        }
+        let rows = self.transition.chunks_exact(self.inputs);
+        Ok(rows.map(|row| row.iter().zip(levels).map(|(c, p)| c * p).sum()).collect())
     }
 
     /// Whether the channel is the identity.
@@ -240,5 +280,18 @@ mod tests {
         assert!(Channel::binary_symmetric(&Labelling::natural(4).unwrap(), -0.1).is_err());
         assert!(Channel::symbol_erasure(4, f64::NAN).is_err());
         assert!(Channel::pulse_amplitude(4, 0.0).is_err());
+        assert!(serde_json::from_str::<Channel>("[[0.5,1.0],[0.4,0.0]]").is_err());
+    }
+
+    #[test]
+    fn a_channel_too_large_for_memory_is_a_typed_error() {
+        for levels in [1 << 40, usize::MAX] {
+            assert!(matches!(Channel::ideal(levels), Err(Error::TooLarge { .. })));
+            assert!(matches!(Channel::symmetric(levels, 0.1), Err(Error::TooLarge { .. })));
+            assert!(matches!(Channel::symbol_erasure(levels, 0.1), Err(Error::TooLarge { .. })));
+            assert!(matches!(Channel::pulse_amplitude(levels, 10.0), Err(Error::TooLarge { .. })));
+        }
+        let four = Channel::pulse_amplitude(4, 10.0).unwrap();
+        assert_eq!(serde_json::from_str::<Channel>(&serde_json::to_string(&four).unwrap()).unwrap(), four);
     }
 }

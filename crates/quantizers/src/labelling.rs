@@ -1,9 +1,9 @@
 //! Which binary word stands for which level, and the message that carries it.
 
 use crate::error::{Error, refuse};
-use crate::quantizer::Quantizer;
+use fewbits_core::Message;
 use fewbits_core::bits::{BitReader, BitWriter, CodecError};
-use fewbits_core::message::{Encoder, Message};
+use serde::{Deserialize, Serialize};
 
 /// Longest word.
 pub const MAX_WORD_BITS: u32 = 16;
@@ -12,7 +12,8 @@ pub const MAX_WORD_BITS: u32 = 16;
 ///
 /// Words that no level uses can still be received over a noisy link. They are given the symbol numbers behind the levels, in
 /// increasing order of the word, so that every received word is one symbol in `0..2^bits`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
 pub struct Labelling {
     bits: u32,
     levels: usize,
@@ -20,6 +21,32 @@ pub struct Labelling {
     words: Vec<u32>,
     /// Symbol of each word.
     symbols: Vec<u32>,
+}
+
+/// The stored form: the word of each level.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    bits: u32,
+    words: Vec<u32>,
+}
+
+impl From<Labelling> for Stored {
+    fn from(mut labelling: Labelling) -> Self {
+        labelling.words.truncate(labelling.levels);
+        Self {
+            bits: labelling.bits,
+            words: labelling.words,
+        }
+    }
+}
+
+impl TryFrom<Stored> for Labelling {
+    type Error = Error;
+
+    fn try_from(stored: Stored) -> Result<Self, Error> {
+        Self::with_words(stored.bits, stored.words)
+    }
 }
 
 impl Labelling {
@@ -120,7 +147,8 @@ fn word_bits(levels: usize) -> Result<u32, Error> {
 }
 
 /// A quantizer level on its way, or the symbol that was received.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
 pub struct Symbol(pub usize);
 
 impl Message for Symbol {
@@ -140,22 +168,10 @@ impl Message for Symbol {
     }
 }
 
-/// The sensor's half: sample in, level out.
-impl Encoder for Quantizer {
-    type Measurement = f64;
-    type Feedback = ();
-    type Message = Symbol;
-
-    #[inline]
-    fn encode(&self, measurement: &f64, (): &()) -> Symbol {
-        Symbol(self.encode(*measurement))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fewbits_core::message::laws;
+    use fewbits_core::laws::message as laws;
 
     #[test]
     fn every_symbol_survives_its_bits() {
@@ -198,5 +214,10 @@ mod tests {
         assert!(Labelling::new(vec![0, 4, 1, 2]).is_err());
         assert!(Labelling::natural(1).is_err());
         assert!(Labelling::with_words(17, vec![0, 1]).is_err());
+        assert!(Labelling::natural(1 << 40).is_err());
+        let gaps = Labelling::with_words(2, vec![0, 1, 3]).unwrap();
+        let json = serde_json::to_string(&gaps).unwrap();
+        assert_eq!(serde_json::from_str::<Labelling>(&json).unwrap(), gaps);
+        assert!(serde_json::from_str::<Labelling>(r#"{"bits":2,"words":[0,0]}"#).is_err());
     }
 }

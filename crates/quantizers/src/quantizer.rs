@@ -1,24 +1,90 @@
 //! The scalar quantizer a sensor holds.
 
+use crate::channel::Channel;
 use crate::error::{Error, refuse};
 use crate::lloyd_max::LloydMax;
+use fewbits_core::Cell;
+use fewbits_core::factor::{Constant, Partition, Scalar};
+use fewbits_numerics::error::{all_finite, finite, positive};
+use fewbits_numerics::{ArgumentError, normal};
+use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 
 /// Ordered breakpoints that part the line into cells, and the level each cell is reported as.
 ///
-/// Cell `i` is `(breakpoints[i - 1], breakpoints[i]]`, the outer cells being unbounded. In a *contiguous* quantizer cell `i`
-/// is level `i`; otherwise several cells may share a level ("labels"), as in a modulo or `|y| > c` quantizer.
+/// Cell `i` is `[breakpoints[i - 1], breakpoints[i])`, the outer cells being unbounded: a sample on a breakpoint belongs to the
+/// cell above it. In a *contiguous* quantizer cell `i` is level `i`; otherwise several cells may share a level ("labels"), as in
+/// a modulo or `|y| > c` quantizer.
 ///
 /// ```
 /// use fewbits_quantizers::Quantizer;
 /// let folded = Quantizer::with_labels(vec![-1.4, 1.4], vec![1, 0, 1])?;
-/// assert_eq!((folded.levels(), folded.encode(-3.0), folded.encode(0.2)), (2, 1, 0));
+/// assert_eq!((folded.levels(), folded.encode(-3.0)?, folded.encode(0.2)?), (2, 1, 0));
 /// # Ok::<(), fewbits_quantizers::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
 pub struct Quantizer {
     breakpoints: Vec<f64>,
     labels: Vec<usize>,
     levels: usize,
+}
+
+/// The stored form.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    breakpoints: Vec<f64>,
+    labels: Vec<usize>,
+}
+
+impl From<Quantizer> for Stored {
+    fn from(quantizer: Quantizer) -> Self {
+        Self {
+            breakpoints: quantizer.breakpoints,
+            labels: quantizer.labels,
+        }
+    }
+}
+
+impl TryFrom<Stored> for Quantizer {
+    type Error = Error;
+
+    fn try_from(stored: Stored) -> Result<Self, Error> {
+        Self::with_labels(stored.breakpoints, stored.labels)
+    }
+}
+
+/// Whether the numbers are finite and strictly increasing.
+pub(crate) fn increasing(b: &[f64]) -> bool {
+    b.iter().all(|x| x.is_finite()) && b.windows(2).all(|w| w[0] < w[1])
+}
+
+/// Accepts strictly increasing finite breakpoints.
+///
+/// # Errors
+/// If a number is not finite, or not above the one before.
+pub fn check_increasing(breakpoints: &[f64]) -> Result<(), ArgumentError> {
+    all_finite("breakpoints", breakpoints)?;
+    match breakpoints.windows(2).position(|w| w[0] >= w[1]) {
+        None => Ok(()),
+        Some(at) => {
+            let pair = format!("{}, {} at index {at}", breakpoints[at], breakpoints[at + 1]);
+            Err(ArgumentError::new("breakpoints", pair, "strictly increasing numbers"))
+        }
+    }
+}
+
+/// Index of the cell that holds `y`: the number of breakpoints at or below it. Infinite samples fall into the outer cells.
+///
+/// # Errors
+/// If `y` is NaN.
+#[inline]
+pub fn cell_of(breakpoints: &[f64], y: f64) -> Result<usize, Error> {
+    if y.is_nan() {
+        return refuse("measurement", y, "a number");
+    }
+    Ok(breakpoints.partition_point(|b| *b <= y))
 }
 
 impl Quantizer {
@@ -40,11 +106,7 @@ impl Quantizer {
         if breakpoints.is_empty() {
             return refuse("breakpoints", "empty", "at least one breakpoint (two levels)");
         }
-        fewbits_numerics::error::all_finite("breakpoints", &breakpoints)?;
-        if let Some(at) = breakpoints.windows(2).position(|w| w[0] >= w[1]) {
-            let pair = format!("{}, {} at index {at}", breakpoints[at], breakpoints[at + 1]);
-            return refuse("breakpoints", pair, "strictly increasing numbers");
-        }
+        check_increasing(&breakpoints)?;
         if labels.len() != breakpoints.len() + 1 {
             return refuse("labels", format!("{} labels", labels.len()), format!("{} labels", breakpoints.len() + 1));
         }
@@ -67,7 +129,7 @@ impl Quantizer {
     /// # Errors
     /// If `outer` is not a positive number.
     pub fn symmetric(outer: f64) -> Result<Self, Error> {
-        fewbits_numerics::error::positive("outer", outer)?;
+        positive("outer", outer)?;
         Self::new(vec![-outer, 0.0, outer])
     }
 
@@ -96,11 +158,64 @@ impl Quantizer {
         self.cells() == self.levels && self.labels.iter().enumerate().all(|(i, l)| i == *l)
     }
 
-    /// Level of the cell that holds `y`; a breakpoint belongs to the cell below it. Never allocates. Infinite samples fall
-    /// into the outer cells and NaN into the first.
+    /// Level of the cell that holds `y`; a breakpoint belongs to the cell above it. Never allocates. Infinite samples fall into
+    /// the outer cells.
+    ///
+    /// # Errors
+    /// If `y` is NaN.
     #[inline]
-    pub fn encode(&self, y: f64) -> usize {
-        self.labels[self.breakpoints.partition_point(|b| *b < y)]
+    pub fn encode(&self, y: f64) -> Result<usize, Error> {
+        Ok(self.labels[cell_of(&self.breakpoints, y)?])
+    }
+
+    /// Cell `i`, if there is one.
+    pub fn cell(&self, cell: usize) -> Option<Cell> {
+        let (lower, upper) = self.edges(cell);
+        (cell < self.cells()).then(|| Cell::new(lower, upper).ok()).flatten()
+    }
+
+    /// Probability of each level for a sample `N(mean, deviation^2)`, each a sum of positive terms.
+    ///
+    /// # Errors
+    /// If `mean` is not finite or `deviation` is not a positive number.
+    pub fn level_probabilities(&self, mean: f64, deviation: f64) -> Result<Vec<f64>, Error> {
+        finite("mean", mean)?;
+        positive("deviation", deviation)?;
+        let mut levels = vec![0.0; self.levels];
+        for (cell, label) in self.labels.iter().enumerate() {
+            let (lower, upper) = self.edges(cell);
+            levels[*label] += normal::interval((lower - mean) / deviation, (upper - mean) / deviation);
+        }
+        Ok(levels)
+    }
+
+    /// `p(symbol received | h(x) = m)` for a sample `m + n`, `n ~ N(0, noise_variance)`, whose level crosses `channel`.
+    ///
+    /// A symbol that no level can cause is a factor of probability 0.
+    ///
+    /// # Errors
+    /// If the channel takes another number of levels, has no such symbol, or the variance is not a positive number.
+    pub fn factor(&self, symbol: usize, channel: &Channel, noise_variance: f64) -> Result<Scalar, Error> {
+        if channel.inputs() != self.levels {
+            return refuse("channel", format!("{} inputs", channel.inputs()), format!("{} inputs", self.levels));
+        }
+        if symbol >= channel.outputs() {
+            return refuse("symbol", symbol, format!("a number below {}", channel.outputs()));
+        }
+        self.factor_of(noise_variance, |level| channel.probability(symbol, level))
+    }
+
+    /// The factor of an observation of which `given_level(l)` is the probability if level `l` was sent.
+    ///
+    /// # Errors
+    /// If a probability is outside `[0, 1]` or the variance is not a positive number.
+    pub fn factor_of(&self, noise_variance: f64, given_level: impl Fn(usize) -> f64) -> Result<Scalar, Error> {
+        positive("noise_variance", noise_variance)?;
+        let given_cell: Vec<f64> = self.labels.iter().map(|l| given_level(*l)).collect();
+        if given_cell.iter().all(|p| *p == 0.0) {
+            return Ok(Constant::new(0.0)?.into());
+        }
+        Ok(Partition::new(self.breakpoints.clone(), given_cell, noise_variance)?.into())
     }
 
     /// Lower and upper edge of cell `i`, infinite at the ends.
@@ -134,8 +249,8 @@ impl Quantizer {
     /// # Errors
     /// If `mean` is not finite or `scale` is not a positive number.
     pub fn affine(&self, mean: f64, scale: f64) -> Result<Self, Error> {
-        fewbits_numerics::error::finite("mean", mean)?;
-        fewbits_numerics::error::positive("scale", scale)?;
+        finite("mean", mean)?;
+        positive("scale", scale)?;
         self.with_breakpoints(self.breakpoints.iter().map(|b| mean + scale * b).collect())
     }
 }
@@ -150,44 +265,63 @@ impl From<&LloydMax> for Quantizer {
     }
 }
 
-/// The same set of quantizers in a fixed orientation: of the design and its mirror image, each with identical sensors sorted,
-/// the lexicographically larger one. Two descriptions of one optimum compare equal after this.
+/// The same set of quantizers in a fixed form: levels numbered in the order in which their cells appear, and of the design and
+/// its mirror image, each with interchangeable sensors sorted, the one that sorts last. Two descriptions of one design over
+/// clear channels compare equal after this, to `1e-6` of the largest breakpoint.
 ///
 /// `interchangeable[n]` names the class of sensor `n`; sensors of one class may be swapped.
 pub fn canonical(quantizers: &[Quantizer], interchangeable: &[usize]) -> Vec<Quantizer> {
+    let scale = quantizers
+        .iter()
+        .flat_map(|q| &q.breakpoints)
+        .fold(0.0, |m, b| f64::max(m, b.abs()));
     let order = |a: &Quantizer, b: &Quantizer| {
-        let key = |q: &Quantizer| (q.cells(), q.labels().to_vec());
-        key(a)
-            .cmp(&key(b))
-            .then_with(|| compare(a.breakpoints(), b.breakpoints()))
+        (a.cells(), a.labels())
+            .cmp(&(b.cells(), b.labels()))
+            .then_with(|| compare(a.breakpoints(), b.breakpoints(), 1e-6 * scale))
     };
     let sorted = |mut all: Vec<Quantizer>| {
         for i in 0..all.len() {
             for j in i + 1..all.len() {
                 let same = interchangeable.get(i) == interchangeable.get(j);
-                if same && order(&all[i], &all[j]) == std::cmp::Ordering::Greater {
+                if same && order(&all[i], &all[j]) == Ordering::Greater {
                     all.swap(i, j);
                 }
             }
         }
         all
     };
-    let plain = sorted(quantizers.to_vec());
-    let mirror = sorted(quantizers.iter().map(Quantizer::mirrored).collect());
-    let flat = |all: &[Quantizer]| -> Vec<f64> { all.iter().flat_map(|q| q.breakpoints().to_vec()).collect() };
-    if compare(&flat(&plain), &flat(&mirror)) == std::cmp::Ordering::Less {
-        mirror
-    } else {
-        plain
+    let plain = sorted(quantizers.iter().map(Quantizer::renumbered).collect());
+    let mirror = sorted(quantizers.iter().map(|q| q.mirrored().renumbered()).collect());
+    let first = plain.iter().zip(&mirror).map(|(p, m)| order(p, m)).find(|o| o.is_ne());
+    if first == Some(Ordering::Less) { mirror } else { plain }
+}
+
+impl Quantizer {
+    /// Levels numbered in the order in which their cells appear from the left.
+    fn renumbered(&self) -> Self {
+        let mut names = vec![None; self.levels];
+        let mut next = 0;
+        let labels = self.labels.iter().map(|label| {
+            *names[*label].get_or_insert_with(|| {
+                next += 1;
+                next - 1
+            })
+        });
+        Self {
+            labels: labels.collect(),
+            breakpoints: self.breakpoints.clone(),
+            levels: self.levels,
+        }
     }
 }
 
-/// Lexicographic order that takes numbers within rounding of each other as equal.
-fn compare(a: &[f64], b: &[f64]) -> std::cmp::Ordering {
+/// Lexicographic order that takes numbers within `slack` of each other as equal.
+fn compare(a: &[f64], b: &[f64], slack: f64) -> Ordering {
     a.iter()
         .zip(b)
-        .find(|(x, y)| (*x - *y).abs() > 1e-6)
-        .map_or(std::cmp::Ordering::Equal, |(x, y)| x.total_cmp(y))
+        .find(|(x, y)| (*x - *y).abs() > slack)
+        .map_or(Ordering::Equal, |(x, y)| x.total_cmp(y))
 }
 
 #[cfg(test)]
@@ -195,10 +329,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn breakpoints_belong_to_the_cell_below() {
+    fn breakpoints_belong_to_the_cell_above() {
         let q = Quantizer::new(vec![-1.0, 0.0, 1.0]).unwrap();
-        assert_eq!([-1.0, -0.999, 0.0, 1.0, 1.001].map(|y| q.encode(y)), [0, 1, 1, 2, 3]);
-        assert_eq!((q.encode(f64::NEG_INFINITY), q.encode(f64::INFINITY), q.encode(f64::NAN)), (0, 3, 0));
+        assert_eq!([-1.001, -1.0, -0.001, 0.0, 1.0].map(|y| q.encode(y).unwrap()), [0, 1, 1, 2, 3]);
+        assert_eq!([f64::NEG_INFINITY, f64::INFINITY].map(|y| q.encode(y).unwrap()), [0, 3]);
+        assert!(q.encode(f64::NAN).unwrap_err().to_string().contains("measurement"));
+        for cell in 0..q.cells() {
+            let held = q.cell(cell).unwrap();
+            for y in [-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0] {
+                assert_eq!(held.contains(y), q.encode(y).unwrap() == cell);
+            }
+        }
+        assert_eq!(q.cell(4), None);
         assert_eq!(q.edges(0), (f64::NEG_INFINITY, -1.0));
         assert_eq!(q.edges(3), (1.0, f64::INFINITY));
     }
@@ -233,5 +375,46 @@ mod tests {
         let pairs = [[a.clone(), b.clone()], [b.clone(), a.clone()]];
         assert_eq!(canonical(&pairs[0], &[0, 0]), canonical(&pairs[1], &[0, 0]));
         assert_eq!(canonical(std::slice::from_ref(&a), &[0]), canonical(&[b], &[0]));
+    }
+
+    /// Labels 1, 0, 1 and their mirror image's 0, 1, 0 name one quantizer.
+    #[test]
+    fn folded_cells_and_their_mirror_image_have_one_canonical_form() {
+        for (labels, b) in [(vec![1, 0, 1], vec![-1.4, 1.2]), (vec![0, 1, 2, 0], vec![-1.0, 0.2, 2.0])] {
+            for scale in [1e-4, 1.0, 1e4] {
+                let b = b.iter().map(|x| scale * x).collect();
+                let folded = Quantizer::with_labels(b, labels.clone()).unwrap();
+                let forms = [folded.clone(), folded.mirrored()].map(|q| canonical(&[q], &[0]));
+                assert_eq!(forms[0], forms[1]);
+            }
+        }
+    }
+
+    #[test]
+    fn the_factor_of_a_symbol_is_its_probability() {
+        use fewbits_core::factor::Factor;
+        let q = Quantizer::with_labels(vec![-1.0, 0.3, 1.2], vec![0, 1, 2, 0]).unwrap();
+        let channel = Channel::symbol_erasure(3, 0.2).unwrap();
+        for m in [-3.0, 0.0, 0.7] {
+            let received = channel.received(&q.level_probabilities(m, 0.5).unwrap()).unwrap();
+            for (symbol, p) in received.iter().enumerate() {
+                let factor = q.factor(symbol, &channel, 0.25).unwrap();
+                assert!((factor.log_likelihood(&[m].into()).exp() - p).abs() < 1e-14);
+            }
+        }
+        assert!(q.factor(4, &channel, 0.25).is_err());
+        assert!(q.factor(0, &Channel::ideal(4).unwrap(), 0.25).is_err());
+        assert!(q.factor(0, &channel, 0.0).is_err());
+        let never = Channel::from_rows(&[vec![1.0, 1.0, 1.0], vec![0.0; 3]]).unwrap();
+        assert_eq!(q.factor(1, &never, 0.25).unwrap().log_likelihood(&[0.0].into()), f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn quantizers_are_stored_and_checked_when_restored() {
+        let q = Quantizer::with_labels(vec![-1.4, 1.4], vec![1, 0, 1]).unwrap();
+        let json = serde_json::to_string(&q).unwrap();
+        assert_eq!(serde_json::from_str::<Quantizer>(&json).unwrap(), q);
+        assert!(serde_json::from_str::<Quantizer>(r#"{"breakpoints":[1.0,0.0],"labels":[0,1,2]}"#).is_err());
+        assert!(serde_json::from_str::<Quantizer>(r#"{"breakpoints":[1.0],"labels":[0,2]}"#).is_err());
     }
 }

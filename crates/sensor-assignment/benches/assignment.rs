@@ -5,7 +5,7 @@
 use divan::Bencher;
 use fewbits_binary_patterns::BinaryQuantizer;
 use fewbits_sensor_assignment::{
-    CodedSensors, CostMatrix, Criterion, JonkerVolgenant, LinearAssignment, all_errors, pair_costs,
+    CodedSensors, CostMatrix, Estimator, JonkerVolgenant, LinearAssignment, all_errors, pair_costs,
 };
 
 fn main() {
@@ -20,7 +20,7 @@ fn encode(bencher: Bencher) {
 }
 
 fn table_6_1() -> CodedSensors {
-    CodedSensors::new(1.0, &[0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001]).unwrap()
+    CodedSensors::with_variances(1.0, &[0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001]).unwrap()
 }
 
 /// The matrix of approximate costs of eight sensors.
@@ -31,10 +31,10 @@ fn pair_costs_n8(bencher: Bencher) {
 }
 
 /// Exact errors of all 40 320 assignments; target 1 s by the recursion.
-#[divan::bench(args = [Criterion::Centre, Criterion::Mmse], sample_count = 5)]
-fn all_assignments_n8(bencher: Bencher, criterion: Criterion) {
+#[divan::bench(args = [Estimator::CellCentre, Estimator::PosteriorMean], sample_count = 5)]
+fn all_assignments_n8(bencher: Bencher, estimator: Estimator) {
     let sensors = table_6_1();
-    bencher.bench(|| all_errors(&sensors, criterion));
+    bencher.bench(|| all_errors(&sensors, estimator));
 }
 
 fn random_costs(size: usize) -> Vec<f64> {

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use fewbits_binary_patterns::{
-    Bank, BinaryQuantizer, Grid, IMPOSSIBLE, Nodes, Sensor, Source, gray_basis, linear_pattern,
+    Bank, BinaryQuantizer, Grid, IMPOSSIBLE, Nodes, PatternSensor, Source, gray_basis, linear_pattern,
 };
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::positive;
@@ -35,7 +35,7 @@ impl CodedSensors {
     ///
     /// # Errors
     /// If the half width or a variance is not positive and finite, or the number of sensors is not in `1..=16`.
-    pub fn new(half_width: f64, variances: &[f64]) -> Result<Self, Error> {
+    pub fn with_variances(half_width: f64, variances: &[f64]) -> Result<Self, Error> {
         let sensors = variances.len();
         if !(1..=MAX_SENSORS).contains(&sensors) {
             return Err(ArgumentError::new("variances", format!("{sensors} entries"), "1 to 16 entries").into());
@@ -44,6 +44,22 @@ impl CodedSensors {
             .iter()
             .map(|&v| positive("variance", v).map(f64::sqrt))
             .collect::<Result<Vec<_>, _>>()?;
+        Self::with_deviations(half_width, &noise_stds)
+    }
+
+    /// From the half width of the uniform source and each sensor's noise standard deviation.
+    ///
+    /// # Errors
+    /// As [`CodedSensors::with_variances`].
+    pub fn with_deviations(half_width: f64, deviations: &[f64]) -> Result<Self, Error> {
+        let sensors = deviations.len();
+        if !(1..=MAX_SENSORS).contains(&sensors) {
+            return Err(ArgumentError::new("deviations", format!("{sensors} entries"), "1 to 16 entries").into());
+        }
+        for deviation in deviations {
+            positive("deviation", *deviation)?;
+        }
+        let noise_stds = deviations.to_vec();
         let source = Source::uniform(half_width)?;
         let grid = Grid::uniform(half_width, sensors)?;
         let quantizers = gray_basis(sensors)?
@@ -52,7 +68,7 @@ impl CodedSensors {
             .collect::<Result<Vec<_>, _>>()?;
         let blurs: Vec<(f64, f64)> = noise_stds
             .iter()
-            .flat_map(|&noise| grid.edges().iter().map(move |&t| (t, noise)))
+            .flat_map(|&noise| grid.breakpoints().iter().map(move |&t| (t, noise)))
             .collect();
         let mut nodes = Nodes::adapted(&source, 0.0, half_width, &blurs, PANEL, gauss_legendre::<12>());
         nodes.w.iter_mut().for_each(|w| *w *= 2.0);
@@ -133,7 +149,7 @@ impl CodedSensors {
         let sensors = assignment
             .iter()
             .zip(&self.quantizers)
-            .map(|(&n, quantizer)| Sensor::new(quantizer.clone(), self.noise_stds[n]))
+            .map(|(&n, quantizer)| PatternSensor::new(quantizer.clone(), self.noise_stds[n]))
             .collect::<Result<_, _>>()?;
         Ok(Bank::new(self.source, sensors)?)
     }
@@ -244,7 +260,7 @@ mod tests {
 
     #[test]
     fn the_recursion_agrees_with_all_outcomes() {
-        let sensors = CodedSensors::new(1.3, &[0.04, 0.2, 0.01, 0.08]).unwrap();
+        let sensors = CodedSensors::with_variances(1.3, &[0.04, 0.2, 0.01, 0.08]).unwrap();
         let assignment = [2, 0, 3, 1];
         let bank = sensors.bank(&assignment).unwrap();
         let grid = Grid::uniform(1.3, 4).unwrap();
@@ -258,7 +274,7 @@ mod tests {
                 previous ^= index >> at & 1;
                 value = 2 * value + previous;
             }
-            let left = if value == 0 { -1.3 } else { grid.edges()[value - 1] };
+            let left = if value == 0 { -1.3 } else { grid.breakpoints()[value - 1] };
             let centre = left + 1.3 / 16.0;
             exact += w
                 .iter()
@@ -274,17 +290,17 @@ mod tests {
 
     #[test]
     fn one_bit_without_noise_leaves_half_a_cell() {
-        let sensors = CodedSensors::new(1.0, &[1e-8]).unwrap();
+        let sensors = CodedSensors::with_variances(1.0, &[1e-8]).unwrap();
         assert_relative_eq!(sensors.centre_mse(&[0]).unwrap(), 1.0 / 12.0, max_relative = 1e-3);
     }
 
     #[test]
     fn bad_input_is_refused() {
-        assert!(CodedSensors::new(0.0, &[0.1]).is_err());
-        assert!(CodedSensors::new(1.0, &[]).is_err());
-        assert!(CodedSensors::new(1.0, &[0.1; 17]).is_err());
-        assert!(CodedSensors::new(1.0, &[0.1, 0.0]).is_err());
-        let sensors = CodedSensors::new(1.0, &[0.1, 0.2]).unwrap();
+        assert!(CodedSensors::with_variances(0.0, &[0.1]).is_err());
+        assert!(CodedSensors::with_variances(1.0, &[]).is_err());
+        assert!(CodedSensors::with_variances(1.0, &[0.1; 17]).is_err());
+        assert!(CodedSensors::with_variances(1.0, &[0.1, 0.0]).is_err());
+        let sensors = CodedSensors::with_variances(1.0, &[0.1, 0.2]).unwrap();
         for bad in [vec![0], vec![0, 0], vec![0, 2]] {
             assert!(matches!(sensors.centre_mse(&bad), Err(Error::NotAPermutation { .. })));
             assert!(sensors.mmse(&bad).is_err());

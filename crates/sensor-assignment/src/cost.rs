@@ -84,7 +84,7 @@ pub fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
         let landing = flipped_centre(cell, bit, cells, v);
         let low = v * (2.0 * cell as f64 - cells as f64) / cells as f64;
         let middle = low + 0.5 * width;
-        let right = quantizer.thresholds().partition_point(|&t| t <= middle) % 2;
+        let right = quantizer.breakpoints().partition_point(|&t| t <= middle) % 2;
         cost += rule.composite(low, low + width, panels, |x| {
             (x - landing) * (x - landing) * quantizer.probabilities(x, noise)[1 - right]
         });
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn costs_agree_with_a_plain_midpoint_sum() {
-        let sensors = CodedSensors::new(1.3, &[0.04, 0.0009, 0.3]).unwrap();
+        let sensors = CodedSensors::with_variances(1.3, &[0.04, 0.0009, 0.3]).unwrap();
         let costs = pair_costs(&sensors).unwrap();
         let points = 16_000;
         for bit in 0..3 {

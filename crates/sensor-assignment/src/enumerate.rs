@@ -11,13 +11,13 @@ const MAX_ENUMERATED: usize = 10;
 /// Relative improvement that counts as one.
 const IMPROVEMENT: f64 = 1e-12;
 
-/// Which exact error is minimised.
+/// What the fusion centre answers: which exact error is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Criterion {
+pub enum Estimator {
     /// Of the decoder that answers the cell's centre.
-    Centre,
+    CellCentre,
     /// Of the posterior mean.
-    Mmse,
+    PosteriorMean,
 }
 
 /// Errors of all assignments.
@@ -45,14 +45,14 @@ pub struct Exchanged {
 }
 
 impl CodedSensors {
-    /// Exact error of an assignment under `criterion`.
+    /// Exact error of an assignment under `estimator`.
     ///
     /// # Errors
     /// If the assignment is not a permutation.
-    pub fn mse(&self, assignment: &[usize], criterion: Criterion) -> Result<f64, Error> {
-        match criterion {
-            Criterion::Centre => self.centre_mse(assignment),
-            Criterion::Mmse => self.mmse(assignment),
+    pub fn mse(&self, assignment: &[usize], estimator: Estimator) -> Result<f64, Error> {
+        match estimator {
+            Estimator::CellCentre => self.centre_mse(assignment),
+            Estimator::PosteriorMean => self.mmse(assignment),
         }
     }
 }
@@ -61,16 +61,16 @@ impl CodedSensors {
 ///
 /// # Errors
 /// If the start is not a permutation.
-pub fn exchange(sensors: &CodedSensors, start: &[usize], criterion: Criterion) -> Result<Exchanged, Error> {
+pub fn exchange(sensors: &CodedSensors, start: &[usize], estimator: Estimator) -> Result<Exchanged, Error> {
     let mut assignment = start.to_vec();
-    let mut error = sensors.mse(&assignment, criterion)?;
+    let mut error = sensors.mse(&assignment, estimator)?;
     let mut evaluations = 1;
     loop {
         let mut best = (error * (1.0 - IMPROVEMENT), None);
         for i in 0..assignment.len() {
             for j in i + 1..assignment.len() {
                 assignment.swap(i, j);
-                let trial = sensors.mse(&assignment, criterion)?;
+                let trial = sensors.mse(&assignment, estimator)?;
                 evaluations += 1;
                 assignment.swap(i, j);
                 if trial < best.0 {
@@ -94,8 +94,8 @@ pub fn exchange(sensors: &CodedSensors, start: &[usize], criterion: Criterion) -
 ///
 /// # Errors
 /// As [`all_errors`].
-pub fn brute_force(sensors: &CodedSensors, criterion: Criterion) -> Result<(Vec<usize>, f64), Error> {
-    let all = all_errors(sensors, criterion)?;
+pub fn brute_force(sensors: &CodedSensors, estimator: Estimator) -> Result<(Vec<usize>, f64), Error> {
+    let all = all_errors(sensors, estimator)?;
     Ok((all.best, all.least))
 }
 
@@ -107,19 +107,19 @@ pub fn brute_force(sensors: &CodedSensors, criterion: Criterion) -> Result<(Vec<
 ///
 /// # Errors
 /// If there are more than ten sensors.
-pub fn all_errors(sensors: &CodedSensors, criterion: Criterion) -> Result<AllErrors, Error> {
+pub fn all_errors(sensors: &CodedSensors, estimator: Estimator) -> Result<AllErrors, Error> {
     let n = sensors.sensors();
     if n > MAX_ENUMERATED {
         return Err(ArgumentError::new("sensors", n, "at most 10 sensors").into());
     }
     let mut tally = Tally::default();
-    match criterion {
-        Criterion::Centre => {
+    match estimator {
+        Estimator::CellCentre => {
             let rows = sensors.nodes().len();
             let mut moments = vec![(vec![0.0; rows], vec![0.0; rows]); n + 1];
             centre_tree(sensors, n, &mut vec![0; n], 0, &mut moments, &mut tally);
         }
-        Criterion::Mmse => mmse_halves(sensors, &mut tally),
+        Estimator::PosteriorMean => mmse_halves(sensors, &mut tally),
     }
     Ok(AllErrors {
         best: tally.best,
@@ -284,12 +284,12 @@ mod tests {
             vec![0.012, 0.021, 0.037, 0.05],
             vec![0.01, 0.3, 0.02, 0.04, 0.1],
         ] {
-            let sensors = CodedSensors::new(1.0, &variances).unwrap();
-            for criterion in [Criterion::Centre, Criterion::Mmse] {
-                let all = all_errors(&sensors, criterion).unwrap();
+            let sensors = CodedSensors::with_variances(1.0, &variances).unwrap();
+            for estimator in [Estimator::CellCentre, Estimator::PosteriorMean] {
+                let all = all_errors(&sensors, estimator).unwrap();
                 let (mut sum, mut count, mut least, mut largest) = (0.0, 0.0, f64::INFINITY, 0.0f64);
                 for_permutations(variances.len(), |p| {
-                    let error = sensors.mse(p, criterion).unwrap();
+                    let error = sensors.mse(p, estimator).unwrap();
                     sum += error;
                     count += 1.0;
                     least = least.min(error);
@@ -298,18 +298,18 @@ mod tests {
                 assert_relative_eq!(all.mean, sum / count, max_relative = 1e-10);
                 assert_relative_eq!(all.least, least, max_relative = 1e-9);
                 assert_relative_eq!(all.largest, largest, max_relative = 1e-9);
-                assert_relative_eq!(sensors.mse(&all.best, criterion).unwrap(), least, max_relative = 1e-9);
+                assert_relative_eq!(sensors.mse(&all.best, estimator).unwrap(), least, max_relative = 1e-9);
             }
         }
     }
 
     #[test]
     fn exchange_ends_at_or_below_its_start() {
-        let sensors = CodedSensors::new(1.0, &[0.004, 0.01, 0.02, 0.03, 0.05]).unwrap();
-        let found = exchange(&sensors, &[4, 3, 2, 1, 0], Criterion::Mmse).unwrap();
-        let (_, least) = brute_force(&sensors, Criterion::Mmse).unwrap();
+        let sensors = CodedSensors::with_variances(1.0, &[0.004, 0.01, 0.02, 0.03, 0.05]).unwrap();
+        let found = exchange(&sensors, &[4, 3, 2, 1, 0], Estimator::PosteriorMean).unwrap();
+        let (_, least) = brute_force(&sensors, Estimator::PosteriorMean).unwrap();
         assert_relative_eq!(found.error, least, max_relative = 1e-9);
-        assert!(exchange(&sensors, &[0, 0, 1, 2, 3], Criterion::Centre).is_err());
-        assert!(all_errors(&CodedSensors::new(1.0, &[0.01; 11]).unwrap(), Criterion::Centre).is_err());
+        assert!(exchange(&sensors, &[0, 0, 1, 2, 3], Estimator::CellCentre).is_err());
+        assert!(all_errors(&CodedSensors::with_variances(1.0, &[0.01; 11]).unwrap(), Estimator::CellCentre).is_err());
     }
 }

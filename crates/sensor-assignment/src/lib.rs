@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use fewbits_sensor_assignment::{CodedSensors, JonkerVolgenant, LinearAssignment, pair_costs};
-//! let sensors = CodedSensors::new(1.0, &[0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001])?;
+//! let sensors = CodedSensors::with_variances(1.0, &[0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001])?;
 //! let costs = pair_costs(&sensors)?;
 //! let best = JonkerVolgenant.solve(&costs)?;
 //! assert_eq!(best, [4, 5, 6, 7, 3, 2, 1, 0]);
@@ -32,7 +32,7 @@ mod setup;
 
 pub use coded::CodedSensors;
 pub use cost::{bit_error, flipped_estimate, pair_cost, pair_costs, quantization_error};
-pub use enumerate::{AllErrors, Criterion, Exchanged, all_errors, brute_force, exchange};
+pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, brute_force, exchange};
 pub use error::Error;
 pub use linear::{Certificate, CostMatrix, JonkerVolgenant, LinearAssignment};
 pub use setup::{by_precision, variances_with_moments};

@@ -4,15 +4,38 @@ use super::coded::check_permutation;
 use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::all_finite;
+use serde::{Deserialize, Serialize};
 
 /// Relative slack of the certificate's inequalities, in units of the largest cost.
 const SLACK: f64 = 1e-12;
 
 /// A square matrix of finite costs, rows to be matched with columns.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
 pub struct CostMatrix {
     /// Stored as the solver takes it, so that solving copies nothing.
     costs: lapjv::Matrix<f64>,
+}
+
+impl From<CostMatrix> for Vec<Vec<f64>> {
+    fn from(matrix: CostMatrix) -> Self {
+        matrix.costs.outer_iter().map(|row| row.to_vec()).collect()
+    }
+}
+
+impl TryFrom<Vec<Vec<f64>>> for CostMatrix {
+    type Error = Error;
+
+    fn try_from(rows: Vec<Vec<f64>>) -> Result<Self, Error> {
+        let size = rows.len();
+        if let Some(row) = rows.iter().find(|row| row.len() != size) {
+            return Err(Error::NotSquare {
+                entries: row.len(),
+                size,
+            });
+        }
+        Self::new(size, rows.concat())
+    }
 }
 
 impl CostMatrix {
@@ -103,7 +126,7 @@ impl CostMatrix {
 }
 
 /// Dual variables of an assignment, and how far they are from proving it optimal.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
     /// Dual variable `u_i` of each row.
     pub rows: Vec<f64>,

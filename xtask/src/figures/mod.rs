@@ -57,6 +57,9 @@ pub struct Options {
     /// Fewer trials; claims that need the full count are skipped.
     #[arg(long)]
     pub quick: bool,
+    /// But none that match this id or glob. Repeatable.
+    #[arg(long, value_name = "ID")]
+    pub except: Vec<String>,
     /// Of these figures only those that failed in the output directory, or whose claims did.
     #[arg(long)]
     pub failed: bool,
@@ -184,6 +187,13 @@ pub fn run(options: &Options) -> Result<Ending, Error> {
         None => {}
     }
     let mut chosen = select::figures(&options.ids)?;
+    if !options.except.is_empty() {
+        let left_out: Vec<_> = select::figures(&options.except)?
+            .iter()
+            .map(|figure| figure.about().id)
+            .collect();
+        chosen.retain(|figure| !left_out.contains(&figure.about().id));
+    }
     if options.failed {
         let records = Record::read_all(&options.out)?;
         chosen.retain(|figure| records.get(figure.about().id).is_some_and(|r| !r.good()));

@@ -129,18 +129,150 @@ fn without_plots_there_is_no_svg() {
 }
 
 #[test]
-fn the_list_names_figures_with_their_parameters() {
+fn the_list_is_a_line_a_figure_and_describe_has_the_rest() {
     let out = tempfile::tempdir().unwrap();
-    let run = figures(out.path(), &["dymbo-fig*", "--list"]);
-    let listed = text(&run.stdout);
-    assert!(run.status.success() && listed.contains("dymbo-fig5") && listed.contains("trials="), "{listed}");
-    assert!(!listed.contains("cfwmd"));
+    let listed = text(&figures(out.path(), &["mi-table4-*", "--list"]).stdout);
+    assert!(
+        listed.contains("mi-table4-1") && listed.lines().all(|line| line.starts_with("mi-table")),
+        "{listed}"
+    );
     assert!(files(out.path()).is_empty());
+    let run = Command::new(env!("CARGO_BIN_EXE_xtask"))
+        .args(["figures", "describe", "mi-table4-3"])
+        .output()
+        .unwrap();
+    let page = text(&run.stdout);
+    for words in [
+        "sensors = 9",
+        "from 2 to 10",
+        "mi_nats [nat]: Mutual information",
+        "mi-table4-3-chain.csv",
+    ] {
+        assert!(page.contains(words), "{page}");
+    }
+}
+
+#[test]
+fn a_closed_pipe_is_no_panic() {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_xtask"))
+        .args(["figures", "--list"])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(run.stdout.take());
+    assert!(run.wait().unwrap().success());
+}
+
+#[test]
+fn shards_merge_into_the_whole() {
+    let out = tempfile::tempdir().unwrap();
+    let shards: Vec<_> = ["1/2", "2/2"]
+        .map(|shard| (shard, out.path().join(shard.replace('/', "-"))))
+        .to_vec();
+    for (shard, folder) in &shards {
+        let run = figures(folder, &["mi-table4-[25]*", "--quick", "--shard", shard]);
+        assert!(run.status.success(), "{}", text(&run.stdout));
+    }
+    assert_ne!(files(&shards[0].1).keys().collect::<Vec<_>>(), files(&shards[1].1).keys().collect::<Vec<_>>());
+    let whole = out.path().join("whole");
+    let run = Command::new(env!("CARGO_BIN_EXE_xtask"))
+        .args(["figures", "merge", "--json", "--out"])
+        .args([&whole, &shards[0].1, &shards[1].1])
+        .output()
+        .unwrap();
+    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(summary["good"], true);
+    assert_eq!(summary["figures"].as_array().unwrap().len(), 3);
+    let files = files(&whole);
+    for id in ["mi-table4-2", "mi-table4-5", "mi-table4-5-mismatch"] {
+        assert!(files.contains_key(&format!("{id}.csv")) && files.contains_key(&format!("{id}.json")), "{id}");
+    }
+}
+
+#[test]
+fn what_failed_can_be_run_again_and_stands_first() {
+    let out = tempfile::tempdir().unwrap();
+    assert!(figures(out.path(), &["mi-table4-[25]", "--quick"]).status.success());
+    let path = out.path().join("mi-table4-5.json");
+    let bad = std::fs::read_to_string(&path)
+        .unwrap()
+        .replacen("\"pass\"", "\"fail\"", 1);
+    std::fs::write(&path, bad).unwrap();
+    let run = figures(out.path(), &["--failed", "--quick", "--seed", "2", "--json"]);
+    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(summary["figures"][0]["id"], "mi-table4-5");
+    assert_eq!(summary["figures"].as_array().unwrap().len(), 1);
+    // The other one was not run this time, and has another seed.
+    let page = text(&files(out.path())["index.html"]);
+    assert!(page.find("id=\"mi-table4-5\"") < page.find("id=\"mi-table4-2\""));
+    assert!(page.contains("different seeds: 1, 2") && page.contains("not run this time"));
+    assert!(page.contains("quick ones"));
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_run_leaves_what_is_complete() {
+    let out = tempfile::tempdir().unwrap();
+    let mut run = Command::new(env!("CARGO_BIN_EXE_xtask"))
+        .args(["figures", "mi-table4-2", "cfwmd-fig5", "--threads", "2", "--out"])
+        .arg(out.path())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let made = out.path().join("mi-table4-2.json");
+    for _ in 0..600 {
+        if made.exists() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    Command::new("kill")
+        .args(["-INT", &run.id().to_string()])
+        .status()
+        .unwrap();
+    assert_eq!(run.wait().unwrap().code(), Some(130));
+    let files = files(out.path());
+    assert!(files.contains_key("mi-table4-2.csv") && !files.keys().any(|name| name.starts_with("cfwmd-fig5")));
+    assert!(text(&files["index.html"]).contains("Stopped by the user: 1 of 2"));
+}
+
+/// What a browser makes of the gallery, after its script has run.
+#[test]
+fn the_gallery_opens_in_a_browser() {
+    let Some(browser) = ["chromium", "chromium-browser", "google-chrome"]
+        .into_iter()
+        .find(|name| {
+            Command::new(name)
+                .arg("--version")
+                .output()
+                .is_ok_and(|run| run.status.success())
+        })
+    else {
+        eprintln!("SKIPPED: no Chromium is installed, so the gallery was not opened");
+        return;
+    };
+    let out = tempfile::tempdir().unwrap();
+    assert!(figures(out.path(), &["mi-table4-[25]", "--quick"]).status.success());
+    let page = format!("file://{}/index.html", out.path().display());
+    let run = Command::new(browser)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--window-size=400,800",
+            "--dump-dom",
+            &page,
+        ])
+        .output()
+        .unwrap();
+    let dom = text(&run.stdout);
+    assert!(dom.contains("2 figures shown"), "{}", text(&run.stderr));
 }
 
 #[test]
 fn what_is_refused_is_named_and_nothing_is_written() {
-    let cases: [(&[&str], &[&str]); 10] = [
+    let cases: [(&[&str], &[&str]); 13] = [
         (&["dymbo-fig99"], &["dymbo-fig99", "dymbo-fig5"]),
         (&["nothing-*"], &["nothing-*", "dymbo-fig5"]),
         (&["dymbo-[fig"], &["dymbo-[fig", "pattern"]),
@@ -151,6 +283,9 @@ fn what_is_refused_is_named_and_nothing_is_written() {
         (&["dymbo-fig5", "--set", "gamma=-0.5"], &["-0.5"]),
         (&["dymbo-fig5", "--set", "a"], &["NAME=VALUE"]),
         (&["dymbo-fig5", "--trials", "0"], &["trials", "0"]),
+        (&["mi-table4-3", "--set", "sensors=99"], &["`sensors`", "99", "greater than 10"]),
+        (&["mi-table4-4", "--set", "signals=2,NaN"], &["`signals[1]`", "NaN", "expected a number"]),
+        (&["mi-table4-4", "--shard", "3/2"], &["3/2", "I/N"]),
     ];
     for (arguments, words) in cases {
         let out = tempfile::tempdir().unwrap();

@@ -1,11 +1,11 @@
-//! Adaptive quantization: the sensors speak in turn, and each hears the bits before it.
+//! Adaptive quantization: the sensors report in turn, and each is told the bits before it.
 
 use crate::Error;
 use crate::Source;
 use crate::bank::{IMPOSSIBLE, MAX_OUTCOMES};
 use crate::continuous_map::golden;
 use crate::decoder::{moments, squared_error};
-use crate::grid::noise_in_range;
+use crate::source::noise_in_range;
 use crate::source::Nodes;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, positive};
@@ -49,7 +49,7 @@ pub struct AdaptiveErrors {
     pub mmse: f64,
 }
 
-/// Exact errors of `sensors` sensors that speak in turn, by expanding the tree of all bit strings.
+/// Exact errors of `sensors` sensors that report in turn, by expanding the tree of all bit strings.
 ///
 /// Each node of the tree carries `p(x) P(bits|x)` on the quadrature nodes, so that nothing is simulated.
 ///
@@ -178,8 +178,9 @@ impl Tree<'_> {
 /// equal means an end of the interval.
 ///
 /// # Errors
-/// If a threshold is not finite, or the noise or the bound is not positive and finite.
+/// If there is no bit, a threshold is not finite, or the noise or the bound is not positive and finite.
 pub fn bounded_mle(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> Result<f64, Error> {
+    at_least_one("bits", bits.len())?;
     let thresholds: Vec<f64> = bits.iter().map(|b| b.0).collect();
     all_finite("thresholds", &thresholds)?;
     Ok(maximum_likelihood(bits, noise_in_range(noise_std)?, positive("bound", bound)?))
@@ -263,10 +264,11 @@ mod tests {
         assert_eq!(bounded_mle(&[(0.0, true), (0.5, true)], 0.3, 1.0).unwrap(), 1.0);
         assert_eq!(bounded_mle(&[(0.0, false)], 0.3, 1.0).unwrap(), -1.0);
         assert!(bounded_mle(&[(f64::NAN, false)], 0.3, 1.0).is_err());
+        assert!(bounded_mle(&[], 0.3, 1.0).unwrap_err().to_string().contains("bits"));
     }
 
     #[test]
-    fn one_bit_is_the_sign_and_listening_helps() {
+    fn one_bit_is_the_sign_and_feedback_helps() {
         let source = Source::uniform(1.0).unwrap();
         let noise = source.noise_std(10.0).unwrap();
         let alone = super::super::fixed_threshold(source, noise, 1).unwrap().mmse().unwrap();

@@ -2,9 +2,10 @@
 
 use crate::Error;
 use crate::bank::CountTable;
-use crate::grid::{bits_in_range, noise_in_range};
+use crate::grid::bits_in_range;
+use crate::source::noise_in_range;
 use crate::source::{Blur, Kind, Nodes};
-use crate::{Bank, BinaryQuantizer, Decoder, Grid, Sensor, Source, linear_pattern, natural_basis};
+use crate::{Bank, BinaryQuantizer, Decoder, Grid, PatternSensor, Source, linear_pattern, natural_basis};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::quadrature::gauss_legendre;
 
@@ -75,7 +76,7 @@ impl Luo {
         let mut sensors = Vec::new();
         for (quantizer, &count) in self.quantizers.iter().zip(&self.allocation) {
             for _ in 0..count {
-                sensors.push(Sensor::new(quantizer.clone(), self.noise_std)?);
+                sensors.push(PatternSensor::new(quantizer.clone(), self.noise_std)?);
             }
         }
         Bank::new(self.source, sensors)
@@ -89,7 +90,7 @@ impl Luo {
         let blurs: Vec<Blur> = self
             .quantizers
             .iter()
-            .flat_map(|q| q.thresholds().iter().map(|&t| (t, self.noise_std)))
+            .flat_map(|q| q.breakpoints().iter().map(|&t| (t, self.noise_std)))
             .collect();
         let v = self.half_width;
         let nodes = Nodes::adapted(&self.source, -v, v, &blurs, 1.0, gauss_legendre::<12>());

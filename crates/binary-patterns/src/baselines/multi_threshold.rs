@@ -52,7 +52,8 @@ fn log_information(u: f64, noise_std: f64) -> f64 {
 /// ```
 ///
 /// # Errors
-/// If there is no sensor or `noise_std` is not finite or below `1e-4` of the source's reach.
+/// If there is no sensor or `noise_std` is not finite or below `1e-4` of the source's reach; [`Error::NotConverged`] if the gap is
+/// not closed in 200000 updates.
 pub fn multi_threshold_bound(source: &Source, noise_std: f64, sensors: usize) -> Result<MultiThreshold, Error> {
     let total = at_least_one("sensors", sensors)? as f64;
     let noise_std = source.resolvable(noise_std)?;
@@ -90,9 +91,17 @@ pub fn multi_threshold_bound(source: &Source, noise_std: f64, sensors: usize) ->
         rho.iter_mut().for_each(|r| *r *= total / sum);
         state = Objective::of(&rows, &rho, &nodes);
     }
+    let gap = state.gap(total);
+    if gap.is_nan() || gap >= GAP {
+        return Err(Error::NotConverged {
+            algorithm: "multiplicative updates of the thresholds",
+            iterations: MAX_UPDATES,
+            change: gap,
+        });
+    }
     Ok(MultiThreshold {
         bound: state.value,
-        gap: state.gap(total),
+        gap,
         thresholds,
         sensors: rho,
     })

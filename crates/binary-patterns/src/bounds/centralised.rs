@@ -3,9 +3,11 @@
 use super::rate_distortion::ConditionalMean;
 use crate::Error;
 use crate::Source;
-use crate::grid::noise_in_range;
+use crate::source::noise_in_range;
 use fewbits_numerics::ArgumentError;
-use fewbits_quantizers::lloyd_max::{self, Density};
+use fewbits_numerics::error::at_least_one;
+use fewbits_quantizers::density::{CellMoments, Density};
+use fewbits_quantizers::lloyd_max;
 
 /// Most sensors: the quantizer of the estimate has `2^N` levels.
 const MAX_SENSORS: usize = 12;
@@ -25,9 +27,24 @@ pub fn centralised_bound(source: &Source, noise_std: f64, sensors: usize) -> Res
     if !(1..=MAX_SENSORS).contains(&sensors) {
         return Err(ArgumentError::new("sensors", sensors, "a number of sensors in 1..=12").into());
     }
-    let measurement = ConditionalMean::new(*source, noise_in_range(noise_std)? / (sensors as f64).sqrt())?;
+    centralised_bound_of_levels(source, noise_std, sensors, 1 << sensors)
+}
+
+/// The same for `measurements` measurements described by one of `levels` symbols together: several levels of one measurement,
+/// or a few symbols for many.
+///
+/// # Errors
+/// If `noise_std` is not positive and finite, `measurements` is 0, `levels` not in `2..=4096`, or the quantizer's iteration fails.
+pub fn centralised_bound_of_levels(
+    source: &Source,
+    noise_std: f64,
+    measurements: usize,
+    levels: usize,
+) -> Result<f64, Error> {
+    at_least_one("measurements", measurements)?;
+    let measurement = ConditionalMean::new(*source, noise_in_range(noise_std)? / (measurements as f64).sqrt())?;
     let estimate = EstimateDensity::new(measurement);
-    let quantizer = lloyd_max::design(&estimate, 1 << sensors)?;
+    let quantizer = lloyd_max::design(&estimate, levels)?;
     Ok(measurement.estimation_error() + quantizer.mean_squared_error())
 }
 
@@ -103,16 +120,27 @@ impl Density for EstimateDensity {
         }
     }
 
-    fn mass(&self, a: f64, b: f64) -> f64 {
-        self.integral(a, b, |_| 1.0)
+    fn centre(&self) -> f64 {
+        0.0
     }
 
-    fn first_moment(&self, a: f64, b: f64) -> f64 {
-        self.integral(a, b, |v| v)
+    fn cell(&self, a: f64, b: f64) -> CellMoments {
+        let (low, high) = (a.max(self.table[0]), b.min(self.table[TABLE]));
+        let mass = self.integral(low, high, |_| 1.0);
+        let inside = if mass > 0.0 {
+            self.integral(low, high, |v| v - low) / mass
+        } else {
+            0.5 * (high - low)
+        };
+        CellMoments {
+            mass,
+            from_lower: inside + (low - a),
+            to_upper: (high - low - inside) + (b - high),
+        }
     }
 
-    fn second_moment(&self) -> f64 {
-        self.measurement.source().variance() - self.measurement.estimation_error()
+    fn squared_error(&self, a: f64, b: f64, point: f64) -> f64 {
+        self.integral(a, b, |v| (v - point) * (v - point))
     }
 
     fn extent(&self) -> (f64, f64) {
@@ -132,6 +160,19 @@ mod tests {
         let gain = 0.25 / (0.25 + 0.16 / 3.0);
         let table = lloyd_max::gaussian_table(3).unwrap().mean_squared_error();
         assert_relative_eq!(bound, gain * 0.16 / 3.0 + gain * 0.25 * table, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn several_levels_of_one_measurement_are_bounded_too() {
+        let source = Source::gaussian(0.5).unwrap();
+        let gain = 0.25 / (0.25 + 0.16);
+        for levels in [2, 3, 5, 16] {
+            let bound = centralised_bound_of_levels(&source, 0.4, 1, levels).unwrap();
+            let table = lloyd_max::gaussian(levels).unwrap().mean_squared_error();
+            assert_relative_eq!(bound, gain * 0.16 + gain * 0.25 * table, max_relative = 1e-9);
+        }
+        assert!(centralised_bound_of_levels(&source, 0.4, 0, 4).is_err());
+        assert!(centralised_bound_of_levels(&source, 0.4, 1, 1).is_err());
     }
 
     #[test]

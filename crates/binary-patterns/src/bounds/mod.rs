@@ -2,7 +2,7 @@
 //!
 //! | quantity | function | valid for |
 //! |---|---|---|
-//! | optimal-weight van Trees bound of given sensors | [`van_trees`] | every bank, both sources |
+//! | optimal-weight van Trees bound of given sensors | [`optimal_weight_van_trees`] | every bank, both sources |
 //! | remote rate-distortion bound, `N` observations and bits | [`network_rate_distortion`] | every scheme |
 //! | exact centralised bound | [`centralised_bound`] | every scheme, the tightest of its kind |
 //! | equation 5.13, "CRLB" | [`printed_crlb`] | Gaussian source only |
@@ -12,9 +12,9 @@ mod centralised;
 mod rate_distortion;
 mod van_trees;
 
-pub use centralised::centralised_bound;
+pub use centralised::{centralised_bound, centralised_bound_of_levels};
 pub use rate_distortion::{ConditionalMean, RemoteDistortion, network_rate_distortion, remote_distortion};
-pub use van_trees::van_trees;
+pub use van_trees::optimal_weight_van_trees;
 
 use super::Bank;
 use super::source::{Kind, Nodes};

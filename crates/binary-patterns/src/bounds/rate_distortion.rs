@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::Source;
-use crate::grid::noise_in_range;
+use crate::source::noise_in_range;
 use crate::source::Kind;
 use fewbits_numerics::error::{at_least_one, non_negative};
 use fewbits_numerics::normal::{interval, pdf, truncated_moments};
@@ -27,10 +27,6 @@ impl ConditionalMean {
     pub fn new(source: Source, noise_std: f64) -> Result<Self, Error> {
         let noise_std = noise_in_range(noise_std)?;
         Ok(Self { source, noise_std })
-    }
-
-    pub(super) fn source(&self) -> &Source {
-        &self.source
     }
 
     pub(super) fn noise_std(&self) -> f64 {

@@ -1,6 +1,6 @@
 //! The Bayesian Cramer-Rao bound with the best weight function.
 
-use crate::Bank;
+use crate::{Bank, Error};
 use crate::source::{Blur, Kind};
 use std::f64::consts::PI;
 
@@ -13,6 +13,8 @@ const LEVELS: usize = 8;
 const FINEST: usize = 1 << 17;
 /// Relative change between extrapolated values at which the doubling stops.
 const TOLERANCE: f64 = 1e-11;
+/// Relative change up to which a value that the finest grid still moves is returned.
+const ACCEPTED: f64 = 1e-7;
 /// Half width, in noise standard deviations, of the region around a threshold that gets its share of the nodes.
 const FOCUS: f64 = 4.0;
 
@@ -32,7 +34,10 @@ const FOCUS: f64 = 4.0;
 /// doubling fineness with Romberg extrapolation. The grids are even in a smooth coordinate that gives every threshold its share
 /// of nodes, so that the walls of information are resolved however small the noise is. Without information the bound is `Var X`; as the noise vanishes the
 /// information makes walls at the thresholds and the bound tends to `Delta^2/12`.
-pub fn van_trees(bank: &Bank) -> f64 {
+///
+/// # Errors
+/// [`Error::NotConverged`] if the grids, refined as far as they go, do not agree to `1e-7`.
+pub fn optimal_weight_van_trees(bank: &Bank) -> Result<f64, Error> {
     let source = bank.source();
     let (prior, clamped) = match source.kind() {
         Kind::Uniform { .. } => (0.0, true),
@@ -45,6 +50,7 @@ pub fn van_trees(bank: &Bank) -> f64 {
     let mut points = mesh.points(2 * intervals);
     let mut rates: Vec<f64> = points.iter().step_by(2).map(|&x| rate(x)).collect();
     let mut extrapolated: Vec<f64> = Vec::with_capacity(LEVELS);
+    let mut change = f64::INFINITY;
     for level in 0..LEVELS {
         if level > 0 {
             if 2 * intervals > FINEST {
@@ -70,12 +76,21 @@ pub fn van_trees(bank: &Bank) -> f64 {
         extrapolated.push(value);
         if let Some(last) = last
             && level > 1
-            && (value - last).abs() <= TOLERANCE * value
         {
-            break;
+            change = (value - last).abs() / value;
+            if change <= TOLERANCE {
+                break;
+            }
         }
     }
-    extrapolated.last().copied().unwrap_or(source.variance())
+    match extrapolated.last() {
+        Some(bound) if change <= ACCEPTED => Ok(*bound),
+        _ => Err(Error::NotConverged {
+            algorithm: "van Trees boundary-value problem",
+            iterations: extrapolated.len(),
+            change,
+        }),
+    }
 }
 
 /// The coordinate `xi(x)`: half of it even in `x`, half shared among the thresholds.
@@ -213,14 +228,14 @@ mod tests {
     #[test]
     fn without_information_the_bound_is_the_variance() {
         for source in [Source::uniform(2.0).unwrap(), Source::gaussian(0.3).unwrap()] {
-            let bound = van_trees(&bank(source, 1e6));
+            let bound = optimal_weight_van_trees(&bank(source, 1e6)).unwrap();
             assert_relative_eq!(bound, source.variance(), max_relative = 1e-9);
         }
     }
 
     #[test]
     fn without_noise_the_walls_leave_cells() {
-        let bound = van_trees(&bank(Source::uniform(1.0).unwrap(), 1e-4));
+        let bound = optimal_weight_van_trees(&bank(Source::uniform(1.0).unwrap(), 1e-4)).unwrap();
         assert!(bound <= 1.0 / 12.0);
         assert_relative_eq!(bound, 1.0 / 12.0, max_relative = 2e-3);
     }

@@ -1,15 +1,16 @@
 //! Coordinate descent: one sensor at a time takes its best pattern, all candidates in one matrix product.
 
-use super::{Outcomes, SEARCH_PANEL, scattered};
+use super::outcomes::{Outcomes, SEARCH_PANEL, scattered};
 use crate::Error;
 use crate::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
-use crate::grid::noise_in_range;
+use crate::source::noise_in_range;
 use crate::source::{Blur, Nodes};
-use crate::{Bank, BinaryQuantizer, Sensor, Source};
+use crate::{Bank, BinaryQuantizer, Grid, Pattern, PatternSensor, Source};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 /// Relative improvement that counts as one.
 const IMPROVEMENT: f64 = 1e-11;
@@ -37,11 +38,20 @@ pub struct Descent {
     candidates: Vec<BinaryQuantizer>,
 }
 
+impl Descended {
+    /// The pattern of each sensor over `grid`, if its breakpoints are the grid's; a linear one has a [`mask`](Pattern::mask).
+    pub fn patterns(&self, grid: &Grid) -> Vec<Option<Pattern>> {
+        self.sensors.iter().map(|s| Pattern::of(s.quantizer(), grid)).collect()
+    }
+}
+
 /// A local optimum.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Descended {
     /// Index of the candidate that each sensor uses.
     pub choice: Vec<usize>,
+    /// The sensors with the quantizers chosen for them.
+    pub sensors: Vec<PatternSensor>,
     /// Exact mean squared error of the posterior mean.
     pub mse: f64,
 }
@@ -69,13 +79,20 @@ impl Descent {
     /// # Errors
     /// If there are not as many choices as sensors, or one is no index of a candidate.
     pub fn bank(&self, choice: &[usize]) -> Result<Bank, Error> {
+        Bank::new(self.source, self.sensors(choice)?)
+    }
+
+    /// The sensors of a choice.
+    ///
+    /// # Errors
+    /// As [`Self::bank`].
+    pub fn sensors(&self, choice: &[usize]) -> Result<Vec<PatternSensor>, Error> {
         self.check(choice)?;
-        let sensors = choice
+        choice
             .iter()
             .zip(&self.noise)
-            .map(|(&c, &noise)| Sensor::new(self.candidates[c].clone(), noise))
-            .collect::<Result<_, _>>()?;
-        Bank::new(self.source, sensors)
+            .map(|(&c, &noise)| PatternSensor::new(self.candidates[c].clone(), noise))
+            .collect()
     }
 
     fn check(&self, choice: &[usize]) -> Result<(), Error> {
@@ -111,7 +128,11 @@ impl Descent {
             let found = kernel.descend(start, &allowed)?;
             let mse = self.bank(&found)?.mmse()?;
             if allowed(&found) && best.as_ref().is_none_or(|b| mse < b.mse * (1.0 - IMPROVEMENT)) {
-                best = Some(Descended { choice: found, mse });
+                best = Some(Descended {
+                    sensors: self.sensors(&found)?,
+                    choice: found,
+                    mse,
+                });
             }
         }
         best.ok_or_else(|| {
@@ -134,7 +155,7 @@ struct Kernel<'a> {
 
 /// `Some(flips)` if reflecting `x` keeps the quantizer up to flipping its bit.
 fn symmetry(quantizer: &BinaryQuantizer) -> Option<bool> {
-    let t = quantizer.thresholds();
+    let t = quantizer.breakpoints();
     let symmetric = t.iter().zip(t.iter().rev()).all(|(a, b)| a + b == 0.0);
     symmetric.then_some(t.len() % 2 == 1)
 }
@@ -157,7 +178,7 @@ impl<'a> Kernel<'a> {
         let mut thresholds: Vec<f64> = descent
             .candidates
             .iter()
-            .flat_map(|q| q.thresholds())
+            .flat_map(|q| q.breakpoints())
             .copied()
             .collect();
         thresholds.sort_by(f64::total_cmp);
@@ -285,7 +306,7 @@ impl<'a> Kernel<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{Grid, Pattern, linear_pattern, rank};
+    use super::super::super::{linear_pattern, rank};
     use super::super::LinearSearch;
     use super::*;
     use approx::assert_relative_eq;
@@ -312,6 +333,8 @@ mod tests {
             let start = vec![3, 5, 2, 3, 5, 2];
             let found = descent.run(&[start], 6, full).unwrap();
             assert_relative_eq!(found.mse, exact.mse, max_relative = 1e-10);
+            let chosen: Vec<u32> = found.patterns(&grid).iter().map(|p| p.as_ref().unwrap().mask().unwrap()).collect();
+            assert_eq!(chosen, found.choice.iter().map(|&c| c as u32 + 1).collect::<Vec<_>>());
         }
     }
 

@@ -1,17 +1,18 @@
 //! All sets of linear patterns, by depth-first search over multisets.
 
-use super::{Outcomes, SEARCH_PANEL};
+use super::outcomes::{Outcomes, SEARCH_PANEL};
 use crate::Error;
 use crate::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::count::{full_rank_multisets, multisets};
-use crate::grid::noise_in_range;
+use crate::source::noise_in_range;
 use crate::linear::{Span, check_mask, flips_under_reflection, grid_bits};
 use crate::source::{Blur, Nodes};
-use crate::{Bank, Grid, Mask, Sensor, Source, linear_pattern};
+use crate::{Bank, Grid, Mask, PatternSensor, Source, linear_pattern};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Candidates that are evaluated again on the fine nodes.
 const FINALISTS: usize = 16;
@@ -25,7 +26,7 @@ const MAX_SETS: u128 = 1 << 32;
 const PARALLEL_LEVELS: usize = 2;
 
 /// A set of masks, one a sensor, in increasing order, with the error it achieves.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MaskSet {
     /// The masks.
     pub masks: Vec<Mask>,
@@ -117,7 +118,7 @@ impl LinearSearch {
     pub fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
         let sensors = masks
             .iter()
-            .map(|&mask| Sensor::new(linear_pattern(mask, self.bits)?.on(&self.grid)?, self.noise_std))
+            .map(|&mask| PatternSensor::new(linear_pattern(mask, self.bits)?.on(&self.grid)?, self.noise_std))
             .collect::<Result<_, _>>()?;
         Bank::new(self.source, sensors)
     }
@@ -252,7 +253,7 @@ impl<'a> Walk<'a> {
     fn new(search: &'a LinearSearch, keep: usize) -> Result<Self, Error> {
         let folded = search.grid.is_symmetric();
         let reach = search.source.reach();
-        let blurs: Vec<Blur> = search.grid.edges().iter().map(|&t| (t, search.noise_std)).collect();
+        let blurs: Vec<Blur> = search.grid.breakpoints().iter().map(|&t| (t, search.noise_std)).collect();
         let from = if folded { 0.0 } else { -reach };
         let nodes = Nodes::adapted(&search.source, from, reach, &blurs, SEARCH_PANEL, gauss_legendre::<8>());
         let kinds = search.forced.len();
@@ -410,7 +411,7 @@ mod tests {
     #[test]
     fn an_asymmetric_grid_gives_the_same_as_direct_evaluation() {
         let source = Source::gaussian(0.4).unwrap();
-        let grid = Grid::from_edges(vec![-0.5, 0.1, 0.3]).unwrap();
+        let grid = Grid::from_breakpoints(vec![-0.5, 0.1, 0.3]).unwrap();
         let search = LinearSearch::new(source, grid, 0.2, 3).unwrap();
         for set in search.ranking().unwrap() {
             assert_relative_eq!(set.mse, search.bank(&set.masks).unwrap().mmse().unwrap(), max_relative = 1e-8);
@@ -434,7 +435,7 @@ mod tests {
         assert_eq!(search(3, 2, 10.0).any_rank().best().unwrap().masks.len(), 2);
         assert!(search(3, 2, 10.0).with_forced(&[1, 2, 3]).is_err());
         assert!(search(3, 2, 10.0).with_forced(&[8]).is_err());
-        let grid = Grid::from_edges(vec![0.0, 1.0]).unwrap();
+        let grid = Grid::from_breakpoints(vec![0.0, 1.0]).unwrap();
         assert!(LinearSearch::new(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
         assert!(matches!(search(10, 12, 10.0).best(), Err(Error::TooManyOutcomes { .. })));
         assert!(matches!(

@@ -7,72 +7,16 @@
 //! | more sensors than can be searched (strategy 2) | [`tile`] |
 //! | rank by equation 5.13 (strategy 3, poor) | [`by_information`] |
 //! | large `B` or `N`, any patterns, unequal sensors | [`Descent`] |
-//! | thresholds off the grid | [`free_thresholds`] |
+//! | thresholds off the grid | [`free_breakpoints`] |
 
 mod descent;
 mod exhaustive;
 mod free;
 mod lbfgs;
+mod outcomes;
 mod strategies;
 
 pub use descent::{Descended, Descent};
 pub use exhaustive::{LinearSearch, MaskSet};
-pub use free::{FreeDesign, free_thresholds};
+pub use free::{FreeDesign, free_breakpoints, free_breakpoints_of_masks};
 pub use strategies::{by_information, tile};
-
-use crate::bank::CountTable;
-use nalgebra::{DMatrixView, DMatrixViewMut, Dyn, Matrix, Storage};
-
-/// Nodes for searching: half the width of the final ones suffices with fewer points, to about `1e-10`.
-pub(crate) const SEARCH_PANEL: f64 = 1.6;
-
-/// A fixed sequence of scattered numbers in `[0, 1)` for starting points: designs use no random numbers.
-pub(crate) fn scattered(index: usize) -> f64 {
-    // The mixing function of SplitMix64: neighbouring indices must not make related starts.
-    let mut z = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-}
-
-/// All outcomes of some groups of exchangeable sensors, on the nodes of a search.
-pub(crate) struct Outcomes {
-    /// `w p(x) P(outcome|x)`, one contiguous column an outcome.
-    w: Vec<f64>,
-    /// For each outcome the one that is as likely under `-x`; meaningful where the problem is symmetric.
-    mirror: Vec<usize>,
-}
-
-impl Outcomes {
-    /// Before any sensor has spoken.
-    fn new(weights: &[f64]) -> Self {
-        Self {
-            w: weights.to_vec(),
-            mirror: vec![0],
-        }
-    }
-
-    /// One group more; `flips` says that reflecting `x` flips its bits.
-    fn with(&self, group: &CountTable, flips: bool) -> Self {
-        let counts = group.rows.len();
-        let nodes = self.w.len() / self.mirror.len();
-        let mut w = Vec::with_capacity(self.w.len() * counts);
-        let mut mirror = Vec::with_capacity(self.mirror.len() * counts);
-        for (column, &image) in self.w.chunks_exact(nodes).zip(&self.mirror) {
-            for (k, row) in group.rows.iter().enumerate() {
-                w.extend(column.iter().zip(row).map(|(w, p)| w * p));
-                mirror.push(image * counts + if flips { counts - 1 - k } else { k });
-            }
-        }
-        Self { w, mirror }
-    }
-
-    /// `functions x outcomes`: every row of `functions` (over the nodes) integrated against every outcome, outcome by outcome.
-    fn integrals<S: Storage<f64, Dyn, Dyn>>(&self, functions: &Matrix<f64, Dyn, Dyn, S>) -> Vec<f64> {
-        let (rows, outcomes) = (functions.nrows(), self.mirror.len());
-        let mut sums = vec![0.0; rows * outcomes];
-        let w = DMatrixView::from_slice(&self.w, functions.ncols(), outcomes);
-        DMatrixViewMut::from_slice(&mut sums, rows, outcomes).gemm(1.0, functions, &w, 0.0);
-        sums
-    }
-}

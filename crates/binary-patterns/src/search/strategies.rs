@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::bounds::mean_information;
 use crate::linear::grid_bits;
-use crate::{Bank, Grid, Sensor, linear_pattern};
+use crate::{Bank, Grid, PatternSensor, linear_pattern};
 use crate::{Mask, Source};
 use fewbits_numerics::ArgumentError;
 
@@ -43,7 +43,7 @@ pub fn by_information(
     let bits = grid_bits(grid)?;
     let mut best = (0, f64::NEG_INFINITY);
     for mask in 1..1 << bits {
-        let sensor = Sensor::new(linear_pattern(mask, bits)?.on(grid)?, noise_std)?;
+        let sensor = PatternSensor::new(linear_pattern(mask, bits)?.on(grid)?, noise_std)?;
         let information = mean_information(&Bank::new(*source, vec![sensor])?);
         // Mirror images and rounding make ties; the lowest mask keeps them.
         if information > best.1 * (1.0 + 1e-12) || best.0 == 0 {

@@ -1,8 +1,8 @@
 //! Orderings that must hold for every bank of one-bit sensors.
 
-use fewbits_binary_patterns::bounds::{centralised_bound, network_rate_distortion, printed_crlb, van_trees};
-use fewbits_binary_patterns::search::free_thresholds;
-use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, Grid, Sensor, Source};
+use fewbits_binary_patterns::bounds::{centralised_bound, network_rate_distortion, printed_crlb, optimal_weight_van_trees};
+use fewbits_binary_patterns::search::free_breakpoints;
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, Grid, PatternSensor, Source};
 use proptest::prelude::*;
 
 fn source() -> impl Strategy<Value = Source> {
@@ -25,7 +25,7 @@ fn quantizer(thresholds: &[f64], source: &Source) -> BinaryQuantizer {
 
 fn grid(source: &Source) -> Grid {
     let scale = source.variance().sqrt();
-    Grid::from_edges(
+    Grid::from_breakpoints(
         [-1.2, -0.6, -0.25, 0.0, 0.25, 0.6, 1.2]
             .iter()
             .map(|t| t * scale)
@@ -42,14 +42,14 @@ proptest! {
         source in source(),
         sensors in prop::collection::vec((thresholds(), -10.0f64..35.0), 1..5),
     ) {
-        let sensors: Vec<Sensor> = sensors
+        let sensors: Vec<PatternSensor> = sensors
             .iter()
-            .map(|(t, snr)| Sensor::new(quantizer(t, &source), source.noise_std(*snr).unwrap()).unwrap())
+            .map(|(t, snr)| PatternSensor::new(quantizer(t, &source), source.noise_std(*snr).unwrap()).unwrap())
             .collect();
         let bank = Bank::new(source, sensors).unwrap();
         let mmse = bank.mmse().unwrap();
         prop_assert!(mmse > 0.0 && mmse <= source.variance() * (1.0 + 1e-12));
-        prop_assert!(van_trees(&bank) <= mmse * (1.0 + 1e-9));
+        prop_assert!(optimal_weight_van_trees(&bank).unwrap() <= mmse * (1.0 + 1e-9));
         let grid = grid(&source);
         for decoder in [
             Decoder::DiscreteMap(&grid),
@@ -107,12 +107,12 @@ fn the_printed_bound_is_valid_for_gaussian_sources_only() {
     let quantizers: Vec<_> = patterns.iter().map(|p| p.on(&grid).unwrap()).collect();
     for snr in [-10.0, 0.0, 10.0, 20.0] {
         let bank = Bank::homogeneous(gaussian, quantizers.clone(), gaussian.noise_std(snr).unwrap()).unwrap();
-        assert!(printed_crlb(&bank).unwrap() <= van_trees(&bank) * (1.0 + 1e-9));
+        assert!(printed_crlb(&bank).unwrap() <= optimal_weight_van_trees(&bank).unwrap() * (1.0 + 1e-9));
     }
     let bank = Bank::homogeneous(uniform, quantizers, uniform.noise_std(-20.0).unwrap()).unwrap();
     let mmse = bank.mmse().unwrap();
     assert!(printed_crlb(&bank).unwrap() > 100.0 * mmse);
-    assert!((van_trees(&bank) / mmse - 0.999).abs() < 5e-4);
+    assert!((optimal_weight_van_trees(&bank).unwrap() / mmse - 0.999).abs() < 5e-4);
 }
 
 /// Fifty sensors in three groups have 5508 outcomes.
@@ -130,7 +130,7 @@ fn repeated_sensors_are_counted() {
     let bank = Bank::homogeneous(source, quantizers, source.noise_std(10.0).unwrap()).unwrap();
     assert_eq!(bank.outcomes(), 5508);
     let mmse = bank.mmse().unwrap();
-    assert!(van_trees(&bank) < mmse && mmse < 0.003);
+    assert!(optimal_weight_van_trees(&bank).unwrap() < mmse && mmse < 0.003);
     let table = bank.table(Decoder::Mmse).unwrap();
     assert_eq!(table.outcomes(), 5508);
     assert!(table.expand().is_err());
@@ -193,14 +193,14 @@ fn vanishing_likelihoods_do_not_become_nan() {
 
 /// Three sensors gain little from thresholds off the grid, but never lose.
 #[test]
-fn free_thresholds_beat_the_grid() {
+fn free_breakpoints_beat_the_grid() {
     let source = Source::uniform(1.0).unwrap();
     let noise = source.noise_std(10.0).unwrap();
     let grid = Grid::uniform(1.0, 3).unwrap();
-    let start: Vec<Sensor> = ["00001111", "00111100", "00111100"]
+    let start: Vec<PatternSensor> = ["00001111", "00111100", "00111100"]
         .iter()
         .map(|p| {
-            Sensor::new(
+            PatternSensor::new(
                 p.parse::<fewbits_binary_patterns::Pattern>()
                     .unwrap()
                     .on(&grid)
@@ -211,9 +211,9 @@ fn free_thresholds_beat_the_grid() {
         })
         .collect();
     let before = Bank::new(source, start.clone()).unwrap().mmse().unwrap();
-    let free = free_thresholds(&source, &start, 0.05, 3).unwrap();
+    let free = free_breakpoints(&source, &start, 0.05, 3).unwrap();
     assert!(free.mse < before, "{} from {before}", free.mse);
-    assert!(van_trees(&Bank::new(source, free.sensors).unwrap()) < free.mse);
+    assert!(optimal_weight_van_trees(&Bank::new(source, free.sensors).unwrap()).unwrap() < free.mse);
 }
 
 /// The posterior mean is unbiased on average over the source only: erratum `binary-10`.
@@ -264,7 +264,7 @@ fn vanishing_noise_is_resolved() {
         let bank = Bank::homogeneous(source, quantizers, source.noise_std(snr).unwrap()).unwrap();
         let mmse = bank.mmse().unwrap();
         assert!((mmse / floor - 1.0).abs() < 2e-4, "{mmse} at {snr} dB");
-        assert!(van_trees(&bank) <= mmse * (1.0 + 1e-9));
+        assert!(optimal_weight_van_trees(&bank).unwrap() <= mmse * (1.0 + 1e-9));
         for decoder in [Decoder::DiscreteMap(&grid), Decoder::ExactDivisionMap(&grid)] {
             assert!((bank.mse(decoder).unwrap() / floor - 1.0).abs() < 2e-4);
         }

@@ -4,11 +4,11 @@ use fewbits_binary_patterns::baselines::{
     AdaptiveErrors, AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound,
 };
 use fewbits_binary_patterns::bounds::{
-    centralised_bound, network_rate_distortion, printed_crlb, remote_distortion, van_trees,
+    centralised_bound, network_rate_distortion, printed_crlb, remote_distortion, optimal_weight_van_trees,
 };
-use fewbits_binary_patterns::search::{LinearSearch, MaskSet, by_information, free_thresholds};
+use fewbits_binary_patterns::search::{LinearSearch, MaskSet, by_information, free_breakpoints};
 use fewbits_binary_patterns::{
-    Bank, Decoder, Grid, Mask, Pattern, Sensor, Source, count, gray_basis, linear_pattern, natural_basis,
+    Bank, Decoder, Grid, Mask, Pattern, PatternSensor, Source, count, gray_basis, linear_pattern, natural_basis,
 };
 use serde::Deserialize;
 use serde_json::Value;
@@ -203,7 +203,7 @@ fn table_5_1() {
                 best.mse
             }
             "t51.printed.crlb" => printed_crlb(&printed).unwrap(),
-            "t51.best.vt" => van_trees(&bank(uniform(), &grid(3), &masks_of(&e.inputs["masks"]), 18.2)),
+            "t51.best.vt" => optimal_weight_van_trees(&bank(uniform(), &grid(3), &masks_of(&e.inputs["masks"]), 18.2)).unwrap(),
             // A simulation of t51.best.mmse: the exact value must lie within its four standard errors.
             "t51.best.mmse.mc" => {
                 let exact = search.best().unwrap().mse;
@@ -357,7 +357,7 @@ fn figure_5_8(e: &Entry) -> f64 {
         ("dmap", _) => bank.mse(Decoder::DiscreteMap(&grid)).unwrap(),
         ("cmap", _) => bank.mse(Decoder::ContinuousMap).unwrap(),
         ("crlb", _) => printed_crlb(&bank).unwrap(),
-        ("vt", _) => van_trees(&bank),
+        ("vt", _) => optimal_weight_van_trees(&bank).unwrap(),
         ("central8", _) => centralised_bound(&source, noise, 3).unwrap(),
         ("b1", variant) => {
             let noise = if variant == "print" { noise } else { noise / 3f64.sqrt() };
@@ -449,15 +449,15 @@ fn figure_5_10_with_feedback() {
 }
 
 #[test]
-fn free_thresholds_reach_the_best_known() {
+fn free_breakpoints_reach_the_best_known() {
     for e in entries().iter().filter(|e| e.id.starts_with("bp.")) {
         assert_eq!(e.id, "bp.joint.gauss.N3.5p2");
         let noise = gauss().noise_std(5.2).unwrap();
-        let start: Vec<Sensor> = [4, 4, 6]
+        let start: Vec<PatternSensor> = [4, 4, 6]
             .iter()
-            .map(|&m| Sensor::new(linear_pattern(m, 3).unwrap().on(&gauss_grid()).unwrap(), noise).unwrap())
+            .map(|&m| PatternSensor::new(linear_pattern(m, 3).unwrap().on(&gauss_grid()).unwrap(), noise).unwrap())
             .collect();
-        let found = free_thresholds(&gauss(), &start, 0.02, 2).unwrap();
+        let found = free_breakpoints(&gauss(), &start, 0.02 / 0.1f64.sqrt(), 2).unwrap();
         let expected = e.value.as_f64().unwrap();
         assert!(found.mse <= expected * (1.0 + 1e-6), "{} instead of {expected}", found.mse);
     }

@@ -87,7 +87,6 @@ impl<const M: usize> GaussianInEllipsoid<M> {
     }
 }
 
-
 /// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi rotations: for the two or three dimensions of a
 /// measurement as fast as anything, exact in small eigenvalues, and free of the dimension arithmetic that nalgebra's own
 /// solver would impose on every caller.
@@ -199,7 +198,8 @@ mod tests {
             .unwrap()
             .under(&Matrix1::new(1.3))
             .unwrap();
-        let scalar = |mu: f64| log_interval((-1.5_f64.sqrt() - mu) / 1.3_f64.sqrt(), (1.5_f64.sqrt() - mu) / 1.3_f64.sqrt());
+        let scalar =
+            |mu: f64| log_interval((-1.5_f64.sqrt() - mu) / 1.3_f64.sqrt(), (1.5_f64.sqrt() - mu) / 1.3_f64.sqrt());
         for mu in [0.0, 0.7, -3.0, 40.0, 1e5] {
             let (a, b) = (inside.log_probability(&Vector1::new(mu)), scalar(mu));
             assert!((a - b).abs() <= 1e-12 * b.abs().max(1.0), "{mu}: {a} {b}");
@@ -336,8 +336,17 @@ mod tests {
         let pi = std::f64::consts::PI;
         let volume = |m: f64| m.ln();
         assert!((Ellipsoid::new(&Matrix1::new(9.0), 4.0).unwrap().log_volume() - volume(12.0)).abs() < 1e-14);
-        assert!((Ellipsoid::new(&Matrix2::new(4.0, 0.0, 0.0, 1.0), 1.0).unwrap().log_volume() - volume(2.0 * pi)).abs() < 1e-14);
-        assert!((Ellipsoid::new(&Matrix3::identity(), 4.0).unwrap().log_volume() - volume(32.0 * pi / 3.0)).abs() < 1e-14);
+        assert!(
+            (Ellipsoid::new(&Matrix2::new(4.0, 0.0, 0.0, 1.0), 1.0)
+                .unwrap()
+                .log_volume()
+                - volume(2.0 * pi))
+            .abs()
+                < 1e-14
+        );
+        assert!(
+            (Ellipsoid::new(&Matrix3::identity(), 4.0).unwrap().log_volume() - volume(32.0 * pi / 3.0)).abs() < 1e-14
+        );
     }
 
     #[test]

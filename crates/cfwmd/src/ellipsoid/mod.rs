@@ -3,8 +3,8 @@
 mod inside;
 mod quadrature;
 
-pub use inside::{EllipsoidMoments, GaussianInEllipsoid};
 pub(crate) use inside::symmetric_eigen;
+pub use inside::{EllipsoidMoments, GaussianInEllipsoid};
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};

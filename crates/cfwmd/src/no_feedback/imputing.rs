@@ -3,13 +3,12 @@
 use super::{advance, check};
 use crate::Error;
 use crate::network::{FusionInfo, Network};
-use crate::rule::{CensoringRule, OwnRecursion, OwnStep};
-use fewbits_core::{ColumnsMut, Gaussian, LinearDynamics, LinearSensing, Observation};
-use fewbits_densities::Particles;
-use fewbits_filters::{Resampling, Schedule};
-use fewbits_numerics::linalg::symmetrised;
-use fewbits_numerics::normal::{self, LN_SQRT_2PI};
-use nalgebra::{Cholesky, Const, SMatrix, SVector};
+use crate::rule::{CensoringRule, OwnRecursion};
+use fewbits_core::{FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observation};
+use fewbits_densities::GaussianCloud;
+use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule};
+use fewbits_numerics::normal;
+use nalgebra::SVector;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
@@ -18,309 +17,190 @@ use rand_distr::StandardNormal;
 const VIOLATION: f64 = -1e5;
 
 /// Given every measurement, sent or not, the central Kalman filter and each sensor's own are deterministic. A particle is the
-/// central mean and every sensor's estimate under the measurements it imputed; all share one covariance.
-///
-/// ```text
-/// predict: xc = F xc, xhat_i = F xhat_i;  P = F P F' + Q
-/// received z of i:  w *= N(z; H xc, S);  w *= 1{|z - H xhat_i| >= threshold};  Kalman update of xc, own update of xhat_i
-/// silent i:         z ~ N(H xc, S) where |z - H xhat_i| < threshold, w *= P(there);  the same updates with that z
-/// P = P - K S K' once a sensor;  resample systematically below half the effective sample size
-/// ```
-/// Scalar measurements are drawn from their conditional law; vector ones uniformly in the ellipsoid and weighted. With loss the
-/// silent law is `N(z) (loss + (1 - loss) 1{inside})`.
-#[derive(Debug, Clone)]
-pub struct ImputingFilter<const D: usize> {
-    now: Cloud<D>,
-    /// The step under construction: it becomes `now` when it has succeeded.
-    next: Cloud<D>,
-    increments: Vec<f64>,
-    ancestors: Vec<u32>,
-    column: Vec<f64>,
+/// central mean and, beside it, every sensor's estimate under the measurements imputed to it; all share one covariance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImputedBelief<const D: usize> {
+    own: Vec<OwnRecursion<D>>,
+    /// Side rows: `D` numbers per sensor.
+    cloud: GaussianCloud<D>,
     violations: usize,
 }
 
-#[derive(Debug, Clone)]
-struct Cloud<const D: usize> {
-    own: Vec<OwnRecursion<D>>,
-    central: Particles<D>,
-    /// Columns of the sensors' estimates, `D` per sensor.
-    local: Vec<Vec<f64>>,
-    covariance: SMatrix<f64, D, D>,
-}
-
-/// One sensor in one step.
-struct Turn<'a, const D: usize, const M: usize> {
-    /// `S = H P H' + R` and its factor.
-    factor: Cholesky<f64, Const<M>>,
-    gain: SMatrix<f64, D, M>,
-    own_gain: SMatrix<f64, D, M>,
-    rule: &'a CensoringRule<M>,
-    log_normaliser: f64,
-    loss: f64,
-}
-
-impl<const D: usize> ImputingFilter<D> {
-    /// A filter of `particles` particles that starts from the belief all `sensors` start from.
+impl<const D: usize> ImputedBelief<D> {
+    /// `particles` particles that start from the belief all `sensors` start from.
     ///
     /// # Errors
-    /// If there is no particle.
+    /// If there is no particle or no sensor.
     pub fn new(start: &Gaussian<D>, sensors: usize, particles: usize) -> Result<Self, Error> {
-        let now = Cloud {
-            own: vec![OwnRecursion::new(start); sensors],
-            central: Particles::from_draws(particles, || *start.mean())?,
-            local: (0..sensors * D).map(|c| vec![start.mean()[c % D]; particles]).collect(),
-            covariance: *start.covariance(),
-        };
+        let mut cloud = GaussianCloud::agreed(start, particles)?;
+        let side = (0..particles * sensors * D).map(|c| start.mean()[c % D]).collect();
+        *cloud.means_mut() = cloud.means().clone().with_side(side)?;
         Ok(Self {
-            next: now.clone(),
-            now,
-            increments: vec![0.0; particles],
-            ancestors: vec![0; particles],
-            column: vec![0.0; particles],
+            own: vec![OwnRecursion::new(start); sensors],
+            cloud,
             violations: 0,
         })
     }
 
     /// Mean and covariance of the state.
     pub fn state(&self) -> Gaussian<D> {
-        let mean = self.now.central.mean();
-        Gaussian::from_trusted_parts(mean, self.now.covariance + self.now.central.covariance_about(&mean))
+        self.cloud.gaussian()
     }
 
-    /// The particles: central means, with their weights.
-    pub fn means(&self) -> &Particles<D> {
-        &self.now.central
+    /// The particles.
+    pub fn cloud(&self) -> &GaussianCloud<D> {
+        &self.cloud
     }
 
     /// Number of received values so far that the rule would have withheld under every particle.
     pub fn violations(&self) -> usize {
         self.violations
     }
-
-    /// One step: predict, then one observation per sensor.
-    ///
-    /// # Errors
-    /// [`Error::ObservationCount`]; if a value is not finite; [`fewbits_core::Error::Impossible`]. The belief is then as it
-    /// was.
-    pub fn step_in_place<S, R, const M: usize>(
-        &mut self,
-        rng: &mut R,
-        network: &Network<S, D, M>,
-        dynamics: &impl LinearDynamics<D>,
-        observations: &[Observation<SVector<f64, M>>],
-    ) -> Result<FusionInfo, Error>
-    where
-        S: LinearSensing<D, M> + Clone + PartialEq,
-        R: Rng + ?Sized,
-    {
-        check(network, observations)?;
-        self.next.copy_from(&self.now);
-        self.resample(rng)?;
-        self.next.predict(dynamics);
-        let steps = advance(&mut self.next.own, network, dynamics)?;
-        self.increments.fill(0.0);
-        let (mut info, mut violations) = (FusionInfo::default(), 0);
-        for received in [true, false] {
-            for (i, observation) in observations.iter().enumerate() {
-                if observation.received().is_some() == received {
-                    info.received += usize::from(received);
-                    let clash = self.next.update(rng, network, &steps[i], i, observation, &mut self.increments)?;
-                    violations += usize::from(clash);
-                }
-            }
-        }
-        let arrival = info.received as f64 * (-network.link().loss()).ln_1p();
-        let increments = &self.increments;
-        info.log_likelihood = self.next.central.reweigh(|_, log_weights| {
-            for (log_weight, increment) in log_weights.iter_mut().zip(increments) {
-                *log_weight += increment;
-            }
-        })? + arrival;
-        std::mem::swap(&mut self.now, &mut self.next);
-        self.violations += violations;
-        Ok(info)
-    }
-
-    fn resample<R: Rng + ?Sized>(&mut self, rng: &mut R) -> Result<(), Error> {
-        let cloud = &mut self.next;
-        if !Schedule::Below(0.5).is_due(cloud.central.effective_sample_size(), cloud.central.len()) {
-            return Ok(());
-        }
-        Resampling::Systematic.ancestors(rng, cloud.central.weights(), &mut self.ancestors)?;
-        cloud.central.select(&self.ancestors)?;
-        for column in &mut cloud.local {
-            for (new, a) in self.column.iter_mut().zip(&self.ancestors) {
-                *new = column[*a as usize];
-            }
-            std::mem::swap(column, &mut self.column);
-        }
-        Ok(())
-    }
 }
 
-impl<const D: usize> Cloud<D> {
-    fn copy_from(&mut self, other: &Self) {
-        self.own.clone_from(&other.own);
-        self.central.clone_from(&other.central);
-        self.local.clone_from(&other.local);
-        self.covariance = other.covariance;
+/// One step: predict, then one observation per sensor, those received first.
+///
+/// ```text
+/// resample systematically below half the effective sample size
+/// predict: xc = F xc, xhat_i = F xhat_i;  P = F P F' + Q
+/// received z of i:  w *= N(z; H xc, S);  w *= 1{|z - H xhat_i| >= threshold};  Kalman update of xc, own update of xhat_i
+/// nothing from i:   z ~ N(H xc, S) where |z - H xhat_i| < threshold, w *= P(there);  the same updates with that z
+/// erased:           z ~ N(H xc, S);  the same updates
+/// ```
+/// Scalar measurements are drawn from their conditional law; vector ones uniformly in the ellipsoid and weighted. With loss the
+/// law of what did not arrive is `N(z) (loss + (1 - loss) 1{inside})`.
+///
+/// # Errors
+/// [`Error::ObservationCount`]; if a value is not finite; [`fewbits_core::Error::Impossible`].
+pub fn step<S, R, const D: usize, const M: usize>(
+    rng: &mut R,
+    network: &Network<S, D, M>,
+    dynamics: &impl LinearDynamics<D>,
+    belief: &ImputedBelief<D>,
+    observations: &[Observation<SVector<f64, M>>],
+) -> Result<(ImputedBelief<D>, FusionInfo), Error>
+where
+    S: LinearSensing<D, M> + Clone + PartialEq,
+    R: Rng + ?Sized,
+{
+    check(network, observations)?;
+    let (mut next, mut info) = (belief.clone(), FusionInfo::default());
+    let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5)));
+    filter.predict(rng, dynamics, &mut next.cloud, &mut CloudWorkspace::default())?;
+    for estimate in next.cloud.means_mut().parts_mut().1.chunks_exact_mut(D) {
+        let moved = dynamics.transition() * SVector::<f64, D>::from_column_slice(estimate);
+        estimate.copy_from_slice(moved.as_slice());
     }
-
-    fn predict(&mut self, dynamics: &impl LinearDynamics<D>) {
-        let transition = dynamics.transition();
-        self.covariance = transition * self.covariance * transition.transpose() + dynamics.noise_covariance();
-        let central = self.central.columns_mut();
-        move_columns(transition, central);
-        for sensor in self.local.chunks_exact_mut(D) {
-            let mut columns = sensor.iter_mut();
-            // `chunks_exact_mut` hands out D columns.
-            move_columns(transition, std::array::from_fn(|_| columns.next().map_or(&mut [][..], Vec::as_mut_slice)));
+    let steps = advance(&mut next.own, network, dynamics)?;
+    let loss = network.link().loss();
+    let mut log_weights = vec![0.0; next.cloud.means().len()];
+    let sensors = || network.sensors().iter().zip(&steps).zip(observations).enumerate();
+    for received in [true, false] {
+        for (i, ((sensor, (step, rule)), observation)) in sensors().filter(|s| s.1.1.received().is_some() == received) {
+            let mut contradicted = 0;
+            filter.impute(rng, &mut next.cloud, sensor, &mut log_weights, |rng, innovation, central, side| {
+                let own = &mut side[i * D..(i + 1) * D];
+                let predicted = sensor.matrix() * SVector::<f64, D>::from_column_slice(own);
+                let (z, log_weight) = match observation {
+                    Observation::Received(z) => {
+                        let clash = rule.statistic(&(z - predicted)) < rule.threshold() * (1.0 - 1e-9);
+                        contradicted += usize::from(clash);
+                        (*z, innovation.log_pdf(&(z - central)) + if clash { VIOLATION } else { 0.0 })
+                    }
+                    Observation::Nothing => impute(rng, innovation, rule, loss, central, &predicted),
+                    Observation::Erased => (central + noise(rng, innovation), 0.0),
+                };
+                let moved = step.gain * (z - predicted);
+                own.iter_mut().zip(moved.iter()).for_each(|(x, step)| *x += step);
+                (z, log_weight)
+            })?;
+            info.received += usize::from(received);
+            next.violations += usize::from(received && contradicted == log_weights.len());
         }
     }
-
-    /// Takes in one sensor; tells whether its report contradicts every particle.
-    fn update<S, R, const M: usize>(
-        &mut self,
-        rng: &mut R,
-        network: &Network<S, D, M>,
-        (step, rule): &(OwnStep<D, M>, CensoringRule<M>),
-        i: usize,
-        observation: &Observation<SVector<f64, M>>,
-        increments: &mut [f64],
-    ) -> Result<bool, Error>
-    where
-        S: LinearSensing<D, M> + Clone + PartialEq,
-        R: Rng + ?Sized,
-    {
-        let sensor = &network.sensors()[i];
-        let h = *sensor.matrix();
-        let cross = self.covariance * h.transpose();
-        let innovation = symmetrised(&(h * cross + sensor.noise_covariance()));
-        let factor = Cholesky::new(innovation).ok_or(Error::IMPOSSIBLE)?;
-        let gain = factor.solve(&cross.transpose()).transpose();
-        let log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
-        let turn = Turn {
-            gain,
-            own_gain: step.gain,
-            rule,
-            log_normaliser: -log_determinant - M as f64 * LN_SQRT_2PI,
-            loss: network.link().loss(),
-            factor,
-        };
-        let local = &mut self.local[i * D..(i + 1) * D];
-        let columns = self.central.columns_mut();
-        let mut contradicted = 0;
-        for (p, total) in increments.iter_mut().enumerate() {
-            let central = h * SVector::<f64, D>::from_fn(|d, _| columns[d][p]);
-            let own = h * SVector::<f64, D>::from_fn(|d, _| local[d][p]);
-            let (z, increment) = match observation {
-                Observation::Received(z) => {
-                    let clash = turn.rule.statistic(&(z - own)) < turn.rule.threshold() * (1.0 - 1e-9);
-                    contradicted += usize::from(clash);
-                    (*z, turn.log_density(&(z - central)) + if clash { VIOLATION } else { 0.0 })
-                }
-                Observation::Nothing => turn.impute(rng, &central, &own),
-                Observation::Erased => (central + turn.noise(rng), 0.0),
-            };
-            *total += increment;
-            let (shift, own_shift) = (turn.gain * (z - central), turn.own_gain * (z - own));
-            for d in 0..D {
-                columns[d][p] += shift[d];
-                local[d][p] += own_shift[d];
-            }
-        }
-        let keep = SMatrix::<f64, D, D>::identity() - gain * h;
-        self.covariance =
-            symmetrised(&(keep * self.covariance * keep.transpose() + gain * sensor.noise_covariance() * gain.transpose()));
-        Ok(contradicted == increments.len())
-    }
+    let increment = next.cloud.means_mut().reweigh(|_, logs| {
+        logs.iter_mut()
+            .zip(&log_weights)
+            .for_each(|(log, increment)| *log += increment);
+    })?;
+    info.log_likelihood = increment + info.received as f64 * (-loss).ln_1p();
+    Ok((next, info))
 }
 
-/// `x <- F x` for every column-wise state.
-fn move_columns<const D: usize>(transition: &SMatrix<f64, D, D>, columns: ColumnsMut<'_, D>) {
-    for p in 0..columns.first().map_or(0, |column| column.len()) {
-        let moved = transition * SVector::<f64, D>::from_fn(|d, _| columns[d][p]);
-        for d in 0..D {
-            columns[d][p] = moved[d];
-        }
-    }
+fn noise<const M: usize, R: Rng + ?Sized>(rng: &mut R, innovation: &FactoredGaussian<M>) -> SVector<f64, M> {
+    innovation.lower() * SVector::<f64, M>::from_fn(|_, _| rng.sample(StandardNormal))
 }
 
-impl<const D: usize, const M: usize> Turn<'_, D, M> {
-    fn log_density(&self, innovation: &SVector<f64, M>) -> f64 {
-        self.log_normaliser - 0.5 * innovation.dot(&self.factor.solve(innovation))
+/// A measurement that did not arrive, `z ~ q`, with `ln (N(z; central, S) (loss + (1 - loss) 1{inside}) / q(z))`.
+fn impute<const M: usize, R: Rng + ?Sized>(
+    rng: &mut R,
+    innovation: &FactoredGaussian<M>,
+    rule: &CensoringRule<M>,
+    loss: f64,
+    central: &SVector<f64, M>,
+    own: &SVector<f64, M>,
+) -> (SVector<f64, M>, f64) {
+    if M == 1 {
+        let (z, log_weight) = impute_scalar(rng, innovation.lower()[(0, 0)], rule.interval(own[0]), loss, central[0]);
+        return (SVector::repeat(z), log_weight);
     }
-
-    fn noise<R: Rng + ?Sized>(&self, rng: &mut R) -> SVector<f64, M> {
-        self.factor.l() * SVector::<f64, M>::from_fn(|_, _| rng.sample(StandardNormal))
-    }
-
-    /// A measurement that was not received, with the logarithm of its importance weight.
-    fn impute<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        central: &SVector<f64, M>,
-        own: &SVector<f64, M>,
-    ) -> (SVector<f64, M>, f64) {
-        if M == 1 {
-            return self.impute_scalar(rng, central[0], own[0]);
+    let region = rule.region();
+    // Where everything is sent, only the link can be to blame.
+    let share = if region.threshold() == 0.0 { 1.0 } else { loss };
+    let anywhere = share > 0.0 && rng.random::<f64>() < share;
+    let z = if anywhere {
+        central + noise(rng, innovation)
+    } else {
+        own + region.from_ball(&in_unit_ball(rng))
+    };
+    let inside = region.statistic(&(z - own)) < region.threshold();
+    let log_density = innovation.log_pdf(&(z - central));
+    let log_target = log_density + if inside { 0.0 } else { loss.ln() };
+    // Proposal share N(z) + (1 - share) U(z), U uniform in the ellipsoid.
+    let (normal_part, uniform_part) = (share.ln() + log_density, (1.0 - share).ln() - region.log_volume());
+    let log_proposal = match (inside, share > 0.0) {
+        (true, false) => uniform_part,
+        (false, _) => normal_part,
+        (true, true) => {
+            let largest = normal_part.max(uniform_part);
+            largest + ((normal_part - largest).exp() + (uniform_part - largest).exp()).ln()
         }
-        let region = self.rule.region();
-        let anywhere = self.loss > 0.0 && (rng.random::<f64>() < self.loss || region.threshold() == 0.0);
-        let z = if anywhere {
-            central + self.noise(rng)
+    };
+    (
+        z,
+        if log_target == f64::NEG_INFINITY {
+            log_target
         } else {
-            own + region.from_ball(&in_unit_ball(rng))
-        };
-        let log_density = self.log_density(&(z - central));
-        let inside = region.statistic(&(z - own)) < region.threshold();
-        let log_uniform = if inside {
-            -region.log_volume()
-        } else {
-            f64::NEG_INFINITY
-        };
-        if self.loss == 0.0 {
-            return (z, log_density - log_uniform);
-        }
-        // Target N(z) (loss + (1 - loss) 1{inside}) over proposal loss N(z) + (1 - loss) U(z).
-        let target = log_density + if inside { 0.0 } else { self.loss.ln() };
-        let share = if region.threshold() == 0.0 { 1.0 } else { self.loss };
-        let normal_part = share.ln() + log_density;
-        let uniform_part = (1.0 - share).ln() + log_uniform;
-        let largest = normal_part.max(uniform_part);
-        let proposal = largest + ((normal_part - largest).exp() + (uniform_part - largest).exp()).ln();
-        (z, target - proposal)
-    }
+            log_target - log_proposal
+        },
+    )
+}
 
-    fn impute_scalar<R: Rng + ?Sized>(&self, rng: &mut R, central: f64, own: f64) -> (SVector<f64, M>, f64) {
-        let deviation = self.factor.l_dirty()[(0, 0)];
-        let (low, high) = self.rule.interval(own);
-        let (low, high) = ((low - central) / deviation, (high - central) / deviation);
-        let inside = normal::log_interval(low, high);
-        if inside == f64::NEG_INFINITY && self.loss == 0.0 {
-            return (SVector::repeat(central), inside);
-        }
-        let (log_weight, x) = if self.loss == 0.0 {
-            (inside, normal::sample_truncated(rng, low, high))
-        } else {
-            let share = inside.exp();
-            let total = self.loss + (1.0 - self.loss) * share;
-            let u = rng.random::<f64>() * total;
-            let x = if u < share {
-                normal::sample_truncated(rng, low, high)
-            } else {
-                // The rest is loss times the mass outside.
-                if (u - share) / self.loss < normal::cdf(low) {
-                    normal::sample_truncated(rng, f64::NEG_INFINITY, low)
-                } else {
-                    normal::sample_truncated(rng, high, f64::INFINITY)
-                }
-            };
-            (total.ln(), x)
-        };
-        // A part that was chosen by its mass holds numbers: it is never refused.
-        (SVector::repeat(x.map_or(central, |x| central + deviation * x)), log_weight)
-    }
+/// From the conditional law itself: truncated to the interval, or outside it and lost.
+fn impute_scalar<R: Rng + ?Sized>(
+    rng: &mut R,
+    deviation: f64,
+    interval: (f64, f64),
+    loss: f64,
+    central: f64,
+) -> (f64, f64) {
+    let (low, high) = ((interval.0 - central) / deviation, (interval.1 - central) / deviation);
+    let inside = normal::log_interval(low, high);
+    let share = inside.exp();
+    let total = loss + (1.0 - loss) * share;
+    let log_weight = if loss == 0.0 { inside } else { total.ln() };
+    let u = if loss == 0.0 { 0.0 } else { rng.random::<f64>() * total };
+    let (from, to) = if loss == 0.0 || u < share {
+        (low, high)
+    } else if (u - share) / loss < normal::cdf(low) {
+        // The rest is loss times the mass outside.
+        (f64::NEG_INFINITY, low)
+    } else {
+        (high, f64::INFINITY)
+    };
+    // Only an interval of no width is refused: nothing can lie in it.
+    normal::sample_truncated(rng, from, to)
+        .map_or((central, f64::NEG_INFINITY), |x| (central + deviation * x, log_weight))
 }
 
 /// A point uniform in the unit ball: a random direction at radius `U^(1/M)`.

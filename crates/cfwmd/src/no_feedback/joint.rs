@@ -72,10 +72,8 @@ impl<const D: usize> JointBelief<D> {
     }
 
     fn predict(&mut self, dynamics: &impl LinearDynamics<D>) -> Result<(), Error> {
-        let (transition, noise) = (
-            dynamics.transition(),
-            semidefinite_factor("noise_covariance", dynamics.noise_covariance())?,
-        );
+        let (transition, noise) =
+            (dynamics.transition(), semidefinite_factor("noise_covariance", dynamics.noise_covariance())?);
         for block in (0..self.mean.len()).step_by(D) {
             let mean = transition * self.mean.fixed_rows::<D>(block);
             self.mean.fixed_rows_mut::<D>(block).copy_from(&mean);

@@ -9,13 +9,13 @@
 //! | estimator | item |
 //! |---|---|
 //! | joint Gaussian belief with exact moments after each observation: the default, as accurate as the next in every case measured | [`joint`] |
-//! | exact as the number of particles grows: withheld measurements imputed, the rest Gaussian | [`ImputingFilter`] |
+//! | exact as the number of particles grows: withheld measurements imputed, the rest Gaussian | [`imputing`] |
 //! | silence ignored (the paper's CFoMD) | [`Network::fuse_received`] |
 
-mod imputing;
+pub mod imputing;
 pub mod joint;
 
-pub use imputing::ImputingFilter;
+pub use imputing::ImputedBelief;
 pub use joint::JointBelief;
 
 use crate::Error;
@@ -34,7 +34,7 @@ use rand::Rng;
 ///
 /// What only the sensor knows, its estimate, is its `State`. The factor is that of a receiver that supposes
 /// [`start`](Scheme::start) for it: one that does not know the estimate carries it in its belief, as [`joint`] and
-/// [`ImputingFilter`] do.
+/// [`imputing`] do.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalCensoring<S, const D: usize, const M: usize> {
     scheme: Censoring<S, D, M>,
@@ -81,7 +81,8 @@ impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> Scheme<M> f
         observation: &Observation<SVector<f64, M>>,
         link: &Link,
     ) -> Result<Censored<M>, fewbits_core::Error> {
-        self.scheme.factor(&(self.transition * self.supposed), observation, link)
+        self.scheme
+            .factor(&(self.transition * self.supposed), observation, link)
     }
 }
 

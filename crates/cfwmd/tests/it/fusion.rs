@@ -6,9 +6,9 @@ use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
-use fewbits_core::{Belief, Cell, Dynamics, Factor, Gaussian, Likelihood, Link, Observation, Sensing};
-use fewbits_densities::Particles;
-use fewbits_filters::{ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
+use fewbits_core::{Belief, Cell, Dynamics, Factor, Gaussian, Likelihood, Link, Observation, Observed, Sensing};
+use fewbits_densities::{GaussianCloud, Particles};
+use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix2, Matrix4, SVector, Vector1, Vector2, Vector4};
@@ -27,7 +27,8 @@ fn scalar_network(loss: f64, count: usize) -> Sensors<1> {
 
 fn vector_network(loss: f64) -> Sensors<2> {
     let sensor = LinearSensor::new(Matrix2::identity(), Matrix2::new(2.0, 0.0, 0.0, 4.0)).unwrap();
-    Network::new(vec![sensor; 2], Budget::new(1.0, 2).unwrap().threshold(2).unwrap(), Link::lossy(loss).unwrap()).unwrap()
+    Network::new(vec![sensor; 2], Budget::new(1.0, 2).unwrap().threshold(2).unwrap(), Link::lossy(loss).unwrap())
+        .unwrap()
 }
 
 /// Exact posterior moments by weighting a huge fixed cloud: the law of large numbers as the referee.
@@ -35,7 +36,7 @@ fn referee(belief: &Gaussian<2>, likelihood: &impl Likelihood<2>) -> (Particles<
     let mut rng = Stream::new(77).fast_rng();
     let mut cloud = Particles::from_draws(200_000, || belief.sample(&mut rng)).unwrap();
     let log_likelihood = ParticleFilter::default()
-        .update(likelihood, &mut cloud)
+        .update(&mut cloud, likelihood)
         .unwrap()
         .log_likelihood;
     (cloud, log_likelihood)
@@ -123,7 +124,12 @@ fn the_joint_likelihood_is_the_product_of_the_single_ones() {
 #[test]
 fn a_cloud_is_weighed_as_single_states_are() {
     let sensor = |x, y| ReceivedPower::<4>::new(Vector2::new(x, y), [0, 2], 1000.0, 1.0, 2.0, 1.0).unwrap();
-    let sensors = vec![sensor(-10.0, -10.0), sensor(0.0, 0.0), sensor(10.0, 0.0), sensor(0.0, 0.0)];
+    let sensors = vec![
+        sensor(-10.0, -10.0),
+        sensor(0.0, 0.0),
+        sensor(10.0, 0.0),
+        sensor(0.0, 0.0),
+    ];
     let network = Network::new(sensors, 0.8, Link::lossy(0.2).unwrap()).unwrap();
     let mut rng = Stream::new(3).fast_rng();
     let belief = Gaussian::new(Vector4::new(-8.0, 2.0, -8.0, 2.0), Matrix4::identity() * 4.0).unwrap();
@@ -156,7 +162,8 @@ fn the_three_centres_agree_over_a_run() {
     let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5));
     let mut workspace = Workspace::default();
     let mut cloud = Particles::from_draws(30_000, || *start.mean()).unwrap();
-    let mut rao = RaoBlackwellised::new(&start, 3_000).unwrap();
+    let (mixture, mut clouds) = (RaoBlackwellised::new(filter), CloudWorkspace::default());
+    let mut rao = GaussianCloud::agreed(&start, 3_000).unwrap();
     let (mut squares, mut lowest) = ([0.0; 2], f64::INFINITY);
     for _ in 0..20 {
         truth = dynamics.propagate(&mut truth_rng, &truth);
@@ -170,10 +177,10 @@ fn the_three_centres_agree_over_a_run() {
 
         let likelihood = network.likelihood(&rules, &broadcast, &observations).unwrap();
         filter
-            .step_in_place(&mut rng, &dynamics, &likelihood, &mut cloud, &mut workspace)
+            .step_in_place(&mut rng, &dynamics, &mut cloud, &likelihood, &mut workspace)
             .unwrap();
 
-        rao.predict(&mut rng, &filter, &dynamics, &mut workspace).unwrap();
+        mixture.predict(&mut rng, &dynamics, &mut rao, &mut clouds).unwrap();
         let c = rules[0].half_width();
         let cell = Cell::new(broadcast[0] - c, broadcast[0] + c).unwrap();
         for observation in &observations {
@@ -181,7 +188,9 @@ fn the_three_centres_agree_over_a_run() {
                 Observation::Received(z) => Value::scalar(z[0], 1.0).unwrap().into(),
                 _ => InCell::certain(cell, 1.0).unwrap().into(),
             };
-            rao.update(&mut rng, &sensor, &what).unwrap();
+            mixture
+                .update(&mut rng, &mut rao, &Observed::new(sensor, what), &mut clouds)
+                .unwrap();
         }
         let exact = rao.gaussian();
         let scale = exact.standard_deviations();
@@ -202,7 +211,8 @@ fn the_three_centres_agree_over_a_run() {
 fn all_send_is_the_kalman_filter() {
     let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
     let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
-    let network = Network::new(vec![sensor; 2], Budget::new(2.0, 2).unwrap().threshold(1).unwrap(), Link::PERFECT).unwrap();
+    let network =
+        Network::new(vec![sensor; 2], Budget::new(2.0, 2).unwrap().threshold(1).unwrap(), Link::PERFECT).unwrap();
     let mut ours = Gaussian::known(Vector2::new(0.0, 10.0)).unwrap();
     let mut exact = ours;
     for k in 0..20 {
@@ -210,7 +220,10 @@ fn all_send_is_the_kalman_filter() {
         let predicted = kalman::predict(&dynamics, &ours);
         let rules = network.rules_under(&predicted).unwrap();
         let observations = z.map(|z| Observation::Received(Vector1::new(z)));
-        ours = network.fuse(&predicted, &rules, predicted.mean(), &observations).unwrap().0;
+        ours = network
+            .fuse(&predicted, &rules, predicted.mean(), &observations)
+            .unwrap()
+            .0;
         exact = kalman::predict(&dynamics, &exact);
         for z in z {
             exact = kalman::update(&sensor, &exact, &Vector1::new(z)).unwrap().0;
@@ -238,9 +251,16 @@ fn bad_steps_are_typed_errors_and_leave_the_belief() {
     let network = scalar_network(0.0, 2);
     let belief = prior();
     let rules = network.rules_under(&belief).unwrap();
-    let fuse = |observations: &[Observation<SVector<f64, 1>>]| network.fuse(&belief, &rules, belief.mean(), observations);
+    let fuse =
+        |observations: &[Observation<SVector<f64, 1>>]| network.fuse(&belief, &rules, belief.mean(), observations);
     let value = |z: f64| Observation::Received(Vector1::new(z));
-    assert_eq!(fuse(&[Observation::Nothing]).unwrap_err(), Error::ObservationCount { observations: 1, sensors: 2 });
+    assert_eq!(
+        fuse(&[Observation::Nothing]).unwrap_err(),
+        Error::ObservationCount {
+            observations: 1,
+            sensors: 2
+        }
+    );
     assert!(matches!(fuse(&[value(1.1), value(9.0)]).unwrap_err(), Error::ProtocolViolation { sensor: 0, .. }));
     assert!(matches!(fuse(&[value(9.0), value(f64::NAN)]).unwrap_err(), Error::Core(_)));
     assert!(fuse(&[Observation::Nothing, Observation::Nothing]).is_ok());

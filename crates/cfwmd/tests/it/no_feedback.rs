@@ -2,7 +2,7 @@
 
 use fewbits_cfwmd::Error;
 use fewbits_cfwmd::network::Network;
-use fewbits_cfwmd::no_feedback::{ImputingFilter, JointBelief, LocalSensor, joint};
+use fewbits_cfwmd::no_feedback::{ImputedBelief, JointBelief, LocalSensor, imputing, joint};
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Sensing};
 use fewbits_filters::kalman;
@@ -59,7 +59,10 @@ fn simulate<const M: usize>(
                 .map(|(half, sensor)| {
                     let z = sensor.sample(&mut rng, &truth);
                     let report = half.step(&mut rng, dynamics, &z).unwrap();
-                    network.link().transmit(&mut rng, report.as_ref(), &NumberFormat::Double).unwrap()
+                    network
+                        .link()
+                        .transmit(&mut rng, report.as_ref(), &NumberFormat::Double)
+                        .unwrap()
                 })
                 .collect();
             (truth, observations)
@@ -79,13 +82,15 @@ fn track<const M: usize>(
     let (mut total, mut belief) = (0.0, *start);
     let mut joint = JointBelief::new(start, network.sensors().len()).unwrap();
     let particles = if let Method::Imputing(n) = method { n } else { 1 };
-    let mut imputing = ImputingFilter::new(start, network.sensors().len(), particles).unwrap();
+    let mut imputed = ImputedBelief::new(start, network.sensors().len(), particles).unwrap();
     let beliefs = run
         .iter()
         .map(|(_, observations)| {
             let info = match method {
                 Method::Ignore => {
-                    let (next, info) = network.fuse_received(&kalman::predict(&dynamics, &belief), observations).unwrap();
+                    let (next, info) = network
+                        .fuse_received(&kalman::predict(&dynamics, &belief), observations)
+                        .unwrap();
                     belief = next;
                     info
                 }
@@ -96,8 +101,9 @@ fn track<const M: usize>(
                     info
                 }
                 Method::Imputing(_) => {
-                    let info = imputing.step_in_place(&mut rng, network, &dynamics, observations).unwrap();
-                    belief = imputing.state();
+                    let (next, info) = imputing::step(&mut rng, network, &dynamics, &imputed, observations).unwrap();
+                    imputed = next;
+                    belief = imputed.state();
                     info
                 }
             };
@@ -144,11 +150,7 @@ fn fusing_silence_pays() {
     let network = scalar(0.0);
     let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
     let mut errors = [0.0; 3];
-    let methods = [
-        Method::Ignore,
-        Method::Joint,
-        Method::Imputing(60),
-    ];
+    let methods = [Method::Ignore, Method::Joint, Method::Imputing(60)];
     for seed in 0..120 {
         let run = simulate(&network, &dynamics, &known(), 1000 + seed);
         for (error, method) in errors.iter_mut().zip(methods) {
@@ -174,22 +176,23 @@ fn a_first_report_that_breaks_the_rule_is_noticed() {
     let observations = [Observation::Received(Vector1::new(10.1)), Observation::Nothing];
     let refused = joint::step(&network, &dynamics, &JointBelief::new(&known(), 2).unwrap(), &observations);
     assert!(matches!(refused, Err(Error::ProtocolViolation { sensor: 0, .. })), "{refused:?}");
-    let mut particles = ImputingFilter::new(&known(), 2, 20).unwrap();
-    particles.step_in_place(&mut rng, &network, &dynamics, &observations).unwrap();
+    let particles = ImputedBelief::new(&known(), 2, 20).unwrap();
+    let (particles, _) = imputing::step(&mut rng, &network, &dynamics, &particles, &observations).unwrap();
     assert_eq!(particles.violations(), 1);
 }
 
 #[test]
-fn bad_steps_are_typed_errors_and_leave_the_belief() {
+fn bad_steps_are_typed_errors() {
     let (network, dynamics) = (scalar(0.0), constant_velocity_1d(1.0, 4.0).unwrap());
     let mut rng = Stream::new(1).fast_rng();
     let joint = JointBelief::new(&known(), 2).unwrap();
     let run = simulate(&network, &dynamics, &known(), 3);
-    let mut imputing = ImputingFilter::new(&known(), 2, 50).unwrap();
+    let mut imputed = ImputedBelief::new(&known(), 2, 50).unwrap();
     for (_, observations) in &run[..6] {
-        imputing.step_in_place(&mut rng, &network, &dynamics, observations).unwrap();
+        imputed = imputing::step(&mut rng, &network, &dynamics, &imputed, observations)
+            .unwrap()
+            .0;
     }
-    let before = (imputing.means().clone(), imputing.state());
     // A network that always reports, seen by the same filters: silence is impossible.
     let always = Network::new(network.sensors().to_vec(), 0.0, Link::PERFECT).unwrap();
     let far = Observation::Received(Vector1::new(9.0));
@@ -202,14 +205,13 @@ fn bad_steps_are_typed_errors_and_leave_the_belief() {
     for (network, observations, words) in cases {
         let error = joint::step(network, &dynamics, &joint, &observations).unwrap_err();
         assert!(error.to_string().contains(words), "{error}");
-        let error = imputing.step_in_place(&mut rng, network, &dynamics, &observations).unwrap_err();
+        let error = imputing::step(&mut rng, network, &dynamics, &imputed, &observations).unwrap_err();
         assert!(error.to_string().contains(words), "{error}");
-        assert_eq!((imputing.means().clone(), imputing.state()), before);
     }
     let erased = [Observation::Nothing, Observation::Erased];
     assert!(joint::step(&network, &dynamics, &joint, &erased).is_ok());
-    assert!(imputing.step_in_place(&mut rng, &network, &dynamics, &erased).is_ok());
-    assert!(ImputingFilter::new(&known(), 2, 0).is_err());
+    assert!(imputing::step(&mut rng, &network, &dynamics, &imputed, &erased).is_ok());
+    assert!(ImputedBelief::new(&known(), 2, 0).is_err());
     let sensor = network.sensors()[0];
     assert!(LocalSensor::new(sensor, -1.0, NumberFormat::Double, &known()).is_err());
     assert!(LocalSensor::new(sensor, 1.0, NumberFormat::fixed(0.0, 1.0, 4).unwrap(), &known()).is_err());

@@ -31,7 +31,12 @@ fn links() -> [Link; 2] {
 }
 
 /// Laws 1 and 2 of a scalar scheme whose report is a real number, without memory.
-fn scalar_laws<S: Scheme<1, State = ()>>(scheme: &S, feedback: &S::Feedback, r: f64, report: impl Fn(f64) -> S::Report) {
+fn scalar_laws<S: Scheme<1, State = ()>>(
+    scheme: &S,
+    feedback: &S::Feedback,
+    r: f64,
+    report: impl Fn(f64) -> S::Report,
+) {
     let measurements = [-3.0, -0.4, 0.2, 1.7, 6.0].map(Vector1::new);
     for link in links() {
         // Densities jump where the rule begins to send: panels no wider than a thousandth of the noise.
@@ -49,7 +54,8 @@ fn scalar_laws<S: Scheme<1, State = ()>>(scheme: &S, feedback: &S::Feedback, r: 
         for m in measurements {
             let p = nothing.log_likelihood(&m).exp();
             let measure = |rng: &mut _| m + Vector1::new(draw(rng) * r.sqrt());
-            honesty(scheme, feedback, &link, &mut rng, 20_000, measure, |o| matches!(o, Observation::Nothing), p).unwrap();
+            honesty(scheme, feedback, &link, &mut rng, 20_000, measure, |o| matches!(o, Observation::Nothing), p)
+                .unwrap();
         }
         tilted_is_quadrature(&nothing, &Gaussian::scalar(0.7, 2.0).unwrap(), 16.0, 4001, 1e-9).unwrap();
     }
@@ -79,7 +85,15 @@ fn covariance_feedback_and_the_random_trigger_are_lawful() {
     assert!(CovarianceFeedback::new(position(), -1.0, NumberFormat::Double).is_err());
 
     let trigger = StochasticTrigger::for_rate(0.4, 2.4).unwrap();
-    scalar_laws(&Triggered { sensing: position(), trigger }, &Vector2::new(0.5, 2.0), 1.3, |z| z);
+    scalar_laws(
+        &Triggered {
+            sensing: position(),
+            trigger,
+        },
+        &Vector2::new(0.5, 2.0),
+        1.3,
+        |z| z,
+    );
 }
 
 #[test]
@@ -90,9 +104,12 @@ fn levels_are_cells_outside_the_interval_of_silence() {
     for threshold in [0.0, 0.02, 0.45, 6.0] {
         let rule = CensoringRule::scalar(2.4, threshold).unwrap();
         let scheme = Censoring::new(position(), rule, NumberFormat::Fixed(levels)).unwrap();
-        let values = (0..16).map(|i| Vector1::new(NumberFormat::Fixed(levels).rounded(-4.0 + 0.6 * f64::from(i)).unwrap()));
+        let values =
+            (0..16).map(|i| Vector1::new(NumberFormat::Fixed(levels).rounded(-4.0 + 0.6 * f64::from(i)).unwrap()));
         for link in links() {
-            let possible = values.clone().filter(|v| scheme.factor(&broadcast, &Observation::Received(*v), &link).is_ok());
+            let possible = values
+                .clone()
+                .filter(|v| scheme.factor(&broadcast, &Observation::Received(*v), &link).is_ok());
             total_probability(&scheme, &broadcast, &link, possible, &measurements).unwrap();
         }
     }
@@ -100,12 +117,21 @@ fn levels_are_cells_outside_the_interval_of_silence() {
     let rule = CensoringRule::scalar(2.4, 9.0).unwrap();
     let scheme = Censoring::new(position(), rule, NumberFormat::fixed(-1.0, 1.0, 8).unwrap()).unwrap();
     let mut rng = Stream::new(1).rng();
-    let report = scheme.encode(&mut rng, &mut (), &Vector1::new(100.0), &broadcast).unwrap().unwrap();
+    let report = scheme
+        .encode(&mut rng, &mut (), &Vector1::new(100.0), &broadcast)
+        .unwrap()
+        .unwrap();
     assert_eq!(report[0], 1.0);
-    let factor = scheme.factor(&broadcast, &Observation::Received(report), &Link::PERFECT).unwrap();
+    let factor = scheme
+        .factor(&broadcast, &Observation::Received(report), &Link::PERFECT)
+        .unwrap();
     // All that is known: the measurement is beyond the interval of silence, on this side.
     assert!(factor.log_likelihood(&Vector1::new(100.0)) > -1e-12 && factor.log_likelihood(&Vector1::new(0.0)) < -5.0);
-    assert!(scheme.encode(&mut rng, &mut (), &Vector1::new(f64::NAN), &broadcast).is_err());
+    assert!(
+        scheme
+            .encode(&mut rng, &mut (), &Vector1::new(f64::NAN), &broadcast)
+            .is_err()
+    );
 }
 
 #[test]
@@ -120,7 +146,8 @@ fn vectors_are_lawful() {
         for m in [Vector2::new(0.0, 2.5), Vector2::new(3.0, -1.0)] {
             let p = nothing.log_likelihood(&m).exp();
             let measure = |rng: &mut _| m + sensor.noise_factor() * Vector2::new(draw(rng), draw(rng));
-            honesty(&scheme, &broadcast, &link, &mut rng, 40_000, measure, |o| matches!(o, Observation::Nothing), p).unwrap();
+            honesty(&scheme, &broadcast, &link, &mut rng, 40_000, measure, |o| matches!(o, Observation::Nothing), p)
+                .unwrap();
             // What is sent arrives with its density: the share of reports in a half plane.
             let half = |o: &Observation<Vector2<f64>>| o.received().is_some_and(|z| z[0] > 4.0);
             let reach = gauss_legendre::<24>();
@@ -138,7 +165,9 @@ fn vectors_are_lawful() {
     assert!(Censoring::new(sensor, rule.clone(), NumberFormat::fixed(0.0, 1.0, 8).unwrap()).is_err());
     let json = serde_json::to_string(&rule).unwrap();
     assert_eq!(serde_json::from_str::<CensoringRule<2>>(&json).unwrap(), rule);
-    assert!(serde_json::from_str::<CensoringRule<2>>(&json.replace("\"threshold\":1.0", "\"threshold\":-1.0")).is_err());
+    assert!(
+        serde_json::from_str::<CensoringRule<2>>(&json.replace("\"threshold\":1.0", "\"threshold\":-1.0")).is_err()
+    );
 }
 
 /// Without feedback, given the sensor's memory; a fresh memory for every draw.
@@ -204,13 +233,24 @@ fn ties_are_sent_and_breaches_refused() {
     let breach = Observation::Received(Vector1::new(1.0));
     assert!(scheme.factor(&Vector2::zeros(), &breach, &Link::PERFECT).is_err());
     let far = Observation::Received(Vector1::new(5.0));
-    assert!(scheme.factor(&Vector2::zeros(), &far, &Link::flipping(0.1).unwrap()).is_err());
-    assert!(scheme.factor(&Vector2::new(f64::NAN, 0.0), &far, &Link::PERFECT).is_err());
+    assert!(
+        scheme
+            .factor(&Vector2::zeros(), &far, &Link::flipping(0.1).unwrap())
+            .is_err()
+    );
+    assert!(
+        scheme
+            .factor(&Vector2::new(f64::NAN, 0.0), &far, &Link::PERFECT)
+            .is_err()
+    );
     // A network names the sensor.
-    let network = Network::new(vec![position(); 2], Budget::new(1.0, 2).unwrap().threshold(1).unwrap(), Link::PERFECT).unwrap();
+    let network =
+        Network::new(vec![position(); 2], Budget::new(1.0, 2).unwrap().threshold(1).unwrap(), Link::PERFECT).unwrap();
     let belief = Gaussian::new(Vector2::zeros(), Matrix2::identity()).unwrap();
     let rules = network.rules_under(&belief).unwrap();
-    let error = network.likelihood(&rules, belief.mean(), &[far, Observation::Received(Vector1::new(0.1))]).unwrap_err();
+    let error = network
+        .likelihood(&rules, belief.mean(), &[far, Observation::Received(Vector1::new(0.1))])
+        .unwrap_err();
     assert!(error.to_string().starts_with("sensor 1"), "{error}");
     let power = Network::new(vec![field(); 2], 1.0, Link::PERFECT).unwrap();
     let plane = Gaussian::new(Vector4::new(8.0, 1.0, 2.0, 0.0), Matrix4::identity()).unwrap();

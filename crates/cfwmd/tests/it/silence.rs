@@ -172,8 +172,13 @@ fn fifty_honest_sensors_never_make_a_belief_that_is_no_number() {
         let predicted = kalman::predict(&dynamics, &belief);
         let rules = network.rules_under(&predicted).unwrap();
         let measurements: Vec<_> = (0..50).map(|_| sensor.sample(&mut rng, &truth)).collect();
-        let (observations, _) = network.transmit(&mut rng, &rules, predicted.mean(), &measurements).unwrap();
-        belief = network.fuse(&predicted, &rules, predicted.mean(), &observations).unwrap().0;
+        let (observations, _) = network
+            .transmit(&mut rng, &rules, predicted.mean(), &measurements)
+            .unwrap();
+        belief = network
+            .fuse(&predicted, &rules, predicted.mean(), &observations)
+            .unwrap()
+            .0;
         let (mean, variance) = (belief.mean()[0], belief.covariance()[0]);
         assert!(mean.is_finite() && variance > 0.0 && variance < 10.0, "step {k}: {mean} {variance}");
         squares += (truth[0] - mean).powi(2) / variance;
@@ -199,8 +204,19 @@ fn silence_is_a_lawful_factor() {
             sweep_is_scalar(&factor, &points).unwrap();
             is_a_number(&factor, &points).unwrap();
             // Scaled input, scaled output.
-            let [ours, unit] = [(silence, scale), (Silence { centre: 0.5, half_width, noise_variance: 1.0, ..silence }, 1.0)]
-                .map(|(s, k)| s.moments(2.0 * k, 3.0 * k * k).unwrap());
+            let [ours, unit] = [
+                (silence, scale),
+                (
+                    Silence {
+                        centre: 0.5,
+                        half_width,
+                        noise_variance: 1.0,
+                        ..silence
+                    },
+                    1.0,
+                ),
+            ]
+            .map(|(s, k)| s.moments(2.0 * k, 3.0 * k * k).unwrap());
             assert!((ours.log_evidence - unit.log_evidence).abs() < 1e-10);
             assert!((ours.mean[0] / scale - unit.mean[0]).abs() < 1e-10);
             assert!((ours.covariance[0] / (scale * scale) / unit.covariance[0] - 1.0).abs() < 1e-9);

@@ -8,6 +8,7 @@ use crate::gaussian::Gaussian;
 use crate::observation::Link;
 use crate::sign::Sign;
 use fewbits_numerics::error::{ArgumentError, positive};
+use fewbits_numerics::kernels::{scalar, vectorised};
 use fewbits_numerics::normal;
 use nalgebra::SVector;
 #[cfg(feature = "serde")]
@@ -133,7 +134,18 @@ impl InCell {
     /// `ln p(observation | m)`.
     #[inline]
     pub fn log_probability(&self, m: f64) -> f64 {
-        self.mixed(self.log_inside(m))
+        if self.floor == 0.0 {
+            return self.log_share + self.log_inside(m);
+        }
+        let (lower, upper) = (self.cell.lower(), self.cell.upper());
+        let inside = if upper == f64::INFINITY {
+            normal::cdf((m - lower) / self.deviation)
+        } else if lower == f64::NEG_INFINITY {
+            normal::cdf((upper - m) / self.deviation)
+        } else {
+            normal::interval((lower - m) / self.deviation, (upper - m) / self.deviation)
+        };
+        (self.floor + self.share * inside).ln()
     }
 
     /// `ln P(m + n in cell)`.
@@ -184,8 +196,57 @@ impl Factor<1> for InCell {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
-        for (log_weight, m) in log_weights.iter_mut().zip(means[0]) {
-            *log_weight += self.log_probability(*m);
+        let (lower, upper) = (self.cell.lower(), self.cell.upper());
+        let (scale, floor, share) = (1.0 / self.deviation, self.floor, self.share);
+        // A half-line is one cut, rising (`m` above the edge) or falling.
+        let cut = if upper == f64::INFINITY {
+            Some((lower, scale))
+        } else if lower == f64::NEG_INFINITY {
+            Some((upper, -scale))
+        } else {
+            None
+        };
+        let pairs = log_weights.iter_mut().zip(means[0]);
+        match (cut, floor > 0.0) {
+            (Some((edge, scale)), false) => {
+                let log_share = self.log_share;
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        for (log_weight, m) in pairs {
+                            *log_weight += log_share + scalar::log_cdf((m - edge) * scale);
+                        }
+                    },
+                );
+            }
+            (Some((edge, scale)), true) => vectorised(
+                #[inline(always)]
+                || {
+                    for (log_weight, m) in pairs {
+                        *log_weight += scalar::ln(floor + share * scalar::cdf((m - edge) * scale));
+                    }
+                },
+            ),
+            (None, false) => {
+                let log_share = self.log_share;
+                vectorised(
+                    #[inline(always)]
+                    || {
+                        for (log_weight, m) in pairs {
+                            *log_weight += log_share + scalar::log_interval((lower - m) * scale, (upper - m) * scale);
+                        }
+                    },
+                );
+            }
+            (None, true) => vectorised(
+                #[inline(always)]
+                || {
+                    for (log_weight, m) in pairs {
+                        let inside = scalar::interval((lower - m) * scale, (upper - m) * scale);
+                        *log_weight += scalar::ln(floor + share * inside);
+                    }
+                },
+            ),
         }
     }
 

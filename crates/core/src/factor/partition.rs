@@ -6,7 +6,7 @@ use crate::columns::Columns;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, all_finite, positive};
-use fewbits_numerics::normal;
+use fewbits_numerics::{kernels, normal};
 use nalgebra::SVector;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -131,7 +131,7 @@ impl Partition {
             .parts()
             .map(|(lower, upper, p)| p * normal::interval(standard(lower), standard(upper)))
             .sum();
-        if p > 1e-280 {
+        if p > LEAST {
             return p.min(1.0).ln();
         }
         // All cells that matter are far away: only logarithms have digits left.
@@ -147,14 +147,71 @@ impl Partition {
     }
 }
 
+/// Means swept at once.
+const BLOCK: usize = 256;
+/// Below this a probability has lost digits, and logarithms are summed instead.
+const LEAST: f64 = 1e-280;
+
+/// Adds `p P(lower < m + n < upper)` for every mean.
+fn add_cell(means: &[f64], lower: f64, upper: f64, scale: f64, p: f64, probabilities: &mut [f64]) {
+    use kernels::scalar::{cdf, interval};
+    let pairs = probabilities.iter_mut().zip(means);
+    if lower == f64::NEG_INFINITY && upper == f64::INFINITY {
+        pairs.for_each(|(sum, _)| *sum += p);
+    } else if lower == f64::NEG_INFINITY || upper == f64::INFINITY {
+        let (edge, scale) = if upper == f64::INFINITY {
+            (lower, scale)
+        } else {
+            (upper, -scale)
+        };
+        kernels::vectorised(
+            #[inline(always)]
+            || {
+                for (sum, m) in pairs {
+                    *sum += p * cdf((m - edge) * scale);
+                }
+            },
+        );
+    } else {
+        kernels::vectorised(
+            #[inline(always)]
+            || {
+                for (sum, m) in pairs {
+                    *sum += p * interval((lower - m) * scale, (upper - m) * scale);
+                }
+            },
+        );
+    }
+}
+
 impl Factor<1> for Partition {
     fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
         self.log_probability(m[0])
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
-        for (log_weight, m) in log_weights.iter_mut().zip(means[0]) {
-            *log_weight += self.log_probability(*m);
+        let mut probabilities = [0.0; BLOCK];
+        for (log_weights, means) in log_weights.chunks_mut(BLOCK).zip(means[0].chunks(BLOCK)) {
+            let probabilities = &mut probabilities[..means.len()];
+            probabilities.fill(0.0);
+            for (lower, upper, p) in self.parts() {
+                add_cell(means, lower, upper, 1.0 / self.deviation, p, probabilities);
+            }
+            kernels::vectorised(
+                #[inline(always)]
+                || {
+                    for (log_weight, p) in log_weights.iter_mut().zip(&*probabilities) {
+                        // What is far away is left to the logarithms below.
+                        let p = if *p > LEAST { *p } else { 1.0 };
+                        *log_weight += kernels::scalar::ln(if p < 1.0 { p } else { 1.0 });
+                    }
+                },
+            );
+            for ((log_weight, m), p) in log_weights.iter_mut().zip(means).zip(&*probabilities) {
+                if *p <= LEAST {
+                    *log_weight += self.log_probability(*m);
+                }
+            }
         }
     }
 

@@ -7,6 +7,7 @@ mod beliefs;
 mod bounds;
 mod common;
 mod fixtures;
+mod laws;
 mod particles;
 mod products;
 mod reduction;

@@ -364,7 +364,7 @@ fn regress_entry(entry: &Entry<'_>) -> Option<Vec<f64>> {
         means.push(belief.mean()[0]);
         if part.starts_with("exact") {
             density = exact.predict(&density).unwrap();
-            density.update(|theta| factor.log_probability(theta)).unwrap();
+            density.update_with(|theta| factor.log_probability(theta)).unwrap();
             exact_moments.push((density.mean(), density.variance()));
         }
     }

@@ -5,15 +5,14 @@ mod shapes;
 mod table6_1;
 
 use crate::AnyFigure;
-use crate::legacy::Old;
 
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
-        &Old(shapes::Landings),
-        &Old(table6_1::Table),
-        &Old(networks::Spread),
-        &Old(networks::Mean),
-        &Old(shapes::BitErrors),
+        &shapes::Landings,
+        &table6_1::Table,
+        &networks::Spread,
+        &networks::Mean,
+        &shapes::BitErrors,
     ]
 }

@@ -1,38 +1,29 @@
 //! `assign-fig6-1` and `assign-figC-1`: where a wrong bit lands, and how likely it is.
 
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
 use fewbits_sensor_assignment::{CodedSensors, bit_error, flipped_estimate};
+use garde::Validate;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 const BITS: usize = 4;
 
 /// `-1, -1 + step, ..., 1`.
-fn axis_points(step: f64) -> Vec<f64> {
+fn axis_points(step: f64) -> impl Iterator<Item = f64> {
     let count = (2.0 / step).round().max(1.0) as usize;
-    (0..=count).map(|i| -1.0 + 2.0 * i as f64 / count as f64).collect()
-}
-
-fn check_step(figure: &'static str, step: f64) -> Result<(), Error> {
-    if (1e-5..=1.0).contains(&step) {
-        return Ok(());
-    }
-    Err(Error::BadParameter {
-        figure,
-        name: "step".into(),
-        value: step.to_string(),
-        expected: "a number from 1e-5 to 1".into(),
-    })
+    (0..=count).map(move |i| -1.0 + 2.0 * i as f64 / count as f64)
 }
 
 /// `assign-fig6-1`.
 pub struct Landings;
 
 /// Parameters of `assign-fig6-1`.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct LandingParameters {
     /// Step of the horizontal axis in units of V.
+    #[garde(range(min = 1e-5, max = 1.0))]
     step: f64,
 }
 
@@ -42,10 +33,54 @@ impl Default for LandingParameters {
     }
 }
 
-const LANDINGS: [&str; BITS] = ["f1", "f2", "f3", "f4"];
+#[derive(Serialize, JsonSchema)]
+pub struct Landing {
+    /// Source.
+    #[schemars(extend("unit" = "V"))]
+    x: f64,
+    /// Estimate with bit 1, the coarsest, wrong.
+    #[schemars(extend("unit" = "V"))]
+    f1: f64,
+    /// Estimate with bit 2 wrong.
+    #[schemars(extend("unit" = "V"))]
+    f2: f64,
+    /// Estimate with bit 3 wrong.
+    #[schemars(extend("unit" = "V"))]
+    f3: f64,
+    /// Estimate with bit 4 wrong.
+    #[schemars(extend("unit" = "V"))]
+    f4: f64,
+}
+
+impl Landing {
+    fn at(x: f64) -> Result<Self, Error> {
+        let wrong = |bit| flipped_estimate(x, bit, BITS, 1.0).map_err(Error::failed);
+        Ok(Self {
+            x,
+            f1: wrong(0)?,
+            f2: wrong(1)?,
+            f3: wrong(2)?,
+            f4: wrong(3)?,
+        })
+    }
+
+    fn estimates(&self) -> [f64; BITS] {
+        [self.f1, self.f2, self.f3, self.f4]
+    }
+}
+
+/// The tables of `assign-fig6-1`.
+#[derive(Serialize, JsonSchema)]
+pub struct Landed {
+    /// Estimates along the axis.
+    curve: Vec<Landing>,
+    /// Estimates at the centres of the cells.
+    centres: Vec<Landing>,
+}
 
 impl Figure for Landings {
     type Parameters = LandingParameters;
+    type Tables = Landed;
 
     fn about(&self) -> About {
         About {
@@ -57,68 +92,42 @@ impl Figure for Landings {
         }
     }
 
-    fn check(&self, p: &LandingParameters) -> Result<(), Error> {
-        check_step("assign-fig6-1", p.step)
+    fn run(&self, p: &LandingParameters, _: &Context<'_>) -> Result<Landed, Error> {
+        let centres = (0..16).map(|c| (2.0 * f64::from(c) + 1.0) / 16.0 - 1.0);
+        Ok(Landed {
+            curve: axis_points(p.step).map(Landing::at).collect::<Result<_, _>>()?,
+            centres: centres.map(Landing::at).collect::<Result<_, _>>()?,
+        })
     }
 
-    fn run(&self, p: &LandingParameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let mut columns = vec![column("x", "V", "source")];
-        columns.extend(
-            LANDINGS
-                .iter()
-                .map(|name| column(name, "V", "estimate with this bit wrong")),
-        );
-        let mut table = Table::new(columns);
-        for x in axis_points(p.step) {
-            let mut row = row![x];
-            for bit in 0..BITS {
-                row.push(flipped_estimate(x, bit, BITS, 1.0).map_err(Error::failed)?.into());
-            }
-            table.push(row)?;
-        }
-        Ok(table.into())
-    }
-
-    fn claims(&self, _: &LandingParameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let centres: Vec<f64> = (0..16).map(|c| (2.0 * f64::from(c) + 1.0) / 16.0 - 1.0).collect();
-        let mut broken = 0;
-        for bit in 0..BITS {
-            for &centre in &centres {
-                let there = flipped_estimate(centre, bit, BITS, 1.0).map_err(Error::failed)?;
-                let back = flipped_estimate(there, bit, BITS, 1.0).map_err(Error::failed)?;
-                broken +=
-                    usize::from((back - centre).abs() > 1e-14 || !centres.iter().any(|c| (c - there).abs() < 1e-14));
-            }
-        }
-        let mut levels = 0;
-        for name in LANDINGS {
-            let mut values = tables.main.numbers(name)?;
-            values.sort_by(f64::total_cmp);
-            values.dedup();
-            levels += values.len().abs_diff(16);
-        }
-        Ok(vec![
-            Claim::never("involution", "flipping a bit twice returns to the centre", broken),
-            Claim::never("staircase", "every curve takes exactly the sixteen centres as values", levels).at_defaults(),
-        ])
-    }
-
-    fn plot(&self, _: &LandingParameters, tables: &Tables) -> Result<Plot, Error> {
-        let panels = LANDINGS
-            .iter()
-            .enumerate()
-            .map(|(bit, name)| {
-                Ok(Panel::new(
-                    format!("Bit {} wrong", bit + 1),
-                    Axis::linear("x / V"),
-                    Axis::linear("estimate / V").between(-1.1, 1.1),
-                )
-                .with(Layer::line("", tables.main.points("x", name)?).coloured(bit))
-                .with(Layer::dashed("", vec![(-1.0, -1.0), (1.0, 1.0)]).coloured(7))
-                .legend(Legend::Hidden))
+    fn claims(&self, _: &LandingParameters, tables: &Landed, claims: &mut Claims) {
+        let centre = |x: f64| tables.centres.iter().find(|l| (l.x - x).abs() < 1e-14);
+        claims.all("involution", "flipping a bit twice returns to the centre", &tables.centres, |l| {
+            let back = |bit: usize| {
+                centre(l.estimates()[bit]).is_some_and(|there| (there.estimates()[bit] - l.x).abs() < 1e-14)
+            };
+            (0..BITS).all(back)
+        });
+        let what = "every curve takes exactly the sixteen centres as values";
+        claims
+            .all("staircase", what, 0..BITS, |bit| {
+                let mut values: Vec<f64> = tables.curve.iter().map(|l| l.estimates()[bit]).collect();
+                values.sort_by(f64::total_cmp);
+                values.dedup();
+                values.len() == 16 && values.iter().all(|v| centre(*v).is_some())
             })
-            .collect::<Result<_, Error>>()?;
-        Ok(Plot::grid(2, panels))
+            .at_defaults();
+    }
+
+    fn plot(&self, _: &LandingParameters, tables: &Landed) -> Plot {
+        let panel = |bit: usize| {
+            let (x, y) = (Axis::linear("source x / V"), Axis::linear("estimate / V").between(-1.1, 1.1));
+            Panel::new(format!("Bit {} wrong", bit + 1), x, y)
+                .with(Layer::line("", points(&tables.curve, |l| (l.x, l.estimates()[bit]))).coloured(0))
+                .with(Layer::dashed("", vec![(-1.0, -1.0), (1.0, 1.0)]).coloured(7))
+                .legend(Legend::Hidden)
+        };
+        Plot::grid(2, (0..BITS).map(panel).collect())
     }
 }
 
@@ -126,12 +135,14 @@ impl Figure for Landings {
 pub struct BitErrors;
 
 /// Parameters of `assign-figC-1`.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorParameters {
     /// Noise variance in units of V^2.
+    #[garde(range(min = 1e-9, max = 1e3))]
     variance: f64,
     /// Step of the horizontal axis in units of V.
+    #[garde(range(min = 1e-5, max = 1.0))]
     step: f64,
 }
 
@@ -144,10 +155,30 @@ impl Default for ErrorParameters {
     }
 }
 
-const ERRORS: [&str; BITS] = ["pa1", "pa2", "pa3", "pa4"];
+#[derive(Serialize, JsonSchema)]
+pub struct Wrong {
+    /// Source.
+    #[schemars(extend("unit" = "V"))]
+    x: f64,
+    /// Probability that bit 1, the coarsest, is wrong.
+    pa1: f64,
+    /// Probability that bit 2 is wrong.
+    pa2: f64,
+    /// Probability that bit 3 is wrong.
+    pa3: f64,
+    /// Probability that bit 4 is wrong.
+    pa4: f64,
+}
+
+impl Wrong {
+    fn probabilities(&self) -> [f64; BITS] {
+        [self.pa1, self.pa2, self.pa3, self.pa4]
+    }
+}
 
 impl Figure for BitErrors {
     type Parameters = ErrorParameters;
+    type Tables = Vec<Wrong>;
 
     fn about(&self) -> About {
         About {
@@ -160,73 +191,42 @@ impl Figure for BitErrors {
         }
     }
 
-    fn check(&self, p: &ErrorParameters) -> Result<(), Error> {
-        fewbits_numerics::error::positive("variance", p.variance)?;
-        check_step("assign-figC-1", p.step)
+    fn run(&self, p: &ErrorParameters, _: &Context<'_>) -> Result<Vec<Wrong>, Error> {
+        let sensors = CodedSensors::with_variances(1.0, &[p.variance; BITS]).map_err(Error::failed)?;
+        let at = |x: f64| {
+            let wrong = |bit: usize| bit_error(&sensors.quantizers()[bit], x, p.variance.sqrt()).map_err(Error::failed);
+            Ok(Wrong {
+                x,
+                pa1: wrong(0)?,
+                pa2: wrong(1)?,
+                pa3: wrong(2)?,
+                pa4: wrong(3)?,
+            })
+        };
+        axis_points(p.step).map(at).collect()
     }
 
-    fn run(&self, p: &ErrorParameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let sensors = CodedSensors::new(1.0, &[p.variance; BITS]).map_err(Error::failed)?;
-        let mut columns = vec![column("x", "V", "source")];
-        columns.extend(
-            ERRORS
-                .iter()
-                .map(|name| column(name, "", "probability that this bit is wrong")),
-        );
-        let mut table = Table::new(columns);
-        for x in axis_points(p.step) {
-            let mut row = row![x];
-            for quantizer in sensors.quantizers() {
-                row.push(
-                    bit_error(quantizer, x, p.variance.sqrt())
-                        .map_err(Error::failed)?
-                        .into(),
-                );
-            }
-            table.push(row)?;
-        }
-        Ok(table.into())
+    fn claims(&self, _: &ErrorParameters, rows: &Vec<Wrong>, claims: &mut Claims) {
+        let near = |x: f64| rows.iter().find(|r| (r.x - x).abs() < 1e-9).map(|r| r.pa1);
+        claims
+            .near("half", "the sign bit is a coin at zero", near(0.0), 0.5, 1e-12)
+            .at_defaults();
+        claims
+            .references("pa1", "the sign bit is wrong with this probability, x =", [0.2], |x| (x.to_string(), near(x)));
+        let what = "all values are probabilities";
+        claims.all("probabilities", what, rows, |r| r.probabilities().iter().all(|p| (0.0..=1.0).contains(p)));
+        let mean = |bit: usize| rows.iter().map(|r| r.probabilities()[bit]).sum::<f64>() / rows.len() as f64;
+        claims
+            .increasing("order", "finer bits are wrong more often on average", (0..BITS).map(mean))
+            .at_defaults();
     }
 
-    fn claims(&self, _: &ErrorParameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let first = tables.main.points("x", "pa1")?;
-        let at = |x: f64| first.iter().find(|p| (p.0 - x).abs() < 1e-9).map_or(-1.0, |p| p.1);
-        let mut beyond = 0;
-        let mut means = Vec::new();
-        for name in ERRORS {
-            let values = tables.main.numbers(name)?;
-            beyond += values.iter().filter(|v| !(0.0..=1.0).contains(*v)).count();
-            means.push(values.iter().sum::<f64>() / values.len() as f64);
-        }
-        Ok(vec![
-            Claim::near("half", "the sign bit is a coin at zero", at(0.0), 0.5, 1e-12).at_defaults(),
-            Claim::near(
-                "sign",
-                "and wrong with probability 0.12410654 at 0.2",
-                at(0.2),
-                0.124_106_539_494_961_86,
-                1e-9,
-            )
-            .at_defaults(),
-            Claim::never("probabilities", "all values are probabilities", beyond),
-            Claim::never(
-                "order",
-                "finer bits are wrong more often on average",
-                crate::legacy::claim::not_increasing(&means),
-            )
-            .at_defaults(),
-        ])
-    }
-
-    fn plot(&self, p: &ErrorParameters, tables: &Tables) -> Result<Plot, Error> {
-        let mut panel = Panel::new(
-            format!("Noise variance {}", p.variance),
-            Axis::linear("x / V"),
-            Axis::linear("probability that the bit is wrong").between(0.0, 0.9),
-        );
-        for (bit, name) in ERRORS.iter().enumerate() {
-            panel = panel.with(Layer::line(format!("bit {}", bit + 1), tables.main.points("x", name)?).coloured(bit));
-        }
-        Ok(Plot::of(panel))
+    fn plot(&self, p: &ErrorParameters, rows: &Vec<Wrong>) -> Plot {
+        let line = |bit: usize| {
+            Layer::line(format!("bit {}", bit + 1), points(rows, |r| (r.x, r.probabilities()[bit]))).coloured(bit)
+        };
+        let y = Axis::linear("probability that the bit is wrong").between(0.0, 0.9);
+        let title = format!("Noise variance {} V²", p.variance);
+        Plot::of(Panel::new(title, Axis::linear("source x / V"), y).with_all((0..BITS).map(line)))
     }
 }

@@ -5,10 +5,10 @@ use super::{Scene, pattern};
 use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use fewbits_binary_patterns::baselines::{AdaptiveRule, adaptive};
-use fewbits_binary_patterns::search::{Descent, free_thresholds};
-use fewbits_binary_patterns::{BinaryQuantizer, Grid, Mask, Pattern, Sensor, Source, gray_basis};
+use fewbits_binary_patterns::search::{Descent, free_breakpoints};
+use fewbits_binary_patterns::{BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source, gray_basis};
 use fewbits_sensor_assignment::{
-    CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, brute_force, exchange, pair_costs,
+    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, brute_force, exchange, pair_costs,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -156,9 +156,9 @@ fn free(id: &'static str, name: &'static str, scene: Scene, sensors: usize, jitt
             .map(|quantizers| {
                 let sensors = quantizers
                     .into_iter()
-                    .map(|q| Sensor::new(q, scene.noise))
+                    .map(|q| PatternSensor::new(q, scene.noise))
                     .collect::<Result<Vec<_>, _>>()?;
-                free_thresholds(&scene.source, &sensors, jitter, 4)
+                free_breakpoints(&scene.source, &sensors, jitter / scene.source.scale(), 4)
             })
             .collect::<Result<Vec<_>, _>>()
             .map_err(Error::failed)?;
@@ -234,7 +234,7 @@ fn smaller_steps(snr: f64) -> Job {
 const VARIANCES: [f64; 8] = [0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001];
 
 fn decoder_of_table_6_1() -> Result<Case, Error> {
-    let sensors = CodedSensors::new(1.0, &VARIANCES).map_err(Error::failed)?;
+    let sensors = CodedSensors::with_variances(1.0, &VARIANCES).map_err(Error::failed)?;
     let best = pair_costs(&sensors)
         .and_then(|c| JonkerVolgenant.solve(&c))
         .map_err(Error::failed)?;
@@ -249,8 +249,10 @@ fn decoder_of_table_6_1() -> Result<Case, Error> {
 }
 
 fn joint_of_table_6_1() -> Result<Case, Error> {
-    let sensors = CodedSensors::new(1.0, &VARIANCES).map_err(Error::failed)?;
-    let before = brute_force(&sensors, Criterion::Mmse).map_err(Error::failed)?.1;
+    let sensors = CodedSensors::with_variances(1.0, &VARIANCES).map_err(Error::failed)?;
+    let before = brute_force(&sensors, Estimator::PosteriorMean)
+        .map_err(Error::failed)?
+        .1;
     let grid = Grid::uniform(1.0, 4).map_err(Error::failed)?;
     let candidates = (1..16)
         .map(|mask| pattern(mask, 4)?.on(&grid).map_err(Error::failed))
@@ -274,11 +276,11 @@ fn joint_of_table_6_1() -> Result<Case, Error> {
 }
 
 fn exchange_of_table_6_1() -> Result<Case, Error> {
-    let sensors = CodedSensors::new(1.0, &VARIANCES).map_err(Error::failed)?;
+    let sensors = CodedSensors::with_variances(1.0, &VARIANCES).map_err(Error::failed)?;
     let linear = pair_costs(&sensors)
         .and_then(|c| JonkerVolgenant.solve(&c))
         .map_err(Error::failed)?;
-    let found = exchange(&sensors, &linear, Criterion::Mmse).map_err(Error::failed)?;
+    let found = exchange(&sensors, &linear, Estimator::PosteriorMean).map_err(Error::failed)?;
     Ok(Case {
         id: "exchange".into(),
         idea: "exchange of two sensors",

@@ -4,7 +4,7 @@ use super::{Scene, check_sweep, each, sweep};
 use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use fewbits_binary_patterns::bounds::{
-    centralised_bound, network_rate_distortion, printed_crlb, remote_distortion, van_trees,
+    centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
 };
 use fewbits_binary_patterns::{Decoder, gray_basis};
 use serde::{Deserialize, Serialize};
@@ -65,7 +65,7 @@ fn values(source: &str, snr: f64) -> Result<[f64; 10], Error> {
         mse(Decoder::PrintedDiscreteMap(&scene.grid))?,
         mse(Decoder::ExactDivisionMap(&scene.grid))?,
         printed_crlb(&bank).map_err(Error::failed)?,
-        van_trees(&bank),
+        optimal_weight_van_trees(&bank).map_err(Error::failed)?,
         printed,
         network_rate_distortion(&scene.source, scene.noise, 3).map_err(Error::failed)?,
         centralised_bound(&scene.source, scene.noise, 3).map_err(Error::failed)?,
@@ -118,7 +118,8 @@ impl Figure for Decoders {
         ]);
         for (snr, _) in RATIOS {
             let bank = Scene::uniform(3, snr)?.bank(&[4, 6, 3])?;
-            let (bound, mse) = (van_trees(&bank), bank.mmse().map_err(Error::failed)?);
+            let (bound, mse) =
+                (optimal_weight_van_trees(&bank).map_err(Error::failed)?, bank.mmse().map_err(Error::failed)?);
             ratios.push(row![
                 snr,
                 bound,

@@ -4,7 +4,7 @@ use super::{Scene, check_sweep, crossing, each, mask_text, sweep};
 use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use fewbits_binary_patterns::Mask;
-use fewbits_binary_patterns::bounds::{network_rate_distortion, remote_distortion, van_trees};
+use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
 use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-9`.
@@ -88,7 +88,7 @@ impl Figure for GaussianSource {
                 scene.mmse(&[4, 2, 1])?,
                 printed,
                 network_rate_distortion(&scene.source, scene.noise, SENSORS).map_err(Error::failed)?,
-                van_trees(&scene.bank(&best.masks)?),
+                optimal_weight_van_trees(&scene.bank(&best.masks)?).map_err(Error::failed)?,
                 any.mse,
                 mask_text(&any.masks),
                 scene.mmse(&[4, 4, 4])?,

@@ -75,10 +75,10 @@ impl Figure for Clipping {
         errors.push(row!["nearest outer cell", scene.mmse(&p.masks)?])?;
         // The swapped rule is a pattern over a grid with two more cells, which carry the opposite end's bit.
         let mut edges = vec![-1.0];
-        edges.extend(grid.edges());
+        edges.extend(grid.breakpoints());
         edges.push(1.0);
         let wide = Scene {
-            grid: Grid::from_edges(edges).map_err(Error::failed)?,
+            grid: Grid::from_breakpoints(edges).map_err(Error::failed)?,
             ..scene
         };
         let swapped_mse = |masks: &[Mask]| -> Result<f64, Error> {

@@ -1,7 +1,7 @@
 //! Beyond the paper: lossy links, scheduled thresholds, and what each filter costs.
 
 use super::case::{Case, by_budget};
-use super::ensemble::{Ensemble, Part, agrees, beats, value};
+use super::ensemble::{Ensemble, Part, agrees, beats, first, value};
 use super::linear::{Scheme, Setting, run};
 use crate::error::Error;
 use crate::legacy::claim::Claim;
@@ -96,7 +96,7 @@ impl Case for Lossy {
         }
         for (loss, expected, tolerance) in [("0.1", 0.064, 0.025), ("0.3", 0.555, 0.12)] {
             let rows = paired.only("first", format!("modelled, loss {loss}"))?;
-            let gain = -rows.numbers("pos_mse_difference_m2")?[0];
+            let gain = -first(rows.numbers("pos_mse_difference_m2")?)?;
             claims.push(
                 Claim::near(
                     format!("gain-{loss}"),
@@ -270,7 +270,7 @@ impl Case for Scheduled {
         claims.push(beats(paired, "scheduled, 2 sensors", "CFwMD, 2 sensors", 1.0, Part::Position)?);
         let bounds = tables.named("bound")?;
         for (l, sensors, expected) in [(1.0, 2_u64, 0.772), (1.0, 4, 0.750), (2.0, 4, 0.571)] {
-            let ours = bounds.only("l", l)?.only("sensors", sensors)?.numbers("bound_m")?[0];
+            let ours = first(bounds.only("l", l)?.only("sensors", sensors)?.numbers("bound_m")?)?;
             claims.push(
                 Claim::near(
                     format!("bound-N{sensors}-l{l}"),
@@ -289,7 +289,7 @@ impl Case for Scheduled {
                 ("CFwMD2", "bound_centre_m"),
                 ("scheduled", "bound_centre_m"),
             ] {
-                let ratio = value(summary, scheme, l, "pos_armse_m")? / row.numbers(column)?[0];
+                let ratio = value(summary, scheme, l, "pos_armse_m")? / first(row.numbers(column)?)?;
                 claims.push(
                     Claim::at_least(
                         format!("above-bound-{scheme}-l{l}"),
@@ -301,7 +301,7 @@ impl Case for Scheduled {
                 );
             }
         }
-        let all = bounds.only("l", 2.0)?.only("sensors", 2_u64)?.numbers("bound_m")?[0];
+        let all = first(bounds.only("l", 2.0)?.only("sensors", 2_u64)?.numbers("bound_m")?)?;
         claims.push(
             Claim::near(
                 "bound-all",
@@ -463,7 +463,7 @@ impl Case for Cost {
             claims.extend(agrees(summary, scheme, 1.0, &format!("cost/{reference}"), 0.0, 0.01)?);
         }
         let relative =
-            |scheme: &str| -> Result<f64, Error> { Ok(times.only("scheme", scheme)?.numbers("relative")?[0]) };
+            |scheme: &str| -> Result<f64, Error> { Ok(first(times.only("scheme", scheme)?.numbers("relative")?)?) };
         claims.push(Claim::at_least(
             "cheaper",
             "the Gaussian belief is at least 15 times cheaper than 1000 particles",
@@ -517,7 +517,7 @@ impl Case for Cost {
         for (colour, scheme) in summary.texts("scheme")?.iter().enumerate() {
             let at = summary.only("scheme", scheme.as_str())?;
             let time = times.only("scheme", scheme.as_str())?.numbers("time_us")?[0];
-            let point = vec![(time, at.numbers("pos_armse_m")?[0])];
+            let point = vec![(time, first(at.numbers("pos_armse_m")?)?)];
             panel = panel.with(
                 Layer::points(scheme.as_str(), point)
                     .with_errors(at.numbers("pos_se")?)

@@ -36,6 +36,12 @@ pub(super) enum Part {
     Velocity,
 }
 
+/// The first of some numbers; a row that is not there is an error, not a panic.
+pub(super) fn first(values: Vec<f64>) -> Result<f64, Error> {
+    let value = values.first().copied();
+    value.ok_or_else(|| Error::Table("no row with this key".to_owned()))
+}
+
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }

@@ -5,14 +5,12 @@ mod scalar_only;
 use super::ensemble::{Ensemble, Record};
 use crate::error::Error;
 use crate::legacy::Context;
-use fewbits_cfwmd::message::Format;
 use fewbits_cfwmd::network::Network;
-use fewbits_cfwmd::no_feedback::{LocalSensor, NoFeedback, NoFeedbackCentre};
-use fewbits_cfwmd::particle::{HeardScalars, HeardVectors};
+use fewbits_cfwmd::no_feedback::{ImputedBelief, JointBelief, LocalSensor, imputing, joint};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep, Weighing};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Dynamics, Gaussian, Observation, Sensing};
+use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Sensing};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
@@ -76,7 +74,20 @@ impl Setting {
     }
 }
 
-/// What is sent, and how the fusion centre listens.
+/// How a fusion centre without feedback treats silence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Method {
+    /// Not at all.
+    Ignored,
+    /// Joint Gaussian belief about the state and the sensors' estimates.
+    Joint,
+    /// Withheld measurements imputed, so many particles.
+    Imputed(usize),
+    /// The publication's printed likelihood of silence, `1 - l/N` whatever the state: it cancels in the normalisation.
+    Printed,
+}
+
+/// What is sent, and what the fusion centre makes of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Scheme {
     /// Everything is sent.
@@ -84,7 +95,7 @@ pub(super) enum Scheme {
     /// A coin decides.
     Random,
     /// Censoring, silence ignored (CFoMD), own feedback loop.
-    Deaf,
+    Ignored,
     /// Censoring, silence fused by the Gaussian centre.
     Gaussian(Weighing),
     /// Censoring, silence fused by a bootstrap particle filter.
@@ -96,7 +107,7 @@ pub(super) enum Scheme {
     /// As `Gaussian`, over a link that loses messages; the centre knows the loss rate or believes there is none.
     Lossy { loss: f64, modelled: bool },
     /// No feedback.
-    Blind(NoFeedback),
+    NoFeedback(Method),
     /// No feedback, silence as if each sensor's estimate were scattered about the centre's own (a heuristic).
     Centred,
     /// No feedback, silence with the sensor's estimate given the state but not the data (the paper's law, corrected).
@@ -120,14 +131,16 @@ pub(super) struct Linear<const M: usize> {
     scheduled: Vec<CensoringRule<M>>,
 }
 
+type Sensors<const M: usize> = Network<LinearSensor<2, M>, 2, M>;
+
 /// What all schemes of one trial share.
 struct Draws<const M: usize> {
     truth: Vec<Vector2<f64>>,
     measurements: Vec<Vec<SVector<f64, M>>>,
     coins: Vec<Vec<f64>>,
     losses: Vec<Vec<f64>>,
-    /// What the sensors say without feedback.
-    blind: Vec<Vec<Observation<SVector<f64, M>>>>,
+    /// What arrives from the sensors without feedback.
+    no_feedback: Vec<Vec<Observation<SVector<f64, M>>>>,
 }
 
 /// Measurement dimension that an experiment supports: which of the special schemes exist in it.
@@ -246,14 +259,17 @@ where
             let covariances =
                 expected_covariances(&mut rng, &network, &linear.dynamics, &linear.start, steps, SCHEDULE_RUNS)
                     .map_err(failed)?;
-            let rule = |p: &SMatrix<f64, 2, 2>| network.rule_under(0, p).map_err(failed);
+            let rule = |p: &SMatrix<f64, 2, 2>| {
+                let predicted = Gaussian::from_trusted_parts(Vector2::zeros(), *p);
+                network.rule_under(0, &predicted).map_err(failed)
+            };
             linear.scheduled = covariances.iter().map(rule).collect::<Result<_, _>>()?;
         }
         Ok(linear)
     }
 
-    fn network(&self, loss: f64) -> Result<Network<2, M>, Error> {
-        Network::new(vec![self.sensor; self.sensors], self.threshold, loss).map_err(failed)
+    fn network(&self, loss: f64) -> Result<Sensors<M>, Error> {
+        Network::new(vec![self.sensor; self.sensors], self.threshold, Link::lossy(loss)?).map_err(failed)
     }
 
     fn draw(&self, stream: Stream) -> Result<Draws<M>, Error> {
@@ -261,9 +277,9 @@ where
         let mut noise = stream.named("noise").rng();
         let mut coins = stream.named("coins").rng();
         let mut losses = stream.named("losses").rng();
-        let mut state = self.start.sample(&mut rng)?;
+        let mut state = self.start.sample(&mut rng);
         let mut halves = (0..self.sensors)
-            .map(|_| LocalSensor::new(self.sensor, self.threshold, Format::Double, &self.start))
+            .map(|_| LocalSensor::new(self.sensor, self.threshold, NumberFormat::Double, &self.start))
             .collect::<Result<Vec<_>, _>>()
             .map_err(failed)?;
         let mut draws = Draws {
@@ -271,22 +287,22 @@ where
             measurements: Vec::new(),
             coins: Vec::new(),
             losses: Vec::new(),
-            blind: Vec::new(),
+            no_feedback: Vec::new(),
         };
         for _ in 0..self.steps {
             state = self.dynamics.propagate(&mut rng, &state);
             let measurements: Vec<_> = (0..self.sensors)
                 .map(|_| self.sensor.sample(&mut noise, &state))
                 .collect();
-            let blind = halves
+            let reports = halves
                 .iter_mut()
                 .zip(&measurements)
-                .map(|(half, z)| half.step(&self.dynamics, z).map(|report| report.heard()))
+                .map(|(half, z)| half.step(&mut noise, &self.dynamics, z).map(Observation::from))
                 .collect::<Result<_, _>>()
                 .map_err(failed)?;
             draws.truth.push(state);
             draws.measurements.push(measurements);
-            draws.blind.push(blind);
+            draws.no_feedback.push(reports);
             draws.coins.push((0..self.sensors).map(|_| coins.random()).collect());
             draws.losses.push((0..self.sensors).map(|_| losses.random()).collect());
         }
@@ -306,26 +322,53 @@ where
                 let rate = self.budget.rate();
                 self.values_only(&mut track, |k, i, _, _| draws.coins[k][i] < rate)?;
             }
-            Scheme::Deaf => {
-                self.values_only(&mut track, |k, _, z, prediction| self.own[k].1.speaks(&(z - prediction)))?;
+            Scheme::Ignored => {
+                self.values_only(&mut track, |k, _, z, prediction| self.own[k].1.sends(&(z - prediction)))?;
             }
             Scheme::Gaussian(weighing) => self.gaussian(&mut track, weighing, 0.0, 0.0)?,
             Scheme::Lossy { loss, modelled } => {
                 self.gaussian(&mut track, Weighing::OwnFilter, loss, if modelled { loss } else { 0.0 })?;
             }
-            Scheme::Blind(method) => {
-                let network = self.network(0.0)?;
-                let mut centre =
-                    NoFeedbackCentre::new(network, &self.start, method, self.budget.rate()).map_err(failed)?;
-                let mut rng = track.stream.named("particles").fast_rng();
-                for (k, heard) in draws.blind.iter().enumerate() {
-                    let info = centre.step(&mut rng, &self.dynamics, heard).map_err(failed)?;
-                    track.note(k, &centre.belief(), info.received);
-                }
-            }
+            Scheme::NoFeedback(method) => self
+                .no_feedback(&mut track, method, &self.network(0.0)?)
+                .map_err(failed)?,
+            Scheme::Particles(count, weighing) => self.particles(&mut track, count, weighing)?,
             special => Measured::special(self, special, track)?,
         }
         Ok(record)
+    }
+
+    fn no_feedback(
+        &self,
+        track: &mut Track<'_, M>,
+        method: Method,
+        network: &Sensors<M>,
+    ) -> Result<(), fewbits_cfwmd::Error> {
+        let mut rng = track.stream.named("particles").fast_rng();
+        let mut belief = self.start;
+        let mut gaussian = JointBelief::new(&self.start, self.sensors)?;
+        let particles = if let Method::Imputed(count) = method { count } else { 1 };
+        let mut imputed = ImputedBelief::new(&self.start, self.sensors, particles)?;
+        for (k, observations) in track.draws.no_feedback.iter().enumerate() {
+            let received = observations.iter().filter(|o| o.received().is_some()).count();
+            match method {
+                Method::Ignored | Method::Printed => {
+                    belief = network
+                        .fuse_received(&kalman::predict(&self.dynamics, &belief), observations)?
+                        .0;
+                }
+                Method::Joint => {
+                    gaussian = joint::step(network, &self.dynamics, &gaussian, observations)?.0;
+                    belief = gaussian.state();
+                }
+                Method::Imputed(_) => {
+                    imputed = imputing::step(&mut rng, network, &self.dynamics, &imputed, observations)?.0;
+                    belief = imputed.state();
+                }
+            }
+            track.note(k, &belief, received);
+        }
+        Ok(())
     }
 
     /// A Kalman filter on what is sent, with its own feedback loop.
@@ -354,8 +397,8 @@ where
         &self,
         k: usize,
         weighing: Weighing,
-        network: &Network<2, M>,
-        predicted: &SMatrix<f64, 2, 2>,
+        network: &Sensors<M>,
+        predicted: &Gaussian<2>,
     ) -> Result<Vec<CensoringRule<M>>, Error> {
         let rule = match weighing {
             Weighing::OwnFilter => self.own[k].1.clone(),
@@ -365,8 +408,8 @@ where
         Ok(vec![rule; self.sensors])
     }
 
-    /// What the centre hears of step `k` under these rules, and how many messages were sent.
-    fn hear(
+    /// What arrives in step `k` under these rules, and how many messages were sent.
+    fn observe(
         &self,
         k: usize,
         draws: &Draws<M>,
@@ -376,20 +419,20 @@ where
     ) -> (Vec<Observation<SVector<f64, M>>>, usize) {
         let prediction = self.sensor.matrix() * broadcast;
         let mut sent = 0;
-        let heard = draws.measurements[k]
+        let observations = draws.measurements[k]
             .iter()
             .enumerate()
             .map(|(i, z)| {
-                let speaks = rules[i].speaks(&(z - prediction));
-                sent += usize::from(speaks);
-                if speaks && draws.losses[k][i] >= loss {
+                let sends = rules[i].sends(&(z - prediction));
+                sent += usize::from(sends);
+                if sends && draws.losses[k][i] >= loss {
                     Observation::Received(*z)
                 } else {
-                    Observation::Silent
+                    Observation::Nothing
                 }
             })
             .collect();
-        (heard, sent)
+        (observations, sent)
     }
 
     fn gaussian(&self, track: &mut Track<'_, M>, weighing: Weighing, loss: f64, believed: f64) -> Result<(), Error> {
@@ -397,10 +440,10 @@ where
         let mut belief = self.start;
         for k in 0..self.steps {
             let predicted = kalman::predict(&self.dynamics, &belief);
-            let rules = self.rules(k, weighing, &network, predicted.covariance())?;
-            let (heard, sent) = self.hear(k, track.draws, &rules, predicted.mean(), loss);
+            let rules = self.rules(k, weighing, &network, &predicted)?;
+            let (observations, sent) = self.observe(k, track.draws, &rules, predicted.mean(), loss);
             belief = network
-                .fuse(&predicted, &rules, predicted.mean(), &heard)
+                .fuse(&predicted, &rules, predicted.mean(), &observations)
                 .map_err(failed)?
                 .0;
             track.note(k, &belief, sent);
@@ -408,21 +451,8 @@ where
         Ok(())
     }
 
-    /// A bootstrap filter; `weigh` updates the cloud by what was heard.
-    fn particles(
-        &self,
-        track: &mut Track<'_, M>,
-        count: usize,
-        weighing: Weighing,
-        mut weigh: impl FnMut(
-            &Network<2, M>,
-            &ParticleFilter,
-            &[CensoringRule<M>],
-            &Vector2<f64>,
-            &[Observation<SVector<f64, M>>],
-            &mut Particles<2>,
-        ) -> Result<(), Error>,
-    ) -> Result<(), Error> {
+    /// A bootstrap filter.
+    fn particles(&self, track: &mut Track<'_, M>, count: usize, weighing: Weighing) -> Result<(), Error> {
         let network = self.network(0.0)?;
         let mut rng = track.stream.named("particles").fast_rng();
         let root = semidefinite_factor("initial covariance", self.start.covariance())?;
@@ -435,9 +465,11 @@ where
                 .predict(&mut rng, &self.dynamics, &mut cloud, &mut workspace)
                 .map_err(failed)?;
             let broadcast = cloud.mean();
-            let rules = self.rules(k, weighing, &network, &cloud.covariance_about(&broadcast))?;
-            let (heard, sent) = self.hear(k, track.draws, &rules, &broadcast, 0.0);
-            weigh(&network, &filter, &rules, &broadcast, &heard, &mut cloud)?;
+            let predicted = Gaussian::from_trusted_parts(broadcast, cloud.covariance_about(&broadcast));
+            let rules = self.rules(k, weighing, &network, &predicted)?;
+            let (observations, sent) = self.observe(k, track.draws, &rules, &broadcast, 0.0);
+            let likelihood = network.likelihood(&rules, &broadcast, &observations).map_err(failed)?;
+            filter.update(&mut cloud, &likelihood).map_err(failed)?;
             let mean = cloud.mean();
             let belief = Gaussian::from_trusted_parts(mean, cloud.covariance_about(&mean));
             track.note(k, &belief, sent);
@@ -489,15 +521,6 @@ impl Dimension<1> for Measured {
 
     fn special(linear: &Linear<1>, scheme: Scheme, mut track: Track<'_, 1>) -> Result<(), Error> {
         match scheme {
-            Scheme::Particles(count, weighing) => {
-                let mut likelihood = HeardScalars::new();
-                linear.particles(&mut track, count, weighing, |network, filter, rules, broadcast, heard, cloud| {
-                    network
-                        .hear(rules, broadcast, heard, count, &mut likelihood)
-                        .map_err(failed)?;
-                    filter.update(&likelihood, cloud).map(drop).map_err(failed)
-                })
-            }
             Scheme::RaoBlackwell(count) => linear.rao_blackwell(&mut track, count),
             Scheme::Trigger(weighing) => linear.trigger(&mut track, weighing),
             _ => linear.heuristic(&mut track, scheme == Scheme::Centred),
@@ -515,15 +538,7 @@ impl Dimension<2> for Measured {
         LinearSensor::new(SMatrix::identity(), covariance).map_err(failed)
     }
 
-    fn special(linear: &Linear<2>, scheme: Scheme, mut track: Track<'_, 2>) -> Result<(), Error> {
-        match scheme {
-            Scheme::Particles(count, weighing) => {
-                linear.particles(&mut track, count, weighing, |network, filter, rules, broadcast, heard, cloud| {
-                    let likelihood = HeardVectors::new(network, rules, broadcast, heard).map_err(failed)?;
-                    filter.update(&likelihood, cloud).map(drop).map_err(failed)
-                })
-            }
-            other => Err(Error::Table(format!("{other:?} exists for scalar measurements only"))),
-        }
+    fn special(_: &Linear<2>, scheme: Scheme, _: Track<'_, 2>) -> Result<(), Error> {
+        Err(Error::Table(format!("{scheme:?} exists for scalar measurements only")))
     }
 }

@@ -4,10 +4,10 @@ use crate::AnyFigure;
 use crate::legacy::Old;
 
 mod beyond;
-mod blind;
 mod case;
 mod ensemble;
 mod linear;
+mod no_feedback;
 mod nonlinear;
 mod scalar;
 mod vector;
@@ -19,7 +19,7 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
         const { &Old(Simulated::<scalar::Fig1>::new()) },
         const { &Old(Simulated::<scalar::Fig2>::new()) },
-        const { &Old(Simulated::<blind::Fig3>::new()) },
+        const { &Old(Simulated::<no_feedback::Fig3>::new()) },
         const { &Old(Simulated::<vector::Fig4>::new()) },
         const { &Old(Simulated::<vector::Fig5>::new()) },
         const { &Old(Simulated::<vector::Fig6>::new()) },
@@ -33,6 +33,6 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         const { &Old(Simulated::<beyond::Lossy>::new()) },
         const { &Old(Simulated::<beyond::Scheduled>::new()) },
         const { &Old(Simulated::<beyond::Cost>::new()) },
-        const { &Old(Simulated::<blind::NoFeedbackFigure>::new()) },
+        const { &Old(Simulated::<no_feedback::NoFeedbackFigure>::new()) },
     ]
 }

@@ -5,10 +5,10 @@ pub(super) mod figures;
 use super::ensemble::{Ensemble, Record};
 use crate::error::Error;
 use crate::legacy::Context;
-use fewbits_cfwmd::particle::HeardScalars;
+use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Dynamics, Gaussian, Sensing};
+use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
 use fewbits_models::{LinearGaussian, ReceivedPower, constant_velocity_2d};
@@ -60,16 +60,16 @@ impl Field {
     }
 }
 
-/// What is sent, and whether silence is heard.
+/// What is sent, and whether silence is fused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Scheme {
     All,
     Random,
     /// Censored, silence ignored.
-    Deaf,
-    /// Censored with each sensor's own linearised recursion, silence heard.
+    Ignored,
+    /// Censored with each sensor's own linearised recursion, silence fused.
     State,
-    /// Censored with the particles' covariance, silence heard.
+    /// Censored with the particles' covariance, silence fused.
     StateAndCovariance,
 }
 
@@ -78,10 +78,10 @@ type Named = (&'static str, Scheme);
 const FOUR: [Named; 4] = [
     ("all", Scheme::All),
     ("random", Scheme::Random),
-    ("CFoMD", Scheme::Deaf),
+    ("CFoMD", Scheme::Ignored),
     ("CFwMD", Scheme::State),
 ];
-const HEARD: [Named; 2] = [("CFwMD", Scheme::State), ("CFwMD2", Scheme::StateAndCovariance)];
+const FUSED: [Named; 2] = [("CFwMD", Scheme::State), ("CFwMD2", Scheme::StateAndCovariance)];
 
 struct World {
     dynamics: LinearGaussian<4, 2>,
@@ -128,7 +128,7 @@ impl World {
         let mut noise = stream.named("noise").rng();
         let mut coins = stream.named("coins").rng();
         let mut state = if self.drawn_start {
-            self.start.sample(&mut rng)?
+            self.start.sample(&mut rng)
         } else {
             *self.start.mean()
         };
@@ -163,46 +163,46 @@ impl World {
         let mut rng = stream.fast_rng();
         let mut cloud = self.cloud(&mut rng)?;
         let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Always);
-        let (mut workspace, mut heard) = (Workspace::default(), HeardScalars::new());
+        let mut workspace = Workspace::default();
+        let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT).map_err(failed)?;
+        let always = CensoringRule::scalar(1.0, 0.0).map_err(failed)?;
         let mut own = vec![OwnRecursion::new(&self.start); self.sensors.len()];
         // What the fusion centre fed back last: its estimate and, for the second variant, its covariance.
         let mut fed_back = self.start;
         let mut record = Record::default();
         for k in 0..self.steps {
             let expected = self.dynamics.mean(fed_back.mean());
-            heard.clear();
-            let mut sent = 0;
+            let (mut rules, mut observations) = (Vec::new(), Vec::new());
             for (i, sensor) in self.sensors.iter().enumerate() {
-                let z = draws.measurements[k][i];
-                let prediction = sensor.mean(&expected)[0];
+                let z = Vector1::new(draws.measurements[k][i]);
                 let rule = match scheme {
-                    Scheme::All | Scheme::Random => None,
+                    Scheme::All | Scheme::Random => always.clone(),
                     Scheme::StateAndCovariance => {
-                        Some(CensoringRule::under(&self.dynamics, sensor, &fed_back, threshold).map_err(failed)?)
+                        CensoringRule::under(&self.dynamics, sensor, &fed_back, threshold).map_err(failed)?
                     }
-                    Scheme::Deaf | Scheme::State => {
+                    Scheme::Ignored | Scheme::State => {
                         let step = own[i]
                             .advance(&self.dynamics, sensor, fed_back.mean())
                             .map_err(failed)?;
-                        Some(CensoringRule::new(&step.innovation_covariance, threshold).map_err(failed)?)
+                        CensoringRule::new(&step.innovation_covariance, threshold).map_err(failed)?
                     }
                 };
-                let speaks = match (&rule, scheme) {
-                    (Some(rule), _) => rule.speaks(&Vector1::new(z - prediction)),
-                    (None, Scheme::Random) => draws.coins[k][i] < budget.rate(),
-                    (None, _) => true,
+                let sends = match scheme {
+                    Scheme::Random => draws.coins[k][i] < budget.rate(),
+                    _ => rule.sends(&(z - sensor.mean(&expected))),
                 };
-                if speaks {
-                    sent += 1;
-                    heard.values(sensor, std::iter::once(z)).map_err(failed)?;
-                } else if let (Some(rule), Scheme::State | Scheme::StateAndCovariance) = (&rule, scheme) {
-                    heard
-                        .silence(sensor, prediction, rule.half_width(), 0.0, 1, self.particles)
-                        .map_err(failed)?;
-                }
+                observations.push(match scheme {
+                    _ if sends => Observation::Received(z),
+                    Scheme::State | Scheme::StateAndCovariance => Observation::Nothing,
+                    // To a filter that ignores silence it is no more than an erased report.
+                    _ => Observation::Erased,
+                });
+                rules.push(rule);
             }
+            let sent = observations.iter().filter(|o| o.received().is_some()).count();
+            let likelihood = network.likelihood(&rules, &expected, &observations).map_err(failed)?;
             filter
-                .step_in_place(&mut rng, &self.dynamics, &heard, &mut cloud, &mut workspace)
+                .step_in_place(&mut rng, &self.dynamics, &mut cloud, &likelihood, &mut workspace)
                 .map_err(failed)?;
             let mean = cloud.mean();
             let covariance = match scheme {
@@ -213,7 +213,7 @@ impl World {
             let error = draws.truth[k] - mean;
             record.position.push(error[0] * error[0] + error[2] * error[2]);
             record.velocity.push(error[1] * error[1] + error[3] * error[3]);
-            record.sent.push(f64::from(sent));
+            record.sent.push(sent as f64);
         }
         Ok(record)
     }

@@ -43,7 +43,7 @@ impl Case for Fig1 {
         let schemes = [
             ("all", Scheme::All),
             ("random", Scheme::Random),
-            ("CFoMD", Scheme::Deaf),
+            ("CFoMD", Scheme::Ignored),
             ("CFwMD", Scheme::Gaussian(Weighing::OwnFilter)),
             ("CFwMD particles", Scheme::Particles(particles, Weighing::OwnFilter)),
             ("CFwMD2", Scheme::Gaussian(Weighing::FusionCentre)),

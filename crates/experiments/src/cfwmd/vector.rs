@@ -1,15 +1,14 @@
 //! Vector measurements: figures 4, 5 and 6, table II.
 
 use super::case::Case;
-use super::ensemble::{Ensemble, Part, agrees, beats, ordered_at_every_step, value};
-use super::linear::{Scheme, Setting, run};
+use super::ensemble::{Ensemble, Part, agrees, beats, first, ordered_at_every_step, value};
+use super::linear::{Method, Scheme, Setting, run};
 use super::scalar::{printed_rates, rate_plot, rate_table};
 use crate::error::Error;
 use crate::legacy::claim::Claim;
 use crate::legacy::{About, Context};
 use crate::legacy::{Table, Tables};
 use crate::plot::Plot;
-use fewbits_cfwmd::no_feedback::NoFeedback;
 use fewbits_cfwmd::rule::Weighing;
 
 /// The two acceleration variances: the one that fits the printed table, and the one the text states.
@@ -68,13 +67,13 @@ impl Case for Fig4 {
         let schemes = [
             ("all", Scheme::All),
             ("random", Scheme::Random),
-            ("CFoMD", Scheme::Deaf),
+            ("CFoMD", Scheme::Ignored),
             ("CFwMD", own),
         ];
         let suffixed = [
             ("all 4", Scheme::All),
             ("random 4", Scheme::Random),
-            ("CFoMD 4", Scheme::Deaf),
+            ("CFoMD 4", Scheme::Ignored),
             ("CFwMD 4", own),
         ];
         let mut all = both(context, setting, &schemes, &suffixed)?;
@@ -209,7 +208,7 @@ impl Case for Fig5 {
         }
         // The stated variance contradicts the paper's claim at l = 1.
         let stated = paired.only("first", "CFwMD2 4")?.only("l", 1.0)?;
-        let z = stated.numbers("pos_mse_difference_m2")?[0] / stated.numbers("pos_se")?[0];
+        let z = first(stated.numbers("pos_mse_difference_m2")?)? / first(stated.numbers("pos_se")?)?;
         claims.push(Claim::above("stated-variance-fails", "at the stated acceleration variance CFwMD2 is not better at l = 1 (paired difference in standard errors)", z, -2.0).at_defaults());
         Ok(claims)
     }
@@ -245,20 +244,20 @@ impl Case for Fig6 {
     }
 
     fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        let joint = Scheme::Blind(NoFeedback::AssumedDensity);
+        let joint = Scheme::NoFeedback(Method::Joint);
         let schemes = [
             ("all", Scheme::All),
             ("CFwMD", joint),
-            ("CFoMD", Scheme::Blind(NoFeedback::Ignore)),
+            ("CFoMD", Scheme::NoFeedback(Method::Ignored)),
             ("random", Scheme::Random),
         ];
-        let suffixed = [("CFwMD 4", joint), ("CFoMD 4", Scheme::Blind(NoFeedback::Ignore))];
+        let suffixed = [("CFwMD 4", joint), ("CFoMD 4", Scheme::NoFeedback(Method::Ignored))];
         let mut all = both(context, setting, &schemes, &suffixed)?;
         let few = Setting {
             trials: setting.trials.min(PARTICLE_TRIALS),
             ..setting.clone()
         };
-        let exact = Scheme::Blind(NoFeedback::RaoBlackwell(setting.particles as usize));
+        let exact = Scheme::NoFeedback(Method::Imputed(setting.particles as usize));
         all.extend(both(
             context,
             &few,

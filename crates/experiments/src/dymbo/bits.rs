@@ -96,7 +96,11 @@ impl Figure for WordLength {
     }
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        let cases: Vec<_> = p.plants.iter().flat_map(|at| p.bits.iter().map(move |bits| (*at, *bits))).collect();
+        let cases: Vec<_> = p
+            .plants
+            .iter()
+            .flat_map(|at| p.bits.iter().map(move |bits| (*at, *bits)))
+            .collect();
         let row = |&(plant, bits): &(Plant, usize)| {
             let filter = MultibitFilter::new(plant.model()?, bits)?;
             let (kalman, c) = (plant.kalman_variance()?, filter.information());
@@ -136,7 +140,9 @@ impl Figure for WordLength {
             let plant = curve[0].plant;
             let what = format!("{}: every bit helps", plant.title());
             let losses = curve.iter().map(|r| r.loss);
-            claims.decreasing(format!("falls-{}-{}", plant.a, plant.gamma), what, losses).at_defaults();
+            claims
+                .decreasing(format!("falls-{}-{}", plant.a, plant.gamma), what, losses)
+                .at_defaults();
         }
         let key = |r: &Row| format!("{} {}", r.plant, r.bits);
         let first = rows.words.iter().filter(|r| Some(&r.plant) == p.plants.first());
@@ -145,7 +151,9 @@ impl Figure for WordLength {
         claims.references("mse", "exact error at a, gamma, bits", &rows.words, |r| (key(r), r.exact_mse));
         let longer = rows.words.iter().filter(|r| r.bits > 1);
         let what = "from two bits on the prediction is exact to 0.03 %";
-        claims.all("riccati", what, longer, |r| (r.exact_mse / r.riccati - 1.0).abs() <= 3e-4).at_defaults();
+        claims
+            .all("riccati", what, longer, |r| (r.exact_mse / r.riccati - 1.0).abs() <= 3e-4)
+            .at_defaults();
         let rows = &rows.successive;
         let columns: [(&str, fn(&Successive) -> f64); 4] = [
             ("claimed", |r| r.claimed),

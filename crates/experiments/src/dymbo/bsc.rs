@@ -117,7 +117,9 @@ impl Figure for NoisyBits {
         claims.references("cost", what, rows, |r| (key(r), r.naive_mse / r.aware_mse - 1.0));
         let rare = rows.iter().filter(|r| r.crossover == 0.01);
         let what = "at one inverted bit in a hundred knowing changes less than 0.01 %";
-        claims.all("rare", what, rare, |r| (r.naive_mse / r.aware_mse - 1.0).abs() <= 1e-4).at_defaults();
+        claims
+            .all("rare", what, rare, |r| (r.naive_mse / r.aware_mse - 1.0).abs() <= 1e-4)
+            .at_defaults();
         let fast = rows.iter().filter(|r| r.plant.gamma == 0.5);
         let under = fast.map(|r| r.aware_mse / r.riccati - 1.0).fold(0.0, f64::max);
         let what = "gamma = 0.5: the prediction is too low by up to 1.6 %";
@@ -133,7 +135,8 @@ impl Figure for NoisyBits {
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
         let panel = |rows: &[Row]| {
             let curve = |of: fn(&Row) -> f64| points(rows, |r| (r.crossover, of(r)));
-            let (x, y) = (Axis::linear("probability that a bit is inverted"), Axis::linear("mean squared error / sigma^2"));
+            let (x, y) =
+                (Axis::linear("probability that a bit is inverted"), Axis::linear("mean squared error / sigma^2"));
             Panel::new(rows[0].plant.title(), x, y)
                 .with(Layer::line("knows, exact", curve(|r| r.aware_mse)).coloured(0))
                 .with(Layer::dashed("knows, predicted", curve(|r| r.riccati)).coloured(2))

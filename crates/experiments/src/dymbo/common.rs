@@ -37,7 +37,8 @@ impl Plant {
 
     /// The belief about a plant that has run for ever.
     pub(super) fn stationary(&self) -> Result<Gaussian<1>, Error> {
-        Ok(Gaussian::scalar(0.0, self.model()?.dynamics().stationary_variance()?)?)
+        let variance = self.model()?.dynamics().stationary_variance();
+        Ok(Gaussian::scalar(0.0, variance.map_err(Error::failed)?)?)
     }
 
     /// Title of a panel.

@@ -157,9 +157,7 @@ impl Figure for LostBits {
         let printed = || rows.iter().filter(|r| [0.1, 0.3, 0.5].contains(&r.loss));
         let what = "the bound is tight to 0.35 %";
         claims
-            .all("tight", what, printed(), |r| {
-                r.bound <= 1.0035 * r.mean_variance.value + noise(r.mean_variance)
-            })
+            .all("tight", what, printed(), |r| r.bound <= 1.0035 * r.mean_variance.value + noise(r.mean_variance))
             .at_defaults();
         let what = "the error is the computed variance within 0.5 %";
         claims
@@ -169,7 +167,11 @@ impl Figure for LostBits {
             .at_defaults();
         for r in rows.iter().filter(|r| r.loss == 0.0) {
             let what = format!("gamma = {}: without loss it is the steady variance", r.plant.gamma);
-            let ratio = r.plant.sign_bit_variance().ok().map(|steady| r.mean_variance.value / steady);
+            let ratio = r
+                .plant
+                .sign_bit_variance()
+                .ok()
+                .map(|steady| r.mean_variance.value / steady);
             claims.near(format!("clean-{}", r.plant.gamma), what, ratio, 1.0, 1e-6);
         }
     }

@@ -121,7 +121,10 @@ impl Figure for Loss {
                 push("riccati", level, a, steady::noise_ratio_at_loss(level, a)?);
             }
         }
-        let exact = p.exact_a.par_iter().map(|a| Ok((*a, chain::noise_ratio_at_loss(2.0, *a)?)));
+        let exact = p
+            .exact_a
+            .par_iter()
+            .map(|a| Ok((*a, chain::noise_ratio_at_loss(2.0, *a)?)));
         for (a, gamma) in exact.collect::<Result<Vec<_>, Error>>()? {
             push("exact", 2.0, a, gamma);
         }
@@ -135,7 +138,10 @@ impl Figure for Loss {
         let what = "largest loss over |a| <= 1, gamma <= 1, at the corner";
         let corner = (PI / 4.0 * (1.0 + (1.0 + 8.0 / PI).sqrt()) - 1.0) / ((5.0_f64.sqrt() - 1.0) / 2.0);
         claims.near("corner", what, loss(1.0, 1.0), corner, 1e-12);
-        for (kind, what) in [("riccati", "noise ratio of loss 2 at a"), ("exact", "noise ratio of exact loss 2 at a")] {
+        for (kind, what) in [
+            ("riccati", "noise ratio of loss 2 at a"),
+            ("exact", "noise ratio of exact loss 2 at a"),
+        ] {
             let double = rows.contours.iter().filter(|c| c.kind == kind && c.level == 2.0);
             claims.references(&format!("double-{kind}"), what, double, |c| (c.a.to_string(), c.gamma));
         }
@@ -146,9 +152,13 @@ impl Figure for Loss {
         claims.near("exact-double-gamma-1", "exact loss 2 at gamma = 1", root, 0.971111, 1e-6);
         let exact = || rows.plane.iter().filter_map(|r| Some(r.loss_true? / r.loss_riccati));
         let what = "the exact loss is nowhere below the Riccati loss";
-        claims.all("exact-above", what, exact(), |ratio| ratio >= 1.0 - 1e-10).at_defaults();
+        claims
+            .all("exact-above", what, exact(), |ratio| ratio >= 1.0 - 1e-10)
+            .at_defaults();
         let what = "the Riccati loss is right to 6 % on the whole grid";
-        claims.all("exact-close", what, exact(), |ratio| ratio <= 1.06).at_defaults();
+        claims
+            .all("exact-close", what, exact(), |ratio| ratio <= 1.06)
+            .at_defaults();
         let named = super::common::plants([(0.9, 0.5), (0.9, 1.0), (1.0, 1.0)]);
         let exact = |plant: Plant| plant.model().ok().and_then(|model| chain::true_loss(&model).ok());
         claims.references("exact", "exact loss at a, gamma", named, |plant| (plant.to_string(), exact(plant)));
@@ -177,15 +187,25 @@ impl Figure for Loss {
 /// Monotone and even, on a grid finer than the table's.
 fn shapes(claims: &mut Claims) {
     let gammas = log_spaced(-3.0, 1.0, 400);
-    let line = |a: f64| gammas.iter().map(|g| loss(a, *g).unwrap_or(f64::NAN)).collect::<Vec<_>>();
+    let line = |a: f64| {
+        gammas
+            .iter()
+            .map(|g| loss(a, *g).unwrap_or(f64::NAN))
+            .collect::<Vec<_>>()
+    };
     let a = |i: usize| i as f64 / 200.0;
     let (plane, mirrored): (Vec<_>, Vec<_>) = (0..=200).map(|i| (line(a(i)), line(-a(i)))).unzip();
     let pairs = plane.windows(2).flat_map(|w| w[0].iter().zip(&w[1]));
     claims.all("rises-with-a", "the loss increases strictly with |a| (201 x 400 plants)", pairs, |(b, l)| b < l);
     let pairs = plane.iter().flat_map(|line| line.windows(2));
-    claims.all("rises-with-gamma", "the loss increases strictly with gamma (201 x 400 plants)", pairs, |w| w[0] < w[1]);
+    claims.all("rises-with-gamma", "the loss increases strictly with gamma (201 x 400 plants)", pairs, |w| {
+        w[0] < w[1]
+    });
     claims.all("even", "the loss is even in a", plane.iter().zip(&mirrored), |(l, m)| l == m);
-    let cells = plane.iter().enumerate().flat_map(|(i, line)| gammas.iter().zip(line).map(move |(g, l)| (a(i), *g, *l)));
+    let cells = plane
+        .iter()
+        .enumerate()
+        .flat_map(|(i, line)| gammas.iter().zip(line).map(move |(g, l)| (a(i), *g, *l)));
     let low = cells.filter(|(a, gamma, _)| *a <= 0.979 && *gamma <= 1.0 || *gamma <= 0.926);
     let what = "E4: the loss is below 2 for |a| <= 0.979 and gamma <= 1, or gamma <= 0.926";
     claims.all("below-two", what, low, |(.., loss)| loss < 2.0);

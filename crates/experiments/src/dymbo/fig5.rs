@@ -264,7 +264,9 @@ impl Figure for Convergence {
         claims.all_within("kf-exact", what, rows, |r| (r.kf_mse, r.kf_pred), 4.5);
         let steady = |nees: f64| (0.9995..=1.0030).contains(&nees);
         let what = "exact normalised error within [0.9995, 1.0030] at every step";
-        claims.all("consistent", what, rows, |r| steady(r.dymbo_exact / r.dymbo_pred)).at_defaults();
+        claims
+            .all("consistent", what, rows, |r| steady(r.dymbo_exact / r.dymbo_pred))
+            .at_defaults();
         let what = "normalised error of the prior-aware start within 4.5 standard errors of the same interval";
         claims
             .all("informed-consistent", what, rows, |r| {
@@ -274,9 +276,16 @@ impl Figure for Convergence {
             .at_defaults();
         for curve in rows.chunks(p.steps + 1) {
             let gamma = curve[0].plant.gamma;
-            let late: Moments = curve.iter().skip(30).map(|r| r.dymbo_mse.value / r.dymbo_minf).collect();
-            let what = format!("gamma = {gamma}: simulated error over n >= 30 is the predicted steady variance within 2 %");
-            claims.near(format!("steady-{gamma}"), what, late.mean(), 1.0, 0.02).at_defaults();
+            let late: Moments = curve
+                .iter()
+                .skip(30)
+                .map(|r| r.dymbo_mse.value / r.dymbo_minf)
+                .collect();
+            let what =
+                format!("gamma = {gamma}: simulated error over n >= 30 is the predicted steady variance within 2 %");
+            claims
+                .near(format!("steady-{gamma}"), what, late.mean(), 1.0, 0.02)
+                .at_defaults();
         }
         let key = |r: &Row| format!("{} {}", r.plant, r.n);
         claims.references("exact", "exact sign-bit error at a, gamma, n", rows, |r| (key(r), r.dymbo_exact));
@@ -325,7 +334,11 @@ impl Figure for Convergence {
             panels.push(
                 Panel::new(curve[0].plant.title(), x, y)
                     .with(Layer::line("Kalman, exact", line(|r| r.kf_pred)).coloured(0))
-                    .with(marks("Kalman, simulated", |r| r.kf_mse).coloured(0).marked(Marker::Square))
+                    .with(
+                        marks("Kalman, simulated", |r| r.kf_mse)
+                            .coloured(0)
+                            .marked(Marker::Square),
+                    )
                     .with(Layer::line("sign bit, exact", line(|r| r.dymbo_exact)).coloured(1))
                     .with(marks("sign bit, simulated", |r| r.dymbo_mse).coloured(1))
                     .with(

@@ -218,7 +218,8 @@ impl Figure for GapToExact {
         claims.references("excess", what, of(1), |r| (r.plant.to_string(), r.excess));
         let what = "the same in percent of the minimum error, at a, gamma";
         claims.references("percent", what, of(1), |r| (r.plant.to_string(), r.excess.scaled(100.0 / r.mmse)));
-        let what = "percent that two-bit words leave to the exact posterior: at most .03 at a = .9, .08 at a = 1, and a tenth";
+        let what =
+            "percent that two-bit words leave to the exact posterior: at most .03 at a = .9, .08 at a = 1, and a tenth";
         claims
             .all("two-bits", what, of(2).filter(|r| r.plant.a != 0.99), |r| {
                 let most = if r.plant.a < 1.0 { 0.033 } else { 0.088 };
@@ -242,12 +243,19 @@ impl Figure for GapToExact {
             let shares = points(curve, |r| (r.n as f64, r.excess / r.mmse));
             left = left.with(Layer::line(curve[0].plant.title(), shares).coloured(i));
         }
-        let names = p.plants.iter().enumerate().map(|(i, p)| (i as f64, format!("{}, {}", p.a, p.gamma)));
+        let names = p
+            .plants
+            .iter()
+            .enumerate()
+            .map(|(i, p)| (i as f64, format!("{}, {}", p.a, p.gamma)));
         let x = Axis::linear("plant a, gamma")
             .named(names)
             .between(-0.5, p.plants.len() as f64 - 0.5);
         let mut right = Panel::new("Steady state", x, y);
-        for (bits, label, marker) in [(1, "one bit a sample", Marker::Circle), (2, "two bits a sample", Marker::Square)] {
+        for (bits, label, marker) in [
+            (1, "one bit a sample", Marker::Circle),
+            (2, "two bits a sample", Marker::Square),
+        ] {
             let those = rows.steady.iter().filter(|r| r.bits == bits).enumerate();
             let shares = Layer::measured(label, those, |(i, r)| (i as f64, r.excess.scaled(1.0 / r.mmse)));
             right = right.with(shares.coloured(bits + 3).marked(marker));

@@ -97,7 +97,9 @@ impl Figure for PosteriorShape {
             })
         };
         let noise = p.sigma.iter().copied().fold(f64::INFINITY, f64::min).powi(2);
-        let after = InCell::sign(Sign::Above, 0.0, noise, &Link::PERFECT)?.tilted(&prior)?;
+        let after = InCell::sign(Sign::Above, 0.0, noise, &Link::PERFECT)?
+            .tilted(&prior)
+            .map_err(Error::failed)?;
         let density = |i: i32| {
             let theta = p.sigma_theta * f64::from(i) / 50.0;
             Density {
@@ -116,12 +118,18 @@ impl Figure for PosteriorShape {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let rows = &rows.distances;
         let what = "the posterior becomes normal as the noise grows";
-        claims.decreasing("converges", what, rows.iter().map(|r| r.distance)).at_defaults();
+        claims
+            .decreasing("converges", what, rows.iter().map(|r| r.distance))
+            .at_defaults();
         claims.references("distance", "largest difference at sigma", rows, |r| (r.sigma.to_string(), r.distance));
         let ratio = rows.windows(2).last().map(|w| w[0].distance / w[1].distance);
-        claims.near("cubic", "twice the noise, an eighth of the difference", ratio, 8.0, 0.01).at_defaults();
+        claims
+            .near("cubic", "twice the noise, an eighth of the difference", ratio, 8.0, 0.01)
+            .at_defaults();
         let constant = rows.last().map(|r| r.cubed);
-        claims.near("constant", "constant of the cubic law", constant, 0.0200, 5e-5).at_defaults();
+        claims
+            .near("constant", "constant of the cubic law", constant, 0.0200, 5e-5)
+            .at_defaults();
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {

@@ -86,10 +86,14 @@ impl Figure for SeveralSensors {
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let plants = each(p.a, &p.gamma);
-        let cases: Vec<_> = plants.iter().flat_map(|plant| p.sensors.iter().map(move |k| (*plant, *k))).collect();
+        let cases: Vec<_> = plants
+            .iter()
+            .flat_map(|plant| p.sensors.iter().map(move |k| (*plant, *k)))
+            .collect();
         let row = |&(plant, k): &(Plant, usize)| {
             let model = plant.model()?;
-            let fused = |fusion| -> Result<_, Error> { Ok(chain::parallel_mse(&ParallelFilter::new(model, k, fusion)?)?) };
+            let fused =
+                |fusion| -> Result<_, Error> { Ok(chain::parallel_mse(&ParallelFilter::new(model, k, fusion)?)?) };
             let (parallel_mse, parallel) = fused(CountFusion::Linear)?;
             let (table_mse, table) = fused(CountFusion::Exact)?;
             let together = ScalarPlant::new(plant.a, plant.gamma, 1.0 / k as f64)?;
@@ -119,7 +123,10 @@ impl Figure for SeveralSensors {
             let what = format!("{what}, at a, gamma, sensors");
             claims.references(quantity, &what, rows, |r| (format!("{} {}", r.plant, r.sensors), of(r)));
         }
-        let at = |k: usize| rows.iter().find(|r| r.plant == Plant { a: 0.9, gamma: 0.5 } && r.sensors == k);
+        let at = |k: usize| {
+            rows.iter()
+                .find(|r| r.plant == Plant { a: 0.9, gamma: 0.5 } && r.sensors == k)
+        };
         let two = at(2).zip(at(1));
         let what = "gamma = 0.5: by computed variance two one-bit sensors in turn beat one unquantized sensor";
         let ratio = two.map(|(two, one)| two.sequential / one.kalman);

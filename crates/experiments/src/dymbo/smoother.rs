@@ -136,9 +136,13 @@ impl Figure for Smoothing {
         claims.references("predicted", what, rows, |r| (key(r), r.predicted));
         let at = |gamma: f64, lag: usize| rows.iter().find(|r| r.plant == Plant { a: 0.9, gamma } && r.lag == lag);
         for (gamma, lag, saving) in [(0.5, 5, 0.28), (0.05, 20, 0.21)] {
-            let saved = at(gamma, lag).zip(at(gamma, 0)).map(|(r, now)| 1.0 - r.rts_mse.value / now.rts_mse.value);
+            let saved = at(gamma, lag)
+                .zip(at(gamma, 0))
+                .map(|(r, now)| 1.0 - r.rts_mse.value / now.rts_mse.value);
             let what = format!("gamma = {gamma}: a lag of {lag} saves this share of the filter's error");
-            claims.near(format!("saves-{gamma}"), what, saved, saving, 0.01).at_defaults();
+            claims
+                .near(format!("saves-{gamma}"), what, saved, saving, 0.01)
+                .at_defaults();
         }
         let slow = rows.iter().filter(|r| r.plant.gamma == 0.5);
         let what = "gamma = 0.5: within 0.14 % of the exact smoother at every lag, less 4.5 standard errors";

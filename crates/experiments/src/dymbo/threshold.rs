@@ -19,7 +19,7 @@ const ID: &str = "dymbo-threshold";
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// Plants, `a:gamma`; the state starts from its stationary law.
-    #[garde(length(min = 1), inner(custom(stationary)), dive)]
+    #[garde(length(min = 1), custom(stationary), dive)]
     plants: Vec<Plant>,
     /// Steps of a run that are measured.
     #[garde(range(min = 1, max = 10_000))]
@@ -41,8 +41,8 @@ pub struct Parameters {
     unstable_trials: u64,
 }
 
-fn stationary(plant: &Plant, _: &()) -> garde::Result {
-    if plant.a.abs() < 1.0 {
+fn stationary(plants: &[Plant], (): &()) -> garde::Result {
+    if plants.iter().all(|plant| plant.a.abs() < 1.0) {
         return Ok(());
     }
     Err(garde::Error::new("a must be above -1 and below 1"))

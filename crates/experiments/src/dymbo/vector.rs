@@ -37,12 +37,14 @@ pub struct Parameters {
     trials: u64,
 }
 
-fn stable(transition: &[f64], _: &()) -> garde::Result {
+fn stable(transition: &[f64], (): &()) -> garde::Result {
     let matrix = Matrix2::from_row_slice(transition.get(..4).unwrap_or(&[0.0; 4]));
     let stable = LinearGaussian::with_covariance(matrix, Matrix2::identity())
         .and_then(|dynamics| dynamics.stationary_covariance())
         .is_ok();
-    stable.then_some(()).ok_or_else(|| garde::Error::new("not a stable matrix"))
+    stable
+        .then_some(())
+        .ok_or_else(|| garde::Error::new("not a stable matrix"))
 }
 
 impl Default for Parameters {
@@ -63,11 +65,11 @@ const BURN: usize = 15;
 impl Parameters {
     fn dynamics(&self) -> Result<LinearGaussian<2, 2>, Error> {
         let noise = Matrix2::identity() * self.process_variance;
-        Ok(LinearGaussian::with_covariance(Matrix2::from_row_slice(&self.transition), noise)?)
+        LinearGaussian::with_covariance(Matrix2::from_row_slice(&self.transition), noise).map_err(Error::failed)
     }
 
     fn sensor(&self, direction: [f64; 2]) -> Result<ScalarSensor<2>, Error> {
-        Ok(ScalarSensor::scalar(Vector2::from(direction), self.measurement_variance)?)
+        ScalarSensor::scalar(Vector2::from(direction), self.measurement_variance).map_err(Error::failed)
     }
 
     fn one(&self) -> Result<Filter<1>, Error> {
@@ -108,7 +110,7 @@ fn kalman<const M: usize>(filter: &Filter<M>) -> Result<Matrix2<f64>, Error> {
     let rows = filter.sensors().map(|sensor| sensor.direction());
     let matrix = SMatrix::<f64, M, 2>::from_fn(|i, j| rows[i][j]);
     let noise = SMatrix::<f64, M, M>::from_diagonal_element(filter.sensors()[0].noise_variance());
-    let sensing = LinearSensor::new(matrix, noise)?;
+    let sensing = LinearSensor::new(matrix, noise).map_err(Error::failed)?;
     Ok(steady_state(filter.dynamics(), &sensing)?.filtered_covariance)
 }
 
@@ -123,13 +125,13 @@ struct RunMeans {
 fn one_run<const M: usize>(
     filter: &Filter<M>,
     order: Order,
-    exact: &PlaneFilter,
+    exact: &PlaneFilter<LinearGaussian<2, 2>>,
     steps: usize,
     stream: Stream,
 ) -> Result<RunMeans, fewbits_dymbo::Error> {
     let mut rng = stream.fast_rng();
     let mut belief = Gaussian::from_trusted_parts(Vector2::zeros(), order.steady(filter)?.filtered_covariance);
-    let mut density = exact.normal(belief.mean(), belief.covariance())?;
+    let mut density = exact.normal(&belief)?;
     let mut state = belief.sample(&mut rng);
     let mut means = RunMeans::default();
     for n in 0..BURN + steps {
@@ -152,12 +154,14 @@ fn one_run<const M: usize>(
         if order == Order::AtOnce {
             belief = filter.update_parallel(&ahead, &observations)?.0;
         }
-        exact.update(&mut density, |x| {
+        density.update_with(|x| {
             let seen = filter.sensors().iter().zip(&factors);
-            seen.map(|(sensor, factor)| factor.log_likelihood(&sensor.mean(x))).sum()
+            seen.map(|(sensor, factor)| factor.log_likelihood(&sensor.mean(x)))
+                .sum()
         })?;
         if n >= BURN {
-            let (mean, covariance) = exact.moments(&density);
+            let exact = density.moments();
+            let (mean, covariance) = (exact.mean(), exact.covariance());
             let share = 1.0 / steps as f64;
             means.trace += share * covariance.trace();
             means.excess += share * (belief.mean() - mean).norm_squared();
@@ -212,13 +216,18 @@ impl Row {
     ) -> Result<Self, Error> {
         let exact = PlaneFilter::new(filter.dynamics(), SPACING)?;
         let stream = context.stream(ID).named(scheme);
-        let sums = context.tally(stream, p.trials, || [Moments::default(); 3], |sums, trial| {
-            let run = one_run(filter, order, &exact, p.steps, trial.stream)?;
-            sums[0].add(run.trace);
-            sums[1].add(run.excess);
-            sums[2].add(run.nees);
-            Ok::<_, fewbits_dymbo::Error>(())
-        })?;
+        let sums = context.tally(
+            stream,
+            p.trials,
+            || [Moments::default(); 3],
+            |sums, trial| {
+                let run = one_run(filter, order, &exact, p.steps, trial.stream)?;
+                sums[0].add(run.trace);
+                sums[1].add(run.excess);
+                sums[2].add(run.nees);
+                Ok::<_, fewbits_dymbo::Error>(())
+            },
+        )?;
         let steady = order.steady(filter)?.filtered_covariance;
         Ok(Self {
             scheme,
@@ -285,8 +294,14 @@ impl Figure for VectorState {
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         let names = rows.iter().enumerate().map(|(i, r)| (i as f64, r.scheme.to_owned()));
         let x = Axis::linear("").named(names).between(-0.6, 2.6);
-        let marks = |of: fn(&Row) -> f64, shift: f64| rows.iter().enumerate().map(|(i, r)| (i as f64 + shift, of(r))).collect();
-        let exact = Layer::measured("exact minimum given the bits", rows.iter().enumerate(), |(i, r)| (i as f64, r.mmse_trace));
+        let marks = |of: fn(&Row) -> f64, shift: f64| {
+            rows.iter()
+                .enumerate()
+                .map(|(i, r)| (i as f64 + shift, of(r)))
+                .collect()
+        };
+        let exact =
+            Layer::measured("exact minimum given the bits", rows.iter().enumerate(), |(i, r)| (i as f64, r.mmse_trace));
         let y = Axis::linear("trace of the covariance").between(0.0, 2.2);
         Plot::of(
             Panel::new("Steady error of a two-dimensional state", x, y)

@@ -1,6 +1,6 @@
-//! What the tables of this system share: scenes, starting quantizers, rows of designs, and looking values up again.
+//! What the tables of this system share: scenes, starting quantizers and rows of designs.
 
-use crate::legacy::{Claim, Column, Error, Table, Value, column};
+use crate::Error;
 use fewbits_quantizer_design::design::Design;
 use fewbits_quantizer_design::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max};
 use schemars::JsonSchema;
@@ -108,69 +108,4 @@ impl Pair {
             ..Self::of(&design.system)?
         })
     }
-}
-
-/// A table whose rows are designs of two sensors, behind the given key columns.
-pub(super) fn design_table(keys: &[Column]) -> Table {
-    let columns = [
-        column("gamma1", "", "breakpoints of sensor 1"),
-        column("gamma2", "", "breakpoints of sensor 2"),
-        column("outer1", "", "largest breakpoint of sensor 1"),
-        column("outer2", "", "largest breakpoint of sensor 2"),
-        column("mi_nats", "nat", "mutual information between the unknown and all symbols"),
-        column("mi_bits", "bit", "the same in bits"),
-        column("mse", "", "mean squared error of the posterior mean, in prior variances"),
-        column("curvature", "", "largest eigenvalue of the criterion's Hessian where it was a joint design"),
-        column("printed_mse", "", "the publication's value"),
-    ];
-    Table::new(keys.iter().cloned().chain(columns))
-}
-
-/// Appends a design to a [`design_table`].
-pub(super) fn push_design(
-    table: &mut Table,
-    keys: Vec<Value>,
-    system: &System,
-    curvature: Option<f64>,
-    printed_mse: Option<f64>,
-) -> Result<(), Error> {
-    let quantizers = system.quantizers();
-    let (first, last) = (&quantizers[0], &quantizers[quantizers.len() - 1]);
-    let outer = |q: &Quantizer| q.breakpoints().last().copied();
-    let mi = system.value(MI)?;
-    let mut row = keys;
-    row.extend([
-        Value::from(breakpoints(first).as_str()),
-        Value::from(breakpoints(last).as_str()),
-        outer(first).into(),
-        outer(last).into(),
-        mi.into(),
-        (mi / std::f64::consts::LN_2).into(),
-        system.value(MSE)?.into(),
-        curvature.into(),
-        printed_mse.into(),
-    ]);
-    table.push(row)
-}
-
-/// As [`push_design`] with the curvature of a joint design.
-pub(super) fn push_joint(table: &mut Table, keys: Vec<Value>, design: &Design) -> Result<(), Error> {
-    push_design(table, keys, &design.system, Some(design.largest_curvature), None)
-}
-
-/// The number in `column` of the only row with these keys.
-pub(super) fn cell(table: &Table, keys: &[(&str, Value)], column: &str) -> Result<f64, Error> {
-    let mut rows = table.clone();
-    for (name, value) in keys {
-        rows = rows.only(name, value.clone())?;
-    }
-    match rows.numbers(column)?.as_slice() {
-        [value] => Ok(*value),
-        found => Err(Error::Table(format!("{} rows with {keys:?}", found.len()))),
-    }
-}
-
-/// A claim that a computed number is a known one.
-pub(super) fn exact(id: impl Into<String>, what: impl Into<String>, value: f64, known: f64, tolerance: f64) -> Claim {
-    Claim::near(id, what, value, known, tolerance).at_defaults()
 }

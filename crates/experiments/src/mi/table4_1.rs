@@ -162,7 +162,7 @@ impl Figure for Table41 {
                     van_trees: if correlated {
                         None
                     } else {
-                        Some(bounds::van_trees(&best.system)?)
+                        Some(bounds::bayesian_cramer_rao(&best.system)?)
                     },
                     printed_primal_mse: value(format!("printed-primal/{case}")),
                 });

@@ -119,7 +119,7 @@ impl Figure for Table42 {
                         .filter(|s| reached(s))
                         .count();
                     let bits = (levels as f64).log2();
-                    let ceo_bound = bounds::ceo(1.0, &p.noise_variances, &[bits, bits])?;
+                    let ceo_bound = bounds::ceo(1.0, &p.noise_variances, &[bits, bits])?.distortion;
                     searches.push(Search {
                         levels,
                         starts: p.starts,

@@ -194,7 +194,7 @@ impl Figure for Table43 {
             });
         }
         let variance = p.noise_sd * p.noise_sd;
-        let codes = bounds::ceo(1.0, &vec![variance; p.sensors], &vec![2.0; p.sensors])?;
+        let codes = bounds::ceo(1.0, &vec![variance; p.sensors], &vec![2.0; p.sensors])?.distortion;
         let bounds = vec![
             Bound {
                 bound: "ceo",

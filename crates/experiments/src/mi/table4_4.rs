@@ -30,7 +30,11 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { signals: vec![2.0, 4.0], sensors: 5, false_alarm: 0.01 }
+        Self {
+            signals: vec![2.0, 4.0],
+            sensors: 5,
+            false_alarm: 0.01,
+        }
     }
 }
 
@@ -156,7 +160,11 @@ impl Figure for Table44 {
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let mut rows = Rows { designs: Vec::new(), curve: Vec::new(), checks: Vec::new() };
+        let mut rows = Rows {
+            designs: Vec::new(),
+            curve: Vec::new(),
+            checks: Vec::new(),
+        };
         let newton = Newton::default();
         let ideal = Channel::ideal(4)?;
         for &signal in &p.signals {
@@ -190,7 +198,8 @@ impl Figure for Table44 {
             let order: Vec<usize> = (0..p.sensors).collect();
             if let Some(chain) = design::greedy(&apart, &order, MI, &newton)?.pop() {
                 let offsets: Vec<f64> = chain.quantizers().iter().map(offset).collect();
-                rows.designs.push(Design::of(p, signal, "mi-greedy", &offsets, &chain.system)?);
+                rows.designs
+                    .push(Design::of(p, signal, "mi-greedy", &offsets, &chain.system)?);
             }
             // Person by person from the identical minimum: no sensor alone can do better.
             let minimum = apart.with_quantizers(vec![best.clone(); p.sensors])?;
@@ -201,10 +210,18 @@ impl Figure for Table44 {
             let alone = design::best_contiguous(&minimum, 0, PE, &grid)?.1;
             let unquantized_pe = normal::cdf(-0.5 * signal * (p.sensors as f64).sqrt());
             let single_change_gain = 1.0 - alone / minimum.value(PE)?;
-            rows.checks.push(Check { signal, unquantized_pe, single_change_gain });
+            rows.checks.push(Check {
+                signal,
+                unquantized_pe,
+                single_change_gain,
+            });
             for i in 0..=50 {
                 let t = 0.5 + 0.03 * f64::from(i);
-                rows.curve.push(Point { signal, t, pe: all.with_quantizer(0, about(signal, t)?)?.value(PE)? });
+                rows.curve.push(Point {
+                    signal,
+                    t,
+                    pe: all.with_quantizer(0, about(signal, t)?)?.value(PE)?,
+                });
             }
         }
         Ok(rows)
@@ -220,7 +237,11 @@ impl Figure for Table44 {
         claims.references("equivocation", what, designs(), |d| (d.key(), d.equivocation_nats));
         let what = "error from samples";
         claims.references("unquantized_pe", what, &rows.checks, |c| (c.signal.to_string(), c.unquantized_pe));
-        let pe = |signal, method| designs().find(|d| d.signal == signal && d.method == method).map(|d| d.pe);
+        let pe = |signal, method| {
+            designs()
+                .find(|d| d.signal == signal && d.method == method)
+                .map(|d| d.pe)
+        };
         for &signal in &p.signals {
             let what = "least error < Matusita < mutual information < J-divergence (errata mi-11)";
             let order = ["pe", "matusita", "mi-joint", "j-divergence"].map(|method| pe(signal, method));
@@ -237,7 +258,9 @@ impl Figure for Table44 {
         claims.all("unquantized", what, &rows.checks, |c| pe(c.signal, "pe").is_some_and(|pe| pe > c.unquantized_pe));
         let what =
             "the printed 1.0e-5 at the strong signal is below the best that any design found reaches (errata mi-11)";
-        claims.above("too-low", what, pe(4.0, "pe").map(|pe| pe - 1.0e-5), 0.0).at_defaults();
+        claims
+            .above("too-low", what, pe(4.0, "pe").map(|pe| pe - 1.0e-5), 0.0)
+            .at_defaults();
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
@@ -260,7 +283,12 @@ impl Figure for Table44 {
                 Axis::log("error probability"),
             )
             .with(Layer::line("identical quantizers", curve).coloured(6))
-            .with_all(methods.into_iter().enumerate().map(|(i, method)| designs(method).coloured(i)))
+            .with_all(
+                methods
+                    .into_iter()
+                    .enumerate()
+                    .map(|(i, method)| designs(method).coloured(i)),
+            )
         };
         Plot::grid(2, p.signals.iter().map(panel).collect())
     }

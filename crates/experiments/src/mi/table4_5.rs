@@ -32,7 +32,10 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { crossovers: PRINTED.map(|p| p.0).to_vec(), noise_sd: 1.0 }
+        Self {
+            crossovers: PRINTED.map(|p| p.0).to_vec(),
+            noise_sd: 1.0,
+        }
     }
 }
 
@@ -86,7 +89,13 @@ impl Figure for Table45 {
                 context.check()?;
                 let mut push = |design, pair| {
                     let printed_mse = p.printed(format!("mi-table4-5/printed/{crossover} {labelling} {design}"));
-                    rows.push(Row { crossover, labelling, design, pair, printed_mse });
+                    rows.push(Row {
+                        crossover,
+                        labelling,
+                        design,
+                        pair,
+                        printed_mse,
+                    });
                 };
                 let start = p.start(words, crossover)?;
                 for (criterion, greedy, both) in [(MI, "mi-greedy", "mi-joint"), (MSE, "mse-greedy", "mse-joint")] {
@@ -108,45 +117,78 @@ impl Figure for Table45 {
         claims.references("outer2", "outer breakpoint", rows, |r| (key(r), r.pair.outer2));
         claims.references("printed", "printed error, natural words, three digits", rows, |r| (key(r), r.pair.mse));
         let at = |crossover: f64, labelling: &str, design: &str| {
-            rows.iter().find(|r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design)).map(|r| &r.pair)
+            rows.iter()
+                .find(|r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design))
+                .map(|r| &r.pair)
         };
         let what = "the printed breakpoint exceeds the joint optimum of natural words by 0.5 to 1.1 %";
         claims
             .all("excess", what, PRINTED, |(crossover, outer)| {
-                at(crossover, "natural", "mi-joint").is_some_and(|d| (0.0045..=0.0115).contains(&(outer / d.outer2 - 1.0)))
+                at(crossover, "natural", "mi-joint")
+                    .is_some_and(|d| (0.0045..=0.0115).contains(&(outer / d.outer2 - 1.0)))
             })
             .at_defaults();
         let what = "Gray words move the breakpoint by 0.4 % only, so the printed table is not Gray's";
         let gray = at(0.05, "gray", "mi-joint").zip(at(0.0, "gray", "mi-joint"));
-        claims.at_most("gray-still", what, gray.map(|(a, b)| (a.outer2 / b.outer2 - 1.0).abs()), 0.0045).at_defaults();
+        claims
+            .at_most("gray-still", what, gray.map(|(a, b)| (a.outer2 / b.outer2 - 1.0).abs()), 0.0045)
+            .at_defaults();
         let information = ["natural", "gray"].map(|words| at(0.05, words, "mi-joint").map(|d| d.mi_nats));
-        claims.increasing("mi-prefers-gray", "at 0.05 information prefers Gray words", information).at_defaults();
-        let what = "at 0.05 squared error prefers natural words: the designs are not application-independent (errata mi-12)";
+        claims
+            .increasing("mi-prefers-gray", "at 0.05 information prefers Gray words", information)
+            .at_defaults();
+        let what =
+            "at 0.05 squared error prefers natural words: the designs are not application-independent (errata mi-12)";
         let error = ["natural", "gray"].map(|words| at(0.05, words, "mse-joint").map(|d| d.mse));
         claims.increasing("mse-prefers-natural", what, error).at_defaults();
         let third = at(0.05, "third", "mse-joint").zip(at(0.05, "gray", "mse-joint"));
         let what = "the third assignment is much worse";
-        claims.above("third-worst", what, third.map(|(a, b)| a.mse - b.mse), 0.04).at_defaults();
-        let natural = rows.iter().filter(|r| r.labelling == "natural" && r.design == "mi-joint");
-        claims.increasing("worse", "errors grow with the crossover", natural.map(|r| r.pair.mse)).at_defaults();
+        claims
+            .above("third-worst", what, third.map(|(a, b)| a.mse - b.mse), 0.04)
+            .at_defaults();
+        let natural = rows
+            .iter()
+            .filter(|r| r.labelling == "natural" && r.design == "mi-joint");
+        claims
+            .increasing("worse", "errors grow with the crossover", natural.map(|r| r.pair.mse))
+            .at_defaults();
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         let panel = |title: &str, axis: &str, value: fn(&Row) -> f64, printed: fn(&Row) -> Option<f64>| {
             let lines = LABELLINGS.iter().enumerate().flat_map(|(i, (labelling, title, _))| {
-                let own = rows.iter().filter(|r| r.labelling == *labelling && r.design == "mi-joint");
+                let own = rows
+                    .iter()
+                    .filter(|r| r.labelling == *labelling && r.design == "mi-joint");
                 let line = points(own, |r| (r.crossover, value(r)));
-                [Layer::line(*title, line.clone()).coloured(i), Layer::points("", line).coloured(i)]
+                [
+                    Layer::line(*title, line.clone()).coloured(i),
+                    Layer::points("", line).coloured(i),
+                ]
             });
-            let print = rows.iter().filter(|r| r.labelling == "natural" && r.design == "printed");
-            Panel::new(title, Axis::linear("crossover probability"), Axis::linear(axis)).with_all(lines).with(
-                Layer::points("printed", points(print, |r| (r.crossover, printed(r)))).marked(Marker::Cross).coloured(6),
-            )
+            let print = rows
+                .iter()
+                .filter(|r| r.labelling == "natural" && r.design == "printed");
+            Panel::new(title, Axis::linear("crossover probability"), Axis::linear(axis))
+                .with_all(lines)
+                .with(
+                    Layer::points("printed", points(print, |r| (r.crossover, printed(r))))
+                        .marked(Marker::Cross)
+                        .coloured(6),
+                )
         };
-        Plot::grid(2, vec![
-            panel("Information designs", "outer breakpoint / prior deviations", |r| r.pair.outer2, |r| Some(r.pair.outer2)),
-            panel("Their squared error", "mean squared error / prior variances", |r| r.pair.mse, |r| r.printed_mse),
-        ])
+        Plot::grid(
+            2,
+            vec![
+                panel(
+                    "Information designs",
+                    "outer breakpoint / prior deviations",
+                    |r| r.pair.outer2,
+                    |r| Some(r.pair.outer2),
+                ),
+                panel("Their squared error", "mean squared error / prior variances", |r| r.pair.mse, |r| r.printed_mse),
+            ],
+        )
     }
 }
 
@@ -212,11 +254,21 @@ impl Figure for Mismatch {
                     let met = design.system.with_channels(vec![bsc(words, true_crossover)?; 2])?;
                     let key = format!("mi-table4-5-mismatch/printed/{labelling} {designed_for} {true_crossover}");
                     let (mse, mi_nats) = (met.value(MSE)?, met.value(MI)?);
-                    rows.push(Met { labelling, designed_for, true_crossover, mse, mi_nats, printed_mse: p.printed(key) });
+                    rows.push(Met {
+                        labelling,
+                        designed_for,
+                        true_crossover,
+                        mse,
+                        mi_nats,
+                        printed_mse: p.printed(key),
+                    });
                 }
             }
             let system = p.start(words, 0.05)?.with_quantizers(vec![odd(&[1.37])?; 2])?;
-            printed.push(AtPrinted { labelling, mse: system.value(MSE)? });
+            printed.push(AtPrinted {
+                labelling,
+                mse: system.value(MSE)?,
+            });
         }
         Ok(Mismatches { rows, printed })
     }
@@ -232,13 +284,21 @@ impl Figure for Mismatch {
         claims.references("printed", what, natural, |r| (format!("{} 0 0.05", r.labelling), r.mse));
         for (labelling, matched) in [("natural", &[0.0, 0.01, 0.05][..]), ("gray", &[0.0, 0.05])] {
             let least_is_matched = |truth: &f64| {
-                let met = || rows.iter().filter(|r| r.labelling == labelling && r.true_crossover == *truth);
-                met().min_by(|a, b| a.mse.total_cmp(&b.mse)).is_some_and(|best| best.designed_for == *truth)
+                let met = || {
+                    rows.iter()
+                        .filter(|r| r.labelling == labelling && r.true_crossover == *truth)
+                };
+                met()
+                    .min_by(|a, b| a.mse.total_cmp(&b.mse))
+                    .is_some_and(|best| best.designed_for == *truth)
             };
-            let what =
-                format!("{labelling} words: the matched design has the least squared error at {matched:?} and nowhere else");
+            let what = format!(
+                "{labelling} words: the matched design has the least squared error at {matched:?} and nowhere else"
+            );
             claims
-                .all(format!("{labelling}-diagonal"), what, &p.crossovers, |c| least_is_matched(c) == matched.contains(c))
+                .all(format!("{labelling}-diagonal"), what, &p.crossovers, |c| {
+                    least_is_matched(c) == matched.contains(c)
+                })
                 .at_defaults();
         }
     }
@@ -247,16 +307,26 @@ impl Figure for Mismatch {
         let place = |crossover: f64| p.crossovers.iter().position(|c| *c == crossover).unwrap_or(0) as f64;
         let panel = |(labelling, title, _): &(&'static str, &str, [u32; 4])| {
             let own = |r: &&Met| r.labelling == *labelling;
-            let met = |truth: f64| tables.rows.iter().filter(own).filter(move |r| r.true_crossover == truth);
+            let met = |truth: f64| {
+                tables
+                    .rows
+                    .iter()
+                    .filter(own)
+                    .filter(move |r| r.true_crossover == truth)
+            };
             let least = |truth: f64| met(truth).map(|r| r.mse).fold(f64::INFINITY, f64::min);
             let lines = p.crossovers.iter().enumerate().flat_map(|(i, designed)| {
                 let line = points(tables.rows.iter().filter(own).filter(|r| r.designed_for == *designed), |r| {
                     (place(r.true_crossover), 100.0 * (r.mse / least(r.true_crossover) - 1.0))
                 });
                 let label = format!("designed for {designed}");
-                [Layer::line("", line.clone()).coloured(i), Layer::points(label, line).coloured(i)]
+                [
+                    Layer::line("", line.clone()).coloured(i),
+                    Layer::points(label, line).coloured(i),
+                ]
             });
-            let x = Axis::linear("true crossover probability").named(p.crossovers.iter().map(|c| (place(*c), c.to_string())));
+            let x = Axis::linear("true crossover probability")
+                .named(p.crossovers.iter().map(|c| (place(*c), c.to_string())));
             Panel::new(*title, x, Axis::linear("excess squared error / %")).with_all(lines)
         };
         Plot::grid(2, LABELLINGS.iter().map(panel).collect())

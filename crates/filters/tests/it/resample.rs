@@ -107,5 +107,19 @@ fn bad_weights_are_refused_and_nothing_is_written() {
 fn the_schedule_looks_at_the_effective_sample_size() {
     assert!(Schedule::Always.is_due(100.0, 100));
     assert!(!Schedule::Never.is_due(1.0, 100));
+    // Issue: NaN never resampled.
+    assert!(Schedule::Below(f64::NAN).is_due(100.0, 100));
     assert!(Schedule::Below(0.5).is_due(49.9, 100) && !Schedule::Below(0.5).is_due(50.0, 100));
+}
+
+/// Issue: shares of subnormal weights overflowed.
+#[test]
+fn weights_at_the_ends_of_the_range_are_shared_like_any_others() {
+    for law in Resampling::ALL {
+        for tiny in [5e-324, 1e-300, 1e300] {
+            let ancestors = draw(law, 4, &[tiny, 0.0, tiny], 400);
+            let first = ancestors.iter().filter(|a| **a == 0).count();
+            assert!(ancestors.iter().all(|a| *a != 1) && first.abs_diff(200) < 50, "{law:?} {tiny}: {first}");
+        }
+    }
 }

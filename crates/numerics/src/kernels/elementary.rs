@@ -35,18 +35,26 @@ pub(crate) fn select(condition: bool, yes: f64, no: f64) -> f64 {
     std::hint::select_unpredictable(condition, yes, no)
 }
 
-/// Horner's scheme on even and odd powers apart: two short chains run side by side.
+/// Horner's scheme on four interleaved parts: short chains that run side by side, for a sweep is as slow as its longest chain.
 #[inline(always)]
 pub(crate) fn polynomial<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
     let square = x * x;
-    let (mut even, mut odd) = (0.0, 0.0);
-    for pair in (0..N.div_ceil(2)).rev() {
-        even = even * square + coefficients[2 * pair];
-        if 2 * pair + 1 < N {
-            odd = odd * square + coefficients[2 * pair + 1];
+    let fourth = square * square;
+    let at = |i: usize| if i < N { coefficients[i] } else { 0.0 };
+    let last = 4 * ((N - 1) / 4);
+    let mut part = [at(last), at(last + 1), at(last + 2), at(last + 3)];
+    for i in (0..last / 4).rev() {
+        for k in 0..4 {
+            // The last group may be short: nothing is multiplied by its zeros.
+            let high = if i == last / 4 - 1 && last + k >= N {
+                0.0
+            } else {
+                part[k] * fourth
+            };
+            part[k] = high + at(4 * i + k);
         }
     }
-    odd * x + even
+    (part[0] + part[1] * x) + square * (part[2] + part[3] * x)
 }
 
 /// `2^n` for whole `n` in `-1022..=1023`.

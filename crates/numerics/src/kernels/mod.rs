@@ -16,6 +16,7 @@
 //! | [`inverse_mills`] | in place | 8 |
 //! | [`interval`], [`log_interval`] | in place of the lower edges | 10, 8 |
 //! | [`sum`], [`dot`], [`largest`], [`log_sum_exp`] | a number | as a sum in eight lanes |
+//! | [`StandardNormals`], [`fill_standard_normals`] | independent draws, exact in law | |
 //! | [`exp_minus`] | weights from log weights, with their sum and sum of squares | 1 each |
 //!
 //! The bounds are measured against values with 40 digits, in `tests/it/kernels.rs`: tails, subnormal numbers, infinities and
@@ -38,9 +39,11 @@
 
 pub(crate) mod cell;
 pub(crate) mod elementary;
+mod normals;
 mod reduce;
 pub(crate) mod tail;
 
+pub use normals::{StandardNormals, fill_standard_normals};
 pub use reduce::{ExpSums, dot, exp_minus, largest, log_sum_exp, sum, weighted_covariance};
 
 use pulp::Arch;

@@ -112,29 +112,30 @@ pub fn exp_minus(logs: &[f64], offset: f64, out: &mut [f64]) -> ExpSums {
         #[inline(always)]
         || {
             let count = logs.len().min(out.len());
-        let (mut lane, mut square) = ([0.0; LANES], [0.0; LANES]);
-        // In blocks that stay in the nearest cache: a loop that only exponentiates, then one that only adds.
-        for (out, logs) in out[..count].chunks_mut(BLOCK).zip(logs[..count].chunks(BLOCK)) {
-            for (out, log) in out.iter_mut().zip(logs) {
-                *out = elementary::exp(log - offset);
-            }
-            let chunks = out.chunks_exact(LANES);
-            for (j, e) in chunks.remainder().iter().enumerate() {
-                lane[j] += e;
-                square[j] += e * e;
-            }
-            for chunk in chunks {
-                for j in 0..LANES {
-                    lane[j] += chunk[j];
-                    square[j] += chunk[j] * chunk[j];
+            let (mut lane, mut square) = ([0.0; LANES], [0.0; LANES]);
+            // In blocks that stay in the nearest cache: a loop that only exponentiates, then one that only adds.
+            for (out, logs) in out[..count].chunks_mut(BLOCK).zip(logs[..count].chunks(BLOCK)) {
+                for (out, log) in out.iter_mut().zip(logs) {
+                    *out = elementary::exp(log - offset);
+                }
+                let chunks = out.chunks_exact(LANES);
+                for (j, e) in chunks.remainder().iter().enumerate() {
+                    lane[j] += e;
+                    square[j] += e * e;
+                }
+                for chunk in chunks {
+                    for j in 0..LANES {
+                        lane[j] += chunk[j];
+                        square[j] += chunk[j] * chunk[j];
+                    }
                 }
             }
-        }
-        ExpSums {
-            sum: folded(lane),
-            sum_of_squares: folded(square),
-        }
-    })
+            ExpSums {
+                sum: folded(lane),
+                sum_of_squares: folded(square),
+            }
+        },
+    )
 }
 
 /// `ln sum exp(logs[i])` without overflow: `-inf` of nothing or of zeros alone, `+inf` if an entry is, NaN if an entry is NaN.

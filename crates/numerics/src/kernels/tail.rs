@@ -11,10 +11,10 @@ const INV_SQRT_2PI: f64 = 0.398_942_280_401_432_7;
 const CENTRE: f64 = 5.0;
 
 /// `(1 + t) T(t)` as a polynomial in `q`, from its Chebyshev series with 60 digits (relative error 1e-17). The
-/// second coefficient is moved by eight last places so that the rounded polynomial gives one half at zero.
+/// first is moved by two last places so that the rounded polynomial gives one half at zero.
 const TAIL: [f64; 24] = [
-    0.461_515_829_850_037_75,
-    -0.091_552_281_834_009_15,
+    0.461_515_829_850_037_86,
+    -0.091_552_281_834_009_04,
     0.031_030_368_425_963_708,
     0.010_002_352_385_229_382,
     -0.026_401_042_966_308_307,
@@ -39,7 +39,7 @@ const TAIL: [f64; 24] = [
     -3.815_816_262_633_87e-10,
 ];
 
-/// `T(t)` for `t >= 0`, within four units in the last place; zero at infinity.
+/// `T(t)` for `t >= 0`, within five units in the last place; zero at infinity.
 #[inline(always)]
 pub(crate) fn scaled_tail(t: f64) -> f64 {
     let q = 1.0 - 2.0 * CENTRE / (t + CENTRE);

@@ -275,3 +275,80 @@ fn erfcx_of_a_negative_argument_is_as_good_as_of_a_positive_one() {
     // mpmath: erfcx(-20.3), 20 units off before.
     assert!(ulps(normal::erfcx(-20.3), 1.859_700_651_326_472_2e179) < 6.0);
 }
+
+/// Largest distance between an empirical distribution function and `Phi`, times the root of the count.
+fn kolmogorov_smirnov(draws: &mut [f64]) -> f64 {
+    draws.sort_by(f64::total_cmp);
+    let n = draws.len() as f64;
+    let distance = draws.iter().enumerate().fold(0.0_f64, |d, (i, x)| {
+        let p = normal::cdf(*x);
+        d.max(p - i as f64 / n).max((i + 1) as f64 / n - p)
+    });
+    distance * n.sqrt()
+}
+
+#[test]
+fn blocks_of_draws_are_normal_to_the_tails() {
+    use rand::SeedableRng;
+    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+    let mut draws = vec![0.0; 2_000_000];
+    kernels::fill_standard_normals(&mut rng, &mut draws);
+    let n = draws.len() as f64;
+    // Serial correlation at every distance up to two rows of lanes, and of squares.
+    for lag in 1..=16 {
+        let products: f64 = draws.windows(lag + 1).map(|w| w[0] * w[lag]).sum();
+        assert!(products.abs() < 4.5 * n.sqrt(), "lag {lag}");
+        let squares: f64 = draws
+            .windows(lag + 1)
+            .map(|w| (w[0] * w[0] - 1.0) * (w[lag] * w[lag] - 1.0))
+            .sum();
+        assert!(squares.abs() < 4.5 * 2.0 * n.sqrt(), "squares at lag {lag}");
+    }
+    // Moments against their standard errors.
+    for (power, mean, variance) in [
+        (1, 0.0, 1.0),
+        (2, 1.0, 2.0),
+        (3, 0.0, 15.0),
+        (4, 3.0, 96.0),
+        (6, 15.0, 10_170.0),
+    ] {
+        let moment = draws.iter().map(|x| x.powi(power)).sum::<f64>() / n;
+        assert!((moment - mean).abs() < 4.0 * (variance / n).sqrt(), "moment {power}: {moment}");
+    }
+    // Masses of cells that cut through layers, the tail beyond the lowest edge and the far tail, on either side.
+    for edge in [0.1, 0.5, 1.0, 2.0, 3.0, 3.654_152_885_361_009, 4.0, 4.5] {
+        let p = normal::cdf(-edge);
+        for sign in [-1.0, 1.0] {
+            let count = draws.iter().filter(|x| sign * **x > edge).count() as f64;
+            assert!((count - n * p).abs() < 4.5 * (n * p).sqrt() + 1.0, "{count} beyond {edge}");
+        }
+    }
+    // Beyond 1.95 with probability below 0.001.
+    assert!(kolmogorov_smirnov(&mut draws) < 1.95);
+    // The tail alone, given that it is one.
+    let tail: Vec<f64> = draws
+        .iter()
+        .map(|x| x.abs())
+        .filter(|x| *x > 3.654_152_885_361_009)
+        .collect();
+    let mut mapped: Vec<f64> = tail
+        .iter()
+        .map(|x| normal::quantile(normal::cdf(-*x) / normal::cdf(-3.654_152_885_361_009)))
+        .collect();
+    assert!(mapped.len() > 400 && kolmogorov_smirnov(&mut mapped) < 1.95);
+}
+
+#[test]
+fn draws_depend_on_the_stream_alone() {
+    use rand::SeedableRng;
+    for count in [0, 1, 7, 47, 48, 127, 128, 129, 1000] {
+        let draw = |seed| {
+            let mut out = vec![0.0; count];
+            kernels::fill_standard_normals(&mut rand_pcg::Pcg64Mcg::seed_from_u64(seed), &mut out);
+            out
+        };
+        assert_eq!(draw(3), draw(3));
+        assert!(count == 0 || draw(3) != draw(4));
+        assert!(draw(3).iter().all(|x| x.is_finite()));
+    }
+}

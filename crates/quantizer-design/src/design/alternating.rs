@@ -16,9 +16,9 @@
 //! relatively little; that objective is negative in common cases and depends on the unit of `x`, so mutual information itself
 //! is used here (errata). Edges are found by root search; deciding cell by cell on a fixed grid of `y` stalls up to 10 % short.
 
-use super::cells::level_gains;
+use super::cells::{level_gains, single_sensor};
 use crate::criterion::Criterion;
-use crate::error::{Error, refuse};
+use crate::error::Error;
 use crate::moments::{Table, dot};
 use crate::problem::Problem;
 use crate::system::System;
@@ -34,12 +34,22 @@ const SCAN: usize = 560;
 pub struct Alternating {
     /// Relative change of the criterion that ends the iteration.
     pub tolerance: f64,
-    /// Change of every breakpoint that is allowed at the end.
+    /// Change of every breakpoint that is allowed at the end, in standard deviations of the sample.
     pub breakpoint_tolerance: f64,
     /// Most steps.
     pub max_iterations: usize,
-    /// Refuse cells that are not one interval a level in increasing order.
-    pub contiguous: bool,
+    /// Which cells are accepted.
+    pub cells: AllowedCells,
+}
+
+/// Which cells an alternating design may end in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum AllowedCells {
+    /// One interval per level, in increasing order.
+    #[default]
+    Intervals,
+    /// Any.
+    Any,
 }
 
 impl Default for Alternating {
@@ -48,7 +58,7 @@ impl Default for Alternating {
             tolerance: 1e-12,
             breakpoint_tolerance: f64::INFINITY,
             max_iterations: 1000,
-            contiguous: true,
+            cells: AllowedCells::Intervals,
         }
     }
 }
@@ -73,10 +83,11 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
     let mut current = system.clone();
     let mut value = current.value(criterion)?;
     let mut change = f64::INFINITY;
+    let spread = system.scene().sample_sd(single_sensor(system, group)?.sensors()[0]);
     for iteration in 1..=rule.max_iterations {
         let old = current.group(group)?.quantizer().clone();
         let quantizer = alternating_step(&current, group, criterion)?;
-        if rule.contiguous && !quantizer.is_contiguous() {
+        if rule.cells == AllowedCells::Intervals && !quantizer.is_contiguous() {
             return Err(Error::NotContiguous {
                 labels: quantizer.labels().to_vec(),
             });
@@ -91,7 +102,7 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
         let next = current.value(criterion)?;
         change = (next - value).abs();
         value = next;
-        if change <= rule.tolerance * value.abs() && moved <= rule.breakpoint_tolerance {
+        if change <= rule.tolerance * value.abs() && moved <= rule.breakpoint_tolerance * spread {
             return Ok(Alternated {
                 system: current,
                 value,
@@ -145,15 +156,6 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
         });
     }
     Ok(Quantizer::with_labels(breakpoints, labels)?)
-}
-
-/// The group if it is a single sensor.
-pub(super) fn single_sensor(system: &System, group: usize) -> Result<&crate::system::Group, Error> {
-    let entry = system.group(group)?;
-    match entry.sensors().len() {
-        1 => Ok(entry),
-        n => refuse("group", format!("{n} sensors"), "a group of a single sensor"),
-    }
 }
 
 /// The functions `D_z(y)`.

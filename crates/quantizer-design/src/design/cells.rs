@@ -6,8 +6,19 @@
 
 use crate::criterion::{Criterion, LOG_FLOOR};
 use crate::moments::{Table, moments};
+use crate::error::{Error, refuse};
 use crate::scene::Scene;
+use crate::system::{SensorGroup, System};
 use fewbits_quantizers::Channel;
+
+/// The group if it is a single sensor.
+pub(super) fn single_sensor(system: &System, group: usize) -> Result<&SensorGroup, Error> {
+    let entry = system.group(group)?;
+    match entry.sensors().len() {
+        1 => Ok(entry),
+        n => refuse("group", format!("{n} sensors"), "a group of a single sensor"),
+    }
+}
 
 /// `lambda_z(node) = sum_k w_k P(node | x_k) sum_t' P(t' | node) sum_t C[t, z] score(t', t, x_k)`, levels by nodes.
 ///
@@ -62,19 +73,15 @@ fn scores(scene: &Scene, criterion: Criterion, q: &[f64], out: &mut [f64]) {
                 .iter()
                 .zip(&scene.values)
                 .zip(q)
-                .map(|((w, x), q)| w * x * q)
+                .map(|((w, x), q)| w * (x - scene.mean) * q)
                 .sum();
-            let mean = if total > 0.0 {
-                moment / total
-            } else {
-                scene.sample_mean()
-            };
+            let mean = scene.mean + if total > 0.0 { moment / total } else { 0.0 };
             for (o, x) in out.iter_mut().zip(&scene.values) {
                 *o = -(x - mean) * (x - mean);
             }
         }
         Criterion::BayesError => {
-            let best = crate::table::most_probable(&scene.weights, q);
+            let best = crate::criterion::most_probable(&scene.weights, q);
             for (k, o) in out.iter_mut().enumerate() {
                 *o = if k == best { 0.0 } else { -1.0 };
             }

@@ -14,7 +14,7 @@
 //! quantizers of it, since the best cells are then intervals of the likelihood ratio. It says nothing about several sensors
 //! at once: coordinate-wise optima abound where their noise is correlated.
 
-use super::alternating::single_sensor;
+use super::cells::single_sensor;
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
 use crate::problem::Problem;

@@ -1,4 +1,4 @@
-//! Which words, and how many cells, for sensors that speak over a binary symmetric channel.
+//! Which words, and how many cells, for sensors that report over a binary symmetric channel.
 //!
 //! Inverting the same bit of every word, or exchanging two bit positions, changes nothing on a symmetric channel. Up to that
 //! there are few assignments of words to the cells of a short quantizer (three for four cells and two bits: natural, Gray and
@@ -10,7 +10,8 @@ use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
 use crate::newton::Newton;
 use crate::scene::Scene;
-use crate::system::{Group, System};
+use crate::system::{SensorGroup, System};
+use serde::{Deserialize, Serialize};
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Labelling;
 use fewbits_quantizers::Quantizer;
@@ -24,12 +25,21 @@ pub const MAX_BITS: u32 = 3;
 const MAX_COMBINATIONS: usize = 20_000;
 
 /// An assignment of words and the design found for it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Assignment {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WordsDesign {
     /// Word of each cell from left to right, for each group of the design.
     pub words: Vec<Vec<u32>>,
     /// The joint design with these words.
     pub design: Design,
+}
+
+/// Whose words may differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Words {
+    /// All sensors use the same words.
+    Shared,
+    /// Each sensor may use its own.
+    PerSensor,
 }
 
 /// One representative of every class of injective assignments of `bits`-bit words to `cells` cells.
@@ -90,7 +100,7 @@ fn representative(bits: u32, words: &[u32]) -> Vec<u32> {
 /// Designs the sensors of `scene` for every class of assignments, best first.
 ///
 /// Every sensor sends words of `bits` bits over its own binary symmetric channel of the given crossover. `cells` bounds the
-/// number of cells. With `mixed` the sensors may use different assignments; otherwise all use the same. Each design is the
+/// number of cells. Each design is the
 /// joint Newton optimum from Lloyd-Max quantizers of the samples; assignments whose design loses a cell or does not converge
 /// are left out, since one with fewer cells stands for them.
 ///
@@ -103,14 +113,14 @@ pub fn assign_words(
     crossover: f64,
     cells: RangeInclusive<usize>,
     criterion: Criterion,
-    mixed: bool,
-) -> Result<Vec<Assignment>, Error> {
+    words: Words,
+) -> Result<Vec<WordsDesign>, Error> {
     let mut classes = Vec::new();
     for count in cells {
         classes.extend(word_classes(bits, count)?);
     }
     let sensors = scene.sensors();
-    let combinations: Vec<Vec<usize>> = if mixed {
+    let combinations: Vec<Vec<usize>> = if words == Words::PerSensor {
         let needed = (classes.len() as u64).saturating_pow(sensors as u32);
         if needed > MAX_COMBINATIONS as u64 {
             return Err(Error::TooLarge {
@@ -144,11 +154,11 @@ pub fn assign_words(
             let labelling = Labelling::with_words(bits, words.clone())?;
             let channel = Channel::binary_symmetric_with_gaps(&labelling, crossover)?;
             let sample = lloyd_max::gaussian(words.len())?.affine(scene.sample_mean(), scene.sample_sd(n))?;
-            groups.push(Group::new(Quantizer::from(&sample), channel, vec![n])?);
+            groups.push(SensorGroup::new(Quantizer::from(&sample), channel, vec![n])?);
         }
         let words = combination.iter().map(|c| classes[*c].clone()).collect();
         if let Ok(design) = joint(&System::new(scene.clone(), groups)?, criterion, &Newton::default()) {
-            found.push(Assignment { words, design });
+            found.push(WordsDesign { words, design });
         }
     }
     found.sort_by(|a, b| (criterion.sense() * b.design.value).total_cmp(&(criterion.sense() * a.design.value)));

@@ -2,19 +2,21 @@
 
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
-use crate::newton::{Newton, SADDLE, climb};
+use crate::newton::{Certificate, Newton, climb};
 use crate::problem::Problem;
 use crate::system::System;
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::normal;
 use fewbits_quantizers::Quantizer;
 use rand::RngExt;
+use serde::{Deserialize, Serialize};
 
 /// A design whose rarest cell is rarer than this has lost a level.
 const VANISHED: f64 = 1e-12;
 
 /// A stationary point of a criterion.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Design {
     /// The system with its designed quantizers.
     pub system: System,
@@ -22,6 +24,8 @@ pub struct Design {
     pub value: f64,
     /// Largest eigenvalue of the Hessian of the criterion, signed so that a local optimum has none above 0.
     pub largest_curvature: f64,
+    /// What the second derivatives prove.
+    pub certificate: Certificate,
     /// Newton iterations.
     pub iterations: usize,
     /// Evaluations of the criterion, with or without derivatives.
@@ -36,14 +40,14 @@ impl Design {
 
     /// Whether the point is a saddle: some change of the breakpoints improves it to second order.
     pub fn is_saddle(&self) -> bool {
-        self.largest_curvature > SADDLE
+        self.certificate == Certificate::Saddle
     }
 }
 
 /// The stationary point of `criterion` over the breakpoints of all groups (4.2), started from the system's own quantizers.
 ///
 /// Newton's method finds a *local* optimum; the joint criterion may have several, and from a symmetric start the symmetric one
-/// may be a saddle. See [`Newton::escape_saddles`] and [`multi_start`].
+/// may be a saddle. See [`AtSaddle`](crate::AtSaddle) and [`multi_start`].
 ///
 /// # Errors
 /// [`Error::NotConverged`]; [`Error::VanishingCell`] if a level is squeezed out, as happens behind poor channels;
@@ -70,10 +74,7 @@ pub fn optimise_groups(
         system.group(*g)?;
     }
     let problem = Problem::new(system, criterion, active)?;
-    let scale = active
-        .iter()
-        .map(|g| system.scene().sample_sd(system.groups()[*g].sensors()[0]))
-        .fold(f64::INFINITY, f64::min);
+    let scale = breakpoint_scale(system, active);
     let found = climb(&problem, &problem.start(), scale, newton)?;
     if let Some((quantizer, cell, probability)) = problem.rarest_cell(&found.point)
         && probability < VANISHED
@@ -86,11 +87,21 @@ pub fn optimise_groups(
     }
     Ok(Design {
         system: problem.system_at(&found.point)?,
-        value: found.value * criterion.sense(),
+        value: (found.value + problem.offset()) * criterion.sense(),
         largest_curvature: found.largest_curvature,
+        certificate: found.certificate,
         iterations: found.iterations,
         evaluations: found.evaluations,
     })
+}
+
+/// The size of the breakpoints of some groups: the least standard deviation of their samples.
+pub(super) fn breakpoint_scale(system: &System, groups: &[usize]) -> f64 {
+    groups
+        .iter()
+        .filter_map(|g| system.groups().get(*g))
+        .map(|g| system.scene().sample_sd(g.sensors()[0]))
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// The greedy chain (4.4): sensor by sensor in the given order, each designed for the criterion of the sensors so far.
@@ -187,58 +198,4 @@ fn random_system(system: &System, stream: Stream) -> Result<System, Error> {
         })
         .collect::<Result<Vec<_>, _>>()?;
     system.with_quantizers(quantizers)
-}
-
-/// Cyclic maximisation (4.2): group after group, each to its optimum given the others, until a sweep gains less than
-/// `tolerance`. A coordinate-wise optimum, which where noise is correlated is often short of the joint one.
-///
-/// With `candidates` each sensor is first set to its global optimum among contiguous quantizers on that grid
-/// ([`best_contiguous`](super::best_contiguous)) where that is better than what it has.
-///
-/// # Errors
-/// As [`joint`]; [`Error::NotConverged`] after 500 sweeps.
-pub fn cyclic(
-    system: &System,
-    criterion: Criterion,
-    candidates: Option<&[f64]>,
-    tolerance: f64,
-    newton: &Newton,
-) -> Result<Design, Error> {
-    const SWEEPS: usize = 500;
-    let mut current = system.clone();
-    let mut value = criterion.sense() * current.value(criterion)?;
-    let (mut iterations, mut evaluations, mut gain) = (0, 1, f64::INFINITY);
-    for _ in 0..SWEEPS {
-        let before = value;
-        for group in 0..current.groups().len() {
-            if let Some(candidates) = candidates {
-                let (quantizer, found) = super::best_contiguous(&current, group, criterion, candidates)?;
-                if criterion.sense() * found > value {
-                    current = current.with_quantizer(group, quantizer)?;
-                }
-            }
-            let design = optimise_groups(&current, &[group], criterion, newton)?;
-            iterations += design.iterations;
-            evaluations += design.evaluations;
-            value = criterion.sense() * design.value;
-            current = design.system;
-        }
-        gain = value - before;
-        if gain <= tolerance {
-            let found = current.derivatives(criterion)?;
-            let eigen = nalgebra::SymmetricEigen::new(found.hessian * criterion.sense());
-            return Ok(Design {
-                system: current,
-                value: found.value,
-                largest_curvature: eigen.eigenvalues.max(),
-                iterations,
-                evaluations,
-            });
-        }
-    }
-    Err(Error::NotConverged {
-        algorithm: "cyclic maximisation",
-        iterations: SWEEPS,
-        change: gain,
-    })
 }

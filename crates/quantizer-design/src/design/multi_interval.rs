@@ -73,9 +73,13 @@ pub fn discover(system: &System, criterion: Criterion, settings: &Discovery) -> 
     system.check_outcomes()?;
     // Refuses a Bayes error under a continuous prior before the search.
     system.value(criterion)?;
-    let sensors: Vec<Sensor> = (0..system.groups().len())
-        .map(|g| Sensor::new(system, g, settings.grid))
+    let sensors: Vec<SensorGrid> = (0..system.groups().len())
+        .map(|g| SensorGrid::new(system, g, settings.grid))
         .collect();
+    let size = match criterion {
+        Criterion::MeanSquaredError => system.scene().prior_variance(),
+        Criterion::MutualInformation | Criterion::BayesError => 1.0,
+    };
     let mut found: Vec<(f64, Vec<Quantizer>)> = Vec::new();
     let random = (0..settings.starts).map(|start| {
         let mut rng = Stream::new(settings.seed)
@@ -89,7 +93,7 @@ pub fn discover(system: &System, criterion: Criterion, settings: &Discovery) -> 
         let quantizers: Option<Vec<Quantizer>> = sensors.iter().zip(&labels).map(|(s, l)| s.quantizer(l)).collect();
         let Some(quantizers) = quantizers else { continue };
         let value = criterion.sense() * system.with_quantizers(quantizers.clone())?.value(criterion)?;
-        if found.iter().all(|(v, _)| (v - value).abs() > 1e-9) {
+        if found.iter().all(|(v, _)| (v - value).abs() > 1e-9 * size) {
             found.push((value, quantizers));
         }
     }
@@ -112,7 +116,7 @@ pub fn discover(system: &System, criterion: Criterion, settings: &Discovery) -> 
 
 /// One sensor folded, the others contiguous: every sensor in turn, from one to `levels + 1` cells more than levels, levels
 /// running round or to and fro.
-fn periodic_starts(sensors: &[Sensor]) -> Vec<Vec<Vec<usize>>> {
+fn periodic_starts(sensors: &[SensorGrid]) -> Vec<Vec<Vec<usize>>> {
     let mut starts = Vec::new();
     for (folded, sensor) in sensors.iter().enumerate() {
         let levels = sensor.levels;
@@ -136,14 +140,14 @@ fn periodic_starts(sensors: &[Sensor]) -> Vec<Vec<Vec<usize>>> {
 }
 
 /// One sensor on its grid.
-struct Sensor {
+struct SensorGrid {
     levels: usize,
     edges: Vec<f64>,
     /// Probability of each grid cell at each node.
     cells: Table,
 }
 
-impl Sensor {
+impl SensorGrid {
     fn new(system: &System, group: usize, grid: usize) -> Self {
         let entry = &system.groups()[group];
         let scene = system.scene();
@@ -220,7 +224,7 @@ impl Sensor {
     }
 }
 
-fn ascend(system: &System, criterion: Criterion, sensors: &[Sensor], labels: &mut [Vec<usize>]) {
+fn ascend(system: &System, criterion: Criterion, sensors: &[SensorGrid], labels: &mut [Vec<usize>]) {
     let through = |g: usize, levels: &Table| -> Table {
         let channel = system.groups()[g].channel();
         let mut symbols = vec![0.0; channel.outputs() * levels.nodes];

@@ -5,7 +5,8 @@ use crate::error::{Error, refuse};
 use crate::newton::{Newton, Objective, climb};
 use crate::problem::Problem;
 use crate::scene::{Noise, Prior, Scene};
-use crate::system::{Derivatives, System};
+use crate::derivatives::Derivatives;
+use crate::system::System;
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
 use nalgebra::{DMatrix, DVector};
@@ -21,13 +22,29 @@ pub enum Separation {
     JDivergence,
 }
 
+/// Bhattacharyya coefficient `sum sqrt(p0 p1)` of two distributions: 1 if they are equal, 0 if they never meet.
+///
+/// # Errors
+/// If either is no distribution or they differ in length.
+pub fn bhattacharyya_coefficient(p0: &[f64], p1: &[f64]) -> Result<f64, Error> {
+    fewbits_numerics::error::probabilities("p0", p0)?;
+    fewbits_numerics::error::probabilities("p1", p1)?;
+    if p0.len() != p1.len() {
+        return refuse("p1", format!("{} probabilities", p1.len()), format!("{} probabilities", p0.len()));
+    }
+    Ok(affinity(p0, p1))
+}
+
+fn affinity(p0: &[f64], p1: &[f64]) -> f64 {
+    p0.iter().zip(p1).map(|(a, b)| (a * b).sqrt()).sum()
+}
+
 impl Separation {
     /// The distance of two distributions; infinite for a J-divergence where only one of them vanishes.
     pub fn of(self, p0: &[f64], p1: &[f64]) -> f64 {
-        let affinity = || p0.iter().zip(p1).map(|(a, b)| (a * b).sqrt()).sum::<f64>();
         match self {
             Self::Matusita => p0.iter().zip(p1).map(|(a, b)| (a.sqrt() - b.sqrt()).powi(2)).sum(),
-            Self::Bhattacharyya => -affinity().ln(),
+            Self::Bhattacharyya => -affinity(p0, p1).ln(),
             Self::JDivergence => p0
                 .iter()
                 .zip(p1)
@@ -105,7 +122,8 @@ impl Objective for Separated<'_> {
     fn value(&self, b: &[f64]) -> f64 {
         let (p0, p1) = self.distributions(b);
         match self.distance {
-            Separation::Matusita | Separation::Bhattacharyya => Separation::Matusita.of(&p0, &p1),
+            // Both grow as the coefficient falls, which keeps its digits where the distance is close to its limit.
+            Separation::Matusita | Separation::Bhattacharyya => -2.0 * affinity(&p0, &p1),
             Separation::JDivergence => self.distance.of(&p0, &p1),
         }
     }
@@ -139,5 +157,9 @@ impl Objective for Separated<'_> {
 
     fn blocks(&self) -> Vec<usize> {
         self.problem.blocks()
+    }
+
+    fn unit(&self, value: f64) -> f64 {
+        value.abs()
     }
 }

@@ -3,3 +3,4 @@
 
 mod laws;
 mod mi_fixtures;
+mod scale;

@@ -1,7 +1,7 @@
 //! Every entry of the fixture file, computed by independent programs, within its tolerance.
 
 use fewbits_quantizer_design::design::{self, Design, Separation};
-use fewbits_quantizer_design::system::Group;
+use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::table::JointTable;
 use fewbits_quantizer_design::{
     Channel, Criterion, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, bounds, decoder::NeymanPearson,
@@ -179,7 +179,7 @@ fn ceo(entry: &Entry) {
         }
         None => (numbers(s2), numbers(rate)),
     };
-    close(entry, "D", bounds::ceo(number(&entry.inputs["sx2"]), &s2, &rate).unwrap(), number(&entry.value));
+    close(entry, "D", bounds::ceo(number(&entry.inputs["sx2"]), &s2, &rate).unwrap().distortion, number(&entry.value));
 }
 
 fn van_trees(entry: &Entry) {
@@ -188,7 +188,7 @@ fn van_trees(entry: &Entry) {
     let q = Quantizer::new(numbers(&entry.inputs["breakpoints"])).unwrap();
     let system = System::identical(scene, q).unwrap();
     close(entry, "fisher", bounds::mean_fisher_information(&system).unwrap(), number(&entry.value["fisher"]));
-    let bound = bounds::van_trees(&system).unwrap();
+    let bound = bounds::bayesian_cramer_rao(&system).unwrap();
     close(entry, "bound", bound, number(&entry.value["bound"]));
     assert!(bound < system.value(MSE).unwrap());
 }
@@ -479,7 +479,7 @@ fn bsc_matrix(entry: &Entry) {
 fn collapsed(entry: &Entry) {
     let scene = Scene::gaussian(1.0, &[1.0, 1.0]).unwrap();
     let eps = number(&entry.inputs["eps"]);
-    let best = design::assign_words(&scene, 2, eps, 2..=4, criterion(&entry.id), false)
+    let best = design::assign_words(&scene, 2, eps, 2..=4, criterion(&entry.id), design::Words::Shared)
         .unwrap()
         .remove(0);
     assert_eq!(best.words, vec![words(&entry.inputs["words"]); 2], "{}", entry.id);
@@ -513,7 +513,7 @@ fn alternating_series(entry: &Entry) {
             let quantizer = if stage == 1 {
                 let first = both.groups()[0].clone();
                 let alone = both.scene().subset(&[0]).unwrap();
-                let group = Group::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
+                let group = SensorGroup::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
                 design::alternating_step(&System::new(alone, vec![group]).unwrap(), 0, MI).unwrap()
             } else {
                 design::alternating_step(&both, 1, MI).unwrap()
@@ -521,7 +521,7 @@ fn alternating_series(entry: &Entry) {
             both = both.with_quantizer(stage - 1, quantizer).unwrap();
         }
         let first = &both.groups()[0];
-        let group = Group::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
+        let group = SensorGroup::new(first.quantizer().clone(), first.channel().clone(), vec![0]).unwrap();
         let alone = System::new(both.scene().subset(&[0]).unwrap(), vec![group]).unwrap();
         let outer = |g: usize| both.groups()[g].quantizer().breakpoints()[2];
         let values = [

@@ -1,7 +1,7 @@
 //! Every entry of the fixture file, computed by independent programs, against the library.
 
 use fewbits_sensor_assignment::{
-    CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, bit_error, brute_force, by_precision,
+    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, bit_error, brute_force, by_precision,
     flipped_estimate, pair_costs, quantization_error,
 };
 use serde::Deserialize;
@@ -50,7 +50,7 @@ const VARIANCES_61: [f64; 8] = [0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.0
 
 #[test]
 fn table_6_1() {
-    let sensors = CodedSensors::new(1.0, &VARIANCES_61).unwrap();
+    let sensors = CodedSensors::with_variances(1.0, &VARIANCES_61).unwrap();
     let costs = pair_costs(&sensors).unwrap();
     for e in entries().iter().filter(|e| e.id.starts_with("t61.")) {
         let parts: Vec<&str> = e.id.split('.').collect();
@@ -64,7 +64,7 @@ fn table_6_1() {
             continue;
         }
         if e.id == "t61.bruteforce.mmse" {
-            let (best, error) = brute_force(&sensors, Criterion::Mmse).unwrap();
+            let (best, error) = brute_force(&sensors, Estimator::PosteriorMean).unwrap();
             let one_based: Vec<usize> = best.iter().map(|n| n + 1).collect();
             assert_eq!(serde_json::json!(one_based), e.inputs["assign_1based"]);
             check(e, error).unwrap();
@@ -88,7 +88,7 @@ fn table_6_1() {
         };
         check(e, ours).unwrap();
     }
-    let (best, _) = brute_force(&sensors, Criterion::Centre).unwrap();
+    let (best, _) = brute_force(&sensors, Estimator::CellCentre).unwrap();
     assert_eq!(best, JonkerVolgenant.solve(&costs).unwrap(), "the linear optimum is the exact one");
 }
 
@@ -99,7 +99,7 @@ fn points(e: &Entry) -> Vec<(f64, f64)> {
 
 #[test]
 fn figures_6_1_and_c_1() {
-    let sensors = CodedSensors::new(1.0, &[0.03; 4]).unwrap();
+    let sensors = CodedSensors::with_variances(1.0, &[0.03; 4]).unwrap();
     for e in entries()
         .iter()
         .filter(|e| e.id.starts_with("f61.") || e.id.starts_with("fC1."))
@@ -127,14 +127,14 @@ fn figures_6_3_and_6_4() {
             continue;
         }
         let variances: Vec<f64> = serde_json::from_value(e.inputs["variances"].clone()).unwrap();
-        let sensors = CodedSensors::new(1.0, &variances).unwrap();
+        let sensors = CodedSensors::with_variances(1.0, &variances).unwrap();
         let found = JonkerVolgenant.solve(&pair_costs(&sensors).unwrap()).unwrap();
         let one_based: Vec<usize> = found.iter().map(|n| n + 1).collect();
         assert_eq!(serde_json::json!(one_based), e.value["alg_assign_1based"]);
-        for (criterion, name) in [(Criterion::Centre, "center"), (Criterion::Mmse, "mmse")] {
-            let all = all_errors(&sensors, criterion).unwrap();
+        for (estimator, name) in [(Estimator::CellCentre, "center"), (Estimator::PosteriorMean, "mmse")] {
+            let all = all_errors(&sensors, estimator).unwrap();
             for (what, ours) in [
-                ("alg", sensors.mse(&found, criterion).unwrap()),
+                ("alg", sensors.mse(&found, estimator).unwrap()),
                 ("min", all.least),
                 ("avg", all.mean),
             ] {

@@ -1,8 +1,8 @@
 //! Laws of assignments on random sensors.
 
-use fewbits_binary_patterns::bounds::van_trees;
+use fewbits_binary_patterns::bounds::optimal_weight_van_trees;
 use fewbits_sensor_assignment::{
-    CodedSensors, Criterion, JonkerVolgenant, LinearAssignment, all_errors, exchange, pair_costs,
+    CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, exchange, pair_costs,
     variances_with_moments,
 };
 use proptest::prelude::*;
@@ -16,14 +16,14 @@ proptest! {
 
     #[test]
     fn enumeration_bounds_every_assignment(variances in variances(), half_width in 0.5f64..2.0) {
-        let sensors = CodedSensors::new(half_width, &variances).unwrap();
+        let sensors = CodedSensors::with_variances(half_width, &variances).unwrap();
         let costs = pair_costs(&sensors).unwrap();
         let found = JonkerVolgenant.solve(&costs).unwrap();
         prop_assert!(costs.certificate(&found).unwrap().is_optimal());
-        for criterion in [Criterion::Centre, Criterion::Mmse] {
-            let all = all_errors(&sensors, criterion).unwrap();
-            let ours = sensors.mse(&found, criterion).unwrap();
-            let swapped = exchange(&sensors, &found, criterion).unwrap();
+        for estimator in [Estimator::CellCentre, Estimator::PosteriorMean] {
+            let all = all_errors(&sensors, estimator).unwrap();
+            let ours = sensors.mse(&found, estimator).unwrap();
+            let swapped = exchange(&sensors, &found, estimator).unwrap();
             prop_assert!(all.least <= swapped.error * (1.0 + 1e-9));
             prop_assert!(swapped.error <= ours * (1.0 + 1e-12));
             prop_assert!(ours <= all.largest * (1.0 + 1e-9));
@@ -31,7 +31,7 @@ proptest! {
         // The posterior mean beats the centre decoder and obeys the Bayesian bound.
         let mmse = sensors.mmse(&found).unwrap();
         prop_assert!(mmse <= sensors.centre_mse(&found).unwrap() * (1.0 + 1e-12));
-        prop_assert!(van_trees(&sensors.bank(&found).unwrap()) <= mmse * (1.0 + 1e-9));
+        prop_assert!(optimal_weight_van_trees(&sensors.bank(&found).unwrap()).unwrap() <= mmse * (1.0 + 1e-9));
     }
 
     #[test]
@@ -63,12 +63,12 @@ fn exchanges_close_the_gap_of_the_linear_assignment() {
         let Some(v) = variances_with_moments(0.02, 0.01, &direction).unwrap() else {
             panic!("a variance is too small");
         };
-        let sensors = CodedSensors::new(1.0, &v).unwrap();
+        let sensors = CodedSensors::with_variances(1.0, &v).unwrap();
         let found = JonkerVolgenant.solve(&pair_costs(&sensors).unwrap()).unwrap();
-        let centre = all_errors(&sensors, Criterion::Centre).unwrap();
+        let centre = all_errors(&sensors, Estimator::CellCentre).unwrap();
         assert!(sensors.centre_mse(&found).unwrap() <= 1.09 * centre.least);
-        let mmse = all_errors(&sensors, Criterion::Mmse).unwrap();
-        let swapped = exchange(&sensors, &found, Criterion::Mmse).unwrap();
+        let mmse = all_errors(&sensors, Estimator::PosteriorMean).unwrap();
+        let swapped = exchange(&sensors, &found, Estimator::PosteriorMean).unwrap();
         assert!((swapped.error - mmse.least).abs() <= 1e-9 * mmse.least);
     }
 }

@@ -2,38 +2,44 @@
 
 use super::{Linear, Track, failed};
 use crate::error::Error;
-use fewbits_cfwmd::assumed_density::{ScalarSilence, hear_scalar_silence};
+use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::rule::Weighing;
-use fewbits_cfwmd::trigger::StochasticTrigger;
-use fewbits_core::likelihood::Heard;
-use fewbits_core::message::Cell;
-use fewbits_core::{Dynamics, Observation};
-use fewbits_filters::{ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
-use nalgebra::{SMatrix, Vector2};
+use fewbits_cfwmd::trigger::{StochasticTrigger, Triggered};
+use fewbits_core::factor::{InCell, Scalar, Value};
+use fewbits_core::{Cell, Dynamics, Link, Observation, Observed, Scheme};
+use fewbits_densities::GaussianCloud;
+use fewbits_filters::{
+    CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule, assumed_density, kalman,
+};
+use nalgebra::{Matrix1, SMatrix, Vector1, Vector2};
 
 impl Linear<1> {
     pub(super) fn rao_blackwell(&self, track: &mut Track<'_, 1>, count: usize) -> Result<(), Error> {
         let mut rng = track.stream.named("particles").fast_rng();
-        let mut cloud = RaoBlackwellised::new(&self.start, count).map_err(failed)?;
-        let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5));
-        let mut workspace = Workspace::default();
+        let mut cloud = GaussianCloud::agreed(&self.start, count).map_err(failed)?;
+        let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5)));
+        let mut workspace = CloudWorkspace::default();
         for k in 0..self.steps {
-            cloud
-                .predict(&mut rng, &filter, &self.dynamics, &mut workspace)
+            filter
+                .predict(&mut rng, &self.dynamics, &mut cloud, &mut workspace)
                 .map_err(failed)?;
             let broadcast = cloud.means().mean();
             let rules = vec![self.own[k].1.clone(); self.sensors];
-            let (heard, sent) = self.hear(k, track.draws, &rules, &broadcast, 0.0);
+            let (observations, sent) = self.observe(k, track.draws, &rules, &broadcast, 0.0);
             let c = rules[0].half_width();
-            for observation in &heard {
-                let what = match observation {
-                    Observation::Received(z) => Heard::Value(z[0]),
-                    _ => Heard::Silence {
-                        cell: Cell::new(broadcast[0] - c, broadcast[0] + c)?,
-                        loss: 0.0,
-                    },
+            let silence: Scalar = match Cell::new(broadcast[0] - c, broadcast[0] + c) {
+                Ok(cell) => InCell::certain(cell, self.sensor.noise_variance())?.into(),
+                Err(_) => Scalar::from(fewbits_core::factor::Constant::new(0.0)?),
+            };
+            for observation in &observations {
+                let factor = match observation {
+                    Observation::Received(z) => Value::scalar(z[0], self.sensor.noise_variance())?.into(),
+                    _ => silence.clone(),
                 };
-                cloud.update(&mut rng, &self.sensor, &what).map_err(failed)?;
+                let observed = Observed::new(self.sensor, factor);
+                filter
+                    .update(&mut rng, &mut cloud, &observed, &mut workspace)
+                    .map_err(failed)?;
             }
             track.note(k, &cloud.gaussian(), sent);
         }
@@ -50,17 +56,22 @@ impl Linear<1> {
                 _ => belief.covariance()[(0, 0)] + self.sensor.noise_variance(),
             };
             let trigger = StochasticTrigger::for_rate(self.budget.rate(), s).map_err(failed)?;
-            let silent = trigger.silent_sensor(&self.sensor).map_err(failed)?;
+            let scheme = Triggered {
+                sensing: self.sensor,
+                trigger,
+            };
+            let broadcast = *belief.mean();
             let mut sent = 0;
             for (i, z) in track.draws.measurements[k].iter().enumerate() {
-                let speaks = track.draws.coins[k][i] < trigger.probability(z[0] - prediction[0]);
-                sent += usize::from(speaks);
-                let (sensor, value) = if speaks {
-                    (&self.sensor, z)
-                } else {
-                    (&silent, &prediction)
-                };
-                belief = kalman::update(sensor, &belief, value).map_err(failed)?.0;
+                let sends = track.draws.coins[k][i] < trigger.probability(z[0] - prediction[0]);
+                sent += usize::from(sends);
+                let observation = sends.then_some(z[0]).into();
+                let factor = scheme
+                    .factor(&broadcast, &observation, &Link::PERFECT)
+                    .map_err(failed)?;
+                belief = assumed_density::update(&belief, self.sensor.matrix(), &factor)
+                    .map_err(failed)?
+                    .0;
             }
             track.note(k, &belief, sent);
         }
@@ -89,7 +100,7 @@ impl Linear<1> {
             };
             let mut received = 0;
             let mut silent = 0;
-            for observation in &track.draws.blind[k] {
+            for observation in &track.draws.no_feedback[k] {
                 match observation {
                     Observation::Received(z) => {
                         belief = kalman::update(&self.sensor, &belief, z).map_err(failed)?.0;
@@ -99,14 +110,11 @@ impl Linear<1> {
                 }
             }
             if silent > 0 {
-                let silence = ScalarSilence {
-                    centre,
-                    half_width: rule.half_width(),
-                    noise_variance: noise,
-                    loss: 0.0,
-                    count: silent,
-                };
-                belief = hear_scalar_silence(&belief, &direction, &silence).map_err(failed)?.0;
+                let (centre, noise) = (Vector1::new(centre), Matrix1::new(noise));
+                let factor = Censored::silence(rule, &centre, &noise, &Link::PERFECT, silent)?;
+                belief = assumed_density::update(&belief, &direction.transpose(), &factor)
+                    .map_err(failed)?
+                    .0;
             }
             track.note(k, &belief, received);
         }

@@ -1,14 +1,13 @@
 //! No feedback, scalar measurements: figure 3 and what the printed likelihood is worth.
 
 use super::case::Case;
-use super::ensemble::{Ensemble, Part, agrees, beats, ordered_at_every_step, value};
-use super::linear::{Scheme, Setting, run};
+use super::ensemble::{Ensemble, Part, agrees, beats, first, ordered_at_every_step, value};
+use super::linear::{Method, Scheme, Setting, run};
 use crate::error::Error;
 use crate::legacy::Tables;
 use crate::legacy::claim::Claim;
 use crate::legacy::{About, Context};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
-use fewbits_cfwmd::no_feedback::NoFeedback;
 
 /// Figure 3.
 pub(super) struct Fig3;
@@ -36,8 +35,8 @@ impl Case for Fig3 {
     fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         let schemes = [
             ("all", Scheme::All),
-            ("CFwMD", Scheme::Blind(NoFeedback::AssumedDensity)),
-            ("CFoMD", Scheme::Blind(NoFeedback::Ignore)),
+            ("CFwMD", Scheme::NoFeedback(Method::Joint)),
+            ("CFoMD", Scheme::NoFeedback(Method::Ignored)),
             ("random", Scheme::Random),
         ];
         let messages = setting.messages.iter();
@@ -105,11 +104,11 @@ impl Case for NoFeedbackFigure {
 
     fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         let schemes = [
-            ("exact", Scheme::Blind(NoFeedback::RaoBlackwell(setting.particles as usize))),
-            ("joint Gaussian", Scheme::Blind(NoFeedback::AssumedDensity)),
+            ("exact", Scheme::NoFeedback(Method::Imputed(setting.particles as usize))),
+            ("joint Gaussian", Scheme::NoFeedback(Method::Joint)),
             ("heuristic", Scheme::Centred),
-            ("ignored", Scheme::Blind(NoFeedback::Ignore)),
-            ("as printed", Scheme::Blind(NoFeedback::Literal)),
+            ("ignored", Scheme::NoFeedback(Method::Ignored)),
+            ("as printed", Scheme::NoFeedback(Method::Printed)),
             ("no history", Scheme::Unconditional),
         ];
         let messages = setting.messages.iter();
@@ -158,7 +157,7 @@ impl Case for NoFeedbackFigure {
             claims.push(beats(paired, first, second, 1.0, Part::Position)?);
         }
         let literal = paired.only("first", "as printed")?;
-        let same = literal.numbers("pos_mse_difference_m2")?[0].abs() + literal.numbers("pos_se")?[0];
+        let same = first(literal.numbers("pos_mse_difference_m2")?)?.abs() + first(literal.numbers("pos_se")?)?;
         claims.push(Claim::near(
             "printed-is-deaf",
             "the printed likelihood gives the filter that ignores silence, exactly",
@@ -167,7 +166,7 @@ impl Case for NoFeedbackFigure {
             0.0,
         ));
         let gaussian = paired.only("first", "exact")?.only("second", "joint Gaussian")?;
-        let difference = gaussian.numbers("pos_mse_difference_m2")?[0];
+        let difference = first(gaussian.numbers("pos_mse_difference_m2")?)?;
         claims.push(
             Claim::near(
                 "joint-is-exact",

@@ -1,0 +1,31 @@
+//! Eight one-bit sensors about a uniform unknown: the best linear patterns, then breakpoints off the grid.
+
+use fewbits_binary_patterns::search::{LinearSearch, free_breakpoints_of_masks};
+use fewbits_binary_patterns::{Bit, Decoder, Grid, Pattern, Source, bounds};
+use fewbits_core::Observation;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let source = Source::uniform(1.0)?;
+    let (grid, noise) = (Grid::uniform(1.0, 3)?, source.noise_std(18.2)?);
+    let search = LinearSearch::new(source, grid.clone(), noise, 8)?;
+    let best = search.best()?;
+    println!("masks {:?}, squared error {:.7}", best.masks, best.mse);
+    for mask in &best.masks {
+        println!("  {mask}: {}", Pattern::linear(*mask, 3)?);
+    }
+    let bank = search.bank(&best.masks)?;
+    println!("no estimator is below {:.7}", bounds::optimal_weight_van_trees(&bank)?);
+
+    let free = free_breakpoints_of_masks(&source, &grid, &best.masks, noise, 0.02, 2)?;
+    println!("free breakpoints: {:.7}", free.mse);
+    for sensor in &free.sensors {
+        println!("  {:.4?}", sensor.quantizer().breakpoints());
+    }
+
+    let table = bank.table(Decoder::Mmse)?;
+    let mut seen = [true, false, true, true, false, true, true, false].map(|b| Observation::Received(Bit(b)));
+    println!("estimate {:.4}", table.decode(&seen)?);
+    seen[3] = Observation::Erased;
+    println!("estimate without sensor 4: {:.4}", table.decode(&seen)?);
+    Ok(())
+}

@@ -1,0 +1,86 @@
+//! The laws of `core`, run on every dynamics and every sensing of this crate.
+
+use fewbits_core::{Dynamics, GaussianDynamics, LinearDynamics, Sensing, laws};
+use fewbits_models::{Ar1, LinearGaussian, LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
+use nalgebra::{Matrix2, Matrix2x4, SVector, Vector2, Vector4};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+const DRAWS: usize = 20_000;
+
+/// Every law of linear dynamics, at every scale.
+fn linear<const D: usize>(dynamics: &impl LinearDynamics<D>, states: &[SVector<f64, D>]) {
+    let mut rng = Pcg64Mcg::seed_from_u64(7);
+    laws::dynamics::is_linear(dynamics, states).unwrap();
+    for state in states {
+        laws::dynamics::jacobian_is_the_derivative(dynamics, state).unwrap();
+        laws::dynamics::draws_have_the_law(dynamics, &mut rng, state, DRAWS).unwrap();
+    }
+}
+
+#[test]
+fn dynamics() {
+    for scale in [1e-4, 1.0, 1e4] {
+        linear(&Ar1::new(0.8, 0.5 * scale * scale).unwrap(), &[[3.0 * scale].into(), [-0.2 * scale].into()]);
+        linear(&Ar1::new_unstable(-1.3, 0.0).unwrap(), &[[2.0 * scale].into()]);
+        let line = constant_velocity_1d(0.7, 2.0 * scale * scale).unwrap();
+        linear(&line, &[Vector2::new(1.0, -2.0) * scale]);
+        let plane = constant_velocity_2d(1.5, 0.3 * scale * scale).unwrap();
+        linear(&plane, &[Vector4::new(1.0, 0.5, -3.0, 2.0) * scale]);
+        let noise = Matrix2::new(2.0, 0.9, 0.9, 1.0) * (scale * scale);
+        let coloured = LinearGaussian::with_covariance(Matrix2::new(0.9, 0.3, -0.2, 0.7), noise).unwrap();
+        linear(&coloured, &[Vector2::new(4.0, -1.0) * scale]);
+    }
+    linear(&LinearGaussian::from(Ar1::new(0.8, 0.5).unwrap()), &[[3.0].into()]);
+}
+
+#[test]
+fn sensing() {
+    let states: Vec<Vector4<f64>> = (0..70)
+        .map(|i| f64::from(i) * 0.3)
+        .map(|t| Vector4::new(t - 8.0, 1.0, 4.0 - 0.4 * t, t.sin()))
+        .collect();
+    let h = Matrix2x4::new(1.0, 0.0, 0.5, 0.0, 0.0, -2.0, 0.0, 1.0);
+    let linear = LinearSensor::new(h, Matrix2::new(2.0, 0.9, 0.9, 1.0)).unwrap();
+    laws::sensing::is_consistent(&linear, &states).unwrap();
+    let mut rng = Pcg64Mcg::seed_from_u64(9);
+    laws::sensing::draws_have_the_law(&linear, &mut rng, &states[3], DRAWS).unwrap();
+    for exponent in [1.0, 1.5, 2.0, 3.7] {
+        let power = ReceivedPower::<4>::new(Vector2::new(1.0, -2.0), [0, 2], 50.0, 0.3, exponent, 1.7).unwrap();
+        laws::sensing::is_consistent(&power, &states).unwrap();
+        laws::sensing::draws_have_the_law(&power, &mut rng, &states[3], DRAWS).unwrap();
+    }
+}
+
+#[test]
+fn the_density_of_a_transition_is_that_of_its_noise() {
+    let model = Ar1::new(0.9, 2.0).unwrap();
+    let found = model.log_transition(&[1.5].into(), &[1.0].into()).unwrap();
+    let expected = fewbits_numerics::normal::log_pdf_with(1.5, 0.9, 2.0);
+    assert!((found - expected).abs() < 1e-14);
+    let singular = constant_velocity_1d(1.0, 1.0).unwrap();
+    assert!(singular.log_transition(&Vector2::zeros(), &Vector2::zeros()).is_err());
+    // With all traits in scope no method is ambiguous.
+    assert_eq!((model.noise_covariance()[0], model.mean(&[2.0].into())[0]), (2.0, 1.8));
+    assert_eq!(LinearSensor::direct(0.5).unwrap().mean(&[2.0].into())[0], 2.0);
+}
+
+#[test]
+fn stored_models_come_back_equal_and_checked() {
+    fn restored<T: serde::Serialize + serde::de::DeserializeOwned>(model: &T) -> T {
+        serde_json::from_str(&serde_json::to_string(model).unwrap()).unwrap()
+    }
+    let ar1 = Ar1::new(0.9, 0.1).unwrap();
+    assert_eq!(restored(&ar1), ar1);
+    let line = constant_velocity_1d(0.7, 2.0).unwrap();
+    assert_eq!(restored(&line), line);
+    let sensor = LinearSensor::direct(0.3).unwrap();
+    assert_eq!(restored(&sensor), sensor);
+    let power = ReceivedPower::<4>::new(Vector2::new(1.0, -2.0), [0, 2], 50.0, 0.3, 2.0, 1.7).unwrap();
+    assert_eq!(restored(&power), power);
+    for bad in [r#"{"coefficient":0.9,"noise_variance":-1.0}"#, r#"{"coefficient":0.9}"#] {
+        assert!(serde_json::from_str::<Ar1>(bad).is_err());
+    }
+    assert!(serde_json::from_str::<LinearSensor<1, 1>>(r#"{"matrix":[1.0],"noise_covariance":[0.0]}"#).is_err());
+    assert!(serde_json::from_str::<LinearSensor<1, 1>>(r#"{"matrix":[1.0],"noise_covariance":[2.0]}"#).is_ok());
+}

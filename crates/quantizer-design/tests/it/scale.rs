@@ -1,0 +1,225 @@
+//! Nothing depends on the unit: the design of a scaled scene is the scaled design.
+
+use fewbits_quantizer_design::decoder::MmseDecoder;
+use fewbits_quantizer_design::design::{self, AllowedCells, Alternating, Design, Discovery, Separation, Words};
+use fewbits_quantizer_design::{
+    Certificate, Channel, Criterion, JointTable, Newton, Noise, Prior, Quantizer, Scene, System, lloyd_max,
+};
+
+const MI: Criterion = Criterion::MutualInformation;
+const MSE: Criterion = Criterion::MeanSquaredError;
+const SCALES: [f64; 4] = [1e-4, 1e3, 1e4, 3e5];
+
+fn pair(rho: f64, scale: f64) -> Scene {
+    let noise = Noise::equicorrelated(&[scale, 0.8 * scale], rho).unwrap();
+    Scene::new(Prior::gaussian(scale).unwrap(), noise).unwrap()
+}
+
+fn equal_pair(rho: f64, scale: f64) -> Scene {
+    let noise = Noise::equicorrelated(&[scale; 2], rho).unwrap();
+    Scene::new(Prior::gaussian(scale).unwrap(), noise).unwrap()
+}
+
+fn size(criterion: Criterion, scale: f64) -> f64 {
+    if criterion == MSE { scale * scale } else { 1.0 }
+}
+
+fn agree(one: &Design, other: &Design, scale: f64, criterion: Criterion, tolerance: f64) {
+    let relative = other.value / size(criterion, scale);
+    assert!((relative - one.value).abs() <= 1e-11 * one.value.abs(), "{scale}: {relative} {}", one.value);
+    assert_eq!(one.certificate, other.certificate, "{scale}");
+    for (a, b) in one.quantizers().iter().zip(other.quantizers()) {
+        assert_eq!(a.labels(), b.labels());
+        for (a, b) in a.breakpoints().iter().zip(b.breakpoints()) {
+            assert!((a - b / scale).abs() <= tolerance, "{scale}: {a} {}", b / scale);
+        }
+    }
+}
+
+/// Runs an algorithm at every scale and compares with scale one.
+fn law(criterion: Criterion, tolerance: f64, run: impl Fn(f64) -> Design) {
+    let one = run(1.0);
+    for scale in SCALES {
+        agree(&one, &run(scale), scale, criterion, tolerance);
+    }
+}
+
+#[test]
+fn joint_greedy_and_cyclic_designs_know_no_unit() {
+    let newton = Newton::default();
+    for criterion in [MI, MSE] {
+        for rho in [0.0, 0.6] {
+            let start = |scale: f64| System::lloyd_max(pair(rho, scale), 4).unwrap();
+            law(criterion, 1e-8, |s| design::joint(&start(s), criterion, &newton).unwrap());
+            law(criterion, 1e-8, |s| design::greedy(&start(s), &[1, 0], criterion, &newton).unwrap().pop().unwrap());
+        }
+        law(criterion, 1e-5, |s| {
+            let grid: Vec<f64> = (-20..=20).map(|i| 0.2 * s * f64::from(i)).collect();
+            let start = System::lloyd_max(pair(0.3, s), 3).unwrap();
+            design::cyclic(&start, criterion, Some(&grid), 1e-13, &newton).unwrap()
+        });
+    }
+}
+
+/// At correlation .85 the symmetric start leads to a saddle, which once was taken for an optimum in large units.
+#[test]
+fn saddles_are_left_in_every_unit() {
+    for (rho, levels, best) in [(0.85, 4, Some(0.331_123_01)), (0.7, 3, None)] {
+        let run = |s: f64| {
+            let start = System::lloyd_max(equal_pair(rho, s), levels).unwrap();
+            design::joint(&start, MI, &Newton::default()).unwrap()
+        };
+        let one = run(1.0);
+        assert_eq!(one.certificate, Certificate::LocalOptimum);
+        assert!(best.is_none_or(|b: f64| (one.value - b).abs() < 1e-8), "{}", one.value);
+        for scale in SCALES {
+            let other = run(scale);
+            assert!((other.value - one.value).abs() < 1e-11, "{rho} {scale}: {} {}", other.value, one.value);
+            assert_eq!(other.certificate, Certificate::LocalOptimum);
+        }
+    }
+    let stay = Newton::to_nearest_stationary_point();
+    for scale in SCALES {
+        let start = System::lloyd_max(equal_pair(0.85, scale), 4).unwrap();
+        assert!(design::joint(&start, MSE, &stay).unwrap().is_saddle(), "{scale}");
+    }
+}
+
+#[test]
+fn searches_know_no_unit() {
+    law(MSE, 1e-6, |s| {
+        let start = System::lloyd_max(equal_pair(0.0, s), 3).unwrap();
+        let best = design::multi_start(&start, MSE, 4, 1, &Newton::default()).unwrap();
+        Design { iterations: 0, ..best }
+    });
+    let settings = Discovery {
+        starts: 2,
+        polished: 2,
+        grid: 60,
+        ..Discovery::default()
+    };
+    let folded = |s: f64| {
+        let start = System::lloyd_max(equal_pair(0.85, s), 2).unwrap();
+        design::discover(&start, MSE, &settings).unwrap().value / (s * s)
+    };
+    let one = folded(1.0);
+    for scale in SCALES {
+        assert!((folded(scale) / one - 1.0).abs() < 1e-11, "{scale}");
+    }
+    let words = |s: f64| design::assign_words(&equal_pair(0.0, s), 2, 0.1, 3..=4, MSE, Words::Shared).unwrap();
+    let one = words(1.0);
+    for scale in SCALES {
+        let other = words(scale);
+        assert_eq!(one[0].words, other[0].words);
+        agree(&one[0].design, &other[0].design, scale, MSE, 1e-8);
+    }
+}
+
+#[test]
+fn alternating_steps_and_programmes_know_no_unit() {
+    let rule = Alternating {
+        tolerance: 1e-9,
+        breakpoint_tolerance: 1e-4,
+        cells: AllowedCells::Any,
+        ..Alternating::default()
+    };
+    for criterion in [MI, MSE] {
+        let start = |s: f64| System::lloyd_max(pair(0.3, s), 4).unwrap();
+        let one = design::alternate(&start(1.0), 0, criterion, &rule).unwrap();
+        let grid = |s: f64| (-20..=20).map(|i| 0.21 * s * f64::from(i)).collect::<Vec<_>>();
+        let (best, _) = design::best_contiguous(&start(1.0), 0, criterion, &grid(1.0)).unwrap();
+        for scale in SCALES {
+            let other = design::alternate(&start(scale), 0, criterion, &rule).unwrap();
+            assert_eq!(one.iterations, other.iterations);
+            assert!((other.value / size(criterion, scale) - one.value).abs() < 1e-11);
+            let (scaled, _) = design::best_contiguous(&start(scale), 0, criterion, &grid(scale)).unwrap();
+            for (a, b) in best.breakpoints().iter().zip(scaled.breakpoints()) {
+                assert!((a * scale - b).abs() < 1e-9 * scale);
+            }
+        }
+    }
+}
+
+#[test]
+fn detection_knows_no_unit() {
+    let scene = |s: f64| {
+        Scene::new(Prior::binary(2.0 * s, 0.4).unwrap(), Noise::independent(&vec![s; 3]).unwrap()).unwrap()
+    };
+    let about = |s: f64| Quantizer::new([0.2, 1.0, 1.8].map(|b| s * b).to_vec()).unwrap();
+    for criterion in [MI, Criterion::BayesError] {
+        law(criterion, 1e-6, |s| {
+            let start = System::identical(scene(s), about(s)).unwrap();
+            design::joint(&start, criterion, &Newton::default()).unwrap()
+        });
+    }
+    let ideal = Channel::ideal(4).unwrap();
+    for distance in [Separation::Matusita, Separation::Bhattacharyya, Separation::JDivergence] {
+        let run = |s: f64| design::separate(distance, 2.0 * s, s, &about(s), &ideal, &Newton::default()).unwrap();
+        let (one, reached) = run(1.0);
+        for scale in SCALES {
+            let (other, far) = run(scale);
+            assert!((far - reached).abs() < 1e-12);
+            for (a, b) in one.breakpoints().iter().zip(other.breakpoints()) {
+                assert!((a * scale - b).abs() < 1e-8 * scale);
+            }
+        }
+    }
+}
+
+/// Decisions that are almost sure: information within 1e-20 of its limit still has an optimum, and Newton finds it.
+#[test]
+fn strong_signals_have_designs_too() {
+    for signal in [10.0, 14.0] {
+        let middle = 0.5 * signal;
+        let about = Quantizer::new(vec![middle - 1.0, middle, middle + 1.0]).unwrap();
+        let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), Noise::independent(&[1.0; 9]).unwrap()).unwrap();
+        let start = System::identical(scene, about.clone()).unwrap();
+        let informed = design::joint(&start, MI, &Newton::default()).unwrap();
+        let decided = design::joint(&start, Criterion::BayesError, &Newton::default()).unwrap();
+        let ideal = Channel::ideal(4).unwrap();
+        let (q, _) = design::separate(Separation::Matusita, signal, 1.0, &about, &ideal, &Newton::default()).unwrap();
+        let matusita = start.with_quantizer(0, q).unwrap();
+        let equivocation = |s: &System| JointTable::new(s).unwrap().equivocation().unwrap();
+        assert!(equivocation(&informed.system) <= equivocation(&matusita) * (1.0 + 1e-9));
+        assert!(decided.value <= matusita.value(Criterion::BayesError).unwrap() * (1.0 + 1e-9));
+        assert!(decided.value > 0.0 && decided.certificate != Certificate::Saddle);
+    }
+}
+
+#[test]
+fn a_design_is_stored_rescaled_and_restored() {
+    let best = design::design(&pair(0.2, 1.0), 2).unwrap();
+    let json = serde_json::to_string(&best).unwrap();
+    assert_eq!(serde_json::from_str::<Design>(&json).unwrap(), best);
+    let rescaled = best.rescaled(1e4, MSE).unwrap();
+    agree(&best, &rescaled, 1e4, MSE, 1e-12);
+    assert!((rescaled.system.value(MSE).unwrap() / rescaled.value - 1.0).abs() < 1e-11);
+    let again = design::design(&pair(0.2, 1e4), 2).unwrap();
+    assert!((again.value / rescaled.value - 1.0).abs() < 1e-10);
+}
+
+#[test]
+fn what_a_user_reaches_for_agrees_with_what_he_built_by_hand() {
+    let scene = pair(0.4, 1.0);
+    let lloyd = System::lloyd_max(scene.clone(), 4).unwrap();
+    for (n, q) in lloyd.quantizers().iter().enumerate() {
+        let by_hand = lloyd_max::gaussian(4).unwrap().affine(0.0, scene.sample_sd(n)).unwrap();
+        assert_eq!(q, &Quantizer::from(&by_hand));
+        // The samples are normal, so the symbols have the table's probabilities.
+        for (p, mass) in lloyd.symbol_distribution(n).unwrap().iter().zip(by_hand.probabilities()) {
+            assert!((p - mass).abs() < 1e-12);
+        }
+    }
+    assert!(lloyd.symbol_distribution(2).is_err());
+    assert!((design::bhattacharyya_coefficient(&[0.5, 0.5], &[0.9, 0.1]).unwrap() - 0.894_427_19).abs() < 1e-8);
+    assert!(design::bhattacharyya_coefficient(&[0.5, 0.5], &[1.0]).is_err());
+    let report = design::design(&Scene::gaussian(1.0, &[1.0, 1.0]).unwrap(), 1).unwrap().report().unwrap();
+    let bound = report.ceo_bound.unwrap();
+    assert!((bound - 0.444_444).abs() < 1e-5 && report.mean_squared_error > bound && report.excess().unwrap() > 1.0);
+    let detection = Scene::new(Prior::binary(2.0, 0.5).unwrap(), Noise::independent(&[1.0; 5]).unwrap()).unwrap();
+    let found = design::design(&detection, 2).unwrap();
+    assert!((found.value - 1.660_803_0e-2).abs() < 1e-8, "{}", found.value);
+    assert!(design::design(&detection, 0).is_err() && design::design(&detection, 7).is_err());
+    let decoder = MmseDecoder::new(&lloyd, 16).unwrap();
+    assert_eq!(decoder.len(), 16);
+}

@@ -1,0 +1,146 @@
+//! The whole scheme of a quantizing sensor: sample in, word out, and what a received word says.
+
+use crate::error::Error;
+use crate::labelling::{Labelling, Symbol};
+use crate::quantizer::Quantizer;
+use crate::refuse;
+use fewbits_core::factor::{Constant, Scalar};
+use fewbits_core::nalgebra::SVector;
+use fewbits_core::rand::Rng;
+use fewbits_core::{Link, Observation, Scheme};
+use fewbits_numerics::error::positive;
+use serde::{Deserialize, Serialize};
+
+/// A sensor that reports the level of its scalar sample in every slot: a [`Scheme`], so that every filter takes it.
+///
+/// Over a [`Link`] of crossover `e` each bit of the word is inverted with probability `e`; a word that no level uses is a symbol,
+/// too. The sensor is never silent, so nothing received is a loss.
+///
+/// ```
+/// use fewbits_core::factor::Factor;
+/// use fewbits_core::{Gaussian, Link, Observation, Scheme};
+/// use fewbits_quantizers::{Labelling, QuantizingSensor, Quantizer, Symbol, lloyd_max};
+///
+/// let sensor = QuantizingSensor::new(Quantizer::from(&lloyd_max::gaussian(4)?), Labelling::gray(4)?, 0.5)?;
+/// let level = Symbol(sensor.quantizer().encode(1.2)?);
+/// let received = sensor.factor(&(), &Observation::Received(level), &Link::flipping(0.01)?)?;
+/// let posterior = received.tilted(&Gaussian::scalar(0.0, 1.0)?)?;
+/// assert!(posterior.mean[0] > 0.8 && posterior.covariance[0] < 0.6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct QuantizingSensor {
+    quantizer: Quantizer,
+    labelling: Labelling,
+    noise_variance: f64,
+}
+
+/// The stored form.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    quantizer: Quantizer,
+    labelling: Labelling,
+    noise_variance: f64,
+}
+
+impl From<QuantizingSensor> for Stored {
+    fn from(sensor: QuantizingSensor) -> Self {
+        Self {
+            quantizer: sensor.quantizer,
+            labelling: sensor.labelling,
+            noise_variance: sensor.noise_variance,
+        }
+    }
+}
+
+impl TryFrom<Stored> for QuantizingSensor {
+    type Error = Error;
+
+    fn try_from(stored: Stored) -> Result<Self, Error> {
+        Self::new(stored.quantizer, stored.labelling, stored.noise_variance)
+    }
+}
+
+impl QuantizingSensor {
+    /// A sensor with this quantizer and these words, whose samples have noise of the given variance.
+    ///
+    /// # Errors
+    /// If the labelling has not a word per level, or `noise_variance` is not a positive number.
+    pub fn new(quantizer: Quantizer, labelling: Labelling, noise_variance: f64) -> Result<Self, Error> {
+        positive("noise_variance", noise_variance)?;
+        if labelling.levels() != quantizer.levels() {
+            let given = format!("{} words", labelling.levels());
+            return refuse("labelling", given, format!("{} words, one per level", quantizer.levels()));
+        }
+        Ok(Self {
+            quantizer,
+            labelling,
+            noise_variance,
+        })
+    }
+
+    /// The quantizer.
+    pub fn quantizer(&self) -> &Quantizer {
+        &self.quantizer
+    }
+
+    /// The words: the format of the reports.
+    pub fn labelling(&self) -> &Labelling {
+        &self.labelling
+    }
+
+    /// Variance of the noise in the samples.
+    pub fn noise_variance(&self) -> f64 {
+        self.noise_variance
+    }
+}
+
+impl Scheme<1> for QuantizingSensor {
+    type State = ();
+    type Feedback = ();
+    type Report = Symbol;
+    type Factor = Scalar;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) {}
+
+    fn report_format(&self) -> Labelling {
+        self.labelling.clone()
+    }
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        (): &mut (),
+        measurement: &SVector<f64, 1>,
+        (): &(),
+    ) -> Result<Option<Symbol>, fewbits_core::Error> {
+        Ok(Some(Symbol(self.quantizer.encode(measurement[0])?)))
+    }
+
+    fn factor(
+        &self,
+        (): &(),
+        observation: &Observation<Symbol>,
+        link: &Link,
+    ) -> Result<Scalar, fewbits_core::Error> {
+        let symbol = match observation {
+            Observation::Received(symbol) => *symbol,
+            Observation::Nothing => return Ok(Constant::new(link.loss())?.into()),
+            Observation::Erased => return Ok(Constant::ONE.into()),
+        };
+        let word = |symbol: usize| self.labelling.word(symbol).map(u64::from);
+        let Some(received) = word(symbol.0) else {
+            return Err(refuse::<()>("symbol", symbol.0, format!("a number below {}", self.labelling.symbols()))
+                .map_or_else(Into::into, |()| fewbits_core::Error::Impossible));
+        };
+        let given_level = |level: usize| {
+            let sent = word(level).unwrap_or(received);
+            (1.0 - link.loss()) * link.word_probability(sent, received, self.labelling.bits())
+        };
+        Ok(self.quantizer.factor_of(self.noise_variance, given_level)?)
+    }
+}

@@ -1,0 +1,152 @@
+//! `cargo xtask alone`: every crate built as a user would depend on it, outside the workspace.
+//!
+//! For each library crate a package is written to a temporary folder that depends on that crate alone: checked with default
+//! features and with none, then with each of the crate's examples as its program, which is run.
+
+use cargo_metadata::{DependencyKind, MetadataCommand, Package};
+use clap::Args;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use thiserror::Error;
+
+/// Options of `cargo xtask alone`.
+#[derive(Debug, Clone, Args)]
+pub struct Options {
+    /// Names of crates, such as `fewbits-core`; all without any.
+    pub crates: Vec<String>,
+}
+
+/// Why crates could not be tried.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The workspace's manifests could not be read.
+    #[error(transparent)]
+    Metadata(#[from] cargo_metadata::Error),
+    /// A file could not be read or written, or cargo not be started.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or program.
+        path: PathBuf,
+        /// What went wrong.
+        source: std::io::Error,
+    },
+    /// No crate has that name.
+    #[error("no library crate is called `{name}`")]
+    UnknownCrate {
+        /// The name.
+        name: String,
+    },
+}
+
+/// Tries the crates and prints what failed; `Ok(false)` if anything did.
+///
+/// # Errors
+/// If a manifest cannot be read, a folder not be written, or no crate has a given name.
+pub fn run(options: &Options) -> Result<bool, Error> {
+    let metadata = MetadataCommand::new().no_deps().exec()?;
+    let is_library = |package: &&Package| package.manifest_path.as_str().contains("/crates/");
+    let libraries: Vec<&Package> = metadata.packages.iter().filter(is_library).collect();
+    if let Some(name) = options.crates.iter().find(|name| libraries.iter().all(|p| p.name.as_str() != name.as_str())) {
+        return Err(Error::UnknownCrate { name: name.clone() });
+    }
+    let root = metadata.workspace_root.as_std_path();
+    let target = metadata.target_directory.as_std_path().join("alone");
+    let mut good = true;
+    for package in libraries {
+        if options.crates.is_empty() || options.crates.iter().any(|name| package.name.as_str() == name.as_str()) {
+            good &= try_crate(package, root, &target)?;
+        }
+    }
+    Ok(good)
+}
+
+fn try_crate(package: &Package, root: &Path, target: &Path) -> Result<bool, Error> {
+    let folder = target.join("packages").join(package.name.as_str());
+    let source = folder.join("src");
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |source| Error::Io { path, source }
+    };
+    std::fs::create_dir_all(&source).map_err(failed(&source))?;
+    let lock = folder.join("Cargo.lock");
+    std::fs::copy(root.join("Cargo.lock"), &lock).map_err(failed(&lock))?;
+    let write = |path: PathBuf, text: &str| std::fs::write(&path, text).map_err(failed(&path));
+    let cargo = |verb: &str| {
+        let status = Command::new("cargo")
+            .args([verb, "--quiet", "--offline", "--manifest-path"])
+            .arg(folder.join("Cargo.toml"))
+            .env("CARGO_TARGET_DIR", target)
+            .stdout(std::process::Stdio::null())
+            .status();
+        status.map(|status| status.success()).map_err(failed(Path::new("cargo")))
+    };
+
+    let mut good = true;
+    let mut report = |what: &str, passed: bool| {
+        println!("{:4} {} {what}", if passed { "ok" } else { "FAIL" }, package.name);
+        good &= passed;
+    };
+    write(source.join("main.rs"), "fn main() {}\n")?;
+    for (what, features) in [("with default features", true), ("without features", false)] {
+        write(folder.join("Cargo.toml"), &manifest(package, features, &BTreeSet::new()))?;
+        report(what, cargo("check")?);
+    }
+    for example in package.targets.iter().filter(|t| t.is_example()) {
+        let path = example.src_path.as_std_path();
+        let text = std::fs::read_to_string(path).map_err(failed(path))?;
+        write(folder.join("Cargo.toml"), &manifest(package, true, &used(&text)))?;
+        write(source.join("main.rs"), &text)?;
+        report(&format!("example {}", example.name), cargo("run")?);
+    }
+    Ok(good)
+}
+
+/// First segments of the paths that a program imports.
+fn used(program: &str) -> BTreeSet<String> {
+    let imports = program.lines().filter_map(|line| line.trim().strip_prefix("use "));
+    let first = |path: &str| path.split([':', ';', ' ', '{']).next().map(str::to_owned);
+    imports.filter_map(first).collect()
+}
+
+/// A package that depends on one crate and on what its program imports besides.
+fn manifest(package: &Package, default_features: bool, used: &BTreeSet<String>) -> String {
+    let folder = |manifest: &str| manifest.trim_end_matches("/Cargo.toml").to_owned();
+    let mut text = format!(
+        "[package]\nname = \"alone-{0}\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n[dependencies]\n\
+         {0} = {{ path = \"{1}\", default-features = {default_features} }}\n",
+        package.name,
+        folder(package.manifest_path.as_str()),
+    );
+    let mut known = BTreeSet::from([package.name.to_string()]);
+    for dependency in &package.dependencies {
+        let imported = used.contains(&dependency.name.replace('-', "_"));
+        if dependency.kind == DependencyKind::Build || !imported || !known.insert(dependency.name.clone()) {
+            continue;
+        }
+        let features: Vec<String> = dependency.features.iter().map(|f| format!("\"{f}\"")).collect();
+        let source = match &dependency.path {
+            Some(path) => format!("path = \"{path}\""),
+            None => format!("version = \"{}\"", dependency.req),
+        };
+        text += &format!(
+            "{} = {{ {source}, default-features = {}, features = [{}] }}\n",
+            dependency.name,
+            dependency.uses_default_features,
+            features.join(", ")
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::used;
+
+    #[test]
+    fn imports_are_found() {
+        let program = "//! x\nuse rand::RngExt;\nuse fewbits_core::{Link, Sign};\nfn main() {}\n";
+        assert_eq!(used(program).into_iter().collect::<Vec<_>>(), ["fewbits_core", "rand"]);
+    }
+}
