@@ -4,10 +4,12 @@ use super::common::{A, B, Network, Scheme, Settings, fraction, tracks, trials};
 use crate::plot::{Axis, Layer, Legend, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_diffusive::information::Predictions;
-use fewbits_diffusive::{Rule, Selector};
+use fewbits_diffusive::{Posterior, Rule, Selector, SourceSensor};
 use fewbits_monte_carlo::Moments;
 use garde::Validate;
 use nalgebra::Vector2;
+use rand::RngExt;
+use rand_distr::StandardNormal;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,17 +23,21 @@ pub struct Parameters {
     /// Random deployments in which candidates are ranked.
     #[garde(range(min = 1, max = 10_000))]
     ranking_trials: u64,
-    /// Support points of the exact mutual information.
+    /// Support points of the bounds.
     #[garde(range(min = 10, max = 2_000))]
     points: usize,
+    /// Draws of the mutual information.
+    #[garde(range(min = 10, max = 100_000))]
+    draws: usize,
 }
 
 impl Default for Parameters {
     fn default() -> Self {
         Self {
             trials: 200,
-            ranking_trials: 24,
-            points: 120,
+            ranking_trials: 12,
+            points: 200,
+            draws: 200,
         }
     }
 }
@@ -41,7 +47,7 @@ impl Default for Parameters {
 pub struct Rows {
     /// Searches with the exact belief, by rule.
     searches: Vec<Search>,
-    /// How rules rank the neighbours after three nodes, against the exact mutual information.
+    /// How rules rank the neighbours after three nodes, against the mutual information by draws.
     rankings: Vec<Ranking>,
 }
 
@@ -127,7 +133,7 @@ impl Figure for Selection {
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost {
-            seconds: p.trials as f64 * 0.3 + p.ranking_trials as f64 * (p.points as f64).powi(2) * 4e-4,
+            seconds: p.trials as f64 * 0.3 + p.ranking_trials as f64 * p.draws as f64 * 0.01,
             bytes: 1e7,
         }
     }
@@ -199,13 +205,10 @@ impl Figure for Selection {
             .above("mahalanobis-does-not", "Mahalanobis distance ranks far worse", gap, 0.2)
             .at_full_trials();
         let bias = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).and_then(|r| r.bias);
-        claims.at_most(
-            "lower",
-            "the lower bound is below the exact information on average",
-            bias("pairwise lower"),
-            1e-6,
-        );
-        claims.at_least("upper", "the upper bound is above it on average", bias("pairwise upper"), -1e-6);
+        let what = "the pairwise lower bound is below the information on average (draws leave some noise)";
+        claims.at_most("lower", what, bias("pairwise lower"), 0.05);
+        let what = "the Gaussian bound is not below the information on average";
+        claims.at_least("gaussian-is-a-bound", what, bias("gaussian bound"), -0.1);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
@@ -268,6 +271,7 @@ fn rank(
     if places.len() < 4 {
         return Ok(None);
     }
+    let reference = Reference::new(posterior, p.draws, trial);
     let clumps = posterior.clumps_with_rate(1.0, p.points).map_err(Error::failed)?;
     let weights: Vec<f64> = clumps.clumps().iter().map(|c| c.weight).collect();
     let total: f64 = weights.iter().sum();
@@ -294,7 +298,7 @@ fn rank(
             .collect();
         let predictions = Predictions::new(&means, &weights, sensor.noise())?;
         let bounds = predictions.pairwise_bounds();
-        exact.push(predictions.exact());
+        exact.push(reference.information(&sensor, place)?);
         scores[0].push(predictions.gaussian_bound());
         scores[1].push(bounds.lower);
         scores[2].push(bounds.upper);
@@ -334,4 +338,74 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let own = |v: &[f64], m: f64| v.iter().map(|x| (x - m).powi(2)).sum::<f64>();
     let scale = (own(a, ma) * own(b, mb)).sqrt();
     if scale > 0.0 { cross / scale } else { 0.0 }
+}
+
+/// Draws of position, rate and noise from a posterior, and the cells that say how likely samples are under all of it.
+struct Reference<'a> {
+    posterior: &'a Posterior,
+    draws: Vec<Draw>,
+}
+
+/// A draw: position, rate, and one noise for every sample in standard deviations.
+struct Draw {
+    position: Vector2<f64>,
+    rate: f64,
+    noise: Vec<f64>,
+}
+
+impl<'a> Reference<'a> {
+    fn new(posterior: &'a Posterior, draws: usize, trial: fewbits_monte_carlo::Trial) -> Self {
+        let mut rng = trial.stream.named("information").rng();
+        let [x, y] = posterior.cells.columns();
+        let mut cumulative: Vec<f64> = posterior.cells.weights().to_vec();
+        for i in 1..cumulative.len() {
+            cumulative[i] += cumulative[i - 1];
+        }
+        let total = cumulative.last().copied().unwrap_or(1.0);
+        let draw = |k: usize| {
+            // Systematic in the cells: the sum over the posterior is nearly exact, the noise is what is left.
+            let level = total * (k as f64 + rng.random::<f64>()) / draws as f64;
+            let cell = cumulative.partition_point(|c| *c < level).min(cumulative.len() - 1);
+            let (mean, variance) = posterior.rates.as_ref().map_or((1.0, 0.0), |(m, v)| (m[cell], v[cell]));
+            let mut normal = || rng.sample::<f64, _>(StandardNormal);
+            Draw {
+                position: Vector2::new(x[cell], y[cell]),
+                rate: mean + variance.sqrt() * normal(),
+                noise: (0..B.samples).map(|_| normal()).collect(),
+            }
+        };
+        Self {
+            posterior,
+            draws: (0..draws).map(draw).collect(),
+        }
+    }
+
+    /// Mutual information of (position, rate) and the samples of a node, nats: the mean of `ln p(y | position, rate) - ln p(y)`, with
+    /// `p(y)` the sum over all cells, the rate in each integrated out as a normal of its mean and variance.
+    fn information(&self, sensor: &SourceSensor, place: &Vector2<f64>) -> Result<f64, Error> {
+        let [x, y] = self.posterior.cells.columns();
+        let weights = self.posterior.cells.weights();
+        let mut total = 0.0;
+        for draw in &self.draws {
+            let clean = sensor.responses(place, &draw.position);
+            let samples: Vec<f64> = clean
+                .iter()
+                .zip(&draw.noise)
+                .map(|(a, e)| draw.rate * a + sensor.noise() * e + sensor.bias())
+                .collect();
+            let record = sensor.record(place, &samples).map_err(Error::failed)?;
+            let own = record.sums(&draw.position).log_given_rate(draw.rate);
+            let mut ratio = 0.0;
+            for (i, weight) in weights.iter().enumerate() {
+                let sums = record.sums(&Vector2::new(x[i], y[i]));
+                let (mean, variance) = self.posterior.rates.as_ref().map_or((1.0, 0.0), |(m, v)| (m[i], v[i]));
+                let spread = 1.0 + variance * sums.response;
+                let residual = sums.correlation - mean * sums.response;
+                let gain = 0.5 * residual * residual * variance / spread - 0.5 * spread.ln();
+                ratio += weight * (sums.log_given_rate(mean) + gain - own).exp();
+            }
+            total -= ratio.ln();
+        }
+        Ok(total / self.draws.len() as f64)
+    }
 }
