@@ -48,6 +48,8 @@ pub use fewbits_topology as topology;
 mod pages {
     #[doc = include_str!("../../../README.md")]
     struct Readme;
+    #[doc = include_str!("../../../docs/guide.md")]
+    struct Guide;
     #[doc = include_str!("../../../docs/own-scheme.md")]
     struct OwnScheme;
     #[doc = include_str!("../../../docs/dymbo.md")]
