@@ -97,7 +97,7 @@ proptest! {
         let bits = (bytes.len() * 8).saturating_sub(cut);
         let string = BitString::from_bytes(bytes, bits).unwrap();
         for numbers in [NumberFormat::Double, NumberFormat::Single] {
-            prop_assert!(decoding_is_total(&string, &contract(numbers)));
+            prop_assert!(decoding_is_total::<Packet>(&string, &contract(numbers)));
             if let Ok(packet) = <Packet as fewbits_core::Message>::decode(&contract(numbers), &mut fewbits_core::BitReader::new(&string)) {
                 // A belief or an error, never a panic.
                 let _ = packet.belief();
