@@ -91,12 +91,16 @@ impl<const D: usize> Clumps<D> {
         if order.is_empty() {
             return Err(Error::IMPOSSIBLE);
         }
-        let cloud = Cloud {
+        let mut cloud = Cloud {
             columns,
             spread,
             weights,
             total,
+            scale: SVector::repeat(1.0),
         };
+        // Coordinates may have different units: variances count in parts of the whole's.
+        let whole = cloud.part(&order, 0, order.len()).clump.covariance.diagonal();
+        cloud.scale = whole.map(|v| if v > 0.0 { v.recip() } else { 0.0 });
         let mut parts = vec![cloud.part(&order, 0, order.len())];
         while parts.len() < count {
             let widest = (0..parts.len()).max_by(|a, b| parts[*a].urgency.total_cmp(&parts[*b].urgency));
@@ -296,6 +300,8 @@ struct Cloud<'a, const D: usize> {
     spread: &'a Columns<'a, D>,
     weights: &'a [f64],
     total: f64,
+    /// What makes variances of different coordinates comparable.
+    scale: SVector<f64, D>,
 }
 
 struct Part<const D: usize> {
@@ -325,7 +331,7 @@ impl<const D: usize> Cloud<'_, D> {
         }
         let mean = first / weight;
         let between = second / weight - mean * mean.transpose();
-        let (axis, variance) = between.diagonal().argmax();
+        let (axis, variance) = between.diagonal().component_mul(&self.scale).argmax();
         Part {
             clump: Clump {
                 weight: weight / self.total,

@@ -116,11 +116,15 @@ impl Posterior {
         Ok(Clumps::new(&[x, y, mean], &[&[], &[], spread], self.cells.weights(), count)?)
     }
 
-    /// Share of the mass within a cell of the border of the search box: a source outside shows here.
+    /// Share of the mass within a cell or two standard deviations of the border of the search box: a source outside shows here.
     pub fn mass_at_border(&self, search: &SearchBox) -> f64 {
         let [x, y] = self.cells.columns();
-        let edge = self.cells.width();
-        let outside = |v: f64, d: usize| v < search.lower[d] + edge || v > search.upper[d] - edge;
+        let edge = self
+            .cells
+            .covariance()
+            .diagonal()
+            .map(|v| self.cells.width().max(2.0 * v.sqrt()));
+        let outside = |v: f64, d: usize| v < search.lower[d] + edge[d] || v > search.upper[d] - edge[d];
         let masses = x.iter().zip(y).zip(self.cells.weights());
         masses
             .filter(|((x, y), _)| outside(**x, 0) || outside(**y, 1))

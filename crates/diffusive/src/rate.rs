@@ -107,7 +107,7 @@ pub struct RateSums {
 /// Beyond this many standard deviations on both sides nothing is cut off.
 const UNCUT: f64 = 8.5;
 /// A response below this (times the square of the largest rate) says nothing about the rate.
-const SILENT: f64 = 1e-20;
+const SILENT: f64 = 1e-12;
 
 impl RateSums {
     /// The sums of samples `y` (without bias) and responses `a` under noise of standard deviation `noise`.

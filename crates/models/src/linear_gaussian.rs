@@ -193,18 +193,21 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
             for draw in &mut draws {
                 normals.fill(&mut draw[..length]);
             }
-            vectorised(#[inline(always)] || {
-                for (d, next) in next.iter_mut().enumerate() {
-                    let next = &mut next[..length];
-                    next.fill(0.0);
-                    for (u, draw) in draws.iter().enumerate() {
-                        add_multiple(next, self.noise_factor[(d, u)], &draw[..length]);
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (d, next) in next.iter_mut().enumerate() {
+                        let next = &mut next[..length];
+                        next.fill(0.0);
+                        for (u, draw) in draws.iter().enumerate() {
+                            add_multiple(next, self.noise_factor[(d, u)], &draw[..length]);
+                        }
+                        for (c, column) in states.iter().enumerate() {
+                            add_multiple(next, self.transition[(d, c)], &column[start..start + length]);
+                        }
                     }
-                    for (c, column) in states.iter().enumerate() {
-                        add_multiple(next, self.transition[(d, c)], &column[start..start + length]);
-                    }
-                }
-            });
+                },
+            );
             for (column, next) in states.iter_mut().zip(&next) {
                 column[start..start + length].copy_from_slice(&next[..length]);
             }

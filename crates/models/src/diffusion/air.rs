@@ -146,8 +146,11 @@ impl Air {
         };
         let (value, slope) = self.from_offset(&(field - source), age);
         let mirrored = Vector3::new(source.x, source.y, -source.z);
-        let (image, image_slope) =
-            if sign == 0.0 { (0.0, Vector3::zeros()) } else { self.from_offset(&(field - mirrored), age) };
+        let (image, image_slope) = if sign == 0.0 {
+            (0.0, Vector3::zeros())
+        } else {
+            self.from_offset(&(field - mirrored), age)
+        };
         // The offset falls as the source moves; that of the image rises with its height.
         let image_gradient = Vector3::new(-image_slope.x, -image_slope.y, image_slope.z);
         SourceGradient {
@@ -157,7 +160,10 @@ impl Air {
     }
 
     fn numeric_gradient(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> SourceGradient {
-        let reach = (field - source).norm().max(self.closest).min((4.0 * self.diffusivity * age).sqrt());
+        let reach = (field - source)
+            .norm()
+            .max(self.closest)
+            .min((4.0 * self.diffusivity * age).sqrt());
         let step = 1e-5 * reach;
         let at = |i: usize, by: f64| {
             let mut moved = *source;
@@ -189,7 +195,11 @@ impl Air {
         let spread = (4.0 * k * age).sqrt();
         let speed = self.wind.norm();
         let prefactor = 1.0 / (8.0 * PI * k * r);
-        let direction = if true_distance > 0.0 { offset / true_distance } else { Vector3::zeros() };
+        let direction = if true_distance > 0.0 {
+            offset / true_distance
+        } else {
+            Vector3::zeros()
+        };
         if speed == 0.0 {
             let z = r / spread;
             let g = (-z * z).exp();
@@ -203,11 +213,14 @@ impl Air {
         // |d - v t|^2 = minus^2 spread^2 + 2 (r V - v.d) t, without the cancellation of the difference of vectors.
         let lag = (along - r * speed) / (2.0 * k);
         let g = (lag - minus * minus).exp();
-        let first = if minus >= 0.0 { g * erfcx(minus) } else { lag.exp() * libm::erfc(minus) };
+        let first = if minus >= 0.0 {
+            g * erfcx(minus)
+        } else {
+            lag.exp() * libm::erfc(minus)
+        };
         let second = g * erfcx(plus);
         let sum = prefactor * (first + second);
-        let radial = -sum / r
-            + prefactor * (speed / (2.0 * k) * (second - first) - 4.0 * g / (SQRT_PI * spread));
+        let radial = -sum / r + prefactor * (speed / (2.0 * k) * (second - first) - 4.0 * g / (SQRT_PI * spread));
         (sum, self.wind * (sum / (2.0 * k)) + direction * radial)
     }
 }

@@ -39,7 +39,11 @@ pub(super) fn spherical(l: u32, x: f64) -> f64 {
     }
     // `here` is proportional to j_0 and `above` to j_1; the larger of the two fixes the scale.
     let first = zeroth / x - x.cos() / x;
-    if first.abs() > zeroth.abs() { wanted * (first / above) } else { wanted * (zeroth / here) }
+    if first.abs() > zeroth.abs() {
+        wanted * (first / above)
+    } else {
+        wanted * (zeroth / here)
+    }
 }
 
 /// `j_l'(x)` for `x > 0`.
@@ -76,7 +80,11 @@ fn bisect(f: &impl Fn(f64) -> f64, mut low: f64, mut high: f64, low_is_positive:
         if middle <= low || middle >= high {
             break;
         }
-        if (f(middle) > 0.0) == low_is_positive { low = middle } else { high = middle }
+        if (f(middle) > 0.0) == low_is_positive {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }

@@ -67,7 +67,11 @@ impl Cylinder {
     }
 
     fn series(&self, rho: f64, rho0: f64, angle: f64, scaled: f64) -> f64 {
-        let mut sum = if self.wall == SlabWall::Impermeable { 1.0 / PI } else { 0.0 };
+        let mut sum = if self.wall == SlabWall::Impermeable {
+            1.0 / PI
+        } else {
+            0.0
+        };
         for mode in self.modes.get_or_init(|| modes(self.wall)) {
             let exponent = mode.zero * mode.zero * scaled;
             if exponent > DECAY {

@@ -134,7 +134,11 @@ impl Layered {
         let (below, diagonal, above) = self.rates(k);
         let implicit = |factor: f64| -> [Vec<f64>; 3] {
             let scaled = |v: &[f64]| v.iter().map(|x| -factor * x).collect::<Vec<_>>();
-            [scaled(&below), diagonal.iter().map(|x| 1.0 - factor * x).collect(), scaled(&above)]
+            [
+                scaled(&below),
+                diagonal.iter().map(|x| 1.0 - factor * x).collect(),
+                scaled(&above),
+            ]
         };
         // An implicit half step and the implicit part of a trapezoidal step have the same matrix.
         let matrix = implicit(0.5 * step);

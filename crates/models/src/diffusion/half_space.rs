@@ -118,7 +118,11 @@ mod tests {
 
     #[test]
     fn the_literal_formula_where_it_does_not_overflow() {
-        for (z, z0, t, k, a) in [(0.5, 1.0, 1.0, 1.3, 0.8), (0.0, 1.0, 1.0, 1.3, 5.0), (2.0, 1.0, 0.3, 40.0, 12.0)] {
+        for (z, z0, t, k, a) in [
+            (0.5, 1.0, 1.0, 1.3, 0.8),
+            (0.0, 1.0, 1.0, 1.3, 5.0),
+            (2.0, 1.0, 0.3, 40.0, 12.0),
+        ] {
             let s: f64 = 4.0 * k * t;
             let h: f64 = a / k;
             let total: f64 = z + z0;

@@ -83,7 +83,11 @@ fn to_monomials() -> [[f64; ORDER]; ORDER] {
     chebyshev[1][1] = 1.0;
     for n in 2..ORDER {
         for power in 0..ORDER {
-            let raised = if power > 0 { 2.0 * chebyshev[n - 1][power - 1] } else { 0.0 };
+            let raised = if power > 0 {
+                2.0 * chebyshev[n - 1][power - 1]
+            } else {
+                0.0
+            };
             chebyshev[n][power] = raised - chebyshev[n - 2][power];
         }
     }

@@ -66,7 +66,10 @@ impl Release {
     pub fn concentration(&self, time: f64, per_unit_rate: impl Fn(f64) -> f64) -> f64 {
         let since = |edge: f64| if time > edge { per_unit_rate(time - edge) } else { 0.0 };
         let boxes = self.rates.iter().zip(self.edges.windows(2));
-        boxes.map(|(rate, edge)| rate * (since(edge[0]) - since(edge[1]))).sum::<f64>().max(0.0)
+        boxes
+            .map(|(rate, edge)| rate * (since(edge[0]) - since(edge[1])))
+            .sum::<f64>()
+            .max(0.0)
     }
 
     /// Concentration at `time` of any rate `mu(t)` (kg/s) that began at `start`, given the impulse response at each age and the

@@ -23,7 +23,11 @@ pub(super) fn green(z: f64, z0: f64, age: f64, diffusivity: f64, length: f64, wa
     }
     let scaled = diffusivity * age / (length * length);
     let (a, b) = (z / length, z0 / length);
-    let unit = if scaled > EIGEN_FROM { eigen(a, b, scaled, walls) } else { images(a, b, scaled, walls) };
+    let unit = if scaled > EIGEN_FROM {
+        eigen(a, b, scaled, walls)
+    } else {
+        images(a, b, scaled, walls)
+    };
     // A sum of alternating images may leave a rounding error below zero.
     (unit / length).max(0.0)
 }
@@ -51,7 +55,11 @@ fn eigen(z: f64, z0: f64, scaled: f64, walls: [SlabWall; 2]) -> f64 {
     use SlabWall::{Absorbing, Impermeable};
     let mut sum = if walls == [Impermeable; 2] { 1.0 } else { 0.0 };
     for n in 1..=10 {
-        let order = if walls[0] == walls[1] { f64::from(n) } else { f64::from(n) - 0.5 };
+        let order = if walls[0] == walls[1] {
+            f64::from(n)
+        } else {
+            f64::from(n) - 0.5
+        };
         let wave = order * PI;
         let shape = match walls[0] {
             Impermeable => (wave * z).cos() * (wave * z0).cos(),

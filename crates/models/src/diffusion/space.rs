@@ -70,7 +70,11 @@ pub fn step_response(
         return 0.0;
     }
     let distance = (field - source).norm();
-    let field = if distance < closest { source + Vector3::new(closest, 0.0, 0.0) } else { *field };
+    let field = if distance < closest {
+        source + Vector3::new(closest, 0.0, 0.0)
+    } else {
+        *field
+    };
     let distance = distance.max(closest);
     // Beyond, exp(-distance^2 u^2 / 4 kappa) is zero in floating point.
     let last = (4.0 * response.diffusivity() * 745.0).sqrt() / distance;

@@ -55,7 +55,11 @@ impl Sphere {
         if age <= 0.0 || !(r <= 1.0 && r0 <= 1.0) {
             return 0.0;
         }
-        let cosine = if r > 0.0 && r0 > 0.0 { (a.dot(&b) / (r * r0)).clamp(-1.0, 1.0) } else { 1.0 };
+        let cosine = if r > 0.0 && r0 > 0.0 {
+            (a.dot(&b) / (r * r0)).clamp(-1.0, 1.0)
+        } else {
+            1.0
+        };
         let scaled = self.diffusivity * age / (self.radius * self.radius);
         let unit = if DECAY / scaled > LARGEST_ZERO * LARGEST_ZERO {
             short(r, r0, cosine, scaled, self.wall)
@@ -66,7 +70,11 @@ impl Sphere {
     }
 
     fn series(&self, r: f64, r0: f64, cosine: f64, scaled: f64) -> f64 {
-        let mut sum = if self.wall == SlabWall::Impermeable { 0.75 / PI } else { 0.0 };
+        let mut sum = if self.wall == SlabWall::Impermeable {
+            0.75 / PI
+        } else {
+            0.0
+        };
         let largest = (DECAY / scaled).sqrt().min(LARGEST_ZERO);
         let legendre = legendre(largest as usize + 1, cosine);
         for mode in self.modes.get_or_init(|| modes(self.wall)) {

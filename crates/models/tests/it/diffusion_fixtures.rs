@@ -8,13 +8,18 @@ use serde_json::Value;
 
 fn entries(prefix: &str) -> Vec<Value> {
     let all: Vec<Value> = serde_json::from_str(include_str!("../fixtures/diffusive.json")).unwrap();
-    let chosen: Vec<Value> = all.into_iter().filter(|e| e["id"].as_str().unwrap().starts_with(prefix)).collect();
+    let chosen: Vec<Value> = all
+        .into_iter()
+        .filter(|e| e["id"].as_str().unwrap().starts_with(prefix))
+        .collect();
     assert!(!chosen.is_empty(), "no fixture begins with {prefix}");
     chosen
 }
 
 fn number(entry: &Value, name: &str) -> f64 {
-    entry["inputs"][name].as_f64().unwrap_or_else(|| panic!("{name} of {}", entry["id"]))
+    entry["inputs"][name]
+        .as_f64()
+        .unwrap_or_else(|| panic!("{name} of {}", entry["id"]))
 }
 
 fn vector(entry: &Value, name: &str) -> Vector3<f64> {
@@ -30,9 +35,16 @@ fn check(entry: &Value, got: f64) {
 #[test]
 fn half_space() {
     for e in entries("green1d_semi") {
-        let flux = if e["inputs"]["flux"] == "total" { Flux::Total } else { Flux::Diffusive };
+        let flux = if e["inputs"]["flux"] == "total" {
+            Flux::Total
+        } else {
+            Flux::Diffusive
+        };
         let wall = Wall::permeable(number(&e, "alpha")).unwrap();
-        let axis = Axis::half_space(number(&e, "kappa"), wall).unwrap().with_wind(number(&e, "v"), flux).unwrap();
+        let axis = Axis::half_space(number(&e, "kappa"), wall)
+            .unwrap()
+            .with_wind(number(&e, "v"), flux)
+            .unwrap();
         check(&e, axis.green(number(&e, "z"), number(&e, "z0"), number(&e, "t")));
     }
 }
@@ -41,7 +53,13 @@ fn half_space() {
 fn slab() {
     for e in entries("green1d_slab") {
         let kind = e["inputs"]["kind"].as_str().unwrap();
-        let wall = |c| if c == 'n' { SlabWall::Impermeable } else { SlabWall::Absorbing };
+        let wall = |c| {
+            if c == 'n' {
+                SlabWall::Impermeable
+            } else {
+                SlabWall::Absorbing
+            }
+        };
         let mut walls = kind.chars().map(wall);
         let walls = [walls.next().unwrap(), walls.next().unwrap()];
         let axis = Axis::slab(number(&e, "kappa"), number(&e, "L"), walls).unwrap();

@@ -68,7 +68,12 @@ proptest! {
 /// The printed wall law creates mass in wind away from the wall; the law of the total flux keeps it.
 #[test]
 fn wind_across_the_wall() {
-    let axis = |flux, loss| Axis::half_space(1.3, Wall::permeable(loss).unwrap()).unwrap().with_wind(1.5, flux).unwrap();
+    let axis = |flux, loss| {
+        Axis::half_space(1.3, Wall::permeable(loss).unwrap())
+            .unwrap()
+            .with_wind(1.5, flux)
+            .unwrap()
+    };
     let printed = mass(&axis(Flux::Diffusive, 0.2), 0.0, 30.0, 1.0, 1.0);
     assert!((printed - 1.345).abs() < 5e-4, "{printed}");
     assert!(mass(&axis(Flux::Total, 0.2), 0.0, 30.0, 1.0, 1.0) < 1.0);
@@ -77,12 +82,20 @@ fn wind_across_the_wall() {
 
 #[test]
 fn slab_mass() {
-    for (walls, kept) in [([WALLS[0], WALLS[0]], true), ([WALLS[1], WALLS[1]], false), ([WALLS[0], WALLS[1]], false)] {
+    for (walls, kept) in [
+        ([WALLS[0], WALLS[0]], true),
+        ([WALLS[1], WALLS[1]], false),
+        ([WALLS[0], WALLS[1]], false),
+    ] {
         let axis = Axis::slab(0.5, 2.0, walls).unwrap();
         let mut before = 1.0;
         for t in [0.02, 0.2, 1.0, 1.7, 4.0] {
             let now = mass(&axis, 0.0, 2.0, 0.6, t);
-            assert!(if kept { (now - 1.0).abs() < 1e-10 } else { now < before + 1e-12 });
+            assert!(if kept {
+                (now - 1.0).abs() < 1e-10
+            } else {
+                now < before + 1e-12
+            });
             before = now;
         }
     }
@@ -93,7 +106,8 @@ fn two_media_mass_and_continuity() {
     let media = TwoMedia::new(2.0, 0.5).unwrap();
     for z0 in [0.8, -0.4] {
         let rule = Rule::gauss_legendre(20);
-        let total = rule.composite(-12.0, 0.0, 60, |z| media.green(z, z0, 1.0)) + rule.composite(0.0, 20.0, 60, |z| media.green(z, z0, 1.0));
+        let total = rule.composite(-12.0, 0.0, 60, |z| media.green(z, z0, 1.0))
+            + rule.composite(0.0, 20.0, 60, |z| media.green(z, z0, 1.0));
         assert!((total - 1.0).abs() < 1e-10);
         let h = 1e-5;
         assert!((media.green(h, z0, 1.0) - media.green(-h, z0, 1.0)).abs() < 1e-4);
@@ -113,7 +127,9 @@ fn cylinder_mass_reciprocity_and_wall() {
             let source = [1.1, 0.4];
             let total = rule.sum(0.0, 2.0, |rho| {
                 let spokes = 64;
-                let ring: f64 = (0..spokes).map(|i| cylinder.green([rho, TAU * i as f64 / spokes as f64], source, t)).sum();
+                let ring: f64 = (0..spokes)
+                    .map(|i| cylinder.green([rho, TAU * i as f64 / spokes as f64], source, t))
+                    .sum();
                 rho * ring * TAU / spokes as f64
             });
             match wall {
@@ -128,7 +144,9 @@ fn cylinder_mass_reciprocity_and_wall() {
         let h = 1e-4;
         let c = |rho: f64| cylinder.green([rho, 0.2], [1.1, 0.4], 0.5);
         match wall {
-            SlabWall::Impermeable => assert!(((3.0 * c(2.0) - 4.0 * c(2.0 - h) + c(2.0 - 2.0 * h)) / (2.0 * h)).abs() < 1e-6),
+            SlabWall::Impermeable => {
+                assert!(((3.0 * c(2.0) - 4.0 * c(2.0 - h) + c(2.0 - 2.0 * h)) / (2.0 * h)).abs() < 1e-6)
+            }
             SlabWall::Absorbing => assert!(c(2.0).abs() < 1e-12),
         }
         // Far from the wall and early, free space.
@@ -152,9 +170,11 @@ fn sphere_mass_reciprocity_and_wall() {
         for t in [0.1, 0.6, 3.0] {
             // The source on the z axis leaves the angle about it trivial.
             let total = rule.composite(0.0, 2.0, 2, |r| {
-                r * r * TAU * rule.composite(-1.0, 1.0, 2, |c| {
-                    ball.green(&Vector3::new(r * (1.0 - c * c).sqrt(), 0.0, r * c), &source, t)
-                })
+                r * r
+                    * TAU
+                    * rule.composite(-1.0, 1.0, 2, |c| {
+                        ball.green(&Vector3::new(r * (1.0 - c * c).sqrt(), 0.0, r * c), &source, t)
+                    })
             });
             match wall {
                 SlabWall::Impermeable => assert!((total - 1.0).abs() < 1e-8, "{total} at {t}"),
@@ -168,7 +188,9 @@ fn sphere_mass_reciprocity_and_wall() {
         let h = 1e-4;
         let c = |r: f64| ball.green(&Vector3::new(r, 0.0, 0.0), &Vector3::new(1.1, 0.3, 0.0), 0.5);
         match wall {
-            SlabWall::Impermeable => assert!(((3.0 * c(2.0) - 4.0 * c(2.0 - h) + c(2.0 - 2.0 * h)) / (2.0 * h)).abs() < 1e-6),
+            SlabWall::Impermeable => {
+                assert!(((3.0 * c(2.0) - 4.0 * c(2.0 - h) + c(2.0 - 2.0 * h)) / (2.0 * h)).abs() < 1e-6)
+            }
             SlabWall::Absorbing => assert!(c(2.0).abs() < 1e-12),
         }
     }
@@ -189,7 +211,8 @@ fn closed_forms_are_their_integrals() {
             (Vector3::new(80.0, 40.0, 0.5), Vector3::new(73.0, 38.0, 0.2), 25.0),
             (Vector3::new(44.0, 52.0, 1.0), Vector3::new(73.0, 38.0, 3.0), 50.0),
         ] {
-            let (closed, integral) = (air.concentration(&field, &source, age), step_response(&air, &field, &source, age, 1e-3));
+            let (closed, integral) =
+                (air.concentration(&field, &source, age), step_response(&air, &field, &source, age, 1e-3));
             assert!((closed / integral - 1.0).abs() < 1e-10, "{wind:?} {ground:?}: {closed} {integral}");
         }
     }
@@ -256,7 +279,9 @@ fn a_smooth_rate_between_its_steps() {
     let steps = 4000;
     let edges: Vec<f64> = (0..=steps).map(|i| 20.0 * i as f64 / steps as f64).collect();
     let rates: Vec<f64> = edges.windows(2).map(|e| 0.5 * (e[0] + e[1])).collect();
-    let stepped = Release::piecewise(edges, rates).unwrap().concentration(20.0, |age| air.concentration(&field, &source, age));
+    let stepped = Release::piecewise(edges, rates)
+        .unwrap()
+        .concentration(20.0, |age| air.concentration(&field, &source, age));
     assert!((ramp / stepped - 1.0).abs() < 1e-5);
 }
 
@@ -276,7 +301,12 @@ fn contours_lie_on_the_threshold() {
 #[test]
 fn extremes_stay_finite() {
     for wind in [0.0, 1e-9, 20.0, 1e4] {
-        for ground in [Ground::None, Ground::Impermeable, Ground::Wall(Wall::ABSORBING), Ground::Wall(Wall::permeable(2.0).unwrap())] {
+        for ground in [
+            Ground::None,
+            Ground::Impermeable,
+            Ground::Wall(Wall::ABSORBING),
+            Ground::Wall(Wall::permeable(2.0).unwrap()),
+        ] {
             let air = Air::new(40.0, Vector3::new(wind, 0.0, 0.0), ground).unwrap();
             for distance in [0.0, 1e-9, 1.0, 1e3, 1e8] {
                 for age in [-1.0, 0.0, 1e-12, 1.0, 1e9] {
@@ -285,7 +315,10 @@ fn extremes_stay_finite() {
                         let c = air.concentration(&field, &source, age);
                         assert!(c.is_finite() && c >= 0.0, "{wind} {ground:?} {distance} {age}: {c}");
                         let g = air.source_gradient(&field, &source, age);
-                        assert!(g.value.is_finite() && g.gradient.iter().all(|x| x.is_finite()), "{wind} {ground:?} {distance} {age}: {g:?}");
+                        assert!(
+                            g.value.is_finite() && g.gradient.iter().all(|x| x.is_finite()),
+                            "{wind} {ground:?} {distance} {age}: {g:?}"
+                        );
                     }
                 }
             }

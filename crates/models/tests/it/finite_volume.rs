@@ -12,14 +12,25 @@ fn close(got: f64, want: f64, scale: f64, tolerance: f64) {
 /// Errors fall fourfold when cells and steps are halved.
 #[test]
 fn half_spaces() {
-    for (loss, wind, flux) in [(0.0, 0.0, Flux::Total), (0.8, 0.0, Flux::Total), (f64::INFINITY, 0.0, Flux::Total), (0.2, 1.5, Flux::Total), (0.2, 1.5, Flux::Diffusive), (0.8, -0.9, Flux::Total)] {
+    for (loss, wind, flux) in [
+        (0.0, 0.0, Flux::Total),
+        (0.8, 0.0, Flux::Total),
+        (f64::INFINITY, 0.0, Flux::Total),
+        (0.2, 1.5, Flux::Total),
+        (0.2, 1.5, Flux::Diffusive),
+        (0.8, -0.9, Flux::Total),
+    ] {
         let wall = Wall::permeable(loss).unwrap();
         let exact = Axis::half_space(1.3, wall).unwrap().with_wind(wind, flux).unwrap();
         let peak = exact.green(1.0 + wind, 1.0, 1.0).max(exact.green(1.0, 1.0, 1.0));
         let mut before = f64::INFINITY;
         for cells in [600, 1200, 2400] {
-            let numeric = Layered::new(&[(18.0, 1.3)], [wall, CLOSED], cells).unwrap().with_wind(wind, flux).unwrap();
-            let error = [0.3, 1.0, 2.2, 4.0].map(|z| (numeric.green(z, 1.0, 1.0, cells / 4).unwrap() - exact.green(z, 1.0, 1.0)).abs());
+            let numeric = Layered::new(&[(18.0, 1.3)], [wall, CLOSED], cells)
+                .unwrap()
+                .with_wind(wind, flux)
+                .unwrap();
+            let error = [0.3, 1.0, 2.2, 4.0]
+                .map(|z| (numeric.green(z, 1.0, 1.0, cells / 4).unwrap() - exact.green(z, 1.0, 1.0)).abs());
             let error = error.into_iter().fold(0.0, f64::max) / peak;
             assert!(error < 0.35 * before, "{loss} {wind} {flux:?} {cells}: {error} after {before}");
             before = error;
@@ -34,7 +45,12 @@ fn slabs_and_two_media() {
         SlabWall::Impermeable => CLOSED,
         SlabWall::Absorbing => Wall::ABSORBING,
     };
-    for pair in [[SlabWall::Impermeable; 2], [SlabWall::Absorbing; 2], [SlabWall::Impermeable, SlabWall::Absorbing], [SlabWall::Absorbing, SlabWall::Impermeable]] {
+    for pair in [
+        [SlabWall::Impermeable; 2],
+        [SlabWall::Absorbing; 2],
+        [SlabWall::Impermeable, SlabWall::Absorbing],
+        [SlabWall::Absorbing, SlabWall::Impermeable],
+    ] {
         let exact = Axis::slab(0.5, 1.0, pair).unwrap();
         let numeric = Layered::new(&[(1.0, 0.5)], pair.map(walls), 1000).unwrap();
         for t in [0.05, 0.6] {
@@ -65,7 +81,9 @@ fn three_dimensions() {
 #[test]
 fn bad_layers_are_refused() {
     assert!(Layered::new(&[], [CLOSED; 2], 10).is_err() && Layered::new(&[(1.0, 0.0)], [CLOSED; 2], 10).is_err());
-    assert!(Layered::new(&[(1.0, 1.0)], [CLOSED; 2], 1).is_err() && Layered::new(&[(-1.0, 1.0)], [CLOSED; 2], 10).is_err());
+    assert!(
+        Layered::new(&[(1.0, 1.0)], [CLOSED; 2], 1).is_err() && Layered::new(&[(-1.0, 1.0)], [CLOSED; 2], 10).is_err()
+    );
     let layered = Layered::new(&[(1.0, 1.0)], [CLOSED; 2], 10).unwrap();
     assert!(layered.green(0.5, 0.5, 1.0, 0).is_err() && layered.green(f64::NAN, 0.5, 1.0, 5).is_err());
     assert_eq!(layered.green(0.5, 0.5, -1.0, 5).unwrap(), 0.0);

@@ -2,5 +2,5 @@
 
 mod diffusion_fixtures;
 mod diffusion_laws;
-mod laws;
 mod finite_volume;
+mod laws;

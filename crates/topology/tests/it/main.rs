@@ -72,9 +72,9 @@ fn poisson_disk_keeps_its_distance_and_fills_the_field() {
     for (i, a) in field.positions().iter().enumerate() {
         assert!(field.positions()[..i].iter().all(|b| (a - b).norm() >= 3.0));
     }
-    // Maximal random packings cover about 0.55 to 0.7 of the area with half-distance disks, and those at the border reach out of it.
+    // Maximal random packings stop at 0.547 of the area covered by half-distance disks; 30 candidates leave a few gaps.
     let covered = field.len() as f64 * std::f64::consts::PI * 1.5 * 1.5 / 2400.0;
-    assert!((0.5..0.85).contains(&covered), "{covered}");
+    assert!((0.45..0.6).contains(&covered), "{covered}");
 }
 
 #[test]
