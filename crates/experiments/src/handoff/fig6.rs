@@ -280,10 +280,8 @@ impl Figure for Fig6 {
             claims.all(format!("{name}-first"), what, under.first(), |b| {
                 b.log10_kl_printed < b.log10_l1_printed && b.log10_l1_printed < b.ml_printed.value.log10()
             });
-            for (measure, log) in [
-                ("kl", (|b| b.log10_kl_printed) as fn(&Bound) -> f64),
-                ("l1", |b| b.log10_l1_printed),
-            ] {
+            let logarithms: [fn(&Bound) -> f64; 2] = [|b| b.log10_kl_printed, |b| b.log10_l1_printed];
+            for (measure, log) in ["kl", "l1"].into_iter().zip(logarithms) {
                 let increments: Vec<f64> = under.windows(2).map(|w| log(w[1]) - log(w[0])).collect();
                 let what = format!("the {measure} bound grows by a factor at every step: exponentially");
                 claims.all(format!("{name}-{measure}-exponential"), what, &increments, |d| *d > 0.15);
