@@ -67,7 +67,10 @@ fn message_of_5(bencher: Bencher) {
     let mixture = Reduction::default().reduce(&crescent(500), 5).unwrap();
     let format = WireFormat::around_origin(1.0, 0.25).unwrap();
     bencher.bench_local(|| {
-        let bits = CodedMixture::new(black_box(&mixture), &format, 0).unwrap().to_bits(&format).unwrap();
+        let bits = CodedMixture::new(black_box(&mixture), &format, 0)
+            .unwrap()
+            .to_bits(&format)
+            .unwrap();
         CodedMixture::from_bits(&format, &bits).unwrap()
     });
 }

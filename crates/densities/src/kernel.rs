@@ -194,7 +194,11 @@ pub(crate) fn whitened<const D: usize>(
     std::array::from_fn(|i| {
         range
             .clone()
-            .map(|k| (0..=i).map(|j| factor.whitener[(i, j)] * (columns[j][k] - origin[j])).sum())
+            .map(|k| {
+                (0..=i)
+                    .map(|j| factor.whitener[(i, j)] * (columns[j][k] - origin[j]))
+                    .sum()
+            })
             .collect()
     })
 }
@@ -279,7 +283,11 @@ fn log_kernel_sum<const D: usize>(white: &[&[f64]; D], weights: &[f64], z: &[f64
                 add_products(&mut lane, weights, squares);
                 total += folded(&lane);
             }
-            if nearest == f64::INFINITY { f64::NEG_INFINITY } else { total.ln() - nearest }
+            if nearest == f64::INFINITY {
+                f64::NEG_INFINITY
+            } else {
+                total.ln() - nearest
+            }
         },
     )
 }
@@ -322,7 +330,9 @@ struct Stored<const D: usize> {
 impl<const D: usize> From<KernelEstimate<D>> for Stored<D> {
     fn from(estimate: KernelEstimate<D>) -> Self {
         Self {
-            kernel: (0..D).map(|i| estimate.kernel.row(i).iter().copied().collect()).collect(),
+            kernel: (0..D)
+                .map(|i| estimate.kernel.row(i).iter().copied().collect())
+                .collect(),
             particles: estimate.particles,
         }
     }
@@ -333,7 +343,12 @@ impl<const D: usize> TryFrom<Stored<D>> for KernelEstimate<D> {
 
     fn try_from(stored: Stored<D>) -> Result<Self, Error> {
         if stored.kernel.len() != D || stored.kernel.iter().any(|row| row.len() != D) {
-            return Err(fewbits_numerics::ArgumentError::new("kernel", "of another shape", format!("{D} by {D} numbers")).into());
+            return Err(fewbits_numerics::ArgumentError::new(
+                "kernel",
+                "of another shape",
+                format!("{D} by {D} numbers"),
+            )
+            .into());
         }
         let kernel = SMatrix::from_fn(|i, j| stored.kernel[i][j]);
         Self::new(stored.particles, kernel)

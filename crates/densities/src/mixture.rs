@@ -189,7 +189,11 @@ impl<const D: usize> Mixture<D> {
                 sum += (term - largest).exp();
             }
         }
-        if largest == f64::NEG_INFINITY { largest } else { largest + sum.ln() }
+        if largest == f64::NEG_INFINITY {
+            largest
+        } else {
+            largest + sum.ln()
+        }
     }
 
     /// Writes `ln p` of every point of `columns` to `out`; points beyond the end of `out` are passed over.
@@ -277,10 +281,15 @@ impl<const D: usize> Mixture<D> {
     ///
     /// # Errors
     /// If the image of a component is singular or not finite.
-    pub fn affine<const K: usize>(&self, matrix: &SMatrix<f64, K, D>, shift: &SVector<f64, K>) -> Result<Mixture<K>, Error> {
-        let components = self.components.iter().map(|c| {
-            Component::new(c.weight, matrix * c.mean + shift, matrix * c.covariance * matrix.transpose())
-        });
+    pub fn affine<const K: usize>(
+        &self,
+        matrix: &SMatrix<f64, K, D>,
+        shift: &SVector<f64, K>,
+    ) -> Result<Mixture<K>, Error> {
+        let components = self
+            .components
+            .iter()
+            .map(|c| Component::new(c.weight, matrix * c.mean + shift, matrix * c.covariance * matrix.transpose()));
         Mixture::new(components.collect::<Result<_, _>>()?)
     }
 }

@@ -1,7 +1,7 @@
 //! Errors of a kernel estimate's approximations, estimated at its centres or around them.
 
-use crate::matrix::Factored;
 use crate::kernel::cross_sums;
+use crate::matrix::Factored;
 use crate::{Error, KernelEstimate, Mixture, Tree};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,9 @@ pub fn plug_in<const D: usize>(p: &KernelEstimate<D>, q: &Mixture<D>) -> PlugIn 
     let mut other = vec![0.0; p.len()];
     q.log_pdf_columns(p.particles().columns(), &mut other);
     let weights = p.particles().weights();
-    let ratios = (0..p.len()).filter(|i| weights[*i] > 0.0).map(|i| (weights[i], own[i] - other[i]));
+    let ratios = (0..p.len())
+        .filter(|i| weights[*i] > 0.0)
+        .map(|i| (weights[i], own[i] - other[i]));
     PlugIn::of(ratios)
 }
 

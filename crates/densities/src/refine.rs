@@ -63,9 +63,15 @@ impl<const D: usize> Points<D> {
         let offsets = rule.points::<D>();
         let white = estimate.white();
         let columns = std::array::from_fn(|d| {
-            offsets.iter().flat_map(|(z, _)| kept.iter().map(move |i| white[d][*i] + z[d])).collect()
+            offsets
+                .iter()
+                .flat_map(|(z, _)| kept.iter().map(move |i| white[d][*i] + z[d]))
+                .collect()
         });
-        let weights = offsets.iter().flat_map(|(_, share)| kept.iter().map(move |i| weights[*i] * share)).collect();
+        let weights = offsets
+            .iter()
+            .flat_map(|(_, share)| kept.iter().map(move |i| weights[*i] * share))
+            .collect();
         Self { columns, weights }
     }
 

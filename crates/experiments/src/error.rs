@@ -106,29 +106,13 @@ macro_rules! wrapped {
 wrapped!(
     fewbits_binary_patterns,
     fewbits_core,
+    fewbits_densities,
+    fewbits_handoff,
     fewbits_models,
     fewbits_quantizer_design,
     fewbits_quantizers,
     fewbits_sensor_assignment
 );
-
-impl From<fewbits_handoff::Error> for Error {
-    fn from(error: fewbits_handoff::Error) -> Self {
-        match error {
-            fewbits_handoff::Error::Argument(argument) => Self::Argument(argument),
-            other => Self::failed(other),
-        }
-    }
-}
-
-impl From<fewbits_densities::Error> for Error {
-    fn from(error: fewbits_densities::Error) -> Self {
-        match error {
-            fewbits_densities::Error::Argument(argument) => Self::Argument(argument),
-            other => Self::failed(other),
-        }
-    }
-}
 
 impl From<fewbits_dymbo::Error> for Error {
     fn from(error: fewbits_dymbo::Error) -> Self {

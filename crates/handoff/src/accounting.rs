@@ -164,7 +164,11 @@ impl LogSum {
     }
 
     fn log(&self) -> f64 {
-        if self.largest.is_finite() { self.largest + self.sum.ln() } else { self.largest }
+        if self.largest.is_finite() {
+            self.largest + self.sum.ln()
+        } else {
+            self.largest
+        }
     }
 }
 
@@ -175,7 +179,9 @@ mod tests {
     #[test]
     fn two_steps_by_hand() {
         let step = |ml, dr, kl, l1| StepError { ml, dr, kl, l1 };
-        let account: Accounting = [step(0.3, 0.2, 0.01, 0.1), step(0.4, 0.25, 0.02, 0.15)].into_iter().collect();
+        let account: Accounting = [step(0.3, 0.2, 0.01, 0.1), step(0.4, 0.25, 0.02, 0.15)]
+            .into_iter()
+            .collect();
         let b = account.bounds(Amplification::Ml);
         let a: f64 = 0.6;
         assert!((b.ml_printed - 1.4).abs() < 1e-15 && (b.ml_from_dr - 0.9).abs() < 1e-15);
@@ -188,7 +194,14 @@ mod tests {
 
     #[test]
     fn hundreds_of_steps_do_not_overflow_and_none_is_nothing() {
-        let account: Accounting = (0..500).map(|_| StepError { ml: 4.0, dr: 2.0, kl: 0.1, l1: 0.2 }).collect();
+        let account: Accounting = (0..500)
+            .map(|_| StepError {
+                ml: 4.0,
+                dr: 2.0,
+                kl: 0.1,
+                l1: 0.2,
+            })
+            .collect();
         let b = account.bounds(Amplification::Ml);
         assert!(b.ln_kl_printed > 3000.0 && b.ln_kl_corrected.is_finite() && b.l1_from_dr <= 2.0);
         let none = Accounting::new().bounds(Amplification::Ml);

@@ -103,7 +103,11 @@ impl<R> HandoffFilter<R> {
             SampleSize::Effective => kept.effective_sample_size(),
         };
         let kernel = self.bandwidth.kernel_for(&kept, n)?;
-        let centres = if self.shrink { self.bandwidth.shrunk(&kept, &kernel)? } else { kept };
+        let centres = if self.shrink {
+            self.bandwidth.shrunk(&kept, &kernel)?
+        } else {
+            kept
+        };
         Ok(KernelEstimate::new(centres, kernel)?)
     }
 
@@ -144,8 +148,12 @@ pub fn trimmed<const D: usize>(particles: &Particles<D>, trim: f64) -> Result<Pa
     let weights = particles.weights();
     let largest = weights.iter().fold(0.0_f64, |m, w| m.max(*w));
     let least = (trim / particles.len() as f64).min(largest);
-    let kept: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] >= least && weights[*i] > 0.0).collect();
-    let columns = particles.columns().map(|column| kept.iter().map(|i| column[*i]).collect());
+    let kept: Vec<usize> = (0..weights.len())
+        .filter(|i| weights[*i] >= least && weights[*i] > 0.0)
+        .collect();
+    let columns = particles
+        .columns()
+        .map(|column| kept.iter().map(|i| column[*i]).collect());
     let logs: Vec<f64> = kept.iter().map(|i| particles.log_weights()[*i]).collect();
     Ok(Particles::new(columns, &logs)?)
 }

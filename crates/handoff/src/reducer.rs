@@ -95,7 +95,10 @@ impl<const D: usize> Reducer<D> for Coded<D> {
     fn reduce(&self, estimate: &KernelEstimate<D>) -> Result<Handover<D>, Error> {
         let mixture = self.reduction.reduce(estimate, self.components)?;
         let message = CodedMixture::new(&mixture, &self.format, self.resolution)?;
-        let bits = message.to_bits(&self.format).map_err(fewbits_densities::Error::from)?.bits();
+        let bits = message
+            .to_bits(&self.format)
+            .map_err(fewbits_densities::Error::from)?
+            .bits();
         Ok(Handover {
             mixture: message.into_mixture(),
             bits: Some(bits),

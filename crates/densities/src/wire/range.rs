@@ -62,7 +62,9 @@ impl Writer {
     }
 
     fn put(&mut self, table: Table, index: u32) -> Result<(), CodecError> {
-        self.encoder.encode_symbol(index, table).map_err(|_| out_of_range("symbol", index))
+        self.encoder
+            .encode_symbol(index, table)
+            .map_err(|_| out_of_range("symbol", index))
     }
 
     fn uniform(&mut self, value: u64, bits: u32) -> Result<(), CodecError> {
@@ -80,7 +82,10 @@ impl Writer {
         match *law {
             Law::Uniform { count } => {
                 let (top, low) = digits(count);
-                let value = u64::try_from(n).ok().filter(|v| *v < count).ok_or_else(|| out_of_range("symbol", n))?;
+                let value = u64::try_from(n)
+                    .ok()
+                    .filter(|v| *v < count)
+                    .ok_or_else(|| out_of_range("symbol", n))?;
                 if top > 1 {
                     self.put(Table::Uniform { count: top }, (value >> low) as u32)?;
                 }
@@ -125,7 +130,11 @@ impl Writer {
             writer.write(u64::from(word), 32)?;
         }
         if let EncoderSituation::Inverted(count, first) = situation {
-            let (first, rest) = if point >= WHOLE { (first.wrapping_add(1), 0) } else { (first, u32::MAX) };
+            let (first, rest) = if point >= WHOLE {
+                (first.wrapping_add(1), 0)
+            } else {
+                (first, u32::MAX)
+            };
             writer.write(u64::from(first), 32)?;
             for _ in 1..count.get() {
                 writer.write(u64::from(rest), 32)?;
@@ -180,15 +189,24 @@ impl Reader {
             table: Some(&table),
             ..Found::default()
         };
-        let index = self.decoder.decode_symbol(&found).map_err(|_| out_of_range("code word", "past the last symbol"))?;
+        let index = self
+            .decoder
+            .decode_symbol(&found)
+            .map_err(|_| out_of_range("code word", "past the last symbol"))?;
         let (_, _, frequency) = found.place.get().ok_or_else(|| out_of_range("symbol", index))?;
         // What the encoder would write for the same symbols.
-        self.canonical.encoder.encode_symbol(index, &found).map_err(|_| out_of_range("symbol", index))?;
+        self.canonical
+            .encoder
+            .encode_symbol(index, &found)
+            .map_err(|_| out_of_range("symbol", index))?;
         // A symbol of frequency 2^k to 2^(k+1) takes over 15 - k bits. Beyond the end there is nothing left to decode.
         self.spent += 15_usize.saturating_sub(frequency.ilog2() as usize);
         if self.spent > self.available {
             let requested = (self.spent - self.available) as u32;
-            return Err(CodecError::EndOfMessage { requested, available: 0 });
+            return Err(CodecError::EndOfMessage {
+                requested,
+                available: 0,
+            });
         }
         Ok(index)
     }
@@ -208,9 +226,17 @@ impl Reader {
         match *law {
             Law::Uniform { count } => {
                 let (top, low) = digits(count);
-                let head = if top > 1 { u64::from(self.get(Table::Uniform { count: top })?) } else { 0 };
+                let head = if top > 1 {
+                    u64::from(self.get(Table::Uniform { count: top })?)
+                } else {
+                    0
+                };
                 let value = head << low | self.uniform(low)?;
-                if value < count { Ok(value as i64) } else { Err(out_of_range("symbol", value)) }
+                if value < count {
+                    Ok(value as i64)
+                } else {
+                    Err(out_of_range("symbol", value))
+                }
             }
             Law::Logistic { location, scale } => {
                 let (table, low) = Law::table(location, scale).ok_or_else(|| out_of_range("scale", scale))?;
@@ -244,10 +270,15 @@ mod tests {
             for _ in 0..rng.random_range(1..30) {
                 let law = if rng.random() {
                     let width = rng.random_range(1..40);
-                    Law::Uniform { count: rng.random_range(1..1 << width) }
+                    Law::Uniform {
+                        count: rng.random_range(1..1 << width),
+                    }
                 } else {
                     let scale = 10.0_f64.powf(rng.random_range(-2.0..6.0));
-                    Law::Logistic { location: rng.random_range(-3.0..3.0) * scale, scale }
+                    Law::Logistic {
+                        location: rng.random_range(-3.0..3.0) * scale,
+                        scale,
+                    }
                 };
                 let n = match law {
                     Law::Uniform { count } => {
@@ -259,7 +290,11 @@ mod tests {
                         let n = (location + scale * (u / (1.0 - u)).ln()).round();
                         let cdf = |x: f64| 1.0 / (1.0 + (-(x - location) / scale).exp());
                         information += -(cdf(n + 0.5) - cdf(n - 0.5)).log2() + 0.3;
-                        if round % 7 == 0 { rng.random_range(-1 << 31..1 << 31) } else { n as i64 }
+                        if round % 7 == 0 {
+                            rng.random_range(-1 << 31..1 << 31)
+                        } else {
+                            n as i64
+                        }
                     }
                 };
                 symbols.push((law, n));

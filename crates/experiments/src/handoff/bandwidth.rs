@@ -52,15 +52,30 @@ struct Setup {
 
 fn setups() -> Vec<Setup> {
     let cut = |criterion| Reduction::paper(criterion);
-    let refined = Reduction::Pipeline { cut: 60, iterations: 15 };
+    let refined = Reduction::Pipeline {
+        cut: 60,
+        iterations: 15,
+    };
     let closed = Reduction::Greedy {
-        split: Split { axis: SplitAxis::Widest, at: At::CountMedian },
+        split: Split {
+            axis: SplitAxis::Widest,
+            at: At::CountMedian,
+        },
         criterion: Criterion::LogDeterminant,
     };
     let mut all = Vec::new();
     let mut sent = |filter, reduction, factor, shrink| {
-        let reducer: Box<dyn Reducer<2> + Sync> = Box::new(Components { components: 5, reduction });
-        all.push(Setup { filter, factor, shrink, reducer: Some(reducer), particles: PARTICLES });
+        let reducer: Box<dyn Reducer<2> + Sync> = Box::new(Components {
+            components: 5,
+            reduction,
+        });
+        all.push(Setup {
+            filter,
+            factor,
+            shrink,
+            reducer: Some(reducer),
+            particles: PARTICLES,
+        });
     };
     sent("gauss", Reduction::SingleGaussian, 1.0, false);
     sent("gauss", Reduction::SingleGaussian, 1.0, true);
@@ -77,11 +92,27 @@ fn setups() -> Vec<Setup> {
     sent("pipeline", refined, 1.0, true);
     sent("pipeline", refined, 0.5, true);
     for (factor, shrink) in [(1.0, false), (0.5, false), (1.0, true)] {
-        all.push(Setup { filter: "kde", factor, shrink, reducer: Some(Box::new(Whole)), particles: PARTICLES });
+        all.push(Setup {
+            filter: "kde",
+            factor,
+            shrink,
+            reducer: Some(Box::new(Whole)),
+            particles: PARTICLES,
+        });
     }
     for particles in [PARTICLES, REFERENCE] {
-        let filter = if particles == PARTICLES { "plain-500" } else { "plain-2000" };
-        all.push(Setup { filter, factor: 1.0, shrink: false, reducer: None, particles });
+        let filter = if particles == PARTICLES {
+            "plain-500"
+        } else {
+            "plain-2000"
+        };
+        all.push(Setup {
+            filter,
+            factor: 1.0,
+            shrink: false,
+            reducer: None,
+            particles,
+        });
     }
     all
 }
@@ -90,7 +121,9 @@ fn setups() -> Vec<Setup> {
 pub struct Widths;
 
 fn kl(rows: &[Row], filter: &str, factor: f64, shrunk: bool) -> Option<f64> {
-    rows.iter().find(|r| r.filter == filter && r.factor == factor && r.shrunk == shrunk).map(|r| r.kl.value)
+    rows.iter()
+        .find(|r| r.filter == filter && r.factor == factor && r.shrunk == shrunk)
+        .map(|r| r.kl.value)
 }
 
 impl Figure for Widths {
@@ -131,9 +164,16 @@ impl Figure for Widths {
             }
             let mut errors = Vec::new();
             for (s, setup) in setups.iter().enumerate() {
-                let bandwidth = Bandwidth { factor: setup.factor, ..Bandwidth::default() };
+                let bandwidth = Bandwidth {
+                    factor: setup.factor,
+                    ..Bandwidth::default()
+                };
                 let base = HandoffFilter::of_paper(setup.particles, Whole)?;
-                let filter = HandoffFilter { bandwidth, shrink: setup.shrink, ..base };
+                let filter = HandoffFilter {
+                    bandwidth,
+                    shrink: setup.shrink,
+                    ..base
+                };
                 let mut rng = it.stream.named("filter").indexed(s as u64).fast_rng();
                 let mut known = prior()?;
                 let mut plain = known.sample_systematic(&mut rng, setup.particles)?;
@@ -159,10 +199,17 @@ impl Figure for Widths {
             }
             Ok(errors)
         };
-        let runs = context.monte_carlo(context.stream("handoff-bandwidth"), p.trials).run(one)?;
+        let runs = context
+            .monte_carlo(context.stream("handoff-bandwidth"), p.trials)
+            .run(one)?;
         let rows = setups.iter().enumerate().map(|(s, setup)| {
             let kl: Moments = runs.iter().map(|run| run[s]).collect();
-            Row { filter: setup.filter, factor: setup.factor, shrunk: setup.shrink, kl: (&kl).into() }
+            Row {
+                filter: setup.filter,
+                factor: setup.factor,
+                shrunk: setup.shrink,
+                kl: (&kl).into(),
+            }
         });
         Ok(rows.collect())
     }
@@ -173,18 +220,30 @@ impl Figure for Widths {
         let ratio = |a: Option<f64>, b: Option<f64>| a.zip(b).map(|(a, b)| a / b);
         let paper = kl(rows, "kl", 1.0, false);
         let what = "shrinking removes a quarter of the error or more at no bits";
-        claims.at_most("shrinkage", what, ratio(kl(rows, "kl", 1.0, true), paper), 0.8).at_full_trials();
+        claims
+            .at_most("shrinkage", what, ratio(kl(rows, "kl", 1.0, true), paper), 0.8)
+            .at_full_trials();
         let what = "so does half the bandwidth";
-        claims.at_most("half", what, ratio(kl(rows, "kl", 0.5, false), paper), 0.8).at_full_trials();
+        claims
+            .at_most("half", what, ratio(kl(rows, "kl", 0.5, false), paper), 0.8)
+            .at_full_trials();
         let what = "but not where the estimate itself is handed on";
-        claims.at_least("half-kde", what, ratio(kl(rows, "kde", 0.5, false), kl(rows, "kde", 1.0, false)), 1.1).at_full_trials();
+        claims
+            .at_least("half-kde", what, ratio(kl(rows, "kde", 0.5, false), kl(rows, "kde", 1.0, false)), 1.1)
+            .at_full_trials();
         let what = "the pipeline with shrinkage has at most 0.7 of the paper's error";
-        claims.at_most("pipeline", what, ratio(kl(rows, "pipeline", 1.0, true), paper), 0.7).at_full_trials();
+        claims
+            .at_most("pipeline", what, ratio(kl(rows, "pipeline", 1.0, true), paper), 0.7)
+            .at_full_trials();
         let what = "reduction to five components adds less than a quarter to what smoothing loses";
-        claims.at_most("reduction", what, ratio(paper, kl(rows, "kde", 1.0, false)), 1.25).at_full_trials();
+        claims
+            .at_most("reduction", what, ratio(paper, kl(rows, "kde", 1.0, false)), 1.25)
+            .at_full_trials();
         let what = "one Gaussian is worst";
         let gauss = kl(rows, "gauss", 1.0, false).unwrap_or(f64::NAN);
-        claims.all("gauss", what, rows.iter().filter(|r| r.filter != "gauss"), |r| r.kl.value < gauss).at_full_trials();
+        claims
+            .all("gauss", what, rows.iter().filter(|r| r.filter != "gauss"), |r| r.kl.value < gauss)
+            .at_full_trials();
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {

@@ -38,9 +38,16 @@ impl StepLaw {
                     // Shared linearly between the four nearest cells, which keeps the mean.
                     let base = d.map(f64::floor);
                     for (p, q) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                        let share = |k: usize, up: i64| if up == 1 { d[k] - base[k] } else { 1.0 - (d[k] - base[k]) };
+                        let share = |k: usize, up: i64| {
+                            if up == 1 {
+                                d[k] - base[k]
+                            } else {
+                                1.0 - (d[k] - base[k])
+                            }
+                        };
                         let key = [base[0] as i64 + p, base[1] as i64 + q];
-                        *table.entry(key).or_insert(0.0) += share(0, p) * share(1, q) / f64::from(angles * parts * parts);
+                        *table.entry(key).or_insert(0.0) +=
+                            share(0, p) * share(1, q) / f64::from(angles * parts * parts);
                     }
                 }
             }
@@ -57,7 +64,9 @@ impl Lattice {
         let half = (6.0 * START / CELL).ceil() as i64;
         let size = 2 * half as usize + 1;
         let at = |k: usize| (k as i64 - half) as f64 * CELL / START;
-        let mass = (0..size * size).map(|i| (-0.5 * (at(i / size).powi(2) + at(i % size).powi(2))).exp()).collect();
+        let mass = (0..size * size)
+            .map(|i| (-0.5 * (at(i / size).powi(2) + at(i % size).powi(2))).exp())
+            .collect();
         let mut lattice = Self {
             low: [-half; 2],
             size: [size; 2],
@@ -69,7 +78,10 @@ impl Lattice {
 
     fn normalise(&mut self) {
         let largest = self.mass.iter().fold(0.0_f64, |m, x| m.max(*x));
-        self.mass.iter_mut().filter(|m| **m < NEGLIGIBLE * largest).for_each(|m| *m = 0.0);
+        self.mass
+            .iter_mut()
+            .filter(|m| **m < NEGLIGIBLE * largest)
+            .for_each(|m| *m = 0.0);
         let total: f64 = self.mass.iter().sum();
         self.mass.iter_mut().for_each(|m| *m /= total);
     }
@@ -88,7 +100,9 @@ impl Lattice {
             mass: vec![0.0; size[0] * size[1]],
         };
         for (from, row) in self.mass.chunks(self.size[1]).enumerate() {
-            let Some(first) = row.iter().position(|m| *m > 0.0) else { continue };
+            let Some(first) = row.iter().position(|m| *m > 0.0) else {
+                continue;
+            };
             let last = row.iter().rposition(|m| *m > 0.0).unwrap_or(first);
             for ([dx, dy], p) in &law.moves {
                 let to = (from + (dx - x0) as usize) * size[1] + (dy - y0) as usize;
@@ -110,10 +124,18 @@ impl Lattice {
     /// Without empty rows and columns.
     fn cropped(self) -> Self {
         let (_, index) = self.support();
-        let of = |d: usize| index.iter().map(move |i| if d == 0 { i / self.size[1] } else { i % self.size[1] });
+        let of = |d: usize| {
+            index
+                .iter()
+                .map(move |i| if d == 0 { i / self.size[1] } else { i % self.size[1] })
+        };
         let (x, y) = ((of(0).min(), of(0).max()), (of(1).min(), of(1).max()));
-        let ((Some(x0), Some(x1)), (Some(y0), Some(y1))) = (x, y) else { return self };
-        let mass = (x0..=x1).flat_map(|r| self.mass[r * self.size[1] + y0..=r * self.size[1] + y1].iter().copied()).collect();
+        let ((Some(x0), Some(x1)), (Some(y0), Some(y1))) = (x, y) else {
+            return self;
+        };
+        let mass = (x0..=x1)
+            .flat_map(|r| self.mass[r * self.size[1] + y0..=r * self.size[1] + y1].iter().copied())
+            .collect();
         Self {
             low: [self.low[0] + x0 as i64, self.low[1] + y0 as i64],
             size: [x1 - x0 + 1, y1 - y0 + 1],
@@ -124,8 +146,14 @@ impl Lattice {
     /// Centres of the cells with mass, and their places.
     fn support(&self) -> ([Vec<f64>; 2], Vec<usize>) {
         let index: Vec<usize> = (0..self.mass.len()).filter(|i| self.mass[*i] > 0.0).collect();
-        let x = index.iter().map(|i| (self.low[0] + (i / self.size[1]) as i64) as f64 * CELL).collect();
-        let y = index.iter().map(|i| (self.low[1] + (i % self.size[1]) as i64) as f64 * CELL).collect();
+        let x = index
+            .iter()
+            .map(|i| (self.low[0] + (i / self.size[1]) as i64) as f64 * CELL)
+            .collect();
+        let y = index
+            .iter()
+            .map(|i| (self.low[1] + (i % self.size[1]) as i64) as f64 * CELL)
+            .collect();
         ([x, y], index)
     }
 
@@ -133,7 +161,9 @@ impl Lattice {
     pub(super) fn points(&self) -> ([Vec<f64>; 2], Vec<f64>, Vec<f64>) {
         let largest = self.mass.iter().fold(0.0_f64, |m, x| m.max(*x));
         let (points, index) = self.support();
-        let kept: Vec<usize> = (0..index.len()).filter(|k| self.mass[index[*k]] > 1e-6 * largest).collect();
+        let kept: Vec<usize> = (0..index.len())
+            .filter(|k| self.mass[index[*k]] > 1e-6 * largest)
+            .collect();
         let columns = points.map(|c| kept.iter().map(|k| c[*k]).collect());
         let mass: Vec<f64> = kept.iter().map(|k| self.mass[index[*k]]).collect();
         let logs = mass.iter().map(|m| m.ln() - 2.0 * CELL.ln()).collect();

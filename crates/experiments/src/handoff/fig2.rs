@@ -94,18 +94,35 @@ impl Figure for Fig2 {
         claims.references("kl-total", "KL from the first", rows, |r| (key(r), r.kl_total));
         claims.references("kl-reverse", "KL to the first", rows, |r| (key(r), r.kl_total_reverse));
         let what = "at ratio 0.97 a step loses less than 0.001 nat";
-        claims.below("step", what, at(rows, 0.97, 1).map(|r| r.kl_step), 1e-3).at_defaults();
+        claims
+            .below("step", what, at(rows, 0.97, 1).map(|r| r.kl_step), 1e-3)
+            .at_defaults();
         let what = "and ten steps more than 0.1 nat";
-        claims.above("ten-steps", what, at(rows, 0.97, 10).map(|r| r.kl_total), 0.1).at_defaults();
+        claims
+            .above("ten-steps", what, at(rows, 0.97, 10).map(|r| r.kl_total), 0.1)
+            .at_defaults();
         let what = "while the ten steps' own losses sum to less than 0.01 nat";
-        claims.below("sum", what, at(rows, 0.97, 10).map(|r| r.sum_of_steps), 1e-2).at_defaults();
+        claims
+            .below("sum", what, at(rows, 0.97, 10).map(|r| r.sum_of_steps), 1e-2)
+            .at_defaults();
         let what = "at the printed ratio 0.96 a step loses more than the printed 0.001 nat (errata handoff-1)";
-        claims.above("printed-ratio", what, at(rows, 0.96, 1).map(|r| r.kl_step), 1e-3).at_defaults();
+        claims
+            .above("printed-ratio", what, at(rows, 0.96, 1).map(|r| r.kl_step), 1e-3)
+            .at_defaults();
         let what = "the other way round even 0.97 stays below 0.1 nat after ten steps";
-        claims.below("reverse", what, at(rows, 0.97, 10).map(|r| r.kl_total_reverse), 0.1).at_defaults();
+        claims
+            .below("reverse", what, at(rows, 0.97, 10).map(|r| r.kl_total_reverse), 0.1)
+            .at_defaults();
         for ratio in p.ratio.iter().filter(|r| **r < 1.0) {
-            let gaps = rows.iter().filter(|r| r.ratio == *ratio && r.t > 0).map(|r| r.kl_total / r.sum_of_steps);
-            claims.increasing(format!("gap-r{ratio}"), "the ratio of the whole to the sum of its parts grows with time", gaps);
+            let gaps = rows
+                .iter()
+                .filter(|r| r.ratio == *ratio && r.t > 0)
+                .map(|r| r.kl_total / r.sum_of_steps);
+            claims.increasing(
+                format!("gap-r{ratio}"),
+                "the ratio of the whole to the sum of its parts grows with time",
+                gaps,
+            );
         }
     }
 

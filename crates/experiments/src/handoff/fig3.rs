@@ -99,7 +99,11 @@ impl Figure for Fig3 {
         for i in 0..=400 {
             let x = 0.0025 * f64::from(i);
             let value = |m: &Mixture<1>| m.log_pdf(&Vector1::new(x)).exp();
-            densities.push(Density { x, p0: value(&p0), p1: value(&p1) });
+            densities.push(Density {
+                x,
+                p0: value(&p0),
+                p1: value(&p1),
+            });
         }
         // L1 over an interval of the densities divided by their masses there.
         let distance = |from: f64, to: f64, mass: [f64; 2]| -> Result<f64, Error> {
@@ -108,7 +112,9 @@ impl Figure for Fig3 {
                 out.iter_mut().for_each(|l| *l -= mass.ln());
             };
             let grid = QuadratureGrid::new([from], [to], [2e-5])?;
-            Ok(grid.integrate(|x, out| over(&p0, mass[0], x, out), |x, out| over(&p1, mass[1], x, out)).l1)
+            Ok(grid
+                .integrate(|x, out| over(&p0, mass[0], x, out), |x, out| over(&p1, mass[1], x, out))
+                .l1)
         };
         let below = [p0.cdf(p.threshold), p1.cdf(p.threshold)];
         let above = below.map(|b| 1.0 - b);
@@ -130,7 +136,9 @@ impl Figure for Fig3 {
         claims.references("probability", "probability", &rows.l1, |d| (d.when.to_owned(), d.probability));
         let gap = rows.l1("expected").zip(rows.l1("prior")).map(|(e, p)| e - 2.0 * p);
         claims.at_most("twice", "the expected L1 is at most twice the prior's", gap, 0.0);
-        claims.above("largest", "one answer leaves the largest L1 there is, nearly 2", rows.l1("y1"), 1.999).at_defaults();
+        claims
+            .above("largest", "one answer leaves the largest L1 there is, nearly 2", rows.l1("y1"), 1.999)
+            .at_defaults();
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {

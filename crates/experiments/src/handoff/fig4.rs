@@ -105,7 +105,11 @@ impl Figure for Fig4 {
                 reading: t.checked_sub(1).map(|k| world.readings[k].value),
             }
         };
-        let place = |(sensor, s): (usize, &super::world::Point)| Sensor { sensor, x: s[0], y: s[1] };
+        let place = |(sensor, s): (usize, &super::world::Point)| Sensor {
+            sensor,
+            x: s[0],
+            y: s[1],
+        };
         Ok(Rows {
             track: (0..=p.steps).map(step).collect(),
             sensors: world.sensors.iter().enumerate().map(place).collect(),
@@ -113,7 +117,9 @@ impl Figure for Fig4 {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims.all("changes", "the leader changes at every step", rows.track[1..].windows(2), |w| w[0].leader != w[1].leader);
+        claims.all("changes", "the leader changes at every step", rows.track[1..].windows(2), |w| {
+            w[0].leader != w[1].leader
+        });
         let what = "no leader is nearer than 0.7 steps";
         claims.all("stand-off", what, rows.track.iter().filter_map(|s| s.distance), |d| d >= STAND_OFF * STEP);
         let what = "every step goes forward by 0.7 to 1.1 lengths";
@@ -122,15 +128,34 @@ impl Figure for Fig4 {
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let track = points(&rows.track, |s| (s.x, s.y));
-        let links = rows.track.iter().filter_map(|s| Some(Layer::dashed("", vec![(s.x, s.y), (s.leader_x?, s.leader_y?)]).coloured(2)));
-        let leads: Vec<(f64, f64)> = rows.track.iter().filter_map(|s| Some((s.leader_x?, s.leader_y?))).collect();
-        let names = rows.track.iter().filter_map(|s| Some((s.leader_x?, s.leader_y? + 0.35, s.t.to_string()))).collect();
+        let links = rows
+            .track
+            .iter()
+            .filter_map(|s| Some(Layer::dashed("", vec![(s.x, s.y), (s.leader_x?, s.leader_y?)]).coloured(2)));
+        let leads: Vec<(f64, f64)> = rows
+            .track
+            .iter()
+            .filter_map(|s| Some((s.leader_x?, s.leader_y?)))
+            .collect();
+        let names = rows
+            .track
+            .iter()
+            .filter_map(|s| Some((s.leader_x?, s.leader_y? + 0.35, s.t.to_string())))
+            .collect();
         let panel = Panel::new("One world", Axis::linear("x / r0"), Axis::linear("y / r0"))
-            .with(Layer::points("sensors", points(&rows.sensors, |s| (s.x, s.y))).marked(Marker::Cross).coloured(3))
+            .with(
+                Layer::points("sensors", points(&rows.sensors, |s| (s.x, s.y)))
+                    .marked(Marker::Cross)
+                    .coloured(3),
+            )
             .with_all(links)
             .with(Layer::line("target", track.clone()).coloured(0))
             .with(Layer::points("", track).coloured(0))
-            .with(Layer::points("leaders, with their times", leads).marked(Marker::Square).coloured(1))
+            .with(
+                Layer::points("leaders, with their times", leads)
+                    .marked(Marker::Square)
+                    .coloured(1),
+            )
             .with(Layer::texts(names))
             .legend(Legend::Outside);
         Plot::of(panel)

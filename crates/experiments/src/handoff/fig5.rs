@@ -115,21 +115,33 @@ impl Figure for Fig5 {
             }
             for (i, weight) in cloud.weights().iter().enumerate() {
                 let [x, y] = cloud.columns().map(|c| c[i]);
-                particles.push(Particle { t, i, x, y, weight: *weight });
+                particles.push(Particle {
+                    t,
+                    i,
+                    x,
+                    y,
+                    weight: *weight,
+                });
             }
             let sent = Reduction::default().reduce(&filter.estimate(&cloud)?, p.components)?;
             for (component, c) in sent.components().iter().enumerate() {
                 let outline = ellipse(&c.gaussian(), 0.5, 40)?;
                 let first = outline.first().copied();
-                ellipses.extend(outline.into_iter().chain(first).map(|[x, y]| Outline { t, component, x, y }));
+                ellipses.extend(
+                    outline
+                        .into_iter()
+                        .chain(first)
+                        .map(|[x, y]| Outline { t, component, x, y }),
+                );
             }
         }
-        let distance = context.tally(stream.named("worlds"), p.trials, Moments::default, |sum: &mut Moments, trial| {
-            for estimate in posteriors(trial.stream, &[2, 5, 8])? {
-                sum.add(Truth::new(&estimate).kl(&single(&estimate)?));
-            }
-            Ok::<_, Error>(())
-        })?;
+        let distance =
+            context.tally(stream.named("worlds"), p.trials, Moments::default, |sum: &mut Moments, trial| {
+                for estimate in posteriors(trial.stream, &[2, 5, 8])? {
+                    sum.add(Truth::new(&estimate).kl(&single(&estimate)?));
+                }
+                Ok::<_, Error>(())
+            })?;
         Ok(Rows {
             particles,
             ellipses,
@@ -144,12 +156,20 @@ impl Figure for Fig5 {
         }
         let distance = rows.gaussian.first().map(|d| d.kl.value);
         let what = "the beliefs are far from Gaussian: KL 0.12 nat to the Gaussian of their moments";
-        claims.near("gaussian", what, distance, 0.12, 0.04).at_defaults().at_full_trials();
+        claims
+            .near("gaussian", what, distance, 0.12, 0.04)
+            .at_defaults()
+            .at_full_trials();
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let panel = |t: &usize| {
-            let cloud = points(rows.particles.iter().filter(|r| r.t == *t && r.weight > 0.1 / PARTICLES as f64), |r| (r.x, r.y));
+            let cloud = points(
+                rows.particles
+                    .iter()
+                    .filter(|r| r.t == *t && r.weight > 0.1 / PARTICLES as f64),
+                |r| (r.x, r.y),
+            );
             let outlines = (0..p.components).map(|k| {
                 let outline = points(rows.ellipses.iter().filter(|r| r.t == *t && r.component == k), |r| (r.x, r.y));
                 Layer::line("", outline).coloured(1)

@@ -134,10 +134,22 @@ impl Fig6 {
             })
             .collect();
         let bounds = (1..=STEPS).map(|t| {
-            let account = |steps: &[StepError]| steps[..t].iter().copied().collect::<Accounting>().bounds(Amplification::Ml);
+            let account = |steps: &[StepError]| {
+                steps[..t]
+                    .iter()
+                    .copied()
+                    .collect::<Accounting>()
+                    .bounds(Amplification::Ml)
+            };
             let [ml, kl, l1] = [0, 1, 2].map(|c| account(&typical[c]));
             let own = |c: usize| -> Vec<_> {
-                let of = |run: &Run| run[c][..t].iter().map(|s| s.0).collect::<Accounting>().bounds(Amplification::Ml);
+                let of = |run: &Run| {
+                    run[c][..t]
+                        .iter()
+                        .map(|s| s.0)
+                        .collect::<Accounting>()
+                        .bounds(Amplification::Ml)
+                };
                 runs.iter().map(of).collect()
             };
             let (own_ml, own_kl) = (own(0), own(1));
@@ -186,7 +198,9 @@ impl Rows {
 
 /// The last time up to which `log10` stays below the ML bound.
 fn useful(rows: &[&Bound], log10: fn(&Bound) -> f64) -> f64 {
-    rows.iter().take_while(|b| log10(b) < b.ml_printed.value.log10()).count() as f64
+    rows.iter()
+        .take_while(|b| log10(b) < b.ml_printed.value.log10())
+        .count() as f64
 }
 
 impl Figure for Fig6 {
@@ -196,7 +210,11 @@ impl Figure for Fig6 {
     fn about(&self) -> About {
         About {
             id: self.id,
-            title: if self.components == 5 { "Bounds with five components" } else { "Bounds with ten components" },
+            title: if self.components == 5 {
+                "Bounds with five components"
+            } else {
+                "Bounds with ten components"
+            },
             caption: "Bounds on the error after t lossy hand-overs. The ML bound grows in proportion to time, those of KL and L1 \
                       exponentially; the DR bounds (ours) hold for every data sequence and stay below what is trivial.",
             source: "compressed particle filter, Section 6, Figure 6",
@@ -221,7 +239,9 @@ impl Figure for Fig6 {
         };
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
             let stream = context.stream("handoff-fig6").named(smoothing.name());
-            let runs = context.monte_carlo(stream, p.trials).run(|trial| self.trial(smoothing, trial))?;
+            let runs = context
+                .monte_carlo(stream, p.trials)
+                .run(|trial| self.trial(smoothing, trial))?;
             let (bounds, steps) = Self::rows(smoothing, &runs);
             rows.bounds.extend(bounds);
             rows.steps.extend(steps);
@@ -238,54 +258,77 @@ impl Figure for Fig6 {
         claims.references("size", "components sent", &rows.steps, |s| (key(s), s.size));
         let at = |b: &Bound| format!("{}-t{}", b.smoothing, b.t);
         claims.references("ml-bound", "printed ML bound", &rows.bounds, |b| (at(b), b.ml_printed));
-        claims.references("log10-kl", "logarithm of the printed KL bound", &rows.bounds, |b| (at(b), b.log10_kl_printed));
-        claims.references("log10-l1", "logarithm of the printed L1 bound", &rows.bounds, |b| (at(b), b.log10_l1_printed));
+        claims
+            .references("log10-kl", "logarithm of the printed KL bound", &rows.bounds, |b| (at(b), b.log10_kl_printed));
+        claims
+            .references("log10-l1", "logarithm of the printed L1 bound", &rows.bounds, |b| (at(b), b.log10_l1_printed));
         claims.references("l1-from-dr", "L1 bound from DR", &rows.bounds, |b| (at(b), b.l1_from_dr));
         claims.references("kl-from-dr", "KL bound from DR", &rows.bounds, |b| (at(b), b.kl_from_dr));
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
             let under = rows.under(smoothing);
             let name = smoothing.name();
-            let increments: Vec<f64> = under.windows(2).map(|w| w[1].ml_printed.value - w[0].ml_printed.value).collect();
+            let increments: Vec<f64> = under
+                .windows(2)
+                .map(|w| w[1].ml_printed.value - w[0].ml_printed.value)
+                .collect();
             let mean = increments.iter().copied().collect::<Moments>().mean();
             let what = "the ML bound grows by the same amount at every step, within 25 %";
-            claims.all(format!("{name}-linear"), what, &increments, |d| (d / mean - 1.0).abs() < 0.25).at_full_trials();
+            claims
+                .all(format!("{name}-linear"), what, &increments, |d| (d / mean - 1.0).abs() < 0.25)
+                .at_full_trials();
             let what = "at time 1 the KL bound is the smallest and the ML bound the largest";
             claims.all(format!("{name}-first"), what, under.first(), |b| {
                 b.log10_kl_printed < b.log10_l1_printed && b.log10_l1_printed < b.ml_printed.value.log10()
             });
-            for (measure, log) in [("kl", (|b| b.log10_kl_printed) as fn(&Bound) -> f64), ("l1", |b| b.log10_l1_printed)] {
+            let logarithms: [fn(&Bound) -> f64; 2] = [|b| b.log10_kl_printed, |b| b.log10_l1_printed];
+            for (measure, log) in ["kl", "l1"].into_iter().zip(logarithms) {
                 let increments: Vec<f64> = under.windows(2).map(|w| log(w[1]) - log(w[0])).collect();
                 let what = format!("the {measure} bound grows by a factor at every step: exponentially");
                 claims.all(format!("{name}-{measure}-exponential"), what, &increments, |d| *d > 0.15);
             }
-            let slope = |log: fn(&Bound) -> f64| Some((log(under.last()?) - log(under.first()?)) / (under.len() as f64 - 1.0));
-            let gap = slope(|b| b.log10_kl_printed).zip(slope(|b| b.log10_l1_printed)).map(|(kl, l1)| kl - l1);
-            claims.below(format!("{name}-slopes"), "the KL bound grows more slowly than the L1 bound", gap, 0.0).at_full_trials();
+            let slope =
+                |log: fn(&Bound) -> f64| Some((log(under.last()?) - log(under.first()?)) / (under.len() as f64 - 1.0));
+            let gap = slope(|b| b.log10_kl_printed)
+                .zip(slope(|b| b.log10_l1_printed))
+                .map(|(kl, l1)| kl - l1);
+            claims
+                .below(format!("{name}-slopes"), "the KL bound grows more slowly than the L1 bound", gap, 0.0)
+                .at_full_trials();
             let what = "the DR bound of the ML is never above the printed one, and the corrected KL bound never below";
             claims.all(format!("{name}-tight"), what, &under, |b| {
-                b.ml_from_dr <= b.ml_printed.value && b.log10_kl_corrected >= b.log10_kl_printed && b.l1_from_dr.value <= 2.0
+                b.ml_from_dr <= b.ml_printed.value
+                    && b.log10_kl_corrected >= b.log10_kl_printed
+                    && b.l1_from_dr.value <= 2.0
             });
         }
         let preset = rows.under(Smoothing::Preset);
         let (kl, l1) = if self.components == 5 { (4.0, 2.0) } else { (7.0, 3.0) };
         let what = "the KL bound is below the ML bound up to this time";
-        claims.near("kl-useful", what, useful(&preset, |b| b.log10_kl_printed), kl, 1.0).at_full_trials();
+        claims
+            .near("kl-useful", what, useful(&preset, |b| b.log10_kl_printed), kl, 1.0)
+            .at_full_trials();
         let what = "the L1 bound is below the ML bound up to this time";
-        claims.near("l1-useful", what, useful(&preset, |b| b.log10_l1_printed), l1, 1.0).at_full_trials();
+        claims
+            .near("l1-useful", what, useful(&preset, |b| b.log10_l1_printed), l1, 1.0)
+            .at_full_trials();
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let panel = |smoothing: Smoothing| {
             let under = rows.under(smoothing);
             let of = |log: fn(&Bound) -> f64| points(&under, |b| (b.t as f64, 10.0_f64.powf(log(b)).min(1e8)));
-            Panel::new(format!("{} bandwidth", smoothing.name()), Axis::linear("hand-overs t"), Axis::log("bound on the error"))
-                .with(Layer::line("ML, printed", points(&under, |b| (b.t as f64, b.ml_printed.value))))
-                .with(Layer::line("KL, printed / nat", of(|b| b.log10_kl_printed)))
-                .with(Layer::dashed("KL, corrected / nat", of(|b| b.log10_kl_corrected)))
-                .with(Layer::line("L1, printed", of(|b| b.log10_l1_printed)))
-                .with(Layer::measured("KL from DR / nat", &under, |b| (b.t as f64, b.kl_from_dr)))
-                .with(Layer::measured("L1 from DR", &under, |b| (b.t as f64, b.l1_from_dr)))
-                .legend(Legend::TopLeft)
+            Panel::new(
+                format!("{} bandwidth", smoothing.name()),
+                Axis::linear("hand-overs t"),
+                Axis::log("bound on the error"),
+            )
+            .with(Layer::line("ML, printed", points(&under, |b| (b.t as f64, b.ml_printed.value))))
+            .with(Layer::line("KL, printed / nat", of(|b| b.log10_kl_printed)))
+            .with(Layer::dashed("KL, corrected / nat", of(|b| b.log10_kl_corrected)))
+            .with(Layer::line("L1, printed", of(|b| b.log10_l1_printed)))
+            .with(Layer::measured("KL from DR / nat", &under, |b| (b.t as f64, b.kl_from_dr)))
+            .with(Layer::measured("L1 from DR", &under, |b| (b.t as f64, b.l1_from_dr)))
+            .legend(Legend::TopLeft)
         };
         Plot::grid(2, vec![panel(Smoothing::Preset), panel(Smoothing::Silverman)])
     }

@@ -95,7 +95,10 @@ fn chosen(rng: &mut Pcg64Mcg, particles: &Particles<2>, count: usize) -> [Vec<f6
             i += 1;
             cumulative += particles.weights()[i];
         }
-        points.iter_mut().zip(particles.columns()).for_each(|(p, c)| p.push(c[i]));
+        points
+            .iter_mut()
+            .zip(particles.columns())
+            .for_each(|(p, c)| p.push(c[i]));
     }
     points
 }
@@ -184,7 +187,10 @@ pub struct Fig6c;
 
 impl Rows {
     fn at(&self, t: usize, method: &str) -> Option<Measured> {
-        self.error.iter().find(|r| r.t == t && r.method == method).map(|r| r.kl_increase)
+        self.error
+            .iter()
+            .find(|r| r.t == t && r.method == method)
+            .map(|r| r.kl_increase)
     }
 }
 
@@ -214,7 +220,9 @@ impl Figure for Fig6c {
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let runs = context.monte_carlo(context.stream("handoff-fig6c"), p.trials).run(|it| trial(p, it))?;
+        let runs = context
+            .monte_carlo(context.stream("handoff-fig6c"), p.trials)
+            .run(|it| trial(p, it))?;
         let mut rows = Rows {
             error: Vec::new(),
             difference: Vec::new(),
@@ -234,7 +242,11 @@ impl Figure for Fig6c {
             }
             for (pair, a, b) in [("ml-kl", 0, 1), ("kl-l1", 1, 2)] {
                 let gap: Moments = of(a, 0).zip(of(b, 0)).map(|(a, b)| a - b).collect();
-                rows.difference.push(Difference { t, pair, kl: (&gap).into() });
+                rows.difference.push(Difference {
+                    t,
+                    pair,
+                    kl: (&gap).into(),
+                });
             }
         }
         Ok(rows)
@@ -243,23 +255,49 @@ impl Figure for Fig6c {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         claims.references("kl", "actual error", &rows.error, |r| (format!("{}-t{}", r.method, r.t), r.kl_increase));
         let before = rows.error.iter().filter_map(|r| Some((r, r.before_reduction?)));
-        claims.references("before", "error before the reduction", before, |(r, m)| (format!("{}-t{}", r.method, r.t), m));
-        claims.references("difference", "paired difference", &rows.difference, |d| (format!("{}-t{}", d.pair, d.t), d.kl));
+        claims
+            .references("before", "error before the reduction", before, |(r, m)| (format!("{}-t{}", r.method, r.t), m));
+        claims.references("difference", "paired difference", &rows.difference, |d| {
+            (format!("{}-t{}", d.pair, d.t), d.kl)
+        });
         let pair = |pair: &'static str| rows.difference.iter().filter(move |d| d.pair == pair);
         let what = "ML is behind KL at every time";
-        claims.all("ml-behind", what, pair("ml-kl"), |d| d.kl.value > 0.0).at_full_trials().at_defaults();
+        claims
+            .all("ml-behind", what, pair("ml-kl"), |d| d.kl.value > 0.0)
+            .at_full_trials()
+            .at_defaults();
         let what = "KL and L1 are the same within 0.015 nat and three standard errors";
-        claims.all("kl-l1", what, pair("kl-l1"), |d| d.kl.value.abs() < 0.015 + 3.0 * d.kl.standard_error.unwrap_or(0.0)).at_defaults();
+        claims
+            .all("kl-l1", what, pair("kl-l1"), |d| {
+                d.kl.value.abs() < 0.015 + 3.0 * d.kl.standard_error.unwrap_or(0.0)
+            })
+            .at_defaults();
         let worst = (1..=STEPS).filter_map(|t| {
             let gauss = rows.at(t, "gauss")?.value;
-            Some(METHODS[..5].iter().all(|m| rows.at(t, m).is_some_and(|v| v.value < gauss)))
+            Some(
+                METHODS[..5]
+                    .iter()
+                    .all(|m| rows.at(t, m).is_some_and(|v| v.value < gauss)),
+            )
         });
-        claims.all("gauss-worst", "one Gaussian is worst at every time", worst, |w| w).at_full_trials().at_defaults();
+        claims
+            .all("gauss-worst", "one Gaussian is worst at every time", worst, |w| w)
+            .at_full_trials()
+            .at_defaults();
         let what = "even with no amplification the KL bound at time 10 is four times the error: below 0.683/3";
-        claims.below("below-bound", what, rows.at(10, "kl").map(|v| v.value), 0.683 / 3.0).at_full_trials().at_defaults();
+        claims
+            .below("below-bound", what, rows.at(10, "kl").map(|v| v.value), 0.683 / 3.0)
+            .at_full_trials()
+            .at_defaults();
         let what = "smoothing, not reduction, makes most of the error: the estimate alone is above 0.7 of KL";
-        let share = rows.at(10, "kde_only").zip(rows.at(10, "kl")).map(|(a, b)| a.value / b.value);
-        claims.above("smoothing", what, share, 0.7).at_full_trials().at_defaults();
+        let share = rows
+            .at(10, "kde_only")
+            .zip(rows.at(10, "kl"))
+            .map(|(a, b)| a.value / b.value);
+        claims
+            .above("smoothing", what, share, 0.7)
+            .at_full_trials()
+            .at_defaults();
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {

@@ -3,7 +3,9 @@
 use super::world::{Point, START, Walk, World};
 use crate::Error;
 use fewbits_core::Gaussian;
-use fewbits_densities::{Bandwidth, Component, Criterion, KernelEstimate, Mixture, PaperReductions, Particles, Reduction, SampleSize, cut};
+use fewbits_densities::{
+    Bandwidth, Component, Criterion, KernelEstimate, Mixture, PaperReductions, Particles, Reduction, SampleSize, cut,
+};
 use fewbits_handoff::{HandoffFilter, StepError, Whole};
 use fewbits_monte_carlo::Stream;
 use nalgebra::SMatrix;
@@ -68,7 +70,11 @@ pub(super) fn world(stream: Stream) -> Result<World, Error> {
 }
 
 /// The KD-tree cut of an estimate under one of the paper's criteria, and its plug-in errors.
-pub(super) fn paper_cut(estimate: &KernelEstimate<2>, criterion: usize, components: usize) -> Result<(Mixture<2>, StepError), Error> {
+pub(super) fn paper_cut(
+    estimate: &KernelEstimate<2>,
+    criterion: usize,
+    components: usize,
+) -> Result<(Mixture<2>, StepError), Error> {
     let reductions = PaperReductions::new(estimate)?;
     let sent = cut::greedy(&reductions.tree, &reductions.errors[criterion], components)?.mixture(&reductions.tree)?;
     let error = StepError::plug_in(estimate, &sent);
@@ -76,7 +82,8 @@ pub(super) fn paper_cut(estimate: &KernelEstimate<2>, criterion: usize, componen
 }
 
 /// The paper's criteria in the order of [`paper_cut`].
-pub(super) const CRITERIA: [(&str, Criterion); 3] = [("ml", Criterion::Ml), ("kl", Criterion::Kl), ("l1", Criterion::L1)];
+pub(super) const CRITERIA: [(&str, Criterion); 3] =
+    [("ml", Criterion::Ml), ("kl", Criterion::Kl), ("l1", Criterion::L1)];
 
 /// The Gaussian of the same moments.
 pub(super) fn single(estimate: &KernelEstimate<2>) -> Result<Mixture<2>, Error> {
@@ -84,7 +91,11 @@ pub(super) fn single(estimate: &KernelEstimate<2>) -> Result<Mixture<2>, Error> 
 }
 
 /// A plain particle filter: systematic resampling, propagation, weights.
-pub(super) fn plain_step<R: Rng + ?Sized>(rng: &mut R, particles: &mut Particles<2>, reading: &super::world::Reading) -> Result<(), Error> {
+pub(super) fn plain_step<R: Rng + ?Sized>(
+    rng: &mut R,
+    particles: &mut Particles<2>,
+    reading: &super::world::Reading,
+) -> Result<(), Error> {
     use fewbits_core::{Dynamics, Likelihood};
     let count = particles.len();
     let offset: f64 = rng.random();
@@ -121,7 +132,10 @@ pub(super) fn posteriors(stream: Stream, times: &[usize]) -> Result<Vec<KernelEs
 /// A mixture whose every number was sent as a 32-bit float.
 pub(super) fn as_f32(mixture: &Mixture<2>) -> Result<Mixture<2>, Error> {
     let short = |x: f64| f64::from(x as f32);
-    let components = mixture.components().iter().map(|c| Component::new(short(c.weight()), c.mean().map(short), c.covariance().map(short)));
+    let components = mixture
+        .components()
+        .iter()
+        .map(|c| Component::new(short(c.weight()), c.mean().map(short), c.covariance().map(short)));
     Ok(Mixture::new(components.collect::<Result<_, _>>()?)?)
 }
 

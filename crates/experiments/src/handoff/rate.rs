@@ -58,7 +58,8 @@ pub struct Row {
 pub struct Rate;
 
 fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
-    rows.iter().find(|r| r.message == message && r.size == size && r.resolution == resolution)
+    rows.iter()
+        .find(|r| r.message == message && r.size == size && r.resolution == resolution)
 }
 
 impl Figure for Rate {
@@ -123,7 +124,9 @@ impl Figure for Rate {
                 }
                 sums.resize(all.len(), [0.0; 2]);
                 let share = 1.0 / estimates.len() as f64;
-                sums.iter_mut().zip(&all).for_each(|(s, a)| (0..2).for_each(|k| s[k] += a[k] * share));
+                sums.iter_mut()
+                    .zip(&all)
+                    .for_each(|(s, a)| (0..2).for_each(|k| s[k] += a[k] * share));
             }
             Ok(sums)
         };
@@ -139,7 +142,13 @@ impl Figure for Rate {
         keys.extend([("particles", 100, None), ("particles", 500, None)]);
         let rows = keys.into_iter().enumerate().map(|(i, (message, size, resolution))| {
             let of = |k: usize| Measured::mean(&runs.iter().map(|run| run[i][k]).collect::<Moments>());
-            Row { message, size, resolution, bits: of(0), kl: of(1) }
+            Row {
+                message,
+                size,
+                resolution,
+                bits: of(0),
+                kl: of(1),
+            }
         });
         Ok(rows.collect())
     }
@@ -151,17 +160,43 @@ impl Figure for Rate {
         };
         claims.references("bits", "length", rows, |r| (key(r), r.bits.value));
         claims.references("kl", "KL", rows, |r| (key(r), r.kl));
-        let share = find(rows, "coded", 5, Some(0.25)).zip(find(rows, "f32", 5, None)).map(|(c, f)| c.bits.value / f.bits.value);
-        claims.at_most("sixth", "five coded components take at most a sixth of the bits of floats", share, 1.0 / 6.0).at_defaults();
-        let share = find(rows, "coded", 10, Some(0.15)).zip(find(rows, "particles", 500, None)).map(|(c, f)| c.bits.value / f.bits.value);
-        claims.at_most("hundredth", "ten take at most a hundredth of the bits of 500 particles", share, 0.01).at_defaults();
-        let gap = find(rows, "coded", 10, Some(0.15)).zip(find(rows, "particles", 100, None)).map(|(c, f)| c.kl.value - f.kl.value);
-        claims.below("particles", "and lose less than 100 particles", gap, 0.0).at_full_trials().at_defaults();
+        let share = find(rows, "coded", 5, Some(0.25))
+            .zip(find(rows, "f32", 5, None))
+            .map(|(c, f)| c.bits.value / f.bits.value);
+        claims
+            .at_most("sixth", "five coded components take at most a sixth of the bits of floats", share, 1.0 / 6.0)
+            .at_defaults();
+        let share = find(rows, "coded", 10, Some(0.15))
+            .zip(find(rows, "particles", 500, None))
+            .map(|(c, f)| c.bits.value / f.bits.value);
+        claims
+            .at_most("hundredth", "ten take at most a hundredth of the bits of 500 particles", share, 0.01)
+            .at_defaults();
+        let gap = find(rows, "coded", 10, Some(0.15))
+            .zip(find(rows, "particles", 100, None))
+            .map(|(c, f)| c.kl.value - f.kl.value);
+        claims
+            .below("particles", "and lose less than 100 particles", gap, 0.0)
+            .at_full_trials()
+            .at_defaults();
         for m in [3, 5, 10] {
             let by = [0.35, 0.25, 0.15].map(|r| find(rows, "coded", m, Some(r)).map(|r| r.kl.value));
-            claims.decreasing(format!("finer-m{m}"), "finer steps lose less", by).at_full_trials().at_defaults();
-            let gap = find(rows, "coded", m, Some(0.15)).zip(find(rows, "coded-kd", m, Some(0.15))).map(|(a, b)| a.kl.value - b.kl.value);
-            claims.below(format!("pipeline-m{m}"), "at the same bits the pipeline loses less than the paper's cut", gap, 0.0).at_full_trials().at_defaults();
+            claims
+                .decreasing(format!("finer-m{m}"), "finer steps lose less", by)
+                .at_full_trials()
+                .at_defaults();
+            let gap = find(rows, "coded", m, Some(0.15))
+                .zip(find(rows, "coded-kd", m, Some(0.15)))
+                .map(|(a, b)| a.kl.value - b.kl.value);
+            claims
+                .below(
+                    format!("pipeline-m{m}"),
+                    "at the same bits the pipeline loses less than the paper's cut",
+                    gap,
+                    0.0,
+                )
+                .at_full_trials()
+                .at_defaults();
         }
     }
 
@@ -169,8 +204,14 @@ impl Figure for Rate {
         let of = |message: &'static str, size: usize| {
             points(rows.iter().filter(move |r| r.message == message && r.size == size), |r| (r.bits.value, r.kl.value))
         };
-        let all = |message: &'static str| points(rows.iter().filter(move |r| r.message == message), |r| (r.bits.value, r.kl.value));
-        let layers = p.components.iter().enumerate().map(|(i, m)| Layer::line(format!("coded, {m} components"), of("coded", *m)).coloured(i));
+        let all = |message: &'static str| {
+            points(rows.iter().filter(move |r| r.message == message), |r| (r.bits.value, r.kl.value))
+        };
+        let layers = p
+            .components
+            .iter()
+            .enumerate()
+            .map(|(i, m)| Layer::line(format!("coded, {m} components"), of("coded", *m)).coloured(i));
         let panel = Panel::new("One belief", Axis::log("message / bit"), Axis::log("KL / nat"))
             .with_all(layers)
             .with(Layer::dashed("mixture as floats", all("f32")).coloured(5))

@@ -75,17 +75,39 @@ fn methods() -> Vec<(&'static str, Method)> {
         ("kd ml", greedy(Split::KD, Criterion::Ml)),
         ("kd l1", greedy(Split::KD, Criterion::L1)),
         ("kd kl", greedy(Split::KD, Criterion::Kl)),
-        ("kd kl optimal", Method::Plain(Reduction::Optimal { split: Split::KD, criterion: Criterion::Kl })),
+        (
+            "kd kl optimal",
+            Method::Plain(Reduction::Optimal {
+                split: Split::KD,
+                criterion: Criterion::Kl,
+            }),
+        ),
         ("kd closed form", greedy(split(widest, count), Criterion::LogDeterminant)),
         ("principal kl", greedy(Split::PRINCIPAL, Criterion::Kl)),
         ("principal closed form", greedy(Split::PRINCIPAL, Criterion::LogDeterminant)),
         ("alternating kl", greedy(split(SplitAxis::Alternating, count), Criterion::Kl)),
-        ("runnalls", Method::Plain(Reduction::Merging { cost: MergeCost::Runnalls })),
-        ("salmond", Method::Plain(Reduction::Merging { cost: MergeCost::Salmond })),
+        (
+            "runnalls",
+            Method::Plain(Reduction::Merging {
+                cost: MergeCost::Runnalls,
+            }),
+        ),
+        (
+            "salmond",
+            Method::Plain(Reduction::Merging {
+                cost: MergeCost::Salmond,
+            }),
+        ),
         ("williams from 30", Method::Williams),
         ("pipeline 0", Method::Plain(Reduction::Pipeline { cut: 60, iterations: 0 })),
         ("pipeline 15", Method::Plain(Reduction::default())),
-        ("pipeline 40", Method::Plain(Reduction::Pipeline { cut: 60, iterations: 40 })),
+        (
+            "pipeline 40",
+            Method::Plain(Reduction::Pipeline {
+                cut: 60,
+                iterations: 40,
+            }),
+        ),
     ]
 }
 
@@ -99,7 +121,10 @@ impl Method {
         Ok(match self {
             Self::Plain(reduction) => reduction.reduce(estimate, components)?,
             Self::Williams => {
-                let coarse = Reduction::Merging { cost: MergeCost::Runnalls }.reduce(estimate, 30.max(components))?;
+                let coarse = Reduction::Merging {
+                    cost: MergeCost::Runnalls,
+                }
+                .reduce(estimate, 30.max(components))?;
                 merge(&coarse, components, MergeCost::Williams)?.mixture
             }
         })
@@ -111,7 +136,10 @@ pub struct Reductions;
 
 impl Rows {
     fn kl(&self, method: &str, components: usize) -> Option<f64> {
-        self.errors.iter().find(|r| r.method == method && r.components == components).map(|r| r.kl.value)
+        self.errors
+            .iter()
+            .find(|r| r.method == method && r.components == components)
+            .map(|r| r.kl.value)
     }
 }
 
@@ -164,15 +192,25 @@ impl Figure for Reductions {
             }
             Ok(all)
         };
-        let runs = context.monte_carlo(context.stream("handoff-reduction"), p.trials).run(one)?;
+        let runs = context
+            .monte_carlo(context.stream("handoff-reduction"), p.trials)
+            .run(one)?;
         let (mut errors, mut cost) = (Vec::new(), Vec::new());
         for (m, (method, _)) in methods.iter().enumerate() {
             for (c, components) in p.components.iter().enumerate() {
                 let at = m * p.components.len() + c;
                 let kl: Moments = runs.iter().map(|run| run[at].0).collect();
                 let milliseconds = runs.iter().map(|run| run[at].1).collect::<Moments>().mean();
-                errors.push(Row { method, components: *components, kl: (&kl).into() });
-                cost.push(Time { method, components: *components, milliseconds });
+                errors.push(Row {
+                    method,
+                    components: *components,
+                    kl: (&kl).into(),
+                });
+                cost.push(Time {
+                    method,
+                    components: *components,
+                    milliseconds,
+                });
             }
         }
         Ok(Rows { errors, cost })
@@ -183,15 +221,30 @@ impl Figure for Reductions {
         for m in p.components.iter().filter(|m| **m >= 3) {
             let ratio = rows.kl("pipeline 15", *m).zip(rows.kl("kd kl", *m)).map(|(a, b)| a / b);
             let what = "the recommended pipeline loses at most 0.65 of what the paper's cut does";
-            claims.at_most(format!("pipeline-m{m}"), what, ratio, 0.65).at_full_trials().at_defaults();
+            claims
+                .at_most(format!("pipeline-m{m}"), what, ratio, 0.65)
+                .at_full_trials()
+                .at_defaults();
             let gap = rows.kl("kd kl", *m).zip(rows.kl("kd ml", *m)).map(|(a, b)| a - b);
-            claims.below(format!("ml-worst-m{m}"), "cuts by ML lose more than cuts by KL", gap, 0.0).at_full_trials().at_defaults();
-            let gap = rows.kl("principal kl", *m).zip(rows.kl("alternating kl", *m)).map(|(a, b)| a - b);
+            claims
+                .below(format!("ml-worst-m{m}"), "cuts by ML lose more than cuts by KL", gap, 0.0)
+                .at_full_trials()
+                .at_defaults();
+            let gap = rows
+                .kl("principal kl", *m)
+                .zip(rows.kl("alternating kl", *m))
+                .map(|(a, b)| a - b);
             let what = "alternating axes lose more than principal axes";
-            claims.below(format!("alternating-m{m}"), what, gap, 0.0).at_full_trials().at_defaults();
+            claims
+                .below(format!("alternating-m{m}"), what, gap, 0.0)
+                .at_full_trials()
+                .at_defaults();
         }
         let more = p.components.iter().map(|m| rows.kl("pipeline 15", *m));
-        claims.decreasing("more", "more components lose less", more).at_full_trials().at_defaults();
+        claims
+            .decreasing("more", "more components lose less", more)
+            .at_full_trials()
+            .at_defaults();
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {

@@ -86,7 +86,12 @@ pub(super) struct World {
 impl World {
     /// Draws a world of `steps` steps. The leader is the sensor nearest to the target among those that did not lead just before
     /// and are not too near.
-    pub(super) fn draw<R: Rng + ?Sized>(rng: &mut R, sensors: usize, steps: usize, variance: f64) -> Result<Self, Error> {
+    pub(super) fn draw<R: Rng + ?Sized>(
+        rng: &mut R,
+        sensors: usize,
+        steps: usize,
+        variance: f64,
+    ) -> Result<Self, Error> {
         let length = STEP * (steps as f64 + 1.0);
         let sensors: Vec<Point> = (0..sensors)
             .map(|_| Point::new(rng.random_range(-STEP..length), rng.random_range(-4.0 * STEP..4.0 * STEP)))
@@ -102,14 +107,25 @@ impl World {
         for _ in 0..steps {
             position = Walk.propagate(rng, &position);
             let distance = |i: usize| (world.sensors[i] - position).norm();
-            let able = (0..world.sensors.len()).filter(|i| world.leaders.last() != Some(i) && distance(*i) >= STAND_OFF * STEP);
-            let leader = able.min_by(|a, b| distance(*a).total_cmp(&distance(*b))).ok_or_else(|| {
-                ArgumentError::new("sensors", world.sensors.len(), "enough for a leader beyond the stand-off at every step")
-            })?;
+            let able = (0..world.sensors.len())
+                .filter(|i| world.leaders.last() != Some(i) && distance(*i) >= STAND_OFF * STEP);
+            let leader = able
+                .min_by(|a, b| distance(*a).total_cmp(&distance(*b)))
+                .ok_or_else(|| {
+                    ArgumentError::new(
+                        "sensors",
+                        world.sensors.len(),
+                        "enough for a leader beyond the stand-off at every step",
+                    )
+                })?;
             let noise = variance.sqrt() * rng.sample::<f64, _>(StandardNormal);
             let value = 1.0 / (distance(leader) + 0.05) + noise;
             let sensor = world.sensors[leader];
-            world.readings.push(Reading { sensor, value, variance });
+            world.readings.push(Reading {
+                sensor,
+                value,
+                variance,
+            });
             world.leaders.push(leader);
             world.track.push(position);
         }

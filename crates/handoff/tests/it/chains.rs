@@ -6,7 +6,9 @@ use fewbits_monte_carlo::Stream;
 use rand::{Rng, RngExt};
 
 fn law<R: Rng>(rng: &mut R, points: usize, spread: f64) -> Vec<f64> {
-    let raw: Vec<f64> = (0..points).map(|_| 10.0_f64.powf(-rng.random_range(0.0..spread))).collect();
+    let raw: Vec<f64> = (0..points)
+        .map(|_| 10.0_f64.powf(-rng.random_range(0.0..spread)))
+        .collect();
     let total: f64 = raw.iter().sum();
     raw.iter().map(|x| x / total).collect()
 }
@@ -14,14 +16,19 @@ fn law<R: Rng>(rng: &mut R, points: usize, spread: f64) -> Vec<f64> {
 /// `p_i` after one step of the dynamics and a measurement whose likelihood is given.
 fn filtered(p: &[f64], rows: &[Vec<f64>], likelihood: &[f64]) -> Vec<f64> {
     let n = p.len();
-    let joint: Vec<f64> = (0..n).map(|j| likelihood[j] * (0..n).map(|i| p[i] * rows[i][j]).sum::<f64>()).collect();
+    let joint: Vec<f64> = (0..n)
+        .map(|j| likelihood[j] * (0..n).map(|i| p[i] * rows[i][j]).sum::<f64>())
+        .collect();
     let total: f64 = joint.iter().sum();
     joint.iter().map(|x| x / total).collect()
 }
 
 /// A slightly wrong version of a law.
 fn blurred<R: Rng>(rng: &mut R, p: &[f64]) -> Vec<f64> {
-    let raw: Vec<f64> = p.iter().map(|x| x * 10.0_f64.powf(rng.random_range(-0.3..0.3))).collect();
+    let raw: Vec<f64> = p
+        .iter()
+        .map(|x| x * 10.0_f64.powf(rng.random_range(-0.3..0.3)))
+        .collect();
     let total: f64 = raw.iter().sum();
     raw.iter().map(|x| x / total).collect()
 }
@@ -42,7 +49,12 @@ fn bounds_for_every_data_sequence_hold_on_three_thousand_chains() {
             let posterior = filtered(&known, &rows, &likelihood);
             known = blurred(&mut rng, &posterior);
             let d = discrete(&posterior, &known).unwrap();
-            account.push(StepError { ml: d.ml, dr: d.dr, kl: d.kl, l1: d.l1 });
+            account.push(StepError {
+                ml: d.ml,
+                dr: d.dr,
+                kl: d.kl,
+                l1: d.l1,
+            });
             let (truth, bounds) = (discrete(&exact, &known).unwrap(), account.bounds(Amplification::Dr));
             let slack = 1.0 + 1e-9;
             assert!(truth.ml <= bounds.ml_from_dr * slack && bounds.ml_from_dr <= bounds.ml_printed * slack);
@@ -67,7 +79,9 @@ fn expected_bounds_hold_over_all_data() {
         let given = |y: usize| -> Vec<f64> { up.iter().map(|u| if y == 1 { *u } else { 1.0 - u }).collect() };
         let mass = |p: &[f64], y: usize| -> f64 {
             let l = given(y);
-            (0..n).map(|j| l[j] * (0..n).map(|i| p[i] * rows[i][j]).sum::<f64>()).sum()
+            (0..n)
+                .map(|j| l[j] * (0..n).map(|i| p[i] * rows[i][j]).sum::<f64>())
+                .sum()
         };
         let (mut kl, mut l1) = (0.0, 0.0);
         let (mut kl_corrected, mut l1_tight, mut kl_printed) = (0.0, 0.0, 0.0);
@@ -82,7 +96,12 @@ fn expected_bounds_hold_over_all_data() {
                 let posterior = filtered(&known, &rows, &given(second));
                 let sent = blurred(&mut rng, &posterior);
                 let e = discrete(&posterior, &sent).unwrap();
-                let step = |d: &fewbits_densities::divergence::Divergence| StepError { ml: d.ml, dr: d.dr, kl: d.kl, l1: d.l1 };
+                let step = |d: &fewbits_densities::divergence::Divergence| StepError {
+                    ml: d.ml,
+                    dr: d.dr,
+                    kl: d.kl,
+                    l1: d.l1,
+                };
                 let account: Accounting = [step(&d), step(&e)].into_iter().collect();
                 let b = account.bounds(Amplification::Dr);
                 let truth = discrete(&after, &sent).unwrap();

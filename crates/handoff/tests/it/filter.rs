@@ -40,11 +40,35 @@ fn follows_kalman(reducer: &dyn Reducer<1>, slack: f64) {
 fn a_linear_world_is_tracked_as_by_kalman_whatever_travels() {
     follows_kalman(&Whole, 0.06);
     follows_kalman(&Components::new(3), 0.06);
-    follows_kalman(&Components { components: 1, reduction: Reduction::SingleGaussian }, 0.06);
+    follows_kalman(
+        &Components {
+            components: 1,
+            reduction: Reduction::SingleGaussian,
+        },
+        0.06,
+    );
     let format = WireFormat::around_origin(1.0, 0.15).unwrap();
-    follows_kalman(&Coded { components: 2, reduction: Reduction::default(), format: format.clone(), resolution: 0 }, 0.12);
-    let control = RateControl { components: vec![1, 2], ..RateControl::default() };
-    follows_kalman(&RateLimited { control, format, budget: 60 }, 0.12);
+    follows_kalman(
+        &Coded {
+            components: 2,
+            reduction: Reduction::default(),
+            format: format.clone(),
+            resolution: 0,
+        },
+        0.12,
+    );
+    let control = RateControl {
+        components: vec![1, 2],
+        ..RateControl::default()
+    };
+    follows_kalman(
+        &RateLimited {
+            control,
+            format,
+            budget: 60,
+        },
+        0.12,
+    );
 }
 
 #[test]
@@ -52,7 +76,11 @@ fn shrinkage_undoes_what_the_kernel_adds() {
     let x: Vec<f64> = (0..100).map(|i| (f64::from(i) * 0.77).sin()).collect();
     let particles = Particles::uniform([x]).unwrap();
     let filter = HandoffFilter::new(100, Whole).unwrap();
-    let wide = HandoffFilter::of_paper(100, Whole).unwrap().estimate(&particles).unwrap().covariance()[(0, 0)];
+    let wide = HandoffFilter::of_paper(100, Whole)
+        .unwrap()
+        .estimate(&particles)
+        .unwrap()
+        .covariance()[(0, 0)];
     let kept = filter.estimate(&particles).unwrap().covariance()[(0, 0)];
     assert!((kept - particles.covariance()[(0, 0)]).abs() < 1e-12 && wide > 1.05 * kept);
 }
@@ -71,17 +99,28 @@ fn what_cannot_be_is_an_error_by_name() {
     let walk = Ar1::new(0.9, 0.3).unwrap();
     let known = Mixture::single(&Gaussian::scalar(0.0, 1.0).unwrap()).unwrap();
     let mut rng = Stream::new(62).rng();
-    let refusal = filter.step(&mut rng, &known, &walk, &Impossible).unwrap_err().to_string();
+    let refusal = filter
+        .step(&mut rng, &known, &walk, &Impossible)
+        .unwrap_err()
+        .to_string();
     assert!(refusal.contains("degenerate"), "{refusal}");
     assert!(HandoffFilter::new(0, Whole).is_err());
     let none = HandoffFilter::new(50, Components::new(0)).unwrap();
     let sensor = ScalarSensor::scalar(Vector1::new(1.0), 0.5).unwrap();
     let seen = Observed::new(sensor, Value::new(Vector1::new(0.1), [[0.5]].into()).unwrap());
-    assert!(none.step(&mut rng, &known, &walk, &seen).unwrap_err().to_string().contains("components"));
+    assert!(
+        none.step(&mut rng, &known, &walk, &seen)
+            .unwrap_err()
+            .to_string()
+            .contains("components")
+    );
     // A single particle has no spread to smooth over, unless the bandwidth has a floor.
     let mut single = HandoffFilter::new(1, Components::new(1)).unwrap();
     assert!(single.step(&mut rng, &known, &walk, &seen).is_err());
-    single.bandwidth = Bandwidth { floor: 0.1, ..Bandwidth::default() };
+    single.bandwidth = Bandwidth {
+        floor: 0.1,
+        ..Bandwidth::default()
+    };
     single.step(&mut rng, &known, &walk, &seen).unwrap();
 }
 
