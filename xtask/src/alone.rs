@@ -48,7 +48,11 @@ pub fn run(options: &Options) -> Result<bool, Error> {
     let metadata = MetadataCommand::new().no_deps().exec()?;
     let is_library = |package: &&Package| package.manifest_path.as_str().contains("/crates/");
     let libraries: Vec<&Package> = metadata.packages.iter().filter(is_library).collect();
-    if let Some(name) = options.crates.iter().find(|name| libraries.iter().all(|p| p.name.as_str() != name.as_str())) {
+    if let Some(name) = options
+        .crates
+        .iter()
+        .find(|name| libraries.iter().all(|p| p.name.as_str() != name.as_str()))
+    {
         return Err(Error::UnknownCrate { name: name.clone() });
     }
     let root = metadata.workspace_root.as_std_path();
@@ -80,7 +84,9 @@ fn try_crate(package: &Package, root: &Path, target: &Path) -> Result<bool, Erro
             .env("CARGO_TARGET_DIR", target)
             .stdout(std::process::Stdio::null())
             .status();
-        status.map(|status| status.success()).map_err(failed(Path::new("cargo")))
+        status
+            .map(|status| status.success())
+            .map_err(failed(Path::new("cargo")))
     };
 
     let mut good = true;

@@ -215,9 +215,19 @@ impl Figure for Unknowns {
             rows.bounds.iter().map(|b| b.sd_x),
         );
         let bound = |unknown: &str| rows.bounds.iter().find(|b| b.unknown == unknown).map(|b| b.sd_x);
-        for (unknown, expected) in [("nothing", 0.047_177_569), ("rate", 0.151_477_405), ("+ diffusivity", 0.151_486_062), ("+ start", 0.165_460_552), ("+ bias", 0.167_181_520)] {
-            let what = format!("the bound of x by another program (differences, Gauss-Jordan): {unknown} unknown besides the position");
-            claims.near(format!("bound/{unknown}").replace(' ', ""), what, bound(unknown), expected, 1e-5).at_defaults();
+        for (unknown, expected) in [
+            ("nothing", 0.047_177_569),
+            ("rate", 0.151_477_405),
+            ("+ diffusivity", 0.151_486_062),
+            ("+ start", 0.165_460_552),
+            ("+ bias", 0.167_181_520),
+        ] {
+            let what = format!(
+                "the bound of x by another program (differences, Gauss-Jordan): {unknown} unknown besides the position"
+            );
+            claims
+                .near(format!("bound/{unknown}").replace(' ', ""), what, bound(unknown), expected, 1e-5)
+                .at_defaults();
         }
         let bias = |key: &str| rows.models.iter().find(|m| m.key() == key);
         let what = "a rate for each sample is metres off without any noise (errata diffusive-2)";

@@ -74,9 +74,21 @@ fn a_failing_trial_can_be_run_again_alone() {
 #[test]
 fn errors_of_any_type_and_panics_stay_with_their_trial() {
     let run = MonteCarlo::new(Stream::new(4), 100);
-    let boxed = run.run(|t| if t.index == 70 { Err::<(), Box<dyn std::error::Error>>("no luck".into()) } else { Ok(()) });
+    let boxed = run.run(|t| {
+        if t.index == 70 {
+            Err::<(), Box<dyn std::error::Error>>("no luck".into())
+        } else {
+            Ok(())
+        }
+    });
     assert!(matches!(boxed, Err(MonteCarloError::Trial { index: 70, ref message, .. }) if message == "no luck"));
-    let panicked = run.run(|t| if t.index == 7 { panic!("trial {}", t.index) } else { Ok::<_, Infallible>(()) });
+    let panicked = run.run(|t| {
+        if t.index == 7 {
+            panic!("trial {}", t.index)
+        } else {
+            Ok::<_, Infallible>(())
+        }
+    });
     assert!(matches!(panicked, Err(MonteCarloError::Panicked { index: 7, ref message, .. }) if message == "trial 7"));
 }
 
