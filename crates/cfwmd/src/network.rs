@@ -33,6 +33,9 @@ pub struct FusionInfo {
     pub received: usize,
 }
 
+/// What arrives of each sensor's measurement, and how many reports were sent.
+pub type Transmitted<const M: usize> = (Vec<Observation<SVector<f64, M>>>, usize);
+
 impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
     /// A network of at least one sensor with threshold `eta >= 0`; values travel in double precision.
     ///
@@ -108,7 +111,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         rules: &[CensoringRule<M>],
         broadcast: &SVector<f64, D>,
         measurements: &[SVector<f64, M>],
-    ) -> Result<(Vec<Observation<SVector<f64, M>>>, usize), Error> {
+    ) -> Result<Transmitted<M>, Error> {
         self.count(rules.len(), measurements.len())?;
         let mut sent = 0;
         let observations = (0..self.sensors.len()).map(|i| {

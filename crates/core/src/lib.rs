@@ -67,7 +67,7 @@ pub use factor::{Factor, Tilted};
 pub use fewbits_numerics::ArgumentError;
 pub use gaussian::{FactoredGaussian, Gaussian};
 pub use likelihood::{Likelihood, Observed};
-pub use message::{Encoder, Message};
+pub use message::Message;
 pub use number::NumberFormat;
 pub use observation::{Link, Observation};
 pub use scheme::Scheme;

@@ -59,16 +59,3 @@ impl Message for () {
         Ok(())
     }
 }
-
-/// The sensor's half of a scheme: cheap, allocation-free, and ignorant of everything but its measurement and the feedback.
-pub trait Encoder {
-    /// What the sensor measures.
-    type Measurement;
-    /// What the fusion centre broadcast beforehand; `()` without feedback.
-    type Feedback;
-    /// What the sensor says. Silence is a message of zero bits: make it a variant.
-    type Message: Message;
-
-    /// Turns a measurement into a message.
-    fn encode(&self, measurement: &Self::Measurement, feedback: &Self::Feedback) -> Self::Message;
-}

@@ -221,7 +221,8 @@ impl<const D: usize> Clumps<D> {
             }
             components = sums.iter().filter_map(|s| s.clump(&floor)).collect();
             logs.truncate(components.len());
-            if !(mean_log - before > options.tolerance) {
+            let gained = mean_log - before;
+            if gained <= options.tolerance || gained.is_nan() {
                 break;
             }
             before = mean_log;

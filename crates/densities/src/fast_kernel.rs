@@ -134,7 +134,7 @@ fn smoothed_rows(values: &[f64], counts: [usize; 2], kernel: &[f64]) -> Vec<f64>
         for (k, value) in row.iter().enumerate().filter(|(_, v)| **v != 0.0) {
             let low = k.saturating_sub(kernel.len() - 1);
             let high = (k + kernel.len()).min(n);
-            let (left, right) = (&mut out[low..high]).split_at_mut(k - low);
+            let (left, right) = out[low..high].split_at_mut(k - low);
             left.iter_mut()
                 .rev()
                 .zip(&kernel[1..])

@@ -65,7 +65,7 @@ pub fn hermite<const D: usize>(nu: [usize; D], z: &SVector<f64, D>, w: &SMatrix<
 pub fn hermite_terms<const D: usize>(nu: [usize; D], w: &SMatrix<f64, D, D>) -> Result<Vec<([usize; D], f64)>, Error> {
     check_degree(nu.iter().sum())?;
     let mut terms: Vec<_> = polynomial_of(nu, w).terms.into_iter().filter(|t| t.1 != 0.0).collect();
-    terms.sort_by(|a, b| (b.0.iter().sum::<usize>(), b.0).cmp(&(a.0.iter().sum::<usize>(), a.0)));
+    terms.sort_by_key(|(powers, _)| std::cmp::Reverse((powers.iter().sum::<usize>(), *powers)));
     Ok(terms)
 }
 
@@ -199,7 +199,7 @@ pub fn series_moments<const D: usize>(
         }
     }
     let mut terms: Vec<_> = polynomial.into_iter().collect();
-    terms.sort_by(|a, b| a.0.cmp(&b.0));
+    terms.sort_by_key(|a| a.0);
     let zero = SVector::<f64, D>::zeros();
     let expectation = |raise: &[usize]| -> Result<f64, Error> {
         let mut sum = 0.0;

@@ -124,7 +124,7 @@ impl<const D: usize> Particles<D> {
     /// If the length of `side` is no multiple of the number of particles, or an entry is not finite.
     pub fn with_side(mut self, side: Vec<f64>) -> Result<Self, Error> {
         all_finite("side", &side)?;
-        if side.len() % self.len() != 0 {
+        if !side.len().is_multiple_of(self.len()) {
             let expected = format!("rows of equal length for {} particles", self.len());
             return Err(ArgumentError::new("side", format!("{} numbers", side.len()), expected).into());
         }

@@ -65,7 +65,7 @@ impl StoredParticles {
         let effective = 1.0 / self.weights.iter().map(|w| w * w).sum::<f64>();
         if let Some(bad) = self
             .effective_sample_size
-            .filter(|n| !((n / effective - 1.0).abs() <= 1e-9))
+            .filter(|n| (n / effective - 1.0).abs() > 1e-9 || n.is_nan())
         {
             return Err(ArgumentError::new("effective_sample_size", bad, format!("{effective}")).into());
         }

@@ -211,7 +211,7 @@ pub fn fisher_information_of(
         .fold(f64::INFINITY, f64::min);
     let with_diffusivity = |k: f64| -> Result<SourceSensor, Error> {
         let air = Air::new(k, *sensor.air().wind(), Ground::Impermeable)?;
-        Ok(SourceSensor::new(air, sensor.instants().to_vec(), sensor.noise())?.with_start(sensor.start())?)
+        SourceSensor::new(air, sensor.instants().to_vec(), sensor.noise())?.with_start(sensor.start())
     };
     let slower = with_diffusivity(diffusivity * (1.0 - step))?;
     let faster = with_diffusivity(diffusivity * (1.0 + step))?;

@@ -68,7 +68,7 @@ impl PointMassFilter {
         };
         let nodes: Vec<f64> = grid.nodes().collect();
         let moved: Vec<(f64, f64)> = nodes.iter().map(noise).collect();
-        if let Some((_, deviation)) = moved.iter().find(|(_, s)| !(*s >= COARSEST * grid.spacing())) {
+        if let Some((_, deviation)) = moved.iter().find(|(_, s)| s.is_nan() || *s < COARSEST * grid.spacing()) {
             return Err(too_coarse(&grid, *deviation));
         }
         Ok(Self::from_kernel(grid, &moved))

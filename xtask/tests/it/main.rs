@@ -278,7 +278,7 @@ fn what_is_refused_is_named_and_nothing_is_written() {
         (&["dymbo-[fig"], &["dymbo-[fig", "pattern"]),
         (&["dymbo-fig5", "--set", "alpha=1"], &["alpha", "gamma"]),
         (&["dymbo-fig5", "--set", "a=fast"], &["`a`", "fast", "number"]),
-        (&["dymbo-fig5", "--set", "a=NaN"], &["`a`", "NaN", "finite"]),
+        (&["dymbo-fig5", "--set", "a=NaN"], &["`a`", "NaN", "number"]),
         (&["dymbo-fig5", "--set", "a=1.2"], &["a", "1.2"]),
         (&["dymbo-fig5", "--set", "gamma=-0.5"], &["-0.5"]),
         (&["dymbo-fig5", "--set", "a"], &["NAME=VALUE"]),

@@ -76,6 +76,7 @@ fn erased_says_nothing<const M: usize, S: Scheme<M>>(
 ///
 /// # Errors
 /// If encoding fails, or the frequency found.
+#[allow(clippy::too_many_arguments, reason = "a law names everything that it is about")]
 pub fn honesty<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
     scheme: &S,
     feedback: &S::Feedback,
@@ -108,6 +109,7 @@ pub fn honesty<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
 ///
 /// # Errors
 /// As [`honesty`].
+#[allow(clippy::too_many_arguments, reason = "a law names everything that it is about")]
 pub fn frequencies<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
     scheme: &S,
     feedback: &S::Feedback,

@@ -1,5 +1,12 @@
 //! Tests of the search for a diffusive source.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a panic is how a test fails"
+)]
+
 mod attacks;
 mod fixtures;
 mod laws;

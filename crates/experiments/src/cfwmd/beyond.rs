@@ -463,7 +463,7 @@ impl Case for Cost {
             claims.extend(agrees(summary, scheme, 1.0, &format!("cost/{reference}"), 0.0, 0.01)?);
         }
         let relative =
-            |scheme: &str| -> Result<f64, Error> { Ok(first(times.only("scheme", scheme)?.numbers("relative")?)?) };
+            |scheme: &str| -> Result<f64, Error> { first(times.only("scheme", scheme)?.numbers("relative")?) };
         claims.push(Claim::at_least(
             "cheaper",
             "the Gaussian belief is at least 15 times cheaper than 1000 particles",

@@ -155,7 +155,8 @@ impl Figure for WordLength {
             .all("riccati", what, longer, |r| (r.exact_mse / r.riccati - 1.0).abs() <= 3e-4)
             .at_defaults();
         let rows = &rows.successive;
-        let columns: [(&str, fn(&Successive) -> f64); 4] = [
+        type Of = fn(&Successive) -> f64;
+        let columns: [(&str, Of); 4] = [
             ("claimed", |r| r.claimed),
             ("own-levels", |r| r.own_levels),
             ("centroids", |r| r.centroids),

@@ -309,7 +309,8 @@ impl Figure for Convergence {
             let level = c.last().map(|r| r.kf_minf);
             (c[0].plant.to_string(), settled(c, |r| r.kf_pred, level))
         });
-        let ratios: [(&str, &str, fn(&Row) -> f64); 2] = [
+        type Of = fn(&Row) -> f64;
+        let ratios: [(&str, &str, Of); 2] = [
             ("exact", "exact errors", |r| r.dymbo_exact / r.kf_pred),
             ("computed", "computed variances", |r| r.dymbo_pred / r.kf_pred),
         ];

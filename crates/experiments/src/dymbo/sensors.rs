@@ -113,7 +113,8 @@ impl Figure for SeveralSensors {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
-        let columns: [(&str, &str, fn(&Row) -> f64); 4] = [
+        type Of = fn(&Row) -> f64;
+        let columns: [(&str, &str, Of); 4] = [
             ("sequential", "computed variance in turn", |r| r.sequential),
             ("parallel", "exact error at once, linear fusion", |r| r.parallel_mse),
             ("table", "exact error at once, count table", |r| r.table_mse),

@@ -336,7 +336,8 @@ impl<S: Setting> Figure for Iterations<S> {
         let curve = |crossover: f64, column: Column| {
             points(rows.chain.iter().filter(|r| r.crossover == crossover), |r| (r.iteration as f64, column(r)))
         };
-        let panel = |title: String, drawn: Vec<(String, Vec<(f64, f64)>, usize)>| {
+        type Curve = (String, Vec<(f64, f64)>, usize);
+        let panel = |title: String, drawn: Vec<Curve>| {
             let heights = drawn.iter().flat_map(|(_, curve, _)| curve).map(|p| p.1);
             let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
             let edge = steps as f64;

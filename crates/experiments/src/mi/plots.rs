@@ -8,7 +8,8 @@ pub(super) fn errors(title: &str, rows: impl Iterator<Item = (String, f64, Optio
         .enumerate()
         .map(|(i, (name, mse, printed))| (-(i as f64), name, mse, printed))
         .collect();
-    let place = |value: fn(&(f64, String, f64, Option<f64>)) -> Option<f64>| {
+    type Place = (f64, String, f64, Option<f64>);
+    let place = |value: fn(&Place) -> Option<f64>| {
         let place = |row| Some((value(row)?, row.0));
         rows.iter().filter_map(place).collect::<Vec<_>>()
     };

@@ -103,7 +103,7 @@ fn what_cannot_be_is_an_error_by_name() {
         .step(&mut rng, &known, &walk, &Impossible)
         .unwrap_err()
         .to_string();
-    assert!(refusal.contains("degenerate"), "{refusal}");
+    assert!(refusal.contains("impossible"), "{refusal}");
     assert!(HandoffFilter::new(0, Whole).is_err());
     let none = HandoffFilter::new(50, Components::new(0)).unwrap();
     let sensor = ScalarSensor::scalar(Vector1::new(1.0), 0.5).unwrap();

@@ -117,7 +117,7 @@ impl Air {
         let Some(sign) = self.image() else {
             return step_response(&self.space, field, source, age, self.closest);
         };
-        let direct = self.from_offset(&(field - source), age).0;
+        let direct = self.at_offset(&(field - source), age).0;
         if sign == 0.0 {
             return direct;
         }
@@ -126,7 +126,7 @@ impl Air {
             return (1.0 + sign) * direct;
         }
         let mirrored = Vector3::new(source.x, source.y, -source.z);
-        (direct + sign * self.from_offset(&(field - mirrored), age).0).max(0.0)
+        (direct + sign * self.at_offset(&(field - mirrored), age).0).max(0.0)
     }
 
     /// Concentration and its gradient with respect to the source position.
@@ -144,12 +144,12 @@ impl Air {
         let Some(sign) = self.image() else {
             return self.numeric_gradient(field, source, age);
         };
-        let (value, slope) = self.from_offset(&(field - source), age);
+        let (value, slope) = self.at_offset(&(field - source), age);
         let mirrored = Vector3::new(source.x, source.y, -source.z);
         let (image, image_slope) = if sign == 0.0 {
             (0.0, Vector3::zeros())
         } else {
-            self.from_offset(&(field - mirrored), age)
+            self.at_offset(&(field - mirrored), age)
         };
         // The offset falls as the source moves; that of the image rises with its height.
         let image_gradient = Vector3::new(-image_slope.x, -image_slope.y, image_slope.z);
@@ -188,7 +188,7 @@ impl Air {
     ///
     /// `c = e^{v.d/2k} [e^{-rV/2k} erfc(zm) + e^{rV/2k} erfc(zp)] / (8 pi k r)`, `zm, zp = (r -+ V t) / sqrt(4 k t)`. Both terms
     /// hold the factor `g = exp(-|d - v t|^2 / 4 k t)`, which leaves `erfcx` of the arguments: nothing overflows.
-    fn from_offset(&self, offset: &Vector3<f64>, age: f64) -> (f64, Vector3<f64>) {
+    fn at_offset(&self, offset: &Vector3<f64>, age: f64) -> (f64, Vector3<f64>) {
         let k = self.diffusivity;
         let true_distance = offset.norm();
         let r = true_distance.max(self.closest);

@@ -126,7 +126,7 @@ mod tests {
             let s: f64 = 4.0 * k * t;
             let h: f64 = a / k;
             let total: f64 = z + z0;
-            let literal = ((-(z - z0) * (z - z0) / s as f64).exp() + (-total * total / s).exp()) / (PI * s).sqrt()
+            let literal = ((-(z - z0) * (z - z0) / s).exp() + (-total * total / s).exp()) / (PI * s).sqrt()
                 - h * (h * total + h * h * k * t).exp() * libm::erfc(total / s.sqrt() + h * (k * t).sqrt());
             assert!((green(z, z0, t, k, a, 0.0) / literal - 1.0).abs() < 1e-12);
         }

@@ -260,8 +260,8 @@ fn gradients_are_differences() {
 #[test]
 fn released_mass_is_in_the_half_space() {
     let air = Air::new(40.0, Vector3::zeros(), Ground::Impermeable).unwrap();
-    let age = 30.0;
-    let reach = 14.0 * (2.0 * 40.0 * age as f64).sqrt();
+    let age: f64 = 30.0;
+    let reach = 14.0 * (2.0 * 40.0 * age).sqrt();
     let total = Rule::gauss_legendre(20).composite(0.0, reach, 100, |r| {
         TAU * r * r * air.concentration(&Vector3::new(r, 0.0, 0.0), &Vector3::zeros(), age)
     });

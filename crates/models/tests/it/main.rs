@@ -1,5 +1,12 @@
 //! Tests of the models against independent references.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a panic is how a test fails"
+)]
+
 mod diffusion_fixtures;
 mod diffusion_laws;
 mod finite_volume;

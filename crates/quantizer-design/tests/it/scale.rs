@@ -148,7 +148,7 @@ fn alternating_steps_and_programmes_know_no_unit() {
 #[test]
 fn detection_knows_no_unit() {
     let scene =
-        |s: f64| Scene::new(Prior::binary(2.0 * s, 0.4).unwrap(), Noise::independent(&vec![s; 3]).unwrap()).unwrap();
+        |s: f64| Scene::new(Prior::binary(2.0 * s, 0.4).unwrap(), Noise::independent(&[s; 3]).unwrap()).unwrap();
     let about = |s: f64| Quantizer::new([0.2, 1.0, 1.8].map(|b| s * b).to_vec()).unwrap();
     for criterion in [MI, Criterion::BayesError] {
         law(criterion, 1e-6, |s| {
