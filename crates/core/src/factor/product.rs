@@ -20,6 +20,9 @@ pub struct Repeated {
     count: usize,
 }
 
+/// Measurements swept at once.
+const BLOCK: usize = 128;
+
 impl Repeated {
     /// `factor` to the power `count`.
     ///
@@ -46,12 +49,23 @@ impl Factor<1> for Repeated {
         self.count as f64 * self.factor.log_likelihood(m)
     }
 
+    fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        let mut logs = [0.0; BLOCK];
+        for (means, log_weights) in means[0].chunks(BLOCK).zip(log_weights.chunks_mut(BLOCK)) {
+            let logs = &mut logs[..means.len()];
+            logs.fill(0.0);
+            self.factor.add_log_likelihoods(&[means], logs);
+            for (log_weight, log) in log_weights.iter_mut().zip(&*logs) {
+                *log_weight += self.count as f64 * log;
+            }
+        }
+    }
+
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         if self.count == 1 {
             return self.factor.tilted(prior);
         }
-        let log_likelihood = |m: f64| self.log_likelihood(&[m].into());
-        tilted_by_quadrature(prior, self.factor.features(), log_likelihood)
+        tilted_by_quadrature(prior, self.factor.features(), |m, logs| self.add_log_likelihoods(&[m], logs))
     }
 }
 
@@ -111,7 +125,7 @@ impl Factor<1> for Product {
         match self.factors.as_slice() {
             [] => Tilted::unchanged(prior, 0.0),
             [factor] => factor.tilted(prior),
-            _ => tilted_by_quadrature(prior, self.features(), |m| self.log_likelihood(&[m].into())),
+            _ => tilted_by_quadrature(prior, self.features(), |m, logs| self.add_log_likelihoods(&[m], logs)),
         }
     }
 }
