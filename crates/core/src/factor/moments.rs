@@ -3,6 +3,7 @@
 use super::Tilted;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
+use fewbits_numerics::kernels;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use fewbits_numerics::quadrature::gauss_legendre;
 
@@ -59,6 +60,9 @@ pub fn tilted_by_quadrature(
         log_likelihoods,
         evaluations: 0,
     };
+    if let Some(tilted) = posterior.by_trapezoid(&features) {
+        return Ok(tilted);
+    }
     let places = candidates(&features);
     let mut values = vec![0.0; places.len()];
     posterior.logs(&places, &mut values);
@@ -146,6 +150,51 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
             }
             self.evaluations += at.len();
         }
+    }
+
+    /// The moments by the trapezoid rule, where features near the prior and no finer than it allow that: for entire functions
+    /// under a Gaussian it converges as `exp(-c/h^2)`, so that the rule of half the nodes, which comes for free, bounds the
+    /// error by its fourth power.
+    fn by_trapezoid(&mut self, features: &[(f64, f64)]) -> Option<Tilted<1>> {
+        const REACH: f64 = 9.0;
+        const MOST_NODES: usize = 121;
+        let finest = features.iter().map(|f| f.1).fold(1.0, f64::min);
+        if features.iter().any(|(at, _)| at.abs() > 6.0) || finest < 0.3 {
+            return None;
+        }
+        let half = (REACH / (0.5 * finest)).ceil() as usize;
+        let count = (2 * half + 1).min(MOST_NODES);
+        let step = REACH / half as f64;
+        let (mut nodes, mut logs, mut weights) = ([0.0; MOST_NODES], [0.0; MOST_NODES], [0.0; MOST_NODES]);
+        let (nodes, logs, weights) = (&mut nodes[..count], &mut logs[..count], &mut weights[..count]);
+        for (i, t) in nodes.iter_mut().enumerate() {
+            *t = step * (i as f64 - half as f64);
+        }
+        self.logs(nodes, logs);
+        let peak = kernels::largest(logs);
+        if !peak.is_finite() || logs[0].max(logs[count - 1]) > peak - 34.0 {
+            return None;
+        }
+        kernels::exp_minus(logs, peak, weights);
+        let (mut all, mut even) = ([0.0; 3], [0.0; 3]);
+        for (i, (t, p)) in nodes.iter().zip(&*weights).enumerate() {
+            for (k, term) in [*p, p * t, p * t * t].into_iter().enumerate() {
+                all[k] += term;
+                if i % 2 == 0 {
+                    even[k] += 2.0 * term;
+                }
+            }
+        }
+        let scales = [all[0], (all[0] * all[2]).sqrt(), all[2]];
+        if (0..3).any(|k| (all[k] - even[k]).abs() > 1e-4 * scales[k]) {
+            return None;
+        }
+        let shift = all[1] / all[0];
+        let spread = |(t, p): (&f64, &f64)| p * (t - shift) * (t - shift);
+        let second = nodes.iter().zip(&*weights).map(spread).sum::<f64>() / all[0];
+        let log_evidence = peak + (all[0] * step).ln() - LN_SQRT_2PI;
+        let mean = self.centre + self.deviation * shift;
+        Tilted::scalar(log_evidence, mean, self.deviation * self.deviation * second).ok()
     }
 
     fn log(&mut self, t: f64) -> f64 {
