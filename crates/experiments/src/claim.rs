@@ -84,6 +84,16 @@ impl Claim {
     }
 }
 
+/// Claims that were made together.
+pub struct Group<'a>(&'a mut [Claim]);
+
+impl Group<'_> {
+    /// They are undecided with fewer trials than the paper's: what they compare is no plain average of trials.
+    pub fn at_full_trials(self) {
+        self.0.iter_mut().for_each(|claim| claim.full_effort = true);
+    }
+}
+
 /// The claims of one figure as they are made. Every method adds one claim (or one for each reference) and returns it, so that
 /// it can be limited: `claims.near(...).at_defaults()`.
 #[derive(Debug, Clone)]
@@ -293,18 +303,19 @@ impl Claims {
         statement: &str,
         rows: impl IntoIterator<Item = R>,
         key_and_value: impl Fn(R) -> (String, V),
-    ) {
+    ) -> Group<'_> {
+        let first = self.made.len();
         let rows: Vec<_> = rows.into_iter().map(key_and_value).collect();
         let known = match reference::group(self.figure, quantity) {
             Ok(known) if !known.is_empty() => known,
             Ok(_) => {
                 let empty = "there are references of that name";
                 self.at_least(format!("{quantity}-references"), empty, 0.0, 1.0);
-                return;
+                return Group(&mut self.made[first..]);
             }
             Err(error) => {
                 self.condition(format!("{quantity}-references"), error, None, "to be read".to_owned(), |_| false);
-                return;
+                return Group(&mut self.made[first..]);
             }
         };
         for (key, known) in known {
@@ -316,6 +327,7 @@ impl Claims {
             self.near(id, statement, found.and_then(Cell::number), known.value, tolerance)
                 .at_defaults();
         }
+        Group(&mut self.made[first..])
     }
 
     /// The claims with the verdicts of a run: undecided ones are skipped.
@@ -540,6 +552,11 @@ mod tests {
         assert_eq!(judge(vec![("lloyd-x", 0.130_487)]), Verdict::Fail);
         assert_eq!(judge(vec![("other", 0.130_486_15)]), Verdict::Fail);
         // A group without references is a mistake, not a success.
-        assert_eq!(verdict(|c| c.references("nothing", "", [1.0], |v| (String::new(), v))), Verdict::Fail);
+        assert_eq!(
+            verdict(|c| c
+                .references("nothing", "", [1.0], |v| (String::new(), v))
+                .at_full_trials()),
+            Verdict::Fail
+        );
     }
 }

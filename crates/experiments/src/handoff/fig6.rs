@@ -251,19 +251,37 @@ impl Figure for Fig6 {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let key = |s: &Step| format!("{}-{}", s.smoothing, s.method);
-        claims.references("ml", "mean ML of a hand-over", &rows.steps, |s| (key(s), s.ml));
-        claims.references("kl", "mean KL of a hand-over", &rows.steps, |s| (key(s), s.kl));
-        claims.references("l1", "mean L1 of a hand-over", &rows.steps, |s| (key(s), s.l1));
-        claims.references("dr", "mean DR of a hand-over", &rows.steps, |s| (key(s), s.dr));
-        claims.references("size", "components sent", &rows.steps, |s| (key(s), s.size));
+        claims
+            .references("ml", "mean ML of a hand-over", &rows.steps, |s| (key(s), s.ml))
+            .at_full_trials();
+        claims
+            .references("kl", "mean KL of a hand-over", &rows.steps, |s| (key(s), s.kl))
+            .at_full_trials();
+        claims
+            .references("l1", "mean L1 of a hand-over", &rows.steps, |s| (key(s), s.l1))
+            .at_full_trials();
+        claims
+            .references("dr", "mean DR of a hand-over", &rows.steps, |s| (key(s), s.dr))
+            .at_full_trials();
+        claims
+            .references("size", "components sent", &rows.steps, |s| (key(s), s.size))
+            .at_full_trials();
         let at = |b: &Bound| format!("{}-t{}", b.smoothing, b.t);
-        claims.references("ml-bound", "printed ML bound", &rows.bounds, |b| (at(b), b.ml_printed));
         claims
-            .references("log10-kl", "logarithm of the printed KL bound", &rows.bounds, |b| (at(b), b.log10_kl_printed));
+            .references("ml-bound", "printed ML bound", &rows.bounds, |b| (at(b), b.ml_printed))
+            .at_full_trials();
         claims
-            .references("log10-l1", "logarithm of the printed L1 bound", &rows.bounds, |b| (at(b), b.log10_l1_printed));
-        claims.references("l1-from-dr", "L1 bound from DR", &rows.bounds, |b| (at(b), b.l1_from_dr));
-        claims.references("kl-from-dr", "KL bound from DR", &rows.bounds, |b| (at(b), b.kl_from_dr));
+            .references("log10-kl", "logarithm of the printed KL bound", &rows.bounds, |b| (at(b), b.log10_kl_printed))
+            .at_full_trials();
+        claims
+            .references("log10-l1", "logarithm of the printed L1 bound", &rows.bounds, |b| (at(b), b.log10_l1_printed))
+            .at_full_trials();
+        claims
+            .references("l1-from-dr", "L1 bound from DR", &rows.bounds, |b| (at(b), b.l1_from_dr))
+            .at_full_trials();
+        claims
+            .references("kl-from-dr", "KL bound from DR", &rows.bounds, |b| (at(b), b.kl_from_dr))
+            .at_full_trials();
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
             let under = rows.under(smoothing);
             let name = smoothing.name();

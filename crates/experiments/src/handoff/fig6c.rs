@@ -253,13 +253,16 @@ impl Figure for Fig6c {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims.references("kl", "actual error", &rows.error, |r| (format!("{}-t{}", r.method, r.t), r.kl_increase));
+        claims
+            .references("kl", "actual error", &rows.error, |r| (format!("{}-t{}", r.method, r.t), r.kl_increase))
+            .at_full_trials();
         let before = rows.error.iter().filter_map(|r| Some((r, r.before_reduction?)));
         claims
-            .references("before", "error before the reduction", before, |(r, m)| (format!("{}-t{}", r.method, r.t), m));
-        claims.references("difference", "paired difference", &rows.difference, |d| {
-            (format!("{}-t{}", d.pair, d.t), d.kl)
-        });
+            .references("before", "error before the reduction", before, |(r, m)| (format!("{}-t{}", r.method, r.t), m))
+            .at_full_trials();
+        claims
+            .references("difference", "paired difference", &rows.difference, |d| (format!("{}-t{}", d.pair, d.t), d.kl))
+            .at_full_trials();
         let pair = |pair: &'static str| rows.difference.iter().filter(move |d| d.pair == pair);
         let what = "ML is behind KL at every time";
         claims

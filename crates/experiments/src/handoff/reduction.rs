@@ -217,7 +217,9 @@ impl Figure for Reductions {
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims.references("kl", "KL", &rows.errors, |r| (format!("{}-m{}", r.method, r.components), r.kl));
+        claims
+            .references("kl", "KL", &rows.errors, |r| (format!("{}-m{}", r.method, r.components), r.kl))
+            .at_full_trials();
         for m in p.components.iter().filter(|m| **m >= 3) {
             let ratio = rows.kl("pipeline 15", *m).zip(rows.kl("kd kl", *m)).map(|(a, b)| a / b);
             let what = "the recommended pipeline loses at most 0.65 of what the paper's cut does";

@@ -295,7 +295,9 @@ impl<S: Setting> Figure for Iterations<S> {
                 claims.references("mi_x_z1_nats", "information of sensor 1", clean(), |r| (key(r), r.mi_x_z1_nats));
                 claims.references("mi_x_z1z2_nats", "information of both", clean(), |r| (key(r), r.mi_x_z1z2_nats));
             }
-            "mi-fig4-3" => claims.references("mse", "squared error", clean(), |r| (key(r), r.mse)),
+            "mi-fig4-3" => {
+                claims.references("mse", "squared error", clean(), |r| (key(r), r.mse));
+            }
             "mi-fig4-4" => {
                 let what = "the smaller the crossover, the higher the information, at every step";
                 claims
