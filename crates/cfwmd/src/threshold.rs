@@ -69,7 +69,7 @@ impl Budget {
 
 /// The `eta` that a chi-square variable of `dimension` degrees of freedom reaches with probability `rate`.
 ///
-/// One degree: `(Phi^-1(rate/2))^2`. Two: `-2 ln rate`. More: Newton steps on [`chi_square_upper_tail`].
+/// One degree: `(Phi^-1(rate/2))^2`. Two: `-2 ln rate`. More: Newton steps on the upper tail of the chi-square law.
 ///
 /// # Errors
 /// If `rate` is outside `(0, 1]` or `dimension` is zero.

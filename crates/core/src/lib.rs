@@ -8,15 +8,15 @@
 //! |---|---|
 //! | how the world moves | [`Dynamics`], [`GaussianDynamics`], [`LinearDynamics`] |
 //! | how it is sensed | [`Sensing`], [`LinearSensing`] |
-//! | what travels, as real bits | [`Message`], [`bits`], [`NumberFormat`](number::NumberFormat) |
+//! | what travels, as real bits | [`Message`], [`bits`], [`NumberFormat`] |
 //! | the sensor's half, and what its reports mean | [`Scheme`] |
 //! | what is observed, and through what | [`Observation`], [`Link`] |
-//! | `p(observation | noise-free measurement)` | [`Factor`](factor::Factor) and its kinds |
+//! | `p(observation | noise-free measurement)` | [`Factor`] and its kinds |
 //! | `p(observed | state)` | [`Likelihood`], [`Observed`] |
 //! | what is known | [`Belief`], [`Density`], [`Gaussian`] |
 //! | what implementations must obey | [`laws`] |
 //!
-//! The central choice is the [`Factor`](factor::Factor): one small type for each kind of observation, with its logarithm for
+//! The central choice is the [`Factor`]: one small type for each kind of observation, with its logarithm for
 //! particle and grid filters and its posterior moments for Gaussian ones. A new scheme writes its factor once and has every
 //! filter. The price is that a factor knows the noise-free measurement only; what depends on more of the state (a nuisance that
 //! must be integrated out) implements [`Likelihood`] itself.

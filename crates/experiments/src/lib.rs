@@ -7,7 +7,7 @@
 //!
 //! The central choice is that a figure is judged by its claims and not by its looks: each statement of the paper about it,
 //! corrected where the paper errs, is code. The cost is that every figure needs an expected value from elsewhere; these stand in
-//! `references/<system>.csv` and are found by key ([`reference`]). `docs/architecture.md`, "How to add a figure", shows one whole.
+//! `references/<system>.csv` and are found by key ([`mod@reference`]). `docs/architecture.md`, "How to add a figure", shows one whole.
 //!
 //! Not here: printing, files, the command line, drawing.
 

@@ -78,7 +78,7 @@ impl<R> HandoffFilter<R> {
     /// The weighted particles after receiving, predicting and updating, and the log-likelihood increment.
     ///
     /// # Errors
-    /// If there is no particle, or none has any likelihood ([`fewbits_densities::Error::Degenerate`]).
+    /// If there is no particle, or none has any likelihood ([`fewbits_core::Error::Impossible`]).
     pub fn posterior<const D: usize, G: Rng + ?Sized>(
         &self,
         rng: &mut G,

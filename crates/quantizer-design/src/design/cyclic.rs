@@ -14,7 +14,7 @@ use crate::system::System;
 /// ([`best_contiguous`]) where that is better than what it has.
 ///
 /// # Errors
-/// As [`joint`]; [`Error::NotConverged`] after 500 sweeps.
+/// As [`joint`](super::joint); [`Error::NotConverged`] after 500 sweeps.
 pub fn cyclic(
     system: &System,
     criterion: Criterion,
