@@ -109,11 +109,14 @@ fn try_crate(package: &Package, root: &Path, target: &Path) -> Result<bool, Erro
     Ok(good)
 }
 
-/// First segments of the paths that a program imports.
+/// Names that stand before a `::` in a program: crates among them.
 fn used(program: &str) -> BTreeSet<String> {
-    let imports = program.lines().filter_map(|line| line.trim().strip_prefix("use "));
-    let first = |path: &str| path.split([':', ';', ' ', '{']).next().map(str::to_owned);
-    imports.filter_map(first).collect()
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let before = |end: usize| program[..end].rsplit(|c| !is_name(c)).next().unwrap_or_default();
+    program
+        .match_indices("::")
+        .map(|(end, _)| before(end).to_owned())
+        .collect()
 }
 
 /// A package that depends on one crate and on what its program imports besides.
