@@ -157,7 +157,7 @@ impl Figure for Fig5 {
         let distance = rows.gaussian.first().map(|d| d.kl.value);
         let what = "the beliefs are far from Gaussian: KL 0.12 nat to the Gaussian of their moments";
         claims
-            .near("gaussian", what, distance, 0.12, 0.04)
+            .near("gaussian", what, distance, 0.12, 0.03)
             .at_defaults()
             .at_full_trials();
     }
