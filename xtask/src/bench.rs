@@ -28,6 +28,14 @@ pub enum Error {
         /// Crates with benchmarks.
         valid: String,
     },
+    /// Benchmarks ran and their table was not understood: divan prints no other format.
+    #[error("the benchmarks of crate `{name}` ran, but their table was not understood: {line}")]
+    Unread {
+        /// The crate.
+        name: String,
+        /// What was met.
+        line: String,
+    },
     /// cargo could not be run, or the output not read.
     #[error("cannot run cargo bench: {0}")]
     Cargo(#[from] std::io::Error),
@@ -68,7 +76,11 @@ pub fn run(options: &Options) -> Result<bool, Error> {
             eprintln!("{}", String::from_utf8_lossy(&output.stderr));
             fine = false;
         }
-        for group in parse(&String::from_utf8_lossy(&output.stdout)) {
+        let groups = parse(&String::from_utf8_lossy(&output.stdout)).map_err(|line| Error::Unread {
+            name: name.clone(),
+            line,
+        })?;
+        for group in groups {
             print(name, &group);
         }
     }
@@ -88,8 +100,9 @@ fn crates_with_benches() -> Result<Vec<String>, Error> {
     Ok(names)
 }
 
-/// Splits the output of divan into bench binaries and reads name and median of each line.
-fn parse(output: &str) -> Vec<Vec<Measured>> {
+/// Splits the output of divan into bench binaries and reads name and median of each line; else the line that has none, or that
+/// there is no table.
+fn parse(output: &str) -> Result<Vec<Vec<Measured>>, String> {
     let mut groups: Vec<Vec<Measured>> = Vec::new();
     let mut path: Vec<String> = Vec::new();
     for line in output.lines() {
@@ -116,14 +129,19 @@ fn parse(output: &str) -> Vec<Vec<Measured>> {
         path.push(name);
         // Columns: name and fastest, slowest, median, mean, samples, iterations.
         let median = cells.get(2).and_then(|cell| nanoseconds(cell));
-        if let (Some(median_ns), Some(group)) = (median, groups.last_mut()) {
-            group.push(Measured {
+        match (median, groups.last_mut()) {
+            (Some(median_ns), Some(group)) => group.push(Measured {
                 name: path.join("/"),
                 median_ns,
-            });
+            }),
+            (None, _) if !timed => {}
+            _ => return Err(format!("no median under its heading in `{line}`")),
         }
     }
-    groups
+    match groups.iter().any(Vec::is_empty) || groups.is_empty() {
+        true => Err("no rows of times".to_owned()),
+        false => Ok(groups),
+    }
 }
 
 fn nanoseconds(cell: &str) -> Option<f64> {
@@ -171,7 +189,7 @@ filter             fastest       │ slowest       │ median        │ mean   
    ├─ (1.0, 2.5)    1 µs          │ 2 µs          │ 1.5 µs        │ 1.6 µs        │ 100     │ 100
    ╰─ 1000          1 ms          │ 2 ms          │ 1.25 ms       │ 1.6 ms        │ 100     │ 100
 ";
-        let groups = parse(output);
+        let groups = parse(output).unwrap();
         let names: Vec<_> = groups[0].iter().map(|m| (m.name.as_str(), m.median_ns)).collect();
         assert_eq!(
             names,
@@ -181,5 +199,17 @@ filter             fastest       │ slowest       │ median        │ mean   
                 ("step/1000", 1.25e6)
             ]
         );
+    }
+
+    #[test]
+    fn another_table_is_refused() {
+        for output in [
+            "",
+            "filter fastest │ median\n",
+            "step 5 ns\n",
+            "filter fastest │ slowest │ median\n├─ step 1 ns │ 2 ns │ 3 fortnights │ 4 ns │ 1 │ 1\n",
+        ] {
+            assert!(parse(output).is_err(), "{output}");
+        }
     }
 }

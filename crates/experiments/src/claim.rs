@@ -89,8 +89,15 @@ pub struct Group<'a>(&'a mut [Claim]);
 
 impl Group<'_> {
     /// They are undecided with fewer trials than the paper's: what they compare is no plain average of trials.
-    pub fn at_full_trials(self) {
+    pub fn at_full_trials(self) -> Self {
         self.0.iter_mut().for_each(|claim| claim.full_effort = true);
+        self
+    }
+
+    /// They speak of the figure's own parameters only.
+    pub fn at_defaults(self) -> Self {
+        self.0.iter_mut().for_each(|claim| claim.at_defaults = true);
+        self
     }
 }
 
@@ -109,6 +116,11 @@ impl Claims {
             figure,
             made: Vec::new(),
         }
+    }
+
+    /// All claims made so far.
+    pub fn so_far(&mut self) -> Group<'_> {
+        Group(&mut self.made)
     }
 
     fn decide(

@@ -17,18 +17,6 @@ pub enum Error {
         valid: String,
     },
     /// A parameter of the wrong type or out of range.
-    #[error("parameter `{name}` of figure `{figure}` is `{value}`: expected {expected}")]
-    BadParameter {
-        /// Id of the figure.
-        figure: &'static str,
-        /// Name of the parameter.
-        name: String,
-        /// The refused value.
-        value: String,
-        /// What would have been accepted.
-        expected: String,
-    },
-    /// A parameter of the wrong type or out of range.
     #[error("parameter `{name}` of figure `{figure}` is `{value}`: {reason}")]
     Refused {
         /// Id of the figure.

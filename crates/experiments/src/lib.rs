@@ -20,7 +20,6 @@ pub mod dymbo;
 mod error;
 mod figure;
 pub mod handoff;
-pub mod legacy;
 mod measured;
 pub mod mi;
 mod parameters;

@@ -295,6 +295,17 @@ impl Layer {
         Self::new("", Shape::Texts { texts })
     }
 
+    /// Whether it has no points.
+    pub fn is_empty(&self) -> bool {
+        match &self.shape {
+            Shape::Line { points, .. } | Shape::Points { points, .. } | Shape::Bars { points, .. } => points.is_empty(),
+            Shape::Heat { values, .. } => values.is_empty(),
+            Shape::Boxes { boxes } => boxes.is_empty(),
+            Shape::Band { limits } => limits.is_empty(),
+            Shape::Texts { texts } => texts.is_empty(),
+        }
+    }
+
     /// Fixes the colour.
     #[must_use]
     pub fn coloured(self, colour: usize) -> Self {
@@ -329,23 +340,6 @@ impl Layer {
     }
 }
 
-/// Whether there is a legend. It stands below its panel, where it hides no data; the names of other places are kept for old callers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Legend {
-    /// Top right.
-    TopRight,
-    /// Top left.
-    TopLeft,
-    /// Bottom right.
-    BottomRight,
-    /// Bottom left.
-    BottomLeft,
-    /// In a column of its own, right of the panel: for many layers.
-    Outside,
-    /// None.
-    Hidden,
-}
-
 /// A pair of axes with layers on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
@@ -357,8 +351,8 @@ pub struct Panel {
     pub y: Axis,
     /// Layers, drawn in order.
     pub layers: Vec<Layer>,
-    /// Place of the legend.
-    pub legend: Legend,
+    /// Whether there is a legend. It stands below the panel, where it hides no data.
+    pub legend: bool,
 }
 
 impl Panel {
@@ -369,7 +363,7 @@ impl Panel {
             x,
             y,
             layers: Vec::new(),
-            legend: Legend::TopRight,
+            legend: true,
         }
     }
 
@@ -387,9 +381,9 @@ impl Panel {
         self
     }
 
-    /// Places the legend.
+    /// Leaves the legend out.
     #[must_use]
-    pub fn legend(self, legend: Legend) -> Self {
-        Self { legend, ..self }
+    pub fn without_legend(self) -> Self {
+        Self { legend: false, ..self }
     }
 }

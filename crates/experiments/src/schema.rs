@@ -109,10 +109,11 @@ fn fields(key: &str, name: String, list: &Json) -> Fields {
     }
 }
 
-/// The parameters that `P` describes, with the given defaults.
+/// The parameters that `P` describes, with the given defaults; those without one are not the figure's.
 pub(crate) fn parameters<P: JsonSchema>(defaults: &Map<String, Json>) -> Vec<Parameter> {
     let schema = root::<P>();
     properties(&schema)
+        .filter(|(name, _)| defaults.contains_key(name.as_str()))
         .map(|(name, schema)| {
             let entry = schema.get("items").unwrap_or(schema);
             let entries: Vec<String> = properties(entry).map(|(name, _)| name.clone()).collect();

@@ -1,6 +1,6 @@
 //! `assign-fig6-1` and `assign-figC-1`: where a wrong bit lands, and how likely it is.
 
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_sensor_assignment::{CodedSensors, bit_error, flipped_estimate};
 use garde::Validate;
@@ -125,7 +125,7 @@ impl Figure for Landings {
             Panel::new(format!("Bit {} wrong", bit + 1), x, y)
                 .with(Layer::line("", points(&tables.curve, |l| (l.x, l.estimates()[bit]))).coloured(0))
                 .with(Layer::dashed("", vec![(-1.0, -1.0), (1.0, 1.0)]).coloured(7))
-                .legend(Legend::Hidden)
+                .without_legend()
         };
         Plot::grid(2, (0..BITS).map(panel).collect())
     }

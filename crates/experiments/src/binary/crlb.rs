@@ -1,6 +1,6 @@
 //! `binary-fig5-6`: equation 5.13 for three sets of patterns, and why it misleads.
 
-use super::{Ratios, Scene, crossing, each, not_below};
+use super::{Scene, crossing, each, not_below, sweep};
 use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, reference};
 use fewbits_binary_patterns::bounds::printed_crlb;
@@ -144,12 +144,8 @@ impl Figure for PrintedBounds {
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let (mut sets, mut crossings) = (Vec::new(), Vec::new());
         for &bits in &p.bits {
-            let ratios = Ratios {
-                from_db: p.from_db,
-                to_db: p.to_db,
-                step_db: p.step_db,
-            };
-            sets.extend(each(&ratios.points(), |snr_db| {
+            let ratios = sweep(p.from_db, p.to_db, p.step_db);
+            sets.extend(each(&ratios, |snr_db| {
                 Ok(Row {
                     bits,
                     snr_db,

@@ -1,283 +1,237 @@
 //! `binary-fig5-8`: decoders and bounds for three Gray bits.
 
-use super::{Scene, check_sweep, each, sweep};
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use super::{Ratios, Scene, each, sweep};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
 use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
 };
 use fewbits_binary_patterns::{Decoder, gray_basis};
-use serde::{Deserialize, Serialize};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// `binary-fig5-8`.
 pub struct Decoders;
 
-/// Parameters of `binary-fig5-8`.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// First signal-to-noise ratio, dB.
-    from_db: f64,
-    /// Last signal-to-noise ratio, dB.
-    to_db: f64,
-    /// Step, dB.
-    step_db: f64,
+type Parameters = Ratios<-10, 40>;
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Errors and bounds.
+    curves: Vec<Row>,
+    /// How close the van Trees bound is, uniform source.
+    tightness: Vec<Tightness>,
 }
 
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            from_db: -10.0,
-            to_db: 40.0,
-            step_db: 1.0,
-        }
-    }
+#[derive(Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    /// Uniform on [-1, 1].
+    Uniform,
+    /// Gaussian of variance 0.1.
+    Gaussian,
 }
 
-const CURVES: [(&str, &str); 10] = [
-    ("mmse", "posterior mean"),
-    ("cmap", "continuous MAP"),
-    ("dmap", "discrete MAP"),
-    ("dmap_print", "discrete MAP as printed"),
-    ("dmap_exact", "discrete MAP, exact cells"),
-    ("crlb", "equation 5.13"),
-    ("vt", "van Trees"),
-    ("rd_print", "rate-distortion, printed"),
-    ("rd_per_n", "rate-distortion, N bits"),
-    ("central", "centralised"),
-];
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    /// Uniform on [-1, 1], or Gaussian of variance 0.1.
+    source: Kind,
+    /// Signal-to-noise ratio.
+    #[schemars(extend("unit" = "dB"))]
+    snr_db: f64,
+    /// Posterior mean.
+    #[schemars(extend("unit" = "V^2"))]
+    mmse: f64,
+    /// Continuous maximum a posteriori.
+    #[schemars(extend("unit" = "V^2"))]
+    cmap: f64,
+    /// Discrete maximum a posteriori.
+    #[schemars(extend("unit" = "V^2"))]
+    dmap: f64,
+    /// Discrete maximum a posteriori as printed.
+    #[schemars(extend("unit" = "V^2"))]
+    dmap_print: f64,
+    /// Discrete maximum a posteriori, exact cells.
+    #[schemars(extend("unit" = "V^2"))]
+    dmap_exact: f64,
+    /// Equation 5.13.
+    #[schemars(extend("unit" = "V^2"))]
+    crlb: f64,
+    /// Van Trees bound with optimal weight.
+    #[schemars(extend("unit" = "V^2"))]
+    vt: f64,
+    /// Rate-distortion bound as printed.
+    #[schemars(extend("unit" = "V^2"))]
+    rd_print: f64,
+    /// Rate-distortion bound of N bits.
+    #[schemars(extend("unit" = "V^2"))]
+    rd_per_n: f64,
+    /// Exact centralised bound.
+    #[schemars(extend("unit" = "V^2"))]
+    central: f64,
+}
 
-fn values(source: &str, snr: f64) -> Result<[f64; 10], Error> {
-    let scene = if source == "uniform" {
-        Scene::uniform(3, snr)?
-    } else {
-        Scene::gaussian(snr)?
+#[derive(Serialize, JsonSchema)]
+struct Tightness {
+    /// Signal-to-noise ratio.
+    #[schemars(extend("unit" = "dB"))]
+    snr_db: f64,
+    /// Optimal-weight bound, uniform source.
+    #[schemars(extend("unit" = "V^2"))]
+    van_trees: f64,
+    /// Exact error.
+    #[schemars(extend("unit" = "V^2"))]
+    mmse: f64,
+    /// Equation 5.13.
+    #[schemars(extend("unit" = "V^2"))]
+    crlb: f64,
+    /// Bound over error.
+    ratio: f64,
+}
+
+fn row(source: Kind, snr_db: f64) -> Result<Row, Error> {
+    let scene = match source {
+        Kind::Uniform => Scene::uniform(3, snr_db)?,
+        Kind::Gaussian => Scene::gaussian(snr_db)?,
     };
-    let bank = scene.bank(&gray_basis(3).map_err(Error::failed)?)?;
-    let mse = |decoder| bank.mse(decoder).map_err(Error::failed);
-    let printed = remote_distortion(&scene.source, scene.noise)
-        .and_then(|d| d.at(3.0))
-        .map_err(Error::failed)?;
-    Ok([
-        mse(Decoder::Mmse)?,
-        mse(Decoder::ContinuousMap)?,
-        mse(Decoder::DiscreteMap(&scene.grid))?,
-        mse(Decoder::PrintedDiscreteMap(&scene.grid))?,
-        mse(Decoder::ExactDivisionMap(&scene.grid))?,
-        printed_crlb(&bank).map_err(Error::failed)?,
-        optimal_weight_van_trees(&bank).map_err(Error::failed)?,
-        printed,
-        network_rate_distortion(&scene.source, scene.noise, 3).map_err(Error::failed)?,
-        centralised_bound(&scene.source, scene.noise, 3).map_err(Error::failed)?,
-    ])
+    let bank = scene.bank(&gray_basis(3)?)?;
+    Ok(Row {
+        source,
+        snr_db,
+        mmse: bank.mse(Decoder::Mmse)?,
+        cmap: bank.mse(Decoder::ContinuousMap)?,
+        dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
+        dmap_print: bank.mse(Decoder::PrintedDiscreteMap(&scene.grid))?,
+        dmap_exact: bank.mse(Decoder::ExactDivisionMap(&scene.grid))?,
+        crlb: printed_crlb(&bank)?,
+        vt: optimal_weight_van_trees(&bank)?,
+        rd_print: remote_distortion(&scene.source, scene.noise)?.at(3.0)?,
+        rd_per_n: network_rate_distortion(&scene.source, scene.noise, 3)?,
+        central: centralised_bound(&scene.source, scene.noise, 3)?,
+    })
+}
+
+fn tightness(snr_db: f64) -> Result<Tightness, Error> {
+    let bank = Scene::uniform(3, snr_db)?.bank(&[4, 6, 3])?;
+    let (van_trees, mmse) = (optimal_weight_van_trees(&bank)?, bank.mmse()?);
+    Ok(Tightness {
+        snr_db,
+        van_trees,
+        mmse,
+        crlb: printed_crlb(&bank)?,
+        ratio: van_trees / mmse,
+    })
 }
 
 impl Figure for Decoders {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
             id: "binary-fig5-8",
             title: "Decoders and bounds, three Gray bits",
             caption: "The caption of the thesis says Gaussian, the text uniform: both are here. The posterior mean is best everywhere. The \
-                      continuous maximum a posteriori decoder is worse than the discrete one for a uniform source, and better only up to 13 dB for a \
-                      Gaussian one. Equation 5.13 is no bound for a uniform source; the optimal-weight van Trees bound is one, and tight.",
+                      continuous maximum a posteriori (MAP) decoder is worse than the discrete one for a uniform source, and better only \
+                      up to 13 dB for a Gaussian one. Equation 5.13 is no bound for a uniform source; the optimal-weight van Trees \
+                      bound is one, and tight.",
             source: "Movaghati, thesis, figure 5.8",
         }
-    }
-
-    fn check(&self, p: &Parameters) -> Result<(), Error> {
-        check_sweep("binary-fig5-8", p.from_db, p.to_db, p.step_db)
     }
 
     fn quicken(&self, p: &mut Parameters) {
         p.step_db = 5.0;
     }
 
-    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let mut columns = vec![
-            column("source", "", "uniform on [-1, 1], or Gaussian of variance 0.1"),
-            column("snr_db", "dB", "signal-to-noise ratio"),
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
+        let ratios = sweep(p.from_db, p.to_db, p.step_db);
+        let of = |kind| each(&ratios, move |snr| row(kind, snr));
+        Ok(Rows {
+            curves: [of(Kind::Uniform)?, of(Kind::Gaussian)?]
+                .into_iter()
+                .flatten()
+                .collect(),
+            tightness: each(&[-20.0, 0.0, 5.0, 8.0, 10.0, 15.0, 20.0, 25.0, 40.0], tightness)?,
+        })
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let of = |kind: Kind| rows.curves.iter().filter(move |r| r.source == kind);
+        let at_most = 1.0 + 1e-9;
+        let what = "the posterior mean is no worse than any other decoder";
+        claims.all("mmse", what, &rows.curves, |r| {
+            [r.cmap, r.dmap, r.dmap_print, r.dmap_exact]
+                .iter()
+                .all(|other| r.mmse <= other * at_most)
+        });
+        type Bound = (&'static str, &'static str, fn(&Row) -> f64);
+        let bounds: [Bound; 3] = [
+            ("van-trees", "the optimal-weight van Trees value", |r| r.vt),
+            ("rate-distortion", "the rate-distortion value of N bits", |r| r.rd_per_n),
+            ("central", "the centralised value", |r| r.central),
         ];
-        columns.extend(CURVES.iter().map(|(name, label)| column(name, "V^2", label)));
-        let mut table = Table::new(columns);
-        let points = sweep(p.from_db, p.to_db, p.step_db);
-        for source in ["uniform", "gaussian"] {
-            for (snr, v) in points.iter().zip(each(&points, |snr| values(source, snr))?) {
-                let mut row = row![source, *snr];
-                row.extend(v.map(Into::into));
-                table.push(row)?;
-            }
+        for (id, what, bound) in bounds {
+            claims.all(id, format!("{what} is a bound"), &rows.curves, |r| bound(r) <= r.mmse * at_most);
         }
-        let mut ratios = Table::new([
-            column("snr_db", "dB", "signal-to-noise ratio"),
-            column("van_trees", "V^2", "optimal-weight bound, uniform source"),
-            column("mmse", "V^2", "exact error"),
-            column("crlb", "V^2", "equation 5.13"),
-            column("ratio", "", "bound over error"),
-        ]);
-        for (snr, _) in RATIOS {
-            let bank = Scene::uniform(3, snr)?.bank(&[4, 6, 3])?;
-            let (bound, mse) =
-                (optimal_weight_van_trees(&bank).map_err(Error::failed)?, bank.mmse().map_err(Error::failed)?);
-            ratios.push(row![
-                snr,
-                bound,
-                mse,
-                printed_crlb(&bank).map_err(Error::failed)?,
-                bound / mse
-            ])?;
-        }
-        Ok(Tables::from(table).with("tightness", ratios))
+        let what = "the exact centralised bound is above the rate-distortion bound";
+        claims.all("central-tighter", what, &rows.curves, |r| r.rd_per_n <= r.central * at_most);
+        let what = "for a uniform source the continuous MAP decoder is worse than the discrete one throughout (erratum binary-15)";
+        claims.all("uniform-cmap", what, of(Kind::Uniform), |r| r.cmap > r.dmap);
+        let what = "for a Gaussian source continuous MAP beats discrete MAP up to 13 dB and loses from 14 dB on";
+        claims
+            .all("gaussian-cmap", what, of(Kind::Gaussian), |r| match r.snr_db {
+                snr if snr <= 13.0 => r.cmap < r.dmap,
+                snr => snr < 14.0 || r.cmap > r.dmap,
+            })
+            .at_defaults();
+        let what = "for a Gaussian source equation 5.13 is a bound";
+        claims.all("gaussian-crlb", what, of(Kind::Gaussian), |r| r.crlb <= r.mmse * at_most);
+        let key = |r: &Row| format!("{} dB", r.snr_db);
+        let what = "Gaussian source: equation 5.10 as printed (erratum binary-4)";
+        claims.references("as-printed", what, of(Kind::Gaussian), |r| (key(r), r.dmap_print));
+        claims.references("corrected", "the same corrected", of(Kind::Gaussian), |r| (key(r), r.dmap));
+        let key = |r: &Tightness| format!("{} dB", r.snr_db);
+        claims.references("tightness", "van Trees bound over error", &rows.tightness, |r| (key(r), r.ratio));
+        claims.references("crlb", "equation 5.13, uniform source", &rows.tightness, |r| (key(r), r.crlb));
+        let what =
+            "it exceeds the true error at -20, 0, 15 and 20 dB: no bound for a uniform source (erratum binary-7)";
+        let beyond = rows
+            .tightness
+            .iter()
+            .filter(|r| [-20.0, 0.0, 15.0, 20.0].contains(&r.snr_db));
+        claims.all("uniform-crlb", what, beyond, |r| r.crlb > r.mmse);
     }
 
-    fn claims(&self, _: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let mut claims = Vec::new();
-        for source in ["uniform", "gaussian"] {
-            let rows = tables.main.only("source", source)?;
-            let get = |name: &str| rows.numbers(name);
-            let (snr, mmse, cmap, dmap) = (get("snr_db")?, get("mmse")?, get("cmap")?, get("dmap")?);
-            let count = |broken: &dyn Fn(usize) -> bool| (0..snr.len()).filter(|&i| broken(i)).count();
-            let at_most = 1.0 + 1e-9;
-            claims.push(Claim::never(
-                format!("{source}-mmse"),
-                "the posterior mean is no worse than any other decoder",
-                count(&|i| mmse[i] > cmap[i].min(dmap[i]) * at_most),
-            ));
-            for bound in ["vt", "rd_per_n", "central"] {
-                let values = get(bound)?;
-                claims.push(Claim::never(
-                    format!("{source}-{bound}"),
-                    format!("`{bound}` is a bound"),
-                    count(&|i| values[i] > mmse[i] * at_most),
-                ));
-            }
-            let (rd, central) = (get("rd_per_n")?, get("central")?);
-            claims.push(Claim::never(
-                format!("{source}-central-tighter"),
-                "the exact centralised bound is above the rate-distortion bound",
-                count(&|i| rd[i] > central[i] * at_most),
-            ));
-            let (crlb, printed) = (get("crlb")?, get("dmap_print")?);
-            if source == "uniform" {
-                claims.push(Claim::never(
-                    "uniform-cmap",
-                    "for a uniform source the continuous MAP decoder is worse than the discrete one throughout (erratum binary-15)",
-                    count(&|i| cmap[i] <= dmap[i]),
-                ));
-                claims.push(
-                    Claim::at_least(
-                        "uniform-crlb",
-                        "equation 5.13 exceeds the true error somewhere: no bound for a uniform source (erratum binary-7)",
-                        count(&|i| crlb[i] > mmse[i]) as f64,
-                        1.0,
-                    )
-                    .at_defaults(),
-                );
-            } else {
-                claims.push(
-                    Claim::never(
-                        "gaussian-cmap",
-                        "for a Gaussian source continuous MAP beats discrete MAP up to 13 dB and loses from 14 dB on",
-                        count(&|i| {
-                            if snr[i] <= 13.0 {
-                                cmap[i] >= dmap[i]
-                            } else {
-                                snr[i] >= 14.0 && cmap[i] <= dmap[i]
-                            }
-                        }),
-                    )
-                    .at_defaults(),
-                );
-                claims.push(Claim::never(
-                    "gaussian-crlb",
-                    "for a Gaussian source equation 5.13 is a bound",
-                    count(&|i| crlb[i] > mmse[i] * at_most),
-                ));
-                for (at, wrong, right) in [(10.0, 0.03280, 0.01626), (15.0, 0.02181, 0.00668)] {
-                    if let Some(i) = snr.iter().position(|s| (s - at).abs() < 1e-9) {
-                        claims.push(
-                            Claim::near(
-                                format!("gaussian-print-{at}"),
-                                format!("equation 5.10 as printed has error {wrong} at {at} dB (erratum binary-4)"),
-                                printed[i],
-                                wrong,
-                                1e-5,
-                            )
-                            .at_defaults(),
-                        );
-                        claims.push(
-                            Claim::near(
-                                format!("gaussian-dmap-{at}"),
-                                format!("corrected, {right}"),
-                                dmap[i],
-                                right,
-                                1e-5,
-                            )
-                            .at_defaults(),
-                        );
-                    }
-                }
-            }
-        }
-        let tightness = tables.named("tightness")?;
-        for ((snr, expected), ratio) in RATIOS.iter().zip(tightness.numbers("ratio")?) {
-            let statement = format!("van Trees bound over error at {snr} dB");
-            claims.push(Claim::near(format!("tightness-{snr}"), statement, ratio, *expected, 6e-4));
-        }
-        for (snr, crlb) in [(-20.0, 52.4), (0.0, 0.3819), (15.0, 0.01676), (20.0, 0.00913)] {
-            let own = tightness.only("snr_db", snr)?;
-            let (formula, mse) = (own.numbers("crlb")?[0], own.numbers("mmse")?[0]);
-            claims.push(Claim::near_relative(
-                format!("crlb-{snr}"),
-                format!("equation 5.13 at {snr} dB"),
-                formula,
-                crlb,
-                2e-3,
-            ));
-            claims.push(Claim::above(
-                format!("crlb-exceeds-{snr}"),
-                "and it exceeds the true error there",
-                formula,
-                mse,
-            ));
-        }
-        Ok(claims)
-    }
-
-    fn plot(&self, _: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let mut panels = Vec::new();
-        for (source, name) in [("uniform", "uniform"), ("gaussian", "Gaussian")] {
-            let rows = tables.main.only("source", source)?;
-            let axis = || Axis::linear("signal-to-noise ratio / dB");
-            let mut decoders =
-                Panel::new(format!("Decoders, {name} source"), axis(), Axis::log("mean squared error / V^2"));
-            let mut bounds = Panel::new(format!("Bounds, {name} source"), axis(), Axis::log("V^2"));
-            for (at, (curve, label)) in CURVES.iter().enumerate() {
-                let points = rows.points("snr_db", curve)?;
-                if at < 4 {
-                    decoders = decoders.with(Layer::line(*label, points).coloured(at));
-                } else if at > 4 {
-                    bounds = bounds.with(Layer::dashed(*label, points).coloured(at - 4));
-                }
-            }
-            bounds = bounds.with(Layer::line("posterior mean", rows.points("snr_db", "mmse")?).coloured(0));
-            panels.push(decoders.legend(Legend::TopRight));
-            panels.push(bounds.legend(Legend::BottomLeft));
-        }
-        Ok(Plot::grid(2, panels))
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        type Curve = (&'static str, fn(&Row) -> f64);
+        let decoders: [Curve; 4] = [
+            ("posterior mean", |r| r.mmse),
+            ("continuous MAP", |r| r.cmap),
+            ("discrete MAP", |r| r.dmap),
+            ("discrete MAP as printed", |r| r.dmap_print),
+        ];
+        let bounds: [Curve; 6] = [
+            ("posterior mean", |r| r.mmse),
+            ("equation 5.13", |r| r.crlb),
+            ("van Trees", |r| r.vt),
+            ("rate-distortion, printed", |r| r.rd_print),
+            ("rate-distortion, N bits", |r| r.rd_per_n),
+            ("centralised", |r| r.central),
+        ];
+        let panels = [(Kind::Uniform, "uniform"), (Kind::Gaussian, "Gaussian")]
+            .into_iter()
+            .flat_map(|(kind, name)| {
+                let own = || rows.curves.iter().filter(move |r| r.source == kind);
+                let panel = |title: &str, curves: &[Curve]| {
+                    let layers = curves.iter().enumerate();
+                    let layers = layers
+                        .map(|(i, (label, of))| Layer::line(*label, points(own(), |r| (r.snr_db, of(r)))).coloured(i));
+                    let axes = (Axis::linear("signal-to-noise ratio / dB"), Axis::log("mean squared error / V²"));
+                    Panel::new(format!("{title}, {name} source"), axes.0, axes.1).with_all(layers.collect::<Vec<_>>())
+                };
+                [panel("Decoders", &decoders), panel("Bounds", &bounds)]
+            });
+        Plot::grid(2, panels.collect())
     }
 }
-
-/// Bound over error, as found independently.
-const RATIOS: [(f64, f64); 9] = [
-    (-20.0, 0.999),
-    (0.0, 0.859),
-    (5.0, 0.776),
-    (8.0, 0.730),
-    (10.0, 0.737),
-    (15.0, 0.887),
-    (20.0, 0.961),
-    (25.0, 0.928),
-    (40.0, 0.969),
-];

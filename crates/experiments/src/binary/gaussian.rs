@@ -1,41 +1,17 @@
 //! `binary-fig5-9`: a Gaussian source, three sensors of three bits.
 
-use super::{Ratios, Scene, crossing, each, mask_text, not_below};
+use super::{Ratios, Scene, crossing, each, mask_text, sweep};
 use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
-use garde::Validate;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// `binary-fig5-9`.
 pub struct GaussianSource;
 
-/// Parameters of `binary-fig5-9`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// First signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    from_db: f64,
-    /// Last signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-    to_db: f64,
-    /// Step, dB.
-    #[garde(range(min = 0.01, max = 60.0))]
-    step_db: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            from_db: -10.0,
-            to_db: 30.0,
-            step_db: 1.0,
-        }
-    }
-}
+type Parameters = Ratios<-10, 30>;
 
 const SENSORS: usize = 3;
 const GRAY: [Mask; 3] = [3, 4, 6];
@@ -105,12 +81,8 @@ impl Figure for GaussianSource {
     }
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        let ratios = Ratios {
-            from_db: p.from_db,
-            to_db: p.to_db,
-            step_db: p.step_db,
-        };
-        let errors = each(&ratios.points(), |snr_db| {
+        let ratios = sweep(p.from_db, p.to_db, p.step_db);
+        let errors = each(&ratios, |snr_db| {
             let scene = Scene::gaussian(snr_db)?;
             let search = scene.search(SENSORS)?;
             let best = search.best().map_err(Error::failed)?;

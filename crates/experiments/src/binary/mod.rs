@@ -12,12 +12,14 @@ mod patterns;
 mod table5_1;
 mod table5_2;
 
-use crate::legacy::Old;
-use crate::plot::{Axis, Layer, Legend, Panel};
+use crate::plot::{Axis, Layer, Panel};
 use crate::{AnyFigure, Error};
-use fewbits_binary_patterns::search::LinearSearch;
-use fewbits_binary_patterns::{Bank, Grid, Mask, Pattern, Source, linear_pattern};
+use fewbits_binary_patterns::search::{Descent, LinearSearch};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, Grid, Mask, Pattern, Source, linear_pattern, rank};
+use garde::Validate;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
@@ -28,13 +30,13 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &patterns::Extra,
         &patterns::Response,
         &crlb::PrintedBounds,
-        &Old(table5_1::Table),
-        &Old(optimum::Optimum),
-        &Old(decoders::Decoders),
+        &table5_1::Table,
+        &optimum::Optimum,
+        &decoders::Decoders,
         &gaussian::GaussianSource,
-        &Old(table5_2::Table),
-        &Old(feedback::Feedback),
-        &Old(beyond::Beyond),
+        &table5_2::Table,
+        &feedback::Feedback,
+        &beyond::Beyond,
     ]
 }
 
@@ -93,16 +95,28 @@ impl Scene {
     }
 }
 
-/// Signal-to-noise ratios `from, from + step, ..., to`.
-struct Ratios {
+/// Signal-to-noise ratios from `FROM` to `TO` in steps of 1 dB by default.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Ratios<const FROM: i32, const TO: i32> {
+    /// First signal-to-noise ratio, dB.
+    #[garde(range(min = -60.0, max = 60.0))]
     from_db: f64,
+    /// Last signal-to-noise ratio, dB.
+    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
     to_db: f64,
+    /// Step, dB.
+    #[garde(range(min = 0.01, max = 60.0))]
     step_db: f64,
 }
 
-impl Ratios {
-    fn points(&self) -> Vec<f64> {
-        sweep(self.from_db, self.to_db, self.step_db)
+impl<const FROM: i32, const TO: i32> Default for Ratios<FROM, TO> {
+    fn default() -> Self {
+        Self {
+            from_db: f64::from(FROM),
+            to_db: f64::from(TO),
+            step_db: 1.0,
+        }
     }
 }
 
@@ -113,20 +127,6 @@ fn not_below(from: f64, to: f64) -> garde::Result {
     } else {
         Err(garde::Error::new(format!("lower than from_db, {from}")))
     }
-}
-
-/// Checks a sweep: finite limits in order and a positive step of not too many points.
-fn check_sweep(figure: &'static str, from: f64, to: f64, step: f64) -> Result<(), Error> {
-    let fine = from.is_finite() && to.is_finite() && from <= to && step > 0.0 && (to - from) / step < 10_000.0;
-    if fine && from >= -60.0 && to <= 60.0 {
-        return Ok(());
-    }
-    Err(Error::BadParameter {
-        figure,
-        name: "from_db, to_db, step_db".into(),
-        value: format!("{from}, {to}, {step}"),
-        expected: "-60 <= from_db <= to_db <= 60 and a positive step".into(),
-    })
 }
 
 /// `from, from + step, ..., to`.
@@ -156,6 +156,37 @@ fn crossing(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, Error>) 
         }
     }
     Ok(0.5 * (low + high))
+}
+
+/// The quantizers of masks on a scene's grid.
+fn quantizers(
+    scene: &Scene,
+    masks: impl IntoIterator<Item = Mask>,
+    bits: usize,
+) -> Result<Vec<BinaryQuantizer>, Error> {
+    masks
+        .into_iter()
+        .map(|m| Ok(pattern(m, bits)?.on(&scene.grid)?))
+        .collect()
+}
+
+/// The best masks of full rank that a descent from these and `extra` scattered starts finds, and their error.
+fn descent_from(
+    scene: &Scene,
+    bits: usize,
+    sensors: usize,
+    starts: &[Vec<Mask>],
+    extra: usize,
+) -> Result<(Vec<Mask>, f64), Error> {
+    let candidates = quantizers(scene, 1..1 << bits, bits)?;
+    let descent = Descent::new(scene.source, vec![scene.noise; sensors], candidates)?;
+    let places = |masks: &Vec<Mask>| masks.iter().map(|&m| m as usize - 1).collect::<Vec<_>>();
+    let masks = |choice: &[usize]| choice.iter().map(|&c| c as Mask + 1).collect::<Vec<_>>();
+    let starts: Vec<_> = starts.iter().map(places).collect();
+    let found = descent.run(&starts, extra, |choice| rank(&masks(choice)) == bits)?;
+    let mut best = masks(&found.choice);
+    best.sort_unstable();
+    Ok((best, found.mse))
 }
 
 /// Masks as text, in decreasing order of their first column: `4 6 3`.
@@ -199,5 +230,5 @@ fn pattern_panel(title: impl Into<String>, rows: &[(String, Pattern)]) -> Panel 
     .with(Layer::boxes("", zeros).coloured(5))
     .with(Layer::boxes("", ones).coloured(4))
     .with(Layer::texts(texts).coloured(6))
-    .legend(Legend::Hidden)
+    .without_legend()
 }

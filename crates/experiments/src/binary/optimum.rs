@@ -1,31 +1,46 @@
 //! `binary-fig5-7`: optimal linear patterns against the signal-to-noise ratio, shortcuts, and Luo's scheme.
 
-use super::{Scene, check_sweep, crossing, each, mask_text, pattern, sweep};
-use crate::legacy::claim::largest;
-use crate::legacy::{About, Claim, Context, Error, Figure, Table, Tables, column, row};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use super::{Scene, crossing, descent_from, each, mask_text, not_below, sweep};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
 use fewbits_binary_patterns::baselines::Luo;
-use fewbits_binary_patterns::search::{Descent, by_information, tile};
-use fewbits_binary_patterns::{Mask, gray_basis, rank};
+use fewbits_binary_patterns::search::{by_information, tile};
+use fewbits_binary_patterns::{Mask, gray_basis};
+use garde::Validate;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-7`.
 pub struct Optimum;
 
 /// Parameters of `binary-fig5-7`.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// Bits of the cell index.
+    #[garde(range(min = 2, max = 4))]
     bits: usize,
-    /// Numbers of sensors.
+    /// Numbers of sensors, each at least the number of bits.
+    #[garde(length(min = 1, max = 6), inner(range(min = 2, max = 10)), inner(custom(|n: &usize, _: &()| enough(*n, self.bits))))]
     sensors: Vec<usize>,
     /// First signal-to-noise ratio, dB.
+    #[garde(range(min = -60.0, max = 60.0))]
     from_db: f64,
     /// Last signal-to-noise ratio, dB.
+    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
     to_db: f64,
     /// Step, dB.
+    #[garde(range(min = 0.01, max = 60.0))]
     step_db: f64,
+}
+
+/// Refuses fewer sensors than bits: no set of full rank.
+fn enough(sensors: usize, bits: usize) -> garde::Result {
+    if sensors >= bits {
+        Ok(())
+    } else {
+        Err(garde::Error::new(format!("fewer sensors than the {bits} bits")))
+    }
 }
 
 impl Default for Parameters {
@@ -40,90 +55,122 @@ impl Default for Parameters {
     }
 }
 
-struct Point {
-    opt: f64,
-    masks: String,
-    any_rank: f64,
-    any_masks: String,
-    strategy1: f64,
-    strategy13: f64,
-    strategy3: f64,
-    luo: [Option<f64>; 3],
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Errors of searches and shortcuts.
+    errors: Vec<Row>,
+    /// Single quantities.
+    special: Vec<Special>,
+    /// Sixteen sensors at 18.2 dB.
+    tiling: Vec<Tiling>,
 }
 
-fn point(bits: usize, sensors: usize, snr: f64) -> Result<Point, Error> {
-    let scene = Scene::uniform(bits, snr)?;
-    let gray = gray_basis(bits).map_err(Error::failed)?;
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    /// Signal-to-noise ratio.
+    #[schemars(extend("unit" = "dB"))]
+    snr_db: f64,
+    /// Number of sensors N.
+    sensors: usize,
+    /// Least error over sets of full rank.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_opt: f64,
+    /// The best set.
+    masks: String,
+    /// Least error over all sets.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_unconstrained: f64,
+    /// The best of all sets.
+    masks_unconstrained: String,
+    /// Least error with the Gray basis forced (strategy 1).
+    #[schemars(extend("unit" = "V^2"))]
+    mse_strategy1: f64,
+    /// Gray basis filled up by equation 5.13.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_strategy13: f64,
+    /// All masks by equation 5.13.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_strategy3: f64,
+    /// Luo's bits, linear fusion; few sensors leave a bit without any.
+    #[schemars(extend("unit" = "V^2"))]
+    luo_soft: Option<f64>,
+    /// Luo's bits, posterior mean.
+    #[schemars(extend("unit" = "V^2"))]
+    luo_mmse: Option<f64>,
+    /// Luo's bits, majority.
+    #[schemars(extend("unit" = "V^2"))]
+    luo_majority: Option<f64>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Special {
+    /// What.
+    quantity: &'static str,
+    /// Its value.
+    value: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Tiling {
+    /// How sixteen masks were found.
+    design: &'static str,
+    /// Exact error.
+    #[schemars(extend("unit" = "V^2"))]
+    mse: f64,
+    /// The masks.
+    masks: String,
+}
+
+fn row(bits: usize, sensors: usize, snr_db: f64) -> Result<Row, Error> {
+    let scene = Scene::uniform(bits, snr_db)?;
+    let gray = gray_basis(bits)?;
     let search = scene.search(sensors)?;
-    let best = search.best().map_err(Error::failed)?;
-    let any = search.clone().any_rank().best().map_err(Error::failed)?;
-    let forced = search
-        .with_forced(&gray)
-        .and_then(|s| s.best())
-        .map_err(Error::failed)?;
+    let best = search.best()?;
+    let any = search.clone().any_rank().best()?;
     let informed = |forced: &[Mask]| {
-        by_information(&scene.source, &scene.grid, scene.noise, sensors, forced)
-            .map_err(Error::failed)
-            .and_then(|masks| scene.mmse(&masks))
+        let masks = by_information(&scene.source, &scene.grid, scene.noise, sensors, forced)?;
+        scene.mmse(&masks)
     };
-    // Few sensors leave a bit without any.
-    let luo = match Luo::new(scene.source, scene.noise, bits, sensors) {
-        Ok(luo) => {
-            let errors = luo.errors().map_err(Error::failed)?;
-            [Some(errors.soft), Some(errors.mmse), Some(errors.majority)]
-        }
-        Err(_) => [None; 3],
-    };
-    Ok(Point {
-        opt: best.mse,
+    let luo = Luo::new(scene.source, scene.noise, bits, sensors).ok();
+    let luo = luo.map(|luo| luo.errors()).transpose()?;
+    Ok(Row {
+        snr_db,
+        sensors,
+        mse_opt: best.mse,
         masks: mask_text(&best.masks),
-        any_rank: any.mse,
-        any_masks: mask_text(&any.masks),
-        strategy1: forced.mse,
-        strategy13: informed(&gray)?,
-        strategy3: informed(&[])?,
-        luo,
+        mse_unconstrained: any.mse,
+        masks_unconstrained: mask_text(&any.masks),
+        mse_strategy1: search.with_forced(&gray)?.best()?.mse,
+        mse_strategy13: informed(&gray)?,
+        mse_strategy3: informed(&[])?,
+        luo_soft: luo.as_ref().map(|e| e.soft),
+        luo_mmse: luo.as_ref().map(|e| e.mmse),
+        luo_majority: luo.as_ref().map(|e| e.majority),
     })
 }
 
 /// Strategy 2 at 18.2 dB: tiles of small optima against a descent for sixteen sensors.
-fn tiling() -> Result<Table, Error> {
-    let mut table = Table::new([
-        column("design", "", "how sixteen masks were found"),
-        column("mse", "V^2", "exact error at 18.2 dB"),
-        column("masks", "", "the masks"),
-    ]);
+fn tiling() -> Result<Vec<Tiling>, Error> {
     let scene = Scene::uniform(3, 18.2)?;
-    let tiled = |n: usize| -> Result<Vec<Mask>, Error> {
-        let best = scene.search(n)?.best().map_err(Error::failed)?;
-        tile(&best.masks, 16).map_err(Error::failed)
+    let tiled = |n: usize| Ok::<_, Error>(tile(&scene.search(n)?.best()?.masks, 16)?);
+    let row = |design, masks: &[Mask], mse| Tiling {
+        design,
+        mse,
+        masks: mask_text(masks),
     };
     let (eights, fours) = (tiled(8)?, tiled(4)?);
-    table.push(row!["best 8, twice", scene.mmse(&eights)?, mask_text(&eights)])?;
-    table.push(row!["best 4, four times", scene.mmse(&fours)?, mask_text(&fours)])?;
-    let candidates = (1..8)
-        .map(|mask| pattern(mask, 3)?.on(&scene.grid).map_err(Error::failed))
-        .collect::<Result<Vec<_>, _>>()?;
-    let descent = Descent::new(scene.source, vec![scene.noise; 16], candidates).map_err(Error::failed)?;
-    let start: Vec<usize> = eights.iter().map(|&m| m as usize - 1).collect();
-    let masks = |choice: &[usize]| choice.iter().map(|&c| c as Mask + 1).collect::<Vec<_>>();
-    let found = descent
-        .run(&[start], 2, |choice| rank(&masks(choice)) == 3)
-        .map_err(Error::failed)?;
-    let mut best = masks(&found.choice);
-    best.sort_unstable();
-    table.push(row!["descent", found.mse, mask_text(&best)])?;
-    Ok(table)
-}
-
-impl Optimum {
-    fn rows(tables: &Tables, sensors: usize) -> Result<Table, Error> {
-        tables.main.only("sensors", sensors)
-    }
+    let found = descent_from(&scene, 3, 16, std::slice::from_ref(&eights), 2)?;
+    Ok(vec![
+        row("best 8, twice", &eights, scene.mmse(&eights)?),
+        row("best 4, four times", &fours, scene.mmse(&fours)?),
+        row("descent", &found.0, found.1),
+    ])
 }
 
 impl Figure for Optimum {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
@@ -136,226 +183,107 @@ impl Figure for Optimum {
         }
     }
 
-    fn check(&self, p: &Parameters) -> Result<(), Error> {
-        check_sweep("binary-fig5-7", p.from_db, p.to_db, p.step_db)
-    }
-
     fn quicken(&self, p: &mut Parameters) {
         p.step_db = 5.0;
     }
 
-    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("snr_db", "dB", "signal-to-noise ratio"),
-            column("sensors", "", "number of sensors N"),
-            column("mse_opt", "V^2", "least error over sets of full rank"),
-            column("masks", "", "the best set"),
-            column("mse_unconstrained", "V^2", "least error over all sets"),
-            column("masks_unconstrained", "", "the best of all sets"),
-            column("mse_strategy1", "V^2", "least error with the Gray basis forced"),
-            column("mse_strategy13", "V^2", "Gray basis filled up by equation 5.13"),
-            column("mse_strategy3", "V^2", "all masks by equation 5.13"),
-            column("luo_soft", "V^2", "Luo's bits, linear fusion"),
-            column("luo_mmse", "V^2", "Luo's bits, posterior mean"),
-            column("luo_majority", "V^2", "Luo's bits, majority"),
-        ]);
-        let points = sweep(p.from_db, p.to_db, p.step_db);
-        for &sensors in &p.sensors {
-            for (snr, point) in points.iter().zip(each(&points, |snr| point(p.bits, sensors, snr))?) {
-                table.push(row![
-                    *snr,
-                    sensors,
-                    point.opt,
-                    point.masks,
-                    point.any_rank,
-                    point.any_masks,
-                    point.strategy1,
-                    point.strategy13,
-                    point.strategy3,
-                    point.luo[0],
-                    point.luo[1],
-                    point.luo[2],
-                ])?;
-            }
-        }
-        let mut special = Table::new([column("quantity", "", "what"), column("value", "", "its value")]);
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
+        let ratios = sweep(p.from_db, p.to_db, p.step_db);
+        let of = |n: &usize| each(&ratios, |snr| row(p.bits, *n, snr));
+        let errors = p.sensors.iter().map(of).collect::<Result<Vec<_>, _>>()?;
         let at = |masks: &[Mask], snr: f64| Scene::uniform(3, snr)?.mmse(masks);
-        special.push(row![
-            "Gray crosses {4,5,6}, dB",
-            crossing(6.0, 10.0, |snr| Ok(at(&[4, 5, 6], snr)? - at(&[4, 6, 3], snr)?))?
-        ])?;
-        special.push(row!["eight sensors at 22 dB, V^2", at(&[2, 2, 3, 3, 3, 3, 4, 6], 22.0)?])?;
-        special.push(row!["eight sensors at 60 dB, V^2", at(&[2, 2, 3, 3, 3, 3, 4, 6], 60.0)?])?;
-        special.push(row!["three Gray bits at 50 dB, V^2", at(&[4, 6, 3], 50.0)?])?;
-        Ok(Tables::from(table).with("special", special).with("tiling", tiling()?))
+        let eight = [2, 2, 3, 3, 3, 3, 4, 6];
+        let meet = crossing(6.0, 10.0, |snr| Ok(at(&[4, 5, 6], snr)? - at(&[4, 6, 3], snr)?))?;
+        let special = [
+            ("Gray crosses {4,5,6}, dB", meet),
+            ("eight sensors at 22 dB, V^2", at(&eight, 22.0)?),
+            ("eight sensors at 60 dB, V^2", at(&eight, 60.0)?),
+            ("three Gray bits at 50 dB, V^2", at(&[4, 6, 3], 50.0)?),
+        ];
+        Ok(Rows {
+            errors: errors.into_iter().flatten().collect(),
+            special: special.map(|(quantity, value)| Special { quantity, value }).into(),
+            tiling: tiling()?,
+        })
     }
 
-    fn claims(&self, p: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let mut claims = Vec::new();
-        let all = &tables.main;
-        let (opt, any, first) =
-            (all.numbers("mse_opt")?, all.numbers("mse_unconstrained")?, all.numbers("mse_strategy1")?);
-        claims.push(Claim::never(
-            "order",
-            "dropping the rank constraint never hurts, forcing the Gray basis never helps",
-            (0..opt.len())
-                .filter(|&i| any[i] > opt[i] * (1.0 + 1e-9) || first[i] < opt[i] * (1.0 - 1e-9))
-                .count(),
-        ));
-        if p.sensors.contains(&8) {
-            let rows = Self::rows(tables, 8)?;
-            let (snr, opt) = (rows.numbers("snr_db")?, rows.numbers("mse_opt")?);
-            let mut beaten = 0;
-            for name in ["luo_soft", "luo_mmse", "luo_majority"] {
-                let luo = rows.numbers(name)?;
-                beaten += (0..snr.len()).filter(|&i| snr[i] >= 5.0 && opt[i] >= luo[i]).count();
+    fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let all = &rows.errors;
+        let of = |sensors: usize| all.iter().filter(move |r| r.sensors == sensors);
+        let what = "dropping the rank constraint never hurts, forcing the Gray basis never helps";
+        claims.all("order", what, all, |r| {
+            r.mse_unconstrained <= r.mse_opt * (1.0 + 1e-9) && r.mse_strategy1 >= r.mse_opt * (1.0 - 1e-9)
+        });
+        let what = "from 5 dB on eight optimal sensors beat Luo's under every fusion rule";
+        claims
+            .all("luo", what, of(8).filter(|r| r.snr_db >= 5.0), |r| {
+                [r.luo_soft, r.luo_mmse, r.luo_majority]
+                    .iter()
+                    .all(|luo| luo.is_some_and(|luo| r.mse_opt < luo))
+            })
+            .at_defaults();
+        let least = of(8).min_by(|a, b| a.mse_opt.total_cmp(&b.mse_opt)).map(|r| r.snr_db);
+        let what = "the error of eight sensors is least near 22 dB and rises beyond (erratum binary-18)";
+        claims.near("dither", what, least, 22.0, 1.0).at_defaults();
+        let what = "filling the Gray basis by equation 5.13 is poor: ratio to the optimum";
+        let ratio = |r: &Row| (format!("{} sensors, {} dB", r.sensors, r.snr_db), r.mse_strategy13 / r.mse_opt);
+        claims.references("strategy-3", what, all, ratio);
+        let what = "without the basis, equation 5.13 repeats one pattern; the worst ratio to the optimum";
+        let worst = of(8).map(|r| r.mse_strategy3 / r.mse_opt).reduce(f64::max);
+        claims.above("strategy-3-alone", what, worst, 20.0).at_defaults();
+        if p.bits == 3 {
+            for (sensors, lossless) in [(5, 9.0), (8, 7.5)] {
+                let loss = |from: f64| {
+                    let high = of(sensors).filter(move |r| r.snr_db >= from);
+                    high.map(|r| r.mse_strategy1 / r.mse_opt - 1.0).reduce(f64::max)
+                };
+                let what = format!("forcing the Gray basis costs nothing from {lossless} dB on, {sensors} sensors");
+                claims.at_most(format!("strategy-1-n{sensors}"), what, loss(lossless), 1e-9);
+                let what = format!("and at most 3.3 % from 5 dB on, {sensors} sensors (erratum binary-14)");
+                claims.at_most(format!("strategy-1-loss-n{sensors}"), what, loss(5.0), 0.033);
             }
-            claims.push(Claim::never(
-                "luo",
-                "from 5 dB on eight optimal sensors beat Luo's under every fusion rule",
-                beaten,
-            ));
-            let least = (0..snr.len())
-                .min_by(|&a, &b| opt[a].total_cmp(&opt[b]))
-                .map_or(0.0, |i| snr[i]);
-            claims.push(
-                Claim::near(
-                    "dither",
-                    "the error of eight sensors is least near 22 dB and rises beyond (erratum binary-18)",
-                    least,
-                    22.0,
-                    1.0,
-                )
-                .at_defaults(),
-            );
-            let strategy = rows.numbers("mse_strategy13")?;
-            for (at, expected) in [
-                (5.0, 1.79),
-                (10.0, 2.07),
-                (15.0, 1.31),
-                (20.0, 2.53),
-                (25.0, 1.83),
-                (30.0, 1.39),
-            ] {
-                if let Some(i) = snr.iter().position(|s| (s - at).abs() < 1e-9) {
-                    claims.push(
-                        Claim::near(
-                            format!("strategy-3-at-{at}"),
-                            "filling the Gray basis by equation 5.13 is poor: ratio to the optimum",
-                            strategy[i] / opt[i],
-                            expected,
-                            6e-3,
-                        )
-                        .at_defaults(),
-                    );
-                }
-            }
-            let repeated = rows.numbers("mse_strategy3")?;
-            claims.push(
-                Claim::above(
-                    "strategy-3-alone",
-                    "without the basis, equation 5.13 repeats one pattern; the worst ratio to the optimum",
-                    largest((0..snr.len()).map(|i| repeated[i] / opt[i])),
-                    20.0,
-                )
-                .at_defaults(),
-            );
         }
-        for &(sensors, lossless) in [(5usize, 9.0), (8, 7.5)].iter().filter(|s| p.sensors.contains(&s.0)) {
-            let rows = Self::rows(tables, sensors)?;
-            let (snr, opt, forced) =
-                (rows.numbers("snr_db")?, rows.numbers("mse_opt")?, rows.numbers("mse_strategy1")?);
-            let loss = |i: usize| forced[i] / opt[i] - 1.0;
-            claims.push(Claim::at_most(
-                format!("strategy-1-n{sensors}"),
-                format!("forcing the Gray basis costs nothing from {lossless} dB on, {sensors} sensors"),
-                largest((0..snr.len()).filter(|&i| snr[i] >= lossless).map(loss)),
-                1e-9,
-            ));
-            claims.push(Claim::at_most(
-                format!("strategy-1-loss-n{sensors}"),
-                "and at most 3.3 % from 5 dB on (erratum binary-14)",
-                largest((0..snr.len()).filter(|&i| snr[i] >= 5.0).map(loss)),
-                0.033,
-            ));
-        }
-        if p.sensors.contains(&3) {
-            let rows = Self::rows(tables, 3)?;
-            let (snr, masks) = (rows.numbers("snr_db")?, rows.texts("masks")?);
-            let expected = |snr: f64| match snr {
-                s if s <= 1.0 => "1 2 4",
-                s if s <= 3.0 => "1 4 6",
-                s if s <= 8.0 => "4 5 6",
-                _ => "3 4 6",
-            };
-            claims.push(
-                Claim::never(
-                    "regimes",
-                    "N = B: natural up to 1 dB, {4,6,1} at 2 and 3, {4,5,6} at 4 to 8, Gray above (erratum binary-13)",
-                    (0..snr.len()).filter(|&i| masks[i] != expected(snr[i])).count(),
-                )
-                .at_defaults(),
-            );
-        }
-        let special = tables.named("special")?.numbers("value")?;
-        let floor = 0.25 * 0.25 / 12.0;
-        claims.extend([
-            Claim::near("gray-from", "Gray is optimal only above 8.0212 dB", special[0], 8.021_226_314_507_864, 1e-3),
-            Claim::near("least", "least error of eight sensors", special[1], 0.00276, 1e-5),
-            Claim::below("limit-below", "their error tends to Delta^2/12 from below", special[2], floor),
-            Claim::near_relative("limit", "and reaches it within 3 % at 60 dB", special[2], floor, 0.03),
-            Claim::near_relative("limit-three", "three Gray bits tend to Delta^2/12", special[3], floor, 1e-3),
-        ]);
-        let tiles = tables.named("tiling")?.numbers("mse")?;
-        for (i, (id, expected)) in [
-            ("tile-8", 0.001_655_2),
-            ("tile-4", 0.001_917_6),
-            ("descent-16", 0.001_562_5),
-        ]
-        .into_iter()
-        .enumerate()
-        {
-            claims.push(Claim::near(
-                id,
-                "strategy 2 for sixteen sensors at 18.2 dB: tiles lose against a descent",
-                tiles[i],
-                expected,
-                2e-7,
-            ));
-        }
-        Ok(claims)
+        let expected = |snr: f64| match snr {
+            s if s <= 1.0 => "1 2 4",
+            s if s <= 3.0 => "1 4 6",
+            s if s <= 8.0 => "4 5 6",
+            _ => "3 4 6",
+        };
+        let what = "N = B: natural up to 1 dB, {4,6,1} at 2 and 3, {4,5,6} at 4 to 8, Gray above (erratum binary-13)";
+        claims
+            .all("regimes", what, of(3), |r| r.masks == expected(r.snr_db))
+            .at_defaults();
+        let what = "Gray is optimal only above 8.0212 dB; with little noise the errors tend to the square of a cell's width over 12";
+        claims.references("special", what, &rows.special, |r| (r.quantity.to_owned(), r.value));
+        let limit = rows
+            .special
+            .iter()
+            .find(|r| r.quantity.contains("at 60 dB"))
+            .map(|r| r.value);
+        claims.below("limit-below", "eight sensors tend to it from below", limit, 0.25 * 0.25 / 12.0);
+        let what = "strategy 2 for sixteen sensors at 18.2 dB: tiles lose against a descent";
+        claims.references("tiling", what, &rows.tiling, |r| (r.design.to_owned(), r.mse));
     }
 
-    fn plot(&self, p: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let snr = || Axis::linear("signal-to-noise ratio / dB");
-        let mut panels = Vec::new();
-        for &sensors in &p.sensors {
-            let rows = Self::rows(tables, sensors)?;
-            let mut panel =
-                Panel::new(format!("{sensors} sensors, {} bits", p.bits), snr(), Axis::log("mean squared error / V^2"));
-            for (colour, (name, label)) in [
-                ("mse_opt", "best of full rank"),
-                ("mse_unconstrained", "best of any rank"),
-                ("mse_strategy1", "Gray basis forced"),
-                ("mse_strategy13", "Gray, filled by eq. 5.13"),
-                ("luo_soft", "Luo, linear"),
-                ("luo_mmse", "Luo, posterior mean"),
-            ]
-            .into_iter()
-            .enumerate()
-            {
-                let points = rows.points("snr_db", name)?;
-                if !points.is_empty() {
-                    let layer = if name == "mse_strategy1" {
-                        Layer::dashed(label, points)
-                    } else {
-                        Layer::line(label, points)
-                    };
-                    panel = panel.with(layer.coloured(colour));
-                }
-            }
-            panels.push(panel.legend(Legend::BottomLeft));
-        }
-        Ok(Plot::grid(p.sensors.len().min(3), panels))
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        type Curve = (&'static str, fn(&Row) -> Option<f64>);
+        let curves: [Curve; 6] = [
+            ("best of full rank", |r| Some(r.mse_opt)),
+            ("best of any rank", |r| Some(r.mse_unconstrained)),
+            ("Gray basis forced", |r| Some(r.mse_strategy1)),
+            ("Gray, filled by eq. 5.13", |r| Some(r.mse_strategy13)),
+            ("Luo, linear", |r| r.luo_soft),
+            ("Luo, posterior mean", |r| r.luo_mmse),
+        ];
+        let panel = |&sensors: &usize| {
+            let own = || rows.errors.iter().filter(move |r| r.sensors == sensors);
+            let layers = curves.iter().enumerate().map(|(colour, (label, of))| {
+                Layer::line(*label, points(own(), |r| (r.snr_db, of(r)))).coloured(colour)
+            });
+            let shown = layers.filter(|layer| !layer.is_empty());
+            let axes = (Axis::linear("signal-to-noise ratio / dB"), Axis::log("mean squared error / V²"));
+            Panel::new(format!("{sensors} sensors, {} bits", p.bits), axes.0, axes.1).with_all(shown)
+        };
+        Plot::grid(2, p.sensors.iter().map(panel).collect())
     }
 }

@@ -1,7 +1,7 @@
 //! `binary-fig5-2` to `binary-fig5-5` and `binary-figB-1`: the grid, its patterns, and what noise makes of one.
 
 use super::{Scene, pattern, pattern_panel};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_binary_patterns::{
     BinaryQuantizer, Grid, Mask, Pattern, check_separation, generator_matrix, gray_basis, natural_basis,
@@ -473,7 +473,7 @@ impl Figure for Response {
             .with(Layer::line("with noise", points(rows, |r| (r.x, r.p1))).coloured(0));
         let information = Panel::new("Information in the bit", x(), Axis::linear("Fisher information / V⁻²"))
             .with(Layer::line("", points(rows, |r| (r.x, r.information))).coloured(1))
-            .legend(Legend::Hidden);
+            .without_legend();
         Plot::grid(2, vec![probability, information])
     }
 }

@@ -1,24 +1,28 @@
 //! `binary-table5-1`: eight patterns of three bits at 18.2 dB.
 
 use super::{Scene, mask_text, pattern, pattern_panel};
-use crate::legacy::{About, Claim, Context, Error, Figure, Table as Rows, Tables, column, row};
 use crate::plot::Plot;
+use crate::{About, Claims, Context, Error, Figure};
 use fewbits_binary_patterns::bounds::{optimal_weight_van_trees, printed_crlb};
 use fewbits_binary_patterns::search::MaskSet;
 use fewbits_binary_patterns::{Decoder, Mask, count};
+use garde::Validate;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `binary-table5-1`.
 pub struct Table;
 
 /// Parameters of `binary-table5-1`.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// Signal-to-noise ratio, dB.
+    #[garde(range(min = -60.0, max = 60.0))]
     snr_db: f64,
-    /// The printed masks.
+    /// The printed masks, below 8.
+    #[garde(length(min = 3, max = 10), inner(range(min = 1, max = 7)))]
     printed: Vec<Mask>,
 }
 
@@ -33,21 +37,73 @@ impl Default for Parameters {
 
 const BITS: usize = 3;
 
-fn sorted(masks: &[Mask]) -> Vec<Mask> {
-    let mut masks = masks.to_vec();
-    masks.sort_unstable();
-    masks
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// The printed and the best sets.
+    sets: Vec<Set>,
+    /// Sizes of the search space.
+    search_spaces: Vec<Space>,
+    /// All sets with both errors, in the order of the posterior mean's.
+    listed: Vec<Listed>,
 }
 
-/// Position of a set in a ranking, from 0.
-fn rank(sets: &[MaskSet], masks: &[Mask]) -> Result<usize, Error> {
-    sets.iter()
-        .position(|s| s.masks == masks)
-        .ok_or_else(|| Error::Table(format!("{masks:?} is not among the sets of full rank")))
+#[derive(Serialize, JsonSchema)]
+struct Set {
+    /// Which set.
+    set: &'static str,
+    /// Its masks.
+    masks: String,
+    /// Exact error of the posterior mean.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_mmse: f64,
+    /// Exact error of the discrete maximum a posteriori decoder.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_dmap: f64,
+    /// The same with exact cell probabilities.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_exact_dmap: f64,
+    /// Equation 5.13.
+    #[schemars(extend("unit" = "V^2"))]
+    crlb: f64,
+    /// Optimal-weight van Trees bound.
+    #[schemars(extend("unit" = "V^2"))]
+    van_trees: f64,
+    /// Place among all sets under the posterior mean, from 0; none for a set that is not of full rank.
+    rank: Option<usize>,
+    /// Place under the discrete decoder, from 0.
+    rank_dmap: Option<usize>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Space {
+    /// Bits B.
+    bits: usize,
+    /// Sensors N.
+    sensors: usize,
+    /// Sets by equation 5.7.
+    printed: f64,
+    /// Multisets of full rank.
+    exact: f64,
+    /// Sets that hold the Gray basis (strategy 1).
+    with_gray: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Listed {
+    /// Masks.
+    masks: String,
+    /// Error of the posterior mean.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_mmse: f64,
+    /// Error of the discrete decoder.
+    #[schemars(extend("unit" = "V^2"))]
+    mse_dmap: Option<f64>,
 }
 
 impl Figure for Table {
     type Parameters = Parameters;
+    type Tables = Rows;
 
     fn about(&self) -> About {
         About {
@@ -59,155 +115,102 @@ impl Figure for Table {
         }
     }
 
-    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Tables, Error> {
+    fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let scene = Scene::uniform(BITS, p.snr_db)?;
         let search = scene.search(p.printed.len())?;
-        let ranking = search.ranking().map_err(Error::failed)?;
-        let mut by_map: Vec<MaskSet> = ranking
-            .par_iter()
-            .map(|set| {
-                let bank = search.bank(&set.masks)?;
-                Ok(MaskSet {
-                    masks: set.masks.clone(),
-                    mse: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
-                })
+        let ranking = search.ranking()?;
+        let decoded = ranking.par_iter().map(|set| {
+            let mse = search.bank(&set.masks)?.mse(Decoder::DiscreteMap(&scene.grid))?;
+            Ok(MaskSet {
+                masks: set.masks.clone(),
+                mse,
             })
-            .collect::<Result<_, fewbits_binary_patterns::Error>>()
-            .map_err(Error::failed)?;
+        });
+        let mut by_map: Vec<MaskSet> = decoded.collect::<Result<_, Error>>()?;
         by_map.sort_by(|a, b| a.mse.total_cmp(&b.mse).then_with(|| a.masks.cmp(&b.masks)));
-        let mut table = Rows::new([
-            column("set", "", "which set"),
-            column("masks", "", "its masks"),
-            column("mse_mmse", "V^2", "exact error of the posterior mean"),
-            column("mse_dmap", "V^2", "exact error of the discrete maximum a posteriori decoder"),
-            column("mse_exact_dmap", "V^2", "the same with exact cell probabilities"),
-            column("crlb", "V^2", "equation 5.13"),
-            column("van_trees", "V^2", "optimal-weight van Trees bound"),
-            column("rank", "", "place among all sets under the posterior mean, from 0"),
-            column("rank_dmap", "", "place under the discrete decoder, from 0"),
-        ]);
-        let printed = sorted(&p.printed);
-        let best = search.best().map_err(Error::failed)?.masks;
-        for (name, masks) in [
+        let place = |sets: &[MaskSet], masks: &[Mask]| sets.iter().position(|s| s.masks == masks);
+        let mut printed = p.printed.clone();
+        printed.sort_unstable();
+        let best = search.best()?.masks;
+        let set = |(set, masks): (_, &Vec<Mask>)| {
+            let bank = scene.bank(masks)?;
+            Ok(Set {
+                set,
+                masks: mask_text(masks),
+                mse_mmse: bank.mse(Decoder::Mmse)?,
+                mse_dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
+                mse_exact_dmap: bank.mse(Decoder::ExactDivisionMap(&scene.grid))?,
+                crlb: printed_crlb(&bank)?,
+                van_trees: optimal_weight_van_trees(&bank)?,
+                rank: place(&ranking, masks),
+                rank_dmap: place(&by_map, masks),
+            })
+        };
+        let sets = [
             ("printed", &printed),
             ("best, posterior mean", &best),
             ("best, discrete MAP", &by_map[0].masks),
-        ] {
-            let bank = scene.bank(masks)?;
-            let mse = |decoder| bank.mse(decoder).map_err(Error::failed);
-            table.push(row![
-                name,
-                mask_text(masks),
-                mse(Decoder::Mmse)?,
-                mse(Decoder::DiscreteMap(&scene.grid))?,
-                mse(Decoder::ExactDivisionMap(&scene.grid))?,
-                printed_crlb(&bank).map_err(Error::failed)?,
-                optimal_weight_van_trees(&bank).map_err(Error::failed)?,
-                rank(&ranking, masks)?,
-                rank(&by_map, masks)?,
-            ])?;
-        }
-        let mut spaces = Rows::new([
-            column("bits", "", "bits B"),
-            column("sensors", "", "sensors N"),
-            column("printed", "", "sets by equation 5.7"),
-            column("exact", "", "multisets of full rank"),
-        ]);
-        for (bits, sensors) in [(2, 4), (3, 5), (3, 8), (3, 10), (4, 7), (4, 8), (4, 10)] {
-            spaces.push(row![
+        ];
+        let space = |(bits, sensors)| {
+            Ok(Space {
                 bits,
                 sensors,
-                count::printed_pattern_sets(bits, sensors).map_err(Error::failed)? as f64,
-                count::full_rank_multisets(bits, sensors).map_err(Error::failed)? as f64,
-            ])?;
-        }
-        Ok(Tables::from(table)
-            .with("search-spaces", spaces)
-            .with("listed", listed(&ranking, &by_map)?))
+                printed: count::printed_pattern_sets(bits, sensors)? as f64,
+                exact: count::full_rank_multisets(bits, sensors)? as f64,
+                with_gray: count::forced_basis_sets(bits, sensors)? as f64,
+            })
+        };
+        let spaces = [(2, 4), (3, 5), (3, 8), (3, 10), (4, 7), (4, 8), (4, 10)];
+        let other: std::collections::BTreeMap<&[Mask], f64> =
+            by_map.iter().map(|s| (s.masks.as_slice(), s.mse)).collect();
+        let listed = ranking.iter().map(|set| Listed {
+            masks: mask_text(&set.masks),
+            mse_mmse: set.mse,
+            mse_dmap: other.get(set.masks.as_slice()).copied(),
+        });
+        Ok(Rows {
+            sets: sets.into_iter().map(set).collect::<Result<_, Error>>()?,
+            search_spaces: spaces.into_iter().map(space).collect::<Result<_, Error>>()?,
+            listed: listed.collect(),
+        })
     }
 
-    fn claims(&self, p: &Parameters, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let mmse = tables.main.numbers("mse_mmse")?;
-        let dmap = tables.main.numbers("mse_dmap")?;
-        let ranks = tables.main.numbers("rank")?;
-        let bound = tables.main.numbers("van_trees")?;
-        let spaces = tables.named("search-spaces")?;
-        let (printed, exact) = (spaces.numbers("printed")?, spaces.numbers("exact")?);
-        let texts = tables.main.texts("masks")?;
-        let sets = tables.named("listed")?.len() as f64;
-        let strategy = count::forced_basis_sets(BITS, p.printed.len()).map_err(Error::failed)? as f64;
-        Ok(vec![
-            Claim::near_relative("printed", "error of the printed set", mmse[0], 0.003_473_787_532_911_221, 1e-8)
-                .at_defaults(),
-            Claim::near("rank", "the printed set is at place 25 of 0..2701 (erratum binary-11)", ranks[0], 25.0, 0.0)
-                .at_defaults(),
-            Claim::near("sets", "there are 2702 sets", sets, 2702.0, 0.0).at_defaults(),
-            Claim::near_relative("best", "error of the best set", mmse[1], 0.003_119_112_724_490_280_5, 1e-8)
-                .at_defaults(),
-            Claim::never("best-masks", "the best set is {4,6,3,3,3,3,2,2}", usize::from(texts[1] != "2 2 3 3 3 3 4 6"))
-                .at_defaults(),
-            Claim::near_relative(
-                "dmap-printed",
-                "discrete error of the printed set",
-                dmap[0],
-                0.006_920_809_484_397_439,
-                1e-8,
-            )
-            .at_defaults(),
-            Claim::near_relative("dmap-best", "least discrete error", dmap[2], 0.006_900_117_289_130_259, 1e-8)
-                .at_defaults(),
-            Claim::never("dmap-masks", "it belongs to {1,2,3,3,3,3,4,6}", usize::from(texts[2] != "1 2 3 3 3 3 4 6"))
-                .at_defaults(),
-            Claim::near(
-                "dmap-rank",
-                "under the discrete decoder the printed set is fourth: the table fits a search with that decoder",
-                tables.main.numbers("rank_dmap")?[0],
-                3.0,
-                0.0,
-            )
-            .at_defaults(),
-            Claim::never(
-                "bound",
-                "the van Trees bound is below every error",
-                (0..3).filter(|&i| bound[i] > mmse[i]).count(),
-            ),
-            Claim::never(
-                "over-count",
-                "equation 5.7 counts multisets once per basis, 1.5 to 18 times too often (erratum binary-2)",
-                printed
-                    .iter()
-                    .zip(&exact)
-                    .filter(|(p, e)| !(1.4..=18.0).contains(&(*p / *e)))
-                    .count(),
-            ),
-            Claim::near("strategy-1", "with the Gray basis forced 462 sets remain", strategy, 462.0, 0.0).at_defaults(),
-        ])
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let at = |set: &str| rows.sets.iter().find(|r| r.set == set);
+        let (best, decoded) = (at("best, posterior mean"), at("best, discrete MAP"));
+        let name = |r: &Set| r.set.to_owned();
+        claims.references("mmse", "error of the posterior mean", &rows.sets, |r| (name(r), r.mse_mmse));
+        claims.references("dmap", "error of the discrete decoder", &rows.sets, |r| (name(r), r.mse_dmap));
+        let what = "place among 0..2701 under the posterior mean (erratum binary-11)";
+        claims.references("rank", what, &rows.sets, |r| (name(r), r.rank.map(|rank| rank as f64)));
+        let what = "place under the discrete decoder: the table fits a search with that decoder";
+        claims.references("rank-dmap", what, &rows.sets, |r| (name(r), r.rank_dmap.map(|rank| rank as f64)));
+        claims
+            .near("sets", "there are 2702 sets", rows.listed.len() as f64, 2702.0, 0.0)
+            .at_defaults();
+        let what = "the best set is {4,6,3,3,3,3,2,2}";
+        claims
+            .all("best-masks", what, best, |r| r.masks == "2 2 3 3 3 3 4 6")
+            .at_defaults();
+        let what = "the best under the discrete decoder is {1,2,3,3,3,3,4,6}";
+        claims
+            .all("dmap-masks", what, decoded, |r| r.masks == "1 2 3 3 3 3 4 6")
+            .at_defaults();
+        let what = "the van Trees bound is below every error";
+        claims.all("bound", what, &rows.sets, |r| r.van_trees <= r.mse_mmse);
+        let what = "equation 5.7 counts multisets once per basis, 1.5 to 18 times too often (erratum binary-2)";
+        claims.all("over-count", what, &rows.search_spaces, |r| (1.4..=18.0).contains(&(r.printed / r.exact)));
+        let eight = rows.search_spaces.iter().find(|r| (r.bits, r.sensors) == (3, 8));
+        let what = "with the Gray basis forced 462 sets of eight sensors remain";
+        claims.near("strategy-1", what, eight.map(|r| r.with_gray), 462.0, 0.0);
     }
 
-    fn plot(&self, p: &Parameters, tables: &Tables) -> Result<Plot, Error> {
-        let mut panels = Vec::new();
-        for (title, masks) in tables.main.texts("set")?.iter().zip(tables.main.texts("masks")?) {
-            let rows = masks
-                .split(' ')
-                .filter_map(|m| m.parse::<Mask>().ok())
-                .map(|mask| Ok((format!("mask {mask}"), pattern(mask, BITS)?)))
-                .collect::<Result<Vec<_>, Error>>()?;
-            panels.push(pattern_panel(format!("{title}, {} dB", p.snr_db), &rows));
-        }
-        Ok(Plot::grid(3, panels))
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let panel = |r: &Set| {
+            let masks = r.masks.split(' ').filter_map(|m| m.parse::<Mask>().ok());
+            let patterns = masks.filter_map(|mask| Some((format!("mask {mask}"), pattern(mask, BITS).ok()?)));
+            pattern_panel(format!("{}, {} dB", r.set, p.snr_db), &patterns.collect::<Vec<_>>())
+        };
+        Plot::grid(2, rows.sets.iter().map(panel).collect())
     }
-}
-
-/// All sets with both errors, in the order of the posterior mean's.
-fn listed(ranking: &[MaskSet], by_map: &[MaskSet]) -> Result<Rows, Error> {
-    let other: std::collections::BTreeMap<&[Mask], f64> = by_map.iter().map(|s| (s.masks.as_slice(), s.mse)).collect();
-    let mut rows = Rows::new([
-        column("masks", "", "masks"),
-        column("mse_mmse", "V^2", "error of the posterior mean"),
-        column("mse_dmap", "V^2", "error of the discrete decoder"),
-    ]);
-    for set in ranking {
-        rows.push(row![mask_text(&set.masks), set.mse, other.get(set.masks.as_slice()).copied()])?;
-    }
-    Ok(rows)
 }

@@ -1,14 +1,13 @@
 //! Beyond the paper: lossy links, scheduled thresholds, and what each filter costs.
 
-use super::case::{Case, by_budget};
-use super::ensemble::{Ensemble, Part, agrees, beats, first, value};
-use super::linear::{Scheme, Setting, run};
-use crate::error::Error;
-use crate::legacy::claim::Claim;
-use crate::legacy::row;
-use crate::legacy::{About, Context};
-use crate::legacy::{Table, Tables, column};
-use crate::plot::{Axis, Layer, Panel, Plot};
+use super::case::Case;
+use super::linear::{Scheme, start, time_of_steps};
+use super::pictures::{by_budget, curve};
+use super::rows::{Ensemble, Nothing, Part, Rows, Step, Summary, steps};
+use super::scalar::{BUDGETS, CENSORED};
+use super::setting::{Linear, Setting};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error};
 use fewbits_cfwmd::information::fisher_information;
 use fewbits_cfwmd::rule::Weighing;
 use fewbits_filters::cramer_rao;
@@ -16,337 +15,217 @@ use fewbits_models::constant_velocity_1d;
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::Matrix2;
-use std::hint::black_box;
-use std::time::Instant;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// Links that lose messages.
 pub(super) struct Lossy;
 
-const LOSSES: [f64; 4] = [0.05, 0.1, 0.2, 0.3];
-
-fn lossy_names() -> Vec<(String, Scheme)> {
-    LOSSES
-        .iter()
-        .flat_map(|loss| {
-            [("ignored", false), ("modelled", true)]
-                .map(|(how, modelled)| (format!("{how}, loss {loss}"), Scheme::Lossy { loss: *loss, modelled }))
-        })
-        .collect()
-}
+const NO_LOSS: &str = "no loss";
+const IGNORED: &str = "loss ignored";
+const MODELLED: &str = "loss modelled";
 
 impl Case for Lossy {
-    type Setting = Setting;
+    type Setting = Linear;
+    type Main = Step;
+    type Further = Nothing;
 
-    fn about() -> About {
-        About {
-            id: "cfwmd-lossy",
-            title: "Censored or lost?",
-            caption: "Nothing arrived: the sensor was silent, or spoke and was not heard. A fusion centre that takes loss for silence believes too much; one that weighs both loses far less.",
-            source: "",
+    const ABOUT: About = About {
+        id: "cfwmd-lossy",
+        title: "Censored or lost?",
+        caption: "Nothing arrived: the sensor was silent, or its message was lost. A fusion centre that takes loss for silence believes too \
+                  much; one that weighs both loses far less.",
+        source: "",
+    };
+    const PAIRS: &'static [(&'static str, &'static str)] = &[(MODELLED, IGNORED)];
+
+    fn setting() -> Linear {
+        Linear {
+            losses: Some(vec![0.05, 0.1, 0.2, 0.3]),
+            ..Linear::scalar(2, &[1.0])
         }
     }
 
-    fn setting() -> Setting {
-        Setting::scalar(2, vec![1.0])
-    }
-
-    fn quicken(setting: &mut Setting) {
-        setting.quicken();
-    }
-
-    fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        let names = lossy_names();
-        let mut schemes: Vec<(&str, Scheme)> = vec![("no loss", Scheme::Gaussian(Weighing::OwnFilter))];
-        schemes.extend(names.iter().map(|(name, scheme)| (name.as_str(), *scheme)));
-        let messages = setting.messages.iter();
-        messages
-            .map(|l| run::<1>(context, setting, *l, &schemes))
-            .collect::<Result<Vec<_>, _>>()
-            .map(|e| e.concat())
-    }
-
-    fn pairs() -> Vec<(&'static str, &'static str)> {
-        vec![
-            ("modelled, loss 0.1", "ignored, loss 0.1"),
-            ("modelled, loss 0.3", "ignored, loss 0.3"),
-        ]
-    }
-
-    fn claims(_: &Setting, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let (summary, paired) = (tables.named("summary")?, tables.named("paired")?);
-        let mut claims = Vec::new();
-        for loss in ["0.1", "0.3"] {
-            for how in ["ignored", "modelled"] {
-                claims.extend(agrees(
-                    summary,
-                    &format!("{how}, loss {loss}"),
-                    1.0,
-                    &format!("loss/p{loss}_{how}"),
-                    0.0,
-                    0.01,
-                )?);
-            }
-            claims.push(beats(
-                paired,
-                &format!("modelled, loss {loss}"),
-                &format!("ignored, loss {loss}"),
-                1.0,
-                Part::Position,
-            )?);
+    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+        let mut all = setting.at_budgets(context, "", &[(NO_LOSS, CENSORED[0].1)])?;
+        for loss in setting.losses.iter().flatten().copied() {
+            let schemes = [(IGNORED, false), (MODELLED, true)];
+            let schemes = schemes.map(|(name, modelled)| (name, Scheme::Lossy { loss, modelled }));
+            all.extend(setting.at_budgets(context, &format!("loss {loss}"), &schemes)?);
         }
-        for (loss, expected, tolerance) in [("0.1", 0.064, 0.025), ("0.3", 0.555, 0.12)] {
-            let rows = paired.only("first", format!("modelled, loss {loss}"))?;
-            let gain = -first(rows.numbers("pos_mse_difference_m2")?)?;
-            claims.push(
-                Claim::near(
-                    format!("gain-{loss}"),
-                    format!("gain in squared position error at loss {loss} (m^2)"),
-                    gain,
-                    expected,
-                    tolerance,
-                )
-                .at_defaults(),
-            );
-        }
-        let honest = value(summary, "modelled, loss 0.3", 1.0, "nees")?;
-        let naive = value(summary, "ignored, loss 0.3", 1.0, "nees")?;
-        claims.push(
-            Claim::below(
-                "honest",
-                "modelling the loss keeps the belief honest: squared error over variance",
-                honest,
-                1.4,
-            )
-            .at_defaults(),
-        );
-        claims.push(Claim::above("naive", "ignoring it does not", naive, 2.0).at_defaults());
-        Ok(claims)
+        Ok(all)
     }
 
-    fn plot(tables: &Tables) -> Result<Plot, Error> {
-        let summary = tables.named("summary")?;
-        let clean =
-            value(summary, "no loss", 1.0, "pos_armse_m").or_else(|_| summary.numbers("pos_armse_m").map(|v| v[0]))?;
+    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
+        Ok((steps(all), Nothing {}))
+    }
+
+    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+        for loss in ["loss 0.1", "loss 0.3"] {
+            rows.beats(claims, (MODELLED, IGNORED), (loss, 1.0), &[Part::Position]);
+        }
+        let what = "gain in squared position error by modelling the loss (m^2)";
+        claims
+            .references("gain", what, &rows.paired, |p| (p.world.clone().unwrap_or_default(), p.position.scaled(-1.0)));
+        let nees = |name: &str| Some(rows.at(name, 1.0)?.nees?.value);
+        let what = "modelling the loss keeps the belief honest: squared error over variance";
+        claims.below("honest", what, nees("loss modelled, loss 0.3"), 1.4);
+        claims.above("naive", "ignoring it does not", nees("loss ignored, loss 0.3"), 2.0);
+    }
+
+    fn plot(setting: &Linear, rows: &Rows<Step>) -> Plot {
+        let l = setting.messages[0];
         let mut panel = Panel::new(
             "Position error over a lossy link",
             Axis::linear("loss probability"),
             Axis::linear("time-averaged RMSE (m)"),
-        )
-        .legend(crate::plot::Legend::TopLeft);
-        let names = summary.texts("scheme")?;
-        let (values, errors) = (summary.numbers("pos_armse_m")?, summary.numbers("pos_se")?);
-        for (colour, how) in ["ignored", "modelled"].into_iter().enumerate() {
-            let at: Vec<usize> = LOSSES
-                .iter()
-                .filter_map(|loss| names.iter().position(|n| *n == format!("{how}, loss {loss}")))
-                .collect();
-            let mut points: Vec<(f64, f64)> = vec![(0.0, clean)];
-            points.extend(at.iter().zip(LOSSES).map(|(i, loss)| (loss, values[*i])));
-            let marks = points[1..].to_vec();
-            panel = panel.with(Layer::line("", points).coloured(colour)).with(
-                Layer::points(format!("loss {how}"), marks)
-                    .with_errors(at.iter().map(|i| errors[*i]).collect())
-                    .coloured(colour),
-            );
+        );
+        for (colour, scheme) in [IGNORED, MODELLED].into_iter().enumerate() {
+            let at = |loss: &f64| Some((*loss, rows.at(&format!("{scheme}, loss {loss}"), l)?.position_rmse));
+            let clean = rows.at(NO_LOSS, l).map(|r| (0.0, r.position_rmse));
+            let lossy = setting.losses.iter().flatten().filter_map(at);
+            panel = panel.with_all(curve(scheme, colour, clean.into_iter().chain(lossy).collect()));
         }
-        Ok(Plot::of(panel))
+        Plot::of(panel)
     }
 }
 
 /// Thresholds computed before deployment.
 pub(super) struct Scheduled;
 
-const BUDGETS: [f64; 5] = [1.0, 1.2, 1.5, 2.0, 3.0];
+const TWO: &str = "2 sensors";
+
+/// Bounds beside the runs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Bounds {
+    /// Bounds of any filter that receives these messages.
+    bound: Vec<Bound>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+struct Bound {
+    /// Message budget.
+    #[schemars(extend("unit" = "messages/step"))]
+    l: f64,
+    /// Number of sensors.
+    sensors: u64,
+    /// Time-averaged position bound, innovations weighed by the sensor's own filter (CFwMD).
+    #[schemars(extend("unit" = "m"))]
+    bound_m: f64,
+    /// The same, weighed with the bound's own covariance (CFwMD2, scheduled).
+    #[schemars(extend("unit" = "m"))]
+    bound_centre_m: f64,
+}
+
+fn world(sensors: u64) -> String {
+    format!("{sensors} sensors")
+}
 
 impl Case for Scheduled {
-    type Setting = Setting;
+    type Setting = Linear;
+    type Main = Step;
+    type Further = Bounds;
 
-    fn about() -> About {
-        About {
-            id: "cfwmd-scheduled",
-            title: "The rate of covariance feedback without the feedback",
-            caption: "A schedule of innovation variances, simulated once before deployment, meets the message budget and the error of covariance feedback (CFwMD2) without sending a covariance. Dashed: optimistic bounds for any filter that hears these messages.",
-            source: "",
-        }
+    const ABOUT: About = About {
+        id: "cfwmd-scheduled",
+        title: "The rate of covariance feedback without the feedback",
+        caption: "A schedule of innovation variances, simulated once before deployment, meets the message budget and the error of covariance \
+                  feedback (CFwMD2) without sending a covariance. Thin: optimistic bounds for any filter that receives these messages.",
+        source: "",
+    };
+    const PAIRS: &'static [(&'static str, &'static str)] = &[("scheduled", "CFwMD2"), ("scheduled", "CFwMD")];
+
+    fn setting() -> Linear {
+        Linear::scalar(4, &BUDGETS)
     }
 
-    fn setting() -> Setting {
-        Setting::scalar(4, BUDGETS.to_vec())
-    }
-
-    fn quicken(setting: &mut Setting) {
-        setting.quicken();
-    }
-
-    fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         let schemes = [
-            ("CFwMD", Scheme::Gaussian(Weighing::OwnFilter)),
-            ("CFwMD2", Scheme::Gaussian(Weighing::FusionCentre)),
+            CENSORED[0],
+            CENSORED[1],
             ("scheduled", Scheme::Gaussian(Weighing::Scheduled)),
         ];
-        let messages = setting.messages.iter();
-        let mut all = messages
-            .map(|l| run::<1>(context, setting, *l, &schemes))
-            .collect::<Result<Vec<_>, _>>()
-            .map(|e| e.concat())?;
-        let two = Setting {
-            sensors: 2,
-            ..setting.clone()
-        };
-        let suffixed = [
-            ("CFwMD, 2 sensors", schemes[0].1),
-            ("CFwMD2, 2 sensors", schemes[1].1),
-            ("scheduled, 2 sensors", schemes[2].1),
-        ];
-        all.extend(run::<1>(context, &two, 1.0, &suffixed)?);
+        let mut all = setting.at_budgets(context, &world(setting.sensors), &schemes)?;
+        if setting.sensors != 2 {
+            let two = Linear {
+                sensors: 2,
+                ..setting.clone()
+            };
+            all.extend(two.run(context, TWO, 1.0, &schemes)?);
+        }
         Ok(all)
     }
 
-    fn pairs() -> Vec<(&'static str, &'static str)> {
-        vec![
-            ("scheduled", "CFwMD2"),
-            ("scheduled", "CFwMD"),
-            ("scheduled, 2 sensors", "CFwMD, 2 sensors"),
-        ]
-    }
-
-    fn exact() -> &'static [&'static str] {
-        &["bound-"]
-    }
-
-    fn further(setting: &Setting, _: &Context<'_>, tables: Tables) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("l", "messages/step", "message budget"),
-            column("sensors", "", "number of sensors"),
-            column(
-                "bound_m",
-                "m",
-                "time-averaged position bound, innovations weighed by the sensor's own filter (CFwMD)",
-            ),
-            column("bound_centre_m", "m", "the same, weighed with the bound's own covariance (CFwMD2, scheduled)"),
-        ]);
-        let mut cases: Vec<(f64, u64)> = setting.messages.iter().map(|l| (*l, setting.sensors)).collect();
-        cases.extend([(1.0, 2), (2.0, 2)]);
-        for (l, sensors) in cases {
-            table.push(row![
+    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Bounds), Error> {
+        let row = |(l, sensors)| {
+            Ok(Bound {
                 l,
                 sensors,
-                bound(setting, l, sensors, true)?,
-                bound(setting, l, sensors, false)?
-            ])?;
-        }
-        Ok(tables.with("bound", table))
-    }
-
-    fn claims(_: &Setting, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let (summary, paired) = (tables.named("summary")?, tables.named("paired")?);
-        let mut claims = Vec::new();
-        for l in BUDGETS {
-            claims.extend(agrees(summary, "scheduled", l, &format!("cal/N4_l{l}"), 0.0, 0.01)?);
-            let rate = value(summary, "scheduled", l, "lbar")?;
-            claims.push(
-                Claim::near(
-                    format!("budget-l{l}"),
-                    format!("the schedule meets the budget l = {l} without covariance feedback"),
-                    rate,
-                    l,
-                    0.02,
-                )
-                .at_defaults(),
-            );
-            let ratio = value(summary, "scheduled", l, "pos_armse_m")? / value(summary, "CFwMD2", l, "pos_armse_m")?;
-            claims.push(
-                Claim::near(
-                    format!("error-l{l}"),
-                    format!("and the error of covariance feedback or less, l = {l} (ratio)"),
-                    ratio,
-                    0.99,
-                    0.03,
-                )
-                .at_defaults(),
-            );
-        }
-        claims.extend(agrees(summary, "scheduled, 2 sensors", 1.0, "cal/N2l1_sched", 0.0, 0.01)?);
-        claims.push(beats(paired, "scheduled, 2 sensors", "CFwMD, 2 sensors", 1.0, Part::Position)?);
-        let bounds = tables.named("bound")?;
-        for (l, sensors, expected) in [(1.0, 2_u64, 0.772), (1.0, 4, 0.750), (2.0, 4, 0.571)] {
-            let ours = first(bounds.only("l", l)?.only("sensors", sensors)?.numbers("bound_m")?)?;
-            claims.push(
-                Claim::near(
-                    format!("bound-N{sensors}-l{l}"),
-                    format!("information bound with {sensors} sensors at l = {l} (m)"),
-                    ours,
-                    expected,
-                    0.002,
-                )
-                .at_defaults(),
-            );
-        }
-        for l in BUDGETS {
-            let row = bounds.only("l", l)?.only("sensors", 4_u64)?;
-            for (scheme, column) in [
-                ("CFwMD", "bound_m"),
-                ("CFwMD2", "bound_centre_m"),
-                ("scheduled", "bound_centre_m"),
-            ] {
-                let ratio = value(summary, scheme, l, "pos_armse_m")? / first(row.numbers(column)?)?;
-                claims.push(
-                    Claim::at_least(
-                        format!("above-bound-{scheme}-l{l}"),
-                        format!("{scheme} does not beat its bound at l = {l} (ratio)"),
-                        ratio,
-                        0.995,
-                    )
-                    .at_defaults(),
-                );
-            }
-        }
-        let all = first(bounds.only("l", 2.0)?.only("sensors", 2_u64)?.numbers("bound_m")?)?;
-        claims.push(
-            Claim::near(
-                "bound-all",
-                "with everything sent the bound is the Kalman filter's error (m)",
-                all,
-                0.6646,
-                0.0005,
-            )
-            .at_defaults(),
-        );
-        Ok(claims)
-    }
-
-    fn plot(tables: &Tables) -> Result<Plot, Error> {
-        let four = |table: &Table| -> Result<Table, Error> {
-            let mut kept = Table::new(table.columns().to_vec());
-            for row in table.rows() {
-                if !matches!(&row[0], crate::legacy::Value::Text(name) if name.ends_with("sensors")) {
-                    kept.push(row.clone())?;
-                }
-            }
-            Ok(kept)
+                bound_m: bound(p, l, sensors, true)?,
+                bound_centre_m: bound(p, l, sensors, false)?,
+            })
         };
-        let summary = four(tables.named("summary")?)?;
-        let bounds = tables.named("bound")?.only("sensors", 4_u64)?;
-        let error = by_budget(&summary, "Position error", "pos_armse_m", "pos_se", "time-averaged RMSE (m)")?
-            .with(Layer::dashed("bound on CFwMD", bounds.points("l", "bound_m")?).coloured(0))
-            .with(Layer::dashed("bound on the others", bounds.points("l", "bound_centre_m")?).coloured(1));
-        let rate = by_budget(&summary, "Rate", "lbar", "lbar_se", "messages a step")?
-            .with(Layer::dashed("budget", vec![(1.0, 1.0), (3.0, 3.0)]).coloured(7))
-            .legend(crate::plot::Legend::TopLeft);
-        Ok(Plot::grid(2, vec![error, rate]))
+        let own = p.messages.iter().map(|l| (*l, p.sensors));
+        let cases = own.chain([(1.0, 2), (2.0, 2)]).filter(|_| p.noise_variances.len() == 1);
+        let bound = cases.map(row).collect::<Result<_, Error>>()?;
+        Ok((steps(all), Bounds { bound }))
+    }
+
+    fn claims(rows: &Rows<Step, Bounds>, claims: &mut Claims) {
+        let name = |scheme: &str| format!("{scheme}, 4 sensors");
+        let bounds = &rows.further.bound;
+        for l in BUDGETS {
+            let rate = rows.at(&name("scheduled"), l).map(|r| r.rate.value);
+            let what = format!("the schedule meets the budget l = {l} without covariance feedback");
+            claims.near(format!("budget-l{l}"), what, rate, l, 0.02);
+            let ratio = rows.ratio(&name("scheduled"), &name("CFwMD2"), l);
+            let what = format!("and the error of covariance feedback or less, l = {l} (ratio)");
+            claims.near(format!("error-l{l}"), what, ratio, 0.99, 0.03);
+            let bound = bounds.iter().find(|b| b.l == l && b.sensors == 4);
+            for scheme in ["CFwMD", "CFwMD2", "scheduled"] {
+                let error = rows.at(&name(scheme), l).map(|r| r.position_rmse.value);
+                let own = bound.map(|b| if scheme == "CFwMD" { b.bound_m } else { b.bound_centre_m });
+                let ratio = error.zip(own).map(|(error, bound)| error / bound);
+                let what = format!("{scheme} does not beat its bound at l = {l} (ratio)");
+                claims.at_least(format!("above-bound-{scheme}-l{l}"), what, ratio, 0.995);
+            }
+        }
+        rows.beats(claims, ("scheduled", "CFwMD"), (TWO, 1.0), &[Part::Position]);
+        let key = |b: &Bound| (format!("N = {}, l = {}", b.sensors, b.l), b.bound_m);
+        claims.references("bound", "information bound of CFwMD (m)", bounds, key);
+    }
+
+    fn plot(setting: &Linear, rows: &Rows<Step, Bounds>) -> Plot {
+        let own = world(setting.sensors);
+        let all: Vec<&Summary> = rows
+            .summary
+            .iter()
+            .filter(|r| r.run.world.as_ref() == Some(&own))
+            .collect();
+        let bounds = || {
+            rows.further
+                .bound
+                .iter()
+                .filter(|b| b.sensors == setting.sensors)
+                .take(setting.messages.len())
+        };
+        let error = by_budget(&all, "Position error", "time-averaged RMSE (m)", |r| r.position_rmse)
+            .with(Layer::dashed("bound on CFwMD", points(bounds(), |b| (b.l, b.bound_m))).coloured(0))
+            .with(Layer::dashed("bound on the others", points(bounds(), |b| (b.l, b.bound_centre_m))).coloured(1));
+        let budget = setting.messages.iter().map(|l| (*l, *l)).collect();
+        let rate =
+            by_budget(&all, "Rate", "messages a step", |r| r.rate).with(Layer::dashed("budget", budget).coloured(7));
+        Plot::grid(2, vec![error, rate])
     }
 }
 
 /// Time-averaged position bound: expected Fisher information of each sensor at the bound's own covariance.
-fn bound(setting: &Setting, messages: f64, sensors: u64, own_filter: bool) -> Result<f64, Error> {
+fn bound(setting: &Linear, messages: f64, sensors: u64, own_filter: bool) -> Result<f64, Error> {
     let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance).map_err(Error::failed)?;
-    let noise = setting.noise_variances.first().copied().unwrap_or(1.0);
+    let noise = setting.noise_variances[0];
     let eta = fewbits_cfwmd::threshold::threshold(messages / sensors as f64, 1).map_err(Error::failed)?;
-    let (f, q) = (
-        *fewbits_core::LinearDynamics::transition(&dynamics),
-        *fewbits_core::LinearDynamics::noise_covariance(&dynamics),
-    );
-    let mut bound = Matrix2::identity() * setting.initial_variance;
+    let (f, q) = (*dynamics.transition(), *dynamics.noise_covariance());
+    let mut bound = *start(setting)?.covariance();
     let mut own = bound;
     let mut total = 0.0;
     for _ in 0..setting.steps {
@@ -362,8 +241,8 @@ fn bound(setting: &Setting, messages: f64, sensors: u64, own_filter: bool) -> Re
             let density = normal::log_pdf_with(mu, 0.0, p).exp();
             information += weight * density * fisher_information(mu, half_width, noise).map_err(Error::failed)?;
         }
-        let heard = Matrix2::new(sensors as f64 * information, 0.0, 0.0, 0.0);
-        bound = cramer_rao::covariance_step(&dynamics, &bound, &heard).map_err(Error::failed)?;
+        let received = Matrix2::new(sensors as f64 * information, 0.0, 0.0, 0.0);
+        bound = cramer_rao::covariance_step(&dynamics, &bound, &received).map_err(Error::failed)?;
         total += bound[(0, 0)];
     }
     Ok((total / setting.steps as f64).sqrt())
@@ -372,161 +251,98 @@ fn bound(setting: &Setting, messages: f64, sensors: u64, own_filter: bool) -> Re
 /// Error against cost.
 pub(super) struct Cost;
 
-const CLOUDS: [(&str, usize); 3] = [("PF 100", 100), ("PF 300", 300), ("PF 1000", 1000)];
-const MIXTURES: [(&str, usize); 3] = [("RBPF 10", 10), ("RBPF 30", 30), ("RBPF 100", 100)];
+const SCHEMES: [(&str, Scheme); 7] = [
+    ("ADF", CENSORED[0].1),
+    ("PF 100", Scheme::Particles(100, Weighing::OwnFilter)),
+    ("PF 300", Scheme::Particles(300, Weighing::OwnFilter)),
+    ("PF 1000", Scheme::Particles(1000, Weighing::OwnFilter)),
+    ("RBPF 10", Scheme::RaoBlackwell(10)),
+    ("RBPF 30", Scheme::RaoBlackwell(30)),
+    ("RBPF 100", Scheme::RaoBlackwell(100)),
+];
 
-impl Cost {
-    fn schemes() -> Vec<(&'static str, Scheme)> {
-        let mut schemes = vec![("ADF", Scheme::Gaussian(Weighing::OwnFilter))];
-        schemes.extend(CLOUDS.map(|(name, n)| (name, Scheme::Particles(n, Weighing::OwnFilter))));
-        schemes.extend(MIXTURES.map(|(name, n)| (name, Scheme::RaoBlackwell(n))));
-        schemes
-    }
+/// Times beside the runs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Times {
+    /// Time of a fusion step.
+    #[schemars(extend("volatile" = true))]
+    time: Vec<Time>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+struct Time {
+    /// Filter.
+    scheme: &'static str,
+    /// Time of one fusion step, best of the repetitions.
+    #[schemars(extend("unit" = "us"))]
+    time_us: f64,
+    /// Time over that of the Gaussian belief.
+    relative: f64,
 }
 
 impl Case for Cost {
-    type Setting = Setting;
+    type Setting = Linear;
+    type Main = Step;
+    type Further = Times;
 
-    fn about() -> About {
-        About {
-            id: "cfwmd-cost",
-            title: "Error against cost",
-            caption: "The Gaussian belief with exact moments (ADF) is as accurate as a thousand particles at a small fraction of the time; thirty Rao-Blackwellised particles are on a par. Times are per step of fusion, draws of the experiment excluded.",
-            source: "",
-        }
+    const ABOUT: About = About {
+        id: "cfwmd-cost",
+        title: "Error against cost",
+        caption: "The Gaussian belief with exact moments (ADF) is as accurate as a thousand particles (PF) at a small fraction of the time; \
+                  thirty Rao-Blackwellised particles (RBPF) are on a par. Times are per step of fusion, draws of the experiment excluded.",
+        source: "",
+    };
+    const PAIRS: &'static [(&'static str, &'static str)] = &[("PF 1000", "ADF"), ("RBPF 30", "ADF"), ("ADF", "PF 100")];
+    const MEASURES_TIME: bool = true;
+
+    fn setting() -> Linear {
+        Linear::scalar(2, &[1.0])
     }
 
-    fn setting() -> Setting {
-        Setting::scalar(2, vec![1.0])
+    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+        setting.at_budgets(context, "", &SCHEMES)
     }
 
-    fn quicken(setting: &mut Setting) {
-        setting.quicken();
-    }
-
-    fn measures_time() -> bool {
-        true
-    }
-
-    fn exact() -> &'static [&'static str] {
-        &["cheaper"]
-    }
-
-    fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        let messages = setting.messages.iter();
-        messages
-            .map(|l| run::<1>(context, setting, *l, &Cost::schemes()))
-            .collect::<Result<Vec<_>, _>>()
-            .map(|e| e.concat())
-    }
-
-    fn further(setting: &Setting, context: &Context<'_>, tables: Tables) -> Result<Tables, Error> {
-        let mut table = Table::new([
-            column("scheme", "", "filter"),
-            column("time_us", "us", "time of one fusion step, best of the repetitions"),
-            column("relative", "", "time over that of the Gaussian belief"),
-        ]);
-        let l = setting.messages.first().copied().unwrap_or(1.0);
-        let bench = super::linear::Stopwatch::new(context, setting, l)?;
-        let mut base = 0.0;
-        for (name, scheme) in Cost::schemes() {
-            let mut best = f64::INFINITY;
-            for _ in 0..REPETITIONS {
-                let started = Instant::now();
-                let steps = black_box(bench.run(scheme)?);
-                best = best.min(started.elapsed().as_secs_f64() / steps as f64);
-            }
-            if name == "ADF" {
-                base = best;
-            }
-            table.push(row![name, best * 1e6, best / base])?;
-        }
-        Ok(tables.with_volatile("time", table))
-    }
-
-    fn pairs() -> Vec<(&'static str, &'static str)> {
-        vec![("PF 1000", "ADF"), ("RBPF 30", "ADF"), ("ADF", "PF 100")]
-    }
-
-    fn claims(_: &Setting, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let (summary, times) = (tables.named("summary")?, tables.named("time")?);
-        let mut claims = Vec::new();
-        for (scheme, reference) in [
-            ("ADF", "ADF"),
-            ("PF 100", "PF100"),
-            ("PF 300", "PF300"),
-            ("PF 1000", "PF1000"),
-            ("RBPF 10", "RB10"),
-            ("RBPF 30", "RB30"),
-            ("RBPF 100", "RB100"),
-        ] {
-            claims.extend(agrees(summary, scheme, 1.0, &format!("cost/{reference}"), 0.0, 0.01)?);
-        }
-        let relative =
-            |scheme: &str| -> Result<f64, Error> { first(times.only("scheme", scheme)?.numbers("relative")?) };
-        claims.push(Claim::at_least(
-            "cheaper",
-            "the Gaussian belief is at least 15 times cheaper than 1000 particles",
-            relative("PF 1000")?,
-            15.0,
-        ));
-        let ratio = |scheme: &str| -> Result<f64, Error> {
-            Ok(value(summary, scheme, 1.0, "pos_armse_m")? / value(summary, "ADF", 1.0, "pos_armse_m")?)
+    fn tables(p: &Linear, all: &[Ensemble], _: bool, context: &Context<'_>) -> Result<(Vec<Step>, Times), Error> {
+        let times = time_of_steps(context, p, p.messages[0], &SCHEMES)?;
+        let base = times[0].1;
+        let row = |(scheme, seconds): (_, f64)| Time {
+            scheme,
+            time_us: seconds * 1e6,
+            relative: seconds / base,
         };
-        claims.push(
-            Claim::at_least(
-                "not-worse",
-                "and not worse: RMSE of 1000 particles over that of the Gaussian belief",
-                ratio("PF 1000")?,
-                0.995,
-            )
-            .at_defaults(),
-        );
-        claims.push(
-            Claim::near(
-                "rao-blackwell",
-                "30 Rao-Blackwellised particles are within 1.5% of it",
-                ratio("RBPF 30")?,
-                1.0,
-                0.015,
-            )
-            .at_defaults(),
-        );
-        claims
-            .push(Claim::above("too-few", "100 plain particles are not enough", ratio("PF 100")?, 1.03).at_defaults());
-        claims.push(
-            Claim::near(
-                "consistent",
-                "squared position error over its variance averages to one",
-                value(summary, "ADF", 1.0, "nees")?,
-                1.0,
-                0.06,
-            )
-            .at_defaults(),
-        );
-        Ok(claims)
+        let time = times.into_iter().map(row).collect();
+        Ok((steps(all), Times { time }))
     }
 
-    fn plot(tables: &Tables) -> Result<Plot, Error> {
-        let (summary, times) = (tables.named("summary")?, tables.named("time")?);
-        let mut panel = Panel::new(
-            "Position error against time",
-            Axis::log("time a step (us)"),
-            Axis::linear("time-averaged RMSE (m)"),
-        );
-        for (colour, scheme) in summary.texts("scheme")?.iter().enumerate() {
-            let at = summary.only("scheme", scheme.as_str())?;
-            let time = times.only("scheme", scheme.as_str())?.numbers("time_us")?[0];
-            let point = vec![(time, first(at.numbers("pos_armse_m")?)?)];
-            panel = panel.with(
-                Layer::points(scheme.as_str(), point)
-                    .with_errors(at.numbers("pos_se")?)
-                    .coloured(colour),
-            );
-        }
-        Ok(Plot::of(panel))
+    fn claims(rows: &Rows<Step, Times>, claims: &mut Claims) {
+        let ratio = |scheme: &str| rows.ratio(scheme, "ADF", 1.0);
+        let what = "1000 particles are not better than the Gaussian belief (RMSE over that of the Gaussian belief)";
+        claims.at_least("not-worse", what, ratio("PF 1000"), 0.995);
+        let what = "30 Rao-Blackwellised particles are within 1.5% of it";
+        claims.near("rao-blackwell", what, ratio("RBPF 30"), 1.0, 0.015);
+        claims.above("too-few", "100 plain particles are not enough", ratio("PF 100"), 1.03);
+        let nees = rows.at("ADF", 1.0).and_then(|r| r.nees);
+        claims.within("consistent", "squared position error over its variance averages to one", nees, 1.0, 4.0);
+    }
+
+    fn always(_: &Linear, rows: &Rows<Step, Times>, claims: &mut Claims) {
+        let relative = rows
+            .further
+            .time
+            .iter()
+            .find(|t| t.scheme == "PF 1000")
+            .map(|t| t.relative);
+        let what = "the Gaussian belief is at least 15 times cheaper than 1000 particles";
+        claims.at_least("cheaper", what, relative, 15.0);
+    }
+
+    fn plot(setting: &Linear, rows: &Rows<Step, Times>) -> Plot {
+        let axes = (Axis::log("time a step (µs)"), Axis::linear("time-averaged RMSE (m)"));
+        let marks = rows.further.time.iter().enumerate().filter_map(|(colour, time)| {
+            let at = rows.at(time.scheme, setting.messages[0])?;
+            Some(Layer::measured(time.scheme, [at], |r| (time.time_us, r.position_rmse)).coloured(colour))
+        });
+        Plot::of(Panel::new("Position error against time", axes.0, axes.1).with_all(marks))
     }
 }
-
-/// Repetitions of a timed run; the best is kept, as others share the machine.
-const REPETITIONS: usize = 5;

@@ -2,9 +2,9 @@
 
 mod scalar_only;
 
-use super::ensemble::{Ensemble, Record};
-use crate::error::Error;
-use crate::legacy::Context;
+use super::rows::{Ensemble, Record, simulate};
+use super::setting::Linear;
+use crate::{Context, Error};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::no_feedback::{ImputedBelief, JointBelief, LocalSensor, imputing, joint};
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion, OwnStep, Weighing};
@@ -16,80 +16,26 @@ use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace, kalman};
 use fewbits_models::{LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::linalg::semidefinite_factor;
-use nalgebra::{SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rand::RngExt;
 use rand_distr::StandardNormal;
-use serde::{Deserialize, Serialize};
-
-/// Parameters of a linear figure.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Setting {
-    /// Monte-Carlo trials.
-    pub(super) trials: u64,
-    /// Time steps of a trial.
-    pub(super) steps: u64,
-    /// Number of sensors `N`.
-    pub(super) sensors: u64,
-    /// Message budgets `l`.
-    pub(super) messages: Vec<f64>,
-    /// Variance of the acceleration (m^2/s^4).
-    pub(super) acceleration_variance: f64,
-    /// Noise variance of each measured component (m^2; m^2/s^2).
-    pub(super) noise_variances: Vec<f64>,
-    /// Initial variance of position and velocity; zero is a known start, and a positive one draws the truth too.
-    pub(super) initial_variance: f64,
-    /// Particles of particle schemes.
-    pub(super) particles: u64,
-}
-
-impl Setting {
-    /// The scalar experiment with `N` sensors.
-    pub(super) fn scalar(sensors: u64, messages: Vec<f64>) -> Self {
-        Self {
-            trials: 5000,
-            steps: 20,
-            sensors,
-            messages,
-            acceleration_variance: 4.0,
-            noise_variances: vec![1.0],
-            initial_variance: 0.0,
-            particles: 1000,
-        }
-    }
-
-    /// The vector experiment with `N` sensors. The acceleration variance that fits the printed table is 1, not the 4 of the text.
-    pub(super) fn vector(sensors: u64, messages: Vec<f64>) -> Self {
-        Self {
-            acceleration_variance: 1.0,
-            noise_variances: vec![2.0, 4.0],
-            ..Self::scalar(sensors, messages)
-        }
-    }
-
-    /// About a second of work.
-    pub(super) fn quicken(&mut self) {
-        self.trials = 100;
-        self.particles = 100;
-    }
-}
+use std::hint::black_box;
+use std::time::Instant;
 
 /// How a fusion centre without feedback treats silence.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Method {
+pub enum Method {
     /// Not at all.
     Ignored,
     /// Joint Gaussian belief about the state and the sensors' estimates.
     Joint,
     /// Withheld measurements imputed, so many particles.
     Imputed(usize),
-    /// The publication's printed likelihood of silence, `1 - l/N` whatever the state: it cancels in the normalisation.
-    Printed,
 }
 
 /// What is sent, and what the fusion centre makes of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Scheme {
+pub enum Scheme {
     /// Everything is sent.
     All,
     /// A coin decides.
@@ -114,8 +60,18 @@ pub(super) enum Scheme {
     Unconditional,
 }
 
+impl Scheme {
+    fn needs_scalars(self) -> bool {
+        matches!(self, Self::RaoBlackwell(_) | Self::Trigger(_) | Self::Centred | Self::Unconditional)
+    }
+
+    fn needs_schedule(self) -> bool {
+        matches!(self, Self::Gaussian(Weighing::Scheduled) | Self::Particles(_, Weighing::Scheduled))
+    }
+}
+
 /// One linear experiment at one budget.
-pub(super) struct Linear<const M: usize> {
+pub(super) struct Experiment<const M: usize> {
     dynamics: LinearGaussian<2, 1>,
     sensor: LinearSensor<2, M>,
     sensors: usize,
@@ -129,6 +85,16 @@ pub(super) struct Linear<const M: usize> {
     open_loop: Vec<SMatrix<f64, 2, 2>>,
     /// Scheduled innovation rule, where a scheme asks for it.
     scheduled: Vec<CensoringRule<M>>,
+    /// Whether sensors report by their own estimates in any scheme.
+    local: bool,
+}
+
+/// The belief about the state before the first step.
+pub(super) fn start(setting: &Linear) -> Result<Gaussian<2>, Error> {
+    let (position, velocity) = (setting.start_variances[0], setting.start_variances[1]);
+    let common = setting.start_correlation * (position * velocity).sqrt();
+    let covariance = Matrix2::new(position, common, common, velocity);
+    Ok(Gaussian::new(Vector2::new(setting.start[0], setting.start[1]), covariance)?)
 }
 
 type Sensors<const M: usize> = Network<LinearSensor<2, M>, 2, M>;
@@ -148,7 +114,7 @@ pub(super) trait Dimension<const M: usize> {
     /// Noise model of one sensor.
     fn sensor(variances: &[f64]) -> Result<LinearSensor<2, M>, Error>;
     /// Schemes with particles or with closed forms of their own.
-    fn special(linear: &Linear<M>, scheme: Scheme, track: Track<'_, M>) -> Result<(), Error>;
+    fn special(experiment: &Experiment<M>, scheme: Scheme, track: Track<'_, M>) -> Result<(), Error>;
 }
 
 /// The dimension of the measurement, as a type.
@@ -177,59 +143,52 @@ fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
     Error::failed(error)
 }
 
-/// Runs schemes over the trials of a setting at one budget, on common random numbers.
+/// Runs schemes over the trials of a setting at one budget, on common random numbers. Schemes for scalar measurements are left
+/// out where position and velocity are measured.
 pub(super) fn run<const M: usize>(
     context: &Context<'_>,
-    setting: &Setting,
+    setting: &Linear,
+    world: &str,
     messages: f64,
-    schemes: &[(&str, Scheme)],
+    schemes: &[(&'static str, Scheme)],
 ) -> Result<Vec<Ensemble>, Error>
 where
     Measured: Dimension<M>,
 {
-    let needs_schedule = schemes
+    let schemes: Vec<_> = schemes
         .iter()
-        .any(|(_, s)| matches!(s, Scheme::Gaussian(Weighing::Scheduled) | Scheme::Particles(_, Weighing::Scheduled)));
-    let linear = Linear::<M>::new(context, setting, messages, needs_schedule)?;
-    // One stream for all figures and budgets: schemes differ by what they do, not by their luck.
-    let stream = context.stream("cfwmd-linear");
-    let trials = context
-        .monte_carlo(stream, setting.trials)
-        .run(|trial| -> Result<_, Error> {
-            let draws = linear.draw(trial.stream)?;
-            schemes
-                .iter()
-                .map(|(_, scheme)| linear.trial(*scheme, &draws, trial.stream.named("scheme")))
-                .collect::<Result<Vec<_>, _>>()
-        })?;
-    let mut ensembles: Vec<_> = schemes
-        .iter()
-        .map(|(name, _)| Ensemble {
-            scheme: (*name).to_owned(),
-            messages,
-            records: Vec::with_capacity(trials.len()),
-        })
+        .copied()
+        .filter(|(_, s)| M == 1 || !s.needs_scalars())
         .collect();
-    for records in trials {
-        for (ensemble, record) in ensembles.iter_mut().zip(records) {
-            ensemble.records.push(record);
-        }
-    }
-    Ok(ensembles)
+    let experiment = Experiment::<M>::new(context, setting, messages, &schemes)?;
+    // One stream for all figures and budgets: schemes differ by what they do, not by their luck.
+    simulate(
+        context,
+        context.stream("cfwmd-linear"),
+        setting.trials,
+        (world, messages),
+        &schemes,
+        |stream| experiment.draw(stream),
+        |scheme, draws, stream| experiment.trial(*scheme, draws, stream.named("scheme")),
+    )
 }
 
-impl<const M: usize> Linear<M>
+impl<const M: usize> Experiment<M>
 where
     Measured: Dimension<M>,
 {
-    fn new(context: &Context<'_>, setting: &Setting, messages: f64, schedule: bool) -> Result<Self, Error> {
+    fn new(
+        context: &Context<'_>,
+        setting: &Linear,
+        messages: f64,
+        schemes: &[(&'static str, Scheme)],
+    ) -> Result<Self, Error> {
         let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance).map_err(failed)?;
         let sensor = Measured::sensor(&setting.noise_variances)?;
         let sensors = setting.sensors as usize;
         let budget = Budget::new(messages, sensors).map_err(failed)?;
         let threshold = budget.threshold(M).map_err(failed)?;
-        fewbits_numerics::error::non_negative("initial_variance", setting.initial_variance)?;
-        let start = Gaussian::new(Vector2::new(0.0, 10.0), SMatrix::identity() * setting.initial_variance)?;
+        let start = start(setting)?;
         let steps = setting.steps as usize;
         let mut recursion = OwnRecursion::new(&start);
         let (mut own, mut open_loop) = (Vec::new(), Vec::new());
@@ -241,7 +200,7 @@ where
             prior = kalman::predict(&dynamics, &prior);
             open_loop.push(*prior.covariance());
         }
-        let mut linear = Self {
+        let mut experiment = Self {
             dynamics,
             sensor,
             sensors,
@@ -252,20 +211,23 @@ where
             own,
             open_loop,
             scheduled: Vec::new(),
+            local: schemes
+                .iter()
+                .any(|(_, s)| matches!(s, Scheme::NoFeedback(_) | Scheme::Centred | Scheme::Unconditional)),
         };
-        if schedule {
-            let network = linear.network(0.0)?;
+        if schemes.iter().any(|(_, s)| s.needs_schedule()) {
+            let network = experiment.network(0.0)?;
             let mut rng = context.stream("cfwmd-schedule").rng();
             let covariances =
-                expected_covariances(&mut rng, &network, &linear.dynamics, &linear.start, steps, SCHEDULE_RUNS)
+                expected_covariances(&mut rng, &network, &experiment.dynamics, &experiment.start, steps, SCHEDULE_RUNS)
                     .map_err(failed)?;
             let rule = |p: &SMatrix<f64, 2, 2>| {
                 let predicted = Gaussian::from_trusted_parts(Vector2::zeros(), *p);
                 network.rule_under(0, &predicted).map_err(failed)
             };
-            linear.scheduled = covariances.iter().map(rule).collect::<Result<_, _>>()?;
+            experiment.scheduled = covariances.iter().map(rule).collect::<Result<_, _>>()?;
         }
-        Ok(linear)
+        Ok(experiment)
     }
 
     fn network(&self, loss: f64) -> Result<Sensors<M>, Error> {
@@ -294,15 +256,15 @@ where
             let measurements: Vec<_> = (0..self.sensors)
                 .map(|_| self.sensor.sample(&mut noise, &state))
                 .collect();
-            let reports = halves
-                .iter_mut()
-                .zip(&measurements)
-                .map(|(half, z)| half.step(&mut noise, &self.dynamics, z).map(Observation::from))
-                .collect::<Result<_, _>>()
-                .map_err(failed)?;
+            if self.local {
+                let reports = halves.iter_mut().zip(&measurements);
+                let reports = reports.map(|(half, z)| half.step(&mut noise, &self.dynamics, z).map(Observation::from));
+                draws
+                    .no_feedback
+                    .push(reports.collect::<Result<_, _>>().map_err(failed)?);
+            }
             draws.truth.push(state);
             draws.measurements.push(measurements);
-            draws.no_feedback.push(reports);
             draws.coins.push((0..self.sensors).map(|_| coins.random()).collect());
             draws.losses.push((0..self.sensors).map(|_| losses.random()).collect());
         }
@@ -352,7 +314,7 @@ where
         for (k, observations) in track.draws.no_feedback.iter().enumerate() {
             let received = observations.iter().filter(|o| o.received().is_some()).count();
             match method {
-                Method::Ignored | Method::Printed => {
+                Method::Ignored => {
                     belief = network
                         .fuse_received(&kalman::predict(&self.dynamics, &belief), observations)?
                         .0;
@@ -478,36 +440,48 @@ where
     }
 }
 
-/// The filters alone, for timing: trials drawn beforehand, the sensors' comparisons included.
-pub(super) struct Stopwatch {
-    linear: Linear<1>,
-    draws: Vec<Draws<1>>,
-    stream: Stream,
+/// Repetitions of a timed run; the best is kept, as others share the machine.
+const REPETITIONS: usize = 5;
+
+/// Seconds of one step of each scheme, the sensors' comparisons included and the experiment's draws excluded.
+pub(super) fn time_of_steps(
+    context: &Context<'_>,
+    setting: &Linear,
+    messages: f64,
+    schemes: &[(&'static str, Scheme)],
+) -> Result<Vec<(&'static str, f64)>, Error> {
+    match setting.noise_variances.len() {
+        1 => time::<1>(context, setting, messages, schemes),
+        _ => time::<2>(context, setting, messages, schemes),
+    }
 }
 
-impl Stopwatch {
-    /// Twenty trials of a setting.
-    pub(super) fn new(context: &Context<'_>, setting: &Setting, messages: f64) -> Result<Self, Error> {
-        let linear = Linear::<1>::new(context, setting, messages, false)?;
-        let stream = context.stream("cfwmd-linear");
-        let draws = (0..20)
-            .map(|trial| linear.draw(stream.indexed(trial)))
-            .collect::<Result<_, _>>()?;
-        Ok(Self { linear, draws, stream })
-    }
-
-    /// Runs a scheme over all trials; the number of steps done.
-    pub(super) fn run(&self, scheme: Scheme) -> Result<usize, Error> {
-        let mut steps = 0;
-        for draws in &self.draws {
-            steps += self
-                .linear
-                .trial(scheme, draws, self.stream.named("scheme"))?
-                .position
-                .len();
+fn time<const M: usize>(
+    context: &Context<'_>,
+    setting: &Linear,
+    messages: f64,
+    schemes: &[(&'static str, Scheme)],
+) -> Result<Vec<(&'static str, f64)>, Error>
+where
+    Measured: Dimension<M>,
+{
+    let experiment = Experiment::<M>::new(context, setting, messages, schemes)?;
+    let stream = context.stream("cfwmd-linear");
+    let draws = (0..20).map(|trial| experiment.draw(stream.indexed(trial)));
+    let draws = draws.collect::<Result<Vec<_>, _>>()?;
+    let mut times = Vec::new();
+    for (name, scheme) in schemes.iter().filter(|(_, s)| M == 1 || !s.needs_scalars()) {
+        let mut best = f64::INFINITY;
+        for _ in 0..REPETITIONS {
+            let started = Instant::now();
+            for draws in &draws {
+                black_box(experiment.trial(*scheme, draws, stream.named("scheme"))?);
+            }
+            best = best.min(started.elapsed().as_secs_f64() / (draws.len() * experiment.steps) as f64);
         }
-        Ok(steps)
+        times.push((*name, best));
     }
+    Ok(times)
 }
 
 /// Offline runs behind a scheduled threshold.
@@ -519,11 +493,11 @@ impl Dimension<1> for Measured {
         LinearSensor::scalar(Vector2::new(1.0, 0.0), variance).map_err(failed)
     }
 
-    fn special(linear: &Linear<1>, scheme: Scheme, mut track: Track<'_, 1>) -> Result<(), Error> {
+    fn special(experiment: &Experiment<1>, scheme: Scheme, mut track: Track<'_, 1>) -> Result<(), Error> {
         match scheme {
-            Scheme::RaoBlackwell(count) => linear.rao_blackwell(&mut track, count),
-            Scheme::Trigger(weighing) => linear.trigger(&mut track, weighing),
-            _ => linear.heuristic(&mut track, scheme == Scheme::Centred),
+            Scheme::RaoBlackwell(count) => experiment.rao_blackwell(&mut track, count),
+            Scheme::Trigger(weighing) => experiment.trigger(&mut track, weighing),
+            _ => experiment.heuristic(&mut track, scheme == Scheme::Centred),
         }
     }
 }
@@ -538,7 +512,7 @@ impl Dimension<2> for Measured {
         LinearSensor::new(SMatrix::identity(), covariance).map_err(failed)
     }
 
-    fn special(_: &Linear<2>, scheme: Scheme, _: Track<'_, 2>) -> Result<(), Error> {
+    fn special(_: &Experiment<2>, scheme: Scheme, _: Track<'_, 2>) -> Result<(), Error> {
         Err(Error::Table(format!("{scheme:?} exists for scalar measurements only")))
     }
 }

@@ -1,200 +1,207 @@
 //! No feedback, scalar measurements: figure 3 and what the printed likelihood is worth.
 
 use super::case::Case;
-use super::ensemble::{Ensemble, Part, agrees, beats, first, ordered_at_every_step, value};
-use super::linear::{Method, Scheme, Setting, run};
-use crate::error::Error;
-use crate::legacy::Tables;
-use crate::legacy::claim::Claim;
-use crate::legacy::{About, Context};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use super::linear::{Method, Scheme, start};
+use super::pictures::{BOTH, by_step};
+use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
+use super::setting::{Linear, Setting};
+use crate::plot::{Axis, Layer, Panel, Plot};
+use crate::{About, Claims, Context, Error};
+use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
+use fewbits_models::{LinearSensor, constant_velocity_1d};
+use fewbits_numerics::normal;
+use fewbits_numerics::quadrature::gauss_legendre;
+use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// Figure 3.
 pub(super) struct Fig3;
 
 impl Case for Fig3 {
-    type Setting = Setting;
+    type Setting = Linear;
+    type Main = Step;
+    type Further = Nothing;
 
-    fn about() -> About {
-        About {
-            id: "cfwmd-fig3",
-            title: "Scalar measurements, no feedback",
-            caption: "The order of the published figure, obtained with the correct filter: a joint Gaussian belief over the state and the sensors' own estimates. With the printed likelihood CFwMD would coincide with CFoMD.",
-            source: "CFwMD paper, figure 3",
-        }
+    const ABOUT: About = About {
+        id: "cfwmd-fig3",
+        title: "Scalar measurements, no feedback",
+        caption: "The order of the published figure, obtained with the correct filter: a joint Gaussian belief over the state and the sensors' \
+                  own estimates. With the printed likelihood CFwMD would coincide with CFoMD.",
+        source: "CFwMD paper, figure 3",
+    };
+    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("CFoMD", "random")];
+
+    fn setting() -> Linear {
+        Linear::scalar(2, &[1.0])
     }
 
-    fn setting() -> Setting {
-        Setting::scalar(2, vec![1.0])
-    }
-
-    fn quicken(setting: &mut Setting) {
-        setting.quicken();
-    }
-
-    fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         let schemes = [
             ("all", Scheme::All),
             ("CFwMD", Scheme::NoFeedback(Method::Joint)),
             ("CFoMD", Scheme::NoFeedback(Method::Ignored)),
             ("random", Scheme::Random),
         ];
-        let messages = setting.messages.iter();
-        messages
-            .map(|l| run::<1>(context, setting, *l, &schemes))
-            .collect::<Result<Vec<_>, _>>()
-            .map(|e| e.concat())
+        setting.at_budgets(context, "", &schemes)
     }
 
-    fn pairs() -> Vec<(&'static str, &'static str)> {
-        vec![("CFwMD", "CFoMD"), ("CFoMD", "random")]
+    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
+        Ok((steps(all), Nothing {}))
     }
 
-    fn claims(_: &Setting, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let (summary, paired) = (tables.named("summary")?, tables.named("paired")?);
-        let mut claims = agrees(summary, "CFoMD", 1.0, "fig3/CFoMD", 0.0, 0.01)?;
-        claims.extend(agrees(summary, "CFwMD", 1.0, "fig3/ADFaug_1500", 0.0, 0.01)?);
-        for (column, error) in [("pos_rmse_m", "pos_se"), ("vel_rmse_mps", "vel_se")] {
-            claims.push(ordered_at_every_step(&tables.main, &["all", "CFwMD", "CFoMD", "random"], 1.0, column, error)?);
-        }
-        for part in [Part::Position, Part::Velocity] {
-            claims.push(beats(paired, "CFwMD", "CFoMD", 1.0, part)?);
-        }
-        claims.push(beats(paired, "CFoMD", "random", 1.0, Part::Position)?);
-        let rate = value(summary, "CFwMD", 1.0, "lbar")?;
-        claims.push(
-            Claim::near("rate-exact", "without feedback the rate is exactly the budget", rate, 1.0, 0.012)
-                .at_defaults(),
-        );
-        let gain = 1.0 - value(summary, "CFwMD", 1.0, "pos_armse_m")? / value(summary, "CFoMD", 1.0, "pos_armse_m")?;
-        claims.push(
-            Claim::near("gain", "hearing silence lowers the position RMSE by a tenth", gain, 0.105, 0.025)
-                .at_defaults(),
-        );
-        Ok(claims)
+    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+        rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], ("", 1.0), &BOTH);
+        rows.beats(claims, ("CFwMD", "CFoMD"), ("", 1.0), &BOTH);
+        rows.beats(claims, ("CFoMD", "random"), ("", 1.0), &[Part::Position]);
+        let rate = rows.at("CFwMD", 1.0).map(|r| r.rate);
+        claims.within("rate-exact", "without feedback the rate is exactly the budget", rate, 1.0, 4.0);
+        let gain = rows.ratio("CFwMD", "CFoMD", 1.0).map(|r| 1.0 - r);
+        claims.near("gain", "using silence lowers the position RMSE by a tenth", gain, 0.105, 0.025);
+    }
+
+    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
+        by_step(&rows.main)
     }
 }
 
-/// Six ways to hear silence without feedback.
+/// Ways to use silence without feedback.
 pub(super) struct NoFeedbackFigure;
 
+/// What the printed likelihood says.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Literal {
+    /// The printed likelihood of silence over the law that it assumes.
+    printed_likelihood: Vec<Printed>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+struct Printed {
+    /// Time step.
+    k: usize,
+    /// Position less its mean.
+    #[schemars(extend("unit" = "m"))]
+    offset: f64,
+    /// Probability of silence as printed: averaged over an own estimate that scatters about this position.
+    probability: f64,
+}
+
+/// The printed likelihood by quadrature over the sensor's estimate, at positions of all steps.
+fn printed_likelihood(setting: &Linear) -> Result<Vec<Printed>, Error> {
+    let noise = setting.noise_variances[0];
+    let rate = setting.messages[0] / setting.sensors as f64;
+    let threshold = fewbits_cfwmd::threshold::threshold(rate, 1).map_err(Error::failed)?;
+    let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance).map_err(Error::failed)?;
+    let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), noise).map_err(Error::failed)?;
+    let start = start(setting)?;
+    let mut own = OwnRecursion::new(&start);
+    let mut rows = Vec::new();
+    for k in 1..=setting.steps as usize {
+        let step = own.advance(&dynamics, &sensor, start.mean()).map_err(Error::failed)?;
+        let half_width = CensoringRule::new(&step.innovation_covariance, threshold)
+            .map_err(Error::failed)?
+            .half_width();
+        let spread = step.innovation_covariance[(0, 0)] - noise;
+        for offset in [-10.0, -1.0, 0.0, 1.0, 10.0] {
+            let reach = 9.0 * spread.sqrt();
+            let mut probability = 0.0;
+            for (estimate, weight) in gauss_legendre::<24>().panels(offset - reach, offset + reach, 8) {
+                let density = normal::log_pdf_with(estimate, offset, spread).exp();
+                let [low, high] = [-half_width, half_width].map(|side| (estimate + side - offset) / noise.sqrt());
+                probability += weight * density * normal::log_interval(low, high).exp();
+            }
+            rows.push(Printed { k, offset, probability });
+        }
+    }
+    Ok(rows)
+}
+
 impl Case for NoFeedbackFigure {
-    type Setting = Setting;
+    type Setting = Linear;
+    type Main = Step;
+    type Further = Literal;
 
-    fn about() -> About {
-        About {
-            id: "cfwmd-nofeedback",
-            title: "What silence is worth without feedback, and what the printed likelihood is",
-            caption: "Exact filter (measurements imputed), joint Gaussian belief, a heuristic that scatters the sensors' estimates about the fusion centre's, the filter that ignores silence, the printed likelihood (identical with it to the last bit), and the paper's law of the sensors' estimates with its mean corrected, which does harm because it forgets the data.",
-            source: "",
-        }
-    }
+    const ABOUT: About = About {
+        id: "cfwmd-nofeedback",
+        title: "What silence is worth without feedback, and what the printed likelihood is",
+        caption: "Exact filter (measurements imputed), joint Gaussian belief, a heuristic that scatters the sensors' estimates about the fusion \
+                  centre's, the filter that ignores silence, and the paper's law of the sensors' estimates with its mean corrected, \
+                  which does harm because it forgets the data. The likelihood as printed is one number whatever the state, and so \
+                  leaves the filter that ignores silence.",
+        source: "",
+    };
+    const PAIRS: &'static [(&'static str, &'static str)] = &[
+        ("exact", "joint Gaussian"),
+        ("joint Gaussian", "ignored"),
+        ("exact", "ignored"),
+        ("heuristic", "ignored"),
+        ("ignored", "no history"),
+        ("joint Gaussian", "heuristic"),
+    ];
 
-    fn setting() -> Setting {
-        Setting {
+    fn setting() -> Linear {
+        Linear {
             trials: 4000,
-            particles: 500,
-            ..Setting::scalar(2, vec![1.0])
+            ..Linear::scalar(2, &[1.0]).with_particles(500)
         }
     }
 
-    fn quicken(setting: &mut Setting) {
-        setting.quicken();
-    }
-
-    fn simulate(setting: &Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         let schemes = [
-            ("exact", Scheme::NoFeedback(Method::Imputed(setting.particles as usize))),
+            ("exact", Scheme::NoFeedback(Method::Imputed(setting.cloud()))),
             ("joint Gaussian", Scheme::NoFeedback(Method::Joint)),
             ("heuristic", Scheme::Centred),
             ("ignored", Scheme::NoFeedback(Method::Ignored)),
-            ("as printed", Scheme::NoFeedback(Method::Printed)),
             ("no history", Scheme::Unconditional),
         ];
-        let messages = setting.messages.iter();
-        messages
-            .map(|l| run::<1>(context, setting, *l, &schemes))
-            .collect::<Result<Vec<_>, _>>()
-            .map(|e| e.concat())
+        setting.at_budgets(context, "", &schemes)
     }
 
-    fn exact() -> &'static [&'static str] {
-        &["printed-is-deaf"]
+    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Literal), Error> {
+        let printed_likelihood = printed_likelihood(p)?;
+        Ok((steps(all), Literal { printed_likelihood }))
     }
 
-    fn pairs() -> Vec<(&'static str, &'static str)> {
-        vec![
-            ("exact", "joint Gaussian"),
-            ("joint Gaussian", "ignored"),
-            ("exact", "ignored"),
-            ("heuristic", "ignored"),
-            ("ignored", "no history"),
-            ("as printed", "ignored"),
-            ("joint Gaussian", "heuristic"),
-        ]
-    }
-
-    fn claims(_: &Setting, tables: &Tables) -> Result<Vec<Claim>, Error> {
-        let (summary, paired) = (tables.named("summary")?, tables.named("paired")?);
-        let mut claims = Vec::new();
-        for (scheme, reference) in [
-            ("ignored", "fig3/CFoMD"),
-            ("ignored", "fig3/CFoMD_1500"),
-            ("exact", "fig3/RBPF500_1500"),
-            ("joint Gaussian", "fig3/ADFaug_1500"),
-            ("heuristic", "fig3/heur_centred"),
-            ("no history", "fig3/uncond"),
-        ] {
-            claims.extend(agrees(summary, scheme, 1.0, reference, 0.0, 0.01)?);
-        }
-        for (first, second) in [
+    fn claims(rows: &Rows<Step, Literal>, claims: &mut Claims) {
+        for pair in [
             ("exact", "ignored"),
             ("joint Gaussian", "ignored"),
             ("heuristic", "ignored"),
             ("ignored", "no history"),
             ("joint Gaussian", "heuristic"),
         ] {
-            claims.push(beats(paired, first, second, 1.0, Part::Position)?);
+            rows.beats(claims, pair, ("", 1.0), &[Part::Position]);
         }
-        let literal = paired.only("first", "as printed")?;
-        let same = first(literal.numbers("pos_mse_difference_m2")?)?.abs() + first(literal.numbers("pos_se")?)?;
-        claims.push(Claim::near(
-            "printed-is-deaf",
-            "the printed likelihood gives the filter that ignores silence, exactly",
-            same,
-            0.0,
-            0.0,
-        ));
-        let gaussian = paired.only("first", "exact")?.only("second", "joint Gaussian")?;
-        let difference = first(gaussian.numbers("pos_mse_difference_m2")?)?;
-        claims.push(
-            Claim::near(
-                "joint-is-exact",
-                "the joint Gaussian belief is as good as the exact filter (difference in squared error, m^2)",
-                difference,
-                0.0,
-                0.01,
-            )
-            .at_defaults(),
-        );
-        Ok(claims)
+        let gap = rows.pair("exact", "joint Gaussian", "", 1.0).map(|p| p.position.value);
+        let what = "the joint Gaussian belief is as good as the exact filter (difference in squared error, m^2)";
+        claims.near("joint-is-exact", what, gap, 0.0, 0.01);
     }
 
-    fn plot(tables: &Tables) -> Result<Plot, Error> {
-        let summary = tables.named("summary")?;
-        let names = summary.texts("scheme")?;
-        let bars = summary.numbers("pos_armse_m")?;
-        let errors = summary.numbers("pos_se")?;
-        let points: Vec<(f64, f64)> = bars.iter().enumerate().map(|(i, v)| (i as f64, *v)).collect();
-        let axis = Axis::linear("").named(names.into_iter().enumerate().map(|(i, n)| (i as f64, n)));
-        Ok(Plot::of(
+    fn always(setting: &Linear, rows: &Rows<Step, Literal>, claims: &mut Claims) {
+        let silent = 1.0 - setting.messages[0] / setting.sensors as f64;
+        let what = "the printed likelihood of silence is 1 - l/N at every position and step: it says nothing (erratum cfwmd-2)";
+        let printed = &rows.further.printed_likelihood;
+        claims.all("printed-is-constant", what, printed, |r| (r.probability - silent).abs() < 1e-9);
+    }
+
+    fn plot(_: &Linear, rows: &Rows<Step, Literal>) -> Plot {
+        let place = |i: usize| i as f64 + 1.0;
+        let names = rows
+            .summary
+            .iter()
+            .enumerate()
+            .map(|(i, r)| (place(i), r.run.scheme.to_owned()));
+        let all = rows.summary.iter().enumerate();
+        Plot::of(
             Panel::new(
                 "Position error without feedback",
-                axis,
-                Axis::linear("time-averaged RMSE (m)").between(0.8, 1.3),
+                Axis::linear("")
+                    .between(0.5, rows.summary.len() as f64 + 0.5)
+                    .named(names),
+                Axis::linear("time-averaged RMSE (m)"),
             )
-            .with(Layer::points("", points).with_errors(errors))
-            .legend(Legend::Hidden),
-        ))
+            .with(Layer::measured("", all, |(i, r)| (place(i), r.position_rmse)))
+            .without_legend(),
+        )
     }
 }

@@ -1,10 +1,8 @@
 //! The nonlinear experiments: a target in a plane among sensors of received power.
 
-pub(super) mod figures;
-
-use super::ensemble::{Ensemble, Record};
-use crate::error::Error;
-use crate::legacy::Context;
+use super::rows::{Ensemble, Record, simulate};
+use super::setting::Field;
+use crate::{Context, Error};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::Budget;
@@ -16,53 +14,10 @@ use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix4, Vector1, Vector2, Vector4};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
-use serde::{Deserialize, Serialize};
-
-/// Parameters of a nonlinear figure.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Field {
-    /// Monte-Carlo trials.
-    trials: u64,
-    /// Time steps of a trial.
-    steps: u64,
-    /// Message budgets `l`.
-    messages: Vec<f64>,
-    /// Particles of every filter.
-    particles: u64,
-    /// Distance of neighbouring sensors of the 3 by 3 grid (m).
-    spacing_m: f64,
-    /// Variance of the acceleration of each axis (m^2/s^4).
-    acceleration_variance: f64,
-    /// Variance of the measurement noise.
-    noise_variance: f64,
-    /// Whether the truth is drawn from the prior; the publication's starts at its mean.
-    drawn_start: bool,
-}
-
-impl Field {
-    fn new(messages: Vec<f64>) -> Self {
-        Self {
-            trials: 200,
-            steps: 20,
-            messages,
-            particles: 10_000,
-            spacing_m: 10.0,
-            acceleration_variance: 0.1,
-            noise_variance: 1.0,
-            drawn_start: false,
-        }
-    }
-
-    fn quicken(&mut self) {
-        self.trials = 24;
-        self.particles = 500;
-    }
-}
 
 /// What is sent, and whether silence is fused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Scheme {
+pub enum Scheme {
     All,
     Random,
     /// Censored, silence ignored.
@@ -73,28 +28,18 @@ enum Scheme {
     StateAndCovariance,
 }
 
-type Named = (&'static str, Scheme);
-
-const FOUR: [Named; 4] = [
-    ("all", Scheme::All),
-    ("random", Scheme::Random),
-    ("CFoMD", Scheme::Ignored),
-    ("CFwMD", Scheme::State),
-];
-const FUSED: [Named; 2] = [("CFwMD", Scheme::State), ("CFwMD2", Scheme::StateAndCovariance)];
-
-struct World {
+pub(super) struct World {
     dynamics: LinearGaussian<4, 2>,
-    sensors: Vec<ReceivedPower<4>>,
-    start: Gaussian<4>,
+    pub(super) sensors: Vec<ReceivedPower<4>>,
+    pub(super) start: Gaussian<4>,
     steps: usize,
     particles: usize,
     drawn_start: bool,
 }
 
 /// Truth, measurements and coins of one trial.
-struct Draws {
-    truth: Vec<Vector4<f64>>,
+pub(super) struct Draws {
+    pub(super) truth: Vec<Vector4<f64>>,
     measurements: Vec<Vec<f64>>,
     coins: Vec<Vec<f64>>,
 }
@@ -104,26 +49,26 @@ fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
 }
 
 impl World {
-    fn new(field: &Field) -> Result<Self, Error> {
+    pub(super) fn new(field: &Field) -> Result<Self, Error> {
         let dynamics = constant_velocity_2d(0.5, field.acceleration_variance).map_err(failed)?;
-        let spacing = fewbits_numerics::error::positive("spacing_m", field.spacing_m)?;
         let sensors = (0..9)
-            .map(|i| Vector2::new((f64::from(i % 3) - 1.0) * spacing, (f64::from(i / 3) - 1.0) * spacing))
+            .map(|i| Vector2::new(f64::from(i % 3) - 1.0, f64::from(i / 3) - 1.0) * field.spacing_m)
             .map(|place| ReceivedPower::new(place, [0, 2], 1000.0, 1.0, 2.0, field.noise_variance))
             .collect::<Result<Vec<_>, _>>()
             .map_err(failed)?;
-        let mean = Vector4::new(-8.0, 2.0, -8.0, 2.0);
+        let (mean, variances) =
+            (Vector4::from_column_slice(&field.start), Vector4::from_column_slice(&field.start_variances));
         Ok(Self {
             dynamics,
             sensors,
-            start: Gaussian::new(mean, Matrix4::from_diagonal(&Vector4::new(9.0, 4.0, 9.0, 4.0)))?,
+            start: Gaussian::new(mean, Matrix4::from_diagonal(&variances))?,
             steps: field.steps as usize,
-            particles: fewbits_numerics::error::at_least_one("particles", field.particles as usize)?,
-            drawn_start: field.drawn_start,
+            particles: field.particles as usize,
+            drawn_start: field.drawn_start.unwrap_or(false),
         })
     }
 
-    fn draw(&self, stream: Stream) -> Result<Draws, Error> {
+    pub(super) fn draw(&self, stream: Stream) -> Result<Draws, Error> {
         let mut rng = stream.named("truth").rng();
         let mut noise = stream.named("noise").rng();
         let mut coins = stream.named("coins").rng();
@@ -219,34 +164,22 @@ impl World {
     }
 }
 
-/// Runs schemes at budgets on common trials. A pair of one trial and one scheme is the unit of parallel work.
-fn run(context: &Context<'_>, field: &Field, cases: &[(Named, f64)]) -> Result<Vec<Ensemble>, Error> {
+/// Runs schemes at one budget on the common trials.
+pub(super) fn run(
+    context: &Context<'_>,
+    field: &Field,
+    world_name: &str,
+    messages: f64,
+    schemes: &[(&'static str, Scheme)],
+) -> Result<Vec<Ensemble>, Error> {
     let world = World::new(field)?;
-    let stream = context.stream("cfwmd-nonlinear");
-    let units = field.trials * cases.len() as u64;
-    let records = context.monte_carlo(stream, units).run(|unit| -> Result<_, Error> {
-        let (trial, case) = (unit.index / cases.len() as u64, (unit.index % cases.len() as u64) as usize);
-        let ((_, scheme), messages) = cases[case];
-        let stream = stream.indexed(trial);
-        world.trial(scheme, messages, &world.draw(stream)?, stream.named("particles"))
-    })?;
-    let mut ensembles: Vec<_> = cases
-        .iter()
-        .map(|((name, _), messages)| Ensemble {
-            scheme: (*name).to_owned(),
-            messages: *messages,
-            records: Vec::with_capacity(field.trials as usize),
-        })
-        .collect();
-    for (index, record) in records.into_iter().enumerate() {
-        ensembles[index % cases.len()].records.push(record);
-    }
-    Ok(ensembles)
-}
-
-fn every(schemes: &[Named], budgets: &[f64]) -> Vec<(Named, f64)> {
-    budgets
-        .iter()
-        .flat_map(|l| schemes.iter().map(|scheme| (*scheme, *l)))
-        .collect()
+    simulate(
+        context,
+        context.stream("cfwmd-nonlinear"),
+        field.trials,
+        (world_name, messages),
+        schemes,
+        |stream| world.draw(stream),
+        |scheme, draws, stream| world.trial(*scheme, messages, draws, stream.named("particles")),
+    )
 }

@@ -1,7 +1,7 @@
 //! Figures 5 and 6, and the divergence of what travels from the exact belief.
 
 use super::common::{B, Scheme, Settings, quantile, trials};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Cost, Error, Figure};
 use fewbits_core::{Belief, Density};
 use fewbits_densities::{Clumps, Mixture, MixtureFit};
@@ -460,8 +460,7 @@ impl Figure for Divergences {
     }
 
     fn plot(&self, _: &KlParameters, rows: &Vec<KlRow>) -> Plot {
-        let mut panel = Panel::new("Divergence per number", Axis::linear("nodes"), Axis::log("median KL (nats)"))
-            .legend(Legend::Outside);
+        let mut panel = Panel::new("Divergence per number", Axis::linear("nodes"), Axis::log("median KL (nats)"));
         for (i, (rep, _)) in FORMS.iter().enumerate() {
             let of = || rows.iter().filter(|r| r.rep == *rep);
             let scalars = of().next().map_or(0, |r| r.scalars);

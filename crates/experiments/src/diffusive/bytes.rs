@@ -1,7 +1,7 @@
 //! Bytes until the threshold is reached.
 
 use super::common::{B, Scheme, Settings, Track, fraction, median, tracks};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_diffusive::Form;
 use fewbits_diffusive::message::{SampleCode, Wire};
@@ -136,8 +136,7 @@ impl Figure for Bytes {
             "Cost and accuracy",
             Axis::log("bytes of all messages (median)"),
             Axis::log("error at the end (m, median)"),
-        )
-        .legend(Legend::Outside);
+        );
         for row in rows {
             let place = row
                 .bytes_median

@@ -1,7 +1,7 @@
 //! Figures 3, 4, 7 to 10: error and determinant along many searches.
 
 use super::common::{A, B, Scheme, Settings, Track, fraction, median, quantile, tracks};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_diffusive::{Form, Rule};
 use schemars::JsonSchema;
@@ -461,9 +461,8 @@ impl Figure for Chains {
             rows.curves.iter().filter(move |c| c.scheme == name && c.range == range)
         };
         let (mut errors, mut determinants) = (
-            Panel::new("Error", Axis::linear("nodes"), Axis::log("distance to the source (m)")).legend(Legend::Hidden),
-            Panel::new("Determinant", Axis::linear("nodes"), Axis::linear("log10 det of the covariance (m^4)"))
-                .legend(Legend::Outside),
+            Panel::new("Error", Axis::linear("nodes"), Axis::log("distance to the source (m)")).without_legend(),
+            Panel::new("Determinant", Axis::linear("nodes"), Axis::linear("log10 det of the covariance (m^4)")),
         );
         let threshold = schemes[0].example.threshold.log10();
         let last = rows.curves.iter().map(|c| c.step).max().unwrap_or(1) as f64;

@@ -1,7 +1,7 @@
 //! The area above a threshold, with credible bands.
 
 use super::common::{ALARM, B, DIFFUSIVITY, RATE, Scheme, Settings, fraction, median, trials};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_diffusive::{Envelope as Area, SourceLikelihood};
 use fewbits_models::diffusion::contour_radius;
@@ -255,8 +255,7 @@ impl Figure for Envelope {
             Axis::linear("y (m)").between(0.0, 100.0),
         )
         .with(Layer::heat("P(c > threshold)", centres.clone(), centres, values))
-        .with(Layer::dashed("true edge", circle.collect()).coloured(3))
-        .legend(Legend::Outside);
+        .with(Layer::dashed("true edge", circle.collect()).coloured(3));
         let of = |f: fn(&Band) -> f64| rows.band.iter().map(|b| (b.direction_deg, f(b))).collect::<Vec<_>>();
         let limits = rows.band.iter().map(|b| (b.direction_deg, b.r05, b.r95)).collect();
         let band = Panel::new(

@@ -1,7 +1,7 @@
 //! Figures 1 and 2: one search, event by event and on the map.
 
 use super::common::{A, ALARM, Network, Scheme, Settings};
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
+use crate::plot::{Axis, Layer, Marker, Panel, Plot};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_densities::ellipse;
 use fewbits_diffusive::{Form, Outcome, Rule};
@@ -170,7 +170,7 @@ impl Figure for Trace {
             })
             .collect();
         let determinant = Panel::new("Test", Axis::linear("nodes"), Axis::linear("log10 det of the covariance (m^4)"));
-        let sent = Panel::new("Messages", Axis::linear("nodes"), Axis::linear("bytes so far")).legend(Legend::TopLeft);
+        let sent = Panel::new("Messages", Axis::linear("nodes"), Axis::linear("bytes so far"));
         Plot::grid(
             2,
             vec![
@@ -297,7 +297,7 @@ impl Figure for Route {
 
     fn plot(&self, _: &Parameters, rows: &RouteRows) -> Plot {
         let axis = |label: &str| Axis::linear(label).between(0.0, 100.0);
-        let mut panel = Panel::new("Route and belief", axis("x (m)"), axis("y (m)")).legend(Legend::Outside);
+        let mut panel = Panel::new("Route and belief", axis("x (m)"), axis("y (m)"));
         panel = panel.with(Layer::points("deployed", rows.field.iter().map(|p| (p.x, p.y)).collect()).coloured(7));
         for r in &rows.route {
             let covariance = nalgebra::Matrix2::new(r.variance_x, r.covariance_xy, r.covariance_xy, r.variance_y);

@@ -1,7 +1,7 @@
 //! Rules that choose the next node: how well they rank it, and what that saves.
 
 use super::common::{A, B, Network, Scheme, Settings, fraction, tracks, trials};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{Posterior, Rule, Selector, SourceSensor};
@@ -222,8 +222,7 @@ impl Figure for Selection {
             "Nodes to the threshold",
             Axis::linear("example and range (m)").named(names),
             Axis::linear("mean nodes"),
-        )
-        .legend(Legend::TopLeft);
+        );
         for (c, rule) in ["information", "mahalanobis"].into_iter().enumerate() {
             let of = rows.searches.iter().filter(|s| s.rule == rule).enumerate();
             nodes = nodes.with(

@@ -1,7 +1,7 @@
 //! What else could be unknown, and what the model of the rate does to the estimate.
 
 use super::common::{B, Settings, search_box, trials};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_core::{Belief, Gaussian};
 use fewbits_densities::CellOptions;
@@ -273,8 +273,7 @@ impl Figure for Unknowns {
             0.6,
         ));
         let mut bias =
-            Panel::new("Noise-free samples", Axis::linear("nodes"), Axis::log("median distance to the source (m)"))
-                .legend(Legend::Outside);
+            Panel::new("Noise-free samples", Axis::linear("nodes"), Axis::log("median distance to the source (m)"));
         for (c, model) in ["sample-wise", "node-wise", "joint"].into_iter().enumerate() {
             let of = || rows.models.iter().filter(|m| m.model == model);
             bias = bias

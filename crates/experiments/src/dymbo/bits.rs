@@ -1,7 +1,7 @@
 //! How many bits a sample are worth sending.
 
 use super::common::{Plant, plants};
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain, iterated};
 use garde::Validate;
@@ -197,8 +197,7 @@ impl Figure for WordLength {
                 Layer::points("successive, centroids", curve(|r| r.centroids))
                     .coloured(5)
                     .marked(Marker::Triangle),
-            )
-            .legend(Legend::BottomLeft);
+            );
         Plot::grid(2, vec![left, right])
     }
 }

@@ -2,7 +2,7 @@
 
 use super::common::{Plant, each};
 use super::gap::steady_excess;
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, Measured};
 use fewbits_core::Link;
 use fewbits_dymbo::{DymboFilter, ScalarFilter, chain};
@@ -141,7 +141,6 @@ impl Figure for NoisyBits {
                 .with(Layer::line("knows, exact", curve(|r| r.aware_mse)).coloured(0))
                 .with(Layer::dashed("knows, predicted", curve(|r| r.riccati)).coloured(2))
                 .with(Layer::points("does not know, exact", curve(|r| r.naive_mse)).coloured(1))
-                .legend(Legend::TopLeft)
         };
         Plot::grid(2, rows.chunks(p.crossover.len()).map(panel).collect())
     }

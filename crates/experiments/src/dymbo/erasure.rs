@@ -1,7 +1,7 @@
 //! Lost bits.
 
 use super::common::{Plant, each};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, Measured};
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing, Sign};
 use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant, steady};
@@ -182,7 +182,6 @@ impl Figure for LostBits {
             Panel::new(rows[0].plant.title(), x, y)
                 .with(Layer::line("bound on the mean variance", points(rows, |r| (r.loss, r.bound))).coloured(0))
                 .with(Layer::measured("mean squared error", rows, |r| (r.loss, r.mse)).coloured(1))
-                .legend(Legend::TopLeft)
         };
         Plot::grid(2, rows.chunks(p.loss.len()).map(panel).collect())
     }

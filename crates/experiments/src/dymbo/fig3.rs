@@ -1,7 +1,7 @@
 //! How much of the measurement noise the filters remove, against the noise ratio.
 
 use super::common::{Plant, log_spaced};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use garde::Validate;
 use schemars::JsonSchema;
@@ -109,7 +109,7 @@ impl Figure for KalmanVariance {
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
         let (x, y) = (Axis::log("gamma = process / measurement variance"), Axis::log("filtered variance / sigma^2"));
-        let mut panel = Panel::new("Steady variance", x, y).legend(Legend::BottomRight);
+        let mut panel = Panel::new("Steady variance", x, y);
         for (i, (a, curve)) in p.a.iter().zip(rows.chunks(p.gamma.len())).enumerate() {
             let kalman = points(curve, |r| (r.plant.gamma, r.kf_reduction));
             let sign_bit = points(curve, |r| (r.plant.gamma, r.dymbo_reduction));

@@ -1,7 +1,7 @@
 //! What the missing bits cost: the loss over the plane of plants.
 
 use super::common::{Plant, each, log_spaced};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_dymbo::{chain, filtered_variance, steady};
 use garde::Validate;
@@ -180,7 +180,7 @@ impl Figure for Loss {
             panel = panel.with(Layer::line(level.to_string(), curve("riccati", level)).coloured(i));
         }
         panel = panel.with(Layer::dashed("2, exact", curve("exact", 2.0)).coloured(p.level.len()));
-        Plot::of(panel.legend(Legend::Outside))
+        Plot::of(panel)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Convergence from the first message: simulated, exact and predicted.
 
 use super::common::{Plant, each, plants};
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, Measured};
 use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Sensing, Sign};
 use fewbits_dymbo::chain::first_message_transient;
@@ -357,8 +357,7 @@ impl Figure for Convergence {
                 Panel::new(title, Axis::linear("step n"), Axis::linear("state / sigma"))
                     .with(Layer::line("state", line(|r| r.theta)).coloured(4))
                     .with(Layer::dashed("Kalman", line(|r| r.kf)).coloured(0))
-                    .with(Layer::line("sign bit", line(|r| r.dymbo)).coloured(1))
-                    .legend(Legend::TopRight),
+                    .with(Layer::line("sign bit", line(|r| r.dymbo)).coloured(1)),
             );
         }
         Plot::grid(p.gamma.len().min(2), panels)

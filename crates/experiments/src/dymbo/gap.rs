@@ -1,7 +1,7 @@
 //! How much any estimator could gain from the same bits.
 
 use super::common::{Plant, plants};
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, Measured};
 use fewbits_core::Link;
 use fewbits_dymbo::chain::{self, MessageLaw};
@@ -260,6 +260,6 @@ impl Figure for GapToExact {
             let shares = Layer::measured(label, those, |(i, r)| (i as f64, r.excess.scaled(1.0 / r.mmse)));
             right = right.with(shares.coloured(bits + 3).marked(marker));
         }
-        Plot::grid(2, vec![left.legend(Legend::BottomRight), right.legend(Legend::TopLeft)])
+        Plot::grid(2, vec![left, right])
     }
 }

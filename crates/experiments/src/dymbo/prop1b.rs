@@ -1,6 +1,6 @@
 //! How normal the posterior of one bit is.
 
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Gaussian, Link, Sign};
@@ -143,8 +143,7 @@ impl Figure for PosteriorShape {
         let densities = Panel::new(title, Axis::linear("state"), Axis::linear("density"))
             .with(Layer::dashed("prior", curve(|r| r.prior)).coloured(2))
             .with(Layer::line("exact posterior", curve(|r| r.exact)).coloured(0))
-            .with(Layer::dashed("normal, same moments", curve(|r| r.normal)).coloured(1))
-            .legend(Legend::TopLeft);
+            .with(Layer::dashed("normal, same moments", curve(|r| r.normal)).coloured(1));
         Plot::grid(2, vec![distance, densities])
     }
 }

@@ -1,6 +1,6 @@
 //! The fine first message: what it brings, and the variance to start from.
 
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_core::Gaussian;
 use fewbits_dymbo::chain::first_message_transient;
@@ -152,10 +152,9 @@ impl Figure for FirstMessage {
         let left = Panel::new("First message", Axis::log("resolution tau"), Axis::log("mean squared error"))
             .with(Layer::points("exact, worst state", curve(|r| r.exact_sup)).coloured(0))
             .with(Layer::line("sigma^2 + tau^2/12", curve(|r| r.tight)).coloured(0))
-            .with(Layer::dashed("printed bound", curve(|r| r.printed_bound)).coloured(1))
-            .legend(Legend::TopLeft);
+            .with(Layer::dashed("printed bound", curve(|r| r.printed_bound)).coloured(1));
         let (x, y) = (Axis::linear("step n"), Axis::linear("exact error / computed variance"));
-        let mut right = Panel::new("Consistency after the start", x, y).legend(Legend::BottomRight);
+        let mut right = Panel::new("Consistency after the start", x, y);
         for (i, &gamma) in p.gamma.iter().enumerate() {
             let of = |start: &str| {
                 let those = rows.starts.iter().filter(|r| r.gamma == gamma && r.start == start);

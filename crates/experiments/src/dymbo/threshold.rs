@@ -1,7 +1,7 @@
 //! Where the threshold belongs, and what an unstable plant does.
 
 use super::common::{Plant, plants};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claims, Context, Error, Figure, Measured};
 use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Scheme, Sensing, Sign};
 use fewbits_dymbo::{DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant};
@@ -264,6 +264,6 @@ impl Figure for ThresholdPlace {
             let (those, shift) = (rows.rules.iter().filter(|r| r.rule == rule).enumerate(), 0.2 * (i as f64 - 1.0));
             panel = panel.with(Layer::measured(label, those, |(at, r)| (at as f64 + shift, r.mse)).coloured(i));
         }
-        Plot::of(panel.legend(Legend::TopLeft))
+        Plot::of(panel)
     }
 }

@@ -1,6 +1,6 @@
 //! A two-dimensional state watched by one or three one-bit sensors.
 
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot};
+use crate::plot::{Axis, Layer, Marker, Panel, Plot};
 use crate::{About, Claims, Context, Error, Figure, Measured};
 use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing, Sign};
@@ -311,8 +311,7 @@ impl Figure for VectorState {
                     Layer::points("Kalman, unquantized", marks(|r| r.kalman_trace, 0.12))
                         .coloured(2)
                         .marked(Marker::Square),
-                )
-                .legend(Legend::TopRight),
+                ),
         )
     }
 }

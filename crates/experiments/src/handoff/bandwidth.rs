@@ -3,7 +3,7 @@
 use super::exact::{Lattice, StepLaw};
 use super::filters::{PARTICLES, REFERENCE, plain_step, prior, world};
 use super::world::Walk;
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_densities::tree::{At, Axis as SplitAxis};
 use fewbits_densities::{Bandwidth, Criterion, Reduction, Split};
@@ -262,7 +262,7 @@ impl Figure for Widths {
             Axis::linear("").named(names).between(-0.7, rows.len() as f64 - 0.3),
         )
         .with(Layer::boxes("", bars))
-        .legend(Legend::Hidden);
+        .without_legend();
         Plot::of(panel)
     }
 }

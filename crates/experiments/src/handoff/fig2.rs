@@ -1,6 +1,6 @@
 //! Figure 2: small losses add up to more than their sum.
 
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_densities::divergence::kl_centred_normals;
 use garde::Validate;
@@ -134,7 +134,6 @@ impl Figure for Fig2 {
                 .with(Layer::dashed("to the first density", points(of(), |r| (r.t.into(), r.kl_total_reverse))))
                 .with(Layer::points("sum of the steps", points(of(), |r| (r.t.into(), r.sum_of_steps))))
                 .with(Layer::dashed("0.1 nat", vec![(1.0, 0.1), (f64::from(p.steps), 0.1)]))
-                .legend(Legend::BottomRight)
         };
         Plot::grid(2, p.ratio.iter().map(panel).collect())
     }

@@ -1,7 +1,7 @@
 //! Figure 4: the field, the target's way, the leaders.
 
 use super::world::{STAND_OFF, STEP, World};
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
 use garde::Validate;
 use schemars::JsonSchema;
@@ -156,8 +156,7 @@ impl Figure for Fig4 {
                     .marked(Marker::Square)
                     .coloured(1),
             )
-            .with(Layer::texts(names))
-            .legend(Legend::Outside);
+            .with(Layer::texts(names));
         Plot::of(panel)
     }
 }

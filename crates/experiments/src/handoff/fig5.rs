@@ -2,7 +2,7 @@
 
 use super::filters::{PARTICLES, STEPS, Smoothing, Truth, posteriors, prior, single};
 use super::world::World;
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, Measured};
 use fewbits_densities::{Reduction, ellipse};
 use fewbits_monte_carlo::Moments;
@@ -177,7 +177,7 @@ impl Figure for Fig5 {
             Panel::new(format!("time {t}"), Axis::linear("x / r0"), Axis::linear("y / r0"))
                 .with(Layer::points("particles", cloud).coloured(0))
                 .with_all(outlines)
-                .legend(Legend::Hidden)
+                .without_legend()
         };
         Plot::grid(2, p.time.iter().map(panel).collect())
     }

@@ -2,7 +2,7 @@
 
 use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, paper_cut, prior, world};
 use super::world::Walk;
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_handoff::{Accounting, Amplification, StepError};
 use fewbits_monte_carlo::{Moments, Trial};
@@ -346,7 +346,6 @@ impl Figure for Fig6 {
             .with(Layer::line("L1, printed", of(|b| b.log10_l1_printed)))
             .with(Layer::measured("KL from DR / nat", &under, |b| (b.t as f64, b.kl_from_dr)))
             .with(Layer::measured("L1 from DR", &under, |b| (b.t as f64, b.l1_from_dr)))
-            .legend(Legend::TopLeft)
         };
         Plot::grid(2, vec![panel(Smoothing::Preset), panel(Smoothing::Silverman)])
     }

@@ -2,7 +2,7 @@
 
 use super::filters::{CRITERIA, PARTICLES, REFERENCE, STEPS, Smoothing, paper_cut, plain_step, prior, single, world};
 use super::world::{Reading, Walk};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_core::Columns;
 use fewbits_densities::{KernelEstimate, Mixture, Particles};
@@ -315,8 +315,7 @@ impl Figure for Fig6c {
         });
         let panel = Panel::new("Five components", Axis::linear("hand-overs t"), Axis::linear("KL increase / nat"))
             .with_all(lines)
-            .with_all(layers)
-            .legend(Legend::Outside);
+            .with_all(layers);
         Plot::of(panel)
     }
 }

@@ -1,7 +1,7 @@
 //! KL against bits.
 
 use super::filters::{Truth, as_f32, posteriors};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_core::Message;
 use fewbits_densities::wire::{CodedMixture, WireFormat};
@@ -215,8 +215,7 @@ impl Figure for Rate {
         let panel = Panel::new("One belief", Axis::log("message / bit"), Axis::log("KL / nat"))
             .with_all(layers)
             .with(Layer::dashed("mixture as floats", all("f32")).coloured(5))
-            .with(Layer::points("particles as floats", all("particles")).coloured(6))
-            .legend(Legend::Outside);
+            .with(Layer::points("particles as floats", all("particles")).coloured(6));
         Plot::of(panel)
     }
 }

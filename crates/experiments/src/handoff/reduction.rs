@@ -1,7 +1,7 @@
 //! KL against components for every reduction.
 
 use super::filters::{Truth, posteriors};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot};
+use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_densities::merge::{MergeCost, merge};
 use fewbits_densities::tree::{At, Axis as SplitAxis};
@@ -257,9 +257,8 @@ impl Figure for Reductions {
             let of = rows.errors.iter().filter(|r| r.method == method);
             Layer::line(method, of.map(|r| (r.components as f64, r.kl.value)).collect()).coloured(i)
         });
-        let panel = Panel::new("KL of the reduced mixture", Axis::log("components M"), Axis::log("KL / nat"))
-            .with_all(layers)
-            .legend(Legend::Outside);
+        let panel =
+            Panel::new("KL of the reduced mixture", Axis::log("components M"), Axis::log("KL / nat")).with_all(layers);
         Plot::of(panel)
     }
 }

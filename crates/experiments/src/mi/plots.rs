@@ -1,6 +1,6 @@
 //! Panels that several tables draw.
 
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, points};
+use crate::plot::{Axis, Layer, Marker, Panel, points};
 
 /// Squared errors of designs, one a line: name, exact error, printed one.
 pub(super) fn errors(title: &str, rows: impl Iterator<Item = (String, f64, Option<f64>)>) -> Panel {
@@ -18,5 +18,4 @@ pub(super) fn errors(title: &str, rows: impl Iterator<Item = (String, f64, Optio
     Panel::new(title, Axis::linear("mean squared error / prior variances"), y)
         .with(Layer::points("exact", points(place(|r| Some(r.2)), |p| p)))
         .with(Layer::points("printed", points(place(|r| r.3), |p| p)).marked(Marker::Cross))
-        .legend(Legend::Outside)
 }

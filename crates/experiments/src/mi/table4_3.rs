@@ -1,7 +1,7 @@
 //! Table 4.3: nine sensors.
 
 use super::common::{MI, MSE, lloyd, scene};
-use crate::plot::{Axis, Layer, Legend, Marker, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, reference};
 use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design};
 use garde::Validate;
@@ -278,7 +278,7 @@ impl Figure for Table43 {
         )
         .with(Layer::line("", chain.clone()).coloured(0))
         .with(Layer::points("", chain).coloured(0))
-        .legend(Legend::Hidden);
+        .without_legend();
         Plot::grid(2, vec![error, stages])
     }
 }

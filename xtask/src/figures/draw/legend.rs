@@ -4,7 +4,7 @@ use super::Area;
 use super::frame::{mark, path};
 use super::scale::Scaled;
 use super::style::{LINE, TEXT, TICK, colour, dashes, heat, marker, pen, text};
-use fewbits_experiments::plot::{Axis, Layer, Legend, Panel, Shape};
+use fewbits_experiments::plot::{Axis, Layer, Panel, Shape};
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::element::{Rectangle, Text};
 use plotters::style::Color;
@@ -35,7 +35,7 @@ fn lines(panel: &Panel, width: i32) -> Vec<Vec<(i32, usize)>> {
 
 /// Height of a panel's legend.
 pub(super) fn height(panel: &Panel, width: i32) -> i32 {
-    if panel.legend == Legend::Hidden {
+    if !panel.legend {
         0
     } else {
         lines(panel, width).len() as i32 * LINE
@@ -44,7 +44,7 @@ pub(super) fn height(panel: &Panel, width: i32) -> i32 {
 
 /// Draws the legend into an area that is as high as [`height`] says.
 pub(super) fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), String> {
-    if panel.legend == Legend::Hidden {
+    if !panel.legend {
         return Ok(());
     }
     let (width, _) = area.dim_in_pixel();

@@ -1,7 +1,7 @@
 //! Schemes that exist for scalar measurements only.
 
-use super::{Linear, Track, failed};
-use crate::error::Error;
+use super::{Experiment, Track, failed};
+use crate::Error;
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::rule::Weighing;
 use fewbits_cfwmd::trigger::{StochasticTrigger, Triggered};
@@ -13,7 +13,7 @@ use fewbits_filters::{
 };
 use nalgebra::{Matrix1, SMatrix, Vector1, Vector2};
 
-impl Linear<1> {
+impl Experiment<1> {
     pub(super) fn rao_blackwell(&self, track: &mut Track<'_, 1>, count: usize) -> Result<(), Error> {
         let mut rng = track.stream.named("particles").fast_rng();
         let mut cloud = GaussianCloud::agreed(&self.start, count).map_err(failed)?;

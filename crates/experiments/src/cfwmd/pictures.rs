@@ -1,0 +1,77 @@
+//! The pictures of the simulated figures.
+
+use super::rows::{Part, Step, Summary};
+use crate::Measured;
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+
+pub(super) const BOTH: [Part; 2] = [Part::Position, Part::Velocity];
+
+/// One colour for a scheme in every figure; `otherwise` for schemes that stand in one figure only.
+fn colour_of(scheme: &str, otherwise: usize) -> usize {
+    match scheme {
+        "all" => 0,
+        "random" => 1,
+        "CFoMD" => 2,
+        "CFwMD" => 3,
+        "CFwMD particles" => 4,
+        "CFwMD2" => 5,
+        "scheduled" => 6,
+        _ => otherwise,
+    }
+}
+
+/// A curve with its marks and error bars.
+pub(super) fn curve(label: &str, colour: usize, marks: Vec<(f64, Measured)>) -> [Layer; 2] {
+    let line = Layer::line(label, points(&marks, |(x, y)| (*x, y.value)));
+    [line, Layer::measured("", marks, |mark| mark)].map(|layer| layer.coloured(colour))
+}
+
+/// Distinct entries in order of appearance.
+pub(super) fn distinct<R, K: PartialEq>(rows: &[R], key: impl Fn(&R) -> K) -> Vec<K> {
+    let mut seen = Vec::new();
+    for row in rows {
+        let key = key(row);
+        if !seen.contains(&key) {
+            seen.push(key);
+        }
+    }
+    seen
+}
+
+/// Position and velocity error against time, side by side; a row of panels for each world and budget, a curve for each scheme.
+pub(super) fn by_step(steps: &[Step]) -> Plot {
+    let places = distinct(steps, |r| (r.run.world.clone(), r.run.l));
+    let schemes = distinct(steps, |r| r.run.scheme);
+    let mut panels = Vec::new();
+    for (world, l) in &places {
+        let world_name = world.as_ref().map_or_else(String::new, |w| format!(", {w}"));
+        for part in BOTH {
+            let (axis, title) = match part {
+                Part::Position => ("RMSE (m)", "Position"),
+                Part::Velocity => ("RMSE (m/s)", "Velocity"),
+            };
+            let own = |r: &&Step| (&r.run.world, r.run.l) == (world, *l);
+            let layers = schemes.iter().enumerate().flat_map(|(order, scheme)| {
+                let rows = steps.iter().filter(own).filter(|r| r.run.scheme == *scheme);
+                let marks: Vec<_> = rows.map(|r| (r.k as f64, r.rmse(part))).collect();
+                (!marks.is_empty()).then(|| curve(scheme, colour_of(scheme, order), marks))
+            });
+            panels.push(
+                Panel::new(format!("{title}, l = {l}{world_name}"), Axis::linear("time step k"), Axis::linear(axis))
+                    .with_all(layers.flatten()),
+            );
+        }
+    }
+    Plot::grid(2, panels)
+}
+
+/// A number of the summary against the budget, a curve for each scheme.
+pub(super) fn by_budget(rows: &[&Summary], title: &str, label: &str, of: impl Fn(&Summary) -> Measured) -> Panel {
+    let axes = (Axis::linear("message budget l (messages/step)"), Axis::linear(label));
+    let schemes = distinct(rows, |r| r.run.scheme);
+    let layers = schemes.iter().enumerate().flat_map(|(order, scheme)| {
+        let own = rows.iter().filter(|r| r.run.scheme == *scheme);
+        curve(scheme, colour_of(scheme, order), own.map(|r| (r.run.l, of(r))).collect())
+    });
+    Panel::new(title, axes.0, axes.1).with_all(layers)
+}

@@ -1,0 +1,105 @@
+//! Tables of rates: printed ones beside ours.
+
+use super::pictures::{curve, distinct};
+use super::rows::{Ensemble, rate};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{Claims, Measured, reference};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Rates of one budget in one setting.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Rates {
+    /// Message budget.
+    #[schemars(extend("unit" = "messages/step"))]
+    l: f64,
+    /// How start and noise are read, and the estimator.
+    setting: String,
+    /// Mean number of messages, state feedback (CFwMD).
+    #[schemars(extend("unit" = "messages/step"))]
+    state: Measured,
+    /// Mean number of messages, state and covariance feedback (CFwMD2).
+    #[schemars(extend("unit" = "messages/step"))]
+    covariance: Measured,
+    /// The first as printed.
+    #[schemars(extend("unit" = "messages/step"))]
+    printed_state: Option<f64>,
+    /// The second as printed.
+    #[schemars(extend("unit" = "messages/step"))]
+    printed_covariance: Option<f64>,
+    /// Trials.
+    trials: usize,
+}
+
+/// Rates of all budgets and worlds. The print does not say which world is its own: it stands beside all of them.
+pub(super) fn rates(figure: &str, ensembles: &[Ensemble], printed: bool) -> Vec<Rates> {
+    let (first, second) = (|e: &&Ensemble| e.scheme == "CFwMD", |e: &&Ensemble| e.scheme == "CFwMD2");
+    let row = |a: &Ensemble| {
+        let same = |e: &&Ensemble| e.world == a.world && e.messages == a.messages;
+        let b = ensembles.iter().filter(second).find(same)?;
+        let print = |column: &str| {
+            let key = format!("{figure}/printed-{column}/l = {}", a.messages);
+            printed.then(|| reference::value(&key)).flatten()
+        };
+        Some(Rates {
+            l: a.messages,
+            setting: a.world.clone(),
+            state: rate(a),
+            covariance: rate(b),
+            printed_state: print("state"),
+            printed_covariance: print("covariance"),
+            trials: a.records.len(),
+        })
+    };
+    ensembles.iter().filter(first).filter_map(row).collect()
+}
+
+/// Claims that the printed rates are met in one world.
+pub(super) fn as_printed(claims: &mut Claims, rows: &[Rates], world: &str) {
+    type Column = fn(&Rates) -> Measured;
+    let columns: [(&str, Column); 2] = [("state", |r| r.state), ("covariance", |r| r.covariance)];
+    for (name, of) in columns {
+        let what = format!("rate with {name} feedback as printed ({world})");
+        let own = rows.iter().filter(|r| r.setting == world);
+        claims.references(&format!("printed-{name}"), &what, own, |r| (format!("l = {}", r.l), of(r).value));
+    }
+}
+
+/// Our rate minus the printed one.
+pub(super) fn misses(rows: &[Rates], world: &str, l: f64) -> Option<[Measured; 2]> {
+    let row = rows.iter().find(|r| r.setting == world && r.l == l)?;
+    let less = |ours: Measured, printed: f64| Measured {
+        value: ours.value - printed,
+        ..ours
+    };
+    Some([
+        less(row.state, row.printed_state?),
+        less(row.covariance, row.printed_covariance?),
+    ])
+}
+
+/// Rates of both schemes against the budget, with the printed ones.
+pub(super) fn rate_plot(rows: &[Rates]) -> Plot {
+    type Columns = (fn(&Rates) -> Measured, fn(&Rates) -> Option<f64>);
+    let columns: [(&str, Columns); 2] = [
+        ("State feedback (CFwMD)", (|r| r.state, |r| r.printed_state)),
+        ("State and covariance feedback (CFwMD2)", (|r| r.covariance, |r| r.printed_covariance)),
+    ];
+    let panel = |(title, (ours, printed)): (&str, Columns)| {
+        let excess = |r: &Rates| Measured {
+            value: ours(r).value - r.l,
+            ..ours(r)
+        };
+        let worlds = distinct(rows, |r| r.setting.clone());
+        let first = rows.iter().filter(|r| Some(&r.setting) == worlds.first());
+        let layers = worlds.iter().enumerate().flat_map(|(colour, world)| {
+            let own = rows.iter().filter(|r| r.setting == *world);
+            curve(world, colour, own.map(|r| (r.l, excess(r))).collect())
+        });
+        let axis = Axis::linear("message budget l (messages/step)");
+        Panel::new(title, axis, Axis::linear("rate minus budget (messages/step)"))
+            .with(Layer::dashed("printed", points(first, |r| (r.l, printed(r).map(|p| p - r.l)))).coloured(7))
+            .with_all(layers)
+    };
+    Plot::grid(2, columns.map(panel).into())
+}

@@ -1,0 +1,271 @@
+//! Parameters of the simulated figures.
+
+use super::rows::Ensemble;
+use crate::{Context, Cost, Error};
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of an experiment whose schemes are simulated on common trials.
+pub trait Setting:
+    Clone + Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Send + Sync + 'static
+{
+    /// What is sent, and what is made of it.
+    type Scheme: Copy;
+
+    /// About a second of work.
+    fn quicken(&mut self);
+
+    /// Message budgets.
+    fn messages(&self) -> &[f64];
+
+    /// Rough need of a figure of so many schemes.
+    fn cost(&self) -> Cost;
+
+    /// Runs schemes at one budget.
+    ///
+    /// # Errors
+    /// If a filter fails or the run is cancelled.
+    fn run(
+        &self,
+        context: &Context<'_>,
+        world: &str,
+        messages: f64,
+        schemes: &[(&'static str, Self::Scheme)],
+    ) -> Result<Vec<Ensemble>, Error>;
+
+    /// Runs schemes at all budgets.
+    ///
+    /// # Errors
+    /// As [`Setting::run`].
+    fn at_budgets(
+        &self,
+        context: &Context<'_>,
+        world: &str,
+        schemes: &[(&'static str, Self::Scheme)],
+    ) -> Result<Vec<Ensemble>, Error> {
+        let budgets = self.messages().iter();
+        let runs = budgets.map(|l| self.run(context, world, *l, schemes));
+        Ok(runs.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+}
+
+/// Refuses a budget of more messages than sensors.
+fn at_most(messages: f64, sensors: u64) -> garde::Result {
+    if messages <= sensors as f64 {
+        Ok(())
+    } else {
+        Err(garde::Error::new(format!("more messages than the {sensors} sensors send")))
+    }
+}
+
+/// Seconds and bytes of so many trials of ten schemes.
+fn cost(trials: u64, steps: u64, budgets: usize, step_seconds: f64) -> Cost {
+    let runs = trials as f64 * steps as f64 * budgets as f64 * 10.0;
+    Cost {
+        seconds: runs * step_seconds,
+        bytes: runs * 32.0,
+    }
+}
+
+/// A target on a line among identical linear sensors.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Linear {
+    /// Monte-Carlo trials.
+    #[garde(range(min = 2, max = 1_000_000))]
+    pub(super) trials: u64,
+    /// Time steps of a trial.
+    #[garde(range(min = 1, max = 1000))]
+    pub(super) steps: u64,
+    /// Sensors.
+    #[garde(range(min = 1, max = 100))]
+    pub(super) sensors: u64,
+    /// Message budgets, each at most the number of sensors.
+    #[garde(length(min = 1, max = 20), inner(range(min = 1e-3, max = 100.0)), inner(custom(|l: &f64, _: &()| at_most(*l, self.sensors))))]
+    pub(super) messages: Vec<f64>,
+    /// Variance of the acceleration (m²/s⁴).
+    #[garde(range(min = 1e-12, max = 1e6))]
+    pub(super) acceleration_variance: f64,
+    /// Noise variances of what a sensor measures: the position (m²), or position and velocity (m², m²/s²).
+    #[garde(length(min = 1, max = 2), inner(range(min = 1e-6, max = 1e6)))]
+    pub(super) noise_variances: Vec<f64>,
+    /// Mean position (m) and velocity (m/s) at the start.
+    #[garde(length(min = 2, max = 2), inner(range(min = -1e6, max = 1e6)))]
+    pub(super) start: Vec<f64>,
+    /// Variances of position and velocity at the start, from which the truth is drawn; 0 is known.
+    #[garde(length(min = 2, max = 2), inner(range(min = 0.0, max = 1e6)))]
+    pub(super) start_variances: Vec<f64>,
+    /// Correlation of position and velocity at the start.
+    #[garde(range(min = -1.0, max = 1.0))]
+    pub(super) start_correlation: f64,
+    /// Particles of the particle filters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[garde(range(min = 1, max = 1_000_000))]
+    pub(super) particles: Option<u64>,
+    /// Probabilities that the link loses a message.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[garde(length(min = 1, max = 20), inner(inner(range(min = 0.0, max = 0.99))))]
+    pub(super) losses: Option<Vec<f64>>,
+}
+
+impl Linear {
+    /// The scalar experiment of so many sensors.
+    pub(super) fn scalar(sensors: u64, messages: &[f64]) -> Self {
+        Self {
+            trials: 5000,
+            steps: 20,
+            sensors,
+            messages: messages.into(),
+            acceleration_variance: 4.0,
+            noise_variances: vec![1.0],
+            start: vec![0.0, 10.0],
+            start_variances: vec![0.0, 0.0],
+            start_correlation: 0.0,
+            particles: None,
+            losses: None,
+        }
+    }
+
+    /// The vector experiment of so many sensors. The acceleration variance that fits the printed table is 1, not the 4 of the text.
+    pub(super) fn vector(sensors: u64, messages: &[f64]) -> Self {
+        Self {
+            acceleration_variance: 1.0,
+            noise_variances: vec![2.0, 4.0],
+            ..Self::scalar(sensors, messages)
+        }
+    }
+
+    pub(super) fn with_particles(self, particles: u64) -> Self {
+        Self {
+            particles: Some(particles),
+            ..self
+        }
+    }
+
+    /// So many particles as the particle schemes have.
+    pub(super) fn cloud(&self) -> usize {
+        self.particles.unwrap_or(1) as usize
+    }
+
+    /// The same with at most so many trials.
+    pub(super) fn of_trials(&self, most: u64) -> Self {
+        Self {
+            trials: self.trials.min(most),
+            ..self.clone()
+        }
+    }
+}
+
+impl Setting for Linear {
+    type Scheme = super::linear::Scheme;
+
+    fn quicken(&mut self) {
+        self.trials = 100;
+        self.particles = self.particles.map(|_| 100);
+    }
+
+    fn messages(&self) -> &[f64] {
+        &self.messages
+    }
+
+    fn cost(&self) -> Cost {
+        let fusion = self.sensors as f64 * 2e-6 + self.cloud() as f64 * 2e-8;
+        cost(self.trials, self.steps, self.messages.len(), fusion)
+    }
+
+    fn run(
+        &self,
+        context: &Context<'_>,
+        world: &str,
+        messages: f64,
+        schemes: &[(&'static str, Self::Scheme)],
+    ) -> Result<Vec<Ensemble>, Error> {
+        match self.noise_variances.len() {
+            1 => super::linear::run::<1>(context, self, world, messages, schemes),
+            _ => super::linear::run::<2>(context, self, world, messages, schemes),
+        }
+    }
+}
+
+/// A target in a plane among nine sensors of received power.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Field {
+    /// Monte-Carlo trials.
+    #[garde(range(min = 2, max = 1_000_000))]
+    pub(super) trials: u64,
+    /// Time steps of a trial.
+    #[garde(range(min = 1, max = 1000))]
+    pub(super) steps: u64,
+    /// Message budgets, each at most nine.
+    #[garde(length(min = 1, max = 20), inner(range(min = 1e-3, max = 9.0)))]
+    pub(super) messages: Vec<f64>,
+    /// Particles of every filter.
+    #[garde(range(min = 2, max = 1_000_000))]
+    pub(super) particles: u64,
+    /// Distance of neighbouring sensors of the 3 by 3 grid (m).
+    #[garde(range(min = 1e-3, max = 1e6))]
+    pub(super) spacing_m: f64,
+    /// Variance of the acceleration of each axis (m²/s⁴).
+    #[garde(range(min = 1e-12, max = 1e6))]
+    pub(super) acceleration_variance: f64,
+    /// Variance of the measurement noise.
+    #[garde(range(min = 1e-6, max = 1e6))]
+    pub(super) noise_variance: f64,
+    /// Prior mean of x (m), its velocity (m/s), y and its velocity.
+    #[garde(length(min = 4, max = 4), inner(range(min = -1e6, max = 1e6)))]
+    pub(super) start: Vec<f64>,
+    /// Prior variances of the same.
+    #[garde(length(min = 4, max = 4), inner(range(min = 1e-9, max = 1e6)))]
+    pub(super) start_variances: Vec<f64>,
+    /// Whether the truth is drawn from the prior; the publication's starts at its mean.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[garde(skip)]
+    pub(super) drawn_start: Option<bool>,
+}
+
+impl Field {
+    pub(super) fn new(messages: &[f64]) -> Self {
+        Self {
+            trials: 200,
+            steps: 20,
+            messages: messages.into(),
+            particles: 10_000,
+            spacing_m: 10.0,
+            acceleration_variance: 0.1,
+            noise_variance: 1.0,
+            start: vec![-8.0, 2.0, -8.0, 2.0],
+            start_variances: vec![9.0, 4.0, 9.0, 4.0],
+            drawn_start: Some(false),
+        }
+    }
+}
+
+impl Setting for Field {
+    type Scheme = super::nonlinear::Scheme;
+
+    fn quicken(&mut self) {
+        self.trials = 24;
+        self.particles = 500;
+    }
+
+    fn messages(&self) -> &[f64] {
+        &self.messages
+    }
+
+    fn cost(&self) -> Cost {
+        cost(self.trials, self.steps, self.messages.len(), self.particles as f64 * 1e-7)
+    }
+
+    fn run(
+        &self,
+        context: &Context<'_>,
+        world: &str,
+        messages: f64,
+        schemes: &[(&'static str, Self::Scheme)],
+    ) -> Result<Vec<Ensemble>, Error> {
+        super::nonlinear::run(context, self, world, messages, schemes)
+    }
+}
