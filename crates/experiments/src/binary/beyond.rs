@@ -101,7 +101,7 @@ fn any_patterns(scene: &Scene, linear: &[Mask]) -> Result<(Vec<BinaryQuantizer>,
         .collect::<Result<Vec<_>, _>>()
         .map_err(Error::failed)?;
     let descent =
-        Descent::new(scene.source, vec![scene.noise; linear.len()], candidates.clone()).map_err(Error::failed)?;
+        Descent::with_deviations(scene.source, vec![scene.noise; linear.len()], candidates.clone()).map_err(Error::failed)?;
     let found = descent.run(&[start], 12, |_| true).map_err(Error::failed)?;
     Ok((found.choice.into_iter().map(|c| candidates[c].clone()).collect(), found.mse))
 }
@@ -156,7 +156,7 @@ fn free(id: &'static str, name: &'static str, scene: Scene, sensors: usize, jitt
             .map(|quantizers| {
                 let sensors = quantizers
                     .into_iter()
-                    .map(|q| PatternSensor::new(q, scene.noise))
+                    .map(|q| PatternSensor::with_deviation(q, scene.noise))
                     .collect::<Result<Vec<_>, _>>()?;
                 free_breakpoints(&scene.source, &sensors, jitter / scene.source.scale(), 4)
             })
@@ -258,7 +258,7 @@ fn joint_of_table_6_1() -> Result<Case, Error> {
         .map(|mask| pattern(mask, 4)?.on(&grid).map_err(Error::failed))
         .collect::<Result<Vec<_>, _>>()?;
     let source = Source::uniform(1.0).map_err(Error::failed)?;
-    let descent = Descent::new(source, sensors.noise_stds().to_vec(), candidates).map_err(Error::failed)?;
+    let descent = Descent::with_deviations(source, sensors.noise_stds().to_vec(), candidates).map_err(Error::failed)?;
     let gray = gray_basis(4).map_err(Error::failed)?;
     // The most precise sensors come last, and serve the finest bits well.
     let start: Vec<usize> = gray.iter().cycle().take(8).map(|&m| m as usize - 1).collect();

@@ -55,7 +55,7 @@ pub(super) fn descend(bits: usize, sensors: usize, snr: f64, extra: usize) -> Re
     let candidates = (1..1 << bits)
         .map(|mask| pattern(mask, bits)?.on(&scene.grid).map_err(Error::failed))
         .collect::<Result<Vec<_>, _>>()?;
-    let descent = Descent::new(scene.source, vec![scene.noise; sensors], candidates).map_err(Error::failed)?;
+    let descent = Descent::with_deviations(scene.source, vec![scene.noise; sensors], candidates).map_err(Error::failed)?;
     let gray = gray_basis(bits).map_err(Error::failed)?;
     // Both the fine and the coarse end of the basis may need the spare sensors.
     let cycle = |masks: Vec<Mask>| {
@@ -127,7 +127,7 @@ fn point(p: &Parameters, snr: f64) -> Result<Point, Error> {
         ml: ml.mle,
         ml_mmse: ml.mmse,
         mean: rule(AdaptiveRule::PosteriorMean)?.mmse,
-        clairvoyant: ConditionalMean::new(scene.source, scene.noise / (p.sensors as f64).sqrt())
+        clairvoyant: ConditionalMean::with_deviation(scene.source, scene.noise / (p.sensors as f64).sqrt())
             .map_err(Error::failed)?
             .estimation_error(),
     })

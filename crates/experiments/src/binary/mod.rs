@@ -60,7 +60,7 @@ impl Scene {
     /// Gaussian of variance 0.1 over the eight cells with the printed Lloyd-Max edges.
     fn gaussian(snr_db: f64) -> Result<Self, Error> {
         let std = GAUSSIAN_VARIANCE.sqrt();
-        let source = Source::gaussian(std).map_err(Error::failed)?;
+        let source = Source::gaussian_with_deviation(std).map_err(Error::failed)?;
         let grid = Grid::printed_gaussian(std).map_err(Error::failed)?;
         Self::new(source, grid, snr_db)
     }
@@ -71,7 +71,7 @@ impl Scene {
     }
 
     fn search(&self, sensors: usize) -> Result<LinearSearch, Error> {
-        LinearSearch::new(self.source, self.grid.clone(), self.noise, sensors).map_err(Error::failed)
+        LinearSearch::with_deviation(self.source, self.grid.clone(), self.noise, sensors).map_err(Error::failed)
     }
 
     fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
@@ -84,7 +84,7 @@ impl Scene {
             .map(|p| p.on(&self.grid))
             .collect::<Result<_, _>>()
             .map_err(Error::failed)?;
-        Bank::homogeneous(self.source, quantizers, self.noise).map_err(Error::failed)
+        Bank::homogeneous_with_deviation(self.source, quantizers, self.noise).map_err(Error::failed)
     }
 
     /// Exact error of the posterior mean.

@@ -104,7 +104,7 @@ fn tiling() -> Result<Table, Error> {
     let candidates = (1..8)
         .map(|mask| pattern(mask, 3)?.on(&scene.grid).map_err(Error::failed))
         .collect::<Result<Vec<_>, _>>()?;
-    let descent = Descent::new(scene.source, vec![scene.noise; 16], candidates).map_err(Error::failed)?;
+    let descent = Descent::with_deviations(scene.source, vec![scene.noise; 16], candidates).map_err(Error::failed)?;
     let start: Vec<usize> = eights.iter().map(|&m| m as usize - 1).collect();
     let masks = |choice: &[usize]| choice.iter().map(|&c| c as Mask + 1).collect::<Vec<_>>();
     let found = descent
