@@ -7,7 +7,7 @@ use fewbits_core::Observation;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let source = Source::uniform(1.0)?;
     let (grid, noise) = (Grid::uniform(1.0, 3)?, source.noise_std(18.2)?);
-    let search = LinearSearch::new(source, grid.clone(), noise, 8)?;
+    let search = LinearSearch::with_deviation(source, grid.clone(), noise, 8)?;
     let best = search.best()?;
     println!("masks {:?}, squared error {:.7}", best.masks, best.mse);
     for mask in &best.masks {

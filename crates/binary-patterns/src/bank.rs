@@ -5,6 +5,7 @@ use super::source::noise_in_range;
 use super::source::{Blur, Nodes, Source};
 use crate::Error;
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::binomial;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::quadrature::gauss_legendre;
 use serde::{Deserialize, Serialize};
@@ -47,7 +48,7 @@ impl TryFrom<StoredSensor> for PatternSensor {
     type Error = Error;
 
     fn try_from(stored: StoredSensor) -> Result<Self, Error> {
-        Self::new(stored.quantizer, stored.noise_std)
+        Self::with_deviation(stored.quantizer, stored.noise_std)
     }
 }
 
@@ -56,7 +57,7 @@ impl PatternSensor {
     ///
     /// # Errors
     /// If `noise_std` is not positive and finite.
-    pub fn new(quantizer: BinaryQuantizer, noise_std: f64) -> Result<Self, Error> {
+    pub fn with_deviation(quantizer: BinaryQuantizer, noise_std: f64) -> Result<Self, Error> {
         let noise_std = noise_in_range(noise_std)?;
         Ok(Self { quantizer, noise_std })
     }
@@ -163,10 +164,14 @@ impl Bank {
     ///
     /// # Errors
     /// If there is no quantizer or `noise_std` is not positive and finite.
-    pub fn homogeneous(source: Source, quantizers: Vec<BinaryQuantizer>, noise_std: f64) -> Result<Self, Error> {
+    pub fn homogeneous_with_deviation(
+        source: Source,
+        quantizers: Vec<BinaryQuantizer>,
+        noise_std: f64,
+    ) -> Result<Self, Error> {
         let sensors = quantizers
             .into_iter()
-            .map(|quantizer| PatternSensor::new(quantizer, noise_std))
+            .map(|quantizer| PatternSensor::with_deviation(quantizer, noise_std))
             .collect::<Result<_, _>>()?;
         Self::new(source, sensors)
     }
@@ -323,7 +328,7 @@ impl CountTable {
     }
 
     pub fn from_probabilities(p: &[[f64; 2]], count: usize) -> Self {
-        let log_choose = log_binomials(count);
+        let log_choose = binomial::log_row(count);
         let rows = (0..=count)
             .map(|k| {
                 let choose = log_choose[k].exp().round();
@@ -347,14 +352,6 @@ fn times_log(n: usize, p: f64) -> f64 {
     if n == 0 { 0.0 } else { n as f64 * p.ln() }
 }
 
-fn log_binomials(count: usize) -> Vec<f64> {
-    let mut logs = vec![0.0; count + 1];
-    for k in 1..=count {
-        logs[k] = logs[k - 1] + ((count + 1 - k) as f64).ln() - (k as f64).ln();
-    }
-    logs
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -368,7 +365,8 @@ mod tests {
     fn outcomes_sum_to_one_and_repeats_are_counted() {
         let source = Source::uniform(1.0).unwrap();
         let other = BinaryQuantizer::new(vec![-0.5, 0.5]).unwrap();
-        let bank = Bank::homogeneous(source, vec![sign(), other.clone(), sign(), other, sign()], 0.2).unwrap();
+        let bank =
+            Bank::homogeneous_with_deviation(source, vec![sign(), other.clone(), sign(), other, sign()], 0.2).unwrap();
         assert_eq!(bank.outcomes(), 12);
         let (mut total, mut seen) = (0.0, 0);
         bank.for_outcomes(&bank.fine_nodes(), |index, w| {
@@ -402,12 +400,12 @@ mod tests {
         let source = Source::uniform(1.0).unwrap();
         assert!(Bank::new(source, vec![]).is_err());
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(PatternSensor::new(sign(), bad).is_err());
+            assert!(PatternSensor::with_deviation(sign(), bad).is_err());
         }
         let distinct = (0..27)
             .map(|i| BinaryQuantizer::new(vec![f64::from(i)]).unwrap())
             .collect();
-        let bank = Bank::homogeneous(source, distinct, 0.2).unwrap();
+        let bank = Bank::homogeneous_with_deviation(source, distinct, 0.2).unwrap();
         assert!(matches!(bank.checked_outcomes(), Err(Error::TooManyOutcomes { .. })));
     }
 }

@@ -2,26 +2,10 @@
 
 use super::grid::bits_in_range;
 use crate::Error;
+use fewbits_numerics::binomial::exact as binomial;
 
 fn overflow(what: &'static str) -> Error {
     Error::CountOverflow { what }
-}
-
-/// `C(n, k)`; `None` on overflow of the result (or of an intermediate product that nearly is one).
-fn binomial(n: u128, k: u128) -> Option<u128> {
-    if k > n {
-        return Some(0);
-    }
-    (0..k.min(n - k)).try_fold(1u128, |c, i| {
-        // c (n - i) / (i + 1) is whole; dividing common factors first keeps the product small.
-        let (top, bottom) = (n - i, i + 1);
-        let g = gcd(c, bottom);
-        (c / g).checked_mul(top / (bottom / g))
-    })
-}
-
-fn gcd(a: u128, b: u128) -> u128 {
-    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 /// Number of multisets of `size` out of `kinds` things: `C(kinds + size - 1, size)`.

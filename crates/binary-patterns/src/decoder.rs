@@ -89,26 +89,7 @@ impl LookupTable {
         if bits.len() == observations.len() {
             return self.estimate(&bits);
         }
-        if observations.len() != self.bank.sensors() {
-            let given = format!("{} observations", observations.len());
-            return Err(ArgumentError::new("observations", given, format!("{}", self.bank.sensors())).into());
-        }
-        let nodes = self.bank.fine_nodes();
-        let mut score = vec![0.0; nodes.len()];
-        for (n, bit) in observations
-            .iter()
-            .enumerate()
-            .filter_map(|(n, o)| o.received().map(|bit| (n, bit.0)))
-        {
-            let sensor = self.bank.sensor(n);
-            for (s, x) in score.iter_mut().zip(&nodes.x) {
-                *s += sensor.log_probabilities(*x)[usize::from(bit)];
-            }
-        }
-        let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let w: Vec<f64> = score.iter().zip(&nodes.w).map(|(s, w)| w * (s - best).exp()).collect();
-        let (mass, first) = moments(&w, &nodes.x);
-        Ok(if mass > 0.0 { first / mass } else { 0.0 })
+        self.bank.posterior_mean(observations)
     }
 
     /// The estimate for one bit a sensor.
@@ -165,6 +146,29 @@ impl LookupTable {
 }
 
 impl Bank {
+    /// The posterior mean from one observation per sensor, without a table; a bit that is missing says nothing.
+    ///
+    /// # Errors
+    /// If the number of observations is not the number of sensors.
+    pub fn posterior_mean(&self, observations: &[Observation<Bit>]) -> Result<f64, Error> {
+        if observations.len() != self.sensors() {
+            let given = format!("{} observations", observations.len());
+            return Err(ArgumentError::new("observations", given, format!("{}", self.sensors())).into());
+        }
+        let nodes = self.fine_nodes();
+        let mut score = vec![0.0; nodes.len()];
+        for (n, observation) in observations.iter().enumerate() {
+            let Some(Bit(bit)) = observation.received() else {
+                continue;
+            };
+            let sensor = self.sensor(n);
+            for (s, x) in score.iter_mut().zip(&nodes.x) {
+                *s += sensor.log_probabilities(*x)[usize::from(*bit)];
+            }
+        }
+        Ok(mean_under(&score, &nodes))
+    }
+
     /// The look-up table of a decoder.
     ///
     /// # Errors
@@ -240,10 +244,7 @@ impl Bank {
             for index in impossible {
                 self.counts_at(index, &mut counts);
                 self.log_likelihood(&logs, &counts, &mut score);
-                let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                let w: Vec<f64> = score.iter().zip(&nodes.w).map(|(s, w)| w * (s - best).exp()).collect();
-                let (mass, first) = moments(&w, &nodes.x);
-                estimates[index] = if mass > 0.0 { first / mass } else { 0.0 };
+                estimates[index] = mean_under(&score, &nodes);
             }
         }
         estimates
@@ -374,6 +375,14 @@ fn first_largest(scores: &[f64], slack: impl Fn(f64) -> f64) -> usize {
     scores.iter().position(|&s| s >= enough).unwrap_or(0)
 }
 
+/// Mean of the source when its density is multiplied by the exponential of `score`, given at the nodes.
+fn mean_under(score: &[f64], nodes: &Nodes) -> f64 {
+    let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let w: Vec<f64> = score.iter().zip(&nodes.w).map(|(s, w)| w * (s - best).exp()).collect();
+    let (mass, first) = moments(&w, &nodes.x);
+    if mass > 0.0 { first / mass } else { 0.0 }
+}
+
 /// `(sum w, sum w x)`.
 pub(crate) fn moments(w: &[f64], x: &[f64]) -> (f64, f64) {
     w.iter()
@@ -396,7 +405,7 @@ mod tests {
         let q = |b: &[f64]| BinaryQuantizer::new(b.to_vec()).unwrap();
         let all = vec![q(&[0.0]), q(&[-0.5, 0.5]), q(&[0.25])];
         let bank = |quantizers: Vec<BinaryQuantizer>| {
-            Bank::homogeneous(Source::uniform(1.0).unwrap(), quantizers, 0.2).unwrap()
+            Bank::homogeneous_with_deviation(Source::uniform(1.0).unwrap(), quantizers, 0.2).unwrap()
         };
         let table = bank(all.clone()).table(Decoder::Mmse).unwrap();
         let others = bank(all[..2].to_vec()).table(Decoder::Mmse).unwrap();

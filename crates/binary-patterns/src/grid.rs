@@ -187,7 +187,7 @@ mod tests {
             .unwrap()
             .noiseless_mse(&Source::uniform(1.0).unwrap());
         assert_relative_eq!(uniform, 0.25 * 0.25 / 12.0, max_relative = 1e-12);
-        let source = Source::gaussian(0.7).unwrap();
+        let source = Source::gaussian_with_deviation(0.7).unwrap();
         let exact = 0.49
             * fewbits_quantizers::lloyd_max::gaussian_table(3)
                 .unwrap()

@@ -15,7 +15,7 @@
 //! use fewbits_binary_patterns::{Decoder, Grid, Source, bounds};
 //! let source = Source::uniform(1.0)?;
 //! let noise = source.noise_std(18.2)?;
-//! let search = LinearSearch::new(source, Grid::uniform(1.0, 3)?, noise, 8)?;
+//! let search = LinearSearch::with_deviation(source, Grid::uniform(1.0, 3)?, noise, 8)?;
 //! let best = search.best()?;                                   // of 2702 sets
 //! assert_eq!(best.masks, [2, 2, 3, 3, 3, 3, 4, 6]);
 //! let bank = search.bank(&best.masks)?;

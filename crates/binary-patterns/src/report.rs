@@ -92,7 +92,7 @@ mod tests {
     fn a_bit_of_a_pattern_is_a_lawful_factor() {
         for scale in [1e-4, 1.0, 1e4] {
             let quantizer = BinaryQuantizer::new([-0.5, 0.4, 1.1].map(|b| scale * b).to_vec()).unwrap();
-            let sensor = PatternSensor::new(quantizer, 0.3 * scale).unwrap();
+            let sensor = PatternSensor::with_deviation(quantizer, 0.3 * scale).unwrap();
             let points = [-1e9, -3.0, -0.4, 0.0, 0.7, 30.0].map(|m| SVector::from([scale * m]));
             let prior = Gaussian::scalar(0.2 * scale, scale * scale).unwrap();
             for link in [Link::PERFECT, Link::new(0.3, 0.1).unwrap()] {

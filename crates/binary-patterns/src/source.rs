@@ -29,7 +29,7 @@ impl TryFrom<Kind> for Source {
     fn try_from(kind: Kind) -> Result<Self, Error> {
         match kind {
             Kind::Uniform { half_width } => Self::uniform(half_width),
-            Kind::Gaussian { std } => Self::gaussian(std),
+            Kind::Gaussian { std } => Self::gaussian_with_deviation(std),
         }
     }
 }
@@ -57,7 +57,7 @@ impl Source {
     ///
     /// # Errors
     /// If `std` is not a finite number above zero.
-    pub fn gaussian(std: f64) -> Result<Self, Error> {
+    pub fn gaussian_with_deviation(std: f64) -> Result<Self, Error> {
         let std = positive("std", std)?;
         Ok(Self {
             kind: Kind::Gaussian { std },
@@ -84,7 +84,7 @@ impl Source {
         let scale = factor * self.scale();
         match self.kind {
             Kind::Uniform { .. } => Self::uniform(scale),
-            Kind::Gaussian { .. } => Self::gaussian(scale),
+            Kind::Gaussian { .. } => Self::gaussian_with_deviation(scale),
         }
     }
 
@@ -249,7 +249,10 @@ mod tests {
 
     #[test]
     fn nodes_carry_mass_and_variance() {
-        for source in [Source::uniform(1.3).unwrap(), Source::gaussian(0.4).unwrap()] {
+        for source in [
+            Source::uniform(1.3).unwrap(),
+            Source::gaussian_with_deviation(0.4).unwrap(),
+        ] {
             let nodes = source.nodes(0.2, gauss_legendre::<12>());
             assert_relative_eq!(nodes.expectation(|_| 1.0), 1.0, max_relative = 1e-14);
             assert_relative_eq!(nodes.expectation(|x| x * x), source.variance(), max_relative = 1e-14);
@@ -277,7 +280,7 @@ mod tests {
     fn scales_are_checked() {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(Source::uniform(bad).is_err());
-            assert!(Source::gaussian(bad).is_err());
+            assert!(Source::gaussian_with_deviation(bad).is_err());
         }
         let source = Source::uniform(1.0).unwrap();
         assert!(source.noise_std(f64::NAN).is_err());

@@ -17,6 +17,25 @@ fn gcd(a: u128, b: u128) -> u128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
+/// `C(n, k)`, exactly up to `u64::MAX` and that beyond: for sizes of tables, in inner loops.
+pub fn saturating(n: usize, k: usize) -> u64 {
+    if k > n {
+        return 0;
+    }
+    let k = k.min(n - k);
+    if n <= 60 {
+        return (0..k).fold(1, |value, i| value * (n - i) as u64 / (i + 1) as u64);
+    }
+    let mut value: u128 = 1;
+    for i in 0..k {
+        value = value * (n - i) as u128 / (i + 1) as u128;
+        if value > u128::from(u64::MAX) {
+            return u64::MAX;
+        }
+    }
+    value as u64
+}
+
 /// `ln C(n, k)` for all `k` in `0..=n`.
 ///
 /// Relative error of the coefficients below `(n + 2) 2^-53`: exact products while they fit, ratios beyond.
@@ -49,6 +68,12 @@ mod tests {
             }
         }
         assert_eq!(exact(3, 4), Some(0));
+        for n in 0..130_usize {
+            for k in 0..=n {
+                let truth = exact(n as u128, k as u128).unwrap();
+                assert_eq!(saturating(n, k), u64::try_from(truth).unwrap_or(u64::MAX));
+            }
+        }
         assert_eq!(exact(0, 0), Some(1));
         assert_eq!(exact(1000, 500), None);
         assert_eq!(exact(u128::MAX, 1), Some(u128::MAX));

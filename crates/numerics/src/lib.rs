@@ -24,6 +24,7 @@ pub mod binomial;
 pub mod error;
 pub mod kernels;
 pub mod linalg;
+pub mod newton;
 pub mod normal;
 pub mod quadrature;
 pub mod roots;

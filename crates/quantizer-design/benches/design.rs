@@ -19,12 +19,15 @@ fn lloyd(levels: usize) -> Quantizer {
 }
 
 fn pair(levels: usize, rho: f64) -> System {
-    let scene = Scene::new(Prior::gaussian(1.0).unwrap(), Noise::equicorrelated(&[1.0; 2], rho).unwrap());
+    let scene = Scene::new(
+        Prior::gaussian_with_deviation(1.0).unwrap(),
+        Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
+    );
     System::ideal(scene.unwrap(), vec![lloyd(levels); 2]).unwrap()
 }
 
 fn nine() -> Scene {
-    Scene::gaussian(1.0, &[1.0; 9]).unwrap()
+    Scene::gaussian_with_deviations(1.0, &[1.0; 9]).unwrap()
 }
 
 /// The unit: one encoding by eight levels.

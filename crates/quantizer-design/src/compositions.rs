@@ -3,28 +3,14 @@
 //! The likelihood of `N` identical sensors depends on how many reported each symbol, so `L^N` outcomes collapse to
 //! `C(N + L - 1, L - 1)` count vectors with multinomial coefficients: 220 instead of 262144 for nine sensors of four levels.
 
-/// `C(n, k)`, saturating.
-pub(crate) fn binomial(n: usize, k: usize) -> u64 {
-    let k = k.min(n.saturating_sub(k));
-    if n <= 60 {
-        return (0..k).fold(1, |value, i| value * (n - i) as u64 / (i + 1) as u64);
-    }
-    let mut value: u128 = 1;
-    for i in 0..k {
-        value = value * (n - i) as u128 / (i + 1) as u128;
-        if value > u128::from(u64::MAX) {
-            return u64::MAX;
-        }
-    }
-    value as u64
-}
+use fewbits_numerics::binomial;
 
 /// Number of ways to spread `total` reports over `parts` symbols.
 pub(crate) fn count(total: usize, parts: usize) -> u64 {
     if parts == 0 {
         u64::from(total == 0)
     } else {
-        binomial(total + parts - 1, parts - 1)
+        binomial::saturating(total + parts - 1, parts - 1)
     }
 }
 

@@ -31,7 +31,7 @@ pub struct Estimate {
 /// ```
 /// use fewbits_core::Observation;
 /// use fewbits_quantizer_design::{Quantizer, Scene, Symbol, System, decoder::MmseDecoder};
-/// let system = System::identical(Scene::gaussian(1.0, &[1.0; 9])?, Quantizer::symmetric(1.38)?)?;
+/// let system = System::identical(Scene::gaussian_with_deviations(1.0, &[1.0; 9])?, Quantizer::symmetric(1.38)?)?;
 /// let decoder = MmseDecoder::new(&system, 220)?;
 /// let mut observations = [3, 2, 2, 3, 1, 2, 3, 2, 2].map(|t| Observation::Received(Symbol(t)));
 /// let estimate = decoder.decode(&observations)?;
@@ -234,12 +234,39 @@ fn posterior(scene: &Scene, likelihood: &[f64]) -> [f64; 3] {
 ///
 /// Outcomes are accepted for the second value in decreasing order of their likelihood ratio until the false-alarm budget is
 /// spent; the outcome on which it runs out is accepted with a probability.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredTest", into = "StoredTest")]
 pub struct NeymanPearson {
     table: JointTable,
+    false_alarm: f64,
     /// Probability of accepting the second value, an outcome.
     acceptance: Vec<f64>,
     detection: f64,
+}
+
+/// The stored form of a test; its table is computed again.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredTest {
+    system: System,
+    false_alarm: f64,
+}
+
+impl From<NeymanPearson> for StoredTest {
+    fn from(test: NeymanPearson) -> Self {
+        Self {
+            system: test.table.system().clone(),
+            false_alarm: test.false_alarm,
+        }
+    }
+}
+
+impl TryFrom<StoredTest> for NeymanPearson {
+    type Error = Error;
+
+    fn try_from(stored: StoredTest) -> Result<Self, Error> {
+        Self::new(&stored.system, stored.false_alarm)
+    }
 }
 
 impl NeymanPearson {
@@ -273,6 +300,7 @@ impl NeymanPearson {
         }
         Ok(Self {
             table,
+            false_alarm,
             acceptance,
             detection: detection.min(1.0),
         })
@@ -283,12 +311,31 @@ impl NeymanPearson {
         self.detection
     }
 
-    /// Probability with which to accept the second value when sensor `n` was received as `symbols[n]`: 0 or 1 but for one outcome.
+    /// Probability with which to accept the second value given one observation per sensor: 0 or 1 but for one outcome.
+    ///
+    /// Where symbols are missing (these sensors always report, so that nothing received says no more than an erasure) it is that
+    /// of the most powerful test on the sensors that are left, of the same false-alarm probability, which is made anew.
     ///
     /// # Errors
-    /// If there is not one symbol a sensor, or one is out of range.
-    pub fn acceptance(&self, symbols: &[usize]) -> Result<f64, Error> {
-        Ok(self.acceptance[self.table.outcome(symbols)?])
+    /// If there is not one observation per sensor, or a symbol is out of range.
+    pub fn acceptance(&self, observations: &[Observation<Symbol>]) -> Result<f64, Error> {
+        let system = self.table.system();
+        if observations.len() != system.scene().sensors() {
+            let given = format!("{} observations", observations.len());
+            return refuse("observations", given, format!("one per sensor, {}", system.scene().sensors()));
+        }
+        let symbols: Vec<usize> = observations.iter().filter_map(|o| o.received().map(|s| s.0)).collect();
+        if symbols.is_empty() {
+            return Ok(self.false_alarm);
+        }
+        if symbols.len() == observations.len() {
+            return Ok(self.acceptance[self.table.outcome(&symbols)?]);
+        }
+        let received: Vec<usize> = (0..observations.len())
+            .filter(|n| observations[*n].received().is_some())
+            .collect();
+        let test = Self::new(&system.subset(&received)?, self.false_alarm)?;
+        Ok(test.acceptance[test.table.outcome(&symbols)?])
     }
 }
 
@@ -299,7 +346,7 @@ mod tests {
 
     #[test]
     fn the_table_attains_the_mean_squared_error() {
-        let scene = Scene::gaussian(1.0, &[1.0, 0.7]).unwrap();
+        let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 0.7]).unwrap();
         let q = Quantizer::symmetric(1.2).unwrap();
         let system = System::ideal(scene, vec![q.clone(), q]).unwrap();
         let decoder = MmseDecoder::new(&system, 16).unwrap();
@@ -318,8 +365,8 @@ mod tests {
     #[test]
     fn an_erased_symbol_leaves_the_posterior_of_the_others() {
         for rho in [0.0, 0.5] {
-            let noise = Noise::equicorrelated(&[1.0; 3], rho).unwrap();
-            let scene = Scene::new(Prior::gaussian(1.0).unwrap(), noise).unwrap();
+            let noise = Noise::equicorrelated_with_deviations(&[1.0; 3], rho).unwrap();
+            let scene = Scene::new(Prior::gaussian_with_deviation(1.0).unwrap(), noise).unwrap();
             let q = Quantizer::symmetric(1.2).unwrap();
             let system = System::identical(scene.clone(), q.clone()).unwrap();
             let decoder = MmseDecoder::new(&system, 20).unwrap();
@@ -351,7 +398,7 @@ mod tests {
     fn an_offset_prior_has_the_error_of_one_at_zero() {
         let scene = |m: f64| {
             let prior = Prior::discrete(vec![m, m + 1.0], vec![0.5, 0.5]).unwrap();
-            Scene::new(prior, Noise::independent(&[1.0]).unwrap()).unwrap()
+            Scene::new(prior, Noise::independent_with_deviations(&[1.0]).unwrap()).unwrap()
         };
         let system = |m: f64| System::ideal(scene(m), vec![Quantizer::new(vec![m + 0.5]).unwrap()]).unwrap();
         let exact = system(0.0).value(Criterion::MeanSquaredError).unwrap();
@@ -371,7 +418,7 @@ mod tests {
     #[test]
     fn likelihood_ratios_are_ordered_by_their_logarithms() {
         let five = |signal: f64, sensors: usize, b: Vec<f64>| {
-            let noise = Noise::independent(&vec![1.0; sensors]).unwrap();
+            let noise = Noise::independent_with_deviations(&vec![1.0; sensors]).unwrap();
             let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
             System::identical(scene, Quantizer::new(b).unwrap()).unwrap()
         };
@@ -383,13 +430,16 @@ mod tests {
         let far = five(40.0, 3, vec![10.0, 20.0, 30.0]);
         let test = NeymanPearson::new(&far, 0.01).unwrap();
         assert!((test.detection_probability() - 1.0).abs() < 1e-12);
-        assert_eq!(test.acceptance(&[3, 3, 3]).unwrap(), 1.0);
-        assert!(test.acceptance(&[0, 0, 0]).unwrap() < 0.011);
+        let all = |t: usize| [Observation::Received(Symbol(t)); 3];
+        assert_eq!(test.acceptance(&all(3)).unwrap(), 1.0);
+        assert!(test.acceptance(&all(0)).unwrap() < 0.011);
     }
 
     #[test]
     fn the_test_spends_its_budget_exactly() {
-        let scene = Scene::new(Prior::binary(2.0, 0.5).unwrap(), Noise::independent(&[1.0; 3]).unwrap()).unwrap();
+        let scene =
+            Scene::new(Prior::binary(2.0, 0.5).unwrap(), Noise::independent_with_deviations(&[1.0; 3]).unwrap())
+                .unwrap();
         let system = System::identical(scene, Quantizer::new(vec![0.0, 1.0, 2.0]).unwrap()).unwrap();
         let mut last: f64 = 0.0;
         for alpha in [1e-6, 0.01, 0.3, 0.9] {
@@ -401,13 +451,38 @@ mod tests {
             assert!(test.detection_probability() > last.max(alpha));
             last = test.detection_probability();
         }
+        // Averaged over what the first and the last sensor report, the test without the second spends the same.
+        let test = NeymanPearson::new(&system, 0.3).unwrap();
+        let given = system.symbol_distributions_given_values(0).unwrap();
+        let received = |t: usize| Observation::Received(Symbol(t));
+        let mut spent = 0.0;
+        for a in 0..4 {
+            for b in 0..4 {
+                let accepted = test
+                    .acceptance(&[received(a), Observation::Erased, received(b)])
+                    .unwrap();
+                spent += given[0][a] * given[0][b] * accepted;
+            }
+        }
+        assert!((spent - 0.3).abs() < 1e-13);
+        assert_eq!(test.acceptance(&[Observation::Nothing; 3]).unwrap(), 0.3);
+        assert!(test.acceptance(&[Observation::Erased; 2]).is_err());
+        let json = serde_json::to_string(&test).unwrap();
+        assert_eq!(serde_json::from_str::<NeymanPearson>(&json).unwrap(), test);
+        assert!(
+            serde_json::from_str::<NeymanPearson>(&json.replace("\"false_alarm\":0.3", "\"false_alarm\":1.3")).is_err()
+        );
+        let json = serde_json::to_string(&test.table).unwrap();
+        assert_eq!(serde_json::from_str::<JointTable>(&json).unwrap(), test.table);
         assert!(NeymanPearson::new(&system, 0.0).is_err());
         assert!(NeymanPearson::new(&system, 1.0).is_err());
     }
 
     #[test]
     fn equivocation_and_information_make_up_the_prior_entropy() {
-        let scene = Scene::new(Prior::binary(1.0, 0.3).unwrap(), Noise::independent(&[1.0; 3]).unwrap()).unwrap();
+        let scene =
+            Scene::new(Prior::binary(1.0, 0.3).unwrap(), Noise::independent_with_deviations(&[1.0; 3]).unwrap())
+                .unwrap();
         let system = System::identical(scene, Quantizer::new(vec![0.5]).unwrap()).unwrap();
         let table = JointTable::new(&system).unwrap();
         let entropy = -(0.3 * f64::ln(0.3) + 0.7 * f64::ln(0.7));

@@ -80,3 +80,13 @@ pub(crate) fn refuse<T>(
 ) -> Result<T, Error> {
     Err(ArgumentError::new(name, value, expected).into())
 }
+
+/// A stored number that is a size: not negative, but for rounding, and finite.
+pub(crate) fn stored_size<'de, D: serde::Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
+    let size = <f64 as serde::Deserialize>::deserialize(source)?;
+    if size.is_finite() && size >= -1e-9 {
+        Ok(size)
+    } else {
+        Err(serde::de::Error::custom(ArgumentError::new("value", size, "a finite number that is not negative")))
+    }
+}

@@ -24,7 +24,7 @@
 //! use fewbits_quantizer_design::{Criterion, Newton, Scene, Symbol, System, design};
 //!
 //! // Two sensors with unit noise about a standard normal unknown, two bits each, started from Lloyd-Max quantizers.
-//! let scene = Scene::gaussian(1.0, &[1.0, 1.0])?;
+//! let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0])?;
 //! let start = System::lloyd_max(scene, 4)?;
 //! let best = design::joint(&start, Criterion::MutualInformation, &Newton::default())?;
 //! assert!(!best.is_saddle());

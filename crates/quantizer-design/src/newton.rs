@@ -56,6 +56,7 @@ pub enum AtSaddle {
 
 /// Stopping and safeguards of a Newton design.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredNewton")]
 pub struct Newton {
     /// Most iterations, escapes from saddles included.
     pub max_iterations: usize,
@@ -65,6 +66,36 @@ pub struct Newton {
     pub max_step: f64,
     /// What to do on arriving at a saddle.
     pub at_saddle: AtSaddle,
+}
+
+/// The stored form of the settings, whose values are checked when read.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredNewton {
+    max_iterations: usize,
+    tolerance: f64,
+    max_step: f64,
+    at_saddle: AtSaddle,
+}
+
+impl TryFrom<StoredNewton> for Newton {
+    type Error = Error;
+
+    fn try_from(stored: StoredNewton) -> Result<Self, Error> {
+        let StoredNewton {
+            max_iterations,
+            tolerance,
+            max_step,
+            at_saddle,
+        } = stored;
+        let newton = Self {
+            max_iterations,
+            tolerance,
+            max_step,
+            at_saddle,
+        };
+        newton.check().map(|()| newton)
+    }
 }
 
 impl Default for Newton {
@@ -79,6 +110,14 @@ impl Default for Newton {
 }
 
 impl Newton {
+    /// Refuses settings with which no design could end.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        fewbits_numerics::error::at_least_one("max_iterations", self.max_iterations)?;
+        fewbits_numerics::error::non_negative("tolerance", self.tolerance)?;
+        fewbits_numerics::error::positive("max_step", self.max_step)?;
+        Ok(())
+    }
+
     /// Stays at the stationary point that the start leads to, be it a saddle.
     pub fn to_nearest_stationary_point() -> Self {
         Self {
@@ -126,6 +165,7 @@ pub(crate) fn climb(
     scale: f64,
     newton: &Newton,
 ) -> Result<Stationary, Error> {
+    newton.check()?;
     let blocks = objective.blocks();
     let mut b = start.to_vec();
     let mut evaluations = 0;
@@ -221,4 +261,26 @@ fn in_order(b: &[f64], blocks: &[usize]) -> bool {
         rest = tail;
         head.iter().all(|x| x.is_finite()) && head.windows(2).all(|w| w[0] < w[1])
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_are_stored_and_checked_when_restored() {
+        let newton = Newton::to_nearest_stationary_point();
+        let json = serde_json::to_string(&newton).unwrap();
+        assert_eq!(serde_json::from_str::<Newton>(&json).unwrap(), newton);
+        for (from, to) in [
+            ("0.3", "-0.3"),
+            ("1e-13", "-1"),
+            ("300", "0"),
+            ("\"max_step\"", "\"longest\""),
+        ] {
+            let bad = json.replacen(from, to, 1);
+            assert_ne!(bad, json);
+            assert!(serde_json::from_str::<Newton>(&bad).is_err(), "{bad}");
+        }
+    }
 }

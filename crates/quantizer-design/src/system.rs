@@ -97,7 +97,7 @@ impl SensorGroup {
 ///
 /// ```
 /// use fewbits_quantizer_design::{Criterion, Quantizer, Scene, System};
-/// let scene = Scene::gaussian(1.0, &[1.0, 1.0])?;
+/// let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0])?;
 /// let system = System::identical(scene, Quantizer::symmetric(1.37)?)?;
 /// assert!((system.value(Criterion::MeanSquaredError)? - 0.388_458_855_09).abs() < 1e-9);
 /// # Ok::<(), fewbits_quantizer_design::Error>(())
@@ -220,7 +220,7 @@ impl System {
     pub fn lloyd_max_over(scene: Scene, channel: &Channel) -> Result<Self, Error> {
         let standard = lloyd_max::gaussian(channel.inputs())?;
         let quantizers = (0..scene.sensors())
-            .map(|n| Ok(Quantizer::from(&standard.affine(scene.sample_mean(), scene.sample_sd(n))?)))
+            .map(|n| Ok(Quantizer::from(&standard.affine(scene.sample_mean(), scene.sample_deviation(n))?)))
             .collect::<Result<Vec<_>, Error>>()?;
         let channels = vec![channel.clone(); scene.sensors()];
         Self::distinct(scene, quantizers, channels)
@@ -237,6 +237,24 @@ impl System {
         });
         let rescaled = Self::new(self.scene.rescaled(factor)?, groups.collect::<Result<_, _>>()?)?;
         Ok(rescaled.with_outcome_limit(self.outcome_limit))
+    }
+
+    /// The system of some of the sensors only, in the given order.
+    ///
+    /// # Errors
+    /// If `sensors` is empty, names a sensor that is not there, or one twice.
+    pub fn subset(&self, sensors: &[usize]) -> Result<Self, Error> {
+        let groups = self.groups.iter().filter_map(|g| {
+            let kept: Vec<usize> = (0..sensors.len())
+                .filter(|n| g.sensors.contains(&sensors[*n]))
+                .collect();
+            (!kept.is_empty()).then(|| SensorGroup::new(g.quantizer.clone(), g.channel.clone(), kept))
+        });
+        if let Some(n) = (1..sensors.len()).find(|n| sensors[..*n].contains(&sensors[*n])) {
+            return refuse("sensor", format!("{} twice", sensors[n]), "each sensor once");
+        }
+        let system = Self::new(self.scene.subset(sensors)?, groups.collect::<Result<_, _>>()?)?;
+        Ok(system.with_outcome_limit(self.outcome_limit))
     }
 
     /// Distribution of the symbol received from one sensor, whatever the unknown.
@@ -258,7 +276,7 @@ impl System {
         let Some(group) = self.groups.iter().find(|g| g.sensors.contains(&sensor)) else {
             return refuse("sensor", sensor, format!("a number below {}", self.scene.sensors()));
         };
-        let deviation = self.scene.noise().sd(sensor);
+        let deviation = self.scene.noise().deviation(sensor);
         self.scene
             .values
             .iter()
@@ -379,7 +397,7 @@ mod tests {
 
     #[test]
     fn systems_that_do_not_fit_are_refused() {
-        let scene = Scene::gaussian(1.0, &[1.0, 0.5]).unwrap();
+        let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 0.5]).unwrap();
         let q = Quantizer::symmetric(1.0).unwrap();
         assert!(
             System::identical(scene.clone(), q.clone())

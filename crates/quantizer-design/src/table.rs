@@ -6,6 +6,7 @@ use crate::error::{Error, refuse};
 use crate::law::Reports;
 use crate::scene::Scene;
 use crate::system::System;
+use serde::{Deserialize, Serialize};
 
 /// Most entries of a table (outcomes times values of the unknown).
 const ENTRY_LIMIT: u64 = 1 << 25;
@@ -57,13 +58,35 @@ impl Layout {
 }
 
 /// `P(outcome | x)` for every joint outcome, up to permutations within groups, and every value of the unknown.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredTable", into = "StoredTable")]
 pub struct JointTable {
+    system: System,
     layout: Layout,
-    scene: Scene,
     /// Outcomes by values.
     likelihood: Vec<f64>,
     log_multiplicity: Vec<f64>,
+}
+
+/// The stored form: the system; the probabilities are computed again.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredTable {
+    system: System,
+}
+
+impl From<JointTable> for StoredTable {
+    fn from(table: JointTable) -> Self {
+        Self { system: table.system }
+    }
+}
+
+impl TryFrom<StoredTable> for JointTable {
+    type Error = Error;
+
+    fn try_from(stored: StoredTable) -> Result<Self, Error> {
+        Self::new(&stored.system)
+    }
 }
 
 impl JointTable {
@@ -83,10 +106,19 @@ impl JointTable {
         let reports = Reports::of(system)?;
         Ok(Self {
             layout: Layout::new(system),
-            scene: system.scene().clone(),
+            system: system.clone(),
             likelihood: reports.moments(&system.scene().given),
             log_multiplicity: reports.log_multiplicity,
         })
+    }
+
+    /// The system whose outcomes are tabulated.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    fn scene(&self) -> &Scene {
+        self.system.scene()
     }
 
     /// Number of outcomes.
@@ -96,7 +128,7 @@ impl JointTable {
 
     /// Values of the unknown, the columns of the table.
     pub fn values(&self) -> &[f64] {
-        self.scene.values()
+        self.scene().values()
     }
 
     /// Outcome in which sensor `n` was received as symbol `symbols[n]`.
@@ -110,7 +142,7 @@ impl JointTable {
     /// `P(outcome | x_k)` for all `k`; sums to 1 over outcomes. Sensors of a group are not told apart: divide by the
     /// [`multiplicity`](Self::multiplicity) for one particular report.
     pub fn likelihood(&self, outcome: usize) -> &[f64] {
-        let values = self.scene.values().len();
+        let values = self.scene().values().len();
         self.likelihood
             .get(outcome * values..(outcome + 1) * values)
             .unwrap_or_default()
@@ -123,7 +155,7 @@ impl JointTable {
 
     /// Prior probability of an outcome.
     pub fn probability(&self, outcome: usize) -> f64 {
-        self.scene
+        self.scene()
             .weights()
             .iter()
             .zip(self.likelihood(outcome))
@@ -133,7 +165,7 @@ impl JointTable {
 
     /// Maximum a posteriori value of the unknown, as an index into [`values`](Self::values); the first on ties.
     pub fn decide(&self, outcome: usize) -> usize {
-        most_probable(self.scene.weights(), self.likelihood(outcome))
+        most_probable(self.scene().weights(), self.likelihood(outcome))
     }
 
     /// Entropy of the unknown given the outcome, `H(X | T)` in nats, for a finite prior.
@@ -143,7 +175,7 @@ impl JointTable {
     /// # Errors
     /// If the prior is continuous.
     pub fn equivocation(&self) -> Result<f64, Error> {
-        if !self.scene.is_discrete() {
+        if !self.scene().is_discrete() {
             return refuse("prior", "a continuous prior", "a discrete prior for a conditional entropy");
         }
         let mut total = 0.0;
@@ -154,7 +186,7 @@ impl JointTable {
                 continue;
             }
             let mut others = 0.0;
-            for (k, (w, q)) in self.scene.weights().iter().zip(self.likelihood(outcome)).enumerate() {
+            for (k, (w, q)) in self.scene().weights().iter().zip(self.likelihood(outcome)).enumerate() {
                 let joint = w * q;
                 if k != best && joint > 0.0 {
                     others += joint;

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{Bencher, black_box};
-use fewbits_quantizers::density::Normal;
+use fewbits_quantizers::density::{Density, Normal};
 use fewbits_quantizers::{Quantizer, lloyd_max};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -27,7 +27,7 @@ fn encode(bencher: Bencher) {
     bencher.bench(|| quantizer.encode(black_box(0.3)));
 }
 
-/// A design from scratch, as for a density that no table holds.
+/// A design for a normal density, which starts from the kept table.
 #[divan::bench(args = [8, 32, 256, 4096])]
 fn lloyd_max_design(bencher: Bencher, levels: usize) {
     let density = Normal::with_deviation(0.3, 1.7).unwrap();
@@ -38,4 +38,11 @@ fn lloyd_max_design(bencher: Bencher, levels: usize) {
 #[divan::bench(args = [8, 32])]
 fn lloyd_max_table(bencher: Bencher, levels: usize) {
     bencher.bench(|| lloyd_max::gaussian(black_box(levels)));
+}
+
+/// A design from the companding solution, as when a table is made.
+#[divan::bench(args = [8, 32, 256, 4096])]
+fn lloyd_max_from_companding(bencher: Bencher, levels: usize) {
+    let start = Normal::STANDARD.companding(levels);
+    bencher.bench(|| lloyd_max::design_from(&Normal::STANDARD, black_box(&start)));
 }

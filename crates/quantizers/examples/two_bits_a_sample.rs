@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (prior_variance, noise_variance) = (4.0_f64, 1.0);
     let sample_deviation = (prior_variance + noise_variance).sqrt();
     let table = lloyd_max::gaussian(4)?.affine(0.0, sample_deviation)?;
-    let sensor = QuantizingSensor::new(Quantizer::from(&table), Labelling::gray(4)?, noise_variance)?;
+    let sensor = QuantizingSensor::with_variance(Quantizer::from(&table), Labelling::gray(4)?, noise_variance)?;
     // The design can be stored and flashed to the sensor.
     println!("{}", serde_json::to_string(&sensor)?);
 

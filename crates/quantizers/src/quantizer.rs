@@ -1,6 +1,7 @@
 //! The scalar quantizer a sensor holds.
 
 use crate::channel::Channel;
+use crate::density::edges;
 use crate::error::{Error, refuse};
 use crate::lloyd_max::LloydMax;
 use fewbits_core::Cell;
@@ -220,11 +221,7 @@ impl Quantizer {
 
     /// Lower and upper edge of cell `i`, infinite at the ends.
     pub fn edges(&self, cell: usize) -> (f64, f64) {
-        let lower = cell.checked_sub(1).and_then(|i| self.breakpoints.get(i));
-        (
-            lower.copied().unwrap_or(f64::NEG_INFINITY),
-            self.breakpoints.get(cell).copied().unwrap_or(f64::INFINITY),
-        )
+        edges(&self.breakpoints, cell)
     }
 
     /// The same labels on other breakpoints.

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 /// use fewbits_core::{Gaussian, Link, Observation, Scheme};
 /// use fewbits_quantizers::{Labelling, QuantizingSensor, Quantizer, Symbol, lloyd_max};
 ///
-/// let sensor = QuantizingSensor::new(Quantizer::from(&lloyd_max::gaussian(4)?), Labelling::gray(4)?, 0.5)?;
+/// let sensor = QuantizingSensor::with_variance(Quantizer::from(&lloyd_max::gaussian(4)?), Labelling::gray(4)?, 0.5)?;
 /// let level = Symbol(sensor.quantizer().encode(1.2)?);
 /// let received = sensor.factor(&(), &Observation::Received(level), &Link::flipping(0.01)?)?;
 /// let posterior = received.tilted(&Gaussian::scalar(0.0, 1.0)?)?;
@@ -59,7 +59,7 @@ impl TryFrom<Stored> for QuantizingSensor {
     type Error = Error;
 
     fn try_from(stored: Stored) -> Result<Self, Error> {
-        Self::new(stored.quantizer, stored.labelling, stored.noise_variance)
+        Self::with_variance(stored.quantizer, stored.labelling, stored.noise_variance)
     }
 }
 
@@ -68,7 +68,7 @@ impl QuantizingSensor {
     ///
     /// # Errors
     /// If the labelling has not a word per level, or `noise_variance` is not a positive number.
-    pub fn new(quantizer: Quantizer, labelling: Labelling, noise_variance: f64) -> Result<Self, Error> {
+    pub fn with_variance(quantizer: Quantizer, labelling: Labelling, noise_variance: f64) -> Result<Self, Error> {
         positive("noise_variance", noise_variance)?;
         if labelling.levels() != quantizer.levels() {
             let given = format!("{} words", labelling.levels());

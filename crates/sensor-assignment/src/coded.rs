@@ -2,11 +2,13 @@
 
 use crate::Error;
 use fewbits_binary_patterns::{
-    Bank, BinaryQuantizer, Grid, IMPOSSIBLE, Nodes, PatternSensor, Source, gray_basis, linear_pattern,
+    Bank, BinaryQuantizer, Bit, Grid, IMPOSSIBLE, Nodes, PatternSensor, Source, gray_basis, linear_pattern,
 };
+use fewbits_core::Observation;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::positive;
 use fewbits_numerics::quadrature::gauss_legendre;
+use serde::{Deserialize, Serialize};
 
 /// Most sensors: there are `2^N` cells.
 const MAX_SENSORS: usize = 16;
@@ -16,7 +18,8 @@ const PANEL: f64 = 2.0;
 /// `N` sensors that share the `N` Gray bits of `2^N` cells over `[-V, V]`.
 ///
 /// Construction tabulates every bit's probabilities at every sensor's noise, so that errors of assignments are cheap.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredSensors", into = "StoredSensors")]
 pub struct CodedSensors {
     source: Source,
     half_width: f64,
@@ -28,6 +31,31 @@ pub struct CodedSensors {
     contrast: Vec<Vec<Vec<f64>>>,
     /// `[P0, P1]` at the nodes, `[bit][sensor][value]`.
     probability: Vec<Vec<[Vec<f64>; 2]>>,
+}
+
+/// The stored form; the tables are computed again.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredSensors {
+    half_width: f64,
+    noise_deviations: Vec<f64>,
+}
+
+impl From<CodedSensors> for StoredSensors {
+    fn from(sensors: CodedSensors) -> Self {
+        Self {
+            half_width: sensors.half_width,
+            noise_deviations: sensors.noise_stds,
+        }
+    }
+}
+
+impl TryFrom<StoredSensors> for CodedSensors {
+    type Error = Error;
+
+    fn try_from(stored: StoredSensors) -> Result<Self, Error> {
+        Self::with_deviations(stored.half_width, &stored.noise_deviations)
+    }
 }
 
 impl CodedSensors {
@@ -149,7 +177,7 @@ impl CodedSensors {
         let sensors = assignment
             .iter()
             .zip(&self.quantizers)
-            .map(|(&n, quantizer)| PatternSensor::new(quantizer.clone(), self.noise_stds[n]))
+            .map(|(&n, quantizer)| PatternSensor::with_deviation(quantizer.clone(), self.noise_stds[n]))
             .collect::<Result<_, _>>()?;
         Ok(Bank::new(self.source, sensors)?)
     }
@@ -215,6 +243,29 @@ impl CodedSensors {
             self.push_bit(bit, sensor, &mut m1, &mut m2);
         }
         Ok(self.centre_error(&m1, &m2))
+    }
+
+    /// The estimate from one observation per bit, the coarsest first: the centre of the cell that the Gray bits name. Where a
+    /// bit is missing (these sensors always report, so that nothing received says no more than an erasure) it is the posterior
+    /// mean given the others.
+    ///
+    /// # Errors
+    /// If the assignment is not a permutation, or there is not one observation per bit.
+    pub fn decode(&self, assignment: &[usize], observations: &[Observation<Bit>]) -> Result<f64, Error> {
+        self.check(assignment)?;
+        if observations.len() != self.sensors() {
+            let given = format!("{} observations", observations.len());
+            return Err(ArgumentError::new("observations", given, format!("one per bit, {}", self.sensors())).into());
+        }
+        // From the finest bit on, as in `centre_mse`.
+        let centre = observations.iter().rev().try_fold(0.0, |u, o| {
+            let sign = if o.received()?.0 { -1.0 } else { 1.0 };
+            Some(sign * (0.5 + 0.5 * u))
+        });
+        match centre {
+            Some(u) => Ok(-self.half_width * u),
+            None => Ok(self.bank(assignment)?.posterior_mean(observations)?),
+        }
     }
 
     /// One step of the recursion.
@@ -290,6 +341,29 @@ mod tests {
         let mmse = sensors.mmse(&assignment).unwrap();
         assert!(mmse < exact);
         assert_relative_eq!(mmse, bank.mmse().unwrap(), max_relative = 1e-11);
+    }
+
+    #[test]
+    fn the_bits_of_every_cell_decode_to_its_centre_and_a_missing_one_to_the_mean() {
+        let sensors = CodedSensors::with_variances(2.0, &[1e-6, 1e-6, 1e-6]).unwrap();
+        let order = [1, 0, 2];
+        for cell in 0..8 {
+            let centre = 2.0 * (2.0 * f64::from(cell) + 1.0 - 8.0) / 8.0;
+            let mut seen: Vec<Observation<Bit>> = sensors
+                .quantizers()
+                .iter()
+                .map(|q| Observation::Received(q.report(centre).unwrap()))
+                .collect();
+            assert!((sensors.decode(&order, &seen).unwrap() - centre).abs() < 1e-15);
+            assert!(sensors.decode(&order, &seen[..2]).is_err());
+            // Without the finest bit the two cells of a pair are one.
+            seen[2] = Observation::Erased;
+            let pair = 2.0 * (2.0 * f64::from(cell / 2) + 1.0 - 4.0) / 4.0;
+            assert!((sensors.decode(&order, &seen).unwrap() - pair).abs() < 1e-2);
+        }
+        let json = serde_json::to_string(&sensors).unwrap();
+        assert_eq!(serde_json::from_str::<CodedSensors>(&json).unwrap(), sensors);
+        assert!(serde_json::from_str::<CodedSensors>(r#"{"half_width":1.0,"noise_deviations":[0.1,-0.1]}"#).is_err());
     }
 
     #[test]

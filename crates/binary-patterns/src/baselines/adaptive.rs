@@ -9,6 +9,7 @@ use crate::source::Nodes;
 use crate::source::noise_in_range;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, positive};
+use fewbits_numerics::newton;
 use fewbits_numerics::normal::{cdf, inverse_mills, log_cdf, log_pdf};
 use fewbits_numerics::quadrature::gauss_legendre;
 
@@ -187,33 +188,17 @@ pub fn bounded_mle(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> Result<f
 }
 
 fn maximum_likelihood(bits: &[(f64, bool)], noise_std: f64, bound: f64) -> f64 {
-    let (mut low, mut high) = (-bound, bound);
-    if balance(bits, noise_std, low).0 <= 0.0 {
-        return low;
+    if balance(bits, noise_std, -bound).0 <= 0.0 {
+        return -bound;
     }
-    if balance(bits, noise_std, high).0 >= 0.0 {
-        return high;
+    if balance(bits, noise_std, bound).0 >= 0.0 {
+        return bound;
     }
-    let mut x = 0.0;
-    while high - low > MLE_STOP * bound {
+    let falling = |x: f64| {
         let (value, slope) = balance(bits, noise_std, x);
-        if value > 0.0 {
-            low = x;
-        } else {
-            high = x;
-        }
-        let newton = x - value / slope;
-        let next = if newton > low && newton < high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        if (next - x).abs() <= MLE_STOP * bound {
-            return next;
-        }
-        x = next;
-    }
-    x
+        (-value, -slope)
+    };
+    newton::increasing(falling, -bound, bound, 0.0, MLE_STOP * bound)
 }
 
 /// Logarithm of the pull of the 1s over that of the 0s, and its derivative: zero where the score is, decreasing.

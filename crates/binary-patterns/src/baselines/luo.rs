@@ -76,7 +76,7 @@ impl Luo {
         let mut sensors = Vec::new();
         for (quantizer, &count) in self.quantizers.iter().zip(&self.allocation) {
             for _ in 0..count {
-                sensors.push(PatternSensor::new(quantizer.clone(), self.noise_std)?);
+                sensors.push(PatternSensor::with_deviation(quantizer.clone(), self.noise_std)?);
             }
         }
         Bank::new(self.source, sensors)
@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(Luo::new(source, 0.1, 3, 8).unwrap().allocation(), [4, 2, 2]);
         assert_eq!(Luo::new(source, 0.1, 3, 10).unwrap().allocation(), [5, 2, 3]);
         assert!(Luo::new(source, 0.1, 3, 3).is_err());
-        assert!(Luo::new(Source::gaussian(1.0).unwrap(), 0.1, 3, 8).is_err());
+        assert!(Luo::new(Source::gaussian_with_deviation(1.0).unwrap(), 0.1, 3, 8).is_err());
     }
 
     #[test]

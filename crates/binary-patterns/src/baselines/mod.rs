@@ -19,5 +19,5 @@ use fewbits_numerics::error::at_least_one;
 pub fn fixed_threshold(source: Source, noise_std: f64, sensors: usize) -> Result<Bank, Error> {
     at_least_one("sensors", sensors)?;
     let sign = BinaryQuantizer::new(vec![0.0])?;
-    Bank::homogeneous(source, vec![sign; sensors], noise_std)
+    Bank::homogeneous_with_deviation(source, vec![sign; sensors], noise_std)
 }

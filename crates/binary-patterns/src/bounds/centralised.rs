@@ -6,6 +6,7 @@ use crate::Source;
 use crate::source::noise_in_range;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::newton;
 use fewbits_quantizers::density::{CellMoments, Density};
 use fewbits_quantizers::lloyd_max;
 
@@ -13,8 +14,6 @@ use fewbits_quantizers::lloyd_max;
 const MAX_SENSORS: usize = 12;
 /// Points of the table that starts the inversion of the conditional mean.
 const TABLE: usize = 2000;
-/// Newton steps of the inversion.
-const STEPS: usize = 60;
 
 /// Exact least mean squared error of any scheme in which `sensors` measurements of equal noise are described by as many bits.
 ///
@@ -42,7 +41,8 @@ pub fn centralised_bound_of_levels(
     levels: usize,
 ) -> Result<f64, Error> {
     at_least_one("measurements", measurements)?;
-    let measurement = ConditionalMean::new(*source, noise_in_range(noise_std)? / (measurements as f64).sqrt())?;
+    let measurement =
+        ConditionalMean::with_deviation(*source, noise_in_range(noise_std)? / (measurements as f64).sqrt())?;
     let estimate = EstimateDensity::new(measurement);
     let quantizer = lloyd_max::design(&estimate, levels)?;
     Ok(measurement.estimation_error() + quantizer.mean_squared_error())
@@ -75,28 +75,13 @@ impl EstimateDensity {
             return reach;
         }
         let y_at = |i: usize| reach * (2.0 * i as f64 / TABLE as f64 - 1.0);
-        let (mut low, mut high) = (y_at(at - 1), y_at(at));
+        let (low, high) = (y_at(at - 1), y_at(at));
         let noise = self.measurement.noise_std();
-        let mut y = 0.5 * (low + high);
-        for _ in 0..STEPS {
+        let off = |y: f64| {
             let (mean, variance) = self.measurement.moments(y);
-            if mean < v {
-                low = y;
-            } else {
-                high = y;
-            }
-            let newton = y - (mean - v) * noise * noise / variance;
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
-            if (next - y).abs() <= 1e-14 * reach {
-                return next;
-            }
-            y = next;
-        }
-        y
+            (mean - v, variance / (noise * noise))
+        };
+        newton::increasing(off, low, high, 0.5 * (low + high), 1e-14 * reach)
     }
 
     fn integral(&self, a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
@@ -127,16 +112,7 @@ impl Density for EstimateDensity {
     fn cell(&self, a: f64, b: f64) -> CellMoments {
         let (low, high) = (a.max(self.table[0]), b.min(self.table[TABLE]));
         let mass = self.integral(low, high, |_| 1.0);
-        let inside = if mass > 0.0 {
-            self.integral(low, high, |v| v - low) / mass
-        } else {
-            0.5 * (high - low)
-        };
-        CellMoments {
-            mass,
-            from_lower: inside + (low - a),
-            to_upper: (high - low - inside) + (b - high),
-        }
+        CellMoments::clipped((a, b), (low, high), mass, self.integral(low, high, |v| v - low))
     }
 
     fn squared_error(&self, a: f64, b: f64, point: f64) -> f64 {
@@ -155,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_gaussian_source_needs_only_the_normal_table() {
-        let source = Source::gaussian(0.5).unwrap();
+        let source = Source::gaussian_with_deviation(0.5).unwrap();
         let bound = centralised_bound(&source, 0.4, 3).unwrap();
         let gain = 0.25 / (0.25 + 0.16 / 3.0);
         let table = lloyd_max::gaussian_table(3).unwrap().mean_squared_error();
@@ -164,7 +140,7 @@ mod tests {
 
     #[test]
     fn several_levels_of_one_measurement_are_bounded_too() {
-        let source = Source::gaussian(0.5).unwrap();
+        let source = Source::gaussian_with_deviation(0.5).unwrap();
         let gain = 0.25 / (0.25 + 0.16);
         for levels in [2, 3, 5, 16] {
             let bound = centralised_bound_of_levels(&source, 0.4, 1, levels).unwrap();

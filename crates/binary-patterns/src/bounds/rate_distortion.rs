@@ -24,7 +24,7 @@ impl ConditionalMean {
     ///
     /// # Errors
     /// If `noise_std` is not positive and finite.
-    pub fn new(source: Source, noise_std: f64) -> Result<Self, Error> {
+    pub fn with_deviation(source: Source, noise_std: f64) -> Result<Self, Error> {
         let noise_std = noise_in_range(noise_std)?;
         Ok(Self { source, noise_std })
     }
@@ -122,7 +122,7 @@ impl RemoteDistortion {
 /// # Errors
 /// If `noise_std` is not positive and finite.
 pub fn remote_distortion(source: &Source, noise_std: f64) -> Result<RemoteDistortion, Error> {
-    let measurement = ConditionalMean::new(*source, noise_std)?;
+    let measurement = ConditionalMean::with_deviation(*source, noise_std)?;
     if let Kind::Gaussian { std } = source.kind() {
         let gain = std * std / (std * std + noise_std * noise_std);
         return Ok(RemoteDistortion {
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn gaussian_is_equation_5_12() {
-        let source = Source::gaussian(0.1f64.sqrt()).unwrap();
+        let source = Source::gaussian_with_deviation(0.1f64.sqrt()).unwrap();
         let s = source.noise_std(-5.0).unwrap();
         assert_relative_eq!(remote_distortion(&source, s).unwrap().at(3.0).unwrap(), 0.076350, max_relative = 1e-5);
         assert_relative_eq!(network_rate_distortion(&source, s, 3).unwrap(), 0.052077, max_relative = 1e-5);
@@ -170,7 +170,7 @@ mod tests {
     fn variance_splits_into_estimation_error_and_estimate() {
         let source = Source::uniform(1.0).unwrap();
         for noise in [0.02, 0.3, 4.0] {
-            let y = ConditionalMean::new(source, noise).unwrap();
+            let y = ConditionalMean::with_deviation(source, noise).unwrap();
             let reach = y.measurement_reach();
             let explained = y.integrate(-reach, reach, |_, mean, _| mean * mean);
             assert_relative_eq!(explained + y.estimation_error(), source.variance(), max_relative = 1e-11);

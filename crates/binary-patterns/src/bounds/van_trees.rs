@@ -2,6 +2,7 @@
 
 use crate::source::{Blur, Kind};
 use crate::{Bank, Error};
+use fewbits_numerics::newton;
 use std::f64::consts::PI;
 
 /// Intervals of the coarsest grid, and more for each threshold.
@@ -147,27 +148,9 @@ impl Mesh {
         let mut x = -self.reach;
         for i in 1..intervals {
             let target = start + self.total * i as f64 / intervals as f64;
-            let (mut low, mut high) = (x, self.reach);
-            x += self.stretch(x) / intervals as f64;
-            for _ in 0..100 {
-                let off = self.coordinate(x) - target;
-                if off < 0.0 {
-                    low = low.max(x);
-                } else {
-                    high = high.min(x);
-                }
-                let newton = x - off * self.stretch(x) / self.total;
-                let next = if newton > low && newton < high {
-                    newton
-                } else {
-                    0.5 * (low + high)
-                };
-                let done = (next - x).abs() <= 1e-14 * self.reach;
-                x = next;
-                if done {
-                    break;
-                }
-            }
+            let off = |x: f64| (self.coordinate(x) - target, self.total / self.stretch(x));
+            let guess = x + self.stretch(x) / intervals as f64;
+            x = newton::increasing(off, x, self.reach, guess, 1e-14 * self.reach);
             points.push(x);
         }
         points.push(self.reach);
@@ -175,7 +158,8 @@ impl Mesh {
     }
 }
 
-/// `E[q]` for `-(p q')' + p r q = p` by elimination; even entries of `points` are nodes, odd ones the middles between them.
+/// `E[q]` for `-(p q')' + p r q = p` by an elimination of its own, in which nothing is subtracted but a ratio from one, so that huge
+/// information costs no digit; even entries of `points` are nodes, odd ones the middles between them.
 fn weighted_mean(mesh: &Mesh, points: &[f64], rates: &[f64], clamped: bool, density: impl Fn(f64) -> f64) -> f64 {
     let n = rates.len() - 1;
     let h = 1.0 / n as f64;
@@ -222,12 +206,15 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn bank(source: Source, noise: f64) -> Bank {
-        Bank::homogeneous(source, vec![BinaryQuantizer::new(vec![0.0]).unwrap()], noise).unwrap()
+        Bank::homogeneous_with_deviation(source, vec![BinaryQuantizer::new(vec![0.0]).unwrap()], noise).unwrap()
     }
 
     #[test]
     fn without_information_the_bound_is_the_variance() {
-        for source in [Source::uniform(2.0).unwrap(), Source::gaussian(0.3).unwrap()] {
+        for source in [
+            Source::uniform(2.0).unwrap(),
+            Source::gaussian_with_deviation(0.3).unwrap(),
+        ] {
             let bound = optimal_weight_van_trees(&bank(source, 1e6)).unwrap();
             assert_relative_eq!(bound, source.variance(), max_relative = 1e-9);
         }

@@ -53,6 +53,7 @@ pub struct Descended {
     /// The sensors with the quantizers chosen for them.
     pub sensors: Vec<PatternSensor>,
     /// Exact mean squared error of the posterior mean.
+    #[serde(deserialize_with = "crate::error::stored_size")]
     pub mse: f64,
 }
 
@@ -61,7 +62,11 @@ impl Descent {
     ///
     /// # Errors
     /// If either list is empty or a noise is not positive and finite.
-    pub fn new(source: Source, noise_stds: Vec<f64>, candidates: Vec<BinaryQuantizer>) -> Result<Self, Error> {
+    pub fn with_deviations(
+        source: Source,
+        noise_stds: Vec<f64>,
+        candidates: Vec<BinaryQuantizer>,
+    ) -> Result<Self, Error> {
         at_least_one("noise_stds", noise_stds.len())?;
         at_least_one("candidates", candidates.len())?;
         for &noise in &noise_stds {
@@ -91,7 +96,7 @@ impl Descent {
         choice
             .iter()
             .zip(&self.noise)
-            .map(|(&c, &noise)| PatternSensor::new(self.candidates[c].clone(), noise))
+            .map(|(&c, &noise)| PatternSensor::with_deviation(self.candidates[c].clone(), noise))
             .collect()
     }
 
@@ -324,11 +329,11 @@ mod tests {
         let grid = Grid::uniform(1.0, 3).unwrap();
         for snr in [5.0, 18.2] {
             let noise = source.noise_std(snr).unwrap();
-            let exact = LinearSearch::new(source, grid.clone(), noise, 6)
+            let exact = LinearSearch::with_deviation(source, grid.clone(), noise, 6)
                 .unwrap()
                 .best()
                 .unwrap();
-            let descent = Descent::new(source, vec![noise; 6], masks(&grid)).unwrap();
+            let descent = Descent::with_deviations(source, vec![noise; 6], masks(&grid)).unwrap();
             let full = |choice: &[usize]| rank(&choice.iter().map(|&c| c as u32 + 1).collect::<Vec<_>>()) == 3;
             let start = vec![3, 5, 2, 3, 5, 2];
             let found = descent.run(&[start], 6, full).unwrap();
@@ -347,7 +352,7 @@ mod tests {
         let source = Source::uniform(1.0).unwrap();
         let grid = Grid::uniform(1.0, 2).unwrap();
         let all: Vec<_> = Pattern::all(4).unwrap().iter().map(|p| p.on(&grid).unwrap()).collect();
-        let descent = Descent::new(source, vec![0.1, 0.4, 0.4], all.clone()).unwrap();
+        let descent = Descent::with_deviations(source, vec![0.1, 0.4, 0.4], all.clone()).unwrap();
         let kernel = Kernel::new(&descent);
         let choice = [2, 5, 5];
         for (c, explained) in kernel.respond(&choice, 0).unwrap().into_iter().enumerate() {
@@ -371,10 +376,10 @@ mod tests {
     fn bad_input_is_refused() {
         let source = Source::uniform(1.0).unwrap();
         let candidates = masks(&Grid::uniform(1.0, 2).unwrap());
-        assert!(Descent::new(source, vec![], candidates.clone()).is_err());
-        assert!(Descent::new(source, vec![0.1], vec![]).is_err());
-        assert!(Descent::new(source, vec![-0.1], candidates.clone()).is_err());
-        let descent = Descent::new(source, vec![0.1; 2], candidates).unwrap();
+        assert!(Descent::with_deviations(source, vec![], candidates.clone()).is_err());
+        assert!(Descent::with_deviations(source, vec![0.1], vec![]).is_err());
+        assert!(Descent::with_deviations(source, vec![-0.1], candidates.clone()).is_err());
+        let descent = Descent::with_deviations(source, vec![0.1; 2], candidates).unwrap();
         assert!(descent.run(&[], 0, |_| true).is_err());
         assert!(descent.run(&[vec![0, 3]], 0, |_| true).is_err());
         assert!(descent.bank(&[0]).is_err());

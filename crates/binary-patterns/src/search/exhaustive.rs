@@ -31,6 +31,7 @@ pub struct MaskSet {
     /// The masks.
     pub masks: Vec<Mask>,
     /// Mean squared error of the posterior mean.
+    #[serde(deserialize_with = "crate::error::stored_size")]
     pub mse: f64,
 }
 
@@ -65,7 +66,7 @@ impl LinearSearch {
     ///
     /// # Errors
     /// If the grid has not `2^B` cells, the noise is not positive and finite, or there is no sensor.
-    pub fn new(source: Source, grid: Grid, noise_std: f64, sensors: usize) -> Result<Self, Error> {
+    pub fn with_deviation(source: Source, grid: Grid, noise_std: f64, sensors: usize) -> Result<Self, Error> {
         let bits = grid_bits(&grid)?;
         at_least_one("sensors", sensors)?;
         Ok(Self {
@@ -118,7 +119,9 @@ impl LinearSearch {
     pub fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
         let sensors = masks
             .iter()
-            .map(|&mask| PatternSensor::new(linear_pattern(mask, self.bits)?.on(&self.grid)?, self.noise_std))
+            .map(|&mask| {
+                PatternSensor::with_deviation(linear_pattern(mask, self.bits)?.on(&self.grid)?, self.noise_std)
+            })
             .collect::<Result<_, _>>()?;
         Bank::new(self.source, sensors)
     }
@@ -394,7 +397,7 @@ mod tests {
     fn search(bits: usize, sensors: usize, snr: f64) -> LinearSearch {
         let source = Source::uniform(1.0).unwrap();
         let noise = source.noise_std(snr).unwrap();
-        LinearSearch::new(source, Grid::uniform(1.0, bits).unwrap(), noise, sensors).unwrap()
+        LinearSearch::with_deviation(source, Grid::uniform(1.0, bits).unwrap(), noise, sensors).unwrap()
     }
 
     #[test]
@@ -415,9 +418,9 @@ mod tests {
 
     #[test]
     fn an_asymmetric_grid_gives_the_same_as_direct_evaluation() {
-        let source = Source::gaussian(0.4).unwrap();
+        let source = Source::gaussian_with_deviation(0.4).unwrap();
         let grid = Grid::from_breakpoints(vec![-0.5, 0.1, 0.3]).unwrap();
-        let search = LinearSearch::new(source, grid, 0.2, 3).unwrap();
+        let search = LinearSearch::with_deviation(source, grid, 0.2, 3).unwrap();
         for set in search.ranking().unwrap() {
             assert_relative_eq!(set.mse, search.bank(&set.masks).unwrap().mmse().unwrap(), max_relative = 1e-8);
         }
@@ -441,7 +444,7 @@ mod tests {
         assert!(search(3, 2, 10.0).with_forced(&[1, 2, 3]).is_err());
         assert!(search(3, 2, 10.0).with_forced(&[8]).is_err());
         let grid = Grid::from_breakpoints(vec![0.0, 1.0]).unwrap();
-        assert!(LinearSearch::new(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
+        assert!(LinearSearch::with_deviation(Source::uniform(1.0).unwrap(), grid, 0.1, 3).is_err());
         assert!(matches!(search(10, 12, 10.0).best(), Err(Error::TooManyOutcomes { .. })));
         assert!(matches!(
             search(6, 40, 10.0).best(),

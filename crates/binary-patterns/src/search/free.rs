@@ -27,6 +27,7 @@ pub struct FreeDesign {
     /// The sensors with their new thresholds.
     pub sensors: Vec<PatternSensor>,
     /// Exact mean squared error of the posterior mean.
+    #[serde(deserialize_with = "crate::error::stored_size")]
     pub mse: f64,
 }
 
@@ -91,7 +92,7 @@ pub fn free_breakpoints_of_masks(
     let bits = grid_bits(grid)?;
     let sensors = masks
         .iter()
-        .map(|mask| PatternSensor::new(Pattern::linear(*mask, bits)?.on(grid)?, noise_std))
+        .map(|mask| PatternSensor::with_deviation(Pattern::linear(*mask, bits)?.on(grid)?, noise_std))
         .collect::<Result<Vec<_>, _>>()?;
     free_breakpoints(source, &sensors, jitter, starts)
 }
@@ -99,7 +100,7 @@ pub fn free_breakpoints_of_masks(
 /// The sensor in units in which every number is `factor` times as large.
 fn rescaled(sensor: &PatternSensor, factor: f64) -> Result<PatternSensor, Error> {
     let breakpoints = sensor.quantizer().breakpoints().iter().map(|b| factor * b).collect();
-    PatternSensor::new(BinaryQuantizer::new(breakpoints)?, factor * sensor.noise_std())
+    PatternSensor::with_deviation(BinaryQuantizer::new(breakpoints)?, factor * sensor.noise_std())
 }
 
 fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: usize) -> Result<FreeDesign, Error> {
@@ -138,7 +139,9 @@ fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: 
         let found = decode(&variables, &tree.lengths)
             .into_iter()
             .zip(sensors)
-            .map(|(thresholds, sensor)| PatternSensor::new(BinaryQuantizer::new(thresholds)?, sensor.noise_std()))
+            .map(|(thresholds, sensor)| {
+                PatternSensor::with_deviation(BinaryQuantizer::new(thresholds)?, sensor.noise_std())
+            })
             .collect::<Result<Vec<_>, _>>();
         // A run that drives two thresholds into one has left the domain; the others stand.
         let Ok(found) = found else { continue };
@@ -312,7 +315,7 @@ mod tests {
     fn sensors() -> Vec<PatternSensor> {
         [(vec![0.1], 0.3), (vec![-0.4, 0.5], 0.2), (vec![-0.7, -0.1, 0.6], 0.25)]
             .into_iter()
-            .map(|(t, s)| PatternSensor::new(BinaryQuantizer::new(t).unwrap(), s).unwrap())
+            .map(|(t, s)| PatternSensor::with_deviation(BinaryQuantizer::new(t).unwrap(), s).unwrap())
             .collect()
     }
 
@@ -346,7 +349,8 @@ mod tests {
             let grid = Grid::uniform(v, 3).unwrap();
             let noise = source.noise_std(5.0).unwrap();
             let found = free_breakpoints_of_masks(&source, &grid, &[4, 4, 6], noise, 0.05, 2).unwrap();
-            let start = PatternSensor::new(Pattern::linear(4, 3).unwrap().on(&grid).unwrap(), noise).unwrap();
+            let start =
+                PatternSensor::with_deviation(Pattern::linear(4, 3).unwrap().on(&grid).unwrap(), noise).unwrap();
             assert!(found.sensors.iter().any(|s| *s != start));
             (found.mse / (v * v), found.sensors[2].quantizer().breakpoints()[0] / v)
         };
@@ -360,7 +364,7 @@ mod tests {
 
     #[test]
     fn descent_never_ends_above_its_start() {
-        let source = Source::gaussian(0.5).unwrap();
+        let source = Source::gaussian_with_deviation(0.5).unwrap();
         let before = Bank::new(source, sensors()).unwrap().mmse().unwrap();
         let found = free_breakpoints(&source, &sensors(), 0.05, 2).unwrap();
         assert!(found.mse < before);

@@ -43,7 +43,7 @@ pub fn by_information(
     let bits = grid_bits(grid)?;
     let mut best = (0, f64::NEG_INFINITY);
     for mask in 1..1 << bits {
-        let sensor = PatternSensor::new(linear_pattern(mask, bits)?.on(grid)?, noise_std)?;
+        let sensor = PatternSensor::with_deviation(linear_pattern(mask, bits)?.on(grid)?, noise_std)?;
         let information = mean_information(&Bank::new(*source, vec![sensor])?);
         // Mirror images and rounding make ties; the lowest mask keeps them.
         if information > best.1 * (1.0 + 1e-12) || best.0 == 0 {

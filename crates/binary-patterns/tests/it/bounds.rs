@@ -10,7 +10,7 @@ use proptest::prelude::*;
 fn source() -> impl Strategy<Value = Source> {
     prop_oneof![
         (0.3f64..3.0).prop_map(|v| Source::uniform(v).unwrap()),
-        (0.2f64..2.0).prop_map(|s| Source::gaussian(s).unwrap()),
+        (0.2f64..2.0).prop_map(|s| Source::gaussian_with_deviation(s).unwrap()),
     ]
 }
 
@@ -46,7 +46,7 @@ proptest! {
     ) {
         let sensors: Vec<PatternSensor> = sensors
             .iter()
-            .map(|(t, snr)| PatternSensor::new(quantizer(t, &source), source.noise_std(*snr).unwrap()).unwrap())
+            .map(|(t, snr)| PatternSensor::with_deviation(quantizer(t, &source), source.noise_std(*snr).unwrap()).unwrap())
             .collect();
         let bank = Bank::new(source, sensors).unwrap();
         let mmse = bank.mmse().unwrap();
@@ -77,7 +77,7 @@ proptest! {
         let noise = source.noise_std(snr).unwrap();
         let quantizers: Vec<_> = patterns.iter().map(|t| quantizer(t, &source)).collect();
         let count = quantizers.len();
-        let mmse = Bank::homogeneous(source, quantizers, noise).unwrap().mmse().unwrap();
+        let mmse = Bank::homogeneous_with_deviation(source, quantizers, noise).unwrap().mmse().unwrap();
         let central = centralised_bound(&source, noise, count).unwrap();
         prop_assert!(network_rate_distortion(&source, noise, count).unwrap() <= central * (1.0 + 1e-9));
         prop_assert!(central <= mmse * (1.0 + 1e-9), "{central} above {mmse}");
@@ -89,12 +89,12 @@ proptest! {
         let one = quantizer(&t, &source);
         let mut last = source.variance();
         for n in 1..4 {
-            let mmse = Bank::homogeneous(source, vec![one.clone(); n], noise).unwrap().mmse().unwrap();
+            let mmse = Bank::homogeneous_with_deviation(source, vec![one.clone(); n], noise).unwrap().mmse().unwrap();
             prop_assert!(mmse <= last * (1.0 + 1e-10));
             last = mmse;
         }
         let (unit, other) = (Source::uniform(1.0).unwrap(), Source::uniform(scale).unwrap());
-        let error = |s: Source| Bank::homogeneous(s, vec![quantizer(&t, &s)], s.noise_std(snr).unwrap()).unwrap().mmse().unwrap();
+        let error = |s: Source| Bank::homogeneous_with_deviation(s, vec![quantizer(&t, &s)], s.noise_std(snr).unwrap()).unwrap().mmse().unwrap();
         prop_assert!((error(other) - scale * scale * error(unit)).abs() <= 1e-9 * error(other));
     }
 }
@@ -102,16 +102,17 @@ proptest! {
 /// For a Gaussian source the printed formula is a van Trees bound of constant weight, below the optimal one.
 #[test]
 fn the_printed_bound_is_valid_for_gaussian_sources_only() {
-    let gaussian = Source::gaussian(0.6).unwrap();
+    let gaussian = Source::gaussian_with_deviation(0.6).unwrap();
     let uniform = Source::uniform(1.0).unwrap();
     let grid = Grid::uniform(1.0, 3).unwrap();
     let patterns = ["00001111", "00111100", "01100110"].map(|p| p.parse::<fewbits_binary_patterns::Pattern>().unwrap());
     let quantizers: Vec<_> = patterns.iter().map(|p| p.on(&grid).unwrap()).collect();
     for snr in [-10.0, 0.0, 10.0, 20.0] {
-        let bank = Bank::homogeneous(gaussian, quantizers.clone(), gaussian.noise_std(snr).unwrap()).unwrap();
+        let bank =
+            Bank::homogeneous_with_deviation(gaussian, quantizers.clone(), gaussian.noise_std(snr).unwrap()).unwrap();
         assert!(printed_crlb(&bank).unwrap() <= optimal_weight_van_trees(&bank).unwrap() * (1.0 + 1e-9));
     }
-    let bank = Bank::homogeneous(uniform, quantizers, uniform.noise_std(-20.0).unwrap()).unwrap();
+    let bank = Bank::homogeneous_with_deviation(uniform, quantizers, uniform.noise_std(-20.0).unwrap()).unwrap();
     let mmse = bank.mmse().unwrap();
     assert!(printed_crlb(&bank).unwrap() > 100.0 * mmse);
     assert!((optimal_weight_van_trees(&bank).unwrap() / mmse - 0.999).abs() < 5e-4);
@@ -129,7 +130,7 @@ fn repeated_sensors_are_counted() {
     ] {
         quantizers.extend(std::iter::repeat_n(BinaryQuantizer::new(thresholds).unwrap(), count));
     }
-    let bank = Bank::homogeneous(source, quantizers, source.noise_std(10.0).unwrap()).unwrap();
+    let bank = Bank::homogeneous_with_deviation(source, quantizers, source.noise_std(10.0).unwrap()).unwrap();
     assert_eq!(bank.outcomes(), 5508);
     let mmse = bank.mmse().unwrap();
     assert!(optimal_weight_van_trees(&bank).unwrap() < mmse && mmse < 0.003);
@@ -148,12 +149,17 @@ fn tables_have_limits() {
     let quantizers: Vec<_> = (0..25)
         .map(|i| BinaryQuantizer::new(vec![f64::from(i) / 50.0]).unwrap())
         .collect();
-    let bank = Bank::homogeneous(source, quantizers, 0.1).unwrap();
+    let bank = Bank::homogeneous_with_deviation(source, quantizers, 0.1).unwrap();
     assert_eq!(bank.outcomes(), 1 << 25);
     let many = (0..30)
         .map(|i| BinaryQuantizer::new(vec![f64::from(i) / 50.0]).unwrap())
         .collect();
-    assert!(Bank::homogeneous(source, many, 0.1).unwrap().mmse().is_err());
+    assert!(
+        Bank::homogeneous_with_deviation(source, many, 0.1)
+            .unwrap()
+            .mmse()
+            .is_err()
+    );
 }
 
 /// Estimates at 29 dB, where a discrete MAP without floored logarithms is NaN.
@@ -172,7 +178,7 @@ fn vanishing_likelihoods_do_not_become_nan() {
                     .unwrap()
             })
             .collect();
-        let bank = Bank::homogeneous(source, quantizers, noise).unwrap();
+        let bank = Bank::homogeneous_with_deviation(source, quantizers, noise).unwrap();
         for decoder in [
             Decoder::Mmse,
             Decoder::DiscreteMap(&grid),
@@ -202,7 +208,7 @@ fn free_breakpoints_beat_the_grid() {
     let start: Vec<PatternSensor> = ["00001111", "00111100", "00111100"]
         .iter()
         .map(|p| {
-            PatternSensor::new(
+            PatternSensor::with_deviation(
                 p.parse::<fewbits_binary_patterns::Pattern>()
                     .unwrap()
                     .on(&grid)
@@ -232,7 +238,7 @@ fn the_posterior_mean_is_biased_at_the_ends() {
                 .unwrap()
         })
         .collect();
-    let bank = Bank::homogeneous(source, quantizers, source.noise_std(18.2).unwrap()).unwrap();
+    let bank = Bank::homogeneous_with_deviation(source, quantizers, source.noise_std(18.2).unwrap()).unwrap();
     let table = bank.table(Decoder::Mmse).unwrap();
     let (bias, _) = table.conditional_error(1.0).unwrap();
     assert!((bias + 0.135).abs() < 5e-4, "{bias}");
@@ -263,7 +269,7 @@ fn vanishing_noise_is_resolved() {
                     .unwrap()
             })
             .collect();
-        let bank = Bank::homogeneous(source, quantizers, source.noise_std(snr).unwrap()).unwrap();
+        let bank = Bank::homogeneous_with_deviation(source, quantizers, source.noise_std(snr).unwrap()).unwrap();
         let mmse = bank.mmse().unwrap();
         assert!((mmse / floor - 1.0).abs() < 2e-4, "{mmse} at {snr} dB");
         assert!(optimal_weight_van_trees(&bank).unwrap() <= mmse * (1.0 + 1e-9));

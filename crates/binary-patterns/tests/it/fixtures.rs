@@ -31,7 +31,7 @@ fn uniform() -> Source {
 }
 
 fn gauss() -> Source {
-    Source::gaussian(0.1f64.sqrt()).unwrap()
+    Source::gaussian_with_deviation(0.1f64.sqrt()).unwrap()
 }
 
 fn gauss_grid() -> Grid {
@@ -49,7 +49,7 @@ fn bank(source: Source, grid: &Grid, masks: &[Mask], snr: f64) -> Bank {
         .iter()
         .map(|&m| linear_pattern(m, bits).unwrap().on(grid).unwrap())
         .collect();
-    Bank::homogeneous(source, quantizers, noise).unwrap()
+    Bank::homogeneous_with_deviation(source, quantizers, noise).unwrap()
 }
 
 fn mmse(source: Source, grid: &Grid, masks: &[Mask], snr: f64) -> f64 {
@@ -165,7 +165,7 @@ const PRINTED_51: [Mask; 8] = [1, 2, 3, 3, 3, 4, 5, 6];
 #[test]
 fn table_5_1() {
     let noise = uniform().noise_std(18.2).unwrap();
-    let search = LinearSearch::new(uniform(), grid(3), noise, 8).unwrap();
+    let search = LinearSearch::with_deviation(uniform(), grid(3), noise, 8).unwrap();
     for e in entries().iter().filter(|e| e.id.starts_with("t51.")) {
         let printed = bank(uniform(), &grid(3), &PRINTED_51, 18.2);
         let ours = match e.id.as_str() {
@@ -221,7 +221,7 @@ fn table_5_1() {
 #[test]
 fn table_5_2() {
     let noise = gauss().noise_std(5.2).unwrap();
-    let search = LinearSearch::new(gauss(), gauss_grid(), noise, 3).unwrap();
+    let search = LinearSearch::with_deviation(gauss(), gauss_grid(), noise, 3).unwrap();
     family("t52.", |e| match e.id.as_str() {
         "t52.sigma" => noise,
         "t52.printed.mmse" => {
@@ -238,7 +238,10 @@ fn table_5_2() {
                         .unwrap()
                 })
                 .collect();
-            Bank::homogeneous(gauss(), quantizers, noise).unwrap().mmse().unwrap()
+            Bank::homogeneous_with_deviation(gauss(), quantizers, noise)
+                .unwrap()
+                .mmse()
+                .unwrap()
         }
         "t52.best_linear.mmse" => {
             let best = search.best().unwrap();
@@ -299,7 +302,7 @@ fn optimum(e: &Entry, any_rank: bool) -> f64 {
     let snr = snr_of(&e.id);
     let sensors = e.inputs["N"].as_u64().unwrap_or(10) as usize;
     let noise = uniform().noise_std(snr).unwrap();
-    let search = LinearSearch::new(uniform(), grid(3), noise, sensors).unwrap();
+    let search = LinearSearch::with_deviation(uniform(), grid(3), noise, sensors).unwrap();
     let best = if any_rank {
         search.any_rank().best()
     } else {
@@ -398,7 +401,7 @@ fn figure_5_9() {
         let noise = gauss().noise_std(snr_of(&e.id)).unwrap();
         match e.id.split('.').nth(1).unwrap() {
             "best" => {
-                let best = LinearSearch::new(gauss(), gauss_grid(), noise, 3)
+                let best = LinearSearch::with_deviation(gauss(), gauss_grid(), noise, 3)
                     .unwrap()
                     .best()
                     .unwrap();
@@ -457,7 +460,9 @@ fn free_breakpoints_reach_the_best_known() {
         let noise = gauss().noise_std(5.2).unwrap();
         let start: Vec<PatternSensor> = [4, 4, 6]
             .iter()
-            .map(|&m| PatternSensor::new(linear_pattern(m, 3).unwrap().on(&gauss_grid()).unwrap(), noise).unwrap())
+            .map(|&m| {
+                PatternSensor::with_deviation(linear_pattern(m, 3).unwrap().on(&gauss_grid()).unwrap(), noise).unwrap()
+            })
             .collect();
         let found = free_breakpoints(&gauss(), &start, 0.02 / 0.1f64.sqrt(), 2).unwrap();
         let expected = e.value.as_f64().unwrap();

@@ -161,7 +161,7 @@ fn any_patterns(scene: &Scene, linear: &[Mask]) -> Result<(Vec<BinaryQuantizer>,
     };
     let start = linear.iter().map(place).collect::<Result<Vec<_>, _>>()?;
     let candidates = all.iter().map(|p| p.on(&scene.grid)).collect::<Result<Vec<_>, _>>()?;
-    let descent = Descent::new(scene.source, vec![scene.noise; linear.len()], candidates.clone())?;
+    let descent = Descent::with_deviations(scene.source, vec![scene.noise; linear.len()], candidates.clone())?;
     let found = descent.run(&[start], 12, |_| true)?;
     Ok((found.choice.into_iter().map(|c| candidates[c].clone()).collect(), found.mse))
 }
@@ -198,7 +198,9 @@ fn free(id: &'static str, name: &'static str, scene: Scene, sensors: usize, jitt
             starts.push(("any of 127 patterns", any_patterns(&scene, &linear.masks)?.0));
         }
         let moved = starts.into_par_iter().map(|(start, quantizers)| {
-            let sensors = quantizers.into_iter().map(|q| PatternSensor::new(q, scene.noise));
+            let sensors = quantizers
+                .into_iter()
+                .map(|q| PatternSensor::with_deviation(q, scene.noise));
             let sensors = sensors.collect::<Result<Vec<_>, _>>()?;
             Ok((start, free_breakpoints(&scene.source, &sensors, jitter / scene.source.scale(), 4)?))
         });
@@ -281,7 +283,7 @@ fn joint_of_table_6_1() -> Result<Outcome, Error> {
         noise: 0.0,
     };
     let candidates = quantizers(&scene, 1..16, 4)?;
-    let descent = Descent::new(scene.source, sensors.noise_stds().to_vec(), candidates.clone())?;
+    let descent = Descent::with_deviations(scene.source, sensors.noise_stds().to_vec(), candidates.clone())?;
     let gray = gray_basis(4)?;
     // The most precise sensors come last, and serve the finest bits well.
     let start: Vec<usize> = gray.iter().cycle().take(8).map(|&m| m as usize - 1).collect();

@@ -143,7 +143,8 @@ fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
         aqml_mle: ml.mle,
         aqml_mmse: ml.mmse,
         aq_posterior_mean: rule(AdaptiveRule::PosteriorMean)?.mmse,
-        clairvoyant: ConditionalMean::new(scene.source, scene.noise / (p.sensors as f64).sqrt())?.estimation_error(),
+        clairvoyant: ConditionalMean::with_deviation(scene.source, scene.noise / (p.sensors as f64).sqrt())?
+            .estimation_error(),
     })
 }
 

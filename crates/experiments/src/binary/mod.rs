@@ -62,7 +62,7 @@ impl Scene {
     /// Gaussian of variance 0.1 over the eight cells with the printed Lloyd-Max edges.
     fn gaussian(snr_db: f64) -> Result<Self, Error> {
         let std = GAUSSIAN_VARIANCE.sqrt();
-        let source = Source::gaussian(std).map_err(Error::failed)?;
+        let source = Source::gaussian_with_deviation(std).map_err(Error::failed)?;
         let grid = Grid::printed_gaussian(std).map_err(Error::failed)?;
         Self::new(source, grid, snr_db)
     }
@@ -73,7 +73,7 @@ impl Scene {
     }
 
     fn search(&self, sensors: usize) -> Result<LinearSearch, Error> {
-        LinearSearch::new(self.source, self.grid.clone(), self.noise, sensors).map_err(Error::failed)
+        LinearSearch::with_deviation(self.source, self.grid.clone(), self.noise, sensors).map_err(Error::failed)
     }
 
     fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
@@ -86,7 +86,7 @@ impl Scene {
             .map(|p| p.on(&self.grid))
             .collect::<Result<_, _>>()
             .map_err(Error::failed)?;
-        Bank::homogeneous(self.source, quantizers, self.noise).map_err(Error::failed)
+        Bank::homogeneous_with_deviation(self.source, quantizers, self.noise).map_err(Error::failed)
     }
 
     /// Exact error of the posterior mean.
@@ -179,7 +179,7 @@ fn descent_from(
     extra: usize,
 ) -> Result<(Vec<Mask>, f64), Error> {
     let candidates = quantizers(scene, 1..1 << bits, bits)?;
-    let descent = Descent::new(scene.source, vec![scene.noise; sensors], candidates)?;
+    let descent = Descent::with_deviations(scene.source, vec![scene.noise; sensors], candidates)?;
     let places = |masks: &Vec<Mask>| masks.iter().map(|&m| m as usize - 1).collect::<Vec<_>>();
     let masks = |choice: &[usize]| choice.iter().map(|&c| c as Mask + 1).collect::<Vec<_>>();
     let starts: Vec<_> = starts.iter().map(places).collect();

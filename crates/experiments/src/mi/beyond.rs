@@ -183,8 +183,9 @@ const SEARCHES: [(&str, usize, f64, f64, &[Criterion]); 7] = [
 ];
 
 fn signs(noise_sd: f64, rho: f64) -> Result<System, fewbits_quantizer_design::Error> {
-    let noise = fewbits_quantizer_design::Noise::equicorrelated(&[noise_sd; 2], rho)?;
-    let scene = fewbits_quantizer_design::Scene::new(fewbits_quantizer_design::Prior::gaussian(1.0)?, noise)?;
+    let noise = fewbits_quantizer_design::Noise::equicorrelated_with_deviations(&[noise_sd; 2], rho)?;
+    let scene =
+        fewbits_quantizer_design::Scene::new(fewbits_quantizer_design::Prior::gaussian_with_deviation(1.0)?, noise)?;
     System::ideal(scene, vec![Quantizer::new(vec![0.0])?; 2])
 }
 
@@ -199,7 +200,7 @@ fn searches(p: &Parameters, context: &Context<'_>) -> Result<Vec<Search>, Error>
         for &criterion in criteria {
             context.check()?;
             let scene = scene(&[noise_sd; 2], rho)?;
-            let start = lloyd_system(&scene, levels, |n| scene.sample_sd(n))?;
+            let start = lloyd_system(&scene, levels, |n| scene.sample_deviation(n))?;
             let contiguous = design::multi_start(&start, criterion, p.contiguous_starts, 1, &Newton::default())?;
             let settings = Discovery {
                 grid: p.grid,
@@ -208,7 +209,10 @@ fn searches(p: &Parameters, context: &Context<'_>) -> Result<Vec<Search>, Error>
             };
             let folded = design::discover(&contiguous.system, criterion, &settings)?;
             let bits = (levels as f64).log2();
-            let bound = bounds::ceo(1.0, &[noise_sd * noise_sd; 2], &[bits; 2])?.distortion;
+            let bound = match rho {
+                0.0 => Some(bounds::ceo(scene.prior(), scene.noise(), &[bits; 2])?.distortion),
+                _ => None,
+            };
             for (cells, design) in [("contiguous", contiguous), ("any", folded)] {
                 let q = design.quantizers();
                 rows.push(Search {
@@ -219,7 +223,7 @@ fn searches(p: &Parameters, context: &Context<'_>) -> Result<Vec<Search>, Error>
                     mi_nats: design.system.value(MI)?,
                     mse: design.system.value(MSE)?,
                     curvature: design.largest_curvature,
-                    ceo_bound: (rho == 0.0).then_some(bound),
+                    ceo_bound: bound,
                     gamma1: breakpoints(&q[0]),
                     labels1: listed(q[0].labels(), " "),
                     gamma2: breakpoints(&q[1]),
@@ -329,14 +333,18 @@ fn limits() -> Result<Vec<Limit>, Error> {
         };
         let bits = (levels as f64).log2() * (1.0 - flips);
         let words: Vec<u32> = (0..levels as u32).collect();
-        let group =
-            SensorGroup::new(lloyd(levels, scene.sample_sd(0))?, bsc(&words, crossover)?, (0..sensors).collect())?;
+        let group = SensorGroup::new(
+            lloyd(levels, scene.sample_deviation(0))?,
+            bsc(&words, crossover)?,
+            (0..sensors).collect(),
+        )?;
         let best = design::joint(&System::new(scene, vec![group])?, MSE, &Newton::default())?;
         rows.push(Limit {
             sensors,
             levels,
             crossover,
-            ceo_bound: bounds::ceo(1.0, &vec![1.0; sensors], &vec![bits; sensors])?.distortion,
+            ceo_bound: bounds::ceo(best.system.scene().prior(), best.system.scene().noise(), &vec![bits; sensors])?
+                .distortion,
             van_trees: if crossover == 0.0 {
                 Some(bounds::bayesian_cramer_rao(&best.system)?)
             } else {

@@ -20,7 +20,7 @@ pub(super) fn name(criterion: Criterion) -> &'static str {
 
 /// A standard normal unknown in noise of these standard deviations and this common correlation.
 pub(super) fn scene(sds: &[f64], rho: f64) -> Result<Scene, Error> {
-    Ok(Scene::new(Prior::gaussian(1.0)?, Noise::equicorrelated(sds, rho)?)?)
+    Ok(Scene::new(Prior::gaussian_with_deviation(1.0)?, Noise::equicorrelated_with_deviations(sds, rho)?)?)
 }
 
 /// The Lloyd-Max quantizer of a normal variable of standard deviation `sd`.

@@ -132,7 +132,7 @@ impl Figure for Table41 {
                 });
             };
             let scene = scene(&[p.noise_sd; 2], if correlated { p.correlation } else { 0.0 })?;
-            let sample = lloyd_system(&scene, levels, |n| scene.sample_sd(n))?;
+            let sample = lloyd_system(&scene, levels, |n| scene.sample_deviation(n))?;
             for (criterion, [first, second]) in [MI, MSE].into_iter().zip(printed) {
                 context.check()?;
                 let method = name(criterion);

@@ -99,7 +99,7 @@ impl Figure for Table42 {
                     printed_mse: printed.filter(|_| as_printed),
                 });
             };
-            let sample = lloyd_system(&scene, levels, |n| scene.sample_sd(n))?;
+            let sample = lloyd_system(&scene, levels, |n| scene.sample_deviation(n))?;
             push("mi-printed", Pair::of(&System::ideal(scene.clone(), vec![odd(first)?, odd(second)?])?)?);
             for (criterion, greedy, reversed, joint) in [
                 (MI, "mi-greedy", "mi-greedy-better-first", "mi-joint"),
@@ -119,7 +119,7 @@ impl Figure for Table42 {
                         .filter(|s| reached(s))
                         .count();
                     let bits = (levels as f64).log2();
-                    let ceo_bound = bounds::ceo(1.0, &p.noise_variances, &[bits, bits])?.distortion;
+                    let ceo_bound = bounds::ceo(scene.prior(), scene.noise(), &[bits, bits])?.distortion;
                     searches.push(Search {
                         levels,
                         starts: p.starts,

@@ -132,7 +132,7 @@ impl Figure for Table43 {
         let common =
             |t: f64| -> Result<System, Error> { Ok(System::identical(scene.clone(), Quantizer::symmetric(t)?)?) };
         let unit = lloyd(4, 1.0)?.breakpoints()[2];
-        let sample = unit * scene.sample_sd(0);
+        let sample = unit * scene.sample_deviation(0);
         let newton = Newton::default();
         let best = |criterion| -> Result<f64, Error> {
             Ok(design::joint(&common(sample)?, criterion, &newton)?.quantizers()[0].breakpoints()[2])
@@ -194,7 +194,7 @@ impl Figure for Table43 {
             });
         }
         let variance = p.noise_sd * p.noise_sd;
-        let codes = bounds::ceo(1.0, &vec![variance; p.sensors], &vec![2.0; p.sensors])?.distortion;
+        let codes = bounds::ceo(scene.prior(), scene.noise(), &vec![2.0; p.sensors])?.distortion;
         let bounds = vec![
             Bound {
                 bound: "ceo",

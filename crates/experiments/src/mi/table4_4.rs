@@ -106,7 +106,7 @@ struct Check {
 }
 
 fn scene(signal: f64, sensors: usize) -> Result<Scene, Error> {
-    Ok(Scene::new(Prior::binary(signal, 0.5)?, Noise::independent(&vec![1.0; sensors])?)?)
+    Ok(Scene::new(Prior::binary(signal, 0.5)?, Noise::independent_with_deviations(&vec![1.0; sensors])?)?)
 }
 
 fn about(signal: f64, t: f64) -> Result<Quantizer, Error> {

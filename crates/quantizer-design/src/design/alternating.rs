@@ -22,8 +22,9 @@ use crate::error::Error;
 use crate::moments::{Table, dot};
 use crate::problem::Problem;
 use crate::system::System;
-use fewbits_numerics::normal;
+use fewbits_numerics::{newton, normal};
 use fewbits_quantizers::Quantizer;
+use serde::{Deserialize, Serialize};
 
 /// Scan of the sample axis: this many standard deviations either side, in this many steps.
 const REACH: f64 = 7.0;
@@ -64,11 +65,13 @@ impl Default for Alternating {
 }
 
 /// Result of [`alternate`].
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Alternated {
     /// The system with the designed quantizer.
     pub system: System,
     /// Value of the criterion.
+    #[serde(deserialize_with = "crate::error::stored_size")]
     pub value: f64,
     /// Steps taken.
     pub iterations: usize,
@@ -83,7 +86,9 @@ pub fn alternate(system: &System, group: usize, criterion: Criterion, rule: &Alt
     let mut current = system.clone();
     let mut value = current.value(criterion)?;
     let mut change = f64::INFINITY;
-    let spread = system.scene().sample_sd(single_sensor(system, group)?.sensors()[0]);
+    let spread = system
+        .scene()
+        .sample_deviation(single_sensor(system, group)?.sensors()[0]);
     for iteration in 1..=rule.max_iterations {
         let old = current.group(group)?.quantizer().clone();
         let quantizer = alternating_step(&current, group, criterion)?;
@@ -134,7 +139,7 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
         sd,
     };
 
-    let spread = scene.sample_sd(entry.sensors()[0]);
+    let spread = scene.sample_deviation(entry.sensors()[0]);
     let start = scene.sample_mean() - REACH * spread;
     let step = 2.0 * REACH * spread / SCAN as f64;
     let (mut labels, mut breakpoints) = (vec![worth.best(start)], Vec::new());
@@ -179,18 +184,10 @@ impl Worth<'_> {
     }
 
     /// Where level `after` overtakes level `before`, which is the better one at `low` and the worse at `high`.
-    ///
-    /// Newton's method on the difference, kept inside the shrinking bracket by bisection.
-    fn crossing(&self, before: usize, after: usize, mut low: f64, mut high: f64) -> f64 {
-        let difference: Vec<f64> = self
-            .gains
-            .row(after)
-            .iter()
-            .zip(self.gains.row(before))
-            .map(|(a, b)| a - b)
-            .collect();
-        let mut y = 0.5 * (low + high);
-        for _ in 0..80 {
+    fn crossing(&self, before: usize, after: usize, low: f64, high: f64) -> f64 {
+        let pairs = self.gains.row(after).iter().zip(self.gains.row(before));
+        let difference: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+        let lead = |y: f64| {
             let (mut value, mut slope) = (0.0, 0.0);
             for (m, d) in self.means.iter().zip(&difference) {
                 let u = (y - m) / self.sd;
@@ -198,23 +195,10 @@ impl Worth<'_> {
                 value += term;
                 slope -= u * term / self.sd;
             }
-            if value < 0.0 {
-                low = y;
-            } else {
-                high = y;
-            }
-            let newton = y - value / slope;
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
-            if (next - y).abs() <= 1e-15 * y.abs().max(self.sd) {
-                return next;
-            }
-            y = next;
-        }
-        y
+            (value, slope)
+        };
+        let size = low.abs().max(high.abs()).max(self.sd);
+        newton::increasing(lead, low, high, 0.5 * (low + high), 1e-15 * size)
     }
 }
 
@@ -226,7 +210,7 @@ mod tests {
 
     #[test]
     fn converges_to_the_stationary_point_of_newton() {
-        let scene = Scene::gaussian(1.0, &[1.0]).unwrap();
+        let scene = Scene::gaussian_with_deviations(1.0, &[1.0]).unwrap();
         let start = System::ideal(scene, vec![Quantizer::from(&lloyd_max::gaussian(4).unwrap())]).unwrap();
         let criterion = Criterion::MutualInformation;
         let rule = Alternating {
@@ -248,7 +232,7 @@ mod tests {
     #[test]
     fn one_step_for_squared_error_is_a_lloyd_sweep_on_the_sample() {
         // E[X|Y] is linear, so the best one-sensor cells are Lloyd-Max cells of the sample.
-        let scene = Scene::gaussian(1.0, &[1.0]).unwrap();
+        let scene = Scene::gaussian_with_deviations(1.0, &[1.0]).unwrap();
         let b = lloyd_max::gaussian(4)
             .unwrap()
             .affine(0.0, std::f64::consts::SQRT_2)

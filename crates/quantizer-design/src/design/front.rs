@@ -60,9 +60,8 @@ impl Design {
         let (system, scene) = (&self.system, self.system.scene());
         let independent = scene.is_independent();
         let ceo_bound = match scene.prior() {
-            Prior::Gaussian { sd } if independent && scene.sensors() <= bounds::CEO_MAX_SENSORS => {
+            Prior::Gaussian { .. } if independent && scene.sensors() <= bounds::CEO_MAX_SENSORS => {
                 let clear = system.groups().iter().all(|g| g.channel().is_ideal());
-                let variances: Vec<f64> = (0..scene.sensors()).map(|n| scene.noise().sd(n).powi(2)).collect();
                 let mut bits = vec![0.0; scene.sensors()];
                 for group in system.groups() {
                     group
@@ -71,7 +70,7 @@ impl Design {
                         .for_each(|n| bits[*n] = (group.quantizer().levels() as f64).log2());
                 }
                 if clear {
-                    Some(bounds::ceo(sd * sd, &variances, &bits)?.lower())
+                    Some(bounds::ceo(scene.prior(), scene.noise(), &bits)?.lower())
                 } else {
                     None
                 }
@@ -127,7 +126,7 @@ impl Design {
 ///
 /// ```
 /// use fewbits_quantizer_design::{Certificate, Scene, design};
-/// let best = design::design(&Scene::gaussian(1.0, &[1.0, 1.0])?, 2)?;
+/// let best = design::design(&Scene::gaussian_with_deviations(1.0, &[1.0, 1.0])?, 2)?;
 /// let report = best.report()?;
 /// assert!((report.mean_squared_error - 0.388_403_07).abs() < 1e-7);
 /// assert_eq!(report.certificate, Certificate::LocalOptimum);
@@ -180,7 +179,7 @@ fn for_decision(scene: &Scene, levels: usize) -> Result<Design, Error> {
     let mut starts = vec![grouped(&apart)?];
     if let ([low, high], true) = (scene.values(), starts[0].groups().len() == 1) {
         // Two hypotheses and equal sensors: the quantizer that keeps the hypotheses apart at one of them.
-        let (signal, sd) = (high - low, scene.noise().sd(0));
+        let (signal, sd) = (high - low, scene.noise().deviation(0));
         let spread = lloyd_max::gaussian(levels)?.affine(0.5 * signal, sd)?;
         let ideal = Channel::ideal(levels)?;
         if let Ok((q, _)) = separate(Separation::Matusita, signal, sd, &Quantizer::from(&spread), &ideal, &newton) {

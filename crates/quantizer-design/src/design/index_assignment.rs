@@ -153,7 +153,7 @@ pub fn assign_words(
             let words = &classes[*class];
             let labelling = Labelling::with_words(bits, words.clone())?;
             let channel = Channel::binary_symmetric_with_gaps(&labelling, crossover)?;
-            let sample = lloyd_max::gaussian(words.len())?.affine(scene.sample_mean(), scene.sample_sd(n))?;
+            let sample = lloyd_max::gaussian(words.len())?.affine(scene.sample_mean(), scene.sample_deviation(n))?;
             groups.push(SensorGroup::new(Quantizer::from(&sample), channel, vec![n])?);
         }
         let words = combination.iter().map(|c| classes[*c].clone()).collect();

@@ -21,6 +21,7 @@ pub struct Design {
     /// The system with its designed quantizers.
     pub system: System,
     /// Value of the criterion: nats, squared units, or a probability.
+    #[serde(deserialize_with = "crate::error::stored_size")]
     pub value: f64,
     /// Largest eigenvalue of the Hessian of the criterion, signed so that a local optimum has none above 0.
     pub largest_curvature: f64,
@@ -100,7 +101,7 @@ pub(super) fn breakpoint_scale(system: &System, groups: &[usize]) -> f64 {
     groups
         .iter()
         .filter_map(|g| system.groups().get(*g))
-        .map(|g| system.scene().sample_sd(g.sensors()[0]))
+        .map(|g| system.scene().sample_deviation(g.sensors()[0]))
         .fold(f64::INFINITY, f64::min)
 }
 
@@ -186,7 +187,7 @@ fn random_system(system: &System, stream: Stream) -> Result<System, Error> {
         .groups()
         .iter()
         .map(|group| {
-            let spread = 1.3 * system.scene().sample_sd(group.sensors()[0]);
+            let spread = 1.3 * system.scene().sample_deviation(group.sensors()[0]);
             let mut b: Vec<f64> = group
                 .quantizer()
                 .breakpoints()

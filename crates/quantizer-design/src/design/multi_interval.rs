@@ -152,7 +152,7 @@ impl SensorGrid {
         let entry = &system.groups()[group];
         let scene = system.scene();
         let (means, sd) = scene.sample_law(entry.sensors()[0]);
-        let spread = scene.sample_sd(entry.sensors()[0]);
+        let spread = scene.sample_deviation(entry.sensors()[0]);
         let (low, step) = (scene.sample_mean() - REACH * spread, 2.0 * REACH * spread / grid as f64);
         let edges: Vec<f64> = (1..grid).map(|i| low + i as f64 * step).collect();
         let edge = |i: usize| edges.get(i).copied();

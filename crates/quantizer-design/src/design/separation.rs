@@ -90,7 +90,7 @@ pub fn separate(
     if signal == 0.0 {
         return refuse("signal", signal, "a signal other than 0");
     }
-    let scene = Scene::new(Prior::binary(signal, 0.5)?, Noise::independent(&[sd])?)?;
+    let scene = Scene::new(Prior::binary(signal, 0.5)?, Noise::independent_with_deviations(&[sd])?)?;
     let system = System::distinct(scene, vec![start.clone()], vec![channel.clone()])?;
     let problem = Problem::new(&system, Criterion::BayesError, &[0])?;
     let objective = Separated {

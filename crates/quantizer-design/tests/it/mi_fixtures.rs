@@ -162,10 +162,12 @@ fn lloyd_max_of_the_normal(entry: &Entry) {
 
 fn remote(entry: &Entry) {
     let i = |k| number(&entry.inputs[k]);
+    let prior = Prior::gaussian_with_deviation(i("sx2").sqrt()).unwrap();
+    let noise = Noise::independent_with_variances(&[i("s2")]).unwrap();
     close(
         entry,
         "D",
-        bounds::remote_distortion_rate(i("sx2"), i("s2"), i("R_bits")).unwrap(),
+        bounds::remote_distortion_rate(&prior, &noise, i("R_bits")).unwrap(),
         number(&entry.value),
     );
 }
@@ -179,19 +181,14 @@ fn ceo(entry: &Entry) {
         }
         None => (numbers(s2), numbers(rate)),
     };
-    close(
-        entry,
-        "D",
-        bounds::ceo(number(&entry.inputs["sx2"]), &s2, &rate)
-            .unwrap()
-            .distortion,
-        number(&entry.value),
-    );
+    let prior = Prior::gaussian_with_deviation(number(&entry.inputs["sx2"]).sqrt()).unwrap();
+    let noise = Noise::independent_with_variances(&s2).unwrap();
+    close(entry, "D", bounds::ceo(&prior, &noise, &rate).unwrap().distortion, number(&entry.value));
 }
 
 fn van_trees(entry: &Entry) {
     let n = number(&entry.inputs["N"]) as usize;
-    let scene = Scene::gaussian(1.0, &vec![number(&entry.inputs["sigma"]); n]).unwrap();
+    let scene = Scene::gaussian_with_deviations(1.0, &vec![number(&entry.inputs["sigma"]); n]).unwrap();
     let q = Quantizer::new(numbers(&entry.inputs["breakpoints"])).unwrap();
     let system = System::identical(scene, q).unwrap();
     close(entry, "fisher", bounds::mean_fisher_information(&system).unwrap(), number(&entry.value["fisher"]));
@@ -201,7 +198,8 @@ fn van_trees(entry: &Entry) {
 }
 
 fn rectangles(entry: &Entry) {
-    let noise = Noise::equicorrelated(&numbers(&entry.inputs["sigma"]), number(&entry.inputs["rho"])).unwrap();
+    let noise =
+        Noise::equicorrelated_with_deviations(&numbers(&entry.inputs["sigma"]), number(&entry.inputs["rho"])).unwrap();
     let scene = Scene::new(Prior::discrete(vec![number(&entry.inputs["x"])], vec![1.0]).unwrap(), noise).unwrap();
     let q = |k| Quantizer::new(numbers(&entry.inputs[k])).unwrap();
     let table = JointTable::new(&System::ideal(scene, vec![q("b1"), q("b2")]).unwrap()).unwrap();
@@ -223,7 +221,11 @@ fn scene(entry: &Entry) -> Scene {
         _ => vec![1.0, 1.0],
     };
     let rho = i.get("rho").map_or(0.0, number);
-    Scene::new(Prior::gaussian(1.0).unwrap(), Noise::equicorrelated(&sds, rho).unwrap()).unwrap()
+    Scene::new(
+        Prior::gaussian_with_deviation(1.0).unwrap(),
+        Noise::equicorrelated_with_deviations(&sds, rho).unwrap(),
+    )
+    .unwrap()
 }
 
 fn check_values(entry: &Entry, expected: &Value, system: &System) {
@@ -247,7 +249,7 @@ fn check(entry: &Entry, expected: &Value, system: &System) {
         .zip(&found)
         .map(|(b, q)| q.with_breakpoints(b).unwrap())
         .collect();
-    let sds: Vec<f64> = (0..2).map(|n| system.scene().noise().sd(n)).collect();
+    let sds: Vec<f64> = (0..2).map(|n| system.scene().noise().deviation(n)).collect();
     let classes = [0, usize::from(sds[0] != sds[1])];
     let (found, wanted) = (canonical(&found, &classes), canonical(&wanted, &classes));
     for (f, w) in found.iter().zip(&wanted) {
@@ -288,7 +290,7 @@ fn pair(entry: &Entry) {
     let lloyd_of = |sd: &dyn Fn(usize) -> f64| {
         System::ideal(scene.clone(), (0..2).map(|n| lloyd(levels, sd(n))).collect()).unwrap()
     };
-    let sample = lloyd_of(&|n| scene.sample_sd(n));
+    let sample = lloyd_of(&|n| scene.sample_deviation(n));
     let criterion = criterion(id);
     let last = |order: &[usize]| {
         design::greedy(&sample, order, criterion, &plain)
@@ -301,7 +303,7 @@ fn pair(entry: &Entry) {
     } else if id.ends_with("lmY") || id.ends_with("lloydY") {
         check(entry, &entry.value, &sample);
     } else if id.ends_with("lloydW") {
-        check(entry, &entry.value, &lloyd_of(&|n| scene.noise().sd(n)));
+        check(entry, &entry.value, &lloyd_of(&|n| scene.noise().deviation(n)));
     } else if id.contains("greedyrev") {
         let design = last(&[1, 0]);
         let mut quantizers = design.quantizers();
@@ -335,7 +337,7 @@ fn pair(entry: &Entry) {
 
 fn nine_sensors(entry: &Entry) {
     let (n, sd) = (number(&entry.inputs["N"]) as usize, number(&entry.inputs["sigma"]));
-    let scene = Scene::gaussian(1.0, &vec![sd; n]).unwrap();
+    let scene = Scene::gaussian_with_deviations(1.0, &vec![sd; n]).unwrap();
     let criterion = criterion(&entry.id);
     if entry.id.contains("greedy") {
         let start = System::ideal(scene, vec![lloyd(4, 1.4); n]).unwrap();
@@ -364,8 +366,10 @@ fn nine_sensors(entry: &Entry) {
 fn detection(entry: &Entry) {
     let theta = number(&entry.inputs["theta"]);
     let newton = Newton::default();
-    let scene =
-        |n: usize| Scene::new(Prior::binary(theta, 0.5).unwrap(), Noise::independent(&vec![1.0; n]).unwrap()).unwrap();
+    let scene = |n: usize| {
+        Scene::new(Prior::binary(theta, 0.5).unwrap(), Noise::independent_with_deviations(&vec![1.0; n]).unwrap())
+            .unwrap()
+    };
     let about = |t: f64| Quantizer::new(vec![theta / 2.0 - t, theta / 2.0, theta / 2.0 + t]).unwrap();
     let ideal = Channel::ideal(4).unwrap();
     let separated = |d| design::separate(d, theta, 1.0, &about(1.0), &ideal, &newton).unwrap().0;
@@ -436,7 +440,7 @@ fn bsc(labels: &Value, eps: f64) -> Channel {
 }
 
 fn over(channel: &Channel, quantizer: &Quantizer) -> System {
-    let scene = Scene::gaussian(1.0, &[1.0, 1.0]).unwrap();
+    let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
     System::distinct(scene, vec![quantizer.clone(); 2], vec![channel.clone(); 2]).unwrap()
 }
 
@@ -484,7 +488,7 @@ fn bsc_matrix(entry: &Entry) {
 }
 
 fn collapsed(entry: &Entry) {
-    let scene = Scene::gaussian(1.0, &[1.0, 1.0]).unwrap();
+    let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap();
     let eps = number(&entry.inputs["eps"]);
     let best = design::assign_words(&scene, 2, eps, 2..=4, criterion(&entry.id), design::Words::Shared)
         .unwrap()
@@ -543,7 +547,7 @@ fn alternating_series(entry: &Entry) {
 }
 
 fn alternating_step(entry: &Entry) {
-    let scene = Scene::gaussian(1.0, &[number(&entry.inputs["sigma"])]).unwrap();
+    let scene = Scene::gaussian_with_deviations(1.0, &[number(&entry.inputs["sigma"])]).unwrap();
     let start = Quantizer::new(numbers(&entry.inputs["start"])).unwrap();
     let system = System::ideal(scene, vec![start]).unwrap();
     let step = design::alternating_step(&system, 0, MI).unwrap();
@@ -570,8 +574,8 @@ fn alternating_step(entry: &Entry) {
 
 fn bifurcation(entry: &Entry) {
     let signs = |sd: f64, rho: f64| {
-        let noise = Noise::equicorrelated(&[sd, sd], rho)?;
-        let scene = Scene::new(Prior::gaussian(1.0)?, noise)?;
+        let noise = Noise::equicorrelated_with_deviations(&[sd, sd], rho)?;
+        let scene = Scene::new(Prior::gaussian_with_deviation(1.0)?, noise)?;
         System::ideal(scene, vec![Quantizer::new(vec![0.0])?; 2])
     };
     let criterion = criterion(&entry.id);
@@ -584,7 +588,7 @@ fn bifurcation(entry: &Entry) {
 }
 
 fn low_noise(entry: &Entry) -> Scene {
-    Scene::gaussian(1.0, &[number(&entry.inputs["sigma"]); 2]).unwrap()
+    Scene::gaussian_with_deviations(1.0, &[number(&entry.inputs["sigma"]); 2]).unwrap()
 }
 
 fn folded(entry: &Entry) {
@@ -609,8 +613,13 @@ fn contiguous(entry: &Entry) {
 fn modulo_or_monte_carlo(entry: &Entry) {
     if entry.id.starts_with("mc_") {
         // The simulated value must agree with quadrature within its own interval.
-        let scene =
-            |rho| Scene::new(Prior::gaussian(1.0).unwrap(), Noise::equicorrelated(&[1.0; 2], rho).unwrap()).unwrap();
+        let scene = |rho| {
+            Scene::new(
+                Prior::gaussian_with_deviation(1.0).unwrap(),
+                Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap(),
+            )
+            .unwrap()
+        };
         let q = |t| Quantizer::symmetric(t).unwrap();
         let exact = match entry.id.as_str() {
             "mc_rho0" => System::ideal(scene(0.0), vec![q(1.37); 2]).unwrap(),

@@ -11,13 +11,13 @@ const MSE: Criterion = Criterion::MeanSquaredError;
 const SCALES: [f64; 2] = [1e-4, 1e4];
 
 fn pair(rho: f64, scale: f64) -> Scene {
-    let noise = Noise::equicorrelated(&[scale, 0.8 * scale], rho).unwrap();
-    Scene::new(Prior::gaussian(scale).unwrap(), noise).unwrap()
+    let noise = Noise::equicorrelated_with_deviations(&[scale, 0.8 * scale], rho).unwrap();
+    Scene::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
 }
 
 fn equal_pair(rho: f64, scale: f64) -> Scene {
-    let noise = Noise::equicorrelated(&[scale; 2], rho).unwrap();
-    Scene::new(Prior::gaussian(scale).unwrap(), noise).unwrap()
+    let noise = Noise::equicorrelated_with_deviations(&[scale; 2], rho).unwrap();
+    Scene::new(Prior::gaussian_with_deviation(scale).unwrap(), noise).unwrap()
 }
 
 fn size(criterion: Criterion, scale: f64) -> f64 {
@@ -147,8 +147,9 @@ fn alternating_steps_and_programmes_know_no_unit() {
 
 #[test]
 fn detection_knows_no_unit() {
-    let scene =
-        |s: f64| Scene::new(Prior::binary(2.0 * s, 0.4).unwrap(), Noise::independent(&[s; 3]).unwrap()).unwrap();
+    let scene = |s: f64| {
+        Scene::new(Prior::binary(2.0 * s, 0.4).unwrap(), Noise::independent_with_deviations(&[s; 3]).unwrap()).unwrap()
+    };
     let about = |s: f64| Quantizer::new([0.2, 1.0, 1.8].map(|b| s * b).to_vec()).unwrap();
     for criterion in [MI, Criterion::BayesError] {
         law(criterion, 1e-6, |s| {
@@ -176,7 +177,9 @@ fn strong_signals_have_designs_too() {
     for signal in [10.0, 14.0] {
         let middle = 0.5 * signal;
         let about = Quantizer::new(vec![middle - 1.0, middle, middle + 1.0]).unwrap();
-        let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), Noise::independent(&[1.0; 9]).unwrap()).unwrap();
+        let scene =
+            Scene::new(Prior::binary(signal, 0.5).unwrap(), Noise::independent_with_deviations(&[1.0; 9]).unwrap())
+                .unwrap();
         let start = System::identical(scene, about.clone()).unwrap();
         let informed = design::joint(&start, MI, &Newton::default()).unwrap();
         let decided = design::joint(&start, Criterion::BayesError, &Newton::default()).unwrap();
@@ -207,7 +210,10 @@ fn what_a_user_reaches_for_agrees_with_what_he_built_by_hand() {
     let scene = pair(0.4, 1.0);
     let lloyd = System::lloyd_max(scene.clone(), 4).unwrap();
     for (n, q) in lloyd.quantizers().iter().enumerate() {
-        let by_hand = lloyd_max::gaussian(4).unwrap().affine(0.0, scene.sample_sd(n)).unwrap();
+        let by_hand = lloyd_max::gaussian(4)
+            .unwrap()
+            .affine(0.0, scene.sample_deviation(n))
+            .unwrap();
         assert_eq!(q, &Quantizer::from(&by_hand));
         // The samples are normal, so the symbols have the table's probabilities.
         for (p, mass) in lloyd
@@ -222,13 +228,14 @@ fn what_a_user_reaches_for_agrees_with_what_he_built_by_hand() {
     assert!(lloyd.symbol_distribution(2).is_err());
     assert!((design::bhattacharyya_coefficient(&[0.5, 0.5], &[0.9, 0.1]).unwrap() - 0.894_427_19).abs() < 1e-8);
     assert!(design::bhattacharyya_coefficient(&[0.5, 0.5], &[1.0]).is_err());
-    let report = design::design(&Scene::gaussian(1.0, &[1.0, 1.0]).unwrap(), 1)
+    let report = design::design(&Scene::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap(), 1)
         .unwrap()
         .report()
         .unwrap();
     let bound = report.ceo_bound.unwrap();
     assert!((bound - 0.444_444).abs() < 1e-5 && report.mean_squared_error > bound && report.excess().unwrap() > 1.0);
-    let detection = Scene::new(Prior::binary(2.0, 0.5).unwrap(), Noise::independent(&[1.0; 5]).unwrap()).unwrap();
+    let detection =
+        Scene::new(Prior::binary(2.0, 0.5).unwrap(), Noise::independent_with_deviations(&[1.0; 5]).unwrap()).unwrap();
     let found = design::design(&detection, 2).unwrap();
     assert!((found.value - 1.660_803_0e-2).abs() < 1e-8, "{}", found.value);
     assert!(design::design(&detection, 0).is_err() && design::design(&detection, 7).is_err());

@@ -18,9 +18,9 @@ fn sensors() -> Vec<QuantizingSensor> {
         let lloyd = Quantizer::from(&lloyd_max::gaussian(4).unwrap().affine(0.0, scale).unwrap());
         let folded = Quantizer::with_labels(vec![-scale, 0.2 * scale, 1.5 * scale], vec![0, 1, 2, 0]).unwrap();
         let variance = 0.3 * scale * scale;
-        all.push(QuantizingSensor::new(lloyd, Labelling::gray(4).unwrap(), variance).unwrap());
+        all.push(QuantizingSensor::with_variance(lloyd, Labelling::gray(4).unwrap(), variance).unwrap());
         let gaps = Labelling::with_words(2, vec![0, 1, 3]).unwrap();
-        all.push(QuantizingSensor::new(folded, gaps, variance).unwrap());
+        all.push(QuantizingSensor::with_variance(folded, gaps, variance).unwrap());
     }
     all
 }
@@ -106,8 +106,10 @@ fn a_failed_measurement_is_an_error_and_not_a_level() {
             .encode(&mut rng, &mut (), &Scalar::from([f64::NAN]), &())
             .is_err()
     );
-    assert!(QuantizingSensor::new(sensor.quantizer().clone(), Labelling::gray(8).unwrap(), 1.0).is_err());
-    assert!(QuantizingSensor::new(sensor.quantizer().clone(), Labelling::gray(4).unwrap(), f64::NAN).is_err());
+    assert!(QuantizingSensor::with_variance(sensor.quantizer().clone(), Labelling::gray(8).unwrap(), 1.0).is_err());
+    assert!(
+        QuantizingSensor::with_variance(sensor.quantizer().clone(), Labelling::gray(4).unwrap(), f64::NAN).is_err()
+    );
     let json = serde_json::to_string(sensor).unwrap();
     assert_eq!(&serde_json::from_str::<QuantizingSensor>(&json).unwrap(), sensor);
 }

@@ -1,92 +1,15 @@
-//! Lower bounds on the mean squared error that quantized sensors can reach.
-//!
-//! | bound | holds for | function |
-//! |---|---|---|
-//! | remote distortion-rate (2.15) | any code of one noisy source, any block length | [`remote_distortion_rate`] |
-//! | quadratic Gaussian CEO | any codes at separate sensors with independent noise | [`ceo`] |
-//! | Bayesian Cramer-Rao (van Trees, constant weight) | these quantizers, any estimator | [`bayesian_cramer_rao`] |
-//!
-//! The Cramer-Rao bound `1 / J(x)` concerns unbiased estimators of a fixed `x`. The posterior mean is biased towards the prior
-//! and beats it; for a random unknown the van Trees inequality takes its place.
+//! The quadratic Gaussian CEO problem.
 
-use crate::criterion::Criterion;
+use super::{independent_variances, prior_variance};
 use crate::error::{Error, refuse};
-use crate::problem::Problem;
-use crate::scene::Prior;
-use crate::system::System;
+use crate::scene::{Noise, Prior};
 use nalgebra::{DMatrix, DVector};
 
 /// Most sensors of a CEO bound: every subset is a constraint.
 pub const CEO_MAX_SENSORS: usize = 12;
 
-/// `D(R) = s_x^2 - s_x^4 / (s_x^2 + s^2) (1 - 2^{-2R})`: least squared error in `X` from `R` bits a sample about `X + W`, (2.15).
-///
-/// # Errors
-/// If a variance is not positive or `bits` is negative or not finite.
-pub fn remote_distortion_rate(prior_variance: f64, noise_variance: f64, bits: f64) -> Result<f64, Error> {
-    let sx2 = fewbits_numerics::error::positive("prior_variance", prior_variance)?;
-    let s2 = fewbits_numerics::error::positive("noise_variance", noise_variance)?;
-    let bits = fewbits_numerics::error::non_negative("bits", bits)?;
-    // The error of the noise alone plus what is left of the rest: no difference, so no digit is lost.
-    Ok(sx2 / (sx2 + s2) * (s2 + sx2 * (-2.0 * bits).exp2()))
-}
-
-/// Fisher information about `x` in the received symbols at each value of the scene, for independent noise.
-///
-/// `J(x) = sum_sensors sum_t (dP_t(x)/dx)^2 / P_t(x)`; symbols of vanishing probability contribute nothing.
-///
-/// # Errors
-/// [`Error::Argument`] if the noise is correlated.
-pub fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
-    let scene = system.scene();
-    if !scene.is_independent() {
-        return refuse("noise", "correlated noise", "independent noise for a Fisher information");
-    }
-    let nodes = scene.values().len();
-    let mut information = vec![0.0; nodes];
-    let active: Vec<usize> = (0..system.groups().len()).collect();
-    let problem = Problem::new(system, Criterion::MeanSquaredError, &active)?;
-    for (g, group) in system.groups().iter().enumerate() {
-        let law = problem.single_sensor_law(g, group.quantizer().breakpoints());
-        for (t, p) in law.symbols.chunks_exact(nodes).enumerate() {
-            for (k, total) in information.iter_mut().enumerate() {
-                // Raising x is lowering all breakpoints.
-                let slope: f64 = law.exchange.iter().zip(&law.densities).map(|(c, d)| c[t] * d[k]).sum();
-                if p[k] > 0.0 {
-                    *total += group.sensors().len() as f64 * slope * (slope / p[k]);
-                }
-            }
-        }
-    }
-    Ok(information)
-}
-
-/// Fisher information averaged over the prior.
-///
-/// # Errors
-/// As [`fisher_information`].
-pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
-    let information = fisher_information(system)?;
-    Ok(information
-        .iter()
-        .zip(system.scene().weights())
-        .map(|(j, w)| w * j)
-        .sum())
-}
-
-/// `1 / (E J(X) + 1 / s_x^2)`: no estimator from these symbols has a smaller mean squared error (van Trees 1968).
-///
-/// # Errors
-/// [`Error::Argument`] if the noise is correlated or the prior is not Gaussian.
-pub fn bayesian_cramer_rao(system: &System) -> Result<f64, Error> {
-    match system.scene().prior() {
-        Prior::Gaussian { sd } => Ok(1.0 / (mean_fisher_information(system)? + 1.0 / (sd * sd))),
-        Prior::Discrete { .. } => refuse("prior", "a discrete prior", "a smooth prior for the van Trees bound"),
-    }
-}
-
-/// Least mean squared error of the quadratic Gaussian CEO problem: sensor `n` measures `X + W_n`, independent noise of variance
-/// `noise_variances[n]`, and may spend `bits[n]` a sample.
+/// Least mean squared error of the quadratic Gaussian CEO problem: sensor `n` measures `X + W_n`, the noises
+/// independent, and may spend `bits[n]` a sample.
 ///
 /// `D` is achievable if and only if rates `r_n >= 0` (what each sensor says about its own noise) exist with, for every subset
 /// `A` of sensors (Oohama 2005; Prabhakaran, Tse and Ramchandran 2004),
@@ -100,13 +23,12 @@ pub fn bayesian_cramer_rao(system: &System) -> Result<f64, Error> {
 /// how far from the optimum it can be ([`CeoBound::gap`]).
 ///
 /// # Errors
-/// If the lengths differ, there are none or more than 12 sensors, a variance is not positive or a rate is negative;
+/// If the prior is not Gaussian, the noise is correlated, there is not one rate per sensor, there are more than 12 sensors, or a
+/// rate is negative or not finite;
 /// [`Error::NotConverged`] if the barrier method ends with a gap above 1e-6.
-pub fn ceo(prior_variance: f64, noise_variances: &[f64], bits: &[f64]) -> Result<CeoBound, Error> {
-    fewbits_numerics::error::positive("prior_variance", prior_variance)?;
-    for s2 in noise_variances {
-        fewbits_numerics::error::positive("noise_variance", *s2)?;
-    }
+pub fn ceo(prior: &Prior, noise: &Noise, bits: &[f64]) -> Result<CeoBound, Error> {
+    let prior_variance = prior_variance(prior)?;
+    let noise_variances = independent_variances(noise)?;
     for r in bits {
         fewbits_numerics::error::non_negative("bits", *r)?;
     }
@@ -306,7 +228,8 @@ impl Ceo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Quantizer, Scene};
+    use crate::bounds::remote_distortion_rate;
+    use crate::bounds::tests::{noise_of, unit};
 
     /// Equal sensors: `r + ln(1 + N s_x^2 (1 - e^{-2r}) / s^2) / (2N) = R`, by bisection.
     fn symmetric(sensors: f64, snr: f64, bits: f64) -> f64 {
@@ -333,7 +256,8 @@ mod tests {
             (5, 4.0, 0.4),
             (1, 1.0, 3.0),
         ] {
-            let bound = ceo(2.0, &vec![2.0 / snr; n], &vec![bits; n]).unwrap();
+            let two = Prior::gaussian_with_deviation(2f64.sqrt()).unwrap();
+            let bound = ceo(&two, &noise_of(&vec![2.0 / snr; n]), &vec![bits; n]).unwrap();
             assert!(bound.gap < 1e-6 && bound.lower() <= bound.distortion, "{bound:?}");
             let found = bound.distortion;
             assert!((found / 2.0 - symmetric(n as f64, snr, bits)).abs() < 1e-11, "{n} {found}");
@@ -342,39 +266,18 @@ mod tests {
 
     #[test]
     fn one_sensor_is_the_remote_source() {
-        let one = ceo(1.0, &[0.5], &[2.0]).unwrap().distortion;
-        assert!((one - remote_distortion_rate(1.0, 0.5, 2.0).unwrap()).abs() < 1e-11);
+        let one = ceo(&unit(), &noise_of(&[0.5]), &[2.0]).unwrap().distortion;
+        assert!((one - remote_distortion_rate(&unit(), &noise_of(&[0.5]), 2.0).unwrap()).abs() < 1e-11);
         // A silent sensor does not matter.
-        assert!((ceo(1.0, &[0.5, 0.1], &[2.0, 0.0]).unwrap().distortion - one).abs() < 1e-15);
-        assert_eq!(ceo(1.0, &[0.5], &[0.0]).unwrap().distortion, 1.0);
+        assert!((ceo(&unit(), &noise_of(&[0.5, 0.1]), &[2.0, 0.0]).unwrap().distortion - one).abs() < 1e-15);
+        assert_eq!(ceo(&unit(), &noise_of(&[0.5]), &[0.0]).unwrap().distortion, 1.0);
     }
 
     #[test]
     fn a_weak_sensor_with_a_large_budget_is_bound_by_its_own_rate() {
         // An unlimited budget leaves only the other's constraint: the bound lies between the extremes.
-        let [poor, rich] = [1.0, 12.0].map(|b| ceo(1.0, &[1.0, 0.5], &[b, 2.0]).unwrap().distortion);
+        let [poor, rich] = [1.0, 12.0].map(|b| ceo(&unit(), &noise_of(&[1.0, 0.5]), &[b, 2.0]).unwrap().distortion);
         assert!(rich < poor && rich > 1.0 / (1.0 + 1.0 + 2.0));
-    }
-
-    #[test]
-    fn fine_quantizers_attain_the_information_of_the_sample() {
-        let scene = Scene::gaussian(1.0, &[1.0]).unwrap();
-        let fine: Vec<f64> = (-600..=600).map(|i| f64::from(i) * 0.02).collect();
-        let system = System::ideal(scene, vec![Quantizer::new(fine).unwrap()]).unwrap();
-        let j = mean_fisher_information(&system).unwrap();
-        assert!(j < 1.0 && j > 0.9999, "{j}");
-    }
-
-    #[test]
-    fn a_remote_source_in_almost_no_noise_keeps_its_digits() {
-        for (noise, bits, exact) in [
-            (1e-12_f64, 30.0, 1e-12 + 2f64.powi(-60)),
-            (1e-17, 30.0, 1e-17 + 2f64.powi(-60)),
-            (1e-17, 0.0, 1.0),
-        ] {
-            let found = remote_distortion_rate(1.0, noise, bits).unwrap();
-            assert!((found / exact - 1.0).abs() < 1e-11, "{noise} {bits}: {found}");
-        }
     }
 
     /// Extreme budgets and noises end with a certified gap or with an error, never silently.
@@ -386,7 +289,7 @@ mod tests {
             (vec![1e-9, 1e-9], vec![20.0, 20.0]),
             (vec![0.3, 2.0, 5.0, 0.01], vec![12.0, 0.01, 1.0, 0.5]),
         ] {
-            match ceo(1.0, &variances, &bits) {
+            match ceo(&unit(), &noise_of(&variances), &bits) {
                 Ok(bound) => {
                     assert!(bound.gap <= 1e-6 && bound.distortion > 0.0 && bound.distortion < 1.0, "{bound:?}")
                 }
@@ -397,10 +300,9 @@ mod tests {
 
     #[test]
     fn bad_bounds_are_refused() {
-        assert!(remote_distortion_rate(1.0, 0.0, 1.0).is_err());
-        assert!(remote_distortion_rate(1.0, 1.0, -1.0).is_err());
-        assert!(ceo(1.0, &[], &[]).is_err());
-        assert!(ceo(1.0, &[1.0], &[1.0, 1.0]).is_err());
-        assert!(ceo(1.0, &[1.0; 13], &[1.0; 13]).is_err());
+        assert!(ceo(&unit(), &noise_of(&[1.0]), &[1.0, 1.0]).is_err());
+        assert!(ceo(&unit(), &noise_of(&[1.0; 13]), &[1.0; 13]).is_err());
+        assert!(ceo(&unit(), &noise_of(&[1.0]), &[-1.0]).is_err());
+        assert!(ceo(&Prior::binary(1.0, 0.5).unwrap(), &noise_of(&[1.0]), &[1.0]).is_err());
     }
 }

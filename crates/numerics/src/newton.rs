@@ -1,0 +1,56 @@
+//! A root by Newton's method inside a bracket.
+
+/// Steps after which the last point is returned; bisection alone exhausts a double in fewer.
+const MOST_STEPS: usize = 100;
+
+/// The root of an increasing function between `lower` and `upper`: Newton's method from `start`, with bisection wherever a step
+/// would leave the shrinking bracket, so that it never fails.
+///
+/// `f` returns the value and the derivative. The iteration ends when a step is at most `tolerance`. Where `f` does not change its
+/// sign the answer is the nearer end; a value that is NaN counts as too far right.
+///
+/// ```
+/// use fewbits_numerics::newton::increasing;
+/// let root = increasing(|x| (x.exp() - 3.0, x.exp()), 0.0, 5.0, 2.5, 1e-15);
+/// assert!((root - 3f64.ln()).abs() < 1e-15);
+/// ```
+pub fn increasing(mut f: impl FnMut(f64) -> (f64, f64), lower: f64, upper: f64, start: f64, tolerance: f64) -> f64 {
+    let (mut low, mut high, mut x) = (lower, upper, start);
+    for _ in 0..MOST_STEPS {
+        let (value, slope) = f(x);
+        if value < 0.0 {
+            low = x;
+        } else {
+            high = x;
+        }
+        let newton = x - value / slope;
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * low + 0.5 * high
+        };
+        if (next - x).abs() <= tolerance {
+            return next;
+        }
+        x = next;
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::increasing;
+
+    #[test]
+    fn roots_are_found_from_bad_starts_and_at_the_ends() {
+        // Newton alone diverges on the arc tangent from here.
+        let root = increasing(|x| ((x - 1.0).atan(), 1.0 / (1.0 + (x - 1.0) * (x - 1.0))), -50.0, 90.0, 80.0, 1e-14);
+        assert!((root - 1.0).abs() < 1e-14);
+        // No slope at all: bisection.
+        let step = |x: f64| (if x < 0.3 { -1.0 } else { 1.0 }, 0.0);
+        assert!((increasing(step, 0.0, 1.0, 0.5, 1e-15) - 0.3).abs() < 1e-14);
+        assert!((increasing(|_| (1.0, 0.0), 0.0, 1.0, 0.5, 1e-12)).abs() < 1e-11);
+        assert!((increasing(|_| (-1.0, 0.0), 0.0, 1.0, 0.5, 1e-12) - 1.0).abs() < 1e-11);
+        assert!(increasing(|_| (f64::NAN, f64::NAN), 0.0, 1.0, 0.5, 1e-12).is_finite());
+    }
+}

@@ -1,0 +1,76 @@
+//! The information of the symbols about a fixed value of the unknown.
+
+use crate::criterion::Criterion;
+use crate::error::{Error, refuse};
+use crate::problem::Problem;
+use crate::scene::Prior;
+use crate::system::System;
+
+/// Fisher information about `x` in the received symbols at each value of the scene, for independent noise.
+///
+/// `J(x) = sum_sensors sum_t (dP_t(x)/dx)^2 / P_t(x)`; symbols of vanishing probability contribute nothing.
+///
+/// # Errors
+/// [`Error::Argument`] if the noise is correlated.
+pub fn fisher_information(system: &System) -> Result<Vec<f64>, Error> {
+    let scene = system.scene();
+    if !scene.is_independent() {
+        return refuse("noise", "correlated noise", "independent noise for a Fisher information");
+    }
+    let nodes = scene.values().len();
+    let mut information = vec![0.0; nodes];
+    let active: Vec<usize> = (0..system.groups().len()).collect();
+    let problem = Problem::new(system, Criterion::MeanSquaredError, &active)?;
+    for (g, group) in system.groups().iter().enumerate() {
+        let law = problem.single_sensor_law(g, group.quantizer().breakpoints());
+        for (t, p) in law.symbols.chunks_exact(nodes).enumerate() {
+            for (k, total) in information.iter_mut().enumerate() {
+                // Raising x is lowering all breakpoints.
+                let slope: f64 = law.exchange.iter().zip(&law.densities).map(|(c, d)| c[t] * d[k]).sum();
+                if p[k] > 0.0 {
+                    *total += group.sensors().len() as f64 * slope * (slope / p[k]);
+                }
+            }
+        }
+    }
+    Ok(information)
+}
+
+/// Fisher information averaged over the prior.
+///
+/// # Errors
+/// As [`fisher_information`].
+pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
+    let information = fisher_information(system)?;
+    Ok(information
+        .iter()
+        .zip(system.scene().weights())
+        .map(|(j, w)| w * j)
+        .sum())
+}
+
+/// `1 / (E J(X) + 1 / s_x^2)`: no estimator from these symbols has a smaller mean squared error (van Trees 1968).
+///
+/// # Errors
+/// [`Error::Argument`] if the noise is correlated or the prior is not Gaussian.
+pub fn bayesian_cramer_rao(system: &System) -> Result<f64, Error> {
+    match system.scene().prior() {
+        Prior::Gaussian { deviation } => Ok(1.0 / (mean_fisher_information(system)? + 1.0 / (deviation * deviation))),
+        Prior::Discrete { .. } => refuse("prior", "a discrete prior", "a smooth prior for the van Trees bound"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Quantizer, Scene};
+
+    #[test]
+    fn fine_quantizers_attain_the_information_of_the_sample() {
+        let scene = Scene::gaussian_with_deviations(1.0, &[1.0]).unwrap();
+        let fine: Vec<f64> = (-600..=600).map(|i| f64::from(i) * 0.02).collect();
+        let system = System::ideal(scene, vec![Quantizer::new(fine).unwrap()]).unwrap();
+        let j = mean_fisher_information(&system).unwrap();
+        assert!(j < 1.0 && j > 0.9999, "{j}");
+    }
+}

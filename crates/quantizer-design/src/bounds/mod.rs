@@ -1,0 +1,93 @@
+//! Lower bounds on the mean squared error that quantized sensors can reach.
+//!
+//! | bound | holds for | function |
+//! |---|---|---|
+//! | remote distortion-rate (2.15) | any code of one noisy source, any block length | [`remote_distortion_rate`] |
+//! | quadratic Gaussian CEO | any codes at separate sensors with independent noise | [`ceo`] |
+//! | Bayesian Cramer-Rao (van Trees, constant weight) | these quantizers, any estimator | [`bayesian_cramer_rao`] |
+//!
+//! The Cramer-Rao bound `1 / J(x)` concerns unbiased estimators of a fixed `x`. The posterior mean is biased towards the prior
+//! and beats it; for a random unknown the van Trees inequality takes its place.
+
+mod ceo;
+mod fisher;
+
+pub use ceo::{CEO_MAX_SENSORS, CeoBound, ceo};
+pub use fisher::{bayesian_cramer_rao, fisher_information, mean_fisher_information};
+
+use crate::error::{Error, refuse};
+use crate::scene::{Noise, Prior};
+
+/// `D(R) = s_x^2 - s_x^4 / (s_x^2 + s^2) (1 - 2^{-2R})`: least squared error in `X` from `R` bits about the samples of sensors that are
+/// encoded together, (2.15); independent noises combine to `1 / s^2 = sum_n 1 / s_n^2`.
+///
+/// # Errors
+/// If the prior is not Gaussian, the noise is correlated, or `bits` is negative or not finite.
+pub fn remote_distortion_rate(prior: &Prior, noise: &Noise, bits: f64) -> Result<f64, Error> {
+    let sx2 = prior_variance(prior)?;
+    let precision: f64 = independent_variances(noise)?.iter().map(|s2| 1.0 / s2).sum();
+    let s2 = fewbits_numerics::error::positive("noise variance", 1.0 / precision)?;
+    let bits = fewbits_numerics::error::non_negative("bits", bits)?;
+    // The error of the noise alone plus what is left of the rest: no difference, so no digit is lost.
+    Ok(sx2 / (sx2 + s2) * (s2 + sx2 * (-2.0 * bits).exp2()))
+}
+
+/// Variance of a Gaussian prior.
+fn prior_variance(prior: &Prior) -> Result<f64, Error> {
+    match prior {
+        Prior::Gaussian { deviation } => {
+            Ok(fewbits_numerics::error::positive("prior variance", deviation * deviation)?)
+        }
+        Prior::Discrete { .. } => refuse("prior", "a discrete prior", "a Gaussian prior"),
+    }
+}
+
+/// Variance of each sensor's noise, if they are independent.
+fn independent_variances(noise: &Noise) -> Result<Vec<f64>, Error> {
+    if !noise.is_independent() {
+        return refuse("noise", "correlated noise", "independent noise");
+    }
+    (0..noise.sensors())
+        .map(|n| Ok(fewbits_numerics::error::positive("noise variance", noise.deviation(n).powi(2))?))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(super) fn unit() -> Prior {
+        Prior::gaussian_with_deviation(1.0).unwrap()
+    }
+
+    pub(super) fn noise_of(variances: &[f64]) -> Noise {
+        Noise::independent_with_variances(variances).unwrap()
+    }
+
+    #[test]
+    fn a_remote_source_in_almost_no_noise_keeps_its_digits() {
+        for (noise, bits, exact) in [
+            (1e-12_f64, 30.0, 1e-12 + 2f64.powi(-60)),
+            (1e-17, 30.0, 1e-17 + 2f64.powi(-60)),
+            (1e-17, 0.0, 1.0),
+        ] {
+            let found = remote_distortion_rate(&unit(), &noise_of(&[noise]), bits).unwrap();
+            assert!((found / exact - 1.0).abs() < 1e-11, "{noise} {bits}: {found}");
+        }
+    }
+
+    #[test]
+    fn samples_encoded_together_are_one_of_less_noise() {
+        let together = remote_distortion_rate(&unit(), &noise_of(&[1.0, 0.5]), 2.0).unwrap();
+        let one = remote_distortion_rate(&unit(), &noise_of(&[1.0 / 3.0]), 2.0).unwrap();
+        assert!((together - one).abs() < 1e-15);
+    }
+
+    #[test]
+    fn bad_rates_are_refused() {
+        assert!(remote_distortion_rate(&unit(), &noise_of(&[1.0]), -1.0).is_err());
+        assert!(remote_distortion_rate(&Prior::binary(1.0, 0.5).unwrap(), &noise_of(&[1.0]), 1.0).is_err());
+        let correlated = Noise::equicorrelated_with_deviations(&[1.0; 2], 0.5).unwrap();
+        assert!(remote_distortion_rate(&unit(), &correlated, 1.0).is_err());
+    }
+}

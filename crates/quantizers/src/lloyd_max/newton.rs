@@ -1,0 +1,156 @@
+//! Newton's method on the midpoint equations.
+
+use super::table::LloydMax;
+use crate::density::{CellMoments, Density, edges};
+use crate::error::Error;
+use crate::quantizer::{check_increasing, increasing};
+use fewbits_numerics::tridiagonal;
+
+/// Newton steps below this share of the narrowest cell leave, squared, an error below rounding.
+const LAST_STEP: f64 = 3e-8;
+/// Steps below this share of the narrowest cell that no longer shrink have met the rounding of the equations.
+const ROUNDING_STEP: f64 = 1e-5;
+/// Residuals below this share of the density's extent count as no worse than any other.
+const RESIDUAL_TOLERANCE: f64 = 1e-13;
+/// Newton needs 4 to 15 steps; what needs more is not a density with a unique optimum.
+const MAX_ITERATIONS: usize = 200;
+
+/// The quantizer of least squared error near the increasing breakpoints `b`, which are measured from the density's centre.
+pub(super) fn solve(density: &impl Density, mut b: Vec<f64>) -> Result<LloydMax, Error> {
+    let (low, high) = density.extent();
+    let negligible = RESIDUAL_TOLERANCE * (high - low);
+    let mut solver = Solver::new(b.len() + 1);
+    let mut trial = b.clone();
+    solver.enter(density, &b);
+    let (mut change, mut before) = (f64::INFINITY, solver.residual());
+    for _ in 0..MAX_ITERATIONS {
+        solver.newton_step(density, &b);
+        let mut share = 1.0;
+        let after = loop {
+            for ((t, b), s) in trial.iter_mut().zip(&b).zip(&solver.step) {
+                *t = b - share * s;
+            }
+            if increasing(&trial) {
+                solver.enter(density, &trial);
+                let after = solver.residual();
+                if after <= before || after <= negligible {
+                    break after;
+                }
+            }
+            share *= 0.5;
+            if share < 1e-6 {
+                // Newton has no descent here: one sweep of the fixed point always has.
+                solver.enter(density, &b);
+                solver.residual();
+                for ((t, b), r) in trial.iter_mut().zip(&b).zip(&solver.residual) {
+                    *t = b - r;
+                }
+                solver.enter(density, &trial);
+                break solver.residual();
+            }
+        };
+        let last = change;
+        change = b.iter().zip(&trial).fold(0.0, |m, (p, q)| f64::max(m, (p - q).abs()));
+        std::mem::swap(&mut b, &mut trial);
+        before = after;
+        if !increasing(&b) {
+            // A density that is not a number somewhere.
+            break;
+        }
+        let narrowest = b.windows(2).map(|w| w[1] - w[0]).fold(0.5 * (high - low), f64::min);
+        let quadratic = share == 1.0 && change <= LAST_STEP * narrowest;
+        let at_rounding = change <= ROUNDING_STEP * narrowest && change >= 0.5 * last;
+        if quadratic || at_rounding || change <= negligible {
+            return finish(density, &b, &solver.cells);
+        }
+    }
+    Err(Error::NotConverged {
+        algorithm: "Lloyd-Max",
+        iterations: MAX_ITERATIONS,
+        change,
+    })
+}
+
+/// The midpoint equations and their Newton steps.
+pub(super) struct Solver {
+    cells: Vec<CellMoments>,
+    pub(super) residual: Vec<f64>,
+    step: Vec<f64>,
+}
+
+impl Solver {
+    pub(super) fn new(levels: usize) -> Self {
+        let empty = CellMoments {
+            mass: 0.0,
+            from_lower: 0.0,
+            to_upper: 0.0,
+        };
+        Self {
+            cells: vec![empty; levels],
+            residual: vec![0.0; levels - 1],
+            step: vec![0.0; levels - 1],
+        }
+    }
+
+    /// Takes the cells between the breakpoints `b`.
+    pub(super) fn enter(&mut self, density: &impl Density, b: &[f64]) {
+        density.cells(b, &mut self.cells);
+    }
+
+    /// `b_i - (c_i + c_{i+1}) / 2` for all `i`; returns the largest size.
+    pub(super) fn residual(&mut self) -> f64 {
+        let mut largest = 0.0;
+        for (r, pair) in self.residual.iter_mut().zip(self.cells.windows(2)) {
+            *r = 0.5 * (pair[0].to_upper - pair[1].from_lower);
+            largest = f64::max(largest, r.abs());
+        }
+        largest
+    }
+
+    /// Solves the tridiagonal Newton system at `b`; where it is singular the step is a sweep of the fixed point.
+    fn newton_step(&mut self, density: &impl Density, b: &[f64]) {
+        let n = b.len();
+        let densities: Vec<f64> = b.iter().map(|b| density.pdf(*b)).collect();
+        // Influence of an edge on the centroid of a cell, at the given distance from each other.
+        let pull = |cell: &CellMoments, edge: usize, distance: f64| {
+            if cell.mass > 0.0 {
+                0.5 * densities[edge] * distance / cell.mass
+            } else {
+                0.25
+            }
+        };
+        let of_upper = |i: usize| pull(&self.cells[i], i, self.cells[i].to_upper);
+        let of_lower = |i: usize| pull(&self.cells[i], i - 1, self.cells[i].from_lower);
+        let below: Vec<f64> = (1..n).map(|i| -of_lower(i)).collect();
+        let diagonal: Vec<f64> = (0..n).map(|i| 1.0 - of_upper(i) - of_lower(i + 1)).collect();
+        let above: Vec<f64> = (1..n).map(|i| -of_upper(i)).collect();
+        match tridiagonal::solve(&below, &diagonal, &above, &self.residual) {
+            Ok(step) => self.step = step,
+            Err(_) => self.step.copy_from_slice(&self.residual),
+        }
+    }
+}
+
+/// Moves the cells to their place and adds up what they cost, all terms positive.
+fn finish(density: &impl Density, b: &[f64], cells: &[CellMoments]) -> Result<LloydMax, Error> {
+    let centre = density.centre();
+    let (mut centroids, mut error) = (Vec::with_capacity(cells.len()), 0.0);
+    for (i, cell) in cells.iter().enumerate() {
+        let (lower, upper) = edges(b, i);
+        let centroid = if upper.is_finite() {
+            upper - cell.to_upper
+        } else {
+            lower + cell.from_lower
+        };
+        error += density.squared_error(lower, upper, centroid);
+        centroids.push(centre + centroid);
+    }
+    let breakpoints: Vec<f64> = b.iter().map(|b| centre + b).collect();
+    check_increasing(&breakpoints)?;
+    Ok(LloydMax {
+        breakpoints,
+        centroids,
+        probabilities: cells.iter().map(|c| c.mass).collect(),
+        mean_squared_error: error,
+    })
+}

@@ -1,0 +1,154 @@
+//! A designed quantizer with its reconstruction values.
+
+use crate::error::{Error, refuse};
+use crate::quantizer::{cell_of, check_increasing};
+use fewbits_numerics::error::{all_finite, finite, non_negative, positive, probabilities};
+use serde::{Deserialize, Serialize};
+
+/// A least-squares scalar quantizer: cells `[b_{i-1}, b_i)` and the centroid of each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Table", into = "Table")]
+pub struct LloydMax {
+    pub(super) breakpoints: Vec<f64>,
+    pub(super) centroids: Vec<f64>,
+    pub(super) probabilities: Vec<f64>,
+    pub(super) mean_squared_error: f64,
+}
+
+/// The stored form.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    breakpoints: Vec<f64>,
+    centroids: Vec<f64>,
+    probabilities: Vec<f64>,
+    mean_squared_error: f64,
+}
+
+impl From<LloydMax> for Table {
+    fn from(quantizer: LloydMax) -> Self {
+        Self {
+            breakpoints: quantizer.breakpoints,
+            centroids: quantizer.centroids,
+            probabilities: quantizer.probabilities,
+            mean_squared_error: quantizer.mean_squared_error,
+        }
+    }
+}
+
+impl TryFrom<Table> for LloydMax {
+    type Error = Error;
+
+    fn try_from(table: Table) -> Result<Self, Error> {
+        let Table {
+            breakpoints,
+            centroids,
+            probabilities: masses,
+            mean_squared_error,
+        } = table;
+        check_increasing(&breakpoints)?;
+        all_finite("centroids", &centroids)?;
+        probabilities("probabilities", &masses)?;
+        non_negative("mean_squared_error", mean_squared_error)?;
+        let levels = breakpoints.len() + 1;
+        if breakpoints.is_empty() || centroids.len() != levels || masses.len() != levels {
+            let given = format!("{} centroids, {} probabilities", centroids.len(), masses.len());
+            return refuse("centroids", given, format!("one per cell, {levels} of each, and at least two cells"));
+        }
+        let inside = |i: usize| {
+            (i == 0 || breakpoints[i - 1] <= centroids[i]) && (i + 1 == levels || centroids[i] <= breakpoints[i])
+        };
+        if let Some(at) = (0..levels).find(|i| !inside(*i)) {
+            return refuse("centroids", format!("{} at index {at}", centroids[at]), "a point of its own cell");
+        }
+        Ok(Self {
+            breakpoints,
+            centroids,
+            probabilities: masses,
+            mean_squared_error,
+        })
+    }
+}
+
+impl LloydMax {
+    /// Finite breakpoints, increasing, one fewer than levels.
+    pub fn breakpoints(&self) -> &[f64] {
+        &self.breakpoints
+    }
+
+    /// Reconstruction value of each cell.
+    pub fn centroids(&self) -> &[f64] {
+        &self.centroids
+    }
+
+    /// Probability of each cell.
+    pub fn probabilities(&self) -> &[f64] {
+        &self.probabilities
+    }
+
+    /// Number of levels.
+    pub fn levels(&self) -> usize {
+        self.centroids.len()
+    }
+
+    /// Mean squared error of reconstruction by centroids, in the squared unit of the variable.
+    pub fn mean_squared_error(&self) -> f64 {
+        self.mean_squared_error
+    }
+
+    /// Entropy of the cell index in bits: what an ideal entropy coder would spend.
+    pub fn entropy_bits(&self) -> f64 {
+        -self
+            .probabilities
+            .iter()
+            .filter(|p| **p > 0.0)
+            .map(|p| p * p.log2())
+            .sum::<f64>()
+    }
+
+    /// The quantizer of `mean + deviation X`, where this one is the quantizer of `X`.
+    ///
+    /// # Errors
+    /// If `mean` is not finite, `deviation` is not a positive number, or the mean is so large that breakpoints coincide.
+    pub fn affine(&self, mean: f64, deviation: f64) -> Result<Self, Error> {
+        finite("mean", mean)?;
+        positive("deviation", deviation)?;
+        let map = |v: &[f64]| -> Vec<f64> { v.iter().map(|x| mean + deviation * x).collect() };
+        let breakpoints = map(&self.breakpoints);
+        check_increasing(&breakpoints)?;
+        Ok(Self {
+            breakpoints,
+            centroids: map(&self.centroids),
+            probabilities: self.probabilities.clone(),
+            mean_squared_error: deviation * deviation * self.mean_squared_error,
+        })
+    }
+
+    /// Index of the cell that holds `x`, 0 to `levels - 1`: the number of breakpoints at or below it.
+    ///
+    /// # Errors
+    /// If `x` is NaN.
+    #[inline]
+    pub fn encode(&self, x: f64) -> Result<usize, Error> {
+        cell_of(&self.breakpoints, x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lloyd_max::gaussian;
+
+    #[test]
+    fn tables_are_stored_and_checked_when_restored() {
+        let q = gaussian(8).unwrap();
+        let json = serde_json::to_string(&q).unwrap();
+        assert_eq!(serde_json::from_str::<LloydMax>(&json).unwrap(), q);
+        for (from, to) in [
+            ("\"centroids\":[-", "\"centroids\":["),
+            ("\"mean_squared_error\":", "\"mean_squared_error\":-"),
+        ] {
+            assert!(serde_json::from_str::<LloydMax>(&json.replacen(from, to, 1)).is_err());
+        }
+    }
+}
