@@ -369,7 +369,18 @@ mod tests {
         // The integral of the Gaussian profile times the circumference.
         let exact = (std::f64::consts::TAU * 20.0 * (std::f64::consts::TAU).sqrt() * 0.05).ln();
         assert!((cells.log_evidence() - exact).abs() < 1e-3, "{} {exact}", cells.log_evidence());
+        // The stop rule promises the determinant to 2 per cent and no more.
         assert!(cells.mean().norm() < 0.1 && (cells.covariance()[(0, 0)] / 200.0 - 1.0).abs() < 1e-2);
+        // With cells that resolve the profile the midpoint rule is exact: E r^2 = 20^2 + 3 sd^2.
+        let fine = CellOptions {
+            evidence_tolerance: 1e-9,
+            determinant_tolerance: 1e-7,
+            ..CellOptions::default()
+        };
+        let cells = Cells::cover(&Ring, [-50.0; 2], [60.0; 2], 40, &fine).unwrap();
+        assert!((cells.log_evidence() - exact).abs() < 1e-7, "{} {exact}", cells.log_evidence());
+        let variance = 0.5 * (400.0 + 3.0 * 0.05 * 0.05);
+        assert!(cells.mean().norm() < 1e-5 && (cells.covariance()[(0, 0)] / variance - 1.0).abs() < 1e-6);
     }
 
     struct Nowhere;

@@ -1,5 +1,6 @@
 //! A weighted cloud summed up by a few clumps, and Gaussian mixtures fitted to them.
 
+use crate::matrix::eigen;
 use crate::{Component, Error, Mixture};
 use fewbits_core::Columns;
 use fewbits_numerics::ArgumentError;
@@ -21,6 +22,7 @@ pub struct Clump<const D: usize> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clumps<const D: usize> {
     clumps: Vec<Clump<D>>,
+    least: SVector<f64, D>,
 }
 
 /// How a mixture is fitted.
@@ -120,6 +122,7 @@ impl<const D: usize> Clumps<D> {
         }
         Ok(Self {
             clumps: parts.into_iter().map(|part| part.clump).collect(),
+            least: SVector::zeros(),
         })
     }
 
@@ -143,6 +146,17 @@ impl<const D: usize> Clumps<D> {
                 (c.covariance + d * d.transpose()) * c.weight
             })
             .sum()
+    }
+
+    /// The same, with least variances of fitted components: what the points resolve. Zero sets none.
+    ///
+    /// # Errors
+    /// If a variance is negative or not finite.
+    pub fn with_least_variances(self, least: SVector<f64, D>) -> Result<Self, Error> {
+        for variance in &least {
+            non_negative("least", *variance)?;
+        }
+        Ok(Self { least, ..self })
     }
 
     /// A Gaussian mixture of the same mean and covariance, by expectation-maximisation over the clumps.
@@ -189,11 +203,11 @@ impl<const D: usize> Clumps<D> {
     }
 
     fn improve(&self, start: Vec<Clump<D>>, whole: &SMatrix<f64, D, D>, options: &MixtureFit) -> Vec<Clump<D>> {
-        // The floor keeps components from collapsing onto single clumps; it is far below what the belief resolves.
-        let floor = SMatrix::from_diagonal(&whole.diagonal()) * 1e-9;
+        // The floor keeps components from collapsing onto single clumps; it is below what the belief resolves.
+        let floor = (whole.diagonal() * 1e-9).sup(&self.least);
         let mut components = start;
         for c in &mut components {
-            c.covariance += floor;
+            c.covariance = raised(c.covariance, &floor);
         }
         let mut before = f64::NEG_INFINITY;
         let mut logs = vec![0.0; components.len()];
@@ -229,6 +243,21 @@ impl<const D: usize> Clumps<D> {
         }
         components
     }
+}
+
+/// A covariance whose eigenvalues, in coordinates where the given variances are one, are at least one.
+fn raised<const D: usize>(covariance: SMatrix<f64, D, D>, least: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+    if least.iter().any(|v| *v <= 0.0) {
+        return covariance;
+    }
+    let scale = least.map(f64::sqrt);
+    let scaled = SMatrix::<f64, D, D>::from_fn(|i, j| covariance[(i, j)] / (scale[i] * scale[j]));
+    let (values, vectors) = eigen(&scaled);
+    if values.iter().all(|v| *v >= 1.0) {
+        return covariance;
+    }
+    let lifted = vectors * SMatrix::from_diagonal(&values.map(|v| v.max(1.0))) * vectors.transpose();
+    SMatrix::from_fn(|i, j| 0.5 * (lifted[(i, j)] + lifted[(j, i)]) * scale[i] * scale[j])
 }
 
 /// A component ready to be evaluated.
@@ -285,13 +314,13 @@ impl<const D: usize> Sums<D> {
         self.second += (d * d.transpose() + clump.covariance) * weight;
     }
 
-    fn clump(&self, floor: &SMatrix<f64, D, D>) -> Option<Clump<D>> {
+    fn clump(&self, floor: &SVector<f64, D>) -> Option<Clump<D>> {
         let origin = self.origin?;
         let mean = self.first / self.weight;
         (self.weight > 1e-12).then(|| Clump {
             weight: self.weight,
             mean: origin + mean,
-            covariance: self.second / self.weight - mean * mean.transpose() + floor,
+            covariance: raised(self.second / self.weight - mean * mean.transpose(), floor),
         })
     }
 }
@@ -410,5 +439,33 @@ mod tests {
         assert_eq!(clumps.covariance()[0], 3.25);
         assert!(Clumps::<1>::new(&[&[0.0]], &[&[]], &[0.0], 3).is_err());
         assert!(Clumps::<1>::new(&[&[0.0]], &[&[]], &[1.0, 1.0], 3).is_err());
+    }
+
+    #[test]
+    fn components_are_no_narrower_than_what_the_points_resolve() {
+        // Cells of side one under a Gaussian of deviation one: as many clumps as cells, and a component could shrink onto one.
+        let (mut x, mut y, mut weights) = (Vec::new(), Vec::new(), Vec::new());
+        for i in -5..=5 {
+            for j in -5..=5 {
+                let (a, b) = (f64::from(i), f64::from(j));
+                x.push(a);
+                y.push(b);
+                weights.push((-0.5 * (a * a + b * b)).exp() / std::f64::consts::TAU);
+            }
+        }
+        let least = 1.0 / std::f64::consts::TAU;
+        let clumps = Clumps::new(&[&x, &y], &[&[], &[]], &weights, 200).unwrap();
+        let clumps = clumps.with_least_variances(SVector::from([least; 2])).unwrap();
+        let fit = clumps.fit(&MixtureFit::new(8).unwrap()).unwrap();
+        for c in fit.components() {
+            let (values, _) = eigen(c.covariance());
+            assert!(values.iter().all(|v| *v > least * (1.0 - 1e-9)), "{values:?}");
+        }
+        let kl: f64 = (0..weights.len())
+            .map(|i| weights[i] * (weights[i].ln() - fit.log_pdf(&SVector::from([x[i], y[i]]))))
+            .sum();
+        assert!(kl > -1e-6, "{kl}");
+        let bad = Clumps::<1>::new(&[&[0.0, 1.0]], &[&[]], &[1.0, 1.0], 3).unwrap();
+        assert!(bad.with_least_variances(SVector::from([-1.0])).is_err());
     }
 }

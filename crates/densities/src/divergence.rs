@@ -17,8 +17,11 @@
 //! finitely many points is therefore called `*_plugin`: an estimate, never a certificate.
 
 use crate::Error;
+use crate::matrix::{Factored, eigen};
+use fewbits_core::Gaussian;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::probabilities;
+use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 
 /// The four measures between two known laws.
@@ -167,6 +170,38 @@ pub fn kl_centred_normals(a: f64, b: f64) -> Result<f64, Error> {
     }
     Ok(0.5 * (x - x.ln_1p()))
 }
+
+/// `ln sup p/q` of two Gaussians, the logarithm of the amplification `C`: with `S_q - S_p` positive definite it is
+/// `(ln det S_q - ln det S_p + d' (S_q - S_p)^-1 d)/2`, `d` the difference of the means; `+inf` where `p` is the wider one in some
+/// direction; 0 for equal ones.
+///
+/// ML and DR need the infimum as well, which is `-inf` wherever the supremum is finite, unless the two are equal: between
+/// different Gaussians (and mixtures, whose widest components decide) over all of space both are infinite. Finite values exist for
+/// discrete laws ([`discrete`]) and on bounded sets alone.
+///
+/// # Errors
+/// If a covariance is not positive definite.
+pub fn log_largest_ratio<const D: usize>(p: &Gaussian<D>, q: &Gaussian<D>) -> Result<f64, Error> {
+    let own = Factored::new("p", p.covariance())?;
+    let other = Factored::new("q", q.covariance())?;
+    // Where p is standard, q has the eigenvalues 1 + gain.
+    let whiten = |m: &SMatrix<f64, D, D>| own.whitener * m * own.whitener.transpose();
+    let (values, vectors) = eigen(&whiten(q.covariance()));
+    let gap = vectors.transpose() * (own.whitener * (p.mean() - q.mean()));
+    let mut total = 2.0 * (other.half_log_det - own.half_log_det);
+    for (value, gap) in values.iter().zip(gap.iter()) {
+        let gain = value - 1.0;
+        if gain > EQUAL * value {
+            total += gap * gap / gain;
+        } else if gain < -EQUAL || gap.abs() > EQUAL.sqrt() {
+            return Ok(f64::INFINITY);
+        }
+    }
+    Ok(0.5 * total.max(0.0))
+}
+
+/// Variances that differ by less than this share count as equal.
+const EQUAL: f64 = 1e-12;
 
 #[cfg(test)]
 mod tests {

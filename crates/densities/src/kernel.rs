@@ -4,7 +4,7 @@ use crate::matrix::Factored;
 use crate::{Bandwidth, Component, Error, Mixture, Particles};
 use fewbits_core::Columns;
 use fewbits_numerics::error::at_least_one;
-use fewbits_numerics::kernels::{scalar, sum, vectorised};
+use fewbits_numerics::kernels::{sum, vectorised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -117,21 +117,45 @@ impl<const D: usize> KernelEstimate<D> {
         let weights = self.particles.weights();
         let offset = self.factor.half_log_det + D as f64 * LN_SQRT_2PI;
         let white = self.white.each_ref().map(Vec::as_slice);
-        for (p, out) in out.iter_mut().enumerate() {
-            let z: [f64; D] = std::array::from_fn(|d| points[d][p]);
-            *out = log_kernel_sum(&white, weights, &z) - offset;
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                let point = |p: usize| -> [f64; D] { std::array::from_fn(|d| points[d][p]) };
+                let pairs = out.len() / 2 * 2;
+                for p in (0..pairs).step_by(2) {
+                    let logs = log_kernel_sums(&white, weights, &[point(p), point(p + 1)]);
+                    out[p..p + 2].copy_from_slice(&logs.map(|log| log - offset));
+                }
+                for p in pairs..out.len() {
+                    out[p] = log_kernel_sums(&white, weights, &[point(p)])[0] - offset;
+                }
+            },
+        );
     }
 
     /// `ln p` at every centre. Half the kernels of [`log_pdf_columns`](Self::log_pdf_columns): they are symmetric.
     pub fn log_pdf_at_centres(&self) -> Vec<f64> {
         let weights = self.particles.weights();
         let mut sums = weights.to_vec();
-        for i in 0..self.len() {
-            let z: [f64; D] = std::array::from_fn(|d| self.white[d][i]);
-            let rest: [&[f64]; D] = self.white.each_ref().map(|c| &c[i + 1..]);
-            let across = cross_sums(&rest, &weights[i + 1..], &z, weights[i], &mut sums[i + 1..]);
-            sums[i] += across;
+        let white = self.white.each_ref().map(Vec::as_slice);
+        let mut start = 0;
+        // Runs of centres against themselves one by one, against all that follow as a rectangle.
+        while start < self.len() {
+            let end = (start + RUN).min(self.len());
+            let (before, after) = sums.split_at_mut(end);
+            let own = &mut before[start..];
+            for i in start..end {
+                let (one, rest) = own[i - start..].split_at_mut(1);
+                add_cross_sums(
+                    (&chunk_of(&white, i, 1), &weights[i..=i], one),
+                    (&chunk_of(&white, i + 1, end - i - 1), &weights[i + 1..end], rest),
+                );
+            }
+            add_cross_sums(
+                (&chunk_of(&white, start, end - start), &weights[start..end], own),
+                (&chunk_of(&white, end, self.len() - end), &weights[end..], after),
+            );
+            start = end;
         }
         let offset = self.factor.half_log_det + D as f64 * LN_SQRT_2PI;
         sums.iter().map(|s| s.ln() - offset).collect()
@@ -203,120 +227,230 @@ pub(crate) fn whitened<const D: usize>(
     })
 }
 
-/// Centres per block: what a block needs stays in the first-level cache.
-const BLOCK: usize = 256;
 /// Lanes of the sums over kernels.
-const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
+/// Centres that are paired with each other one by one.
+const RUN: usize = 16;
+/// `log2(e)/2`: half squares in powers of two.
+const HALF_LOG2_E: f64 = 0.5 * std::f64::consts::LOG2_E;
+/// Sums of kernels below this (`2^-900`) are taken again with the nearest centre taken out.
+const TINY: f64 = 1.183_053_447e-271;
+/// Exponents of two beyond this count as this: such a kernel is `2^-1020`.
+const FARTHEST: f64 = 1020.0;
+/// `2^52 + 2^51`: adding it leaves the nearest integer in the low bits of the mantissa.
+const ROUNDER: f64 = 6_755_399_441_055_744.0;
+/// `2^f` on `|f| <= 1/2`, interpolated at Chebyshev nodes with 50 digits; relative error 3e-16.
+const EXP2: [f64; 11] = [
+    1.0,
+    std::f64::consts::LN_2,
+    0.240_226_506_959_100_98,
+    0.055_504_108_664_447_72,
+    0.009_618_129_107_606_888,
+    0.001_333_355_823_016_497_4,
+    0.000_154_035_304_417_360_5,
+    1.525_265_726_020_083_7e-5,
+    1.321_544_258_792_169e-6,
+    1.020_869_029_995_830_6e-7,
+    7.072_585_949_269_223e-9,
+];
 
-/// Writes `|z - z_j|^2 / 2` of a block of centres from `from` on.
+/// `2^-s` for `s >= 0`, within three units in the last place down to `2^-1020`, where it stays. A third of the work of a whole
+/// exponential: neither subnormal results nor a second part of the argument.
 #[inline(always)]
-fn half_squares<const D: usize>(white: &[&[f64]; D], z: &[f64; D], from: usize, out: &mut [f64]) {
-    out.fill(0.0);
+pub(crate) fn power_of_half(s: f64) -> f64 {
+    let s = if s < FARTHEST { s } else { FARTHEST };
+    let shifted = ROUNDER - s;
+    let f = (ROUNDER - shifted) - s;
+    let mut p = EXP2[10];
+    for c in EXP2[..10].iter().rev() {
+        p = p * f + c;
+    }
+    f64::from_bits(p.to_bits().wrapping_add(shifted.to_bits() << 52))
+}
+
+/// `|z - z_j|^2 log2(e)/2` of centre `j`.
+#[inline(always)]
+fn exponent<const D: usize>(white: &[&[f64]; D], z: &[f64; D], j: usize) -> f64 {
+    let mut square = 0.0;
     for d in 0..D {
-        let zd = z[d];
-        for (out, x) in out.iter_mut().zip(&white[d][from..]) {
-            let gap = x - zd;
-            *out += 0.5 * gap * gap;
-        }
+        let gap = white[d][j] - z[d];
+        square += gap * gap;
     }
-}
-
-/// Smallest of a block and the given.
-#[inline(always)]
-fn smallest(start: f64, values: &[f64]) -> f64 {
-    let mut lane = [start; LANES];
-    let chunks = values.chunks_exact(LANES);
-    for (l, x) in lane.iter_mut().zip(chunks.remainder()) {
-        *l = if *x < *l { *x } else { *l };
-    }
-    for chunk in chunks {
-        for j in 0..LANES {
-            lane[j] = if chunk[j] < lane[j] { chunk[j] } else { lane[j] };
-        }
-    }
-    lane.iter().fold(start, |m, x| if *x < m { *x } else { m })
-}
-
-/// Adds `w_j k_j` to the lanes.
-#[inline(always)]
-fn add_products(lane: &mut [f64; LANES], weights: &[f64], kernels: &[f64]) {
-    let (weights, kernels) = (weights.chunks_exact(LANES), kernels.chunks_exact(LANES));
-    let rest = weights.remainder().iter().zip(kernels.remainder());
-    lane.iter_mut().zip(rest).for_each(|(l, (w, k))| *l += w * k);
-    for (w, k) in weights.zip(kernels) {
-        for j in 0..LANES {
-            lane[j] += w[j] * k[j];
-        }
-    }
+    square * HALF_LOG2_E
 }
 
 /// Adds the lanes in a fixed order.
 #[inline(always)]
-fn folded(lane: &[f64; LANES]) -> f64 {
+pub(crate) fn folded(lane: &[f64; LANES]) -> f64 {
     ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]))
 }
 
-/// `ln sum_j w_j exp(-|z - z_j|^2/2)`, in the log domain: the nearest centre of a block is taken out before exponentials.
-fn log_kernel_sum<const D: usize>(white: &[&[f64]; D], weights: &[f64], z: &[f64; D]) -> f64 {
-    vectorised(
-        #[inline(always)]
-        || {
-            let mut buffer = [0.0; BLOCK];
-            let mut nearest = f64::INFINITY;
-            let mut total = 0.0;
-            for (block, weights) in weights.chunks(BLOCK).enumerate() {
-                let squares = &mut buffer[..weights.len()];
-                half_squares(white, z, block * BLOCK, squares);
-                let closest = smallest(f64::INFINITY, squares);
-                if closest < nearest {
-                    // Nothing was added yet, or what was is rescaled.
-                    total *= (closest - nearest).exp();
-                    nearest = closest;
-                }
-                if nearest == f64::INFINITY {
-                    continue;
-                }
-                for x in squares.iter_mut() {
-                    *x = scalar::exp(nearest - *x);
-                }
-                let mut lane = [0.0; LANES];
-                add_products(&mut lane, weights, squares);
-                total += folded(&lane);
-            }
-            if nearest == f64::INFINITY {
-                f64::NEG_INFINITY
-            } else {
-                total.ln() - nearest
-            }
-        },
-    )
+/// `count` centres from `from` on: a shape whose bounds are checked once.
+#[inline(always)]
+fn chunk_of<'a, const D: usize>(white: &[&'a [f64]; D], from: usize, count: usize) -> [&'a [f64]; D] {
+    std::array::from_fn(|d| &white[d][from..from + count])
 }
 
-/// `sum_j w_j k_j` with `k_j = exp(-|z - z_j|^2/2)`; adds `weight k_j` to `sums[j]`: both halves of a symmetric kernel matrix.
-pub(crate) fn cross_sums<const D: usize>(
+/// `sum_j w_j 2^-(s_j - offset)` of each point over all centres; exponents below the offset count as equal to it.
+#[inline(always)]
+fn kernel_sums<const D: usize, const P: usize>(
     white: &[&[f64]; D],
     weights: &[f64],
-    z: &[f64; D],
-    weight: f64,
-    sums: &mut [f64],
-) -> f64 {
+    points: &[[f64; D]; P],
+    offset: f64,
+) -> [f64; P] {
+    let mut lane = [[0.0; LANES]; P];
+    let whole = weights.len() / LANES * LANES;
+    for from in (0..whole).step_by(LANES) {
+        let (chunk, w) = (chunk_of(white, from, LANES), &weights[from..from + LANES]);
+        for p in 0..P {
+            for j in 0..LANES {
+                let beyond = exponent(&chunk, &points[p], j) - offset;
+                lane[p][j] += w[j] * power_of_half(if beyond > 0.0 { beyond } else { 0.0 });
+            }
+        }
+    }
+    let (chunk, w) = (chunk_of(white, whole, weights.len() - whole), &weights[whole..]);
+    for p in 0..P {
+        for (j, w) in w.iter().enumerate() {
+            lane[p][j] += w * power_of_half((exponent(&chunk, &points[p], j) - offset).max(0.0));
+        }
+    }
+    lane.map(|lane| folded(&lane))
+}
+
+/// `ln sum_j w_j exp(-|z - z_j|^2/2)` of each point, exact in the tails: where the plain sum is tiny, it is taken again with the
+/// nearest centre taken out.
+#[inline(always)]
+fn log_kernel_sums<const D: usize, const P: usize>(
+    white: &[&[f64]; D],
+    weights: &[f64],
+    points: &[[f64; D]; P],
+) -> [f64; P] {
+    let sums = kernel_sums(white, weights, points, 0.0);
+    std::array::from_fn(|p| {
+        if sums[p] > TINY {
+            sums[p].ln()
+        } else {
+            log_far_sum(white, weights, &points[p])
+        }
+    })
+}
+
+#[cold]
+#[inline(never)]
+fn log_far_sum<const D: usize>(white: &[&[f64]; D], weights: &[f64], z: &[f64; D]) -> f64 {
+    // Centres of weight zero may be nearer; they add nothing.
+    let nearest = (0..weights.len())
+        .filter(|i| weights[*i] > 0.0)
+        .map(|i| exponent(white, z, i))
+        .fold(f64::INFINITY, f64::min);
+    if nearest == f64::INFINITY {
+        return f64::NEG_INFINITY;
+    }
+    let [sum] = kernel_sums(white, weights, &[*z], nearest);
+    sum.ln() - nearest / std::f64::consts::LOG2_E
+}
+
+/// Centres of a block of [`add_cross_sums`].
+const BLOCK: usize = 32;
+
+/// Kernels `k_ij = exp(-|z_i - z_j|^2/2)` between two runs of centres, `(white, weights, sums)` each: adds `sum_j w_j k_ij` to the
+/// first sums and `sum_i w_i k_ij` to the second.
+pub(crate) fn add_cross_sums<const D: usize>(
+    (white_i, weights_i, left): (&[&[f64]; D], &[f64], &mut [f64]),
+    (white_j, weights_j, right): (&[&[f64]; D], &[f64], &mut [f64]),
+) {
     vectorised(
         #[inline(always)]
         || {
-            let mut buffer = [0.0; BLOCK];
-            let mut lane = [0.0; LANES];
-            for (block, (weights, sums)) in weights.chunks(BLOCK).zip(sums.chunks_mut(BLOCK)).enumerate() {
-                let kernels = &mut buffer[..weights.len()];
-                half_squares(white, z, block * BLOCK, kernels);
-                for (x, sum) in kernels.iter_mut().zip(sums) {
-                    *x = scalar::exp(-*x);
-                    *sum += weight * *x;
-                }
-                add_products(&mut lane, weights, kernels);
+            let point = |i: usize| std::array::from_fn(|d| white_i[d][i]);
+            let pairs = weights_i.len() / 2 * 2;
+            for i in (0..pairs).step_by(2) {
+                let weights = [weights_i[i], weights_i[i + 1]];
+                let sums = cross_sums(white_j, weights_j, &[point(i), point(i + 1)], &weights, right);
+                left[i] += sums[0];
+                left[i + 1] += sums[1];
             }
-            folded(&lane)
+            for i in pairs..weights_i.len() {
+                left[i] += cross_sums(white_j, weights_j, &[point(i)], &[weights_i[i]], right)[0];
+            }
         },
-    )
+    );
+}
+
+/// `sum_j w_j k_j` of each point; adds the points' weighted kernels to `sums`: both halves of a symmetric kernel matrix.
+#[inline(always)]
+fn cross_sums<const D: usize, const P: usize>(
+    white: &[&[f64]; D],
+    weights: &[f64],
+    points: &[[f64; D]; P],
+    own: &[f64; P],
+    sums: &mut [f64],
+) -> [f64; P] {
+    let mut lane = [[0.0; LANES]; P];
+    let columns = white.map(|c| c[..weights.len()].as_chunks::<BLOCK>());
+    let (whole, rest) = weights.as_chunks::<BLOCK>();
+    let (sums, sums_of_rest) = sums[..weights.len()].as_chunks_mut::<BLOCK>();
+    for (k, (weights, sums)) in whole.iter().zip(sums).enumerate() {
+        let chunk = std::array::from_fn(|d| &columns[d].0[k]);
+        cross_block(&chunk, weights, points, own, sums, &mut lane);
+    }
+    if rest.len() > LANES {
+        // Filled up with centres of weight zero.
+        let padded = columns.map(|c| padded(c.1));
+        let mut sums = [0.0; BLOCK];
+        cross_block(&padded.each_ref(), &self::padded(rest), points, own, &mut sums, &mut lane);
+        sums_of_rest.iter_mut().zip(&sums).for_each(|(to, sum)| *to += sum);
+    } else {
+        let rests = columns.map(|c| c.1);
+        for p in 0..P {
+            for (j, weight) in rest.iter().enumerate() {
+                let kernel = power_of_half(exponent(&rests, &points[p], j));
+                sums_of_rest[j] += own[p] * kernel;
+                lane[p][j] += weight * kernel;
+            }
+        }
+    }
+    lane.map(|lane| folded(&lane))
+}
+
+/// A short run filled up with zeros.
+#[inline(always)]
+fn padded(values: &[f64]) -> [f64; BLOCK] {
+    let mut block = [0.0; BLOCK];
+    block[..values.len()].copy_from_slice(values);
+    block
+}
+
+#[inline(always)]
+fn cross_block<const D: usize, const P: usize>(
+    white: &[&[f64; BLOCK]; D],
+    weights: &[f64; BLOCK],
+    points: &[[f64; D]; P],
+    own: &[f64; P],
+    sums: &mut [f64; BLOCK],
+    lane: &mut [[f64; LANES]; P],
+) {
+    for p in 0..P {
+        let mut kernels = [0.0; BLOCK];
+        for j in 0..BLOCK {
+            let mut square = 0.0;
+            for d in 0..D {
+                let gap = white[d][j] - points[p][d];
+                square += gap * gap;
+            }
+            kernels[j] = power_of_half(square * HALF_LOG2_E);
+        }
+        for j in 0..BLOCK {
+            sums[j] += own[p] * kernels[j];
+        }
+        for c in 0..BLOCK / LANES {
+            for j in 0..LANES {
+                lane[p][j] += kernels[c * LANES + j] * weights[c * LANES + j];
+            }
+        }
+    }
 }
 
 /// The plain form in which an estimate is stored.

@@ -7,7 +7,7 @@ use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one};
 use fewbits_numerics::normal::LN_SQRT_2PI;
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix, SVector};
 use rand::{Rng, RngExt};
 
 /// A belief `s(x)^2` with `s(x) = sum_l sum_nu c_l,nu sqrt(phi_l(x)) h_nu(u_l)`: Gaussians `phi_l`, whitened coordinates
@@ -105,7 +105,9 @@ impl<const D: usize> Lpg<D> {
                 }
             }
         }
-        let Some(factor) = gram.clone().cholesky() else {
+        // The basis of each Gaussian is orthonormal: the diagonal is one, and a tiny pivot is rounding.
+        let independent = |factor: &Cholesky<f64, Dyn>| factor.l_dirty().diagonal().min() > DEPENDENT;
+        let Some(factor) = gram.clone().cholesky().filter(independent) else {
             return Err(ArgumentError::new("gaussians", "a dependent set", "Gaussians that differ").into());
         };
         let c = factor.solve(&b);
@@ -427,6 +429,8 @@ impl<const D: usize> Belief<D> for Lpg<D> {
 
 /// Widening of the proposal of the rejection sampler.
 const WIDER: f64 = 1.6;
+/// Pivots of the Gram matrix below this mean that its Gaussians are too much alike.
+const DEPENDENT: f64 = 1e-6;
 
 impl<const D: usize> Density<D> for Lpg<D> {
     fn log_density(&self, state: &SVector<f64, D>) -> f64 {

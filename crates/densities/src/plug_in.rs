@@ -1,10 +1,11 @@
 //! Errors of a kernel estimate's approximations, estimated at its centres or around them.
 
-use crate::kernel::cross_sums;
+use crate::kernel::add_cross_sums;
 use crate::matrix::Factored;
 use crate::{Error, KernelEstimate, Mixture, Tree};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Estimates of the four error measures from the log ratios `f_i = ln p(x_i) - ln q(x_i)` at weighted points.
 ///
@@ -160,12 +161,12 @@ pub fn node_errors<const D: usize>(estimate: &KernelEstimate<D>, tree: &Tree<D>)
         };
         let middle = tree.nodes()[right].range.start;
         let (left, right) = (node.range.start..middle, middle..node.range.end);
-        let across: [&[f64]; D] = white.each_ref().map(|c| &c[right.clone()]);
-        for i in left {
-            let z: [f64; D] = std::array::from_fn(|d| white[d][i]);
-            let kernels = cross_sums(&across, &weight[right.clone()], &z, weight[i], &mut sums[right.clone()]);
-            sums[i] += kernels;
-        }
+        let (lower, upper) = sums.split_at_mut(middle);
+        let part = |range: &Range<usize>| -> [&[f64]; D] { white.each_ref().map(|c| &c[range.clone()]) };
+        add_cross_sums(
+            (&part(&left), &weight[left.clone()], &mut lower[left.start..]),
+            (&part(&right), &weight[right.clone()], &mut upper[..right.len()]),
+        );
         let factor = Factored::new("node covariance", &node.covariance)?;
         // ln p = ln(sum / w) - ln det L_H and ln q = -q/2 - ln det L_S, both less the same constant.
         let offset = factor.half_log_det - estimate.factor().half_log_det - node.weight.ln();

@@ -1,8 +1,9 @@
 //! Expectation-maximisation towards a kernel estimate, with a floor under the covariances.
 
-use crate::matrix::{Factored, eigen, log_forms};
+use crate::kernel::{LANES, folded, power_of_half};
+use crate::matrix::{Factored, eigen};
 use crate::{Component, Cubature, Error, KernelEstimate, Mixture};
-use fewbits_numerics::kernels::{dot, scalar, sum, vectorised, weighted_covariance};
+use fewbits_numerics::kernels::vectorised;
 use nalgebra::{SMatrix, SVector};
 
 /// Improves a mixture as an approximation of a kernel estimate by `iterations` steps of expectation-maximisation over the
@@ -39,9 +40,8 @@ pub fn refine<const D: usize>(
             Part::new(c.weight(), mean, covariance)
         })
         .collect::<Result<_, _>>()?;
-    let mut shares = vec![0.0; parts.len() * points.len()];
     for _ in 0..iterations {
-        step(&points, &mut parts, &mut shares)?;
+        step(&points, &mut parts)?;
     }
     let back = parts.iter().map(|p| {
         let covariance = white.lower * p.covariance * white.lower.transpose();
@@ -50,33 +50,38 @@ pub fn refine<const D: usize>(
     Mixture::new(back.collect::<Result<_, _>>()?)
 }
 
-/// The cubature points of all kernels in whitened coordinates.
+/// Points of a block: what a block needs stays in the nearest cache.
+const BLOCK: usize = 32;
+/// Shares of a point that sum to less are taken again with the largest taken out.
+const TINY: f64 = 1e-250;
+
+/// The cubature points of all kernels in whitened coordinates, block by block. The last block is filled up with points of weight
+/// zero.
 struct Points<const D: usize> {
-    columns: [Vec<f64>; D],
-    weights: Vec<f64>,
+    blocks: Vec<([[f64; BLOCK]; D], [f64; BLOCK])>,
 }
 
 impl<const D: usize> Points<D> {
     fn new(estimate: &KernelEstimate<D>, rule: Cubature) -> Self {
         let weights = estimate.particles().weights();
         let kept: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
-        let offsets = rule.points::<D>();
         let white = estimate.white();
-        let columns = std::array::from_fn(|d| {
-            offsets
-                .iter()
-                .flat_map(|(z, _)| kept.iter().map(move |i| white[d][*i] + z[d]))
-                .collect()
-        });
-        let weights = offsets
+        let offsets = rule.points::<D>();
+        let all: Vec<(SVector<f64, D>, f64)> = offsets
             .iter()
-            .flat_map(|(_, share)| kept.iter().map(move |i| weights[*i] * share))
+            .flat_map(|(z, share)| {
+                kept.iter()
+                    .map(move |i| (SVector::from_fn(|d, _| white[d][*i] + z[d]), weights[*i] * share))
+            })
             .collect();
-        Self { columns, weights }
-    }
-
-    fn len(&self) -> usize {
-        self.weights.len()
+        let blocks = all.chunks(BLOCK).map(|chunk| {
+            let at = |j: usize| chunk[j.min(chunk.len() - 1)].0;
+            let columns = std::array::from_fn(|d| std::array::from_fn(|j| at(j)[d]));
+            (columns, std::array::from_fn(|j| chunk.get(j).map_or(0.0, |point| point.1)))
+        });
+        Self {
+            blocks: blocks.collect(),
+        }
     }
 }
 
@@ -98,76 +103,154 @@ impl<const D: usize> Part<D> {
         })
     }
 
-    /// Writes `ln w + ln N(y; mean, covariance)` of every point, a constant left out, and keeps the largest.
-    fn log_terms(&self, columns: &[&[f64]; D], row: &mut [f64], largest: &mut [f64]) {
-        let offset = self.weight.ln() - self.factor.half_log_det;
-        vectorised(
-            #[inline(always)]
-            || {
-                log_forms(&self.factor, &self.mean, offset, columns, row);
-                for (largest, x) in largest.iter_mut().zip(row.iter()) {
-                    *largest = if *x > *largest { *x } else { *largest };
-                }
-            },
-        );
+    /// `log2(w / sqrt(det S))`.
+    fn height(&self) -> f64 {
+        (self.weight.ln() - self.factor.half_log_det) * std::f64::consts::LOG2_E
     }
 }
 
-/// One step. `shares` is room for the responsibilities, one row per part.
-fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Part<D>>, shares: &mut [f64]) -> Result<(), Error> {
-    const BLOCK: usize = 256;
-    let n = points.len();
-    let k = parts.len();
-    let mut largest = [0.0; BLOCK];
-    let mut total = [0.0; BLOCK];
-    let mut logs = vec![0.0; BLOCK * k];
-    for from in (0..n).step_by(BLOCK) {
-        let m = BLOCK.min(n - from);
-        let columns: [&[f64]; D] = points.columns.each_ref().map(|c| &c[from..from + m]);
-        largest.fill(f64::NEG_INFINITY);
-        for (part, row) in parts.iter().zip(logs.chunks_mut(BLOCK)) {
-            part.log_terms(&columns, &mut row[..m], &mut largest[..m]);
-        }
-        vectorised(
-            #[inline(always)]
-            || {
-                total[..m].fill(0.0);
-                for (row, shares) in logs.chunks_exact(BLOCK).zip(shares.chunks_mut(n)) {
-                    let shares = &mut shares[from..from + m];
-                    for ((share, x), largest) in shares.iter_mut().zip(row).zip(&largest) {
-                        *share = scalar::exp(x - largest);
+/// Sums over a part's points, about the part's mean before the step: shares, first and second moments.
+struct Sums<const D: usize> {
+    share: [f64; LANES],
+    first: [[f64; LANES]; D],
+    second: [[[f64; LANES]; D]; D],
+}
+
+impl<const D: usize> Sums<D> {
+    const ZERO: Self = Self {
+        share: [0.0; LANES],
+        first: [[0.0; LANES]; D],
+        second: [[[0.0; LANES]; D]; D],
+    };
+
+    #[inline(always)]
+    fn add(&mut self, shares: &[f64; BLOCK], gaps: &[[f64; BLOCK]; D]) {
+        for c in 0..BLOCK / LANES {
+            for j in 0..LANES {
+                let i = c * LANES + j;
+                self.share[j] += shares[i];
+                for a in 0..D {
+                    let weighted = shares[i] * gaps[a][i];
+                    self.first[a][j] += weighted;
+                    for b in 0..=a {
+                        self.second[a][b][j] += weighted * gaps[b][i];
                     }
-                    total.iter_mut().zip(shares.iter()).for_each(|(t, s)| *t += s);
                 }
-                for (total, weight) in total[..m].iter_mut().zip(&points.weights[from..]) {
-                    *total = weight / *total;
-                }
-                for shares in shares.chunks_mut(n).take(k) {
-                    shares[from..from + m].iter_mut().zip(&total).for_each(|(s, t)| *s *= t);
-                }
-            },
-        );
+            }
+        }
     }
-    let mut next = Vec::with_capacity(k);
-    for share in shares.chunks(n).take(k) {
-        let weight = sum(share);
-        if weight > f64::MIN_POSITIVE {
-            next.push(moments(points, share, weight)?);
+}
+
+/// One step.
+fn step<const D: usize>(points: &Points<D>, parts: &mut Vec<Part<D>>) -> Result<(), Error> {
+    let heights: Vec<f64> = parts.iter().map(Part::height).collect();
+    let top = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mut sums: Vec<Sums<D>> = parts.iter().map(|_| Sums::ZERO).collect();
+    let mut gaps = vec![[[0.0; BLOCK]; D]; parts.len()];
+    let mut shares = vec![[0.0; BLOCK]; parts.len()];
+    vectorised(
+        #[inline(always)]
+        || {
+            for (columns, weights) in &points.blocks {
+                let mut total = [0.0; BLOCK];
+                for (((part, height), gaps), shares) in parts.iter().zip(&heights).zip(&mut gaps).zip(&mut shares) {
+                    exponents(part, top - height, columns, gaps, shares);
+                    for j in 0..BLOCK {
+                        shares[j] = power_of_half(shares[j]);
+                    }
+                    for j in 0..BLOCK {
+                        total[j] += shares[j];
+                    }
+                }
+                if total.iter().any(|t| *t < TINY) {
+                    far_shares(parts, &heights, columns, &mut gaps, &mut shares, &mut total);
+                }
+                let mut scale = [0.0; BLOCK];
+                for j in 0..BLOCK {
+                    scale[j] = weights[j] / total[j];
+                }
+                for ((sums, gaps), shares) in sums.iter_mut().zip(&gaps).zip(&mut shares) {
+                    for j in 0..BLOCK {
+                        shares[j] *= scale[j];
+                    }
+                    sums.add(shares, gaps);
+                }
+            }
+        },
+    );
+    let mut next = Vec::with_capacity(parts.len());
+    for (part, sums) in parts.iter().zip(&sums) {
+        if folded(&sums.share) > f64::MIN_POSITIVE {
+            next.push(moments(part, sums)?);
         }
     }
     *parts = next;
     Ok(())
 }
 
-/// Moments of the points under the given shares, with the eigenvalue floor.
-fn moments<const D: usize>(points: &Points<D>, share: &[f64], weight: f64) -> Result<Part<D>, Error> {
-    let mean = SVector::<f64, D>::from_fn(|d, _| dot(share, &points.columns[d]) / weight);
+/// Writes the gaps to a part's mean, and `below - log2` of the part's unnormalised density.
+#[inline(always)]
+fn exponents<const D: usize>(
+    part: &Part<D>,
+    below: f64,
+    columns: &[[f64; BLOCK]; D],
+    gaps: &mut [[f64; BLOCK]; D],
+    out: &mut [f64; BLOCK],
+) {
+    let scale = (0.5 * std::f64::consts::LOG2_E).sqrt();
+    let whitener = part.factor.whitener * scale;
+    for d in 0..D {
+        for j in 0..BLOCK {
+            gaps[d][j] = columns[d][j] - part.mean[d];
+        }
+    }
+    *out = [below; BLOCK];
+    for a in 0..D {
+        for j in 0..BLOCK {
+            let mut z = 0.0;
+            for b in 0..=a {
+                z += whitener[(a, b)] * gaps[b][j];
+            }
+            out[j] += z * z;
+        }
+    }
+}
+
+/// The shares of a block that holds points far from every part: relative to the largest share of each point.
+#[cold]
+#[inline(never)]
+fn far_shares<const D: usize>(
+    parts: &[Part<D>],
+    heights: &[f64],
+    columns: &[[f64; BLOCK]; D],
+    gaps: &mut [[[f64; BLOCK]; D]],
+    shares: &mut [[f64; BLOCK]],
+    total: &mut [f64; BLOCK],
+) {
+    let top = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    for (((part, height), gaps), shares) in parts.iter().zip(heights).zip(gaps).zip(shares.iter_mut()) {
+        exponents(part, top - height, columns, gaps, shares);
+    }
+    *total = [0.0; BLOCK];
+    for j in 0..BLOCK {
+        let least = shares.iter().map(|s| s[j]).fold(f64::INFINITY, f64::min);
+        for share in shares.iter_mut() {
+            share[j] = power_of_half(share[j] - least);
+            total[j] += share[j];
+        }
+    }
+}
+
+/// Weight, mean and covariance from the sums, with the eigenvalue floor.
+fn moments<const D: usize>(part: &Part<D>, sums: &Sums<D>) -> Result<Part<D>, Error> {
+    let weight = folded(&sums.share);
+    let shift = SVector::<f64, D>::from_fn(|d, _| folded(&sums.first[d]) / weight);
     let mut covariance = SMatrix::<f64, D, D>::zeros();
     for a in 0..D {
         for b in 0..=a {
-            let entry = weighted_covariance(share, (&points.columns[a], mean[a]), (&points.columns[b], mean[b]));
-            covariance[(a, b)] = entry / weight;
-            covariance[(b, a)] = entry / weight;
+            let entry = folded(&sums.second[a][b]) / weight - shift[a] * shift[b];
+            covariance[(a, b)] = entry;
+            covariance[(b, a)] = entry;
         }
     }
     let (values, vectors) = eigen(&covariance);
@@ -175,5 +258,5 @@ fn moments<const D: usize>(points: &Points<D>, share: &[f64], weight: f64) -> Re
         let raised = vectors * SMatrix::from_diagonal(&values.map(|v| v.max(1.0))) * vectors.transpose();
         covariance = (raised + raised.transpose()) * 0.5;
     }
-    Part::new(weight, mean, covariance)
+    Part::new(weight, part.mean + shift, covariance)
 }

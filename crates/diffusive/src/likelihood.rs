@@ -1,8 +1,8 @@
 //! How likely the samples of the visited nodes are for each position of the source.
 
-use crate::rate::{RateModel, RateSums};
+use crate::rate::{Intervals, RateModel, RateSums};
 use crate::{Error, Record};
-use fewbits_core::Likelihood;
+use fewbits_core::{Columns, Likelihood};
 use fewbits_numerics::ArgumentError;
 use nalgebra::{SVector, Vector2};
 
@@ -44,42 +44,82 @@ impl SourceLikelihood {
             .fold(RateSums::default(), |sum, record| sum.plus(&record.sums(position)))
     }
 
-    /// The log likelihood blurred over a cell of the given half width, and the log likelihood itself where the first exceeds
-    /// `floor`; elsewhere the blurred one stands for both.
-    #[inline]
-    pub(crate) fn blurred(&self, position: &Vector2<f64>, half_width: f64, floor: f64) -> (f64, f64) {
-        let (mut all, mut blurred) = (RateSums::default(), RateSums::default());
-        let (mut log, mut blurred_log) = (0.0, 0.0);
-        for record in &self.records {
-            let (sums, share) = record.blurred_sums(position, half_width);
-            // The normalisation of the noise is not discounted: it would favour cells where the response is steep.
-            let less = sums.discounted(share);
-            match &self.rate {
-                RateModel::Known(rate) => {
-                    log += sums.log_given_rate(*rate);
-                    blurred_log += less.log_given_rate(*rate);
+    /// Over a run of cells of the given half width: writes the log likelihood blurred over each cell to `blurred`. Where that plus
+    /// `priors` exceeds `floor`, or the largest of them less `dropped`, writes the log likelihood itself to `logs`; elsewhere the
+    /// blurred one stands for both.
+    pub(crate) fn blurred(
+        &self,
+        centres: &Columns<'_, 2>,
+        half_width: f64,
+        priors: &[f64],
+        (floor, dropped): (f64, f64),
+        [logs, blurred]: [&mut [f64]; 2],
+    ) {
+        let at = |i: usize| Vector2::new(centres[0][i], centres[1][i]);
+        let mut intervals = [Intervals::default(), Intervals::default()];
+        logs.fill(0.0);
+        blurred.fill(0.0);
+        if let RateModel::Joint(range) = &self.rate {
+            let mut all = vec![RateSums::default(); logs.len()];
+            for i in 0..logs.len() {
+                let mut less = RateSums::default();
+                for record in &self.records {
+                    let (sums, share) = record.blurred_sums(&at(i), half_width);
+                    // The normalisation of the noise is not discounted: it would favour cells where the response is steep.
+                    less = less.plus(&sums.discounted(share));
+                    all[i] = all[i].plus(&sums);
                 }
-                RateModel::Joint(_) => {
-                    all = all.plus(&sums);
-                    blurred = blurred.plus(&less);
-                }
-                RateModel::NodeWise(range) => {
-                    log += sums.log_marginal(range);
-                    blurred_log += less.log_marginal(range);
-                }
-                RateModel::SampleWise(range) => {
-                    log += record.log_sample_wise(position, range, 1.0);
-                    blurred_log += record.log_sample_wise(position, range, share)
-                        - 0.5 * share.ln() * record.samples().len() as f64;
-                }
+                let (log, cut) = less.log_uncut(range);
+                blurred[i] = log;
+                intervals[0].push(i, cut);
             }
+            intervals[0].add_to(blurred);
+            let best = blurred
+                .iter()
+                .zip(priors)
+                .fold(f64::NEG_INFINITY, |best, (b, p)| best.max(b + p));
+            let floor = floor.max(best - dropped);
+            for (i, (log, sums)) in logs.iter_mut().zip(&all).enumerate() {
+                if blurred[i] + priors[i] < floor {
+                    *log = blurred[i];
+                    continue;
+                }
+                let (own, cut) = sums.log_uncut(range);
+                *log = own;
+                intervals[1].push(i, cut);
+            }
+            intervals[1].add_to(logs);
+            return;
         }
-        match &self.rate {
-            RateModel::Joint(range) => {
-                let score = blurred.log_marginal(range);
-                (if score > floor { all.log_marginal(range) } else { score }, score)
+        for record in &self.records {
+            let [plain_cuts, blurred_cuts] = &mut intervals;
+            for i in 0..logs.len() {
+                let position = at(i);
+                let (sums, share) = record.blurred_sums(&position, half_width);
+                let less = sums.discounted(share);
+                match &self.rate {
+                    RateModel::Known(rate) => {
+                        logs[i] += sums.log_given_rate(*rate);
+                        blurred[i] += less.log_given_rate(*rate);
+                    }
+                    RateModel::Joint(range) | RateModel::NodeWise(range) => {
+                        for (sums, numbers, cuts) in [
+                            (sums, &mut *logs, &mut *plain_cuts),
+                            (less, &mut *blurred, &mut *blurred_cuts),
+                        ] {
+                            let (log, cut) = sums.log_uncut(range);
+                            numbers[i] += log;
+                            cuts.push(i, cut);
+                        }
+                    }
+                    RateModel::SampleWise(range) => {
+                        let targets = [(&mut logs[i], &mut *plain_cuts), (&mut blurred[i], &mut *blurred_cuts)];
+                        record.add_sample_wise(&position, range, share, i, targets);
+                    }
+                }
             }
-            _ => (log, blurred_log),
+            plain_cuts.add_to(logs);
+            blurred_cuts.add_to(blurred);
         }
     }
 }
@@ -90,11 +130,7 @@ impl Likelihood<2> for SourceLikelihood {
             RateModel::Known(rate) => self.sums(position).log_given_rate(*rate),
             RateModel::Joint(range) => self.sums(position).log_marginal(range),
             RateModel::NodeWise(range) => self.records.iter().map(|r| r.sums(position).log_marginal(range)).sum(),
-            RateModel::SampleWise(range) => self
-                .records
-                .iter()
-                .map(|r| r.log_sample_wise(position, range, 1.0))
-                .sum(),
+            RateModel::SampleWise(range) => self.records.iter().map(|r| r.log_sample_wise(position, range)).sum(),
         }
     }
 }

@@ -1,10 +1,12 @@
 //! The exact posterior of one update, over cells.
 
-use crate::rate::{RateModel, RateRange, cut_normal, log_inside};
+use crate::rate::{Intervals, RateModel, RateRange, cut_normal, ends_about};
 use crate::{Error, SourceLikelihood};
 use fewbits_core::{Belief, Columns, Density, Gaussian};
 use fewbits_densities::{CellOptions, CellTarget, Cells, Clumps, Lpg, Mixture};
-use nalgebra::{Matrix2, Vector2};
+use fewbits_numerics::kernels::largest;
+use fewbits_numerics::normal::log_interval;
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 /// Where the source can be, m: the box that the first cells cover, and to which all later ones are cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,7 +98,9 @@ impl Posterior {
     /// # Errors
     /// If `count` is zero.
     pub fn clumps(&self, count: usize) -> Result<Clumps<2>, Error> {
-        Ok(Clumps::new(&self.cells.columns(), &[&[], &[]], self.cells.weights(), count)?)
+        let clumps = Clumps::new(&self.cells.columns(), &[&[], &[]], self.cells.weights(), count)?;
+        let least = self.least_variance();
+        Ok(clumps.with_least_variances(Vector2::new(least, least))?)
     }
 
     /// Position and rate as clumps; a known rate has no spread.
@@ -113,7 +117,14 @@ impl Posterior {
                 (&fixed, &[])
             }
         };
-        Ok(Clumps::new(&[x, y, mean], &[&[], &[], spread], self.cells.weights(), count)?)
+        let clumps = Clumps::new(&[x, y, mean], &[&[], &[], spread], self.cells.weights(), count)?;
+        let least = self.least_variance();
+        Ok(clumps.with_least_variances(Vector3::new(least, least, 0.0))?)
+    }
+
+    /// Variance of the Gaussian that is as high as the density of one cell: narrower ones are not resolved.
+    fn least_variance(&self) -> f64 {
+        self.cells.width() * self.cells.width() / std::f64::consts::TAU
     }
 
     /// Share of the mass within a cell or two standard deviations of the border of the search box: a source outside shows here.
@@ -312,9 +323,14 @@ impl<'a> Target<'a> {
         for (lobe, given) in self.lobes.iter().zip(&self.conditionals) {
             let d = at - lobe.mean;
             let log = lobe.log_scale - 0.5 * quadratic(&lobe.precision(0.0), &d);
-            let (evidence, mean, variance) = updated(given, &d, [sums.response, sums.correlation, sums.energy], range);
-            let log = log + evidence;
-            if log < best - 30.0 || !log.is_finite() {
+            let (evidence, mean, variance) = updated(given, &d, [sums.response, sums.correlation, sums.energy]);
+            // The evidence is at most zero, and the cut takes more off.
+            if log + evidence < best - FAINT {
+                continue;
+            }
+            let inside = ends_about(mean, variance, range).map_or(0.0, |(from, to)| log_interval(from, to));
+            let log = log + evidence + inside;
+            if log < best - FAINT || !log.is_finite() {
                 continue;
             }
             if log > best {
@@ -340,18 +356,21 @@ impl<'a> Target<'a> {
     }
 }
 
-/// Log evidence of sums `[A, B, C]` under a Gaussian rate cut to a range (without the constant of the cut prior and of the
-/// noise), and the updated mean and variance.
+/// Log evidence of sums `[A, B, C]` under a Gaussian rate (without the constant of the cut prior and of the noise, and without
+/// what the cut takes off), and the updated mean and variance.
 #[inline]
-fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3], range: &RateRange) -> (f64, f64, f64) {
+fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3]) -> (f64, f64, f64) {
     let (m, v) = (given.mean + given.gain.dot(d), given.variance);
     let spread = 1.0 + v * a;
     let residual = b - a * m;
     let variance = v / spread;
     let mean = m + residual * variance;
     let log = -0.5 * (c - m * (2.0 * b - m * a)) + 0.5 * residual * residual * variance - 0.5 * spread.ln();
-    (log + log_inside(mean, variance, range), mean, variance)
+    (log, mean, variance)
 }
+
+/// Cells of a run: their numbers stay in the nearest caches.
+const RUN: usize = 1024;
 
 impl CellTarget<2> for Target<'_> {
     fn evaluate(&self, centres: &Columns<'_, 2>, half_width: f64, logs: &mut [f64], scores: &mut [f64]) {
@@ -364,62 +383,131 @@ impl CellTarget<2> for Target<'_> {
         // Cells that score far below the best so far will be dropped: their log density need not be exact.
         let mut floor = f64::NEG_INFINITY;
         let mut scratch = Vec::new();
-        for i in 0..logs.len() {
-            let at = Vector2::new(centres[0][i], centres[1][i]);
-            (logs[i], scores[i]) = match self.prior {
-                Prior::Position(PositionBelief::Lpg(lpg)) => {
-                    let (own, bound) = lpg.log_density_and_bound(&at, half_width, &mut scratch);
-                    let (log, blurred) = self.likelihood.blurred(&at, half_width, floor - bound);
-                    (log + own, blurred + bound)
+        let mut room = [vec![0.0; RUN], vec![0.0; RUN]];
+        for (run, (logs, scores)) in logs.chunks_mut(RUN).zip(scores.chunks_mut(RUN)).enumerate() {
+            let count = logs.len();
+            let centres: [&[f64]; 2] = centres.map(|c| &c[run * RUN..run * RUN + count]);
+            let at = |i: usize| Vector2::new(centres[0][i], centres[1][i]);
+            if let Prior::WithRate(_, range) = self.prior {
+                self.with_rate(&centres, half_width, &precisions, range, floor, [&mut *logs, &mut *scores]);
+            } else {
+                let [own, wide] = &mut room;
+                let (own, wide) = (&mut own[..count], &mut wide[..count]);
+                for i in 0..count {
+                    (own[i], wide[i]) = match self.prior {
+                        Prior::Position(PositionBelief::Lpg(lpg)) => {
+                            lpg.log_density_and_bound(&at(i), half_width, &mut scratch)
+                        }
+                        _ => log_mixture(&self.lobes, &precisions, &at(i)),
+                    };
                 }
-                Prior::WithRate(_, range) => self.with_rate(&at, half_width, &precisions, range, floor),
-                _ => {
-                    let [own, wide] = log_mixture(&self.lobes, &precisions, &at);
-                    let (log, blurred) = self.likelihood.blurred(&at, half_width, floor - wide);
-                    (log + own, blurred + wide)
-                }
-            };
-            floor = floor.max(scores[i] - DROPPED);
+                let limits = (floor, DROPPED);
+                self.likelihood
+                    .blurred(&centres, half_width, wide, limits, [&mut *logs, &mut *scores]);
+                logs.iter_mut().zip(own.iter()).for_each(|(log, own)| *log += own);
+                scores
+                    .iter_mut()
+                    .zip(wide.iter())
+                    .for_each(|(score, wide)| *score += wide);
+            }
+            floor = floor.max(largest(scores) - DROPPED);
         }
     }
 }
 
 /// Cells this far below the best, in nats, are dropped by any cover; their mass is nothing.
 const DROPPED: f64 = 26.0;
+/// Lobes this far below another, in nats, do not count.
+const FAINT: f64 = 30.0;
 
 impl Target<'_> {
-    #[inline]
+    /// Log density and score of a run of cells under a belief over position and rate.
     fn with_rate(
         &self,
-        at: &Vector2<f64>,
+        centres: &[&[f64]; 2],
         half: f64,
         precisions: &[[[f64; 3]; 2]],
         range: &RateRange,
         floor: f64,
-    ) -> (f64, f64) {
-        let (mut plain, mut blurred, mut log_noise) = ([0.0; 3], [0.0; 3], 0.0);
+        [logs, scores]: [&mut [f64]; 2],
+    ) {
+        let count = logs.len();
+        let (mut plain, mut blurred) = (vec![[0.0; 3]; count], vec![[0.0; 3]; count]);
+        let at = |i: usize| Vector2::new(centres[0][i], centres[1][i]);
+        let log_noise: f64 = self.likelihood.records().iter().map(|r| r.sums(&at(0)).log_noise).sum();
         for record in self.likelihood.records() {
-            let (sums, share) = record.blurred_sums(at, half);
-            for (k, value) in [sums.response, sums.correlation, sums.energy].into_iter().enumerate() {
-                plain[k] += value;
-                blurred[k] += share * value;
-            }
-            log_noise += sums.log_noise;
-        }
-        let sum = |which: usize, sums: [f64; 3]| {
-            let mut result = LogSum::default();
-            for ((lobe, given), precision) in self.lobes.iter().zip(&self.conditionals).zip(precisions) {
-                let d = at - lobe.mean;
-                let own = lobe.log_scale - 0.5 * quadratic(&precision[which], &d);
-                // The evidence is at most zero: lobes that cannot matter are not evaluated.
-                if own > result.largest - 30.0 {
-                    result.add(own + updated(given, &d, sums, range).0);
+            for i in 0..count {
+                let (sums, share) = record.blurred_sums(&at(i), half);
+                for (k, value) in [sums.response, sums.correlation, sums.energy].into_iter().enumerate() {
+                    plain[i][k] += value;
+                    blurred[i][k] += share * value;
                 }
             }
-            result.log() - log_noise
+        }
+        let all: Vec<usize> = (0..count).collect();
+        self.log_sums(&all, &at, precisions, (1, &blurred), range, scores);
+        let floor = floor.max(largest(scores) - log_noise - DROPPED);
+        scores.iter_mut().for_each(|score| *score -= log_noise);
+        logs.copy_from_slice(scores);
+        let kept: Vec<usize> = all.into_iter().filter(|i| scores[*i] > floor).collect();
+        self.log_sums(&kept, &at, precisions, (0, &plain), range, logs);
+        kept.iter().for_each(|i| logs[*i] -= log_noise);
+    }
+
+    /// Writes `ln sum over lobes` of the chosen cells to `out`: of every cell the nearest lobe first, then those that can still
+    /// matter beside it. Cuts of the rate are computed in sweeps.
+    fn log_sums(
+        &self,
+        cells: &[usize],
+        at: &impl Fn(usize) -> Vector2<f64>,
+        precisions: &[[[f64; 3]; 2]],
+        (which, sums): (usize, &[[f64; 3]]),
+        range: &RateRange,
+        out: &mut [f64],
+    ) {
+        let mut intervals = Intervals::default();
+        let own = |k: usize, d: &Vector2<f64>| self.lobes[k].log_scale - 0.5 * quadratic(&precisions[k][which], d);
+        let term = |k: usize, d: &Vector2<f64>, cell: usize, place: usize, intervals: &mut Intervals| {
+            let (log, mean, variance) = updated(&self.conditionals[k], d, sums[cell]);
+            intervals.push(place, ends_about(mean, variance, range));
+            own(k, d) + log
         };
-        let score = sum(1, blurred);
-        (if score > floor { sum(0, plain) } else { score }, score)
+        let mut nearest = Vec::with_capacity(cells.len());
+        let mut first = Vec::with_capacity(cells.len());
+        for (place, cell) in cells.iter().enumerate() {
+            let x = at(*cell);
+            let heights = (0..self.lobes.len()).map(|k| (k, own(k, &(x - self.lobes[k].mean))));
+            let (best, _) =
+                heights.fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best });
+            nearest.push(best);
+            first.push(term(best, &(x - self.lobes[best].mean), *cell, place, &mut intervals));
+        }
+        intervals.add_to(&mut first);
+        // The evidence is at most zero: lobes that cannot matter are not evaluated.
+        let (mut others, mut terms) = (Vec::new(), Vec::new());
+        for (place, cell) in cells.iter().enumerate() {
+            let x = at(*cell);
+            for k in 0..self.lobes.len() {
+                let d = x - self.lobes[k].mean;
+                if k != nearest[place] && own(k, &d) > first[place] - FAINT {
+                    others.push(place);
+                    terms.push(term(k, &d, *cell, terms.len(), &mut intervals));
+                }
+            }
+        }
+        intervals.add_to(&mut terms);
+        let mut results = vec![LogSum::default(); cells.len()];
+        results
+            .iter_mut()
+            .zip(&first)
+            .for_each(|(result, log)| result.add(*log));
+        others
+            .iter()
+            .zip(&terms)
+            .for_each(|(place, log)| results[*place].add(*log));
+        for (cell, result) in cells.iter().zip(&results) {
+            out[*cell] = result.log();
+        }
     }
 }
 
@@ -462,7 +550,7 @@ impl LogSum {
 
 /// Log density of a mixture and of the same blurred.
 #[inline]
-fn log_mixture(lobes: &[Lobe], precisions: &[[[f64; 3]; 2]], at: &Vector2<f64>) -> [f64; 2] {
+fn log_mixture(lobes: &[Lobe], precisions: &[[[f64; 3]; 2]], at: &Vector2<f64>) -> (f64, f64) {
     let mut results = [LogSum::default(), LogSum::default()];
     for (lobe, precision) in lobes.iter().zip(precisions) {
         let d = at - lobe.mean;
@@ -470,5 +558,5 @@ fn log_mixture(lobes: &[Lobe], precisions: &[[[f64; 3]; 2]], at: &Vector2<f64>) 
             result.add(lobe.log_scale - 0.5 * quadratic(p, &d));
         }
     }
-    [results[0].log(), results[1].log()]
+    (results[0].log(), results[1].log())
 }

@@ -2,6 +2,7 @@
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, finite, non_negative, positive};
+use fewbits_numerics::kernels;
 use fewbits_numerics::normal::{LN_SQRT_2PI, log_interval, truncated_moments};
 use serde::{Deserialize, Serialize};
 
@@ -166,20 +167,23 @@ impl RateSums {
     /// `-(C - B^2/A)/2 + ln sqrt(2 pi / A) - ln(high - low) + ln[Phi((high - B/A) sqrt A) - Phi((low - B/A) sqrt A)]`.
     #[inline]
     pub fn log_marginal(&self, range: &RateRange) -> f64 {
+        let (log, cut) = self.log_uncut(range);
+        log + cut.map_or(0.0, |(from, to)| log_interval(from, to))
+    }
+
+    /// [`log_marginal`](Self::log_marginal) less the logarithm of the standard normal's share between the two numbers, if they
+    /// cut anything off.
+    #[inline]
+    pub(crate) fn log_uncut(&self, range: &RateRange) -> (f64, Option<(f64, f64)>) {
         let (a, b) = (self.response, self.correlation);
         if a * range.high * range.high < SILENT {
-            return self.log_given_rate(range.middle());
+            return (self.log_given_rate(range.middle()), None);
         }
         let root = a.sqrt();
         let best = b / a;
-        let (from, to) = ((range.low - best) * root, (range.high - best) * root);
-        let inside = if from < -UNCUT && to > UNCUT {
-            0.0
-        } else {
-            log_interval(from, to)
-        };
-        -0.5 * (self.energy - b * best) + LN_SQRT_2PI - root.ln() - (range.high - range.low).ln() + inside
-            - self.log_noise
+        let log =
+            -0.5 * (self.energy - b * best) + LN_SQRT_2PI - root.ln() - (range.high - range.low).ln() - self.log_noise;
+        (log, ends((range.low - best) * root, (range.high - best) * root))
     }
 
     /// Mean and variance of the rate given the position: `N(B/A, 1/A)` cut to the range.
@@ -210,27 +214,66 @@ pub(crate) fn cut_normal(mean: f64, variance: f64, range: &RateRange) -> (f64, f
     }
 }
 
-/// `ln[Phi((high - mean)/sd) - Phi((low - mean)/sd)]`.
+/// The ends of a range in standard deviations of `N(mean, variance)`, if they cut anything off.
 #[inline]
-pub(crate) fn log_inside(mean: f64, variance: f64, range: &RateRange) -> f64 {
+pub(crate) fn ends_about(mean: f64, variance: f64, range: &RateRange) -> Option<(f64, f64)> {
     let deviation = variance.sqrt();
-    let (from, to) = ((range.low - mean) / deviation, (range.high - mean) / deviation);
-    if from < -UNCUT && to > UNCUT {
-        0.0
-    } else {
-        log_interval(from, to)
+    ends((range.low - mean) / deviation, (range.high - mean) / deviation)
+}
+
+#[inline]
+fn ends(from: f64, to: f64) -> Option<(f64, f64)> {
+    (from >= -UNCUT || to <= UNCUT).then_some((from, to))
+}
+
+/// Intervals whose logarithms are still to be added to numbers of a list: collected, they are computed in one sweep.
+#[derive(Debug, Default)]
+pub(crate) struct Intervals {
+    place: Vec<usize>,
+    from: Vec<f64>,
+    to: Vec<f64>,
+}
+
+impl Intervals {
+    /// Notes that `ln(Phi(to) - Phi(from))` belongs to the number at `place`, if anything is cut off.
+    #[inline]
+    pub(crate) fn push(&mut self, place: usize, cut: Option<(f64, f64)>) {
+        if let Some((from, to)) = cut {
+            self.place.push(place);
+            self.from.push(from);
+            self.to.push(to);
+        }
+    }
+
+    /// Adds what was noted, and forgets it.
+    pub(crate) fn add_to(&mut self, numbers: &mut [f64]) {
+        kernels::log_interval(&mut self.from, &self.to);
+        for (place, log) in self.place.iter().zip(&self.from) {
+            numbers[*place] += log;
+        }
+        self.place.clear();
+        self.from.clear();
+        self.to.clear();
     }
 }
 
 /// `ln p(y | position)` of a single sample with its own rate: equation (13), its distribution functions in the right order.
 pub fn log_sample_marginal(sample: f64, response: f64, noise: f64, range: &RateRange) -> f64 {
+    let (log, cut) = log_sample_uncut(sample, response, noise, range);
+    log + cut.map_or(0.0, |(from, to)| log_interval(from, to))
+}
+
+/// [`log_sample_marginal`] less the logarithm of the standard normal's share between the two numbers.
+#[inline]
+pub(crate) fn log_sample_uncut(sample: f64, response: f64, noise: f64, range: &RateRange) -> (f64, Option<(f64, f64)>) {
     let width = range.high - range.low;
     let reach = response * width / noise;
     let y = sample / noise;
     if reach < 1e-10 {
         // A response far below the noise: the sample is noise about the mean response.
         let d = y - range.middle() * response / noise;
-        return -0.5 * d * d - LN_SQRT_2PI - noise.ln();
+        return (-0.5 * d * d - LN_SQRT_2PI - noise.ln(), None);
     }
-    log_interval(y - range.high * response / noise, y - range.low * response / noise) - reach.ln() - noise.ln()
+    let ends = (y - range.high * response / noise, y - range.low * response / noise);
+    (-(response * width).ln(), Some(ends))
 }

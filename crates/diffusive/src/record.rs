@@ -1,6 +1,6 @@
 //! What one node sampled, tabulated for quick likelihoods.
 
-use crate::rate::{RateRange, RateSums, log_sample_marginal};
+use crate::rate::{Intervals, RateRange, RateSums, log_sample_marginal, log_sample_uncut};
 use crate::{Error, SourceSensor};
 use fewbits_models::diffusion::{ImpulseResponse, Profile};
 use fewbits_numerics::error::positive;
@@ -168,14 +168,36 @@ impl Record {
     }
 
     /// The log likelihood with a new rate for every sample.
-    pub(crate) fn log_sample_wise(&self, position: &Vector2<f64>, range: &RateRange, share: f64) -> f64 {
+    pub(crate) fn log_sample_wise(&self, position: &Vector2<f64>, range: &RateRange) -> f64 {
         let offset = self.node - position;
-        let wider = self.noise / share.sqrt();
         let terms = self
             .samples
             .iter()
             .enumerate()
-            .map(|(j, y)| log_sample_marginal(*y, self.sensor.response(j, &offset), wider, range));
+            .map(|(j, y)| log_sample_marginal(*y, self.sensor.response(j, &offset), self.noise, range));
         terms.sum()
+    }
+
+    /// Adds the same to the numbers at `place` of two lists, to the second with the noise variance raised by `1 / share` but not
+    /// its normalisation; the intervals are noted for later.
+    pub(crate) fn add_sample_wise(
+        &self,
+        position: &Vector2<f64>,
+        range: &RateRange,
+        share: f64,
+        place: usize,
+        [plain, blurred]: [(&mut f64, &mut Intervals); 2],
+    ) {
+        let offset = self.node - position;
+        let wider = self.noise / share.sqrt();
+        for (j, y) in self.samples.iter().enumerate() {
+            let response = self.sensor.response(j, &offset);
+            let (log, cut) = log_sample_uncut(*y, response, self.noise, range);
+            *plain.0 += log;
+            plain.1.push(place, cut);
+            let (log, cut) = log_sample_uncut(*y, response, wider, range);
+            *blurred.0 += log - 0.5 * share.ln();
+            blurred.1.push(place, cut);
+        }
     }
 }

@@ -316,8 +316,31 @@ impl Claims {
         rows: impl IntoIterator<Item = R>,
         key_and_value: impl Fn(R) -> (String, V),
     ) -> Group<'_> {
+        let rows = rows.into_iter().map(key_and_value).collect();
+        self.against_references(quantity, statement, rows, false)
+    }
+
+    /// The same where less is better and the other program is not known to be the best: no row is above its reference by more
+    /// than the tolerance and four combined standard errors.
+    pub fn references_at_most<R, V: Cell>(
+        &mut self,
+        quantity: &str,
+        statement: &str,
+        rows: impl IntoIterator<Item = R>,
+        key_and_value: impl Fn(R) -> (String, V),
+    ) -> Group<'_> {
+        let rows = rows.into_iter().map(key_and_value).collect();
+        self.against_references(quantity, statement, rows, true)
+    }
+
+    fn against_references<V: Cell>(
+        &mut self,
+        quantity: &str,
+        statement: &str,
+        rows: Vec<(String, V)>,
+        one_sided: bool,
+    ) -> Group<'_> {
         let first = self.made.len();
-        let rows: Vec<_> = rows.into_iter().map(key_and_value).collect();
         let known = match reference::group(self.figure, quantity) {
             Ok(known) if !known.is_empty() => known,
             Ok(_) => {
@@ -336,8 +359,14 @@ impl Claims {
             let tolerance = known.tolerance + 4.0 * known.standard_error.unwrap_or(0.0).hypot(own);
             let id = format!("{quantity}/{key}").replace(' ', "-");
             let statement = format!("{statement}, {key}");
-            self.near(id, statement, found.and_then(Cell::number), known.value, tolerance)
-                .at_defaults();
+            let number = found.and_then(Cell::number);
+            if one_sided {
+                let statement = format!("{statement}: no more than the reference {}", known.value);
+                self.at_most(id, statement, number, known.value + tolerance)
+                    .at_defaults();
+            } else {
+                self.near(id, statement, number, known.value, tolerance).at_defaults();
+            }
         }
         Group(&mut self.made[first..])
     }
@@ -385,6 +414,16 @@ impl Cell for f64 {
 impl Cell for Option<f64> {
     fn number(&self) -> Option<f64> {
         *self
+    }
+}
+
+impl Cell for Option<Measured> {
+    fn number(&self) -> Option<f64> {
+        self.map(|m| m.value)
+    }
+
+    fn standard_error(&self) -> Option<f64> {
+        self.and_then(|m| m.standard_error)
     }
 }
 
@@ -563,6 +602,13 @@ mod tests {
         assert_eq!(judge(vec![("other", 1.0), ("lloyd-x", 0.130_486_15)]), Verdict::Pass);
         assert_eq!(judge(vec![("lloyd-x", 0.130_487)]), Verdict::Fail);
         assert_eq!(judge(vec![("other", 0.130_486_15)]), Verdict::Fail);
+        let one_sided = |value: f64| {
+            let mut claims = Claims::about("mi-table4-3");
+            claims.references_at_most("mse", "squared error", [value], |value| ("lloyd-x".to_owned(), Some(value)));
+            let of = |c: Claim| (c.id == "mse/lloyd-x").then_some(c.verdict);
+            claims.judged(true, true).into_iter().find_map(of).unwrap()
+        };
+        assert_eq!((one_sided(0.1), one_sided(0.130_487)), (Verdict::Pass, Verdict::Fail));
         // A group without references is a mistake, not a success.
         assert_eq!(
             verdict(|c| {

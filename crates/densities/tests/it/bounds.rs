@@ -1,9 +1,14 @@
 //! Relations between the error measures, on random laws.
 
+use crate::common::random_mixture;
+use fewbits_core::Gaussian;
 use fewbits_densities::divergence::{
     discrete, kl_chain_corrected, kl_chain_printed, kl_from_dr, kl_from_dr_hoeffding, kl_from_ml, l1_from_dr,
+    log_largest_ratio,
 };
+use fewbits_densities::quadrature::integrated;
 use fewbits_monte_carlo::Stream;
+use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
 
@@ -69,5 +74,51 @@ proptest! {
         let ahead = discrete(&moved_p, &moved_q).unwrap();
         prop_assert!(ahead.dr <= before.dr * (1.0 + 1e-9) + 1e-12);
         prop_assert!(ahead.kl <= before.kl * (1.0 + 1e-9) + 1e-14 && ahead.l1 <= before.l1 * (1.0 + 1e-9) + 1e-14);
+    }
+}
+
+#[test]
+fn the_largest_ratio_of_gaussians_is_what_a_search_finds() {
+    let narrow = Gaussian::new(Vector2::new(0.3, -0.2), Matrix2::new(0.5, 0.1, 0.1, 0.3)).unwrap();
+    let wide = Gaussian::new(Vector2::new(0.0, 0.4), Matrix2::new(1.2, -0.2, -0.2, 0.9)).unwrap();
+    let (p, q) = (narrow.factored().unwrap(), wide.factored().unwrap());
+    let mut most = f64::NEG_INFINITY;
+    for i in -400..=400 {
+        for j in -400..=400 {
+            let x = Vector2::new(f64::from(i) * 0.01, f64::from(j) * 0.01);
+            most = most.max(p.log_pdf(&x) - q.log_pdf(&x));
+        }
+    }
+    let found = log_largest_ratio(&narrow, &wide).unwrap();
+    assert!((found - most).abs() < 1e-3 && found >= most, "{found} {most}");
+    assert_eq!(log_largest_ratio(&wide, &narrow).unwrap(), f64::INFINITY);
+    assert!(log_largest_ratio(&wide, &wide).unwrap() < 1e-9);
+    let moved = Gaussian::new(Vector2::new(5.0, 0.4), *wide.covariance()).unwrap();
+    assert_eq!(log_largest_ratio(&moved, &wide).unwrap(), f64::INFINITY);
+    // Nothing depends on the unit.
+    for unit in [1e-4, 1e4] {
+        let scaled = |g: &Gaussian<2>| Gaussian::new(g.mean() * unit, g.covariance() * (unit * unit)).unwrap();
+        let other = log_largest_ratio(&scaled(&narrow), &scaled(&wide)).unwrap();
+        assert!((other - found).abs() < 1e-9 * found);
+    }
+}
+
+#[test]
+fn relations_hold_between_random_mixtures() {
+    let mut rng = Stream::new(23).rng();
+    for _ in 0..40 {
+        let p = random_mixture::<1, _>(&mut rng, 3, 1.0);
+        let q = random_mixture::<1, _>(&mut rng, 2, 1.0);
+        let d = integrated(&p, &q).unwrap();
+        assert!(d.kl > 0.0 && d.l1 <= 2.0 && d.l1 * d.l1 <= 2.0 * d.kl + 1e-6, "{d:?}");
+        // One Gaussian of the same moments is bounded by the largest of its components' ratios.
+        let whole = p.moment_matched();
+        let bound = p.components().iter().map(|c| {
+            let own = Gaussian::new(*c.mean(), *c.covariance()).unwrap();
+            log_largest_ratio(&own, &whole).unwrap()
+        });
+        let single = fewbits_densities::Mixture::single(&whole).unwrap();
+        let kl = integrated(&p, &single).unwrap().kl;
+        assert!(kl <= bound.fold(0.0, f64::max) + 1e-9);
     }
 }

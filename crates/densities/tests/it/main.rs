@@ -11,4 +11,5 @@ mod laws;
 mod particles;
 mod products;
 mod reduction;
+mod series;
 mod wire;

@@ -1,7 +1,7 @@
 //! Bytes until the threshold is reached.
 
 use super::common::{B, Scheme, Settings, Track, fraction, median, tracks};
-use crate::plot::{Axis, Layer, Panel, Plot};
+use crate::plot::{Axis, Layer, Marker, Panel, Plot};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_diffusive::Form;
 use fewbits_diffusive::message::{SampleCode, Wire};
@@ -137,12 +137,19 @@ impl Figure for Bytes {
             Axis::log("bytes of all messages (median)"),
             Axis::log("error at the end (m, median)"),
         );
-        for row in rows {
-            let place = row
-                .bytes_median
-                .zip(row.final_err_median)
-                .map(|(b, e)| (b.value, e.value));
-            panel = panel.with(Layer::points(row.scheme, place.into_iter().collect()));
+        let markers = [
+            Marker::Circle,
+            Marker::Square,
+            Marker::Triangle,
+            Marker::Diamond,
+            Marker::Cross,
+            Marker::Plus,
+            Marker::Circle,
+            Marker::Square,
+        ];
+        for (row, marker) in rows.iter().zip(markers.into_iter().cycle()) {
+            let place = row.bytes_median.zip(row.final_err_median).map(|(b, e)| (b.value, e));
+            panel = panel.with(Layer::measured(row.scheme, place, |at| at).marked(marker));
         }
         Plot::of(panel)
     }

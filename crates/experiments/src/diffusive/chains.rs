@@ -126,6 +126,7 @@ fn schemes_b_few() -> Vec<Scheme> {
         Scheme::new("lpg-2x5 known rate", B).of(LPG).known(),
         Scheme::new("gaussian known rate", B).of(Form::Gaussian).known(),
         Scheme::new("gaussian-9", B).of(Form::Gaussian),
+        Scheme::new("exact known rate", B).known().up_to(30),
     ]
 }
 
@@ -133,7 +134,6 @@ fn schemes_b() -> Vec<Scheme> {
     let mut all = schemes_b_few();
     all.extend([
         Scheme::new("gmm-4", B).of(Form::Mixture(4)),
-        Scheme::new("exact known rate", B).known().up_to(30),
         Scheme::new("gmm-4 known rate", B).of(Form::Mixture(4)).known(),
         Scheme::new("lpg-1x5 known rate", B)
             .of(Form::Lpg {
@@ -178,26 +178,18 @@ fn nodes(rows: &Rows, key: &str) -> Option<f64> {
 fn references(rows: &Rows, claims: &mut Claims) {
     let summary = || rows.summary.iter();
     claims.references("reach", "share that reaches the threshold", summary(), |r| (r.key(), r.reach));
-    let measured = |m: Option<Measured>| {
-        m.unwrap_or(Measured {
-            value: f64::NAN,
-            standard_error: None,
-        })
-    };
-    claims.references("nodes_median", "median nodes to the threshold", summary(), |r| {
-        (r.key(), measured(r.nodes_median))
-    });
-    claims.references("final_err_median", "median error at the end", summary(), |r| {
-        (r.key(), measured(r.final_err_median))
-    });
+    claims.references("nodes_median", "median nodes to the threshold", summary(), |r| (r.key(), r.nodes_median));
+    claims.references("final_err_median", "median error at the end", summary(), |r| (r.key(), r.final_err_median));
 }
 
 fn calibrated(rows: &Rows, claims: &mut Claims, key: &str) {
     let nees = find(rows, key).and_then(|s| s.nees_median);
     let what = "the exact belief is calibrated: the median squared error is 1.39 covariances";
     claims.near("calibrated", what, nees, 1.386, 0.4).at_full_trials();
+    // A small determinant allows a long thin belief: a metre along it is no error of the belief (errata diffusive-15).
     let wrong = find(rows, key).map(|s| s.converged_wrong.value);
-    claims.at_most("exact-is-right", "no exact belief converges more than a metre off", wrong, 0.0);
+    let what = "at most one in a hundred exact beliefs converges more than a metre off";
+    claims.at_most("exact-is-right", what, wrong, 0.01).at_full_trials();
 }
 
 fn claims_fig3(rows: &Rows, claims: &mut Claims) {
@@ -267,9 +259,17 @@ fn claims_fig7(rows: &Rows, claims: &mut Claims) {
             .at_full_trials();
     }
     let determinant = |scheme| at(scheme, 5).map(|c| c.log10det_med);
-    let what = "log10 det after five nodes, polynomial Gaussians";
+    let what = "after five nodes polynomial Gaussians are as sharp as the other program's (log10 det -3.8) or sharper";
     claims
-        .near("det5/lpg", what, determinant("lpg-2x5 known rate"), -3.8, 1.0)
+        .at_most("det5/lpg", what, determinant("lpg-2x5 known rate"), -3.8)
+        .at_defaults()
+        .at_full_trials();
+    let what = "and no sharper than the exact belief with the rate known";
+    let gap = determinant("lpg-2x5 known rate")
+        .zip(determinant("exact known rate"))
+        .map(|(l, e)| l - e);
+    claims
+        .at_least("det5/honest", what, gap, 0.0)
         .at_defaults()
         .at_full_trials();
     let what = "log10 det after five nodes, one Gaussian";
@@ -283,10 +283,15 @@ fn claims_fig7(rows: &Rows, claims: &mut Claims) {
 fn claims_fig8(rows: &Rows, claims: &mut Claims) {
     references(rows, claims);
     let median = |key: &str| nodes(rows, &format!("{key} 15"));
-    let what = "polynomial Gaussians reach the threshold with about the printed 7 nodes";
+    let what = "polynomial Gaussians reach the threshold with the printed 7 nodes or fewer";
     claims
-        .near("printed-7", what, median("lpg-2x5 known rate"), 7.0, 1.0)
+        .at_most("printed-7", what, median("lpg-2x5 known rate"), 7.0)
         .at_full_trials();
+    let gap = median("lpg-2x5 known rate")
+        .zip(median("exact known rate"))
+        .map(|(l, e)| l - e);
+    let what = "and with no more than one node beyond the exact belief";
+    claims.at_most("lpg-near-exact", what, gap, 1.0).at_full_trials();
     let what = "one Gaussian with the rate carried takes about the printed 20";
     claims
         .near("printed-20", what, median("gaussian-9"), 20.0, 4.0)
@@ -300,11 +305,11 @@ fn claims_fig8(rows: &Rows, claims: &mut Claims) {
             0.0,
         )
         .at_full_trials();
-    let what = "a mixture of 23 numbers is as good as 51 of polynomial Gaussians (errata diffusive-9)";
+    let what = "a mixture of 23 numbers is as good, within a node, as 51 of polynomial Gaussians (errata diffusive-9)";
     let difference = median("gmm-4 known rate")
         .zip(median("lpg-2x5 known rate"))
         .map(|(m, l)| m - l);
-    claims.at_most("mixtures-do", what, difference, 0.0).at_full_trials();
+    claims.at_most("mixtures-do", what, difference, 1.0).at_full_trials();
     let wrong = find(rows, "mode and curvature known rate 15").map(|s| s.wrong.value);
     let what = "mode and curvature report convergence in the wrong place in most searches: never trust a determinant from them";
     claims.at_least("curvature-misleads", what, wrong, 0.5).at_full_trials();
@@ -312,7 +317,14 @@ fn claims_fig8(rows: &Rows, claims: &mut Claims) {
 }
 
 fn claims_wind(rows: &Rows, claims: &mut Claims) {
-    references(rows, claims);
+    let summary = || rows.summary.iter();
+    claims.references("reach", "share that reaches the threshold", summary(), |r| (r.key(), r.reach));
+    // The other program's mixtures are farther from the exact belief (diffusive-kl), and its searches longer.
+    claims
+        .references_at_most("nodes_median", "median nodes to the threshold", summary(), |r| (r.key(), r.nodes_median));
+    claims.references_at_most("final_err_median", "median error at the end", summary(), |r| {
+        (r.key(), r.final_err_median)
+    });
     let reach = |key: &str| find(rows, key).map(|s| s.reach.value);
     for (rule, id) in [
         ("covariance 15", "covariance-first"),
@@ -460,14 +472,31 @@ impl Figure for Chains {
             let (name, range) = (s.name, s.range);
             rows.curves.iter().filter(move |c| c.scheme == name && c.range == range)
         };
-        let (mut errors, mut determinants) = (
-            Panel::new("Error", Axis::linear("nodes"), Axis::log("distance to the source (m)")).without_legend(),
-            Panel::new("Determinant", Axis::linear("nodes"), Axis::linear("log10 det of the covariance (m^4)")),
-        );
         let threshold = schemes[0].example.threshold.log10();
         let last = rows.curves.iter().map(|c| c.step).max().unwrap_or(1) as f64;
-        determinants =
-            determinants.with(Layer::dashed("threshold", vec![(1.0, threshold), (last, threshold)]).coloured(7));
+        let limit = || Layer::dashed("threshold", vec![(1.0, threshold), (last, threshold)]).coloured(7);
+        let determinants = |title: &str, chosen: &dyn Fn(&Scheme) -> bool| {
+            let axis = Axis::linear("log10 det of the covariance (m^4)");
+            let mut panel = Panel::new(title, Axis::linear("nodes"), axis).with(limit());
+            for (i, scheme) in schemes.iter().filter(|s| chosen(s)).enumerate() {
+                let line = points(of(scheme), |c| (c.step as f64, c.log10det_med));
+                panel = panel.with(Layer::line(label(scheme), line).coloured(i));
+            }
+            panel
+        };
+        if schemes.len() > 7 {
+            // Too many lines for one panel.
+            let (unknown, known) = ("Rate unknown", "Rate known");
+            return Plot::grid(
+                2,
+                vec![
+                    determinants(unknown, &|s| !s.known_rate),
+                    determinants(known, &|s| s.known_rate),
+                ],
+            );
+        }
+        let mut errors =
+            Panel::new("Error", Axis::linear("nodes"), Axis::log("distance to the source (m)")).without_legend();
         for (i, scheme) in schemes.iter().enumerate() {
             if i == 0 {
                 let band = of(scheme).map(|c| (c.step as f64, c.err_q10, c.err_q90)).collect();
@@ -475,9 +504,8 @@ impl Figure for Chains {
             }
             errors =
                 errors.with(Layer::line(label(scheme), points(of(scheme), |c| (c.step as f64, c.err_med))).coloured(i));
-            determinants = determinants
-                .with(Layer::line(label(scheme), points(of(scheme), |c| (c.step as f64, c.log10det_med))).coloured(i));
         }
+        let determinants = determinants("Determinant", &|_| true);
         Plot::grid(2, vec![errors, determinants])
     }
 }

@@ -8,6 +8,7 @@ mod envelope;
 mod route;
 mod selection;
 mod table1;
+mod two_phase;
 mod unknowns;
 
 use crate::AnyFigure;

@@ -196,9 +196,15 @@ impl Figure for Table1 {
             .enumerate()
             .map(|(i, m)| (i as f64, format!("{}{}", m.nu1, m.nu2)));
         Plot::of(
-            Panel::new("Mean under the Gaussian", Axis::linear("index nu").named(names), Axis::linear("mean"))
-                .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))
-                .with(Layer::points("by the recursion", bars(|m| Some(m.mean))).coloured(0)),
+            Panel::new(
+                "Mean under the Gaussian",
+                Axis::linear("index nu")
+                    .named(names)
+                    .between(-0.7, rows.means.len() as f64 - 0.3),
+                Axis::linear("mean"),
+            )
+            .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))
+            .with(Layer::points("by the recursion", bars(|m| Some(m.mean))).coloured(0)),
         )
     }
 }

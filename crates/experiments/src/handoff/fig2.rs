@@ -113,6 +113,13 @@ impl Figure for Fig2 {
         claims
             .below("reverse", what, at(rows, 0.97, 10).map(|r| r.kl_total_reverse), 0.1)
             .at_defaults();
+        let both = |ratio: f64| {
+            let (step, total) = (kl_centred_normals(1.0, ratio).ok()?, kl_centred_normals(1.0, ratio.powi(10)).ok()?);
+            Some(step < 1e-3 && total > 0.1)
+        };
+        let what = "both printed statements hold between the ratios 0.96919 and 0.97179 and nowhere near them";
+        let ends = [(0.9691, false), (0.9692, true), (0.9717, true), (0.9719, false)];
+        claims.all("window", what, ends, |(ratio, holds)| both(ratio) == Some(holds));
         for ratio in p.ratio.iter().filter(|r| **r < 1.0) {
             let gaps = rows
                 .iter()

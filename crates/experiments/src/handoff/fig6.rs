@@ -1,8 +1,8 @@
 //! Figures 6(a) and 6(b): what the losses of all hand-overs say about the error at the end.
 
-use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, paper_cut, prior, world};
+use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, paper_cut, prior, world};
 use super::world::Walk;
-use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
 use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
 use fewbits_handoff::{Accounting, Amplification, StepError};
 use fewbits_monte_carlo::{Moments, Trial};
@@ -33,6 +33,8 @@ pub struct Rows {
     bounds: Vec<Bound>,
     /// Plug-in errors of a hand-over, averaged over worlds and time.
     steps: Vec<Step>,
+    /// Bounds in the same worlds with five components, beside ten.
+    five: Vec<Bound>,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -46,15 +48,13 @@ struct Bound {
     /// Twice the sum of mean DR errors: never worse.
     ml_from_dr: f64,
     /// Decimal logarithm of the printed KL bound with mean errors (KL-optimised).
-    log10_kl_printed: f64,
+    log10_kl_printed: Measured,
     /// Of its median over worlds.
     log10_kl_median: f64,
-    /// Mean of its decimal logarithm over the worlds whose estimate of the KL is positive (none need be: it is a cubature).
-    log10_kl_mean: Measured,
     /// Decimal logarithm of the corrected KL bound with mean errors.
     log10_kl_corrected: f64,
     /// Decimal logarithm of the printed L1 bound with mean errors (L1-optimised).
-    log10_l1_printed: f64,
+    log10_l1_printed: Measured,
     /// Mean of `2 tanh(sum DR/2)`, a bound of the L1 for every data sequence (ML-optimised).
     l1_from_dr: Measured,
     /// Mean of `phi(2 sum DR)`, a bound of the KL for every data sequence (ML-optimised).
@@ -100,7 +100,7 @@ pub static FIG6B: Fig6 = Fig6 {
 type Run = [Vec<(StepError, usize)>; 3];
 
 impl Fig6 {
-    fn trial(&self, smoothing: Smoothing, trial: Trial) -> Result<Run, Error> {
+    fn trial(components: usize, smoothing: Smoothing, trial: Trial) -> Result<Run, Error> {
         let world = world(trial.stream)?;
         let filter = smoothing.filter(PARTICLES)?;
         let mut run = Run::default();
@@ -109,8 +109,9 @@ impl Fig6 {
             let mut known = prior()?;
             for reading in &world.readings {
                 let (particles, _) = filter.posterior(&mut rng, &known, &Walk, reading)?;
-                let (sent, error) = paper_cut(&filter.estimate(&particles)?, c, self.components)?;
-                steps.push((error, sent.len()));
+                let estimate = estimate(&filter, &particles)?;
+                let sent = paper_cut(&estimate, c, components)?;
+                steps.push((StepError::plug_in(&estimate, &sent), sent.len()));
                 known = sent;
             }
         }
@@ -118,30 +119,14 @@ impl Fig6 {
     }
 
     fn rows(smoothing: Smoothing, runs: &[Run]) -> (Vec<Bound>, Vec<Step>) {
-        let mean = |c: usize, k: usize, of: fn(&StepError) -> f64| -> f64 {
-            runs.iter().map(|run| of(&run[c][k].0)).collect::<Moments>().mean()
-        };
-        let typical: Vec<Vec<StepError>> = (0..3)
-            .map(|c| {
-                (0..STEPS)
-                    .map(|k| StepError {
-                        ml: mean(c, k, |e| e.ml),
-                        dr: mean(c, k, |e| e.dr),
-                        kl: mean(c, k, |e| e.kl),
-                        l1: mean(c, k, |e| e.l1),
-                    })
-                    .collect()
-            })
-            .collect();
+        let sums = Sums::of(runs);
+        let typical = [0, 1, 2].map(|c| sums.mean(c));
         let bounds = (1..=STEPS).map(|t| {
-            let account = |steps: &[StepError]| {
-                steps[..t]
-                    .iter()
-                    .copied()
-                    .collect::<Accounting>()
-                    .bounds(Amplification::Ml)
+            let [ml, kl] = [0, 1].map(|c| account(&typical[c], t));
+            let jackknifed = |c: usize, log: fn(&fewbits_handoff::Bounds) -> f64| Measured {
+                value: log(&account(&typical[c], t)) / LN_10,
+                standard_error: sums.jackknife(runs, c, |steps| log(&account(steps, t)) / LN_10),
             };
-            let [ml, kl, l1] = [0, 1, 2].map(|c| account(&typical[c]));
             let own = |c: usize| -> Vec<_> {
                 let of = |run: &Run| {
                     run[c][..t]
@@ -154,6 +139,7 @@ impl Fig6 {
             };
             let (own_ml, own_kl) = (own(0), own(1));
             let moments = |values: &mut dyn Iterator<Item = f64>| Measured::mean(&values.collect::<Moments>());
+            // An estimate of a KL may be zero, its logarithm -inf: the median does not mind.
             let mut logs: Vec<f64> = own_kl.iter().map(|b| b.ln_kl_printed / LN_10).collect();
             logs.sort_by(f64::total_cmp);
             Bound {
@@ -161,11 +147,10 @@ impl Fig6 {
                 t,
                 ml_printed: moments(&mut own_ml.iter().map(|b| b.ml_printed)),
                 ml_from_dr: ml.ml_from_dr,
-                log10_kl_printed: kl.ln_kl_printed / LN_10,
+                log10_kl_printed: jackknifed(1, |b| b.ln_kl_printed),
                 log10_kl_median: logs[logs.len() / 2],
-                log10_kl_mean: moments(&mut logs.iter().copied().filter(|log| log.is_finite())),
                 log10_kl_corrected: kl.ln_kl_corrected / LN_10,
-                log10_l1_printed: l1.ln_l1_printed / LN_10,
+                log10_l1_printed: jackknifed(2, |b| b.ln_l1_printed),
                 l1_from_dr: moments(&mut own_ml.iter().map(|b| b.l1_from_dr)),
                 kl_from_dr: moments(&mut own_ml.iter().map(|b| b.kl_from_dr)),
             }
@@ -187,6 +172,66 @@ impl Fig6 {
             }
         });
         (bounds.collect(), steps.collect())
+    }
+}
+
+/// Bounds after `t` hand-overs.
+fn account(steps: &[StepError], t: usize) -> fewbits_handoff::Bounds {
+    let first = steps[..t].iter().copied();
+    first.collect::<Accounting>().bounds(Amplification::Ml)
+}
+
+/// Sums over all worlds of every hand-over's errors, by criterion: `[ml, dr, kl, l1]` each.
+struct Sums {
+    totals: [Vec<[f64; 4]>; 3],
+    worlds: f64,
+}
+
+fn parts(e: &StepError) -> [f64; 4] {
+    [e.ml, e.dr, e.kl, e.l1]
+}
+
+fn step_error([ml, dr, kl, l1]: [f64; 4]) -> StepError {
+    StepError { ml, dr, kl, l1 }
+}
+
+impl Sums {
+    fn of(runs: &[Run]) -> Self {
+        let mut totals = [0, 1, 2].map(|_| vec![[0.0; 4]; STEPS]);
+        for run in runs {
+            for (totals, steps) in totals.iter_mut().zip(run) {
+                for (total, (error, _)) in totals.iter_mut().zip(steps) {
+                    total.iter_mut().zip(parts(error)).for_each(|(t, x)| *t += x);
+                }
+            }
+        }
+        Self {
+            totals,
+            worlds: runs.len() as f64,
+        }
+    }
+
+    /// Mean errors of every hand-over under a criterion.
+    fn mean(&self, c: usize) -> Vec<StepError> {
+        let mean = |total: &[f64; 4]| step_error(total.map(|x| x / self.worlds));
+        self.totals[c].iter().map(mean).collect()
+    }
+
+    /// Standard error of a function of the mean errors, by leaving out one world at a time.
+    fn jackknife(&self, runs: &[Run], c: usize, of: impl Fn(&[StepError]) -> f64) -> Option<f64> {
+        if runs.len() < 2 {
+            return None;
+        }
+        let without = |run: &Run| {
+            let left = self.totals[c].iter().zip(&run[c]).map(|(total, (error, _))| {
+                let own = parts(error);
+                step_error(std::array::from_fn(|k| ((total[k] - own[k]) / (self.worlds - 1.0)).max(0.0)))
+            });
+            of(&left.collect::<Vec<_>>())
+        };
+        let values: Moments = runs.iter().map(without).collect();
+        let error = (self.worlds - 1.0) * values.standard_error();
+        error.is_finite().then_some(error)
     }
 }
 
@@ -236,15 +281,21 @@ impl Figure for Fig6 {
         let mut rows = Rows {
             bounds: Vec::new(),
             steps: Vec::new(),
+            five: Vec::new(),
         };
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
             let stream = context.stream("handoff-fig6").named(smoothing.name());
-            let runs = context
-                .monte_carlo(stream, p.trials)
-                .run(|trial| self.trial(smoothing, trial))?;
-            let (bounds, steps) = Self::rows(smoothing, &runs);
+            let runs = |components| {
+                context
+                    .monte_carlo(stream, p.trials)
+                    .run(|trial| Self::trial(components, smoothing, trial))
+            };
+            let (bounds, steps) = Self::rows(smoothing, &runs(self.components)?);
             rows.bounds.extend(bounds);
             rows.steps.extend(steps);
+            if self.components > 5 {
+                rows.five.extend(Self::rows(smoothing, &runs(5)?).0);
+            }
         }
         Ok(rows)
     }
@@ -296,9 +347,10 @@ impl Figure for Fig6 {
                 .at_full_trials();
             let what = "at time 1 the KL bound is the smallest and the ML bound the largest";
             claims.all(format!("{name}-first"), what, under.first(), |b| {
-                b.log10_kl_printed < b.log10_l1_printed && b.log10_l1_printed < b.ml_printed.value.log10()
+                b.log10_kl_printed.value < b.log10_l1_printed.value
+                    && b.log10_l1_printed.value < b.ml_printed.value.log10()
             });
-            let logarithms: [fn(&Bound) -> f64; 2] = [|b| b.log10_kl_printed, |b| b.log10_l1_printed];
+            let logarithms: [fn(&Bound) -> f64; 2] = [|b| b.log10_kl_printed.value, |b| b.log10_l1_printed.value];
             for (measure, log) in ["kl", "l1"].into_iter().zip(logarithms) {
                 let increments: Vec<f64> = under.windows(2).map(|w| log(w[1]) - log(w[0])).collect();
                 let what = format!("the {measure} bound grows by a factor at every step: exponentially");
@@ -306,8 +358,8 @@ impl Figure for Fig6 {
             }
             let slope =
                 |log: fn(&Bound) -> f64| Some((log(under.last()?) - log(under.first()?)) / (under.len() as f64 - 1.0));
-            let gap = slope(|b| b.log10_kl_printed)
-                .zip(slope(|b| b.log10_l1_printed))
+            let gap = slope(|b| b.log10_kl_printed.value)
+                .zip(slope(|b| b.log10_l1_printed.value))
                 .map(|(kl, l1)| kl - l1);
             claims
                 .below(format!("{name}-slopes"), "the KL bound grows more slowly than the L1 bound", gap, 0.0)
@@ -315,37 +367,56 @@ impl Figure for Fig6 {
             let what = "the DR bound of the ML is never above the printed one, and the corrected KL bound never below";
             claims.all(format!("{name}-tight"), what, &under, |b| {
                 b.ml_from_dr <= b.ml_printed.value
-                    && b.log10_kl_corrected >= b.log10_kl_printed
+                    && b.log10_kl_corrected >= b.log10_kl_printed.value
                     && b.l1_from_dr.value <= 2.0
             });
+        }
+        if !rows.five.is_empty() {
+            let what = "in the same worlds every bound is smaller with ten components than with five, at every time";
+            claims
+                .all("ten-below-five", what, rows.bounds.iter().zip(&rows.five), |(ten, five)| {
+                    ten.ml_printed.value < five.ml_printed.value
+                        && ten.log10_kl_printed.value < five.log10_kl_printed.value
+                        && ten.log10_kl_corrected < five.log10_kl_corrected
+                        && ten.log10_l1_printed.value < five.log10_l1_printed.value
+                        && ten.kl_from_dr.value < five.kl_from_dr.value
+                        && ten.l1_from_dr.value < five.l1_from_dr.value
+                })
+                .at_full_trials();
         }
         let preset = rows.under(Smoothing::Preset);
         let (kl, l1) = if self.components == 5 { (4.0, 2.0) } else { (7.0, 3.0) };
         let what = "the KL bound is below the ML bound up to this time";
         claims
-            .near("kl-useful", what, useful(&preset, |b| b.log10_kl_printed), kl, 1.0)
+            .near("kl-useful", what, useful(&preset, |b| b.log10_kl_printed.value), kl, 1.0)
             .at_full_trials();
         let what = "the L1 bound is below the ML bound up to this time";
         claims
-            .near("l1-useful", what, useful(&preset, |b| b.log10_l1_printed), l1, 1.0)
+            .near("l1-useful", what, useful(&preset, |b| b.log10_l1_printed.value), l1, 1.0)
             .at_full_trials();
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let panel = |smoothing: Smoothing| {
             let under = rows.under(smoothing);
-            let of = |log: fn(&Bound) -> f64| points(&under, |b| (b.t as f64, 10.0_f64.powf(log(b)).min(1e8)));
+            let of = |log: fn(&Bound) -> f64| {
+                points(under.iter().filter(|b| log(b) < 6.0), |b| (b.t as f64, 10.0_f64.powf(log(b))))
+            };
             Panel::new(
                 format!("{} bandwidth", smoothing.name()),
                 Axis::linear("hand-overs t"),
-                Axis::log("bound on the error"),
+                Axis::log("bound (KL in nats)").between(1e-2, 1e6),
             )
             .with(Layer::line("ML, printed", points(&under, |b| (b.t as f64, b.ml_printed.value))))
-            .with(Layer::line("KL, printed / nat", of(|b| b.log10_kl_printed)))
+            .with(Layer::line("KL, printed / nat", of(|b| b.log10_kl_printed.value)))
             .with(Layer::dashed("KL, corrected / nat", of(|b| b.log10_kl_corrected)))
-            .with(Layer::line("L1, printed", of(|b| b.log10_l1_printed)))
+            .with(Layer::line("L1, printed", of(|b| b.log10_l1_printed.value)))
             .with(Layer::measured("KL from DR / nat", &under, |b| (b.t as f64, b.kl_from_dr)))
-            .with(Layer::measured("L1 from DR", &under, |b| (b.t as f64, b.l1_from_dr)))
+            .with(
+                Layer::measured("L1 from DR", &under, |b| (b.t as f64, b.l1_from_dr))
+                    .coloured(6)
+                    .marked(Marker::Triangle),
+            )
         };
         Plot::grid(2, vec![panel(Smoothing::Preset), panel(Smoothing::Silverman)])
     }

@@ -6,7 +6,7 @@ use fewbits_core::Gaussian;
 use fewbits_densities::{
     Bandwidth, Component, Criterion, KernelEstimate, Mixture, PaperReductions, Particles, Reduction, SampleSize, cut,
 };
-use fewbits_handoff::{HandoffFilter, StepError, Whole};
+use fewbits_handoff::{HandoffFilter, Whole, trimmed};
 use fewbits_monte_carlo::Stream;
 use nalgebra::SMatrix;
 use rand::Rng;
@@ -58,6 +58,12 @@ impl Smoothing {
     }
 }
 
+/// The estimate of Figure 6. Its bandwidth counts the particles that were kept, as the other program's does by the evidence of its
+/// numbers (errata `handoff-13`); [`HandoffFilter::estimate`] counts all.
+pub(super) fn estimate(filter: &HandoffFilter<Whole>, particles: &Particles<2>) -> Result<KernelEstimate<2>, Error> {
+    Ok(KernelEstimate::fit(trimmed(particles, filter.trim)?, &filter.bandwidth)?)
+}
+
 /// What all filters know at time 0.
 pub(super) fn prior() -> Result<Mixture<2>, Error> {
     let gaussian = Gaussian::new(Point::zeros(), SMatrix::identity() * (START * START))?;
@@ -69,16 +75,14 @@ pub(super) fn world(stream: Stream) -> Result<World, Error> {
     World::draw(&mut stream.named("world").rng(), SENSORS, STEPS, VARIANCE)
 }
 
-/// The KD-tree cut of an estimate under one of the paper's criteria, and its plug-in errors.
+/// The KD-tree cut of an estimate under one of the paper's criteria.
 pub(super) fn paper_cut(
     estimate: &KernelEstimate<2>,
     criterion: usize,
     components: usize,
-) -> Result<(Mixture<2>, StepError), Error> {
+) -> Result<Mixture<2>, Error> {
     let reductions = PaperReductions::new(estimate)?;
-    let sent = cut::greedy(&reductions.tree, &reductions.errors[criterion], components)?.mixture(&reductions.tree)?;
-    let error = StepError::plug_in(estimate, &sent);
-    Ok((sent, error))
+    Ok(cut::greedy(&reductions.tree, &reductions.errors[criterion], components)?.mixture(&reductions.tree)?)
 }
 
 /// The paper's criteria in the order of [`paper_cut`].

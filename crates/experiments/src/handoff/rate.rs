@@ -158,7 +158,7 @@ impl Figure for Rate {
             let resolution = r.resolution.map_or(String::new(), |r| format!("-r{r}"));
             format!("{}-{}{resolution}", r.message, r.size)
         };
-        claims.references("bits", "length", rows, |r| (key(r), r.bits.value));
+        claims.references("bits", "length", rows, |r| (key(r), r.bits));
         claims.references("kl", "KL", rows, |r| (key(r), r.kl));
         let share = find(rows, "coded", 5, Some(0.25))
             .zip(find(rows, "f32", 5, None))

@@ -216,7 +216,8 @@ impl Air {
         let first = if minus >= 0.0 {
             g * erfcx(minus)
         } else {
-            lag.exp() * libm::erfc(minus)
+            // erfc(-x) = 2 - erfc(x).
+            2.0 * lag.exp() - g * erfcx(-minus)
         };
         let second = g * erfcx(plus);
         let sum = prefactor * (first + second);

@@ -67,7 +67,12 @@ pub fn log_pdf_with(x: f64, mean: f64, variance: f64) -> f64 {
 ///
 /// Positive and decreasing; `+inf` below `x = -26.62`, `~ 1/(x sqrt(pi))` for large `x`. NaN in, NaN out.
 pub fn erfcx(x: f64) -> f64 {
-    scalar::erfcx(x)
+    // The same bits as the branch-free form; what that would discard is not computed.
+    if x >= 0.0 {
+        2.0 * scaled_tail(std::f64::consts::SQRT_2 * x)
+    } else {
+        scalar::erfcx(x)
+    }
 }
 
 /// Distribution function `Phi(x)`, within six units in the last place, the left tail included. The right tail is `cdf(-x)`.

@@ -75,6 +75,11 @@ fn poisson_disk_keeps_its_distance_and_fills_the_field() {
     // Maximal random packings stop at 0.547 of the area covered by half-distance disks; 30 candidates leave a few gaps.
     let covered = field.len() as f64 * std::f64::consts::PI * 1.5 * 1.5 / 2400.0;
     assert!((0.45..0.6).contains(&covered), "{covered}");
+    // What decides: hardly a place is left where another node would keep its distance.
+    let places = (0..240).flat_map(|i| (0..160).map(move |j| Vector2::new(i as f64 * 0.25, -10.0 + j as f64 * 0.25)));
+    let free = |p: &Vector2<f64>| field.positions().iter().all(|q| (p - q).norm() >= 3.0);
+    let share = places.filter(free).count() as f64 / (240.0 * 160.0);
+    assert!(share < 0.02, "{share}");
 }
 
 #[test]
