@@ -15,7 +15,7 @@
 //! | [`cdf`], [`log_cdf`], [`erfcx`] | in place | 6 |
 //! | [`inverse_mills`] | in place | 8 |
 //! | [`interval`], [`log_interval`] | in place of the lower edges | 10, 8 |
-//! | [`sum`], [`dot`], [`largest`], [`log_sum_exp`] | a number | as a sum in eight lanes |
+//! | [`sum`], [`dot`], [`largest`], [`largest_number`], [`log_sum_exp`] | a number | as a sum in eight lanes |
 //! | [`StandardNormals`], [`fill_standard_normals`] | independent draws, exact in law | |
 //! | [`exp_minus`] | weights from log weights, with their sum and sum of squares | 1 each |
 //!
@@ -44,14 +44,14 @@ mod reduce;
 pub(crate) mod tail;
 
 pub use normals::{StandardNormals, fill_standard_normals};
-pub use reduce::{ExpSums, dot, exp_minus, largest, log_sum_exp, sum, weighted_covariance};
+pub use reduce::{ExpSums, dot, exp_minus, largest, largest_number, log_sum_exp, sum, weighted_covariance};
 
 use pulp::Arch;
 
 /// The functions of the slices one element at a time: no branches, no calls, always inlined. For loops under [`vectorised`];
 /// elsewhere [`normal`](crate::normal) has the same functions under the same names.
 pub mod scalar {
-    pub use super::cell::{interval, log_interval};
+    pub use super::cell::{WIDE, interval, interval_wide, log_interval, log_interval_wide};
     pub use super::elementary::{exp, ln};
     pub use super::tail::{cdf, erfcx, inverse_mills, log_cdf, pdf};
 }
