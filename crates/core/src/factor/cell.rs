@@ -8,7 +8,7 @@ use crate::gaussian::Gaussian;
 use crate::observation::Link;
 use crate::sign::Sign;
 use fewbits_numerics::error::{ArgumentError, positive};
-use fewbits_numerics::kernels::{self, scalar, vectorised};
+use fewbits_numerics::kernels::{self, scalar};
 use fewbits_numerics::normal;
 use nalgebra::SVector;
 #[cfg(feature = "serde")]
@@ -189,19 +189,6 @@ impl InCell {
     }
 }
 
-/// `p = of(a, b)`, where `(a, b)` are the edges of the cell seen from each mean in deviations of the noise.
-#[inline(always)]
-fn each(out: &mut [f64], means: &[f64], (lower, upper, scale): (f64, f64, f64), of: impl Fn(f64, f64) -> f64) {
-    vectorised(
-        #[inline(always)]
-        || {
-            for (p, m) in out.iter_mut().zip(means) {
-                *p = of((lower - m) * scale, (upper - m) * scale);
-            }
-        },
-    );
-}
-
 impl Factor<1> for InCell {
     #[inline]
     fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
@@ -222,7 +209,7 @@ impl Factor<1> for InCell {
             None
         };
         let wide = (upper - lower) * scale >= scalar::WIDE;
-        let mut buffer = [0.0; BLOCK];
+        let (mut buffer, mut upper_edges) = ([0.0; BLOCK], [0.0; BLOCK]);
         for (log_weights, means) in log_weights.chunks_mut(BLOCK).zip(means[0].chunks(BLOCK)) {
             let buffer = &mut buffer[..means.len().min(log_weights.len())];
             if let Some((edge, scale)) = cut {
@@ -232,12 +219,15 @@ impl Factor<1> for InCell {
                     false => kernels::log_cdf(buffer),
                 }
             } else {
-                let edges = (lower, upper, scale);
+                let upper_edges = &mut upper_edges[..means.len()];
+                for ((low, high), m) in buffer.iter_mut().zip(&mut *upper_edges).zip(means) {
+                    (*low, *high) = ((lower - m) * scale, (upper - m) * scale);
+                }
                 match (floor > 0.0, wide) {
-                    (true, false) => each(buffer, means, edges, scalar::interval),
-                    (true, true) => each(buffer, means, edges, scalar::interval_wide),
-                    (false, false) => each(buffer, means, edges, scalar::log_interval),
-                    (false, true) => each(buffer, means, edges, scalar::log_interval_wide),
+                    (true, false) => kernels::interval(buffer, upper_edges),
+                    (true, true) => kernels::interval_wide(buffer, upper_edges),
+                    (false, false) => kernels::log_interval(buffer, upper_edges),
+                    (false, true) => kernels::log_interval_wide(buffer, upper_edges),
                 }
             }
             if floor > 0.0 {
