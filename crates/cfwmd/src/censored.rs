@@ -3,10 +3,12 @@
 use crate::Error;
 use crate::ellipsoid::{EllipsoidMoments, GaussianInEllipsoid};
 use crate::rule::CensoringRule;
+use fewbits_core::columns::state_at;
 use fewbits_core::factor::{Constant, InCell, Partition, Repeated, Scalar, Value};
 use fewbits_core::number::Levels;
 use fewbits_core::{Cell, Columns, Factor, Gaussian, Link, Tilted};
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{Cholesky, SMatrix, SVector};
 
@@ -90,6 +92,16 @@ impl<const M: usize> Factor<M> for EllipsoidSilence<M> {
         }
     }
 
+    fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        add_mixed(self.loss, (1.0 - self.loss).ln(), log_weights, |from, logs| {
+            for (i, log) in logs.iter_mut().enumerate() {
+                *log += self
+                    .inside
+                    .log_probability(&(state_at(means, from + i) - self.prediction));
+            }
+        });
+    }
+
     /// With `nu = m + n - prediction` of covariance `S = V + R` and moments `E`, `C` given silence, `K = V S^-1`:
     /// mean `mu + K (E - E0 nu)`, covariance `(I - K) V (I - K)' + K R K' + K C K'`.
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, fewbits_core::Error> {
@@ -105,6 +117,27 @@ impl<const M: usize> Factor<M> for EllipsoidSilence<M> {
             mean: prior.mean() + gain * (after.mean - mu),
             covariance: keep * spread * keep.transpose() + gain * (self.noise + after.covariance) * gain.transpose(),
         })
+    }
+}
+
+/// Adds `ln(floor + exp(log_share + log_p))` to the log weights, block by block: `add(from, logs)` adds `log_p` of the elements
+/// that begin at `from`.
+pub(crate) fn add_mixed(floor: f64, log_share: f64, log_weights: &mut [f64], add: impl Fn(usize, &mut [f64])) {
+    const BLOCK: usize = 128;
+    let mut logs = [0.0; BLOCK];
+    for (from, log_weights) in (0..).step_by(BLOCK).zip(log_weights.chunks_mut(BLOCK)) {
+        let logs = &mut logs[..log_weights.len()];
+        logs.fill(log_share);
+        add(from, logs);
+        if floor > 0.0 {
+            kernels::exp(logs);
+            logs.iter_mut().for_each(|p| *p += floor);
+            kernels::ln(logs);
+        }
+        log_weights
+            .iter_mut()
+            .zip(logs)
+            .for_each(|(weight, log)| *weight += *log);
     }
 }
 

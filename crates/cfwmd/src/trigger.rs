@@ -1,6 +1,7 @@
 //! A random trigger that keeps the belief Gaussian.
 
 use crate::Error;
+use crate::censored::add_mixed;
 use fewbits_core::factor::{Tilted, Value};
 use fewbits_core::{Columns, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
 use fewbits_numerics::ArgumentError;
@@ -103,9 +104,10 @@ impl Factor<1> for Bump {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
-        for (log_weight, m) in log_weights.iter_mut().zip(means[0]) {
-            *log_weight += self.log_likelihood(&[*m].into());
-        }
+        add_mixed(self.floor, self.log_share, log_weights, |from, logs| {
+            self.value
+                .add_log_likelihoods(&[&means[0][from..from + logs.len()]], logs);
+        });
     }
 
     /// The mixture of the prior, by the weight of the floor, and of the Kalman update.

@@ -1,7 +1,7 @@
 //! The Gaussian belief.
 
 use crate::belief::{Belief, Density};
-use crate::columns::{Columns, ColumnsMut, count, set_state, state_at};
+use crate::columns::{Columns, ColumnsMut, count, set_state};
 use fewbits_numerics::error::{self, ArgumentError};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
@@ -52,6 +52,12 @@ impl<const D: usize> Gaussian<D> {
             mean,
             covariance: symmetrised(&covariance),
         }
+    }
+
+    /// The same for a covariance that is symmetric to the last bit, as [`fewbits_numerics::linalg::congruence`] makes it.
+    #[inline]
+    pub fn from_symmetric_parts(mean: SVector<f64, D>, covariance: SMatrix<f64, D, D>) -> Self {
+        Self { mean, covariance }
     }
 
     /// A state that is known exactly: zero covariance.
@@ -255,6 +261,37 @@ impl<const D: usize> FactoredGaussian<D> {
     }
 }
 
+impl<const D: usize> FactoredGaussian<D> {
+    /// Adds `ln N(x; mean, covariance)` of every state to `logs`: blocks of columns through the forward substitution.
+    pub(crate) fn add_log_pdfs(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
+        const BLOCK: usize = 64;
+        let (mut white, mut square) = ([[0.0; BLOCK]; D], [0.0; BLOCK]);
+        for (start, logs) in (0..).step_by(BLOCK).zip(logs.chunks_mut(BLOCK)) {
+            let count = logs.len();
+            square.fill(0.0);
+            for i in 0..D {
+                let (solved, rest) = white.split_at_mut(i);
+                let Some(row) = rest.first_mut() else { break };
+                for (x, state) in row.iter_mut().zip(&states[i][start..start + count]) {
+                    *x = state - self.gaussian.mean[i];
+                }
+                for (j, solved) in solved.iter().enumerate() {
+                    let factor = self.lower[(i, j)];
+                    row.iter_mut().zip(solved).for_each(|(x, y)| *x -= factor * y);
+                }
+                let scale = self.lower[(i, i)];
+                for (x, square) in row.iter_mut().zip(&mut square) {
+                    *x /= scale;
+                    *square += *x * *x;
+                }
+            }
+            logs.iter_mut()
+                .zip(&square)
+                .for_each(|(log, q)| *log += self.log_peak - 0.5 * q);
+        }
+    }
+}
+
 impl<const D: usize> Belief<D> for FactoredGaussian<D> {
     fn mean(&self) -> SVector<f64, D> {
         self.gaussian.mean
@@ -275,8 +312,6 @@ impl<const D: usize> Density<D> for FactoredGaussian<D> {
     }
 
     fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
-        for (i, log) in logs.iter_mut().enumerate() {
-            *log += self.log_pdf(&state_at(states, i));
-        }
+        self.add_log_pdfs(states, logs);
     }
 }

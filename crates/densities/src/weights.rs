@@ -1,7 +1,7 @@
 //! Weights of particles: draws in proportion, rows that travel along, normalisation.
 
 use crate::Error;
-use fewbits_numerics::kernels::{exp_minus, largest, sum};
+use fewbits_numerics::kernels::{exp_minus, largest_number};
 use rand::{Rng, RngExt};
 
 /// Running sums of weights, for draws in proportion to them.
@@ -43,15 +43,15 @@ pub(crate) fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut 
 /// Normalises log weights and writes their exponentials; returns `ln sum exp` and the effective
 /// sample size. On failure `weights` is as it was.
 pub(crate) fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error> {
-    let largest = largest(logs);
-    // Without `+inf`, which `largest` would show, the sum is NaN if and only if a weight is.
-    if !largest.is_finite() || sum(logs).is_nan() {
-        return Err(Error::IMPOSSIBLE);
-    }
+    let largest = largest_number(logs)
+        .filter(|l| l.is_finite())
+        .ok_or(Error::IMPOSSIBLE)?;
     let sums = exp_minus(logs, largest, weights);
     let log_sum = largest + sums.sum.ln();
     let scale = 1.0 / sums.sum;
-    weights.iter_mut().for_each(|w| *w *= scale);
-    logs.iter_mut().for_each(|w| *w -= log_sum);
+    for (log, weight) in logs.iter_mut().zip(weights) {
+        *log -= log_sum;
+        *weight *= scale;
+    }
     Ok((log_sum, sums.sum * sums.sum / sums.sum_of_squares))
 }

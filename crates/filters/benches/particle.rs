@@ -6,13 +6,13 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{AllocProfiler, Bencher, black_box};
-use fewbits_core::factor::Value;
-use fewbits_core::{Dynamics, Gaussian, Likelihood, Observed};
+use fewbits_core::factor::{InCell, Scalar, Value};
+use fewbits_core::{Cell, Dynamics, Gaussian, Likelihood, Link, Observed, Sign};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector2, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
@@ -59,37 +59,58 @@ fn bench_steps<const D: usize>(
     });
 }
 
-/// Scalar autoregression, one draw a particle.
-#[divan::bench]
-fn step_ar1(bencher: Bencher<'_, '_>) {
-    let dynamics = LinearGaussian::from(Ar1::new(0.95, 1.0).unwrap());
-    let observed = Observed::new(LinearSensor::direct(1.0).unwrap(), Value::scalar(0.4, 1.0).unwrap());
+/// Scalar autoregression, one draw a particle, what is observed: a value, a sign bit, one through a link that inverts one in
+/// twenty, one of four cells.
+#[divan::bench(args = ["value", "sign", "noisy sign", "cell"])]
+fn step_ar1(bencher: Bencher<'_, '_>, observed: &str) {
+    let dynamics = Ar1::new(0.95, 1.0).unwrap();
+    let sign = |link| InCell::sign(Sign::Above, 0.4, 1.0, &link).unwrap();
+    let factor: Scalar = match observed {
+        "value" => Value::scalar(0.4, 1.0).unwrap().into(),
+        "sign" => sign(Link::PERFECT).into(),
+        "noisy sign" => sign(Link::flipping(0.05).unwrap()).into(),
+        _ => InCell::certain(Cell::new(0.0, 1.3).unwrap(), 1.0).unwrap().into(),
+    };
+    let observed = Observed::new(LinearSensor::direct(1.0).unwrap(), factor);
     bench_steps(bencher, &dynamics, &observed, Gaussian::scalar(0.0, 4.0).unwrap());
 }
 
-/// Constant velocity in the plane with a process noise of full rank, four draws a particle.
+/// Constant velocity in the plane with a process noise of full rank, four draws a particle, one value.
 #[divan::bench]
 fn step_plane(bencher: Bencher<'_, '_>) {
     let walk = constant_velocity_2d(0.5, 0.1).unwrap();
     let noise = walk.noise_covariance() + Matrix4::identity() * 0.01;
-    let dynamics = LinearGaussian::with_covariance(*walk.transition(), noise).unwrap();
-    plane(bencher, &dynamics);
+    let damped = LinearGaussian::with_covariance(walk.transition() * 0.97, noise).unwrap();
+    let sensor = LinearSensor::scalar(Vector4::new(1.0, 0.0, 1.0, 0.0), 1.0).unwrap();
+    let observed = Observed::new(sensor, Value::scalar(0.4, 1.0).unwrap());
+    bench_steps(bencher, &damped, &observed, standard());
 }
 
 /// The same with one acceleration an axis, two draws a particle.
 #[divan::bench]
 fn step_plane_rank_2(bencher: Bencher<'_, '_>) {
-    plane(bencher, &constant_velocity_2d(0.5, 0.1).unwrap());
-}
-
-fn plane<const U: usize>(bencher: Bencher<'_, '_>, dynamics: &LinearGaussian<4, U>) {
-    // A stationary belief for the whole bench: velocity decays, so that weights stay ordinary.
-    let damped =
-        LinearGaussian::new(dynamics.transition() * 0.97, *dynamics.gain(), *dynamics.noise_variances()).unwrap();
     let sensor = LinearSensor::scalar(Vector4::new(1.0, 0.0, 1.0, 0.0), 1.0).unwrap();
     let observed = Observed::new(sensor, Value::scalar(0.4, 1.0).unwrap());
-    let prior = Gaussian::new(Vector4::zeros(), Matrix4::identity()).unwrap();
-    bench_steps(bencher, &damped, &observed, prior);
+    bench_steps(bencher, &damped(), &observed, standard());
+}
+
+/// The same with two values: both coordinates of the position.
+#[divan::bench]
+fn step_plane_rank_2_two_values(bencher: Bencher<'_, '_>) {
+    let matrix = Matrix2x4::new(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0);
+    let sensor = LinearSensor::new(matrix, Matrix2::identity()).unwrap();
+    let observed = Observed::new(sensor, Value::new(Vector2::new(0.4, -0.3), Matrix2::identity()).unwrap());
+    bench_steps(bencher, &damped(), &observed, standard());
+}
+
+fn standard() -> Gaussian<4> {
+    Gaussian::new(Vector4::zeros(), Matrix4::identity()).unwrap()
+}
+
+/// A stationary belief for the whole bench: velocity decays, so that weights stay ordinary.
+fn damped() -> LinearGaussian<4, 2> {
+    let walk = constant_velocity_2d(0.5, 0.1).unwrap();
+    LinearGaussian::new(walk.transition() * 0.97, *walk.gain(), *walk.noise_variances()).unwrap()
 }
 
 /// Each resampling law alone.

@@ -3,14 +3,14 @@
 use crate::Error;
 use crate::kalman::{self, KalmanInfo};
 use fewbits_core::{Belief, Gaussian, GaussianDynamics, LinearSensing, Sensing};
+use fewbits_numerics::linalg::congruence;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 
 /// Time update about the mean: `f(m)`, `F P F' + Q` with `F` the Jacobian at `m`.
 pub fn predict<const D: usize>(dynamics: &impl GaussianDynamics<D>, belief: &Gaussian<D>) -> Gaussian<D> {
     let jacobian = dynamics.jacobian(belief.mean());
-    let covariance =
-        jacobian * belief.covariance() * jacobian.transpose() + dynamics.noise_covariance_at(belief.mean());
+    let covariance = congruence(&jacobian, belief.covariance()) + dynamics.noise_covariance_at(belief.mean());
     Gaussian::from_trusted_parts(dynamics.mean(belief.mean()), covariance)
 }
 

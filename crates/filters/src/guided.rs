@@ -1,8 +1,10 @@
-//! The optimal proposal of a linear sensor.
+//! Proposals that have seen what was observed: the optimal one for a value, a tilted one for any factor.
 
 use crate::Error;
+use crate::linalg::solve_semidefinite;
 use crate::particle::Proposal;
-use fewbits_core::{LinearDynamics, LinearSensing};
+use fewbits_core::factor::Tilted;
+use fewbits_core::{Belief, Factor, Gaussian, GaussianDynamics, LinearDynamics, LinearSensing, Observed, Sensing};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
@@ -66,5 +68,70 @@ impl<Dyn: LinearDynamics<D>, const D: usize, const M: usize> Proposal<D> for Opt
         let squared = innovation.dot(&self.innovation_factor.solve(&innovation));
         let noise = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
         (mean + self.gain * innovation + self.noise_factor * noise, self.log_normaliser - 0.5 * squared)
+    }
+}
+
+/// Share of draws that [`TiltedProposal`] takes from the dynamics themselves.
+const DEFENCE: f64 = 0.1;
+
+/// A proposal for dynamics with Gaussian noise and any factor: the posterior of the noise-free measurement `m` that
+/// [`Factor::tilted`] finds from each particle, with the rest of the state following as the noise correlates it.
+///
+/// ```text
+/// f = E[x' | x],  m = h(f),  H = h'(f),  V = H Q(x) H',  G = Q H' V^-1
+/// T = N(tilted mean, tilted covariance) of N(m, V) under the factor
+/// y ~ p(x' | x),  u = m + H (y - f)                      the dynamics' own draw
+/// nine times in ten:  v ~ T,  x' = y + G (v - u)         otherwise:  v = u,  x' = y
+/// c = ln p(observed | h(x')) + ln N(v; m, V) - ln(.9 T(v) + .1 N(v; m, V))
+/// ```
+/// The draws from the dynamics bound the weight by ten times the likelihood, however much lighter than the posterior's the tails
+/// of `T` may be. Exact for every sensor: the linearisation shapes the proposal only. `Q` may be singular; where it does not
+/// move `m`, or the factor has no tilted moments, the particle moves by the dynamics alone. For a value through a linear sensor
+/// [`OptimalProposal`] is the better one.
+#[derive(Debug, Clone, Copy)]
+pub struct TiltedProposal<'a, Dyn, S, F, const M: usize> {
+    dynamics: &'a Dyn,
+    observed: &'a Observed<S, F, M>,
+}
+
+impl<'a, Dyn, S, F, const M: usize> TiltedProposal<'a, Dyn, S, F, M> {
+    /// The proposal for what was observed.
+    pub fn new(dynamics: &'a Dyn, observed: &'a Observed<S, F, M>) -> Self {
+        Self { dynamics, observed }
+    }
+}
+
+impl<Dyn, S, F, const D: usize, const M: usize> Proposal<D> for TiltedProposal<'_, Dyn, S, F, M>
+where
+    Dyn: GaussianDynamics<D>,
+    S: Sensing<D, M>,
+    F: Factor<M>,
+{
+    fn propose<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> (SVector<f64, D>, f64) {
+        let Observed { sensing, factor } = self.observed;
+        let weigh = |next: &SVector<f64, D>| factor.log_likelihood(&sensing.mean(next));
+        let own = self.dynamics.propagate(rng, state);
+        let mean = self.dynamics.mean(state);
+        let (matrix, noise) = (sensing.jacobian(&mean), self.dynamics.noise_covariance_at(state));
+        let cross = noise * matrix.transpose();
+        let prior = Gaussian::from_trusted_parts(sensing.mean(&mean), matrix * cross);
+        let gain = solve_semidefinite(prior.covariance(), &cross.transpose()).map(|g| g.transpose());
+        let tilted = factor
+            .tilted(&prior)
+            .ok()
+            .and_then(|Tilted { mean, covariance, .. }| Gaussian::from_trusted_parts(mean, covariance).factored().ok());
+        let (Ok(gain), Ok(prior), Some(tilted)) = (gain, prior.factored(), tilted) else {
+            return (own, weigh(&own));
+        };
+        let reached = prior.mean() + matrix * (own - mean);
+        let (next, measured) = if rng.random::<f64>() < DEFENCE {
+            (own, reached)
+        } else {
+            let drawn = tilted.sample(rng);
+            (own + gain * (drawn - reached), drawn)
+        };
+        let ratio = tilted.log_pdf(&measured) - prior.log_pdf(&measured);
+        let mixed = ratio.max(0.0) + ((1.0 - DEFENCE) * ratio.min(0.0).exp() + DEFENCE * (-ratio.max(0.0)).exp()).ln();
+        (next, weigh(&next) - mixed)
     }
 }

@@ -3,6 +3,7 @@
 use crate::Error;
 use fewbits_core::{Gaussian, LinearDynamics, LinearSensing};
 use fewbits_numerics::error::all_finite;
+use fewbits_numerics::linalg::{congruence, congruence_of, times_transposed};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
 
@@ -26,8 +27,8 @@ pub struct KalmanInfo<const D: usize, const M: usize> {
 #[inline]
 pub fn predict<const D: usize>(dynamics: &impl LinearDynamics<D>, belief: &Gaussian<D>) -> Gaussian<D> {
     let transition = dynamics.transition();
-    let covariance = transition * belief.covariance() * transition.transpose() + dynamics.noise_covariance();
-    Gaussian::from_trusted_parts(transition * belief.mean(), covariance)
+    let covariance = congruence(transition, belief.covariance()) + dynamics.noise_covariance();
+    Gaussian::from_symmetric_parts(transition * belief.mean(), covariance)
 }
 
 /// Measurement update in Joseph form, which keeps the covariance positive semidefinite under rounding.
@@ -51,16 +52,15 @@ pub fn update<const D: usize, const M: usize>(
     all_finite("measurement", measurement.as_slice())?;
     let matrix = sensing.matrix();
     let noise = sensing.noise_covariance();
-    let cross = belief.covariance() * matrix.transpose();
-    let innovation_covariance = matrix * cross + noise;
+    let cross = times_transposed(belief.covariance(), matrix);
+    let innovation_covariance = congruence_of(matrix, &cross) + noise;
     let factor = Cholesky::new(innovation_covariance).ok_or(Error::SingularInnovation)?;
     let gain = factor.solve(&cross.transpose()).transpose();
     let innovation = measurement - matrix * belief.mean();
-    let keep = SMatrix::<f64, D, D>::identity() - gain * matrix;
-    let covariance = keep * belief.covariance() * keep.transpose() + gain * noise * gain.transpose();
-
+    let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
+    let covariance = congruence(&keep, belief.covariance()) + congruence(&gain, noise);
     let squared = innovation.dot(&factor.solve(&innovation));
-    let log_root_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+    let log_root_determinant = log_product(factor.l_dirty().diagonal().as_slice());
     let info = KalmanInfo {
         innovation,
         innovation_covariance,
@@ -68,7 +68,17 @@ pub fn update<const D: usize, const M: usize>(
         log_likelihood: -0.5 * squared - log_root_determinant - M as f64 * LN_SQRT_2PI,
         normalised_innovation_squared: squared / M as f64,
     };
-    Ok((Gaussian::from_trusted_parts(belief.mean() + gain * innovation, covariance), info))
+    Ok((Gaussian::from_symmetric_parts(belief.mean() + gain * innovation, covariance), info))
+}
+
+/// `ln` of a product of positive numbers: one logarithm where the product is within range.
+fn log_product(factors: &[f64]) -> f64 {
+    let product: f64 = factors.iter().product();
+    if product.is_normal() {
+        product.ln()
+    } else {
+        factors.iter().map(|x| x.ln()).sum()
+    }
 }
 
 /// One cycle of the Kalman filter: [`predict`], then [`update`].

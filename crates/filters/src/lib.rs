@@ -54,7 +54,7 @@ mod steady_state;
 pub use closed_loop::{AssumedDensity, ClosedLoop, Filter, LoopState, Slot};
 pub use error::Error;
 pub use fewbits_densities::{GaussianCloud, Grid, Particles, PlaneMass, PointMass};
-pub use guided::OptimalProposal;
+pub use guided::{OptimalProposal, TiltedProposal};
 pub use particle::{ParticleFilter, ParticleInfo, Proposal, Workspace};
 pub use plane::PlaneFilter;
 pub use point_mass::PointMassFilter;

@@ -5,6 +5,7 @@ use fewbits_numerics::kernels::sum;
 use rand::{Rng, RngExt};
 use rand_distr::Open01;
 use serde::{Deserialize, Serialize};
+use std::hint::select_unpredictable;
 
 /// A law that draws `M` ancestors from `N` weighted particles; `M` and `N` are independent.
 ///
@@ -101,7 +102,10 @@ impl Resampling {
 
 /// Sum of the weights and the index of the last positive one.
 fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
-    if let Some(bad) = weights.iter().find(|w| !(**w >= 0.0 && w.is_finite())) {
+    let is_weight = |w: &f64| *w >= 0.0 && *w < f64::INFINITY;
+    // A sweep without an early end runs in vector registers.
+    if !weights.iter().fold(true, |all, w| all & is_weight(w)) {
+        let bad = weights.iter().find(|w| !is_weight(w)).copied().unwrap_or(f64::NAN);
         return Err(ArgumentError::new("weights", bad, "finite weights, 0 or above"));
     }
     let total = sum(weights);
@@ -117,7 +121,6 @@ fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
 /// Each particle writes its index at its first place; one without a place is overwritten by the next. A running maximum then
 /// fills the places between.
 fn systematic(offset: f64, weights: &[f64], per_weight: f64, last: usize, ancestors: &mut [u32]) {
-    let count = ancestors.len();
     ancestors.fill(0);
     let mut cumulative = 0.0;
     let mut first = 0_usize;
@@ -130,8 +133,9 @@ fn systematic(offset: f64, weights: &[f64], per_weight: f64, last: usize, ancest
         first = (cumulative * per_weight + offset) as u32 as usize;
     }
     let mut so_far = 0;
-    for ancestor in &mut ancestors[..count] {
-        so_far = so_far.max(*ancestor);
+    for ancestor in ancestors {
+        // A branch here would be mispredicted wherever weights are uneven.
+        so_far = select_unpredictable(*ancestor > so_far, *ancestor, so_far);
         *ancestor = so_far;
     }
 }

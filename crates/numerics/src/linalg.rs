@@ -1,7 +1,7 @@
 //! What small covariance matrices need beyond nalgebra.
 
 use crate::error::{self, ArgumentError};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{ArrayStorage, SMatrix, SVector};
 
 /// Pivots below this share of the variance of their own coordinate count as zero.
 pub const SEMIDEFINITE_TOLERANCE: f64 = 1e-12;
@@ -11,6 +11,51 @@ pub const SYMMETRY_TOLERANCE: f64 = 1e-9;
 /// `(m + m')/2`.
 pub fn symmetrised<const D: usize>(m: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     (m + m.transpose()) * 0.5
+}
+
+/// `a b'`. Zeros of `b`, of which the matrices of models are full, cost nothing.
+#[inline(always)]
+pub fn times_transposed<const M: usize, const K: usize, const N: usize>(
+    a: &SMatrix<f64, M, K>,
+    b: &SMatrix<f64, N, K>,
+) -> SMatrix<f64, M, N> {
+    let (a, b) = (&a.data.0, &b.data.0);
+    let mut out = [[0.0; M]; N];
+    for j in 0..N {
+        for k in 0..K {
+            let factor = b[k][j];
+            if factor != 0.0 {
+                for i in 0..M {
+                    out[j][i] += a[k][i] * factor;
+                }
+            }
+        }
+    }
+    SMatrix::from_array_storage(ArrayStorage(out))
+}
+
+/// `a p a'` of a symmetric `p`, symmetric to the last bit.
+#[inline(always)]
+pub fn congruence<const M: usize, const D: usize>(
+    a: &SMatrix<f64, M, D>,
+    p: &SMatrix<f64, D, D>,
+) -> SMatrix<f64, M, M> {
+    congruence_of(a, &times_transposed(p, a))
+}
+
+/// The same from `half = p a'`.
+#[inline(always)]
+pub fn congruence_of<const M: usize, const D: usize>(
+    a: &SMatrix<f64, M, D>,
+    half: &SMatrix<f64, D, M>,
+) -> SMatrix<f64, M, M> {
+    let mut out = times_transposed(&half.transpose(), a);
+    for j in 0..M {
+        for i in 0..j {
+            out[(i, j)] = out[(j, i)];
+        }
+    }
+    out
 }
 
 /// A square root `S` with `S S' = m` of a symmetric positive **semi**definite matrix, by Cholesky with diagonal pivoting.
@@ -89,6 +134,16 @@ mod tests {
         // Position in kilometres, time in nanoseconds, correlated.
         assert!(close(&Matrix2::new(1e-6, 0.9e-12, 0.9e-12, 1e-18)));
         assert!(close(&Matrix2::new(1e300, 1e5, 1e5, 1e-288)));
+    }
+
+    #[test]
+    fn products_are_nalgebras() {
+        let a = SMatrix::<f64, 2, 3>::new(1.0, -2.0, 0.5, 3.0, 0.25, 4.0);
+        let p = Matrix3::new(2.0, 0.3, -0.1, 0.3, 1.0, 0.2, -0.1, 0.2, 0.7);
+        assert!((times_transposed(&p, &a) - p * a.transpose()).amax() < 1e-15);
+        let found = congruence(&a, &p);
+        assert!((found - a * p * a.transpose()).amax() < 1e-14);
+        assert_eq!(found, found.transpose());
     }
 
     #[test]

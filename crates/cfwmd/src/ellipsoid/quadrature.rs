@@ -1,9 +1,10 @@
 //! Mass and moments of independent normal variables in a ball, one dimension at a time.
 
-use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_numerics::{kernels, normal};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::FRAC_PI_2;
+use std::sync::OnceLock;
 
 /// A variance below this share of the ball's squared radius is a known number.
 const KNOWN: f64 = 1e-16;
@@ -25,18 +26,20 @@ fn panel(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
     gauss_legendre::<24>().on(a, b)
 }
 
+/// Whether all means and the radius are within so many deviations.
+fn tame(variances: &[f64], means: &[f64], eta: f64, reach: f64) -> bool {
+    let tame = |(w, b): (&f64, &f64)| b * b <= reach * reach * w && eta <= RADIUS * RADIUS * w;
+    variances.iter().zip(means).all(tame)
+}
+
 /// Visits nodes and weights of a quadrature over `theta` in `[-pi/2, pi/2]` that integrates `exp(f)`, a function with one mode,
 /// for independent components `q_j ~ N(b_j, w_j)` in a ball of squared radius `eta`. Hands on `f` and the logarithm of the weight.
 fn integrate(variances: &[f64], means: &[f64], eta: f64, f: impl Fn(f64) -> f64, mut visit: impl FnMut(f64, f64, f64)) {
     let mut node = |(theta, w): (f64, f64)| visit(theta, f(theta), w.ln());
-    let within = |reach: f64| {
-        let tame = |(w, b): (&f64, &f64)| b * b <= reach * reach * w && eta <= RADIUS * RADIUS * w;
-        variances.iter().zip(means).all(tame)
-    };
-    if within(NEAR) {
+    if tame(variances, means, eta, NEAR) {
         return panel(-FRAC_PI_2, FRAC_PI_2).for_each(node);
     }
-    if within(FAR) {
+    if tame(variances, means, eta, FAR) {
         return gauss_legendre::<40>().on(-FRAC_PI_2, FRAC_PI_2).for_each(node);
     }
     let (cuts, peak) = bulk(&f);
@@ -128,6 +131,11 @@ pub(super) fn log_mass(variances: &[f64], means: &[f64], eta: f64) -> f64 {
         let (radius, deviation) = (eta.sqrt(), w.sqrt());
         return normal::log_interval((-radius - b) / deviation, (radius - b) / deviation);
     }
+    if let ([inner_w], [inner_b]) = (inner_variances, inner_means)
+        && tame(variances, means, eta, NEAR)
+    {
+        return tame_plane([*w, *inner_w], [*b, *inner_b], eta);
+    }
     let leading = leading(*w, *b, eta);
     let integrand = |theta: f64| {
         let (_, left, log_density) = leading(theta);
@@ -138,6 +146,31 @@ pub(super) fn log_mass(variances: &[f64], means: &[f64], eta: f64) -> f64 {
         sum.add(log_value + log_weight);
     });
     sum.value()
+}
+
+/// [`log_mass`] in two dimensions on 24 nodes: all chords at once, in vector registers.
+fn tame_plane(variances: [f64; 2], means: [f64; 2], eta: f64) -> f64 {
+    /// Sines and cosines of the nodes, and the logarithms of weights times cosines.
+    static NODES: OnceLock<[[f64; 24]; 3]> = OnceLock::new();
+    let [sines, cosines, log_weights] = NODES.get_or_init(|| {
+        let mut nodes = [[0.0; 24]; 3];
+        for (i, (theta, w)) in panel(-FRAC_PI_2, FRAC_PI_2).enumerate() {
+            (nodes[0][i], nodes[1][i]) = theta.sin_cos();
+            nodes[2][i] = (w * nodes[1][i]).ln();
+        }
+        nodes
+    });
+    let (radius, deviations) = (eta.sqrt(), variances.map(f64::sqrt));
+    let (mut lower, mut upper, mut logs) = ([0.0; 24], [0.0; 24], [0.0; 24]);
+    for i in 0..24 {
+        let along = (radius * sines[i] - means[0]) / deviations[0];
+        logs[i] = log_weights[i] - 0.5 * along * along;
+        lower[i] = (-radius * cosines[i] - means[1]) / deviations[1];
+        upper[i] = (radius * cosines[i] - means[1]) / deviations[1];
+    }
+    kernels::log_interval(&mut lower, &upper);
+    logs.iter_mut().zip(lower).for_each(|(log, inside)| *log += inside);
+    kernels::log_sum_exp(&logs) + (radius / deviations[0]).ln() - normal::LN_SQRT_2PI
 }
 
 /// `ln sum exp` of terms that arrive one after the other.

@@ -8,7 +8,7 @@ use crate::gaussian::Gaussian;
 use crate::observation::Link;
 use crate::sign::Sign;
 use fewbits_numerics::error::{ArgumentError, positive};
-use fewbits_numerics::kernels::{scalar, vectorised};
+use fewbits_numerics::kernels::{self, scalar};
 use fewbits_numerics::normal;
 use nalgebra::SVector;
 #[cfg(feature = "serde")]
@@ -195,9 +195,11 @@ impl Factor<1> for InCell {
         self.log_probability(m[0])
     }
 
+    /// Probabilities into a short buffer, then their logarithms: each stage stays in vector registers.
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        const BLOCK: usize = 128;
         let (lower, upper) = (self.cell.lower(), self.cell.upper());
-        let (scale, floor, share) = (1.0 / self.deviation, self.floor, self.share);
+        let (scale, floor, share, log_share) = (1.0 / self.deviation, self.floor, self.share, self.log_share);
         // A half-line is one cut, rising (`m` above the edge) or falling.
         let cut = if upper == f64::INFINITY {
             Some((lower, scale))
@@ -206,47 +208,39 @@ impl Factor<1> for InCell {
         } else {
             None
         };
-        let pairs = log_weights.iter_mut().zip(means[0]);
-        match (cut, floor > 0.0) {
-            (Some((edge, scale)), false) => {
-                let log_share = self.log_share;
-                vectorised(
-                    #[inline(always)]
-                    || {
-                        for (log_weight, m) in pairs {
-                            *log_weight += log_share + scalar::log_cdf((m - edge) * scale);
-                        }
-                    },
-                );
+        let wide = (upper - lower) * scale >= scalar::WIDE;
+        let (mut buffer, mut upper_edges) = ([0.0; BLOCK], [0.0; BLOCK]);
+        for (log_weights, means) in log_weights.chunks_mut(BLOCK).zip(means[0].chunks(BLOCK)) {
+            let buffer = &mut buffer[..means.len().min(log_weights.len())];
+            if let Some((edge, scale)) = cut {
+                buffer.iter_mut().zip(means).for_each(|(x, m)| *x = (m - edge) * scale);
+                match floor > 0.0 {
+                    true => kernels::cdf(buffer),
+                    false => kernels::log_cdf(buffer),
+                }
+            } else {
+                let upper_edges = &mut upper_edges[..means.len()];
+                for ((low, high), m) in buffer.iter_mut().zip(&mut *upper_edges).zip(means) {
+                    (*low, *high) = ((lower - m) * scale, (upper - m) * scale);
+                }
+                match (floor > 0.0, wide) {
+                    (true, false) => kernels::interval(buffer, upper_edges),
+                    (true, true) => kernels::interval_wide(buffer, upper_edges),
+                    (false, false) => kernels::log_interval(buffer, upper_edges),
+                    (false, true) => kernels::log_interval_wide(buffer, upper_edges),
+                }
             }
-            (Some((edge, scale)), true) => vectorised(
-                #[inline(always)]
-                || {
-                    for (log_weight, m) in pairs {
-                        *log_weight += scalar::ln(floor + share * scalar::cdf((m - edge) * scale));
-                    }
-                },
-            ),
-            (None, false) => {
-                let log_share = self.log_share;
-                vectorised(
-                    #[inline(always)]
-                    || {
-                        for (log_weight, m) in pairs {
-                            *log_weight += log_share + scalar::log_interval((lower - m) * scale, (upper - m) * scale);
-                        }
-                    },
-                );
+            if floor > 0.0 {
+                buffer.iter_mut().for_each(|p| *p = floor + share * *p);
+                kernels::ln(buffer);
+                log_weights
+                    .iter_mut()
+                    .zip(buffer)
+                    .for_each(|(log_weight, log)| *log_weight += *log);
+            } else {
+                let pairs = log_weights.iter_mut().zip(buffer);
+                pairs.for_each(|(log_weight, log)| *log_weight += log_share + *log);
             }
-            (None, true) => vectorised(
-                #[inline(always)]
-                || {
-                    for (log_weight, m) in pairs {
-                        let inside = scalar::interval((lower - m) * scale, (upper - m) * scale);
-                        *log_weight += scalar::ln(floor + share * inside);
-                    }
-                },
-            ),
         }
     }
 

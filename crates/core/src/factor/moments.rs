@@ -154,28 +154,43 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
 
     /// The moments by the trapezoid rule, where features near the prior and no finer than it allow that: for entire functions
     /// under a Gaussian it converges as `exp(-c/h^2)`, so that the rule of half the nodes, which comes for free, bounds the
-    /// error by its fourth power.
+    /// error by its fourth power: a disagreement of `1e-3` leaves `1e-12`. Nodes reach out as far as the posterior does, in multiples
+    /// of eight that fill vector registers.
     fn by_trapezoid(&mut self, features: &[(f64, f64)]) -> Option<Tilted<1>> {
+        const NEAR: f64 = 4.5;
         const REACH: f64 = 9.0;
-        const MOST_NODES: usize = 121;
+        const MOST_NODES: usize = 128;
+        const NEGLIGIBLE: f64 = 34.0;
         let finest = features.iter().map(|f| f.1).fold(1.0, f64::min);
         if features.iter().any(|(at, _)| at.abs() > 6.0) || finest < 0.3 {
             return None;
         }
-        let half = (REACH / (0.5 * finest)).ceil() as usize;
-        let count = (2 * half + 1).min(MOST_NODES);
-        let step = REACH / half as f64;
+        let step = 0.5 * finest;
+        let near = 4 * (NEAR / (4.0 * step)).ceil() as usize;
+        let most = near + 8 * ((REACH - step * near as f64) / (8.0 * step)).ceil() as usize;
         let (mut nodes, mut logs, mut weights) = ([0.0; MOST_NODES], [0.0; MOST_NODES], [0.0; MOST_NODES]);
-        let (nodes, logs, weights) = (&mut nodes[..count], &mut logs[..count], &mut weights[..count]);
+        let (nodes, logs) = (nodes.get_mut(..2 * most)?, logs.get_mut(..2 * most)?);
         for (i, t) in nodes.iter_mut().enumerate() {
-            *t = step * (i as f64 - half as f64);
+            *t = step * (i as f64 - most as f64);
         }
-        self.logs(nodes, logs);
-        let peak = kernels::largest(logs);
-        if !peak.is_finite() || logs[0].max(logs[count - 1]) > peak - 34.0 {
-            return None;
-        }
-        kernels::exp_minus(logs, peak, weights);
+        let (mut from, mut to) = (most - near, most + near);
+        self.logs(&nodes[from..to], &mut logs[from..to]);
+        let reached = |logs: &[f64]| {
+            let peak = kernels::largest(logs);
+            (peak.is_finite() && logs[0].max(logs[logs.len() - 1]) <= peak - NEGLIGIBLE).then_some(peak)
+        };
+        let features_are_near = features.iter().all(|(at, _)| at.abs() <= NEAR - 1.0);
+        let peak = match reached(&logs[from..to]).filter(|_| features_are_near) {
+            Some(peak) => peak,
+            None => {
+                self.logs(&nodes[..from], &mut logs[..from]);
+                self.logs(&nodes[to..], &mut logs[to..]);
+                (from, to) = (0, 2 * most);
+                reached(logs)?
+            }
+        };
+        let (nodes, weights) = (&nodes[from..to], &mut weights[from..to]);
+        kernels::exp_minus(&logs[from..to], peak, weights);
         let (mut all, mut even) = ([0.0; 3], [0.0; 3]);
         for (i, (t, p)) in nodes.iter().zip(&*weights).enumerate() {
             for (k, term) in [*p, p * t, p * t * t].into_iter().enumerate() {
@@ -186,7 +201,7 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
             }
         }
         let scales = [all[0], (all[0] * all[2]).sqrt(), all[2]];
-        if (0..3).any(|k| (all[k] - even[k]).abs() > 1e-4 * scales[k]) {
+        if (0..3).any(|k| (all[k] - even[k]).abs() > 1e-3 * scales[k]) {
             return None;
         }
         let shift = all[1] / all[0];

@@ -1,7 +1,7 @@
 //! A value in Gaussian noise.
 
 use super::{Factor, Tilted};
-use crate::columns::{Columns, state_at};
+use crate::columns::Columns;
 use crate::error::Error;
 use crate::gaussian::{FactoredGaussian, Gaussian};
 use fewbits_numerics::error::{ArgumentError, all_finite};
@@ -84,9 +84,7 @@ impl<const M: usize> Factor<M> for Value<M> {
                 *log_weight += constant - half_precision * (value - m) * (value - m);
             }
         } else {
-            for (i, log_weight) in log_weights.iter_mut().enumerate() {
-                *log_weight += self.noise.log_pdf(&state_at(means, i));
-            }
+            self.noise.add_log_pdfs(means, log_weights);
         }
     }
 

@@ -148,6 +148,31 @@ fn a_factor_seen_through_a_sensor_is_a_likelihood() {
     for scalar in kinds() {
         likelihood::sweep_is_scalar(&vec![Observed::new(Line, scalar.clone()), Observed::new(Line, scalar)], &states)
             .unwrap();
+        // By reference, too.
+        let first = kinds().swap_remove(0);
+        let observed = Observed::new(Line, &first);
+        likelihood::sweep_is_scalar(&&observed, &states).unwrap();
+    }
+}
+
+/// A value of two components in correlated noise, over more than one block.
+#[test]
+fn a_sweep_of_vectors_is_the_scalar() {
+    let value = Value::new(Vector2::new(0.2, 0.1), SMatrix::<f64, 2, 2>::new(0.7, -0.2, -0.2, 0.4)).unwrap();
+    let measurements: Vec<_> = (0..203)
+        .map(|i| Vector2::new(0.1 * f64::from(i) - 10.0, (f64::from(i) * 0.7).sin()))
+        .collect();
+    factor::sweep_is_scalar(&value, &measurements).unwrap();
+    factor::sweep_is_scalar(&&value, &measurements).unwrap();
+}
+
+/// Cells on both sides of what counts as wide, over more than one block.
+#[test]
+fn sweeps_over_wide_and_narrow_cells_are_the_scalar() {
+    let means: Vec<_> = (0..301).map(|i| Vector1::new(0.3 * f64::from(i) - 45.0)).collect();
+    for (width, floor) in [(0.4, 0.0), (0.4, 0.1), (1.0, 0.0), (1.5, 0.0), (1.5, 0.1)] {
+        let cell = Cell::new(0.2, 0.2 + width).unwrap();
+        factor::sweep_is_scalar(&InCell::new(cell, 1.0, floor, 0.8).unwrap(), &means).unwrap();
     }
 }
 

@@ -5,3 +5,4 @@
 mod belief;
 mod codec;
 mod factor;
+mod laws;

@@ -3,12 +3,12 @@
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
 use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
-    Grid, OptimalProposal, ParticleFilter, Particles, PointMass, PointMassFilter, Resampling, Schedule, Workspace,
-    kalman,
+    Grid, OptimalProposal, ParticleFilter, Particles, PointMass, PointMassFilter, Resampling, Schedule, TiltedProposal,
+    Workspace, kalman,
 };
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
-use nalgebra::{Matrix2, SVector, Vector2};
+use nalgebra::{Matrix1, Matrix2, SVector, Vector1, Vector2};
 use rand_pcg::Pcg64Mcg;
 
 const STEPS: usize = 12;
@@ -66,7 +66,12 @@ impl Scene {
 enum Kind {
     Bootstrap,
     Guided,
+    Tilted,
     Auxiliary,
+}
+
+impl Kind {
+    const ALL: [Self; 4] = [Self::Bootstrap, Self::Guided, Self::Tilted, Self::Auxiliary];
 }
 
 /// Runs one filter over the scene; the final belief and the estimate of the log-likelihood.
@@ -83,6 +88,10 @@ fn run(scene: &Scene, kind: Kind, filter: ParticleFilter, count: usize, stream: 
                 let proposal = OptimalProposal::new(&scene.dynamics, &scene.sensor, SVector::from([*z])).unwrap();
                 filter.guided_step(&mut rng, &proposal, &mut belief, &mut workspace)
             }
+            Kind::Tilted => {
+                let proposal = TiltedProposal::new(&scene.dynamics, &observed);
+                filter.guided_step(&mut rng, &proposal, &mut belief, &mut workspace)
+            }
             Kind::Auxiliary => filter.auxiliary_step(&mut rng, &scene.dynamics, &mut belief, &observed, &mut workspace),
         }
         .unwrap();
@@ -93,10 +102,10 @@ fn run(scene: &Scene, kind: Kind, filter: ParticleFilter, count: usize, stream: 
 }
 
 #[test]
-fn all_three_filters_agree_with_the_kalman_filter() {
+fn all_filters_agree_with_the_kalman_filter() {
     let scene = scene(STEPS);
     let (exact, log_likelihood) = scene.kalman();
-    for kind in [Kind::Bootstrap, Kind::Guided, Kind::Auxiliary] {
+    for kind in Kind::ALL {
         for resampling in Resampling::ALL {
             let filter = ParticleFilter::new(resampling, Schedule::Below(0.7));
             let (mut x, mut v, mut spread, mut evidence) = <(Moments, Moments, Moments, Moments)>::default();
@@ -128,7 +137,7 @@ fn all_three_filters_agree_with_the_kalman_filter() {
 fn the_likelihood_estimate_is_unbiased_for_every_law() {
     let scene = scene(6);
     let (_, log_likelihood) = scene.kalman();
-    for kind in [Kind::Bootstrap, Kind::Guided, Kind::Auxiliary] {
+    for kind in Kind::ALL {
         for resampling in Resampling::ALL {
             for schedule in [Schedule::Always, Schedule::Below(0.5)] {
                 let filter = ParticleFilter::new(resampling, schedule);
@@ -162,28 +171,35 @@ fn against_the_grid(observed_at: impl Fn(usize) -> Scalar) {
         evidence += increment;
     }
     let filter = ParticleFilter::default();
-    let mut moments = <(Moments, Moments, Moments)>::default();
-    for repeat in 0..10 {
-        let mut rng = Stream::new(21).indexed(repeat).fast_rng();
-        let prior = Gaussian::scalar(0.0, 3.0).unwrap();
-        let mut belief = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
-        let mut total = 0.0;
-        for likelihood in &likelihoods {
-            let (next, info) = filter.step(&mut rng, &dynamics, &belief, likelihood).unwrap();
-            belief = next;
-            total += info.log_likelihood;
+    for guided in [false, true] {
+        let mut moments = <(Moments, Moments, Moments)>::default();
+        for repeat in 0..10 {
+            let mut rng = Stream::new(21).indexed(repeat).fast_rng();
+            let prior = Gaussian::scalar(0.0, 3.0).unwrap();
+            let mut belief = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
+            let (mut workspace, mut total) = (Workspace::default(), 0.0);
+            for likelihood in &likelihoods {
+                let info = if guided {
+                    let proposal = TiltedProposal::new(&dynamics, likelihood);
+                    filter.guided_step(&mut rng, &proposal, &mut belief, &mut workspace)
+                } else {
+                    filter.step_in_place(&mut rng, &dynamics, &mut belief, likelihood, &mut workspace)
+                };
+                total += info.unwrap().log_likelihood;
+            }
+            moments.0.add(belief.mean()[0]);
+            moments.1.add(belief.covariance()[(0, 0)]);
+            moments.2.add(total);
         }
-        moments.0.add(belief.mean()[0]);
-        moments.1.add(belief.covariance()[(0, 0)]);
-        moments.2.add(total);
-    }
-    for (ours, truth) in [
-        (moments.0, exact.mean()),
-        (moments.1, exact.variance()),
-        (moments.2, evidence),
-    ] {
-        let off = (ours.mean() - truth).abs();
-        assert!(off < 5.0 * ours.standard_error() + 1e-3 && off < 0.05, "{:?} against {truth}", ours.estimate());
+        for (ours, truth) in [
+            (moments.0, exact.mean()),
+            (moments.1, exact.variance()),
+            (moments.2, evidence),
+        ] {
+            let off = (ours.mean() - truth).abs();
+            let found = ours.estimate();
+            assert!(off < 5.0 * ours.standard_error() + 1e-3 && off < 0.05, "{guided}: {found:?} against {truth}");
+        }
     }
 }
 
@@ -237,4 +253,46 @@ fn the_number_of_particles_can_change() {
             .is_err()
     );
     assert_eq!(belief.len(), 400);
+}
+
+/// A sharp value seen through the square root of a distance: weights of the proposal that has seen it are far more even.
+#[test]
+fn a_tilted_proposal_pays_where_the_dynamics_are_wide() {
+    struct Root;
+    impl Sensing<1, 1> for Root {
+        fn mean(&self, state: &Vector1<f64>) -> Vector1<f64> {
+            state.map(|x| (1.0 + x * x).sqrt())
+        }
+        fn jacobian(&self, state: &Vector1<f64>) -> Matrix1<f64> {
+            state.map(|x| x / (1.0 + x * x).sqrt())
+        }
+        fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+            Matrix1::new(1e-4)
+        }
+        fn sample<R: rand::Rng + ?Sized>(&self, _: &mut R, state: &Vector1<f64>) -> Vector1<f64> {
+            self.mean(state)
+        }
+    }
+    let dynamics = Ar1::new(0.9, 1.0).unwrap();
+    let observed = Observed::new(Root, Value::scalar(5.0, 1e-4).unwrap());
+    let prior = Gaussian::scalar(5.0, 0.5).unwrap();
+    let (filter, mut workspace) = (ParticleFilter::default(), Workspace::default());
+    let (mut plain, mut guided) = <(Moments, Moments)>::default();
+    let mut sizes = [0.0; 2];
+    for repeat in 0..40 {
+        let mut rng = Stream::new(22).indexed(repeat).fast_rng();
+        let mut belief = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
+        let (_, info) = filter.step(&mut rng, &dynamics, &belief, &observed).unwrap();
+        plain.add(info.log_likelihood.exp());
+        sizes[0] += info.effective_sample_size;
+        let proposal = TiltedProposal::new(&dynamics, &observed);
+        let info = filter
+            .guided_step(&mut rng, &proposal, &mut belief, &mut workspace)
+            .unwrap();
+        guided.add(info.log_likelihood.exp());
+        sizes[1] += info.effective_sample_size;
+    }
+    let error = plain.standard_error().hypot(guided.standard_error());
+    assert!((plain.mean() - guided.mean()).abs() < 4.0 * error, "{:?} {:?}", plain.estimate(), guided.estimate());
+    assert!(sizes[1] > 20.0 * sizes[0], "{sizes:?}");
 }

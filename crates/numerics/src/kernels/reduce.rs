@@ -96,6 +96,29 @@ pub fn largest(a: &[f64]) -> f64 {
     )
 }
 
+/// The largest entry, `-inf` of nothing; `None` if an entry is NaN. One pass.
+pub fn largest_number(a: &[f64]) -> Option<f64> {
+    vectorised(
+        #[inline(always)]
+        || {
+            let chunks = a.chunks_exact(LANES);
+            let (mut lane, mut numbers) = ([f64::NEG_INFINITY; LANES], [true; LANES]);
+            for (j, x) in chunks.remainder().iter().enumerate() {
+                lane[j] = *x;
+                numbers[j] = !x.is_nan();
+            }
+            for chunk in chunks {
+                for j in 0..LANES {
+                    lane[j] = if chunk[j] > lane[j] { chunk[j] } else { lane[j] };
+                    numbers[j] &= !chunk[j].is_nan();
+                }
+            }
+            let all = numbers.into_iter().all(|n| n);
+            all.then(|| lane.into_iter().fold(f64::NEG_INFINITY, f64::max))
+        },
+    )
+}
+
 /// Sums of a column of exponentials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExpSums {
@@ -203,5 +226,13 @@ mod tests {
     fn nan_is_no_largest_entry() {
         assert_eq!(largest(&[f64::NAN, 1.0, f64::NAN]), 1.0);
         assert_eq!(largest(&[f64::NAN; 20]), f64::NEG_INFINITY);
+        for at in 0..20 {
+            let mut values = [f64::NEG_INFINITY; 20];
+            values[at] = 3.0;
+            assert_eq!(largest_number(&values), Some(3.0));
+            values[at] = f64::NAN;
+            assert_eq!(largest_number(&values), None);
+        }
+        assert_eq!(largest_number(&[]), Some(f64::NEG_INFINITY));
     }
 }

@@ -1,0 +1,377 @@
+//! Every law holds for an honest implementation, whatever its unit and with no noise at all, and refuses each way of being wrong.
+
+use fewbits_core::factor::{Constant, Factor, Tilted, Value};
+use fewbits_core::{
+    Belief, Columns, ColumnsMut, Density, Dynamics, Error, Gaussian, GaussianDynamics, Likelihood, LinearDynamics,
+    Link, NumberFormat, Observation, Scheme, Sensing, Sign, laws,
+};
+use fewbits_monte_carlo::Stream;
+use nalgebra::{Matrix2, SVector, Vector1, Vector2};
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+
+/// What is wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    Nothing,
+    /// A mean that is not that of the draws.
+    Mean,
+    /// Too much noise in the second coordinate.
+    Noise,
+    /// Noise without its correlation.
+    Correlation,
+    /// A sweep that disagrees with the scalar.
+    Sweep,
+    /// A Jacobian that is no derivative.
+    Jacobian,
+    /// Something that is no number.
+    NotANumber,
+}
+
+/// Dynamics, sensing, a belief and a likelihood in a plane, of any unit and noise.
+struct Plane {
+    unit: f64,
+    noise: f64,
+    fault: Fault,
+}
+
+const TURN: Matrix2<f64> = Matrix2::new(0.8, -0.6, 0.5, 0.7);
+const LOWER: Matrix2<f64> = Matrix2::new(1.0, 0.0, 0.5, 1.0);
+const NOISE: Matrix2<f64> = Matrix2::new(1.0, 0.5, 0.5, 1.25);
+const HERE: Vector2<f64> = Vector2::new(1.0, -2.0);
+
+impl Plane {
+    fn has(&self, fault: Fault) -> bool {
+        self.fault == fault
+    }
+
+    fn draw<R: Rng + ?Sized>(&self, rng: &mut R, mean: Vector2<f64>) -> Vector2<f64> {
+        let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
+        let mut noise = LOWER * z;
+        if self.has(Fault::Correlation) {
+            noise[1] = 1.25_f64.sqrt() * z[1];
+        }
+        if self.has(Fault::Noise) {
+            noise[1] *= 1.2;
+        }
+        mean + noise * self.unit * self.noise
+    }
+
+    fn stated(&self, mut mean: Vector2<f64>) -> Vector2<f64> {
+        if self.has(Fault::Mean) {
+            mean[1] += 0.1 * self.unit;
+        }
+        mean
+    }
+
+    fn square(&self) -> f64 {
+        self.unit * self.unit * self.noise * self.noise
+    }
+}
+
+impl Dynamics<2> for Plane {
+    fn mean(&self, state: &Vector2<f64>) -> Vector2<f64> {
+        self.stated(TURN * state)
+    }
+
+    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector2<f64>) -> Vector2<f64> {
+        self.draw(rng, TURN * state)
+    }
+
+    fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, 2>) {
+        let shift = if self.has(Fault::Sweep) { 0.1 * self.unit } else { 0.0 };
+        let [x, y] = states;
+        for (x, y) in x.iter_mut().zip(y) {
+            let next = self.draw(rng, TURN * Vector2::new(*x, *y));
+            (*x, *y) = (next[0] + shift, next[1]);
+        }
+    }
+}
+
+impl GaussianDynamics<2> for Plane {
+    fn jacobian(&self, _: &Vector2<f64>) -> Matrix2<f64> {
+        if self.has(Fault::Jacobian) { TURN * 1.001 } else { TURN }
+    }
+
+    fn noise_covariance_at(&self, _: &Vector2<f64>) -> Matrix2<f64> {
+        NOISE * self.square()
+    }
+}
+
+impl LinearDynamics<2> for Plane {
+    fn transition(&self) -> &Matrix2<f64> {
+        &TURN
+    }
+
+    fn noise_covariance(&self) -> &Matrix2<f64> {
+        &NOISE
+    }
+}
+
+impl Sensing<2, 2> for Plane {
+    fn mean(&self, state: &Vector2<f64>) -> Vector2<f64> {
+        self.stated(TURN * state)
+    }
+
+    fn jacobian(&self, state: &Vector2<f64>) -> Matrix2<f64> {
+        GaussianDynamics::jacobian(self, state)
+    }
+
+    fn noise_covariance_at(&self, _: &Vector2<f64>) -> Matrix2<f64> {
+        NOISE * self.square()
+    }
+
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector2<f64>) -> Vector2<f64> {
+        self.draw(rng, TURN * state)
+    }
+
+    fn mean_columns(&self, states: &Columns<'_, 2>, means: ColumnsMut<'_, 2>) {
+        for i in 0..states[0].len() {
+            let mean = Sensing::mean(self, &Vector2::new(states[0][i], states[1][i]));
+            means[0][i] = mean[0];
+            means[1][i] = mean[1] * if self.has(Fault::Sweep) { 1.001 } else { 1.0 };
+        }
+    }
+}
+
+impl Belief<2> for Plane {
+    fn mean(&self) -> Vector2<f64> {
+        self.stated(HERE * self.unit)
+    }
+
+    fn covariance(&self) -> Matrix2<f64> {
+        NOISE * self.square()
+    }
+
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, [x, y]: ColumnsMut<'_, 2>) {
+        for (x, y) in x.iter_mut().zip(y) {
+            let point = self.draw(rng, HERE * self.unit);
+            (*x, *y) = (point[0], point[1]);
+        }
+    }
+}
+
+impl Density<2> for Plane {
+    fn log_density(&self, state: &Vector2<f64>) -> f64 {
+        let off = if self.has(Fault::Mean) { 0.1 } else { 0.0 };
+        let gaussian = Gaussian::new(HERE * self.unit, NOISE * self.square()).unwrap();
+        gaussian.log_pdf(state).unwrap() + off
+    }
+
+    fn add_log_densities(&self, states: &Columns<'_, 2>, logs: &mut [f64]) {
+        let off = if self.has(Fault::Sweep) { 1e-6 } else { 0.0 };
+        for (i, log) in logs.iter_mut().enumerate() {
+            *log += self.log_density(&Vector2::new(states[0][i], states[1][i])) + off;
+        }
+    }
+}
+
+impl Likelihood<2> for Plane {
+    fn log_likelihood(&self, state: &Vector2<f64>) -> f64 {
+        if self.has(Fault::NotANumber) {
+            f64::NAN
+        } else {
+            -state[0].abs()
+        }
+    }
+
+    fn add_log_likelihoods(&self, states: Columns<'_, 2>, log_weights: &mut [f64]) {
+        let factor = if self.has(Fault::Sweep) { 1.0 + 1e-9 } else { 1.0 };
+        log_weights
+            .iter_mut()
+            .zip(states[0])
+            .for_each(|(log, x)| *log -= x.abs() * factor);
+    }
+}
+
+/// Which faults a law refuses; it must take all others.
+fn refuses(law: &str, with_noise: bool, faults: &[Fault], check: impl Fn(&Plane) -> Result<(), laws::Violation>) {
+    for unit in [1e-4, 1.0, 1e4] {
+        for noise in if with_noise { vec![0.5] } else { vec![0.0, 0.5] } {
+            for fault in [
+                Fault::Nothing,
+                Fault::Mean,
+                Fault::Noise,
+                Fault::Correlation,
+                Fault::Sweep,
+                Fault::Jacobian,
+                Fault::NotANumber,
+            ] {
+                let silent = noise == 0.0 && matches!(fault, Fault::Noise | Fault::Correlation);
+                let found = check(&Plane { unit, noise, fault });
+                let expected = faults.contains(&fault) && !silent;
+                assert_eq!(found.is_err(), expected, "{law}, {fault:?}, unit {unit}, noise {noise}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn laws_of_dynamics_sensing_and_beliefs_refuse_what_is_wrong() {
+    use Fault::{Correlation, Jacobian, Mean, Noise, NotANumber, Sweep};
+    let rng = || Stream::new(3).rng();
+    let draws = 20_000;
+    refuses("dynamics' draws", false, &[Mean, Noise, Correlation, Sweep], |p| {
+        laws::dynamics::draws_have_the_law(p, &mut rng(), &(HERE * p.unit), draws)
+    });
+    refuses("dynamics' Jacobian", false, &[Jacobian], |p| {
+        laws::dynamics::jacobian_is_the_derivative(p, &(HERE * p.unit))
+    });
+    refuses("sensing's sweep and Jacobian", false, &[Sweep, Jacobian], |p| {
+        laws::sensing::is_consistent(p, &[HERE * p.unit, Vector2::zeros()])
+    });
+    refuses("measurements", true, &[Mean, Noise, Correlation], |p| {
+        laws::sensing::draws_have_the_law(p, &mut rng(), &(HERE * p.unit), draws)
+    });
+    refuses("samples", false, &[Mean, Noise, Correlation], |p| {
+        laws::belief::samples_have_the_moments(p, &mut rng(), draws)
+    });
+    refuses("densities", true, &[Mean, Sweep], |p| {
+        let wide = Gaussian::new(HERE * p.unit, NOISE * (2.0 * p.square()))
+            .unwrap()
+            .factored()
+            .unwrap();
+        laws::belief::density_integrates_to_one(p, &wide, &mut rng(), draws)
+    });
+    refuses("likelihoods", false, &[Sweep, NotANumber], |p| {
+        laws::likelihood::sweep_is_scalar(p, &[HERE, Vector2::new(40.0, 0.0)])
+    });
+    let linear = |fault| {
+        laws::dynamics::is_linear(
+            &Plane {
+                unit: 1.0,
+                noise: 1.0,
+                fault,
+            },
+            &[HERE, Vector2::zeros()],
+        )
+    };
+    assert!(linear(Fault::Nothing).is_ok() && linear(Mean).is_err() && linear(Jacobian).is_err());
+    let louder = Plane {
+        unit: 1.0,
+        noise: 1.1,
+        fault: Fault::Nothing,
+    };
+    assert!(laws::dynamics::is_linear(&louder, &[HERE]).is_err());
+}
+
+/// A value whose likelihood or whose moments are off.
+struct Off {
+    value: Value<1>,
+    log: f64,
+    tilt: [f64; 3],
+}
+
+impl Factor<1> for Off {
+    fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
+        self.value.log_likelihood(m) + self.log
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        self.value.add_log_likelihoods(means, log_weights);
+    }
+
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
+        let mut tilted = self.value.tilted(prior)?;
+        tilted.log_evidence += self.tilt[0];
+        tilted.mean[0] += self.tilt[1] * tilted.covariance[0].sqrt();
+        tilted.covariance[0] *= 1.0 + self.tilt[2];
+        Ok(tilted)
+    }
+}
+
+#[test]
+fn laws_of_factors_refuse_what_is_wrong() {
+    for unit in [1e-4, 1.0, 1e4] {
+        let prior = Gaussian::scalar(0.6 * unit, 0.9 * unit * unit).unwrap();
+        let off = |log, tilt| Off {
+            value: Value::scalar(0.4 * unit, 0.7 * unit * unit).unwrap(),
+            log,
+            tilt,
+        };
+        let points = [Vector1::new(0.3 * unit), Vector1::new(-2.0 * unit)];
+        let quadrature = |f: &Off| laws::factor::tilted_is_quadrature(f, &prior, 12.0 * unit, 4001, 1e-9);
+        let honest = off(0.0, [0.0; 3]);
+        laws::factor::is_a_number(&honest, &points).unwrap();
+        laws::factor::sweep_is_scalar(&honest, &points).unwrap();
+        quadrature(&honest).unwrap();
+        for i in 0..3 {
+            let mut tilt = [0.0; 3];
+            tilt[i] = 1e-7;
+            assert!(quadrature(&off(0.0, tilt)).is_err(), "{i}");
+        }
+        assert!(laws::factor::sweep_is_scalar(&off(1e-9, [0.0; 3]), &points).is_err());
+        for nothing in [f64::NAN, f64::INFINITY] {
+            assert!(laws::factor::is_a_number(&off(nothing, [0.0; 3]), &points).is_err());
+        }
+        laws::factor::is_a_number(&off(f64::NEG_INFINITY, [0.0; 3]), &points).unwrap();
+    }
+}
+
+/// A coin, reported over a link, with a factor that believes in `heads` and in what it is told about silence and erasure.
+struct Coin {
+    heads: f64,
+    nothing: f64,
+    erased: f64,
+}
+
+impl Scheme<1> for Coin {
+    type State = ();
+    type Feedback = f64;
+    type Report = Sign;
+    type Factor = Constant;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn report_format(&self) {}
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        (): &mut (),
+        _: &Vector1<f64>,
+        _: &f64,
+    ) -> Result<Option<Sign>, Error> {
+        Ok(Some(if rng.random::<f64>() < 0.3 {
+            Sign::Above
+        } else {
+            Sign::Below
+        }))
+    }
+
+    fn factor(&self, _: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Constant, Error> {
+        let arrives = 1.0 - link.loss();
+        Ok(Constant::new(match observation {
+            Observation::Received(Sign::Above) => arrives * self.heads,
+            Observation::Received(Sign::Below) => arrives * (1.0 - self.heads),
+            Observation::Nothing => self.nothing,
+            Observation::Erased => self.erased,
+        })?)
+    }
+}
+
+#[test]
+fn laws_of_schemes_refuse_what_is_wrong() {
+    let link = Link::lossy(0.2).unwrap();
+    let signs = [Sign::Above, Sign::Below];
+    let m = Vector1::new(0.0);
+    let total = |coin: &Coin| laws::scheme::total_probability(coin, &0.0, &link, signs, &[m]);
+    let with = |coin: &Coin| laws::scheme::total_probability_with(coin, &0.0, &link, |_| 0.8, &[m], 1e-12);
+    let honest = |coin: &Coin| {
+        let rng = &mut Stream::new(5).rng();
+        laws::scheme::frequencies(coin, &0.0, &link, rng, 40_000, &m, |_| m, signs)
+    };
+    let coin = |heads, nothing, erased| Coin { heads, nothing, erased };
+    let right = coin(0.3, 0.2, 1.0);
+    assert!(total(&right).is_ok() && with(&right).is_ok() && honest(&right).is_ok());
+    for wrong in [coin(0.3, 0.19, 1.0), coin(0.3, 0.2, 0.9)] {
+        assert!(total(&wrong).is_err() && with(&wrong).is_err());
+    }
+    let biased = coin(0.33, 0.2, 1.0);
+    assert!(total(&biased).is_ok() && honest(&biased).is_err());
+    assert!(honest(&coin(0.3, 0.25, 1.0)).is_err());
+}
