@@ -153,15 +153,7 @@ impl Channel {
     }
 
     /// The copies of a frame of `bits` bits that arrive over `distance` metres: none, one or two.
-    pub(crate) fn copies<R: Rng + ?Sized>(
-        &self,
-        rng: impl FnOnce() -> R,
-        distance: f64,
-        bits: usize,
-        copies: &mut Vec<Copy>,
-    ) where
-        R: Sized,
-    {
+    pub(crate) fn copies<R: Rng>(&self, rng: impl FnOnce() -> R, distance: f64, bits: usize, copies: &mut Vec<Copy>) {
         if self.is_clean() {
             copies.push(Copy {
                 delay: self.delay,

@@ -123,12 +123,14 @@ impl<W: Walker> Walk<W> {
         let message_bits = message.as_ref().map(|stored| &stored.0);
         let Ok(step) = self.walker.lead(&mut rng, slot, context.id(), message_bits) else {
             context.note(Note::Refused { slot });
-            return Ok(self.stay(node, context, slot + 1, message));
+            self.stay(node, context, slot + 1, message);
+            return Ok(());
         };
         node.estimates.push((slot, step.estimate));
         let Some(next) = step.next else { return Ok(()) };
         if next == context.id() {
-            return Ok(self.stay(node, context, slot + 1, Some(Stored(step.message))));
+            self.stay(node, context, slot + 1, Some(Stored(step.message)));
+            return Ok(());
         }
         let sum = digest(u64::from(slot + 1), &step.message);
         let frame = Frame {

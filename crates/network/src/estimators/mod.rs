@@ -11,6 +11,8 @@ mod handoff;
 #[cfg(feature = "look-up")]
 mod look_up;
 mod scheme;
+#[cfg(feature = "cfwmd")]
+mod send_all;
 
 #[cfg(feature = "cfwmd")]
 pub use censoring::{Broadcast, Censors};
@@ -23,6 +25,8 @@ pub use handoff::Leaders;
 #[cfg(feature = "look-up")]
 pub use look_up::{LookUp, Patterns};
 pub use scheme::Reporting;
+#[cfg(feature = "cfwmd")]
+pub use send_all::SendAll;
 
 #[cfg(any(
     feature = "cfwmd",
