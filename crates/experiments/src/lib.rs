@@ -22,6 +22,7 @@ mod figure;
 pub mod handoff;
 mod measured;
 pub mod mi;
+pub mod network;
 mod parameters;
 pub mod plot;
 pub mod reference;
@@ -47,6 +48,7 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         cfwmd::figures(),
         diffusive::figures(),
         handoff::figures(),
+        network::figures(),
     ]
     .concat()
 }

@@ -14,6 +14,7 @@
 //! | `quantizer_design` | `quantizer-design` | joint design and decoding of distributed scalar quantizers |
 //! | `binary_patterns` | `binary-patterns` | one-bit quantizers with patterned cells |
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
+//! | `network` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
 
 pub use fewbits_core as core;
@@ -34,13 +35,15 @@ pub use fewbits_dymbo as dymbo;
 pub use fewbits_filters as filters;
 #[cfg(feature = "filters")]
 pub use fewbits_models as models;
+#[cfg(feature = "network")]
+pub use fewbits_network as network;
 #[cfg(feature = "quantizer-design")]
 pub use fewbits_quantizer_design as quantizer_design;
 #[cfg(feature = "quantizers")]
 pub use fewbits_quantizers as quantizers;
 #[cfg(feature = "sensor-assignment")]
 pub use fewbits_sensor_assignment as sensor_assignment;
-#[cfg(feature = "diffusive")]
+#[cfg(any(feature = "diffusive", feature = "network"))]
 pub use fewbits_topology as topology;
 
 /// The programs of the README and of the pages in `docs`, kept running.
@@ -62,4 +65,6 @@ mod pages {
     struct Cfwmd;
     #[doc = include_str!("../../../docs/diffusive.md")]
     struct Diffusive;
+    #[doc = include_str!("../../../docs/network.md")]
+    struct Network;
 }

@@ -1,0 +1,311 @@
+//! What faults do to the error, and how long a restarted sensor is out of step.
+
+use super::worlds::{self, RADIUS};
+use crate::plot::{Axis, Layer, Panel, Plot};
+use crate::{About, Claims, Context, Error, Figure, Measured};
+use fewbits_core::{Belief, Dynamics, Gaussian, Link, Sensing};
+use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
+use fewbits_models::{Ar1, LinearSensor};
+use fewbits_monte_carlo::{Moments, Stream};
+use fewbits_network::estimators::Counted;
+use fewbits_network::{Channel, Fault, Loss, Mishap, Seconds, SensorId, Setup, Star};
+use garde::Validate;
+use nalgebra::Vector1;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+const SENSORS: usize = 4;
+const WARM_UP: usize = 20;
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Probabilities that a frame is lost.
+    #[garde(length(min = 1), inner(range(min = 0.0, max = 0.8)))]
+    loss: Vec<f64>,
+    /// Probabilities that a bit is inverted.
+    #[garde(length(min = 1), inner(range(min = 0.0, max = 0.1)))]
+    crossover: Vec<f64>,
+    /// Mean delays of a frame, in slots.
+    #[garde(length(min = 1), inner(range(min = 0.0, max = 10.0)))]
+    delay: Vec<f64>,
+    /// Sensors of four that die after a quarter of the run.
+    #[garde(length(min = 1), inner(range(min = 0, max = 4)))]
+    deaths: Vec<u32>,
+    /// Slots of a run.
+    #[garde(range(min = 60, max = 100_000))]
+    slots: usize,
+    /// Runs at each point.
+    #[garde(range(min = 2, max = 1_000_000))]
+    trials: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            loss: vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.6],
+            crossover: vec![0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2],
+            delay: vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.8],
+            deaths: vec![0, 1, 2, 3, 4],
+            slots: 200,
+            trials: 40,
+        }
+    }
+}
+
+/// One fault at one level.
+#[derive(Serialize, JsonSchema)]
+pub struct Row {
+    /// loss, flips, delay or deaths.
+    fault: &'static str,
+    /// Its level.
+    level: f64,
+    /// told: the centre sends its prediction; echoed: sensors follow by what it received.
+    feedback: &'static str,
+    /// Root mean squared error.
+    rmse: Measured,
+    /// Slots until a sensor that restarts in the middle of the run answers again, at most 50.
+    recovery: Measured,
+    /// Disagreements noted, of 100 slots.
+    disagreements: Measured,
+}
+
+/// Faults.
+pub struct Faulty;
+
+struct Point {
+    fault: &'static str,
+    level: f64,
+    echoed: bool,
+}
+
+fn failed(error: fewbits_network::Error) -> Error {
+    Error::failed(error)
+}
+
+/// Squared error, slots to recover, disagreements of 100 slots.
+fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
+    let (a, q) = (worlds::COEFFICIENT, worlds::PROCESS);
+    let (dynamics, sensor) = (Ar1::new(a, q)?, LinearSensor::<1, 1>::direct(1.0)?);
+    let start = Gaussian::scalar(0.0, dynamics.stationary_variance()?)?;
+    let mut rng = stream.named("world").rng();
+    let mut state = start.sample(&mut rng);
+    let mut truths = Vec::with_capacity(slots);
+    let mut measurements: Vec<Vec<Vector1<f64>>> = Vec::with_capacity(slots);
+    for _ in 0..slots {
+        state = dynamics.propagate(&mut rng, &state);
+        truths.push(state[0]);
+        measurements.push((0..SENSORS).map(|_| sensor.sample(&mut rng, &state)).collect());
+    }
+    let clock = worlds::clock()?;
+    let period = clock.period().value();
+    let mut channel = Channel::PERFECT;
+    let (restarted, middle) = (SensorId(1), slots as u32 / 2);
+    let at = |slot: f64| Seconds::new(slot * period);
+    let mut faults = vec![Fault {
+        at: at(f64::from(middle) + 0.95)?,
+        node: restarted,
+        what: Mishap::Restart,
+    }];
+    match point.fault {
+        "loss" => channel.loss = Loss::Fixed(point.level),
+        "flips" => channel.crossover = point.level,
+        "delay" => channel.jitter = at(point.level)?,
+        _ => {
+            // The last sensors die first, so that the restarted one is the last to go.
+            for i in 0..point.level as u32 {
+                let node = SensorId(SENSORS as u32 - i);
+                let (at, what) = (at(slots as f64 / 4.0)?, Mishap::Death);
+                faults.push(Fault { at, node, what });
+            }
+        }
+    }
+    // What may be lost is what the receiver knows of: the question and the report.
+    let lost = match point.fault {
+        "loss" => 1.0 - (1.0 - point.level).powi(2),
+        "flips" => 1.0 - (1.0 - point.level).powi(144 + 81),
+        "delay" => 0.5,
+        _ => 0.2,
+    };
+    let filter = ParallelFilter::new(ScalarPlant::new(a, q, 1.0)?, SENSORS, CountFusion::Exact)?;
+    let filter = filter.with_link(Link::lossy(lost.min(0.99))?);
+    let estimator = Counted::new(filter, start).map_err(failed)?;
+    let own = stream.named("filter");
+    let star = if point.echoed {
+        Star::echoed(estimator, measurements, clock, own)
+    } else {
+        Star::told(estimator, measurements, clock, own)
+    };
+    let setup = Setup {
+        channel,
+        faults,
+        ..worlds::setup(stream)?
+    };
+    let mut network = star.and_then(|star| star.simulate(RADIUS, setup)).map_err(failed)?;
+    network.run_until(clock.end(middle)).map_err(failed)?;
+    let mut recovery = 0;
+    while recovery < 50 && middle + recovery < slots as u32 {
+        recovery += 1;
+        network.run_until(clock.end(middle + recovery)).map_err(failed)?;
+        if network.nodes()[restarted.index()].answered() == Some(middle + recovery) {
+            break;
+        }
+    }
+    network.run_until(clock.end(slots as u32)).map_err(failed)?;
+    let estimates = network.nodes()[0].estimates();
+    let squared = truths.iter().zip(estimates).skip(WARM_UP);
+    let gap = |(truth, estimate): (&f64, &Vec<f64>)| (truth - estimate.first().copied().unwrap_or(0.0)).powi(2);
+    let count = slots.saturating_sub(WARM_UP).max(1) as f64;
+    let noted = network.ledger().faults().disagreements as f64;
+    Ok([
+        squared.map(gap).sum::<f64>() / count,
+        f64::from(recovery),
+        100.0 * noted / slots as f64,
+    ])
+}
+
+impl Figure for Faulty {
+    type Parameters = Parameters;
+    type Tables = Vec<Row>;
+
+    fn about(&self) -> About {
+        About {
+            id: "network-faults",
+            title: "What faults cost",
+            caption: "Four one-bit sensors of the scalar world under lost frames, inverted bits, random delays and dying sensors. Told the \
+                      prediction in full, a sensor loses only the slot whose question is lost; following by echo, it must first be given the \
+                      belief again, which takes two slots and grows with the loss. Right: slots until a restarted sensor answers.",
+            source: "our own comparison",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = 2;
+        p.slots = 80;
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        let levels = [
+            ("loss", p.loss.clone()),
+            ("flips", p.crossover.clone()),
+            ("delay", p.delay.clone()),
+            ("deaths", p.deaths.iter().map(|n| f64::from(*n)).collect()),
+        ];
+        let mut points = Vec::new();
+        for (fault, levels) in &levels {
+            for level in levels {
+                points.extend([false, true].map(|echoed| Point {
+                    fault,
+                    level: *level,
+                    echoed,
+                }));
+            }
+        }
+        let sums = context.sweep(
+            "network-faults",
+            p.trials,
+            &points,
+            |point| format!("{} {}", point.fault, point.level),
+            |_| [Moments::default(); 3],
+            |point, sums, it| {
+                let numbers = run(point, it.stream, p.slots)?;
+                sums.iter_mut().zip(numbers).for_each(|(sum, x)| sum.add(x));
+                Ok::<_, Error>(())
+            },
+        )?;
+        let row = |(point, sums): (&Point, &[Moments; 3])| Row {
+            fault: point.fault,
+            level: point.level,
+            feedback: if point.echoed { "echoed" } else { "told" },
+            rmse: Measured::root_mean(&sums[0]),
+            recovery: Measured::mean(&sums[1]),
+            disagreements: Measured::mean(&sums[2]),
+        };
+        Ok(points.iter().zip(&sums).map(row).collect())
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let at = |fault: &str, level: f64, feedback: &str| {
+            rows.iter()
+                .find(|r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
+        };
+        let gap = |feedback| {
+            at("loss", 0.0, feedback)
+                .zip(at("loss", 0.6, feedback))
+                .map(|(none, much)| much.rmse.value - none.rmse.value)
+        };
+        for feedback in ["told", "echoed"] {
+            claims
+                .above(format!("loss-{feedback}"), "lost frames cost accuracy", gap(feedback), 0.0)
+                .at_defaults();
+        }
+        let worse = at("loss", 0.4, "echoed")
+            .zip(at("loss", 0.4, "told"))
+            .map(|(e, t)| e.rmse.value / t.rmse.value);
+        claims
+            .above("replicas", "over links that lose much, replicas do worse than questions in full", worse, 1.0)
+            .at_full_trials()
+            .at_defaults();
+        let clean = at("loss", 0.0, "echoed")
+            .zip(at("loss", 0.0, "told"))
+            .map(|(e, t)| (e.recovery.value, t.recovery.value));
+        claims
+            .near(
+                "recovery-told",
+                "a restarted sensor that is told answers in the next slot",
+                clean.map(|c| c.1),
+                1.0,
+                0.0,
+            )
+            .at_defaults();
+        claims
+            .near(
+                "recovery-echoed",
+                "one that follows by echo answers in the slot after",
+                clean.map(|c| c.0),
+                2.0,
+                0.0,
+            )
+            .at_defaults();
+        let restart = at("loss", 0.0, "told").map(|r| r.disagreements.value);
+        claims
+            .near("told", "without faults on air nobody disagrees with a centre that tells", restart, 0.0, 0.0)
+            .at_defaults();
+        let lossy = rows
+            .iter()
+            .filter(|r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
+        claims.all("noted", "replicas that miss frames are seen to disagree", lossy, |r| r.disagreements.value > 0.0);
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
+        let mut panels = Vec::new();
+        for (fault, label) in [
+            ("loss", "probability of loss"),
+            ("flips", "probability of an inverted bit"),
+            ("delay", "mean delay / slots"),
+            ("deaths", "sensors that died"),
+        ] {
+            let of = |feedback: &'static str| rows.iter().filter(move |r| r.fault == fault && r.feedback == feedback);
+            let axis = || {
+                if fault == "flips" {
+                    Axis::log(label)
+                } else {
+                    Axis::linear(label)
+                }
+            };
+            let both = |panel: Panel, of_row: fn(&Row) -> Measured| {
+                panel
+                    .with(Layer::measured("told", of("told"), |r: &Row| (r.level, of_row(r))).coloured(0))
+                    .with(
+                        Layer::measured("following by echo", of("echoed"), |r: &Row| (r.level, of_row(r))).coloured(1),
+                    )
+            };
+            panels.push(both(Panel::new("error", axis(), Axis::linear("RMSE")), |r| r.rmse));
+            panels.push(both(Panel::new("recovery of a restarted sensor", axis(), Axis::linear("slots")), |r| {
+                r.recovery
+            }));
+        }
+        Plot::grid(2, panels)
+    }
+}

@@ -1,0 +1,270 @@
+//! Error against bits, transmitted bits and joules: every scheme on the same worlds.
+
+use super::worlds::{self, COEFFICIENT, Scheme};
+use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::{About, Claims, Comparison, Context, Cost, Error, Figure, Measured};
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Slots of a run.
+    #[garde(range(min = 40, max = 100_000))]
+    slots: usize,
+    /// Runs of each scheme.
+    #[garde(range(min = 2, max = 100_000))]
+    trials: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self { slots: 300, trials: 20 }
+    }
+}
+
+/// One scheme with one setting in one world.
+#[derive(Serialize, JsonSchema)]
+pub struct Row {
+    /// scalar: AR(1), a = 0.95, process variance 0.2; plane: constant velocity. Four sensors of unit noise.
+    world: &'static str,
+    /// The scheme.
+    scheme: &'static str,
+    /// Its setting: K sensors, m bits, n messages in a slot, L levels, M components at resolution r.
+    setting: String,
+    /// How sensors learn the question: told it in full, following by echo, not at all; or the belief travels.
+    feedback: &'static str,
+    /// Root mean squared error of the state, or of the position.
+    rmse: Measured,
+    /// Payload bits of reports (of beliefs, where these travel) in a slot.
+    #[schemars(extend("unit" = "bit"))]
+    payload: Measured,
+    /// Bits on air in a slot: all frames of all nodes with preambles, headers, checks and feedback.
+    #[schemars(extend("unit" = "bit"))]
+    air: Measured,
+    /// Energy of all radios in a slot.
+    #[schemars(extend("unit" = "J"))]
+    energy: Measured,
+    /// What no scheme can beat with so many payload bits and no information in silence (scalar), or with all measurements (plane).
+    floor: f64,
+    /// Nothing else has a smaller error with at most as many payload bits.
+    best_by_payload: &'static str,
+    /// The same by bits on air.
+    best_by_air: &'static str,
+    /// The same by energy.
+    best_by_energy: &'static str,
+}
+
+/// The comparison.
+pub struct Frontier;
+
+/// Least root mean squared error at `rate` bits a slot: the error of the Kalman filter of all measurements, and on top the causal
+/// rate-distortion function of its estimate, an AR(1) process of innovation variance `before - after`.
+fn floor_at(rate: f64, [before, after]: [f64; 2]) -> f64 {
+    (after + (before - after) / (4.0_f64.powf(rate) - COEFFICIENT * COEFFICIENT)).sqrt()
+}
+
+fn marks(rows: &[Row], of: impl Fn(&Row) -> f64) -> Vec<&'static str> {
+    let beaten = |row: &Row| {
+        rows.iter().any(|other| {
+            other.world == row.world
+                && of(other) <= of(row)
+                && other.rmse.value <= row.rmse.value
+                && (of(other) < of(row) || other.rmse.value < row.rmse.value)
+        })
+    };
+    rows.iter().map(|row| if beaten(row) { "no" } else { "yes" }).collect()
+}
+
+fn rows_of(world: &'static str, schemes: &[Scheme], runs: &Comparison<5>, floor: impl Fn(f64) -> f64) -> Vec<Row> {
+    let row = |(i, scheme): (usize, &Scheme)| {
+        let mean = |of: usize| Measured::mean(&runs.moments(i, of));
+        let payload = mean(1);
+        Row {
+            world,
+            scheme: scheme.family(),
+            setting: scheme.setting(),
+            feedback: scheme.talk(),
+            rmse: Measured::root_mean(&runs.moments(i, 0)),
+            payload,
+            air: mean(2),
+            energy: mean(3),
+            floor: floor(payload.value),
+            best_by_payload: "",
+            best_by_air: "",
+            best_by_energy: "",
+        }
+    };
+    schemes.iter().enumerate().map(row).collect()
+}
+
+impl Figure for Frontier {
+    type Parameters = Parameters;
+    type Tables = Vec<Row>;
+
+    fn about(&self) -> About {
+        About {
+            id: "network-frontier",
+            title: "One frontier for all schemes",
+            caption: "Root mean squared error of every scheme against its payload, against all bits on air, and against the energy of \
+                      all radios (CC2420 at 0 dBm), on the same scalar and plane worlds with four sensors. Crosses mark what nothing else \
+                      beats in both. By payload one bit a sensor is the bargain; on air a frame's overhead of 200 bits buries the difference \
+                      between one bit and 32, so that few frames win.",
+            source: "our own comparison",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = 2;
+        p.slots = 60;
+    }
+
+    fn cost(&self, p: &Parameters) -> Cost {
+        Cost {
+            seconds: 2e-2 * (p.trials * p.slots as u64) as f64,
+            bytes: 1e8,
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        let (scalar, plane) = (worlds::scalar()?, worlds::plane()?);
+        let (of_scalar, of_plane) = (worlds::scalar_schemes(), worlds::plane_schemes());
+        let one =
+            |name: &str,
+             schemes: &[Scheme],
+             run: &(dyn Fn(Scheme, fewbits_monte_carlo::Stream) -> Result<worlds::Bill, Error> + Sync)| {
+                let all = context.compare(
+                    "network-frontier",
+                    p.trials,
+                    &[name],
+                    |name| (*name).to_owned(),
+                    schemes,
+                    |_, scheme, it| run(*scheme, it.stream).map(|bill| bill.numbers()),
+                )?;
+                all.into_iter()
+                    .next()
+                    .ok_or_else(|| Error::Table("no world".to_owned()))
+            };
+        let in_scalar = one("scalar", &of_scalar, &|scheme, stream| scalar.run(scheme, stream, p.slots))?;
+        let in_plane = one("plane", &of_plane, &|scheme, stream| plane.run(scheme, stream, p.slots))?;
+        let (least, everything) = (scalar.everything()?, plane.everything()?[1].sqrt());
+        let mut rows = rows_of("scalar", &of_scalar, &in_scalar, |rate| floor_at(rate, least));
+        rows.extend(rows_of("plane", &of_plane, &in_plane, |_| everything));
+        let by = [
+            marks(&rows, |r| r.payload.value),
+            marks(&rows, |r| r.air.value),
+            marks(&rows, |r| r.energy.value),
+        ];
+        for (i, row) in rows.iter_mut().enumerate() {
+            (row.best_by_payload, row.best_by_air, row.best_by_energy) = (by[0][i], by[1][i], by[2][i]);
+        }
+        Ok(rows)
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let find = |world: &str, scheme: &str, setting: &str, feedback: &str| {
+            rows.iter()
+                .find(|r| (r.world, r.scheme, r.setting.as_str(), r.feedback) == (world, scheme, setting, feedback))
+        };
+        let ratio = |a: Option<&Row>, b: Option<&Row>, of: fn(&Row) -> f64| a.zip(b).map(|(a, b)| of(a) / of(b));
+        let slack = |r: &&Row| r.floor - 4.0 * r.rmse.standard_error.unwrap_or(0.0);
+        let loud = || rows.iter().filter(|r| r.scheme != "CFwMD" && r.scheme != "CFwMD2");
+        claims.all("floor", "no scheme that pays for every symbol beats the floor", loud(), |r| {
+            r.rmse.value >= slack(&r)
+        });
+        claims.all("overhead", "air time is never below payload", rows, |r| r.air.value >= r.payload.value);
+        for world in ["scalar", "plane"] {
+            let fine = find(world, "all-send", "32 bit", "none");
+            let last = |bits: &str| ratio(find(world, "innovation-words", bits, "echoed"), fine, |r| r.rmse.value);
+            claims
+                .at_most(
+                    format!("four-bits-{world}"),
+                    "four bits a sensor come within five per cent of everything",
+                    last("m=4"),
+                    1.05,
+                )
+                .at_full_trials();
+            let words = ["m=1", "m=2", "m=3", "m=4"];
+            claims
+                .decreasing(format!("bits-{world}"), "more bits, less error", words.map(last))
+                .at_full_trials();
+            let told = ratio(
+                find(world, "innovation-words", "m=1", "told"),
+                find(world, "innovation-words", "m=1", "echoed"),
+                |r| r.air.value,
+            );
+            claims.above(format!("echo-{world}"), "an echo is cheaper on air than the question in full", told, 1.0);
+            let same = ratio(
+                find(world, "innovation-words", "m=2", "told"),
+                find(world, "innovation-words", "m=2", "echoed"),
+                |r| r.rmse.value,
+            );
+            claims.near(format!("same-{world}"), "and the estimates are the same", same, 1.0, 1e-12);
+            let energy = ratio(find(world, "innovation-words", "m=1", "echoed"), fine, |r| r.energy.value);
+            claims.at_least(
+                format!("frames-{world}"),
+                "one bit a sensor needs more than half of the radio energy of 32: frames cost, not bits",
+                energy,
+                0.5,
+            );
+        }
+        let silent =
+            ratio(find("plane", "CFwMD", "n=1", "echoed"), find("plane", "innovation-words", "m=1", "echoed"), |r| {
+                r.energy.value
+            });
+        claims.below("silence", "one message a slot costs less energy than four sensors of one bit", silent, 1.0);
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
+        type Of = fn(&Row) -> f64;
+        let axes: [(&str, Of, fn(&Row) -> &'static str); 3] = [
+            ("payload / (bit/slot)", |r| r.payload.value, |r| r.best_by_payload),
+            ("bits on air / (bit/slot)", |r| r.air.value, |r| r.best_by_air),
+            ("radio energy / (mJ/slot)", |r| 1e3 * r.energy.value, |r| r.best_by_energy),
+        ];
+        let mut families: Vec<&'static str> = Vec::new();
+        for row in rows {
+            if !families.contains(&row.scheme) {
+                families.push(row.scheme);
+            }
+        }
+        let mut panels = Vec::new();
+        for world in ["scalar", "plane"] {
+            for (i, (label, of, best)) in axes.iter().enumerate() {
+                let mut panel = Panel::new(world, Axis::log(*label), Axis::log("RMSE")).legend(match (world, i) {
+                    ("scalar", 2) => Legend::Outside,
+                    _ => Legend::Hidden,
+                });
+                let here = || rows.iter().filter(|r| r.world == world);
+                if i == 0 {
+                    let mut floor = points(here(), |r| (of(r), r.floor));
+                    floor.sort_by(|a, b| a.0.total_cmp(&b.0));
+                    panel = panel.with(Layer::dashed("floor", floor).coloured(7));
+                }
+                for (colour, family) in families.iter().enumerate() {
+                    let points = points(here().filter(|r| r.scheme == *family), |r| (of(r), r.rmse.value));
+                    panel = panel.with(Layer::points(*family, points).coloured(colour));
+                }
+                let mut frontier = points(here().filter(|r| best(r) == "yes"), |r| (of(r), r.rmse.value));
+                frontier.sort_by(|a, b| a.0.total_cmp(&b.0));
+                panels.push(panel.with(Layer::line("nothing beats these", frontier).coloured(0)));
+            }
+        }
+        Plot::grid(3, panels)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::floor_at;
+
+    #[test]
+    fn without_bits_the_floor_is_the_stationary_variance_and_with_many_the_kalman_filter() {
+        let stationary = super::worlds::PROCESS / (1.0 - super::COEFFICIENT * super::COEFFICIENT);
+        let both = super::worlds::scalar().unwrap().everything().unwrap();
+        assert!((floor_at(0.0, both).powi(2) / stationary - 1.0).abs() < 1e-9);
+        assert!((floor_at(60.0, both).powi(2) / both[1] - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,14 @@
+//! All schemes over one simulated network: figures.
+
+mod faults;
+mod frontier;
+mod lifetime;
+mod scale;
+mod worlds;
+
+use crate::AnyFigure;
+
+/// The figures of this system.
+pub fn figures() -> Vec<&'static dyn AnyFigure> {
+    vec![&frontier::Frontier, &faults::Faulty, &lifetime::Lifetime, &scale::Scale]
+}

@@ -1,0 +1,224 @@
+//! Time and memory of the runner against the number of nodes.
+
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Cost, Error, Figure};
+use fewbits_core::BitString;
+use fewbits_network::{
+    Context as Air, Field, Frame, Instant, Kind, Protocol, Radio, Seconds, SensorId, Setup, Simulator,
+};
+use fewbits_topology::Deployment;
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Nodes, on average ten in range of each.
+    #[garde(length(min = 1), inner(range(min = 2, max = 10_000_000)))]
+    nodes: Vec<u64>,
+    /// Slots; in each every node sends one bit towards node 0.
+    #[garde(range(min = 1, max = 10_000))]
+    slots: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            nodes: vec![1_000, 10_000, 100_000, 1_000_000],
+            slots: 2,
+        }
+    }
+}
+
+/// One size.
+#[derive(Serialize, JsonSchema)]
+pub struct Row {
+    /// Nodes.
+    nodes: u64,
+    /// Nodes that reach node 0.
+    connected: u64,
+    /// Events handled.
+    events: u64,
+    /// Bits on air.
+    #[schemars(extend("unit" = "bit"))]
+    air: u64,
+    /// Memory of the network after the run.
+    #[schemars(extend("unit" = "byte"))]
+    bytes: u64,
+    /// The same for each node.
+    #[schemars(extend("unit" = "byte"))]
+    bytes_per_node: f64,
+}
+
+/// Times of one size.
+#[derive(Serialize, JsonSchema)]
+pub struct Time {
+    /// Nodes.
+    nodes: u64,
+    /// Time to lay out the network.
+    #[schemars(extend("unit" = "s"))]
+    layout: f64,
+    /// Time of an event.
+    #[schemars(extend("unit" = "us"))]
+    event: f64,
+}
+
+/// What was counted, and what was timed.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Counts.
+    sizes: Vec<Row>,
+    /// Times on this machine.
+    #[schemars(extend("volatile" = true))]
+    times: Vec<Time>,
+}
+
+/// The runner's own costs.
+pub struct Scale;
+
+/// Every node sends one bit towards node 0 in each slot.
+struct Collect {
+    parents: Vec<u32>,
+    slots: u64,
+}
+
+/// A tenth of a second.
+const SLOT: u64 = 100_000_000;
+
+impl Protocol for Collect {
+    /// Bits received.
+    type Node = u32;
+
+    fn on_timer(&self, _: &mut u32, air: &mut Air<'_>, token: u32) -> Result<(), fewbits_network::Error> {
+        let parent = self.parents[air.id().index()];
+        let bit = BitString::from_bytes(vec![0x80], 1)?;
+        air.send(SensorId(parent), Frame::new(Kind::Report, token, 0, bit))?;
+        if u64::from(token) < self.slots {
+            air.at(Instant(air.now().0 + SLOT), token + 1);
+        }
+        Ok(())
+    }
+
+    fn on_frame(&self, node: &mut u32, _: &mut Air<'_>, _: SensorId, _: &Frame) -> Result<(), fewbits_network::Error> {
+        *node += 1;
+        Ok(())
+    }
+
+    fn on_restart(&self, _: &mut u32, _: &mut Air<'_>) -> Result<(), fewbits_network::Error> {
+        Ok(())
+    }
+}
+
+fn measure(context: &Context<'_>, nodes: u64, slots: u64) -> Result<(Row, Time), Error> {
+    let failed = |error: fewbits_network::Error| Error::failed(error);
+    let started = std::time::Instant::now();
+    let stream = context.stream("network-scale").indexed(nodes);
+    // Ten nodes in range on average: 10 / (pi 10^2) to the square metre.
+    let side = (nodes as f64 * 10.0 * std::f64::consts::PI).sqrt();
+    let deployment = Deployment::uniform(&mut stream.named("field").rng(), [0.0; 2], [side; 2], nodes as usize);
+    let field = Field::new(&deployment.map_err(Error::failed)?, 10.0).map_err(failed)?;
+    let routes = field.graph().hops_from(0).map_err(Error::failed)?;
+    let parents = (0..nodes as usize)
+        .map(|node| routes.parent(node).map_or(u32::MAX, |parent| parent as u32))
+        .collect();
+    let connected: Vec<u32> = routes.reached().to_vec();
+    let layout = started.elapsed().as_secs_f64();
+    let protocol = Collect { parents, slots };
+    let setup = Setup::new(Radio::cc2420(0.0)?, stream);
+    let mut network = Simulator::new(protocol, vec![0; nodes as usize], field, setup).map_err(failed)?;
+    for node in connected.iter().skip(1) {
+        // Spread over the slot.
+        let phase = u64::from(*node).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 38;
+        network.start(SensorId(*node), Instant(phase), 1).map_err(failed)?;
+    }
+    let started = std::time::Instant::now();
+    let end = Instant::default().after(Seconds::new(0.1 * (slots + 2) as f64)?);
+    let events = network.run_until(end).map_err(failed)?;
+    let event = started.elapsed().as_secs_f64() * 1e6 / events.max(1) as f64;
+    let bytes = network.memory() as u64;
+    let row = Row {
+        nodes,
+        connected: connected.len() as u64,
+        events,
+        air: network.ledger().messages().air.0,
+        bytes,
+        bytes_per_node: bytes as f64 / nodes as f64,
+    };
+    Ok((row, Time { nodes, layout, event }))
+}
+
+impl Figure for Scale {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "network-scale",
+            title: "A million nodes",
+            caption: "Memory of the simulated network and time of an event against the number of nodes, each of which sends a bit \
+                      towards a root in every slot. Memory is linear; an event costs a little more where the queue leaves the cache.",
+            source: "our own measurement",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.nodes.retain(|nodes| *nodes <= 10_000);
+    }
+
+    fn cost(&self, p: &Parameters) -> Cost {
+        let nodes: u64 = p.nodes.iter().sum();
+        Cost {
+            seconds: 1e-5 * (nodes * p.slots) as f64,
+            bytes: 1e3 * p.nodes.iter().max().copied().unwrap_or(0) as f64,
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let mut rows = Rows {
+            sizes: Vec::new(),
+            times: Vec::new(),
+        };
+        for nodes in &p.nodes {
+            context.check()?;
+            let (size, time) = measure(context, *nodes, p.slots)?;
+            rows.sizes.push(size);
+            rows.times.push(time);
+        }
+        Ok(rows)
+    }
+
+    fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let gibibyte = (1_u64 << 30) as f64 / 1e6;
+        claims.all(
+            "memory",
+            "a million nodes fit into 1 GiB: 1073 bytes a node, from 10^4 nodes on",
+            &rows.sizes,
+            |r| r.nodes < 10_000 || r.bytes_per_node <= gibibyte,
+        );
+        claims.all(
+            "events",
+            "every node that reaches the root sends and is received in every slot",
+            &rows.sizes,
+            |r| r.events == 2 * p.slots * (r.connected - 1),
+        );
+        claims.all("air", "each time 201 bits", &rows.sizes, |r| r.air == 201 * p.slots * (r.connected - 1));
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let nodes = || Axis::log("nodes");
+        let memory = points(&rows.sizes, |r| (r.nodes as f64, r.bytes as f64 / 1e6));
+        let limit = points(&rows.sizes, |r| (r.nodes as f64, 1073.741_824));
+        let times = points(&rows.times, |r| (r.nodes as f64, r.event));
+        Plot::grid(
+            2,
+            vec![
+                Panel::new("memory", nodes(), Axis::log("MB"))
+                    .with(Layer::line("network", memory))
+                    .with(Layer::dashed("1 GiB", limit)),
+                Panel::new("time", nodes(), Axis::linear("us an event")).with(Layer::line("event", times)),
+            ],
+        )
+    }
+}

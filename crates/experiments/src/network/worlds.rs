@@ -1,0 +1,475 @@
+//! The two worlds of the comparison, and every scheme over them.
+//!
+//! A scheme that is added here is in all figures: give it a [`Scheme`], its label, and an arm of [`World::run`].
+
+use crate::Error;
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
+use fewbits_cfwmd::network::Network;
+use fewbits_cfwmd::threshold::Budget;
+use fewbits_core::factor::Value;
+use fewbits_core::{Belief, Gaussian, LinearDynamics, Link, NumberFormat, Observed, Sensing};
+use fewbits_densities::wire::WireFormat;
+use fewbits_densities::{Mixture, Reduction};
+use fewbits_dymbo::{CountFusion, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarPlant};
+use fewbits_filters::{AssumedDensity, kalman};
+use fewbits_handoff::{Coded, HandoffFilter};
+use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
+use fewbits_monte_carlo::Stream;
+use fewbits_network::estimators::{Bits, Censors, Counted, Leaders, LookUp, Patterns, Reporting, SendAll};
+use fewbits_network::{Clock, Field, Ledger, Radio, Replicable, Seconds, SensorId, Setup, Star, Walk};
+use fewbits_quantizer_design::{Criterion, Newton, Scene, System, design};
+use fewbits_quantizers::{Labelling, Quantizer, QuantizingSensor, lloyd_max};
+use nalgebra::{Matrix4, SVector, Vector1, Vector4};
+use serde::Serialize;
+
+/// Sensors of either world; their noise has unit variance.
+pub(super) const SENSORS: usize = 4;
+/// Coefficient of the scalar world.
+pub(super) const COEFFICIENT: f64 = 0.95;
+/// Process variance of the scalar world.
+pub(super) const PROCESS: f64 = 0.2;
+/// Acceleration variance of the target in the plane.
+const ACCELERATION: f64 = 0.05;
+/// Slots before errors count.
+const WARM_UP: usize = 20;
+/// Length of a slot of the comparison.
+const PERIOD: f64 = 0.1;
+/// Distance of the sensors from the centre, metres.
+pub(super) const RADIUS: f64 = 20.0;
+
+/// How sensors learn the question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub(super) enum Talk {
+    Told,
+    Echoed,
+}
+
+/// A scheme with its setting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Scheme {
+    /// One-bit sensors under one threshold.
+    SignBits { sensors: usize, talk: Talk },
+    /// One sensor with a word of the innovation.
+    Word { bits: usize, talk: Talk },
+    /// All sensors with a word of the innovation.
+    Words { bits: usize, talk: Talk },
+    /// Censoring sensors; expected messages in a slot, and whether the covariance is shared.
+    Censored { messages: f64, shared: bool, talk: Talk },
+    /// Every measurement, in single precision or a few bits.
+    AllSend { coarse: bool },
+    /// Lloyd-Max quantizers and a table.
+    LloydMax { levels: usize },
+    /// Quantizers designed by mutual information, and a table.
+    Information { levels: usize },
+    /// One-bit quantizers of patterned cells, and a table.
+    Patterned,
+    /// Lloyd-Max quantizers into the assumed-density filter.
+    Filtered { levels: usize },
+    /// A coded mixture from leader to leader.
+    Handoff { components: usize, resolution: f64 },
+}
+
+impl Scheme {
+    /// The scheme without its setting.
+    pub(super) fn family(&self) -> &'static str {
+        match self {
+            Self::SignBits { .. } => "Dymbo",
+            Self::Word { .. } => "Dymbo-multibit",
+            Self::Words { .. } => "innovation-words",
+            Self::Censored { shared: false, .. } => "CFwMD",
+            Self::Censored { shared: true, .. } => "CFwMD2",
+            Self::AllSend { .. } => "all-send",
+            Self::LloydMax { .. } => "Lloyd-Max-table",
+            Self::Information { .. } => "MI-table",
+            Self::Patterned => "patterns-table",
+            Self::Filtered { .. } => "Lloyd-Max-filter",
+            Self::Handoff { .. } => "hand-off",
+        }
+    }
+
+    pub(super) fn setting(&self) -> String {
+        match self {
+            Self::SignBits { sensors, .. } => format!("K={sensors}"),
+            Self::Word { bits, .. } | Self::Words { bits, .. } => format!("m={bits}"),
+            Self::Censored { messages, .. } => format!("n={messages}"),
+            Self::AllSend { coarse } => if *coarse { "few bits" } else { "32 bit" }.to_owned(),
+            Self::LloydMax { levels } | Self::Information { levels } | Self::Filtered { levels } => {
+                format!("L={levels}")
+            }
+            Self::Patterned => "K=4".to_owned(),
+            Self::Handoff { components, resolution } => format!("M={components} r={resolution}"),
+        }
+    }
+
+    pub(super) fn talk(&self) -> &'static str {
+        match self {
+            Self::SignBits { talk, .. }
+            | Self::Word { talk, .. }
+            | Self::Words { talk, .. }
+            | Self::Censored { talk, .. } => match talk {
+                Talk::Told => "told",
+                Talk::Echoed => "echoed",
+            },
+            Self::AllSend { .. }
+            | Self::LloydMax { .. }
+            | Self::Information { .. }
+            | Self::Patterned
+            | Self::Filtered { .. } => "none",
+            Self::Handoff { .. } => "travels",
+        }
+    }
+}
+
+/// The schemes of the scalar world.
+pub(super) fn scalar_schemes() -> Vec<Scheme> {
+    let mut all = plane_schemes();
+    for talk in [Talk::Told, Talk::Echoed] {
+        all.extend([1, 2, 4].map(|sensors| Scheme::SignBits { sensors, talk }));
+        all.extend([2, 3, 4].map(|bits| Scheme::Word { bits, talk }));
+    }
+    all.extend([2, 4, 8].map(|levels| Scheme::LloydMax { levels }));
+    all.extend([2, 4, 8].map(|levels| Scheme::Filtered { levels }));
+    all.extend([2, 4].map(|levels| Scheme::Information { levels }));
+    all.push(Scheme::Patterned);
+    all
+}
+
+/// The schemes that the plane has too.
+pub(super) fn plane_schemes() -> Vec<Scheme> {
+    let mut all = Vec::new();
+    for talk in [Talk::Told, Talk::Echoed] {
+        all.extend([1, 2, 3, 4].map(|bits| Scheme::Words { bits, talk }));
+        for shared in [false, true] {
+            all.extend([0.25, 0.5, 1.0, 2.0].map(|messages| Scheme::Censored { messages, shared, talk }));
+        }
+    }
+    all.extend([true, false].map(|coarse| Scheme::AllSend { coarse }));
+    for components in [1, 3] {
+        all.extend([1.0, 0.25].map(|resolution| Scheme::Handoff { components, resolution }));
+    }
+    all
+}
+
+/// What one run came to, a slot on average.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bill {
+    /// Squared error.
+    pub(super) squared: f64,
+    /// Payload bits of reports, or of beliefs that travel.
+    pub(super) reports: f64,
+    /// Bits on air with everything.
+    pub(super) air: f64,
+    /// Energy of all radios, J.
+    pub(super) joules: f64,
+    /// Energy of the busiest sensor's radio beyond what it takes asleep, J.
+    pub(super) busiest: f64,
+}
+
+impl Bill {
+    pub(super) fn numbers(&self) -> [f64; 5] {
+        [self.squared, self.reports, self.air, self.joules, self.busiest]
+    }
+
+    /// `first` is the first node that is a sensor.
+    fn of(ledger: &Ledger, first: usize, squared: f64, slots: usize) -> Self {
+        let (n, all) = (slots as f64, ledger.messages());
+        let sensors = &ledger.accounts()[first..];
+        let asleep = Radio::cc2420(0.0).map_or(0.0, |radio| radio.sleep.value());
+        let spent = |a: &fewbits_network::Account| a.sending.value() + a.receiving.value() - asleep * a.awake.value();
+        Self {
+            squared,
+            reports: sensors.iter().map(|account| account.payload.0 as f64).sum::<f64>() / n,
+            air: all.air.0 as f64 / n,
+            joules: (all.sending.value() + all.receiving.value()) / n,
+            busiest: sensors.iter().map(spent).fold(0.0, f64::max) / n,
+        }
+    }
+}
+
+/// A world: how it moves, who senses it, and what is known of it beforehand.
+#[derive(Debug, Clone)]
+pub(super) struct World<const D: usize, G> {
+    dynamics: G,
+    sensors: Vec<LinearSensor<D, 1>>,
+    start: Gaussian<D>,
+    /// What all-send and the censoring sensors send in.
+    fine: NumberFormat,
+    coarse: NumberFormat,
+    /// Coordinates that count.
+    counted: &'static [usize],
+}
+
+type Truths<const D: usize> = Vec<SVector<f64, D>>;
+type Measurements = Vec<Vec<Vector1<f64>>>;
+
+/// The scalar world, in its stationary state.
+pub(super) fn scalar() -> Result<World<1, Ar1>, Error> {
+    let dynamics = Ar1::new(COEFFICIENT, PROCESS).map_err(Error::failed)?;
+    let variance = dynamics.stationary_variance().map_err(Error::failed)?;
+    Ok(World {
+        dynamics,
+        sensors: vec![LinearSensor::direct(1.0).map_err(Error::failed)?; SENSORS],
+        start: Gaussian::scalar(0.0, variance)?,
+        fine: NumberFormat::Single,
+        coarse: NumberFormat::fixed(-8.0, 8.0, 8)?,
+        counted: &[0],
+    })
+}
+
+/// A target in the plane at about constant velocity; two sensors of either coordinate.
+pub(super) fn plane() -> Result<World<4, LinearGaussian<4, 2>>, Error> {
+    let along = [Vector4::new(1.0, 0.0, 0.0, 0.0), Vector4::new(0.0, 0.0, 1.0, 0.0)];
+    let sensor = |i: usize| LinearSensor::scalar(along[i % 2], 1.0).map_err(Error::failed);
+    Ok(World {
+        dynamics: constant_velocity_2d(1.0, ACCELERATION).map_err(Error::failed)?,
+        sensors: (0..SENSORS).map(sensor).collect::<Result<_, _>>()?,
+        start: Gaussian::new(Vector4::new(0.0, 1.0, 0.0, -1.0), Matrix4::identity() * 0.5)?,
+        fine: NumberFormat::Single,
+        coarse: NumberFormat::fixed(-256.0, 256.0, 10)?,
+        counted: &[0, 2],
+    })
+}
+
+/// The question of an innovation word under unit noise.
+fn asked(expected: &Gaussian<1>) -> Prediction {
+    Prediction {
+        mean: expected.mean()[0],
+        deviation: (expected.covariance()[0] + 1.0).sqrt(),
+    }
+}
+
+fn nothing(_: &Gaussian<1>) {}
+
+impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
+    /// The least squared error of all measurements, by the Kalman filter that has them all: before and after those of a slot.
+    pub(super) fn everything(&self) -> Result<[f64; 2], Error> {
+        let of = |b: &Gaussian<D>| self.counted.iter().map(|i| b.covariance()[(*i, *i)]).sum();
+        let (mut belief, mut last) = (self.start, [0.0; 2]);
+        for _ in 0..500 {
+            let predicted = kalman::predict(&self.dynamics, &belief);
+            belief = predicted;
+            for sensor in &self.sensors {
+                let expected = sensor.mean(belief.mean());
+                belief = kalman::update(sensor, &belief, &expected).map_err(Error::failed)?.0;
+            }
+            last = [of(&predicted), of(&belief)];
+        }
+        Ok(last)
+    }
+
+    fn draw(&self, stream: Stream, slots: usize) -> (Truths<D>, Measurements) {
+        let mut rng = stream.named("world").rng();
+        let mut state = self.start.sample(&mut rng);
+        let slot = |_| {
+            state = self.dynamics.propagate(&mut rng, &state);
+            let measured = self.sensors.iter().map(|sensor| sensor.sample(&mut rng, &state));
+            (state, measured.collect())
+        };
+        (0..slots).map(slot).unzip()
+    }
+
+    fn squared(&self, truths: &Truths<D>, estimates: &[Vec<f64>]) -> f64 {
+        let pairs = truths.iter().zip(estimates).skip(WARM_UP);
+        let count = pairs.len().max(1) as f64;
+        let error = |(truth, estimate): (&SVector<f64, D>, &Vec<f64>)| {
+            let gap = |i: &usize| (truth[*i] - estimate.get(*i).copied().unwrap_or(0.0)).powi(2);
+            self.counted.iter().map(gap).sum::<f64>()
+        };
+        pairs.map(error).sum::<f64>() / count
+    }
+
+    fn over_star<E>(&self, e: E, talk: Talk, stream: Stream, slots: usize) -> Result<Bill, Error>
+    where
+        E: Replicable<Measurement = Vector1<f64>>,
+    {
+        let (truths, mut measurements) = self.draw(stream, slots);
+        measurements.iter_mut().for_each(|slot| slot.truncate(e.sensors()));
+        let clock = clock()?;
+        let own = stream.named("filter");
+        let star = match talk {
+            Talk::Told => Star::told(e, measurements, clock, own),
+            Talk::Echoed => Star::echoed(e, measurements, clock, own),
+        };
+        let mut network = star
+            .and_then(|star| star.simulate(RADIUS, setup(stream)?))
+            .map_err(Error::failed)?;
+        network.run_until(clock.end(slots as u32)).map_err(Error::failed)?;
+        let squared = self.squared(&truths, network.nodes()[0].estimates());
+        Ok(Bill::of(network.ledger(), 1, squared, slots))
+    }
+
+    fn words(&self, bits: usize) -> Result<impl Replicable<Measurement = Vector1<f64>> + use<D, G>, Error> {
+        Ok(Reporting {
+            dynamics: self.dynamics.clone(),
+            sensors: self.sensors.clone(),
+            scheme: InnovationWord::new(1.0, bits)?,
+            link: Link::PERFECT,
+            filter: AssumedDensity,
+            broadcast: asked as fn(&Gaussian<1>) -> Prediction,
+            start: self.start,
+        })
+    }
+
+    fn censors(
+        &self,
+        threshold: f64,
+        format: NumberFormat,
+        shared: bool,
+        slots: usize,
+    ) -> Result<Censors<G, LinearSensor<D, 1>, D, 1>, Error> {
+        let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT).map_err(Error::failed)?;
+        if shared {
+            return Ok(Censors::told(network, format, self.dynamics.clone(), self.start));
+        }
+        Censors::own(network, format, self.dynamics.clone(), self.start, slots).map_err(Error::failed)
+    }
+
+    fn handed(&self, components: usize, resolution: f64, stream: Stream, slots: usize) -> Result<Bill, Error> {
+        let (truths, measurements) = self.draw(stream, slots);
+        let reading =
+            |(i, z): (usize, &Vector1<f64>)| Ok(Observed::new(self.sensors[i], Value::new(*z, [[1.0]].into())?));
+        let readings = measurements
+            .iter()
+            .map(|slot| slot.iter().enumerate().map(reading).collect());
+        let format = WireFormat::new(SVector::zeros(), 1e3, 1.0, &[resolution])?;
+        let reducer = Coded {
+            components,
+            reduction: Reduction::default(),
+            format,
+            resolution: 0,
+        };
+        let leaders: Vec<_> = (0..slots).map(|k| SensorId((k % SENSORS) as u32)).collect();
+        let walker = Leaders {
+            filter: HandoffFilter::new(300, reducer).map_err(Error::failed)?,
+            dynamics: self.dynamics.clone(),
+            start: Mixture::single(&self.start)?,
+            readings: readings.collect::<Result<Vec<Vec<_>>, Error>>()?,
+            leaders,
+        };
+        let clock = clock()?;
+        let walk = Walk::new(walker, clock, slots as u32, stream.named("filter"));
+        let field = Field::ring(SENSORS, RADIUS).map_err(Error::failed)?;
+        let run = || -> Result<_, fewbits_network::Error> {
+            let mut network = walk.simulate(field, SensorId(0), setup(stream)?)?;
+            network.run_until(clock.end(slots as u32))?;
+            Ok(network)
+        };
+        let network = run().map_err(Error::failed)?;
+        let mut estimates = vec![Vec::new(); slots];
+        for (slot, mean) in network.nodes().iter().flat_map(|node| node.estimates()) {
+            if let Some(place) = estimates.get_mut(*slot as usize - 1) {
+                place.clone_from(mean);
+            }
+        }
+        Ok(Bill::of(network.ledger(), 0, self.squared(&truths, &estimates), slots))
+    }
+
+    /// A scheme that both worlds have; none if only the scalar one does.
+    fn shared(&self, scheme: Scheme, stream: Stream, slots: usize) -> Result<Option<Bill>, Error> {
+        Ok(Some(match scheme {
+            Scheme::Words { bits, talk } => self.over_star(self.words(bits)?, talk, stream, slots)?,
+            Scheme::Censored { messages, shared, talk } => {
+                let threshold = Budget::new(messages, SENSORS)
+                    .and_then(|b| b.threshold(1))
+                    .map_err(Error::failed)?;
+                self.over_star(self.censors(threshold, self.fine, shared, slots)?, talk, stream, slots)?
+            }
+            Scheme::AllSend { coarse } => {
+                let all = Reporting {
+                    dynamics: self.dynamics.clone(),
+                    sensors: self.sensors.clone(),
+                    scheme: SendAll::new(1.0, if coarse { self.coarse } else { self.fine })?,
+                    link: Link::PERFECT,
+                    filter: AssumedDensity,
+                    broadcast: nothing as fn(&Gaussian<1>),
+                    start: self.start,
+                };
+                self.over_star(all, Talk::Told, stream, slots)?
+            }
+            Scheme::Handoff { components, resolution } => self.handed(components, resolution, stream, slots)?,
+            _ => return Ok(None),
+        }))
+    }
+}
+
+impl World<4, LinearGaussian<4, 2>> {
+    pub(super) fn run(&self, scheme: Scheme, stream: Stream, slots: usize) -> Result<Bill, Error> {
+        let only = || fewbits_numerics::ArgumentError::new("scheme", scheme.family(), "one of the plane");
+        Ok(self.shared(scheme, stream, slots)?.ok_or_else(only)?)
+    }
+}
+
+impl World<1, Ar1> {
+    pub(super) fn run(&self, scheme: Scheme, stream: Stream, slots: usize) -> Result<Bill, Error> {
+        if let Some(bill) = self.shared(scheme, stream, slots)? {
+            return Ok(bill);
+        }
+        let plant = ScalarPlant::new(COEFFICIENT, PROCESS, 1.0)?;
+        let (start, deviation) = (self.start, self.start.standard_deviations()[0]);
+        let scene = || Scene::gaussian(deviation, &[1.0; SENSORS]).map_err(Error::failed);
+        let table = |system: &System| {
+            let look_up = LookUp::new(system, 10_000).map_err(Error::failed)?;
+            self.over_star(look_up, Talk::Told, stream, slots)
+        };
+        match scheme {
+            Scheme::SignBits { sensors, talk } => {
+                let filter = ParallelFilter::new(plant, sensors, CountFusion::Exact)?;
+                let counted = Counted::new(filter, start).map_err(Error::failed)?;
+                self.over_star(counted, talk, stream, slots)
+            }
+            Scheme::Word { bits, talk } => {
+                let filter = MultibitFilter::new(plant, bits)?;
+                self.over_star(Bits { filter, start }, talk, stream, slots)
+            }
+            Scheme::Information { levels } => {
+                let from = System::lloyd_max(scene()?, levels).map_err(Error::failed)?;
+                let best = design::joint(&from, Criterion::MutualInformation, &Newton::default());
+                table(&best.map_err(Error::failed)?.system)
+            }
+            Scheme::LloydMax { levels } => table(&System::lloyd_max(scene()?, levels).map_err(Error::failed)?),
+            Scheme::Patterned => {
+                let edges = [vec![0.0], vec![-1.0, 1.0], vec![0.0], vec![-1.5, 0.0, 1.5]];
+                let sensor = |edges: Vec<f64>| {
+                    let cells = BinaryQuantizer::new(edges.iter().map(|e| e * deviation).collect())?;
+                    PatternSensor::new(cells, 1.0)
+                };
+                let sensors: Vec<_> = edges
+                    .into_iter()
+                    .map(sensor)
+                    .collect::<Result<_, _>>()
+                    .map_err(Error::failed)?;
+                let source = Source::gaussian(deviation).map_err(Error::failed)?;
+                let table = Bank::new(source, sensors.clone()).and_then(|bank| bank.table(Decoder::Mmse));
+                let patterns = Patterns::new(sensors, table.map_err(Error::failed)?, deviation * deviation);
+                self.over_star(patterns.map_err(Error::failed)?, Talk::Told, stream, slots)
+            }
+            Scheme::Filtered { levels } => {
+                let spread = (deviation * deviation + 1.0).sqrt();
+                let design = lloyd_max::gaussian(levels).and_then(|design| design.affine(0.0, spread));
+                let quantizer = Quantizer::from(&design.map_err(Error::failed)?);
+                let labels = Labelling::gray(levels).map_err(Error::failed)?;
+                let reporting = Reporting {
+                    dynamics: self.dynamics,
+                    sensors: self.sensors.clone(),
+                    scheme: QuantizingSensor::new(quantizer, labels, 1.0).map_err(Error::failed)?,
+                    link: Link::PERFECT,
+                    filter: AssumedDensity,
+                    broadcast: nothing as fn(&Gaussian<1>),
+                    start,
+                };
+                self.over_star(reporting, Talk::Told, stream, slots)
+            }
+            other => {
+                Err(fewbits_numerics::ArgumentError::new("scheme", other.family(), "one of the scalar world").into())
+            }
+        }
+    }
+}
+
+pub(super) fn clock() -> Result<Clock, Error> {
+    Ok(Clock::new(Seconds::new(PERIOD)?)?)
+}
+
+pub(super) fn setup(stream: Stream) -> Result<Setup, fewbits_numerics::ArgumentError> {
+    Ok(Setup::new(Radio::cc2420(0.0)?, stream.named("network")))
+}

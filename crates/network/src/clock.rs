@@ -1,0 +1,54 @@
+//! Slots.
+
+use crate::units::{Instant, Seconds};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{positive, within};
+use serde::{Deserialize, Serialize};
+
+/// The slots that all nodes share: slot `k` begins at `k` periods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Clock {
+    period: u64,
+    deadline: u64,
+}
+
+impl Clock {
+    /// Slots of the given length; reports are awaited for nine tenths of it.
+    ///
+    /// # Errors
+    /// If the period is below a microsecond or above 10^6 s.
+    pub fn new(period: Seconds) -> Result<Self, ArgumentError> {
+        within("period", positive("period", period.value())?, 1e-6, 1e6)?;
+        let period = Instant::default().after(period).0;
+        Ok(Self {
+            period,
+            deadline: period / 10 * 9,
+        })
+    }
+
+    /// Length of a slot.
+    pub fn period(&self) -> Seconds {
+        Instant(self.period).since_start()
+    }
+
+    /// Beginning of a slot.
+    pub fn start(&self, slot: u32) -> Instant {
+        Instant(self.period.saturating_mul(u64::from(slot)))
+    }
+
+    /// When the reports of a slot must be there.
+    pub fn deadline(&self, slot: u32) -> Instant {
+        Instant(self.start(slot).0.saturating_add(self.deadline))
+    }
+
+    /// The end of a slot, before the next begins.
+    pub fn end(&self, slot: u32) -> Instant {
+        Instant(self.start(slot.saturating_add(1)).0.saturating_sub(1))
+    }
+
+    /// The slot of an instant.
+    pub fn slot(&self, now: Instant) -> u32 {
+        u32::try_from(now.0 / self.period).unwrap_or(u32::MAX)
+    }
+}

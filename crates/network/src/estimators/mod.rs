@@ -1,0 +1,50 @@
+//! The library's estimators, each as an [`Estimator`](crate::Estimator) or [`Walker`](crate::Walker).
+
+#[cfg(feature = "cfwmd")]
+mod censoring;
+#[cfg(feature = "diffusive")]
+mod diffusive;
+#[cfg(feature = "dymbo")]
+mod dymbo;
+#[cfg(feature = "handoff")]
+mod handoff;
+#[cfg(feature = "look-up")]
+mod look_up;
+mod scheme;
+#[cfg(feature = "cfwmd")]
+mod send_all;
+
+#[cfg(feature = "cfwmd")]
+pub use censoring::{Broadcast, Censors};
+#[cfg(feature = "diffusive")]
+pub use diffusive::SourceChain;
+#[cfg(feature = "dymbo")]
+pub use dymbo::{Bits, Counted};
+#[cfg(feature = "handoff")]
+pub use handoff::Leaders;
+#[cfg(feature = "look-up")]
+pub use look_up::{LookUp, Patterns};
+pub use scheme::Reporting;
+#[cfg(feature = "cfwmd")]
+pub use send_all::SendAll;
+
+#[cfg(any(
+    feature = "cfwmd",
+    feature = "diffusive",
+    feature = "dymbo",
+    feature = "handoff",
+    feature = "look-up"
+))]
+use crate::error::Error;
+
+/// An estimator's own error, in words.
+#[cfg(any(
+    feature = "cfwmd",
+    feature = "diffusive",
+    feature = "dymbo",
+    feature = "handoff",
+    feature = "look-up"
+))]
+fn failed(error: impl std::fmt::Display) -> Error {
+    Error::Estimator(error.to_string())
+}

@@ -1,0 +1,210 @@
+//! Quantities that must not be mixed up.
+
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::non_negative;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::iter::Sum;
+use std::ops::{Add, AddAssign, Mul, Sub};
+
+/// A number of bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Bits(pub u64);
+
+/// Which sensor, or node: its index in the field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct SensorId(pub u32);
+
+impl SensorId {
+    /// Its index.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+macro_rules! quantity {
+    ($(#[$meta:meta])* $name:ident, $unit:literal) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
+        #[serde(try_from = "f64", into = "f64")]
+        pub struct $name(f64);
+
+        impl $name {
+            /// Nothing.
+            pub const ZERO: Self = Self(0.0);
+
+            /// The quantity.
+            ///
+            /// # Errors
+            /// If it is negative or not finite.
+            pub fn new(value: f64) -> Result<Self, ArgumentError> {
+                non_negative($unit, value).map(Self)
+            }
+
+            /// A quantity that the caller knows to be finite and not negative.
+            pub(crate) const fn trusted(value: f64) -> Self {
+                Self(value)
+            }
+
+            /// Its value.
+            pub const fn value(self) -> f64 {
+                self.0
+            }
+        }
+
+        impl TryFrom<f64> for $name {
+            type Error = ArgumentError;
+
+            fn try_from(value: f64) -> Result<Self, ArgumentError> {
+                Self::new(value)
+            }
+        }
+
+        impl From<$name> for f64 {
+            fn from(quantity: $name) -> f64 {
+                quantity.0
+            }
+        }
+
+        impl Add for $name {
+            type Output = Self;
+
+            fn add(self, other: Self) -> Self {
+                Self(self.0 + other.0)
+            }
+        }
+
+        impl AddAssign for $name {
+            fn add_assign(&mut self, other: Self) {
+                self.0 += other.0;
+            }
+        }
+
+        /// The difference, or nothing where it would be negative.
+        impl Sub for $name {
+            type Output = Self;
+
+            fn sub(self, other: Self) -> Self {
+                Self((self.0 - other.0).max(0.0))
+            }
+        }
+
+        impl Sum for $name {
+            fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+                all.fold(Self::ZERO, Add::add)
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "{} {}", self.0, $unit)
+            }
+        }
+    };
+}
+
+quantity!(
+    /// Energy, finite and never negative.
+    Joules,
+    "J"
+);
+quantity!(
+    /// A duration, finite and never negative.
+    Seconds,
+    "s"
+);
+quantity!(
+    /// Power, finite and never negative.
+    Watts,
+    "W"
+);
+
+impl Mul<Seconds> for Watts {
+    type Output = Joules;
+
+    fn mul(self, duration: Seconds) -> Joules {
+        Joules(self.0 * duration.0)
+    }
+}
+
+impl Add for Bits {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
+    }
+}
+
+impl AddAssign for Bits {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl Mul<u64> for Bits {
+    type Output = Self;
+
+    fn mul(self, times: u64) -> Self {
+        Self(self.0.saturating_mul(times))
+    }
+}
+
+impl Sum for Bits {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self(0), Add::add)
+    }
+}
+
+impl fmt::Display for Bits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} bit", self.0)
+    }
+}
+
+impl fmt::Display for SensorId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "node {}", self.0)
+    }
+}
+
+/// A point of simulated time, in nanoseconds: integers, so that ties are ties on every machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Instant(pub u64);
+
+impl Instant {
+    /// The instant so much later, to the nanosecond, and at most the last one that can be told.
+    #[must_use]
+    pub fn after(self, duration: Seconds) -> Self {
+        Self(self.0.saturating_add((duration.0 * 1e9).round() as u64))
+    }
+
+    /// Time since the start.
+    pub fn since_start(self) -> Seconds {
+        Seconds(self.0 as f64 * 1e-9)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantities_are_finite_and_never_negative() {
+        assert!(Joules::new(-1.0).is_err() && Seconds::new(f64::NAN).is_err() && Watts::new(f64::INFINITY).is_err());
+        let (one, two) = (Joules::new(1.0).unwrap(), Joules::new(2.0).unwrap());
+        assert_eq!((one - two, two - one, one + one), (Joules::ZERO, one, two));
+        assert_eq!(Watts::new(2.0).unwrap() * Seconds::new(0.5).unwrap(), one);
+        assert!(serde_json::from_str::<Joules>("-1").is_err());
+        assert_eq!(Bits(u64::MAX) + Bits(1), Bits(u64::MAX));
+    }
+
+    #[test]
+    fn time_saturates() {
+        let late = Instant(5).after(Seconds::new(1e300).unwrap());
+        assert_eq!(late, Instant(u64::MAX));
+        assert_eq!(Instant(0).after(Seconds::new(1.5).unwrap()), Instant(1_500_000_000));
+    }
+}

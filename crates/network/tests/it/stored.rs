@@ -1,0 +1,135 @@
+//! Logs and snapshots: written, read, replayed, continued; the same bytes on any number of threads.
+
+use crate::worlds::{clock, counted, scalar, setup};
+use fewbits_core::Link;
+use fewbits_monte_carlo::Stream;
+use fewbits_network::{
+    Channel, Detail, Error, Fault, Field, Log, Loss, Mishap, Seconds, SensorId, Setup, Simulator, Star,
+};
+use proptest::prelude::*;
+use rayon::prelude::*;
+
+const SLOTS: u32 = 20;
+
+fn faulty(seed: u64) -> Setup {
+    let seconds = |s| Seconds::new(s).unwrap();
+    Setup {
+        channel: Channel {
+            loss: Loss::Fixed(0.15),
+            crossover: 1e-3,
+            delay: seconds(0.01),
+            jitter: seconds(0.2),
+            duplication: 0.1,
+            reordering: 0.1,
+            held: seconds(1.0),
+        },
+        retries: Some(1),
+        detail: Detail::Everything,
+        faults: vec![
+            Fault {
+                at: seconds(5.3),
+                node: SensorId(1),
+                what: Mishap::Restart,
+            },
+            Fault {
+                at: seconds(9.7),
+                node: SensorId(0),
+                what: Mishap::Restart,
+            },
+            Fault {
+                at: seconds(12.1),
+                node: SensorId(2),
+                what: Mishap::Outage(seconds(3.0)),
+            },
+            Fault {
+                at: seconds(15.5),
+                node: SensorId(3),
+                what: Mishap::Death,
+            },
+        ],
+        ..setup(seed)
+    }
+}
+
+fn star() -> Star<fewbits_network::estimators::Counted> {
+    let link = Link::lossy(0.4).unwrap();
+    Star::echoed(counted(link), scalar(3, SLOTS as usize, 1), clock(), Stream::new(1)).unwrap()
+}
+
+fn network(seed: u64) -> Simulator<Star<fewbits_network::estimators::Counted>> {
+    star().simulate(10.0, faulty(seed)).unwrap()
+}
+
+fn bytes(log: &Log) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    log.write(&mut bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn a_log_is_read_back_and_replayed() {
+    let mut first = network(1);
+    first.run_until(clock().end(SLOTS)).unwrap();
+    let stored = bytes(first.log());
+    let log = Log::read(stored.as_slice()).unwrap();
+    assert_eq!(&log, first.log());
+    assert!(log.notes().count() > 5 && log.transmissions().count() > 50);
+    // Another seed, but the log says what happened on air.
+    let mut again = network(2).replaying(&log);
+    again.run_until(clock().end(SLOTS)).unwrap();
+    assert_eq!(bytes(again.log()), stored);
+    assert_eq!((again.ledger(), again.nodes()[0].estimates()), (first.ledger(), first.nodes()[0].estimates()));
+    // A run that is not the log's own says so.
+    let other = Star::echoed(counted(Link::lossy(0.4).unwrap()), scalar(3, SLOTS as usize, 2), clock(), Stream::new(1))
+        .unwrap();
+    let mut other = other.simulate(10.0, faulty(1)).unwrap().replaying(&log);
+    assert!(matches!(other.run_until(clock().end(SLOTS)), Err(Error::LeftLog { .. })));
+}
+
+#[test]
+fn a_run_stored_anywhere_goes_on_as_if_it_had_not_been() {
+    let mut whole = network(3);
+    whole.run_until(clock().end(SLOTS)).unwrap();
+    for nanoseconds in [0, 1, 3_000_000_001, 7_500_000_000, 15_900_000_000] {
+        let mut part = network(3);
+        part.run_until(fewbits_network::Instant(nanoseconds)).unwrap();
+        let mut stored = Vec::new();
+        part.snapshot(&mut stored).unwrap();
+        let field = Field::star(3, 10.0).unwrap();
+        let mut rest = Simulator::restore(star(), field, faulty(3), stored.as_slice()).unwrap();
+        rest.run_until(clock().end(SLOTS)).unwrap();
+        assert_eq!(bytes(rest.log()), bytes(whole.log()));
+        assert_eq!(rest.ledger(), whole.ledger());
+        // Of another network it is none.
+        let field = Field::star(4, 10.0).unwrap();
+        assert!(Simulator::restore(star(), field, setup(3), stored.as_slice()).is_err());
+    }
+}
+
+#[test]
+fn the_same_bytes_on_any_number_of_threads() {
+    let all = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let run = |seed: u64| {
+                let mut network = network(seed);
+                network.run_until(clock().end(SLOTS)).unwrap();
+                bytes(network.log())
+            };
+            (0..16_u64).into_par_iter().map(run).collect::<Vec<_>>()
+        })
+    };
+    let one = all(1);
+    assert_eq!(one, all(2));
+    assert_eq!(one, all(7));
+    assert_ne!(one[0], one[1]);
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_are_a_log_or_an_error(noise in prop::collection::vec(any::<u8>(), 0..200)) {
+        let _ = Log::read(noise.as_slice());
+        let field = Field::star(3, 10.0).unwrap();
+        let _ = Simulator::restore(star(), field, setup(1), noise.as_slice());
+    }
+}
