@@ -406,7 +406,7 @@ impl World<1, Ar1> {
         }
         let plant = ScalarPlant::new(COEFFICIENT, PROCESS, 1.0)?;
         let (start, deviation) = (self.start, self.start.standard_deviations()[0]);
-        let scene = || Scene::gaussian(deviation, &[1.0; SENSORS]).map_err(Error::failed);
+        let scene = || Scene::gaussian_with_deviations(deviation, &[1.0; SENSORS]).map_err(Error::failed);
         let table = |system: &System| {
             let look_up = LookUp::new(system, 10_000).map_err(Error::failed)?;
             self.over_star(look_up, Talk::Told, stream, slots)
@@ -431,14 +431,14 @@ impl World<1, Ar1> {
                 let edges = [vec![0.0], vec![-1.0, 1.0], vec![0.0], vec![-1.5, 0.0, 1.5]];
                 let sensor = |edges: Vec<f64>| {
                     let cells = BinaryQuantizer::new(edges.iter().map(|e| e * deviation).collect())?;
-                    PatternSensor::new(cells, 1.0)
+                    PatternSensor::with_deviation(cells, 1.0)
                 };
                 let sensors: Vec<_> = edges
                     .into_iter()
                     .map(sensor)
                     .collect::<Result<_, _>>()
                     .map_err(Error::failed)?;
-                let source = Source::gaussian(deviation).map_err(Error::failed)?;
+                let source = Source::gaussian_with_deviation(deviation).map_err(Error::failed)?;
                 let table = Bank::new(source, sensors.clone()).and_then(|bank| bank.table(Decoder::Mmse));
                 let patterns = Patterns::new(sensors, table.map_err(Error::failed)?, deviation * deviation);
                 self.over_star(patterns.map_err(Error::failed)?, Talk::Told, stream, slots)
@@ -451,7 +451,7 @@ impl World<1, Ar1> {
                 let reporting = Reporting {
                     dynamics: self.dynamics,
                     sensors: self.sensors.clone(),
-                    scheme: QuantizingSensor::new(quantizer, labels, 1.0).map_err(Error::failed)?,
+                    scheme: QuantizingSensor::with_variance(quantizer, labels, 1.0).map_err(Error::failed)?,
                     link: Link::PERFECT,
                     filter: AssumedDensity,
                     broadcast: nothing as fn(&Gaussian<1>),
