@@ -13,6 +13,7 @@
 //! | `quantizers` | `quantizers` | the quantizer a sensor holds, its words, Lloyd-Max tables |
 //! | `quantizer_design` | `quantizer-design` | joint design and decoding of distributed scalar quantizers |
 //! | `binary_patterns` | `binary-patterns` | one-bit quantizers with patterned cells |
+//! | `pf_mpa` | `pf-mpa` | tracking from quantized ranges |
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
 //! | `network` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
@@ -37,6 +38,8 @@ pub use fewbits_filters as filters;
 pub use fewbits_models as models;
 #[cfg(feature = "network")]
 pub use fewbits_network as network;
+#[cfg(feature = "pf-mpa")]
+pub use fewbits_pf_mpa as pf_mpa;
 #[cfg(feature = "quantizer-design")]
 pub use fewbits_quantizer_design as quantizer_design;
 #[cfg(feature = "quantizers")]
@@ -67,4 +70,6 @@ mod pages {
     struct Diffusive;
     #[doc = include_str!("../../../docs/network.md")]
     struct Network;
+    #[doc = include_str!("../../../docs/pf-mpa.md")]
+    struct PfMpa;
 }

@@ -1,0 +1,182 @@
+//! Gaussian beliefs updated by a few weighted draws that have looked at the data.
+
+use crate::Error;
+use crate::error::refuse;
+use crate::linearised::Linearised;
+use crate::target::{Manoeuvres, Target};
+use crate::tracker::{Ranged, StepInfo, Tracker};
+use fewbits_core::columns::set_state;
+use fewbits_core::{Gaussian, Likelihood};
+use fewbits_numerics::kernels;
+use fewbits_numerics::linalg::symmetrised;
+use nalgebra::{Matrix2, Vector2};
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+use serde::{Deserialize, Serialize};
+
+/// The proposal's covariance in those of Gaussian message passing.
+const INFLATION: f64 = 1.5;
+/// Below this effective sample size the draws say nothing about a covariance.
+const LEAST: f64 = 2.5;
+
+/// A Gaussian particle filter with a proposal that has seen the data.
+///
+/// ```text
+/// predicted N(m, P);  proposal q: the Gaussian message-passing posterior of the position, covariance x 1.5
+/// p_i ~ q;  w_i = N(p_i; m, P) p(observed | p_i) / q(p_i)
+/// ESS < 2.5: the message-passing update;  else weighted moments, covariance x ESS / (ESS - 1), velocity by regression
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Stored")]
+pub struct GuidedGaussian {
+    draws: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(rename = "GuidedGaussian", deny_unknown_fields)]
+struct Stored {
+    draws: usize,
+}
+
+impl TryFrom<Stored> for GuidedGaussian {
+    type Error = Error;
+
+    fn try_from(stored: Stored) -> Result<Self, Error> {
+        Self::new(stored.draws)
+    }
+}
+
+/// Buffers kept from step to step.
+#[derive(Debug, Clone, Default)]
+pub struct GuidedWorkspace {
+    places: [Vec<f64>; 2],
+    logs: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl GuidedGaussian {
+    /// A filter with `draws` draws a step.
+    ///
+    /// # Errors
+    /// If there are fewer than two.
+    pub fn new(draws: usize) -> Result<Self, Error> {
+        if draws < 2 {
+            return refuse("draws", draws, "at least 2, for a covariance");
+        }
+        Ok(Self { draws })
+    }
+
+    /// Weighted draws of the position; log evidence, ESS, mean and covariance, or none where ESS is too small.
+    fn update<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        predicted: &Gaussian<4>,
+        guide: &Gaussian<4>,
+        observed: &[Ranged],
+        workspace: &mut GuidedWorkspace,
+    ) -> Result<Option<(Gaussian<4>, f64, f64)>, Error> {
+        let prior = position(predicted).factored()?;
+        let about = position(guide);
+        let proposal = Gaussian::from_trusted_parts(*about.mean(), about.covariance() * INFLATION).factored()?;
+        let GuidedWorkspace { places, logs, weights } = workspace;
+        for buffer in places.iter_mut().chain([&mut *logs, weights]) {
+            buffer.resize(self.draws, 0.0);
+        }
+        for i in 0..self.draws {
+            let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
+            let place = proposal.mean() + proposal.lower() * z;
+            logs[i] = prior.log_pdf(&place) - proposal.log_pdf(&place);
+            set_state(&mut places.each_mut().map(Vec::as_mut_slice), i, &place);
+        }
+        Likelihood::<2>::add_log_likelihoods(observed, places.each_ref().map(Vec::as_slice), logs);
+        let peak = kernels::largest(logs);
+        if !peak.is_finite() {
+            return Ok(None);
+        }
+        kernels::exp_minus(logs, peak, weights);
+        let total = kernels::sum(weights);
+        let size = total * total / kernels::dot(weights, weights);
+        if size.is_nan() || size < LEAST {
+            return Ok(None);
+        }
+        weights.iter_mut().for_each(|w| *w /= total);
+        let mean = Vector2::new(kernels::dot(weights, &places[0]), kernels::dot(weights, &places[1]));
+        let spread = |a: usize, b: usize| {
+            kernels::weighted_covariance(weights, (&places[a], mean[a]), (&places[b], mean[b])) * size / (size - 1.0)
+        };
+        let covariance = Matrix2::new(spread(0, 0), spread(0, 1), spread(0, 1), spread(1, 1));
+        let updated = regressed(predicted, &mean, &covariance)?;
+        Ok(Some((updated, peak + (total / self.draws as f64).ln(), size)))
+    }
+}
+
+/// The belief about the position.
+pub(crate) fn position(belief: &Gaussian<4>) -> Gaussian<2> {
+    let covariance: Matrix2<f64> = belief.covariance().fixed_view::<2, 2>(0, 0).into();
+    Gaussian::from_trusted_parts(Vector2::new(belief.mean()[0], belief.mean()[1]), covariance)
+}
+
+/// The belief when the position's has become `N(mean, covariance)`: the velocity follows by regression.
+pub(crate) fn regressed(
+    predicted: &Gaussian<4>,
+    mean: &Vector2<f64>,
+    covariance: &Matrix2<f64>,
+) -> Result<Gaussian<4>, Error> {
+    let own = position(predicted);
+    let factor = own.cholesky()?;
+    let cross = predicted.covariance().fixed_view::<2, 4>(0, 0).into_owned();
+    let gain = factor.solve(&cross).transpose();
+    let kept = predicted.covariance() - gain * cross;
+    let covariance = symmetrised(&(kept + gain * covariance * gain.transpose()));
+    let mean = predicted.mean() + gain * (mean - own.mean());
+    if !mean.iter().chain(covariance.iter()).all(|x| x.is_finite()) {
+        return Err(Error::IMPOSSIBLE);
+    }
+    Ok(Gaussian::from_trusted_parts(mean, covariance))
+}
+
+impl Tracker for GuidedGaussian {
+    type Belief = Gaussian<4>;
+    type Workspace = GuidedWorkspace;
+
+    fn start<R: Rng + ?Sized>(&self, _: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<Gaussian<4>, Error> {
+        Ok(*prior)
+    }
+
+    fn estimate(&self, belief: &Gaussian<4>) -> Gaussian<4> {
+        *belief
+    }
+
+    fn step_in_place<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        target: &Target,
+        k: usize,
+        belief: &mut Gaussian<4>,
+        observed: &[Ranged],
+        workspace: &mut GuidedWorkspace,
+    ) -> Result<StepInfo, Error> {
+        let predicted = target.predict(belief, k, Manoeuvres::AsNoise);
+        let (guide, guess) = Linearised::MESSAGE_PASSING.update(&predicted, observed)?;
+        let (next, info) = match self.update(rng, &predicted, &guide, observed, workspace)? {
+            Some((updated, log_likelihood, size)) => {
+                let info = StepInfo {
+                    log_likelihood: Some(log_likelihood),
+                    effective_sample_size: Some(size),
+                    fallbacks: 0,
+                };
+                (updated, info)
+            }
+            None => {
+                let info = StepInfo {
+                    log_likelihood: Some(guess),
+                    effective_sample_size: None,
+                    fallbacks: 1,
+                };
+                (guide, info)
+            }
+        };
+        *belief = next;
+        Ok(info)
+    }
+}

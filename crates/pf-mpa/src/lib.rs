@@ -1,0 +1,84 @@
+//! Tracking a target from quantized ranges.
+//!
+//! Sensors that know where they stand measure their distance to a target, in noise that grows with the distance, and send each
+//! the level of a quantizer of a few bits: the thesis's Chapter 3 has particle message passing on a factor graph for it. Here is
+//! that algorithm, as published and with its errata mended, beside what does better.
+//!
+//! The central choice: **a level is a factor, in closed form** ([`RangeFactor`]), and not a ring of particles under kernels. What a
+//! level says about a position is `Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d))`, at the *hypothesised* distance `d`; whoever has it needs no
+//! kernel, no weights and no Jacobian. From it every filter of the library follows, and the recommended one, [`GridFilter`]: a
+//! Gaussian in, its product with all factors on 15 x 15 nodes, a Gaussian out, no random numbers. It is a third below Gaussian message
+//! passing and improved particle message passing, at a tenth of the latter's cost. What it gives up is any belief that is no bell.
+//!
+//! | task | item |
+//! |---|---|
+//! | the sensor, its noise, its quantizer, what a level says | [`RangeSensor`], [`RangeNoise`], [`QuantizedRange`], [`RangeFactor`] |
+//! | how all nodes derive the same cells | [`Encoder`]: published, predicted, adaptive |
+//! | the target | [`Target`], [`WithManoeuvre`] |
+//! | the recommended tracker | [`GridFilter`] |
+//! | linearised: extended Kalman filters, Gaussian message passing | [`Linearised`] |
+//! | particles and draws | [`GuidedGaussian`], [`Bootstrap`], [`RaoBlackwellGuided`] |
+//! | Algorithm 6 | [`MessagePassing`], its [`ProductSampler`] |
+//! | bounds | [`CramerRao`], [`level_information`] |
+//! | two targets, measurements in unknown order | [`association`] |
+//! | who leads, what is handed over, in bits | [`leader`] |
+//! | factor graphs, sum-product over finite alphabets | [`graph`] |
+//! | particle messages on graphs of one's own | [`node`] |
+//!
+//! ```
+//! use fewbits_core::Gaussian;
+//! use fewbits_monte_carlo::Stream;
+//! use fewbits_pf_mpa::{Encoder, GridFilter, Network, QuantizedRange, RangeNoise, Reports, Target, Tracker};
+//! use nalgebra::{Matrix4, Vector2, Vector4};
+//!
+//! let (target, scheme) = (Target::printed()?, QuantizedRange::new(4, RangeNoise::from_snr_db(50.0)?)?);
+//! let places = [[4.0, 4.0], [16.0, 4.0], [10.0, 16.0]].map(Vector2::from);
+//! let network = Network::new(&places, scheme, Encoder::adaptive(4)?)?;
+//! let belief = Gaussian::new(Vector4::new(9.0, 9.0, 0.0, 0.5), Matrix4::identity() * 0.1)?;
+//! let mut rng = Stream::new(1).rng();
+//! let ranges = network.measure(&mut rng, 9.2, 9.4);
+//! let observed = network.observe(&target, 0, &belief, &ranges, Reports::Levels)?;
+//! let (belief, info) = GridFilter::default().step(&mut rng, &target, 0, &belief, &observed)?;
+//! assert_eq!((network.report_bits(), info.fallbacks), (6, 0));
+//! assert!((belief.mean()[0] - 9.2).abs() < 0.5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Not here: radio, energy, delays; more than two targets; ranges in space.
+
+pub mod association;
+mod bound;
+mod encoder;
+mod error;
+mod factor;
+pub mod graph;
+mod grid;
+mod guided;
+mod labels;
+pub mod leader;
+mod linearised;
+mod message;
+mod message_passing;
+pub mod node;
+mod particle;
+mod ring;
+mod sensor;
+mod target;
+mod tracker;
+
+pub use bound::{CramerRao, level_information, position_information, range_information};
+pub use encoder::{Encoder, IntervalRule, Normalisation, QuantizedRange, RangeReference, optimal_loading};
+pub use error::Error;
+pub use factor::RangeFactor;
+pub use grid::{GridFilter, GridWorkspace};
+pub use guided::{GuidedGaussian, GuidedWorkspace};
+pub use labels::{LabelChain, ratio_second_moments};
+pub use linearised::{Linearised, QuantizationNoise, Velocity};
+pub use message::{KernelRule, ProductSampler, kernel_error};
+pub use message_passing::{DynamicsWeight, MessagePassing, MessageWorkspace, Ring, RingWeight};
+pub use particle::{Bootstrap, RaoBlackwellGuided, VelocityCloud, VelocityWorkspace};
+pub use ring::RingBias;
+pub use sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
+pub use target::{AccelerationChain, Manoeuvres, Target, WithManoeuvre};
+pub use tracker::{Network, Ranged, Reports, StepInfo, Tracker};
+pub use {nalgebra, rand};

@@ -1,0 +1,331 @@
+//! A node that measures its distance to the target, and how its noise grows.
+
+use crate::Error;
+use crate::error::refuse;
+use fewbits_core::{Columns, ColumnsMut, Sensing};
+use fewbits_numerics::error::{all_finite, finite, non_negative};
+use fewbits_numerics::kernels::vectorised;
+use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+use serde::{Deserialize, Serialize};
+
+/// Noise of a range: variance `s0^2 + (d / c)^2` at distance `d`. The papers' has `s0 = 0`: a constant ratio of signal to noise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct RangeNoise {
+    constant: f64,
+    relative: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "RangeNoise", deny_unknown_fields)]
+struct Stored {
+    constant: f64,
+    relative: f64,
+}
+
+impl From<RangeNoise> for Stored {
+    fn from(noise: RangeNoise) -> Self {
+        Self {
+            constant: noise.constant,
+            relative: noise.relative,
+        }
+    }
+}
+
+impl TryFrom<Stored> for RangeNoise {
+    type Error = Error;
+
+    fn try_from(stored: Stored) -> Result<Self, Error> {
+        Self::new(stored.constant, stored.relative)
+    }
+}
+
+impl RangeNoise {
+    /// Standard deviation `constant` (length) at the sensor, growing by `relative` = `1 / c` of the distance.
+    ///
+    /// # Errors
+    /// If one is negative or not finite, or both are zero.
+    pub fn new(constant: f64, relative: f64) -> Result<Self, Error> {
+        non_negative("constant", constant)?;
+        non_negative("relative", relative)?;
+        if constant == 0.0 && relative == 0.0 {
+            return refuse("noise", "zero at every distance", "a standard deviation above 0");
+        }
+        Ok(Self { constant, relative })
+    }
+
+    /// A constant ratio `d^2 / sigma^2` of the powers of range and noise, in decibels: `sigma = d / 10^(SNR / 20)`.
+    ///
+    /// # Errors
+    /// If the ratio is not finite or beyond the range of numbers.
+    pub fn from_snr_db(snr_db: f64) -> Result<Self, Error> {
+        Self::new(0.0, 10.0_f64.powf(-finite("snr_db", snr_db)? / 20.0))
+    }
+
+    /// The same standard deviation at every distance.
+    ///
+    /// # Errors
+    /// If it is not above zero.
+    pub fn constant(deviation: f64) -> Result<Self, Error> {
+        Self::new(deviation, 0.0)
+    }
+
+    /// Standard deviation at distance `d`; positive, also at zero and below.
+    #[inline(always)]
+    pub fn deviation(&self, distance: f64) -> f64 {
+        let relative = (self.relative * distance).abs();
+        let deviation = if self.constant == 0.0 {
+            relative
+        } else if self.relative == 0.0 {
+            self.constant
+        } else {
+            (self.constant * self.constant + relative * relative).sqrt()
+        };
+        if deviation > f64::MIN_POSITIVE {
+            deviation
+        } else {
+            f64::MIN_POSITIVE
+        }
+    }
+
+    /// Derivative of the standard deviation with respect to the distance.
+    pub fn slope(&self, distance: f64) -> f64 {
+        self.relative * (self.relative * distance / self.deviation(distance))
+    }
+
+    /// Standard deviation at the sensor.
+    pub fn at_sensor(&self) -> f64 {
+        self.constant
+    }
+
+    /// `1 / c`.
+    pub fn relative(&self) -> f64 {
+        self.relative
+    }
+}
+
+/// A range sensor at a fixed place: `z = |p - n| + v`, `v` of the given [`RangeNoise`]. The position `p` is the first two
+/// coordinates of the state, whatever follows them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Place")]
+pub struct RangeSensor {
+    position: Vector2<f64>,
+    noise: RangeNoise,
+}
+
+#[derive(Deserialize)]
+#[serde(rename = "RangeSensor", deny_unknown_fields)]
+struct Place {
+    position: Vector2<f64>,
+    noise: RangeNoise,
+}
+
+impl TryFrom<Place> for RangeSensor {
+    type Error = Error;
+
+    fn try_from(stored: Place) -> Result<Self, Error> {
+        Self::new(stored.position, stored.noise)
+    }
+}
+
+impl RangeSensor {
+    /// A sensor at `position`.
+    ///
+    /// # Errors
+    /// If a coordinate is not finite.
+    pub fn new(position: Vector2<f64>, noise: RangeNoise) -> Result<Self, Error> {
+        all_finite("position", position.as_slice())?;
+        Ok(Self { position, noise })
+    }
+
+    /// Where it stands.
+    pub fn position(&self) -> &Vector2<f64> {
+        &self.position
+    }
+
+    /// Its noise.
+    pub fn noise(&self) -> &RangeNoise {
+        &self.noise
+    }
+
+    /// Distance of a point.
+    #[inline]
+    pub fn distance(&self, x: f64, y: f64) -> f64 {
+        let (dx, dy) = (x - self.position[0], y - self.position[1]);
+        let squared = dx * dx + dy * dy;
+        // Squares that leave the range of numbers.
+        if squared < 1e-280 || squared > 1e280 {
+            dx.hypot(dy)
+        } else {
+            squared.sqrt()
+        }
+    }
+
+    /// Distances of many points: a sweep without branches, and another one where squares leave the range of numbers.
+    fn distances(&self, x: &[f64], y: &[f64], distances: &mut [f64]) {
+        let (sx, sy) = (self.position[0], self.position[1]);
+        let count = distances.len();
+        let (x, y) = (&x[..count], &y[..count]);
+        let sound = vectorised(
+            #[inline(always)]
+            || {
+                let (mut least, mut most) = (f64::INFINITY, 0.0);
+                for ((distance, x), y) in distances.iter_mut().zip(x).zip(y) {
+                    let (dx, dy) = (x - sx, y - sy);
+                    let squared = dx * dx + dy * dy;
+                    least = if squared < least { squared } else { least };
+                    most = if squared > most { squared } else { most };
+                    *distance = squared.sqrt();
+                }
+                least >= 1e-280 && most <= 1e280
+            },
+        );
+        if !sound {
+            for ((distance, x), y) in distances.iter_mut().zip(x).zip(y) {
+                *distance = self.distance(*x, *y);
+            }
+        }
+    }
+
+    /// Unit vector from the sensor to a point: the slope of the distance; zero at the sensor itself, where it has none.
+    pub fn direction(&self, x: f64, y: f64) -> Vector2<f64> {
+        let distance = self.distance(x, y);
+        if distance > 0.0 {
+            (Vector2::new(x, y) - self.position) / distance
+        } else {
+            Vector2::zeros()
+        }
+    }
+
+    /// A measurement of the given distance.
+    pub fn measure<R: Rng + ?Sized>(&self, rng: &mut R, distance: f64) -> f64 {
+        let normal: f64 = rng.sample(StandardNormal);
+        distance + self.noise.deviation(distance) * normal
+    }
+}
+
+impl<const D: usize> Sensing<D, 1> for RangeSensor {
+    #[inline]
+    fn mean(&self, state: &SVector<f64, D>) -> Vector1<f64> {
+        const { assert!(D >= 2, "the position takes two coordinates") };
+        Vector1::new(self.distance(state[0], state[1]))
+    }
+
+    fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, 1, D> {
+        let direction = self.direction(state[0], state[1]);
+        let mut row = SMatrix::zeros();
+        row[0] = direction[0];
+        row[1] = direction[1];
+        row
+    }
+
+    fn noise_covariance_at(&self, state: &SVector<f64, D>) -> Matrix1<f64> {
+        let deviation = self.noise.deviation(self.distance(state[0], state[1]));
+        Matrix1::new(deviation * deviation)
+    }
+
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> Vector1<f64> {
+        Vector1::new(self.measure(rng, self.distance(state[0], state[1])))
+    }
+
+    fn mean_columns(&self, states: &Columns<'_, D>, [means]: ColumnsMut<'_, 1>) {
+        self.distances(states[0], states[1], means);
+    }
+}
+
+/// A range sensor whose measurements are all too long by the third coordinate of the state: `z = |p - n| + b + v`. Its noise is
+/// taken at `|p - n| + b`, which is exact where it is constant.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BiasedRangeSensor(pub RangeSensor);
+
+impl<const D: usize> Sensing<D, 1> for BiasedRangeSensor {
+    #[inline]
+    fn mean(&self, state: &SVector<f64, D>) -> Vector1<f64> {
+        const { assert!(D >= 3, "the position takes two coordinates, the bias one") };
+        Vector1::new(self.0.distance(state[0], state[1]) + state[2])
+    }
+
+    fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, 1, D> {
+        let mut row: SMatrix<f64, 1, D> = self.0.jacobian(state);
+        row[2] = 1.0;
+        row
+    }
+
+    fn noise_covariance_at(&self, state: &SVector<f64, D>) -> Matrix1<f64> {
+        let mean: Vector1<f64> = self.mean(state);
+        let deviation = self.0.noise.deviation(mean[0]);
+        Matrix1::new(deviation * deviation)
+    }
+
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> Vector1<f64> {
+        let mean: Vector1<f64> = self.mean(state);
+        Vector1::new(self.0.measure(rng, mean[0]))
+    }
+
+    fn mean_columns(&self, states: &Columns<'_, D>, [means]: ColumnsMut<'_, 1>) {
+        self.0.distances(states[0], states[1], means);
+        for (i, mean) in means.iter_mut().enumerate() {
+            *mean += states[2][i];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fewbits_core::laws::sensing;
+    use nalgebra::{Vector3, Vector4};
+
+    fn sensor(noise: RangeNoise) -> RangeSensor {
+        RangeSensor::new(Vector2::new(1.0, -2.0), noise).unwrap()
+    }
+
+    #[test]
+    fn sensors_obey_the_laws_of_sensing() {
+        for noise in [
+            RangeNoise::from_snr_db(30.0).unwrap(),
+            RangeNoise::constant(0.4).unwrap(),
+            RangeNoise::new(0.3, 0.1).unwrap(),
+        ] {
+            let at = Vector4::new(4.0, 2.0, 9.0, 9.0);
+            sensing::is_consistent(&sensor(noise), &[at, Vector4::new(-3.0, 7.0, 0.0, 1.0)]).unwrap();
+            let mut rng = fewbits_monte_carlo::Stream::new(3).rng();
+            sensing::draws_have_the_law(&sensor(noise), &mut rng, &at, 20_000).unwrap();
+            let biased = BiasedRangeSensor(sensor(noise));
+            let at = Vector3::new(4.0, 2.0, 0.5);
+            sensing::is_consistent(&biased, &[at]).unwrap();
+            sensing::draws_have_the_law(&biased, &mut rng, &at, 20_000).unwrap();
+        }
+    }
+
+    #[test]
+    fn noise_is_relative_to_the_range_and_slopes_are_derivatives() {
+        let noise = RangeNoise::from_snr_db(30.0).unwrap();
+        assert!((noise.deviation(5.0) - 5.0 / 1000.0_f64.sqrt()).abs() < 1e-15);
+        assert!(noise.deviation(0.0) > 0.0 && noise.slope(0.0).is_finite());
+        let both = RangeNoise::new(0.3, 0.1).unwrap();
+        let numeric = (both.deviation(2.0 + 1e-6) - both.deviation(2.0 - 1e-6)) / 2e-6;
+        assert!((both.slope(2.0) - numeric).abs() < 1e-9);
+    }
+
+    #[test]
+    fn distances_survive_any_unit() {
+        for scale in [1e-200, 1e-4, 1.0, 1e4, 1e200] {
+            let sensor = RangeSensor::new(Vector2::zeros(), RangeNoise::from_snr_db(40.0).unwrap()).unwrap();
+            assert!((sensor.distance(3.0 * scale, 4.0 * scale) / (5.0 * scale) - 1.0).abs() < 1e-15);
+            assert!((sensor.direction(3.0 * scale, 4.0 * scale) - Vector2::new(0.6, 0.8)).amax() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn bad_noise_and_places_are_refused() {
+        assert!(RangeNoise::new(0.0, 0.0).is_err() && RangeNoise::new(-1.0, 1.0).is_err());
+        assert!(RangeNoise::from_snr_db(f64::NAN).is_err() && RangeNoise::from_snr_db(1e9).is_err());
+        assert!(RangeNoise::constant(0.0).is_err() && RangeNoise::from_snr_db(-1e9).is_err());
+        let noise = RangeNoise::constant(1.0).unwrap();
+        assert!(RangeSensor::new(Vector2::new(f64::NAN, 0.0), noise).is_err());
+        assert!(serde_json::from_str::<RangeNoise>(r#"{"constant":0,"relative":0}"#).is_err());
+    }
+}

@@ -1,0 +1,154 @@
+//! Bad input is a typed error, extreme input an answer.
+
+use fewbits_core::Gaussian;
+use fewbits_monte_carlo::Stream;
+use fewbits_pf_mpa::{
+    AccelerationChain, Bootstrap, Encoder, Error, GridFilter, GridWorkspace, GuidedGaussian, Linearised,
+    MessagePassing, Network, QuantizedRange, RangeNoise, RaoBlackwellGuided, Reports, Target, Tracker,
+};
+use nalgebra::{Matrix4, Vector2, Vector4};
+
+fn network(scale: f64, levels: usize, snr: f64, encoder: Encoder) -> Network {
+    let places = [[4.0, 4.0], [16.0, 4.0], [10.0, 10.0], [4.0, 16.0], [16.0, 16.0]];
+    let places = places.map(|p| Vector2::from(p) * scale);
+    Network::new(&places, QuantizedRange::new(levels, RangeNoise::from_snr_db(snr).unwrap()).unwrap(), encoder).unwrap()
+}
+
+fn prior(scale: f64) -> Gaussian<4> {
+    let covariance = Matrix4::from_diagonal(&Vector4::new(0.04, 0.04, 0.01, 0.01)) * (scale * scale);
+    Gaussian::new(Vector4::new(13.0, 17.0, 0.0, -0.6) * scale, covariance).unwrap()
+}
+
+fn target(scale: f64) -> Target {
+    Target::new(1.0, 0.02 * scale * scale, AccelerationChain::printed(0.1 * scale).unwrap()).unwrap()
+}
+
+/// Ten steps; the estimates in units of the scale.
+fn track<T: Tracker>(tracker: &T, scale: f64, reports: Reports) -> Vec<Vector4<f64>> {
+    let (network, target) = (network(scale, 4, 40.0, Encoder::published(3.0 * scale).unwrap()), target(scale));
+    let mut rng = Stream::new(7).rng();
+    let mut world = Stream::new(8).rng();
+    let truth = target.simulate(&mut world, prior(scale).mean(), 10);
+    let mut belief = tracker.start(&mut rng, &target, &prior(scale)).unwrap();
+    let mut workspace = T::Workspace::default();
+    let mut estimates = Vec::new();
+    for (k, state) in truth.iter().enumerate() {
+        let ranges = network.measure(&mut world, state[0], state[1]);
+        let observed = network
+            .observe(&target, k, &tracker.estimate(&belief), &ranges, reports)
+            .unwrap();
+        tracker
+            .step_in_place(&mut rng, &target, k, &mut belief, &observed, &mut workspace)
+            .unwrap();
+        estimates.push(tracker.estimate(&belief).mean() / scale);
+    }
+    estimates
+}
+
+fn unit_free<T: Tracker>(tracker: &T, tolerance: f64) {
+    for reports in [Reports::Levels, Reports::Ranges] {
+        let own = track(tracker, 1.0, reports);
+        // Powers of two: rounding is then the same, and no draw falls to the other side of a rounded edge.
+        for scale in [-14, 14].map(|e| 2.0_f64.powi(e)) {
+            for (a, b) in own.iter().zip(track(tracker, scale, reports)) {
+                assert!((a - b).amax() < tolerance, "{}: {a} against {b} at {scale}", std::any::type_name::<T>());
+            }
+        }
+    }
+}
+
+#[test]
+fn no_tracker_depends_on_the_unit() {
+    unit_free(&Linearised::EKF, 1e-9);
+    unit_free(&Linearised::MESSAGE_PASSING_TRANSFER, 1e-9);
+    unit_free(&GridFilter::default(), 1e-9);
+    unit_free(&GuidedGaussian::new(20).unwrap(), 1e-6);
+    unit_free(&Bootstrap::new(200).unwrap(), 1e-6);
+    unit_free(&RaoBlackwellGuided::new(100).unwrap(), 1e-6);
+    unit_free(&MessagePassing::improved(20).unwrap(), 1e-6);
+    unit_free(&MessagePassing::published(20).unwrap(), 1e-6);
+}
+
+#[test]
+fn a_failed_step_leaves_the_belief_as_it_was() {
+    let target = target(1.0);
+    let network = network(1.0, 4, 40.0, Encoder::published(3.0).unwrap());
+    assert!(
+        network
+            .observe(&target, 0, &prior(1.0), &[1.0; 4], Reports::Levels)
+            .is_err()
+    );
+    assert!(
+        network
+            .observe(&target, 0, &prior(1.0), &[f64::NAN; 5], Reports::Levels)
+            .is_err()
+    );
+    assert!(
+        network
+            .observe(&target, 0, &prior(1.0), &[f64::INFINITY; 5], Reports::Ranges)
+            .is_err()
+    );
+    // A particle that cannot have seen the level.
+    let observed = network
+        .observe(&target, 0, &prior(1.0), &[0.001; 5], Reports::Levels)
+        .unwrap();
+    let far = Gaussian::known(Vector4::new(1e160, 0.0, 0.0, 0.0)).unwrap();
+    let bootstrap = Bootstrap::new(5).unwrap();
+    let mut rng = Stream::new(3).rng();
+    let mut belief = bootstrap.start(&mut rng, &target, &far).unwrap();
+    let before = belief.clone();
+    let failed = bootstrap.step_in_place(&mut rng, &target, 0, &mut belief, &observed, &mut Default::default());
+    assert!(matches!(failed, Err(Error::Core(fewbits_core::Error::Impossible))) || failed.is_ok());
+    if failed.is_err() {
+        assert_eq!(belief, before);
+    }
+    // A known position has no grid.
+    let known = Gaussian::known(Vector4::zeros()).unwrap();
+    let grid = GridFilter::default().update(&known, observed.as_slice(), &mut GridWorkspace::<2>::default());
+    assert!(matches!(grid, Err(Error::Argument(_))));
+}
+
+#[test]
+fn what_contradicts_everything_falls_back_and_says_so() {
+    let target = target(1.0);
+    let network = network(1.0, 16, 80.0, Encoder::published(30.0).unwrap());
+    // Ranges that no point in the plane has.
+    let observed = network
+        .observe(&target, 0, &prior(1.0), &[0.1, 60.0, 0.1, 60.0, 0.1], Reports::Levels)
+        .unwrap();
+    let mut rng = Stream::new(3).rng();
+    let (belief, info) = GridFilter::default()
+        .step(&mut rng, &target, 0, &prior(1.0), &observed)
+        .unwrap();
+    assert_eq!(info.fallbacks, 1);
+    assert!(belief.mean().iter().all(|x| x.is_finite()));
+    let (_, info) = GuidedGaussian::new(5)
+        .unwrap()
+        .step(&mut rng, &target, 0, &prior(1.0), &observed)
+        .unwrap();
+    assert!(info.fallbacks <= 1);
+    for tracker in [
+        MessagePassing::improved(3).unwrap(),
+        MessagePassing::published(3).unwrap(),
+    ] {
+        let stepped = tracker.step(&mut rng, &target, 0, &prior(1.0), &observed);
+        assert!(stepped.is_err() || stepped.unwrap().0.mean().iter().all(|x| x.is_finite()));
+    }
+}
+
+#[test]
+fn settings_are_checked() {
+    let noise = RangeNoise::from_snr_db(40.0).unwrap();
+    let scheme = QuantizedRange::new(4, noise).unwrap();
+    let encoder = Encoder::published(3.0).unwrap();
+    assert!(Network::new(&[], scheme.clone(), encoder).is_err());
+    let twice = [Vector2::zeros(), Vector2::zeros()];
+    let error = Network::new(&twice, scheme, encoder).unwrap_err().to_string();
+    assert!(error.contains("different places"), "{error}");
+    assert!(GridFilter::new(2).is_err() && GuidedGaussian::new(1).is_err());
+    assert!(Bootstrap::new(0).is_err() && RaoBlackwellGuided::new(0).is_err());
+    let mut broken = MessagePassing::improved(2).unwrap();
+    broken.particles = 1;
+    let mut rng = Stream::new(1).rng();
+    assert!(broken.start(&mut rng, &target(1.0), &prior(1.0)).is_err());
+}

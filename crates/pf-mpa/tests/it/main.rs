@@ -1,0 +1,8 @@
+//! Integration tests: fixtures of another program, laws, bad input.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod attacks;
+mod fixtures;
+mod laws;
+mod recording;
