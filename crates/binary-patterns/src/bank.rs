@@ -1,9 +1,7 @@
 //! A source observed through a bank of one-bit sensors, and the exact enumeration of what they may report.
 
-use super::BinaryQuantizer;
-use super::source::noise_in_range;
-use super::source::{Blur, Nodes, Source};
-use crate::Error;
+use crate::source::{Blur, Nodes};
+use crate::{BinaryQuantizer, Error, PatternSensor, Source};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::binomial;
 use fewbits_numerics::error::at_least_one;
@@ -18,75 +16,6 @@ pub const IMPOSSIBLE: f64 = 1e-290;
 
 /// Panel width in noise standard deviations; with twelve nodes the integrals are good to `1e-12`.
 const PANEL: f64 = 2.0;
-
-/// One sensor: what it measures is `Y = X + N(0, noise_std^2)`, what it reports is the bit of its quantizer.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredSensor", into = "StoredSensor")]
-pub struct PatternSensor {
-    quantizer: BinaryQuantizer,
-    noise_std: f64,
-}
-
-/// The stored form of a sensor.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredSensor {
-    quantizer: BinaryQuantizer,
-    noise_std: f64,
-}
-
-impl From<PatternSensor> for StoredSensor {
-    fn from(sensor: PatternSensor) -> Self {
-        Self {
-            quantizer: sensor.quantizer,
-            noise_std: sensor.noise_std,
-        }
-    }
-}
-
-impl TryFrom<StoredSensor> for PatternSensor {
-    type Error = Error;
-
-    fn try_from(stored: StoredSensor) -> Result<Self, Error> {
-        Self::with_deviation(stored.quantizer, stored.noise_std)
-    }
-}
-
-impl PatternSensor {
-    /// A sensor from its quantizer and the standard deviation (not the variance) of its noise.
-    ///
-    /// # Errors
-    /// If `noise_std` is not positive and finite.
-    pub fn with_deviation(quantizer: BinaryQuantizer, noise_std: f64) -> Result<Self, Error> {
-        let noise_std = noise_in_range(noise_std)?;
-        Ok(Self { quantizer, noise_std })
-    }
-
-    /// Its quantizer.
-    pub fn quantizer(&self) -> &BinaryQuantizer {
-        &self.quantizer
-    }
-
-    /// Standard deviation of its noise.
-    pub fn noise_std(&self) -> f64 {
-        self.noise_std
-    }
-
-    /// `[P(0|x), P(1|x)]`.
-    pub fn probabilities(&self, x: f64) -> [f64; 2] {
-        self.quantizer.probabilities(x, self.noise_std)
-    }
-
-    /// `[ln P(0|x), ln P(1|x)]`.
-    pub fn log_probabilities(&self, x: f64) -> [f64; 2] {
-        self.quantizer.log_probabilities(x, self.noise_std)
-    }
-
-    /// Fisher information about `x` in its bit.
-    pub fn fisher_information(&self, x: f64) -> f64 {
-        self.quantizer.fisher_information(x, self.noise_std)
-    }
-}
 
 /// A source and the sensors that measure it, their noises independent.
 ///
@@ -217,7 +146,7 @@ impl Bank {
     pub(crate) fn finest_noise(&self) -> f64 {
         self.groups
             .iter()
-            .map(|g| g.sensor.noise_std)
+            .map(|g| g.sensor.noise_std())
             .fold(f64::INFINITY, f64::min)
     }
 
@@ -246,10 +175,10 @@ impl Bank {
             .iter()
             .flat_map(|g| {
                 g.sensor
-                    .quantizer
+                    .quantizer()
                     .breakpoints()
                     .iter()
-                    .map(|&t| (t, g.sensor.noise_std))
+                    .map(|&t| (t, g.sensor.noise_std()))
             })
             .collect()
     }

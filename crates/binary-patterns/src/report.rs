@@ -1,7 +1,7 @@
 //! The report: one bit on the wire, and what it says of the noise-free measurement.
 
 use crate::Error;
-use crate::bank::PatternSensor;
+use crate::PatternSensor;
 use crate::quantizer::BinaryQuantizer;
 use fewbits_core::bits::{BitReader, BitWriter, CodecError};
 use fewbits_core::factor::{Constant, Scalar};
@@ -79,6 +79,7 @@ mod tests {
     use super::*;
     use fewbits_core::Gaussian;
     use fewbits_core::laws::{factor, message, scheme};
+    use rand::{RngExt, SeedableRng};
 
     #[test]
     fn a_bit_takes_one_bit() {
@@ -98,6 +99,12 @@ mod tests {
             for link in [Link::PERFECT, Link::new(0.3, 0.1).unwrap()] {
                 let bits = [Bit(false), Bit(true)];
                 scheme::total_probability(&sensor, &(), &link, bits, &points).unwrap();
+                let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+                let noise = |rng: &mut rand_pcg::Pcg64Mcg| {
+                    SVector::from([0.3 * scale * rng.sample::<f64, _>(rand_distr::StandardNormal)])
+                };
+                let m = SVector::from([0.25 * scale]);
+                scheme::frequencies(&sensor, &(), &link, &mut rng, 20_000, &m, noise, bits).unwrap();
                 for bit in bits {
                     let received = sensor.factor(&(), &Observation::Received(bit), &link).unwrap();
                     factor::is_a_number(&received, &points).unwrap();

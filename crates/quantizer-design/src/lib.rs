@@ -64,7 +64,7 @@ mod problem;
 pub use criterion::Criterion;
 pub use derivatives::Derivatives;
 pub use error::Error;
-pub use fewbits_quantizers::{Channel, Labelling, Quantizer, Symbol, lloyd_max, quantizer};
+pub use fewbits_quantizers::{Channel, Labelling, Quantizer, Symbol, canonical, lloyd_max, quantizer};
 pub use newton::{AtSaddle, Certificate, Newton};
 pub use scene::{Noise, Prior, Scene};
 pub use system::{SensorGroup, System};

@@ -143,9 +143,7 @@ impl JointTable {
     /// [`multiplicity`](Self::multiplicity) for one particular report.
     pub fn likelihood(&self, outcome: usize) -> &[f64] {
         let values = self.scene().values().len();
-        self.likelihood
-            .get(outcome * values..(outcome + 1) * values)
-            .unwrap_or_default()
+        self.likelihood.chunks_exact(values).nth(outcome).unwrap_or_default()
     }
 
     /// Number of reports of individual sensors that make up the outcome.

@@ -195,11 +195,8 @@ impl Channel {
 
     /// `P(received = output | sent = input)`; 0 for symbols there are not.
     pub fn probability(&self, output: usize, input: usize) -> f64 {
-        if input < self.inputs {
-            self.transition
-                .get(output * self.inputs + input)
-                .copied()
-                .unwrap_or(0.0)
+        if input < self.inputs && output < self.outputs {
+            self.transition[output * self.inputs + input]
         } else {
             0.0
         }
@@ -298,6 +295,8 @@ mod tests {
             assert!(matches!(Channel::pulse_amplitude(levels, 10.0), Err(Error::TooLarge { .. })));
         }
         let four = Channel::pulse_amplitude(4, 10.0).unwrap();
+        assert_eq!(four.probability(usize::MAX, 3), 0.0);
+        assert_eq!(four.probability(1, usize::MAX), 0.0);
         assert_eq!(serde_json::from_str::<Channel>(&serde_json::to_string(&four).unwrap()).unwrap(), four);
     }
 }

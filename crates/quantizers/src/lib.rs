@@ -40,8 +40,10 @@ pub mod lloyd_max;
 pub mod quantizer;
 pub mod sensor;
 
+mod canonical;
 mod error;
 
+pub use canonical::canonical;
 pub use channel::Channel;
 pub use error::Error;
 pub(crate) use error::refuse;

@@ -4,27 +4,25 @@ use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative, positive};
 
-/// Smallest variance of a random network.
-const SMALLEST: f64 = 1e-4;
-
 /// Variances with exactly this mean and population standard deviation, in the direction of `direction`.
 ///
 /// The direction is centred and scaled, then moved to the mean; drawn from a standard normal vector it gives networks uniform
-/// on the sphere of that radius. `Ok(None)` if a variance falls below `1e-4`: draw again.
+/// on the sphere of that radius. `Ok(None)` if a variance falls below `least`: draw again.
 ///
 /// # Errors
 /// [`Error::InfeasibleVariances`] unless `std <= mean sqrt(N - 1)`, beyond which one variance is always negative;
-/// [`Error::Argument`] if the mean is not positive, the deviation negative, or the direction constant or not finite.
-pub fn variances_with_moments(mean: f64, std: f64, direction: &[f64]) -> Result<Option<Vec<f64>>, Error> {
+/// [`Error::Argument`] if the mean or `least` is not positive, the deviation negative, or the direction constant or not finite.
+pub fn variances_with_moments(mean: f64, std: f64, least: f64, direction: &[f64]) -> Result<Option<Vec<f64>>, Error> {
     let mean = positive("mean", mean)?;
     let std = non_negative("std", std)?;
+    let least = positive("least", least)?;
     all_finite("direction", direction)?;
     let count = direction.len();
     if count == 0 || std > mean * (count as f64 - 1.0).sqrt() {
         return Err(Error::InfeasibleVariances { mean, std, count });
     }
     if std == 0.0 {
-        return Ok((mean >= SMALLEST).then(|| vec![mean; count]));
+        return Ok((mean >= least).then(|| vec![mean; count]));
     }
     let centre = direction.iter().sum::<f64>() / count as f64;
     let spread = (direction.iter().map(|z| (z - centre) * (z - centre)).sum::<f64>() / count as f64).sqrt();
@@ -32,7 +30,7 @@ pub fn variances_with_moments(mean: f64, std: f64, direction: &[f64]) -> Result<
         return Err(ArgumentError::new("direction", "constant", "numbers that differ").into());
     }
     let variances: Vec<f64> = direction.iter().map(|z| mean + std * (z - centre) / spread).collect();
-    Ok(variances.iter().all(|&v| v >= SMALLEST).then_some(variances))
+    Ok(variances.iter().all(|&v| v >= least).then_some(variances))
 }
 
 /// "Assignment II": the most precise sensor takes the coarsest bit, and so on; the lower index first among equals.
@@ -49,7 +47,7 @@ mod tests {
 
     #[test]
     fn moments_are_exact() {
-        let v = variances_with_moments(0.03, 0.01, &[0.3, -1.2, 2.0, 0.1])
+        let v = variances_with_moments(0.03, 0.01, 1e-4, &[0.3, -1.2, 2.0, 0.1])
             .unwrap()
             .unwrap();
         let mean = v.iter().sum::<f64>() / 4.0;
@@ -62,13 +60,13 @@ mod tests {
     #[test]
     fn infeasible_moments_are_typed_errors() {
         assert!(matches!(
-            variances_with_moments(0.03, 0.06, &[1.0, 2.0, 3.0, 4.0]),
+            variances_with_moments(0.03, 0.06, 1e-4, &[1.0, 2.0, 3.0, 4.0]),
             Err(Error::InfeasibleVariances { .. })
         ));
-        assert!(variances_with_moments(0.03, 0.01, &[1.0; 4]).is_err());
-        assert!(variances_with_moments(-0.03, 0.01, &[1.0, 2.0]).is_err());
-        assert!(variances_with_moments(0.03, 0.01, &[1.0, f64::NAN]).is_err());
-        assert!(variances_with_moments(0.03, 0.0, &[]).is_err());
-        assert_eq!(variances_with_moments(0.03, 0.05, &[3.0, 0.0, 0.0, -3.1]).unwrap(), None);
+        assert!(variances_with_moments(0.03, 0.01, 1e-4, &[1.0; 4]).is_err());
+        assert!(variances_with_moments(-0.03, 0.01, 1e-4, &[1.0, 2.0]).is_err());
+        assert!(variances_with_moments(0.03, 0.01, 1e-4, &[1.0, f64::NAN]).is_err());
+        assert!(variances_with_moments(0.03, 0.0, 1e-4, &[]).is_err());
+        assert_eq!(variances_with_moments(0.03, 0.05, 1e-4, &[3.0, 0.0, 0.0, -3.1]).unwrap(), None);
     }
 }

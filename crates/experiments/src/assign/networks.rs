@@ -12,6 +12,8 @@ use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Least variance of a sensor in a random network.
+const SMALLEST: f64 = 1e-4;
 /// Draws before a network of positive variances is given up.
 const MAX_DRAWS: usize = 100_000;
 
@@ -27,7 +29,7 @@ fn draw(stream: Stream, sensors: usize, mean: f64, std: f64) -> Result<Vec<f64>,
     let mut rng = stream.rng();
     for _ in 0..MAX_DRAWS {
         let direction: Vec<f64> = (0..sensors).map(|_| StandardNormal.sample(&mut rng)).collect();
-        if let Some(variances) = variances_with_moments(mean, std, &direction).map_err(Error::failed)? {
+        if let Some(variances) = variances_with_moments(mean, std, SMALLEST, &direction).map_err(Error::failed)? {
             return Ok(variances);
         }
     }

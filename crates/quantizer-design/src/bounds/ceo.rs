@@ -38,8 +38,8 @@ pub fn ceo(prior: &Prior, noise: &Noise, bits: &[f64]) -> Result<CeoBound, Error
         return refuse("sensors", given, format!("as many of each, 1 to {CEO_MAX_SENSORS}"));
     }
     // A sensor without a budget says nothing.
-    let speaking: Vec<usize> = (0..n).filter(|i| bits[*i] > 0.0).collect();
-    if speaking.is_empty() {
+    let reporting: Vec<usize> = (0..n).filter(|i| bits[*i] > 0.0).collect();
+    if reporting.is_empty() {
         return Ok(CeoBound {
             distortion: prior_variance,
             gap: 0.0,
@@ -47,8 +47,8 @@ pub fn ceo(prior: &Prior, noise: &Noise, bits: &[f64]) -> Result<CeoBound, Error
     }
     let problem = Ceo {
         // In units of the prior variance.
-        precision: speaking.iter().map(|i| prior_variance / noise_variances[*i]).collect(),
-        rate: speaking.iter().map(|i| bits[*i] * std::f64::consts::LN_2).collect(),
+        precision: reporting.iter().map(|i| prior_variance / noise_variances[*i]).collect(),
+        rate: reporting.iter().map(|i| bits[*i] * std::f64::consts::LN_2).collect(),
     };
     let (tau, above) = problem.solve()?;
     let bound = CeoBound {

@@ -4,8 +4,8 @@ use fewbits_quantizer_design::design::{self, Design, Separation};
 use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::table::JointTable;
 use fewbits_quantizer_design::{
-    Channel, Criterion, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, bounds, decoder::NeymanPearson,
-    lloyd_max, quantizer::canonical,
+    Channel, Criterion, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, bounds, canonical,
+    decoder::NeymanPearson, lloyd_max,
 };
 use serde_json::Value;
 use std::collections::BTreeSet;

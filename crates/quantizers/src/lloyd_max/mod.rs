@@ -247,6 +247,21 @@ mod tests {
     }
 
     #[test]
+    fn a_design_may_start_from_any_breakpoints() {
+        let exact = gaussian(4).unwrap();
+        let density = Normal::with_deviation(1e3, 2.0).unwrap();
+        for start in [[990.0, 1001.0, 1001.5], [999.999, 1000.0, 1000.001]] {
+            let found = design_from(&density, &start).unwrap();
+            for (a, b) in found.breakpoints().iter().zip(exact.breakpoints()) {
+                assert!((a - 1e3 - 2.0 * b).abs() < 1e-11);
+            }
+        }
+        assert!(design_from(&density, &[]).is_err());
+        assert!(design_from(&density, &[1.0, 1.0]).is_err());
+        assert!(design_from(&density, &[f64::NAN]).is_err());
+    }
+
+    #[test]
     fn bad_arguments_are_named() {
         assert!(gaussian(1).unwrap_err().to_string().contains("levels"));
         assert!(gaussian(MAX_LEVELS + 1).unwrap_err().to_string().contains("levels"));

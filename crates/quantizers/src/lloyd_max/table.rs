@@ -1,7 +1,7 @@
 //! A designed quantizer with its reconstruction values.
 
 use crate::error::{Error, refuse};
-use crate::quantizer::{cell_of, check_increasing};
+use crate::quantizer::{Quantizer, cell_of, check_increasing};
 use fewbits_numerics::error::{all_finite, finite, non_negative, positive, probabilities};
 use serde::{Deserialize, Serialize};
 
@@ -131,6 +131,16 @@ impl LloydMax {
     #[inline]
     pub fn encode(&self, x: f64) -> Result<usize, Error> {
         cell_of(&self.breakpoints, x)
+    }
+}
+
+impl From<&LloydMax> for Quantizer {
+    fn from(design: &LloydMax) -> Self {
+        Self {
+            breakpoints: design.breakpoints().to_vec(),
+            labels: (0..design.centroids().len()).collect(),
+            levels: design.centroids().len(),
+        }
     }
 }
 

@@ -1,5 +1,9 @@
 //! Several sensors with their quantizers and channels, seen by one fusion centre.
 
+mod group;
+
+pub use group::SensorGroup;
+
 use crate::compositions::count;
 use crate::error::{Error, refuse};
 use crate::scene::Scene;
@@ -10,88 +14,6 @@ use serde::{Deserialize, Serialize};
 
 /// Most joint outcomes a computation may enumerate unless told otherwise.
 pub const OUTCOME_LIMIT: u64 = 1 << 20;
-
-/// Sensors of one law that share a quantizer design and a channel law.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredGroup", into = "StoredGroup")]
-pub struct SensorGroup {
-    quantizer: Quantizer,
-    channel: Channel,
-    sensors: Vec<usize>,
-}
-
-/// The stored form of a group.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredGroup {
-    quantizer: Quantizer,
-    channel: Channel,
-    sensors: Vec<usize>,
-}
-
-impl From<SensorGroup> for StoredGroup {
-    fn from(group: SensorGroup) -> Self {
-        Self {
-            quantizer: group.quantizer,
-            channel: group.channel,
-            sensors: group.sensors,
-        }
-    }
-}
-
-impl TryFrom<StoredGroup> for SensorGroup {
-    type Error = Error;
-
-    fn try_from(stored: StoredGroup) -> Result<Self, Error> {
-        Self::new(stored.quantizer, stored.channel, stored.sensors)
-    }
-}
-
-impl SensorGroup {
-    /// The sensors with the given numbers, each with this quantizer, each behind its own copy of the channel.
-    ///
-    /// # Errors
-    /// If the channel's inputs are not the quantizer's levels, or there is no sensor.
-    pub fn new(quantizer: Quantizer, channel: Channel, sensors: Vec<usize>) -> Result<Self, Error> {
-        if channel.inputs() != quantizer.levels() {
-            let levels = quantizer.levels();
-            return refuse("channel", format!("{} inputs", channel.inputs()), format!("one input a level, {levels}"));
-        }
-        if sensors.is_empty() {
-            return refuse("sensors", "empty", "at least one sensor a group");
-        }
-        Ok(Self {
-            quantizer,
-            channel,
-            sensors,
-        })
-    }
-
-    /// The quantizer.
-    pub fn quantizer(&self) -> &Quantizer {
-        &self.quantizer
-    }
-
-    /// The channel behind each sensor.
-    pub fn channel(&self) -> &Channel {
-        &self.channel
-    }
-
-    /// Numbers of the sensors in the scene.
-    pub fn sensors(&self) -> &[usize] {
-        &self.sensors
-    }
-
-    /// `P(received = t | sample in cell i)`.
-    pub(crate) fn cell_transition(&self, t: usize, cell: usize) -> f64 {
-        self.channel.probability(t, self.quantizer.labels()[cell])
-    }
-
-    /// Different joint reports of the group, up to who reported what.
-    pub(crate) fn outcomes(&self) -> u64 {
-        count(self.sensors.len(), self.channel.outputs())
-    }
-}
 
 /// A scene and, for each of its sensors, a quantizer and a channel.
 ///

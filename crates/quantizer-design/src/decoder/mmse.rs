@@ -1,11 +1,11 @@
-//! What the fusion centre does with the symbols: estimate, decide, or test.
+//! The posterior mean as a table.
 
 use crate::error::{Error, refuse};
-use crate::law::{Active, Reports, log_likelihoods};
+use crate::law::{Active, Reports};
 use crate::moments::{Table, dot};
 use crate::scene::{Feature, Scene};
 use crate::system::System;
-use crate::table::{JointTable, Layout};
+use crate::table::Layout;
 use fewbits_core::Observation;
 use fewbits_quantizers::Symbol;
 use serde::{Deserialize, Serialize};
@@ -230,119 +230,10 @@ fn posterior(scene: &Scene, likelihood: &[f64]) -> [f64; 3] {
     ]
 }
 
-/// The randomised Neyman-Pearson test between two values of the unknown on the joint outcome.
-///
-/// Outcomes are accepted for the second value in decreasing order of their likelihood ratio until the false-alarm budget is
-/// spent; the outcome on which it runs out is accepted with a probability.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredTest", into = "StoredTest")]
-pub struct NeymanPearson {
-    table: JointTable,
-    false_alarm: f64,
-    /// Probability of accepting the second value, an outcome.
-    acceptance: Vec<f64>,
-    detection: f64,
-}
-
-/// The stored form of a test; its table is computed again.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredTest {
-    system: System,
-    false_alarm: f64,
-}
-
-impl From<NeymanPearson> for StoredTest {
-    fn from(test: NeymanPearson) -> Self {
-        Self {
-            system: test.table.system().clone(),
-            false_alarm: test.false_alarm,
-        }
-    }
-}
-
-impl TryFrom<StoredTest> for NeymanPearson {
-    type Error = Error;
-
-    fn try_from(stored: StoredTest) -> Result<Self, Error> {
-        Self::new(&stored.system, stored.false_alarm)
-    }
-}
-
-impl NeymanPearson {
-    /// The most powerful test of the second value of the prior against the first with false-alarm probability `false_alarm`.
-    ///
-    /// # Errors
-    /// Unless the prior has exactly two values and `false_alarm` is inside (0, 1); [`Error::TooLarge`] as [`JointTable::new`].
-    pub fn new(system: &System, false_alarm: f64) -> Result<Self, Error> {
-        if !(false_alarm > 0.0 && false_alarm < 1.0) {
-            return refuse("false_alarm", false_alarm, "a probability inside (0, 1)");
-        }
-        if !system.scene().is_discrete() || system.scene().values().len() != 2 {
-            return refuse("prior", "not two hypotheses", "a discrete prior on two values");
-        }
-        let table = JointTable::new(system)?;
-        // ln P1 - ln P0: a key of each outcome, so a total order, and finite where the probabilities underflow.
-        let logs = log_likelihoods(system)?;
-        let key = |outcome: usize| logs[2 * outcome + 1] - logs[2 * outcome];
-        let mut order: Vec<usize> = (0..table.outcomes()).filter(|t| !key(*t).is_nan()).collect();
-        order.sort_by(|a, b| key(*b).total_cmp(&key(*a)));
-        let (mut acceptance, mut left, mut detection) = (vec![0.0; table.outcomes()], false_alarm, 0.0);
-        for outcome in order {
-            let (p0, p1) = (logs[2 * outcome].exp(), logs[2 * outcome + 1].exp());
-            let share = if p0 <= left { 1.0 } else { left / p0 };
-            acceptance[outcome] = share;
-            detection += share * p1;
-            left -= share * p0;
-            if share < 1.0 {
-                break;
-            }
-        }
-        Ok(Self {
-            table,
-            false_alarm,
-            acceptance,
-            detection: detection.min(1.0),
-        })
-    }
-
-    /// Probability of accepting the second value when it is true.
-    pub fn detection_probability(&self) -> f64 {
-        self.detection
-    }
-
-    /// Probability with which to accept the second value given one observation per sensor: 0 or 1 but for one outcome.
-    ///
-    /// Where symbols are missing (these sensors always report, so that nothing received says no more than an erasure) it is that
-    /// of the most powerful test on the sensors that are left, of the same false-alarm probability, which is made anew.
-    ///
-    /// # Errors
-    /// If there is not one observation per sensor, or a symbol is out of range.
-    pub fn acceptance(&self, observations: &[Observation<Symbol>]) -> Result<f64, Error> {
-        let system = self.table.system();
-        if observations.len() != system.scene().sensors() {
-            let given = format!("{} observations", observations.len());
-            return refuse("observations", given, format!("one per sensor, {}", system.scene().sensors()));
-        }
-        let symbols: Vec<usize> = observations.iter().filter_map(|o| o.received().map(|s| s.0)).collect();
-        if symbols.is_empty() {
-            return Ok(self.false_alarm);
-        }
-        if symbols.len() == observations.len() {
-            return Ok(self.acceptance[self.table.outcome(&symbols)?]);
-        }
-        let received: Vec<usize> = (0..observations.len())
-            .filter(|n| observations[*n].received().is_some())
-            .collect();
-        let test = Self::new(&system.subset(&received)?, self.false_alarm)?;
-        Ok(test.acceptance[test.table.outcome(&symbols)?])
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Criterion, Prior, Quantizer, Scene, scene::Noise};
+    use crate::{Criterion, Noise, Prior, Quantizer, Scene};
 
     #[test]
     fn the_table_attains_the_mean_squared_error() {
@@ -413,82 +304,5 @@ mod tests {
                 assert!((a.variance - b.variance).abs() < 1e-13 && (a.mean - m - b.mean).abs() <= 1e-15 * m.abs());
             }
         }
-    }
-
-    #[test]
-    fn likelihood_ratios_are_ordered_by_their_logarithms() {
-        let five = |signal: f64, sensors: usize, b: Vec<f64>| {
-            let noise = Noise::independent_with_deviations(&vec![1.0; sensors]).unwrap();
-            let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
-            System::identical(scene, Quantizer::new(b).unwrap()).unwrap()
-        };
-        // Products of probabilities are no total order here.
-        let b: Vec<f64> = (1..8).map(|i| 4.0 * f64::from(i) / 8.0).collect();
-        let test = NeymanPearson::new(&five(4.0, 5, b), 1e-3).unwrap();
-        assert!(test.detection_probability() > 0.99 && test.detection_probability() <= 1.0);
-        // And underflow here.
-        let far = five(40.0, 3, vec![10.0, 20.0, 30.0]);
-        let test = NeymanPearson::new(&far, 0.01).unwrap();
-        assert!((test.detection_probability() - 1.0).abs() < 1e-12);
-        let all = |t: usize| [Observation::Received(Symbol(t)); 3];
-        assert_eq!(test.acceptance(&all(3)).unwrap(), 1.0);
-        assert!(test.acceptance(&all(0)).unwrap() < 0.011);
-    }
-
-    #[test]
-    fn the_test_spends_its_budget_exactly() {
-        let scene =
-            Scene::new(Prior::binary(2.0, 0.5).unwrap(), Noise::independent_with_deviations(&[1.0; 3]).unwrap())
-                .unwrap();
-        let system = System::identical(scene, Quantizer::new(vec![0.0, 1.0, 2.0]).unwrap()).unwrap();
-        let mut last: f64 = 0.0;
-        for alpha in [1e-6, 0.01, 0.3, 0.9] {
-            let test = NeymanPearson::new(&system, alpha).unwrap();
-            let spent: f64 = (0..test.table.outcomes())
-                .map(|t| test.acceptance[t] * test.table.likelihood(t)[0])
-                .sum();
-            assert!((spent - alpha).abs() < 1e-14);
-            assert!(test.detection_probability() > last.max(alpha));
-            last = test.detection_probability();
-        }
-        // Averaged over what the first and the last sensor report, the test without the second spends the same.
-        let test = NeymanPearson::new(&system, 0.3).unwrap();
-        let given = system.symbol_distributions_given_values(0).unwrap();
-        let received = |t: usize| Observation::Received(Symbol(t));
-        let mut spent = 0.0;
-        for a in 0..4 {
-            for b in 0..4 {
-                let accepted = test
-                    .acceptance(&[received(a), Observation::Erased, received(b)])
-                    .unwrap();
-                spent += given[0][a] * given[0][b] * accepted;
-            }
-        }
-        assert!((spent - 0.3).abs() < 1e-13);
-        assert_eq!(test.acceptance(&[Observation::Nothing; 3]).unwrap(), 0.3);
-        assert!(test.acceptance(&[Observation::Erased; 2]).is_err());
-        let json = serde_json::to_string(&test).unwrap();
-        assert_eq!(serde_json::from_str::<NeymanPearson>(&json).unwrap(), test);
-        assert!(
-            serde_json::from_str::<NeymanPearson>(&json.replace("\"false_alarm\":0.3", "\"false_alarm\":1.3")).is_err()
-        );
-        let json = serde_json::to_string(&test.table).unwrap();
-        assert_eq!(serde_json::from_str::<JointTable>(&json).unwrap(), test.table);
-        assert!(NeymanPearson::new(&system, 0.0).is_err());
-        assert!(NeymanPearson::new(&system, 1.0).is_err());
-    }
-
-    #[test]
-    fn equivocation_and_information_make_up_the_prior_entropy() {
-        let scene =
-            Scene::new(Prior::binary(1.0, 0.3).unwrap(), Noise::independent_with_deviations(&[1.0; 3]).unwrap())
-                .unwrap();
-        let system = System::identical(scene, Quantizer::new(vec![0.5]).unwrap()).unwrap();
-        let table = JointTable::new(&system).unwrap();
-        let entropy = -(0.3 * f64::ln(0.3) + 0.7 * f64::ln(0.7));
-        let sum = table.equivocation().unwrap() + system.value(Criterion::MutualInformation).unwrap();
-        assert!((sum - entropy).abs() < 1e-14);
-        assert_eq!(table.outcome(&[0, 1, 0]), table.outcome(&[1, 0, 0]));
-        assert_eq!(table.multiplicity(table.outcome(&[0, 1, 0]).unwrap()), 3.0);
     }
 }

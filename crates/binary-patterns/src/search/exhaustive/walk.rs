@@ -1,0 +1,220 @@
+//! The tree of all multisets of masks.
+
+use super::{LinearSearch, MaskSet};
+use crate::bank::{CountTable, IMPOSSIBLE};
+use crate::linear::{Span, flips_under_reflection};
+use crate::search::outcomes::{Outcomes, SEARCH_PANEL};
+use crate::source::{Blur, Nodes};
+use crate::{Error, Mask, linear_pattern};
+use fewbits_numerics::quadrature::gauss_legendre;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// Levels of the search tree whose branches are shared among threads.
+const PARALLEL_LEVELS: usize = 2;
+
+/// The best sets so far.
+pub(super) struct Top {
+    keep: usize,
+    pub(super) sets: Vec<MaskSet>,
+    /// Sets worse than this cannot enter.
+    bar: f64,
+}
+
+impl Top {
+    fn new(keep: usize) -> Self {
+        Self {
+            keep,
+            sets: Vec::new(),
+            bar: f64::INFINITY,
+        }
+    }
+
+    fn push(&mut self, chosen: &[(Mask, usize)], last: (Mask, usize), mse: f64) {
+        if mse > self.bar {
+            return;
+        }
+        let masks = chosen
+            .iter()
+            .chain([&last])
+            .flat_map(|&(mask, count)| std::iter::repeat_n(mask, count))
+            .collect();
+        self.sets.push(MaskSet { masks, mse });
+        if self.sets.len() >= self.keep.saturating_mul(4) {
+            self.finish();
+        }
+    }
+
+    pub(super) fn finish(&mut self) {
+        self.sets
+            .sort_by(|a, b| a.mse.total_cmp(&b.mse).then_with(|| a.masks.cmp(&b.masks)));
+        if self.sets.len() >= self.keep {
+            self.sets.truncate(self.keep);
+            self.bar = self.sets.last().map_or(f64::INFINITY, |s| s.mse);
+        }
+    }
+
+    fn merge(mut self, other: Self) -> Self {
+        self.sets.extend(other.sets);
+        self.finish();
+        self
+    }
+}
+
+pub(super) struct Walk<'a> {
+    search: &'a LinearSearch,
+    keep: usize,
+    pub(super) nodes: Nodes,
+    /// Only half of the nodes are there, and outcomes are paired with their mirror images.
+    folded: bool,
+    variance: f64,
+    /// `tables[j][m - 1]`: probabilities of the counts of `m` sensors with mask `j + 1`.
+    tables: Vec<Vec<CountTable>>,
+    /// `leaves[r - 1]`: for every mask and count of `r` sensors the probability, and the same times `x`; a row each.
+    leaves: Vec<DMatrix<f64>>,
+    /// Sensors whose masks are forced, from mask `j + 1` on.
+    forced_from: Vec<usize>,
+}
+
+impl<'a> Walk<'a> {
+    pub(super) fn new(search: &'a LinearSearch, keep: usize) -> Result<Self, Error> {
+        let folded = search.grid.is_symmetric();
+        let reach = search.source.reach();
+        let blurs: Vec<Blur> = search
+            .grid
+            .breakpoints()
+            .iter()
+            .map(|&t| (t, search.noise_std))
+            .collect();
+        let from = if folded { 0.0 } else { -reach };
+        let nodes = Nodes::adapted(&search.source, from, reach, &blurs, SEARCH_PANEL, gauss_legendre::<8>());
+        let kinds = search.forced.len();
+        let mut tables = Vec::with_capacity(kinds);
+        for mask in 1..=kinds {
+            let quantizer = linear_pattern(mask as Mask, search.bits)?.on(&search.grid)?;
+            let p: Vec<[f64; 2]> = nodes
+                .x
+                .iter()
+                .map(|&x| quantizer.probabilities(x, search.noise_std))
+                .collect();
+            tables.push(
+                (1..=search.sensors)
+                    .map(|count| CountTable::from_probabilities(&p, count))
+                    .collect::<Vec<_>>(),
+            );
+        }
+        let leaves = (1..=search.sensors)
+            .map(|r| {
+                DMatrix::from_fn(kinds * (r + 1) * 2, nodes.len(), |row, at| {
+                    let (j, k, moment) = (row / 2 / (r + 1), row / 2 % (r + 1), row % 2);
+                    let p = tables[j][r - 1].rows[k][at];
+                    if moment == 0 { p } else { p * nodes.x[at] }
+                })
+            })
+            .collect();
+        let mut forced_from = vec![0; kinds + 1];
+        for j in (0..kinds).rev() {
+            forced_from[j] = forced_from[j + 1] + search.forced[j];
+        }
+        Ok(Self {
+            search,
+            keep,
+            nodes,
+            folded,
+            variance: search.source.variance(),
+            tables,
+            leaves,
+            forced_from,
+        })
+    }
+
+    /// All sets that continue `chosen` with `left` sensors of masks from `first` on.
+    pub(super) fn branch(
+        &self,
+        first: usize,
+        left: usize,
+        span: Span,
+        chosen: &[(Mask, usize)],
+        level: Outcomes,
+    ) -> Top {
+        let mut found = Top::new(self.keep);
+        self.close(first, left, span, chosen, &level, &mut found);
+        let mut steps = Vec::new();
+        for j in first..self.tables.len() {
+            let needed = self.search.forced[j].max(1);
+            for m in needed..left {
+                let next = span.with(j as Mask + 1);
+                let possible = !self.search.full_rank || next.rank() + (left - m) >= self.search.bits;
+                if possible && left - m >= self.forced_from[j + 1] && j + 1 < self.tables.len() {
+                    steps.push((j, m, next));
+                }
+            }
+            if self.search.forced[j] > 0 {
+                break;
+            }
+        }
+        let descend = |&(j, m, next): &(usize, usize, Span)| {
+            let mut chosen = chosen.to_vec();
+            chosen.push((j as Mask + 1, m));
+            self.branch(j + 1, left - m, next, &chosen, self.extend(&level, j, m))
+        };
+        if chosen.len() < PARALLEL_LEVELS {
+            let parts: Vec<Top> = steps.par_iter().map(descend).collect();
+            parts.into_iter().fold(found, Top::merge)
+        } else {
+            steps.iter().map(descend).fold(found, Top::merge)
+        }
+    }
+
+    /// One group of `m` sensors with mask `j + 1` more.
+    fn extend(&self, level: &Outcomes, j: usize, m: usize) -> Outcomes {
+        level.with(&self.tables[j][m - 1], self.folded && flips_under_reflection(j as Mask + 1))
+    }
+
+    /// Evaluates all sets in which the `left` sensors share one last mask.
+    fn close(
+        &self,
+        first: usize,
+        left: usize,
+        span: Span,
+        chosen: &[(Mask, usize)],
+        level: &Outcomes,
+        found: &mut Top,
+    ) {
+        let allowed = |j: usize| {
+            self.forced_from[j + 1] == 0
+                && left >= self.search.forced[j]
+                && (!self.search.full_rank || span.with(j as Mask + 1).rank() == self.search.bits)
+        };
+        let until = (first..self.tables.len())
+            .find(|&j| self.search.forced[j] > 0)
+            .map_or(self.tables.len(), |j| j + 1);
+        let Some(from) = (first..until).find(|&j| allowed(j)) else {
+            return;
+        };
+        let rows_each = (left + 1) * 2;
+        let rows = (until - from) * rows_each;
+        let sums = level.integrals(&self.leaves[left - 1].rows(from * rows_each, rows));
+        for j in (from..until).filter(|&j| allowed(j)) {
+            let mask = j as Mask + 1;
+            let flips = flips_under_reflection(mask);
+            let mut explained = 0.0;
+            for (outcome, &image) in level.mirror.iter().enumerate() {
+                for k in 0..=left {
+                    let at = |outcome: usize, k: usize| outcome * rows + (j - from) * rows_each + 2 * k;
+                    let here = at(outcome, k);
+                    let (mut mass, mut moment) = (sums[here], sums[here + 1]);
+                    if self.folded {
+                        let there = at(image, if flips { left - k } else { k });
+                        mass += sums[there];
+                        moment -= sums[there + 1];
+                    }
+                    if mass > IMPOSSIBLE {
+                        explained += moment * moment / mass;
+                    }
+                }
+            }
+            found.push(chosen, (mask, left), self.variance - explained);
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Estimates for all that a bank may report.
+
+use crate::source::Nodes;
+use crate::{Bank, Bit, Error};
+use fewbits_core::Observation;
+use fewbits_numerics::ArgumentError;
+use serde::{Deserialize, Serialize};
+
+/// Most sensors for a table over bit strings.
+pub const MAX_TABLE_SENSORS: usize = 24;
+
+/// Estimates for every outcome of a bank.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredTable", into = "StoredTable")]
+pub struct LookupTable {
+    pub(crate) bank: Bank,
+    pub(crate) estimates: Vec<f64>,
+}
+
+/// The stored form of a table.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredTable {
+    bank: Bank,
+    estimates: Vec<f64>,
+}
+
+impl From<LookupTable> for StoredTable {
+    fn from(table: LookupTable) -> Self {
+        Self {
+            bank: table.bank,
+            estimates: table.estimates,
+        }
+    }
+}
+
+impl TryFrom<StoredTable> for LookupTable {
+    type Error = Error;
+
+    fn try_from(stored: StoredTable) -> Result<Self, Error> {
+        fewbits_numerics::error::all_finite("estimates", &stored.estimates)?;
+        let outcomes = stored.bank.checked_outcomes()?;
+        if stored.estimates.len() != outcomes {
+            let given = format!("{} estimates", stored.estimates.len());
+            return Err(ArgumentError::new("estimates", given, format!("{outcomes}, one per outcome")).into());
+        }
+        Ok(Self {
+            bank: stored.bank,
+            estimates: stored.estimates,
+        })
+    }
+}
+
+impl LookupTable {
+    /// The estimate from one observation per sensor. Where a bit is missing (these sensors always report, so that nothing
+    /// received, like an erasure, says nothing) it is the posterior mean given the others, whatever the table's decoder.
+    ///
+    /// # Errors
+    /// If the number of observations is not the number of sensors.
+    pub fn decode(&self, observations: &[Observation<Bit>]) -> Result<f64, Error> {
+        let bits: Vec<bool> = observations
+            .iter()
+            .filter_map(|o| o.received().map(|bit| bit.0))
+            .collect();
+        if bits.len() == observations.len() {
+            return self.estimate(&bits);
+        }
+        self.bank.posterior_mean(observations)
+    }
+
+    /// The estimate for one bit a sensor.
+    ///
+    /// # Errors
+    /// If the number of bits is not the number of sensors.
+    pub fn estimate(&self, bits: &[bool]) -> Result<f64, Error> {
+        Ok(self.estimates[self.bank.index_of(bits)?])
+    }
+
+    /// Number of distinguishable outcomes stored.
+    pub fn outcomes(&self) -> usize {
+        self.estimates.len()
+    }
+
+    /// `(E[xhat|x] - x, Var[xhat|x])`: bias and variance of the estimate for one value of the source.
+    ///
+    /// # Errors
+    /// If `x` is not finite.
+    pub fn conditional_error(&self, x: f64) -> Result<(f64, f64), Error> {
+        let x = fewbits_numerics::error::finite("x", x)?;
+        let at = Nodes {
+            x: vec![x],
+            w: vec![1.0],
+        };
+        let (mut mean, mut second) = (0.0, 0.0);
+        self.bank.for_outcomes(&at, |index, w| {
+            let off = self.estimates[index] - x;
+            mean += w[0] * off;
+            second += w[0] * off * off;
+        });
+        Ok((mean, (second - mean * mean).max(0.0)))
+    }
+
+    /// Expanded to all `2^N` bit strings, sensor 1 the most significant bit of the index.
+    ///
+    /// # Errors
+    /// If there are more than 24 sensors.
+    pub fn expand(&self) -> Result<Vec<f64>, Error> {
+        let sensors = self.bank.sensors();
+        if sensors > MAX_TABLE_SENSORS {
+            return Err(Error::TooManyOutcomes {
+                outcomes: 1u128.checked_shl(sensors as u32).unwrap_or(u128::MAX),
+                limit: 1 << MAX_TABLE_SENSORS,
+            });
+        }
+        (0usize..1 << sensors)
+            .map(|word| {
+                let bits: Vec<bool> = (0..sensors).rev().map(|at| word >> at & 1 == 1).collect();
+                self.estimate(&bits)
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BinaryQuantizer, Decoder, Source};
+
+    #[test]
+    fn a_missing_bit_leaves_the_posterior_of_the_others() {
+        let q = |b: &[f64]| BinaryQuantizer::new(b.to_vec()).unwrap();
+        let all = vec![q(&[0.0]), q(&[-0.5, 0.5]), q(&[0.25])];
+        let bank = |quantizers: Vec<BinaryQuantizer>| {
+            Bank::homogeneous_with_deviation(Source::uniform(1.0).unwrap(), quantizers, 0.2).unwrap()
+        };
+        let table = bank(all.clone()).table(Decoder::Mmse).unwrap();
+        let others = bank(all[..2].to_vec()).table(Decoder::Mmse).unwrap();
+        for bits in [[false, true], [true, true], [true, false]] {
+            let mut seen = bits.map(|b| Observation::Received(Bit(b))).to_vec();
+            seen.push(Observation::Erased);
+            assert!((table.decode(&seen).unwrap() - others.estimate(&bits).unwrap()).abs() < 1e-12);
+            assert!(table.decode(&seen[..2]).is_err());
+            seen[2] = Observation::Received(Bit(true));
+            let full = [bits[0], bits[1], true];
+            assert_eq!(table.decode(&seen).unwrap(), table.estimate(&full).unwrap());
+        }
+        let json = serde_json::to_string(&table).unwrap();
+        assert_eq!(serde_json::from_str::<LookupTable>(&json).unwrap(), table);
+    }
+}

@@ -1,0 +1,253 @@
+//! A criterion as a function of the breakpoints of some groups, the others being fixed: value, gradient and Hessian.
+//!
+//! For a group of `N` identical sensors with received-symbol probabilities `P_t` the reports enter through multinomial
+//! probabilities `R_N(n)`. A breakpoint moves probability between two neighbouring cells, so `dP_t/db_i = c_{t,i} phi_i` with
+//! `c_{t,i} = C_{t,i} - C_{t,i+1}` and `phi_i` the density of the sample at `b_i`, and
+//!
+//! ```text
+//! dR_N(n)/db_i        = N sum_t c_{t,i} phi_i R_{N-1}(n - e_t)
+//! d2R_N(n)/db_i db_j  = N (N-1) sum_{t,u} c_{t,i} c_{u,j} phi_i phi_j R_{N-2}(n - e_t - e_u)
+//!                       + [i = j] N sum_t c_{t,i} phi_i' R_{N-1}(n - e_t)
+//! ```
+//!
+//! The node sums therefore run over the few functions `R_N`, `phi_i R_{N-1}`, `phi_i' R_{N-1}` and `phi_i phi_j R_{N-2}`; the
+//! channel's coefficients act on the results. No term divides by a cell probability, so empty cells are harmless.
+
+mod cells;
+mod second_order;
+
+use crate::axis::Axis;
+use crate::criterion::{Criterion, Scored};
+use crate::derivatives::Derivatives;
+use crate::error::Error;
+use crate::law::{Active, SensorLaw, Slots, negative_entropy, sums};
+use crate::moments::{Table, moments};
+use crate::newton::Objective;
+use crate::system::System;
+
+/// A criterion (signed so that larger is better) over the breakpoints of the active groups.
+#[derive(Debug, Clone)]
+pub(crate) struct Problem<'a> {
+    system: &'a System,
+    scored: Scored,
+    active: Vec<Active<'a>>,
+    /// Report probabilities of each fixed group.
+    fixed: Vec<Table>,
+    /// Log multiplicity of every joint outcome, fixed groups slowest.
+    log_multiplicity: Vec<f64>,
+    constant: f64,
+}
+
+impl Objective for Problem<'_> {
+    fn value(&self, b: &[f64]) -> f64 {
+        self.value(b)
+    }
+
+    fn derivatives(&self, b: &[f64]) -> Derivatives {
+        self.derivatives(b)
+    }
+
+    fn blocks(&self) -> Vec<usize> {
+        self.blocks()
+    }
+
+    fn unit(&self, value: f64) -> f64 {
+        self.scored.unit(value, self.system.scene())
+    }
+}
+
+impl<'a> Problem<'a> {
+    /// The criterion over the breakpoints of the groups `active` (increasing, may be empty).
+    pub(crate) fn new(system: &'a System, criterion: Criterion, active: &[usize]) -> Result<Self, Error> {
+        system.check_outcomes()?;
+        let scene = system.scene();
+        let scored = Scored::new(criterion, scene)?;
+        let mut fixed = Vec::new();
+        let mut log_multiplicity = vec![0.0];
+        let mut constant = scored.constant(scene);
+        let mut chosen = Vec::new();
+        for index in 0..system.groups().len() {
+            let entry = Active::new(system, index)?;
+            if active.contains(&index) {
+                chosen.push(entry);
+                continue;
+            }
+            let (reports, symbols) = entry.reports(entry.group.quantizer().breakpoints());
+            if scored.has_separable_entropy() {
+                constant += entry.group.sensors().len() as f64 * negative_entropy(&symbols, &scene.mass.weights);
+            }
+            fixed.push(reports);
+            log_multiplicity = sums(&log_multiplicity, entry.compositions.log_multiplicity());
+        }
+        for entry in &chosen {
+            log_multiplicity = sums(&log_multiplicity, entry.compositions.log_multiplicity());
+        }
+        Ok(Self {
+            system,
+            scored,
+            active: chosen,
+            fixed,
+            log_multiplicity,
+            constant,
+        })
+    }
+
+    /// The breakpoints of the active groups as they are in the system.
+    pub(crate) fn start(&self) -> Vec<f64> {
+        self.active
+            .iter()
+            .flat_map(|a| a.group.quantizer().breakpoints().to_vec())
+            .collect()
+    }
+
+    /// Numbers of breakpoints of the active groups.
+    pub(crate) fn blocks(&self) -> Vec<usize> {
+        self.active.iter().map(Active::parameters).collect()
+    }
+
+    /// The system with the active groups' breakpoints replaced.
+    pub(crate) fn system_at(&self, b: &[f64]) -> Result<System, Error> {
+        self.active
+            .iter()
+            .zip(self.split(b))
+            .try_fold(self.system.clone(), |system, (a, b)| {
+                system.with_quantizer(a.index, a.group.quantizer().with_breakpoints(b.to_vec())?)
+            })
+    }
+
+    /// Least probability of a cell of an active group: `(group, cell, probability)`.
+    pub(crate) fn rarest_cell(&self, b: &[f64]) -> Option<(usize, usize, f64)> {
+        let mass = &self.system.scene().mass.weights;
+        let cells = self.active.iter().zip(self.split(b)).flat_map(|(a, b)| {
+            let cells = a.cells(b).into_iter().enumerate();
+            cells.map(move |(cell, p)| (a.index, cell, inner_product(&p, mass)))
+        });
+        cells.min_by(|x, y| x.2.total_cmp(&y.2))
+    }
+
+    fn split<'b>(&self, b: &'b [f64]) -> Vec<&'b [f64]> {
+        let mut rest = b;
+        self.active
+            .iter()
+            .map(|a| {
+                let (head, tail) = rest.split_at(a.parameters());
+                rest = tail;
+                head
+            })
+            .collect()
+    }
+
+    /// The signed criterion.
+    pub(crate) fn value(&self, b: &[f64]) -> f64 {
+        let mut value = self.constant;
+        let reports: Vec<Table> = self
+            .active
+            .iter()
+            .zip(self.split(b))
+            .map(|(a, b)| {
+                let (reports, symbols) = a.reports(b);
+                value += self.entropy_share(a, &symbols);
+                reports
+            })
+            .collect();
+        let tables: Vec<&Table> = self.fixed.iter().chain(&reports).collect();
+        value + self.score(&moments(&tables, self.scored.features()))
+    }
+
+    /// Joint report probabilities of the fixed groups and, for the single active group, its symbol probabilities.
+    pub(crate) fn surroundings(&self) -> (Table, Table) {
+        let nodes = self.system.scene().nodes();
+        let symbols = self
+            .active
+            .first()
+            .map(|a| a.symbols(a.group.quantizer().breakpoints()));
+        let joint = self
+            .fixed
+            .iter()
+            .fold(Table::new(vec![1.0; nodes], nodes), |joint, t| joint.outer(t));
+        (joint, Table::new(symbols.unwrap_or_default(), nodes))
+    }
+
+    fn fixed_outcomes(&self) -> usize {
+        self.fixed.iter().map(Table::rows).product()
+    }
+
+    /// Everything about one sensor of the active group number `at` with breakpoints `b`.
+    pub(crate) fn single_sensor_law(&self, at: usize, b: &[f64]) -> SensorLaw<'_> {
+        let Some(a) = self.active.get(at) else {
+            return SensorLaw::default();
+        };
+        let (densities, slopes) = a.densities(b);
+        SensorLaw {
+            symbols: a.symbols(b),
+            densities,
+            slopes,
+            exchange: &a.exchange,
+        }
+    }
+
+    /// What does not depend on the active groups.
+    pub(crate) fn constant(&self) -> f64 {
+        self.constant + self.offset()
+    }
+
+    /// What is added to a value for the outside.
+    pub(crate) fn offset(&self) -> f64 {
+        self.scored.offset()
+    }
+
+    fn entropy_share(&self, a: &Active<'_>, symbols: &[f64]) -> f64 {
+        if self.scored.has_separable_entropy() {
+            a.group.sensors().len() as f64 * negative_entropy(symbols, &self.system.scene().mass.weights)
+        } else {
+            0.0
+        }
+    }
+
+    fn score(&self, moments: &[f64]) -> f64 {
+        let outcomes = moments.chunks_exact(self.scored.features().len());
+        outcomes
+            .zip(&self.log_multiplicity)
+            .map(|(m, l)| self.scored.value(m, *l))
+            .sum()
+    }
+
+    /// Moments over all joint outcomes, some groups' reports replaced; the rows of a replaced group are `(i, m)`.
+    fn node_sums(&self, slots: &[Slots], replaced: &[(usize, Slot)]) -> Vec<f64> {
+        let mut tables: Vec<&Table> = self.fixed.iter().collect();
+        for (g, slots) in slots.iter().enumerate() {
+            let slot = replaced.iter().find(|(h, _)| *h == g).map(|(_, slot)| *slot);
+            let (factor, others) = match slot {
+                None => (None, &slots.reports[0]),
+                Some(Slot::First) => (Some(&slots.densities), &slots.reports[1]),
+                Some(Slot::Slope) => (Some(&slots.slopes), &slots.reports[1]),
+                Some(Slot::Second) => (Some(&slots.pairs), &slots.reports[2]),
+            };
+            tables.extend(factor);
+            // With no sensor left the reports are a single row of ones.
+            if factor.is_none() || others.rows() > 1 {
+                tables.push(others);
+            }
+        }
+        moments(&tables, self.scored.features())
+    }
+
+    fn axis(&self, g: usize, width: usize) -> Axis {
+        let sizes = self.active.iter().map(|a| a.compositions.len());
+        Axis {
+            outer: self.fixed_outcomes() * sizes.clone().take(g).product::<usize>(),
+            inner: sizes.skip(g + 1).product::<usize>() * width,
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Slot {
+    First,
+    Slope,
+    Second,
+}
+
+fn inner_product(a: &[f64], b: &[f64]) -> f64 {
+    crate::moments::dot(a, b)
+}

@@ -1,0 +1,195 @@
+//! Gradients and Hessians of a criterion.
+
+use super::{Problem, Slot, inner_product};
+use crate::axis::{Axis, reduce, scatter, slice};
+use crate::criterion::LOG_FLOOR;
+use crate::derivatives::Derivatives;
+use crate::law::Active;
+use nalgebra::{DMatrix, DVector};
+
+impl Problem<'_> {
+    /// The signed criterion with gradient and Hessian.
+    pub(crate) fn derivatives(&self, b: &[f64]) -> Derivatives {
+        let parts = self.split(b);
+        let total = b.len();
+        let features = self.scored.features();
+        let width = features.len();
+        let mut value = self.constant;
+        let mut gradient = DVector::zeros(total);
+        let mut hessian = DMatrix::zeros(total, total);
+
+        let mut offsets = Vec::with_capacity(parts.len());
+        let mut slots = Vec::with_capacity(parts.len());
+        let mut offset = 0;
+        for (a, b) in self.active.iter().zip(&parts) {
+            let symbols = a.symbols(b);
+            let (densities, slopes) = a.densities(b);
+            value += self.entropy_share(a, &symbols);
+            if self.scored.has_separable_entropy() {
+                let terms = self.entropy_derivatives(a, &symbols, &densities, &slopes);
+                let n = b.len();
+                for i in 0..n {
+                    gradient[offset + i] += terms.gradient[i];
+                    for j in 0..n {
+                        hessian[(offset + i, offset + j)] += terms.hessian[(i, j)];
+                    }
+                }
+            }
+            slots.push(a.slots(&symbols, &densities, &slopes));
+            offsets.push(offset);
+            offset += b.len();
+        }
+
+        // Moments of every outcome, and what a change of each is worth.
+        let full = self.node_sums(&slots, &[]);
+        value += self.score(&full);
+        let mut worth = vec![0.0; full.len()];
+        for ((m, l), out) in full
+            .chunks_exact(width)
+            .zip(&self.log_multiplicity)
+            .zip(worth.chunks_exact_mut(width))
+        {
+            self.scored.slope(m, *l, out);
+        }
+
+        let mut changes = Vec::with_capacity(total);
+        for (g, a) in self.active.iter().enumerate() {
+            let n = a.parameters();
+            let (first, bend) =
+                (self.node_sums(&slots, &[(g, Slot::First)]), self.node_sums(&slots, &[(g, Slot::Slope)]));
+            let second = if a.compositions.total() >= 2 {
+                self.node_sums(&slots, &[(g, Slot::Second)])
+            } else {
+                Vec::new()
+            };
+            let axis = self.axis(g, width);
+            let below = a.compositions.len_below(1);
+            let crossed: Vec<Vec<f64>> = (g + 1..self.active.len())
+                .map(|h| self.node_sums(&slots, &[(g, Slot::First), (h, Slot::First)]))
+                .collect();
+            let mut pair = 0;
+            for i in 0..n {
+                let row = offsets[g] + i;
+                let reduced = reduce(&worth, axis, &a.compositions, 0, &a.exchange[i]);
+                let moved = slice(&first, axis, n, below, i);
+                gradient[row] += inner_product(&reduced, &moved);
+                hessian[(row, row)] += inner_product(&reduced, &slice(&bend, axis, n, below, i));
+                if a.compositions.total() >= 2 {
+                    let pairs = n * (n + 1) / 2;
+                    let twice = a.compositions.len_below(2);
+                    for j in i..n {
+                        let both = reduce(&reduced, axis, &a.compositions, 1, &a.exchange[j]);
+                        let term = inner_product(&both, &slice(&second, axis, pairs, twice, pair));
+                        add_symmetric(&mut hessian, row, offsets[g] + j, term);
+                        pair += 1;
+                    }
+                }
+                for (h, crossed) in (g + 1..self.active.len()).zip(&crossed) {
+                    let other = &self.active[h];
+                    // The axis of h in tables whose axis g has one report fewer.
+                    let plain = self.axis(h, width);
+                    let shrunk = Axis {
+                        outer: plain.outer / a.compositions.len() * below,
+                        inner: plain.inner,
+                    };
+                    let expanded = Axis {
+                        outer: shrunk.outer * n,
+                        ..shrunk
+                    };
+                    let below_h = other.compositions.len_below(1);
+                    for j in 0..other.parameters() {
+                        let both = reduce(&reduced, shrunk, &other.compositions, 0, &other.exchange[j]);
+                        let of_j = slice(crossed, expanded, other.parameters(), below_h, j);
+                        let inner = axis.inner / other.compositions.len() * below_h;
+                        let of_ij = slice(
+                            &of_j,
+                            Axis {
+                                outer: axis.outer,
+                                inner,
+                            },
+                            n,
+                            below,
+                            i,
+                        );
+                        add_symmetric(&mut hessian, row, offsets[h] + j, inner_product(&both, &of_ij));
+                    }
+                }
+                changes.push(scatter(&moved, axis, &a.compositions, &a.exchange[i]));
+            }
+        }
+
+        // Second derivatives of the score along pairs of changes.
+        let mut bent = vec![0.0; full.len()];
+        for p in 0..total {
+            let outcomes = full.chunks_exact(width).zip(changes[p].chunks_exact(width));
+            for ((m, d), out) in outcomes.zip(bent.chunks_exact_mut(width)) {
+                self.scored.curvature(m, d, out);
+            }
+            for q in p..total {
+                add_symmetric(&mut hessian, p, q, inner_product(&bent, &changes[q]));
+            }
+        }
+        Derivatives {
+            value,
+            gradient,
+            hessian,
+        }
+    }
+
+    /// Derivatives of `N sum_node mass sum_t P_t ln P_t`.
+    fn entropy_derivatives(
+        &self,
+        a: &Active<'_>,
+        symbols: &[f64],
+        densities: &[Vec<f64>],
+        slopes: &[Vec<f64>],
+    ) -> Derivatives {
+        let mass = &self.system.scene().mass.weights;
+        let (n, nodes) = (a.parameters(), mass.len());
+        let sensors = a.group.sensors().len() as f64;
+        let mut gradient = DVector::zeros(n);
+        let mut hessian = DMatrix::zeros(n, n);
+        let mut worth = vec![0.0; nodes];
+        for i in 0..n {
+            worth.fill(0.0);
+            for (t, c) in a.exchange[i].iter().enumerate().filter(|(_, c)| **c != 0.0) {
+                let p = &symbols[t * nodes..(t + 1) * nodes];
+                worth
+                    .iter_mut()
+                    .zip(p)
+                    .for_each(|(w, p)| *w += c * p.max(LOG_FLOOR).ln());
+            }
+            for k in 0..nodes {
+                gradient[i] += sensors * mass[k] * densities[i][k] * worth[k];
+                hessian[(i, i)] += sensors * mass[k] * slopes[i][k] * worth[k];
+            }
+            for j in i..n {
+                let mut term = 0.0;
+                for (t, (c, d)) in a.exchange[i].iter().zip(&a.exchange[j]).enumerate() {
+                    if c * d == 0.0 {
+                        continue;
+                    }
+                    for k in 0..nodes {
+                        let p = symbols[t * nodes + k];
+                        if p > LOG_FLOOR {
+                            term += c * d * mass[k] * densities[i][k] * (densities[j][k] / p);
+                        }
+                    }
+                }
+                add_symmetric(&mut hessian, i, j, sensors * term);
+            }
+        }
+        Derivatives {
+            value: 0.0,
+            gradient,
+            hessian,
+        }
+    }
+}
+
+fn add_symmetric(matrix: &mut DMatrix<f64>, i: usize, j: usize, term: f64) {
+    matrix[(i, j)] += term;
+    if i != j {
+        matrix[(j, i)] += term;
+    }
+}
