@@ -25,6 +25,7 @@ mod measured;
 pub mod mi;
 mod parameters;
 pub mod plot;
+pub mod real;
 pub mod reference;
 mod schema;
 mod sweep;
@@ -48,6 +49,7 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         cfwmd::figures(),
         diffusive::figures(),
         handoff::figures(),
+        real::figures(),
     ]
     .concat()
 }
