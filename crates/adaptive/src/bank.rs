@@ -155,7 +155,7 @@ impl Bank {
 
     pub(crate) fn is_valid(&self) -> bool {
         let finite = self.x.iter().chain(&self.v).all(|x| x.is_finite());
-        finite && self.w.iter().all(|w| *w > 0.0 && *w <= 1.0)
+        finite && self.w.iter().all(|w| *w > 0.0 && *w < 1.0 + 1e-9)
     }
 
     /// The time update over `elapsed` slots.
