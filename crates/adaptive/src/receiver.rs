@@ -233,7 +233,8 @@ impl Receiver {
         let slot = replica.predict(elapsed);
         let law = replica.law(&slot);
         let outside = law.bank_outside();
-        let outcome = report::read(&law, reader).and_then(|content| content.apply(&self.config, replica, &slot, outside));
+        let outcome =
+            report::read(&law, reader).and_then(|content| content.apply(&self.config, replica, &slot, outside));
         if outcome.is_err() {
             replica.bank = saved;
         }
