@@ -102,6 +102,15 @@ wrapped!(
     fewbits_sensor_assignment
 );
 
+impl From<fewbits_adaptive::Error> for Error {
+    fn from(error: fewbits_adaptive::Error) -> Self {
+        match error {
+            fewbits_adaptive::Error::Argument(argument) => Self::Argument(argument),
+            other => Self::failed(other),
+        }
+    }
+}
+
 impl From<fewbits_dymbo::Error> for Error {
     fn from(error: fewbits_dymbo::Error) -> Self {
         Self::failed(error)

@@ -35,6 +35,8 @@ pub struct Context<'a> {
     pub progress: Option<&'a (dyn Fn(u64) + Sync)>,
     /// Set to stop early.
     pub cancel: Option<&'a AtomicBool>,
+    /// Reads a user's file: figures open none themselves.
+    pub read: Option<&'a (dyn Fn(&str) -> std::io::Result<String> + Sync)>,
 }
 
 impl Context<'_> {
@@ -44,6 +46,18 @@ impl Context<'_> {
             seed,
             progress: None,
             cancel: None,
+            read: None,
+        }
+    }
+
+    /// The text of a user's file.
+    ///
+    /// # Errors
+    /// If it cannot be read, or the run has no way to.
+    pub fn read(&self, path: &str) -> std::io::Result<String> {
+        match self.read {
+            Some(read) => read(path),
+            None => Err(std::io::Error::new(std::io::ErrorKind::Unsupported, "this run reads no files")),
         }
     }
 

@@ -25,6 +25,7 @@ pub mod mi;
 pub mod network;
 mod parameters;
 pub mod plot;
+pub mod real;
 pub mod reference;
 mod schema;
 mod sweep;
@@ -49,6 +50,7 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         diffusive::figures(),
         handoff::figures(),
         network::figures(),
+        real::figures(),
     ]
     .concat()
 }

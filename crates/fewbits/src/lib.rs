@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | [`core`] | always | messages and their bits, factors and likelihoods, beliefs |
 //! | [`numerics`], [`monte_carlo`] | always | normal-distribution numerics; random streams, Monte Carlo |
+//! | `adaptive` | `adaptive` | any signal within a guaranteed error, in as few bits as it deserves |
 //! | `dymbo` | `dymbo` | Kalman-like filters fed with one sign bit a sample |
 //! | `cfwmd` | `cfwmd` | sensors that censor dull measurements, and fusion that hears their silence |
 //! | `diffusive`, `topology` | `diffusive` | a diffusive source, found by a belief that walks the network |
@@ -22,6 +23,8 @@ pub use fewbits_core as core;
 pub use fewbits_monte_carlo as monte_carlo;
 pub use fewbits_numerics as numerics;
 
+#[cfg(feature = "adaptive")]
+pub use fewbits_adaptive as adaptive;
 #[cfg(feature = "binary-patterns")]
 pub use fewbits_binary_patterns as binary_patterns;
 #[cfg(feature = "cfwmd")]
@@ -58,6 +61,8 @@ mod pages {
     struct Guide;
     #[doc = include_str!("../../../docs/own-scheme.md")]
     struct OwnScheme;
+    #[doc = include_str!("../../../docs/adaptive.md")]
+    struct Adaptive;
     #[doc = include_str!("../../../docs/dymbo.md")]
     struct Dymbo;
     #[doc = include_str!("../../../docs/quantizers.md")]

@@ -12,6 +12,7 @@
 //! | smoothing of Gaussian beliefs | [`smoother`] (Rauch-Tung-Striebel), [`FixedLagSmoother`] |
 //! | any dynamics, any likelihood | [`ParticleFilter`] (bootstrap, guided, auxiliary), [`Resampling`] |
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) |
+//! | several models, one at a time | [`Imm`] (interacting multiple models, any factor) |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) |
 //! | the exact answer | [`PointMassFilter`] (scalar filter and smoother on a grid), [`PlaneFilter`] (two dimensions) |
 //! | world, sensors, link and filter in one call | [`ClosedLoop`] |
@@ -40,6 +41,7 @@ pub mod cramer_rao;
 mod error;
 pub mod extended_kalman;
 mod guided;
+mod imm;
 pub mod kalman;
 mod linalg;
 mod moved;
@@ -55,6 +57,8 @@ pub use closed_loop::{AssumedDensity, ClosedLoop, Filter, LoopState, Slot};
 pub use error::Error;
 pub use fewbits_densities::{GaussianCloud, Grid, Particles, PlaneMass, PointMass};
 pub use guided::{OptimalProposal, TiltedProposal};
+
+pub use imm::{Imm, ImmBelief, ImmInfo, ImmWorkspace};
 pub use particle::{ParticleFilter, ParticleInfo, Proposal, Workspace};
 pub use plane::PlaneFilter;
 pub use point_mass::PointMassFilter;

@@ -226,10 +226,12 @@ pub fn run(options: &Options) -> Result<Ending, Error> {
         let (about, began) = (job.figure.about(), Instant::now());
         let bar = progress.start(about.id);
         let report = |trials: u64| bar.advance(trials);
+        let read = |path: &str| std::fs::read_to_string(path);
         let context = Context {
             seed: options.seed,
             progress: Some(&report),
             cancel: Some(&STOP),
+            read: Some(&read),
         };
         let result = produce(&pool, job, &context);
         bar.finish();

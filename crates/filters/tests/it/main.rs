@@ -5,6 +5,7 @@
 
 mod closed_loop;
 mod failure;
+mod imm;
 mod particle;
 mod rao_blackwell;
 mod resample;

@@ -1,0 +1,127 @@
+//! What both ends agree on beforehand.
+
+use fewbits_numerics::error::{ArgumentError, positive, within};
+use serde::{Deserialize, Serialize};
+
+/// The agreement of a sensor and its receiver: the accuracy, and how losses are survived.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct Config {
+    delta: f64,
+    period: Option<f64>,
+    sequence_bits: u32,
+    refresh_every: Option<u64>,
+    resilient: bool,
+}
+
+impl Config {
+    /// Every reconstruction is within `delta` (measurement units) of its sample, over a link that loses nothing.
+    ///
+    /// # Errors
+    /// If `delta` is not above 0 or `2 delta` not finite.
+    pub fn new(delta: f64) -> Result<Self, ArgumentError> {
+        positive("delta", delta)?;
+        if !(2.0 * delta).is_finite() {
+            return Err(ArgumentError::new("delta", delta, "a number whose double is finite"));
+        }
+        Ok(Self {
+            delta,
+            period: None,
+            sequence_bits: 0,
+            refresh_every: None,
+            resilient: false,
+        })
+    }
+
+    /// The signal lives on a circle: samples are taken modulo `period` (360 for degrees), reconstructions lie in `[0, period)`,
+    /// and `delta` bounds the error around the circle.
+    ///
+    /// # Errors
+    /// If `period` is not positive and finite, or above `2^40 delta`.
+    pub fn circular(mut self, period: f64) -> Result<Self, ArgumentError> {
+        positive("period", period)?;
+        if period / self.delta > (1_u64 << 40) as f64 {
+            let expected = format!("at most 2^40 delta = {}", (1_u64 << 40) as f64 * self.delta);
+            return Err(ArgumentError::new("period", period, expected));
+        }
+        self.period = Some(period);
+        Ok(self)
+    }
+
+    /// For links that lose packets: every packet counts up a number of `sequence_bits` bits (by which the receiver notices a
+    /// loss unless a multiple of `2^sequence_bits` packets vanished in a row) and has a flag that marks a refresh; every
+    /// `refresh_every` slots, and whenever it is asked to, the sensor sends a refresh, from which a receiver can start.
+    ///
+    /// # Errors
+    /// If `sequence_bits` is not in `1..=16` or `refresh_every` is 0.
+    pub fn resilient(mut self, sequence_bits: u32, refresh_every: Option<u64>) -> Result<Self, ArgumentError> {
+        within("sequence_bits", f64::from(sequence_bits), 1.0, 16.0)?;
+        if refresh_every == Some(0) {
+            return Err(ArgumentError::new("refresh_every", 0, "at least 1 slot"));
+        }
+        self.sequence_bits = sequence_bits;
+        self.refresh_every = refresh_every;
+        self.resilient = true;
+        Ok(self)
+    }
+
+    /// The largest error of a reconstruction.
+    pub fn delta(&self) -> f64 {
+        self.delta
+    }
+
+    /// The period of a circular signal.
+    pub fn period(&self) -> Option<f64> {
+        self.period
+    }
+
+    /// Slots from one scheduled refresh to the next.
+    pub fn refresh_every(&self) -> Option<u64> {
+        self.refresh_every
+    }
+
+    /// Bits of the counter in a packet.
+    pub fn sequence_bits(&self) -> u32 {
+        self.sequence_bits
+    }
+
+    /// Whether packets have a counter and a flag.
+    pub fn is_resilient(&self) -> bool {
+        self.resilient
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Config", deny_unknown_fields)]
+struct Stored {
+    delta: f64,
+    period: Option<f64>,
+    sequence_bits: u32,
+    refresh_every: Option<u64>,
+}
+
+impl From<Config> for Stored {
+    fn from(config: Config) -> Self {
+        Self {
+            delta: config.delta,
+            period: config.period,
+            sequence_bits: config.sequence_bits,
+            refresh_every: config.refresh_every,
+        }
+    }
+}
+
+impl TryFrom<Stored> for Config {
+    type Error = ArgumentError;
+
+    fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
+        let mut config = Self::new(stored.delta)?;
+        if let Some(period) = stored.period {
+            config = config.circular(period)?;
+        }
+        if stored.sequence_bits > 0 {
+            config = config.resilient(stored.sequence_bits, stored.refresh_every)?;
+        }
+        Ok(config)
+    }
+}

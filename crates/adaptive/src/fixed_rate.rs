@@ -1,0 +1,208 @@
+//! The sibling with the same few bits in every slot.
+
+use crate::Error;
+use fewbits_core::factor::InCell;
+use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Gaussian, Message, Observed};
+use fewbits_filters::{Imm, ImmBelief, ImmWorkspace};
+use fewbits_models::{LinearGaussian, LinearSensor};
+use fewbits_numerics::error::{ArgumentError, finite, positive};
+use fewbits_numerics::normal;
+use nalgebra::{Matrix2, Vector1, Vector2};
+
+/// Per-slot factors of the velocities; zero is the random walk.
+const DECAYS: [f64; 3] = [0.0, 0.6, 0.95];
+/// Scales of the driving noise, in powers of four of the unit.
+const SCALES: std::ops::RangeInclusive<i32> = -2..=2;
+/// Probability of a new model in a slot.
+const SWITCHING: f64 = 0.05;
+
+/// A word of 1 to 3 bits in every slot: the cell of the sample between quantiles of what both ends predict.
+///
+/// Both ends run one interacting-multiple-model filter ([`Imm`]) of random walks and decaying velocities at scales
+/// `unit 4^-2 .. unit 4^2`; the cells have equal probability under its prediction (with one bit they take turns at being unequal:
+/// thresholds at one half, a tenth and nine tenths tell the scale, which a threshold at the median alone does not), a word is an [`InCell`] factor, and the
+/// estimate is the filter's mean. There is no guarantee: this is for links that carry exactly so many bits. Replicas may differ in
+/// the last place on different machines; their quantiles then do too, and words mean the same.
+///
+/// ```
+/// use fewbits_adaptive::FixedRate;
+/// let (mut sensor, mut receiver) = (FixedRate::new(2, 1.0, 20.0)?, FixedRate::new(2, 1.0, 20.0)?);
+/// for n in 0..200 {
+///     let sample = 20.0 + 3.0 * (f64::from(n) * 0.05).sin();
+///     let word = sensor.encode(sample)?;
+///     let estimate = receiver.receive(word)?;
+///     assert_eq!(estimate, sensor.estimate());
+///     assert!(n < 50 || (estimate - sample).abs() < 0.5);
+/// }
+/// # Ok::<(), fewbits_adaptive::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct FixedRate {
+    bits: u32,
+    noise_variance: f64,
+    filter: Imm<LinearGaussian<2, 1>>,
+    sensor: LinearSensor<2, 1>,
+    belief: ImmBelief<2>,
+    workspace: ImmWorkspace<2>,
+    /// Slots so far, modulo four.
+    turn: usize,
+}
+
+/// A word of a [`FixedRate`] scheme: the number of the cell, from below.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Word(pub u8);
+
+impl Message for Word {
+    /// Bits of a word.
+    type Format = u32;
+
+    fn encode(&self, bits: &u32, writer: &mut BitWriter) -> Result<(), CodecError> {
+        writer.write(u64::from(self.0), *bits)
+    }
+
+    fn decode(bits: &u32, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        Ok(Self(u8::try_from(reader.read(*bits)?).unwrap_or(u8::MAX)))
+    }
+}
+
+impl FixedRate {
+    /// Words of `bits` bits for a signal that starts about `start`, give or take `unit`, and typically moves by up to a few
+    /// `unit` in a slot. `unit` may be wrong by a factor of ten.
+    ///
+    /// # Errors
+    /// If `bits` is not 1, 2 or 3, `unit` not positive or `start` not finite.
+    pub fn new(bits: u32, unit: f64, start: f64) -> Result<Self, Error> {
+        if !(1..=3).contains(&bits) {
+            return Err(ArgumentError::new("bits", bits, "1, 2 or 3").into());
+        }
+        positive("unit", unit)?;
+        finite("start", start)?;
+        let mut models = Vec::new();
+        for decay in DECAYS {
+            for scale in SCALES {
+                let q = unit * 4.0_f64.powi(scale);
+                let transition = Matrix2::new(1.0, decay, 0.0, decay);
+                let gain = Vector2::new(1.0, if decay > 0.0 { 1.0 } else { 0.0 });
+                models.push(LinearGaussian::new(transition, gain, Vector1::new(q * q))?);
+            }
+        }
+        let noise = unit * 4.0_f64.powi(*SCALES.start());
+        let prior = Gaussian::new(Vector2::new(start, 0.0), Matrix2::new(unit * unit, 0.0, 0.0, 0.0))?;
+        Ok(Self {
+            bits,
+            noise_variance: noise * noise,
+            belief: ImmBelief::agreed(&prior, models.len())?,
+            filter: Imm::switching(models, SWITCHING)?,
+            sensor: LinearSensor::scalar(Vector2::new(1.0, 0.0), noise * noise)?,
+            workspace: ImmWorkspace::default(),
+            turn: 0,
+        })
+    }
+
+    /// Bits of a word.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// The estimate of the last sample.
+    pub fn estimate(&self) -> f64 {
+        self.belief.moment_matched().mean()[0]
+    }
+
+    /// Probabilities of the models.
+    pub fn model_weights(&self) -> &[f64] {
+        self.belief.probabilities()
+    }
+
+    /// The sensor's half.
+    ///
+    /// # Errors
+    /// If the sample is not finite; the state is then as it was.
+    pub fn encode(&mut self, sample: f64) -> Result<Word, Error> {
+        finite("sample", sample)?;
+        let predicted = self.predicted()?;
+        let edges = self.edges(&predicted);
+        let word = Word(edges.iter().filter(|edge| sample >= **edge).count() as u8);
+        self.update(predicted, &edges, word)?;
+        Ok(word)
+    }
+
+    /// The receiver's half; returns the estimate.
+    ///
+    /// # Errors
+    /// If the word has more bits than agreed; the state is then as it was.
+    pub fn receive(&mut self, word: Word) -> Result<f64, Error> {
+        if u32::from(word.0) >= 1 << self.bits {
+            return Err(ArgumentError::new("word", word.0, format!("a number of {} bits", self.bits)).into());
+        }
+        let predicted = self.predicted()?;
+        let edges = self.edges(&predicted);
+        self.update(predicted, &edges, word)?;
+        Ok(self.estimate())
+    }
+
+    /// The slot's word is known to be lost.
+    ///
+    /// # Errors
+    /// If the belief would no longer be finite.
+    pub fn miss(&mut self) -> Result<f64, Error> {
+        self.belief = self.predicted()?;
+        self.turn = (self.turn + 1) % 4;
+        Ok(self.estimate())
+    }
+
+    fn predicted(&mut self) -> Result<ImmBelief<2>, Error> {
+        let mut next = self.belief.clone();
+        self.filter.predict_in_place(&mut next, &mut self.workspace)?;
+        Ok(next)
+    }
+
+    /// Quantiles of the predicted sample, by bisection.
+    fn edges(&self, predicted: &ImmBelief<2>) -> Vec<f64> {
+        let modes = || predicted.probabilities().iter().zip(predicted.modes());
+        let deviation = |mode: &Gaussian<2>| (mode.covariance()[(0, 0)] + self.noise_variance).sqrt();
+        let below = |edge: f64| -> f64 {
+            modes()
+                .map(|(p, mode)| p * normal::cdf((edge - mode.mean()[0]) / deviation(mode)))
+                .sum()
+        };
+        let ends = modes().filter(|(p, _)| **p > 1e-9).map(|(_, mode)| {
+            let reach = 9.0 * deviation(mode);
+            (mode.mean()[0] - reach, mode.mean()[0] + reach)
+        });
+        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (a, b)| (l.min(a), h.max(b)));
+        let count = 1_u32 << self.bits;
+        (1..count)
+            .map(|i| {
+                let target = if self.bits == 1 {
+                    [0.5, 0.1, 0.5, 0.9][self.turn]
+                } else {
+                    f64::from(i) / f64::from(count)
+                };
+                let (mut low, mut high) = (low, high);
+                for _ in 0..50 {
+                    let middle = 0.5 * (low + high);
+                    if below(middle) < target {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
+                }
+                0.5 * (low + high)
+            })
+            .collect()
+    }
+
+    fn update(&mut self, mut predicted: ImmBelief<2>, edges: &[f64], word: Word) -> Result<(), Error> {
+        let i = usize::from(word.0);
+        let lower = i.checked_sub(1).and_then(|i| edges.get(i)).copied();
+        let upper = edges.get(i).copied();
+        let cell = Cell::new(lower.unwrap_or(f64::NEG_INFINITY), upper.unwrap_or(f64::INFINITY))?;
+        let observed = Observed::new(self.sensor, InCell::certain(cell, self.noise_variance)?);
+        self.filter
+            .update_in_place(&mut predicted, &observed, &mut self.workspace)?;
+        self.belief = predicted;
+        self.turn = (self.turn + 1) % 4;
+        Ok(())
+    }
+}

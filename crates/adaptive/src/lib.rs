@@ -1,0 +1,65 @@
+//! Real signals within a guaranteed error, in as few bits as they deserve.
+//!
+//! A sensor and its receiver run the same bank of models of the signal and hold the same frequencies of past reports. Silence means
+//! that the sample is within `delta` of what both predict, and costs nothing; otherwise the residual is coded under the law that
+//! both predict for it. Nothing is fitted beforehand, and nothing but reports travels.
+//!
+//! ```
+//! use fewbits_adaptive::{Config, Receiver, Sensor};
+//! let config = Config::new(0.05)?; // every reconstruction within 0.05
+//! let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
+//! let mut bits = 0;
+//! for n in 0..1000 {
+//!     let sample = 20.0 + 3.0 * (f64::from(n) * 0.01).sin();
+//!     let report = sensor.encode(sample)?;
+//!     bits += report.as_ref().map_or(0, |report| report.packet.bits());
+//!     let tracked = receiver.receive(&report.map(|report| report.packet).into())?;
+//!     assert!(tracked.value.is_some_and(|value| (value - sample).abs() <= 0.05));
+//! }
+//! assert!(bits < 500); // half a bit per sample
+//! # Ok::<(), fewbits_adaptive::Error>(())
+//! ```
+//!
+//! | part | where |
+//! |---|---|
+//! | the agreement: accuracy, circle, refreshes | [`Config`] |
+//! | the two halves | [`Sensor`], [`Receiver`] |
+//! | whole bits in a slot, and a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
+//! | a slot for other filters | [`SlotScheme`] |
+//! | the same number of bits in every slot | [`FixedRate`] |
+//!
+//! The central choice: **replicas hold integers.** Reconstructions lie on a lattice `anchor + 2 delta j` through the first sample, so
+//! that values which return are the same integer again, an instrument's own steps stay aligned, and both ends update from the same
+//! exact numbers. The cost is that the prediction is rounded to the lattice: silence is a cell of the lattice and not `+-delta` about
+//! the best prediction. On recordings the first is worth far more than the second.
+//!
+//! The second choice: the bank's filters have constant gains and logistic predictive laws, where
+//! [`fewbits_filters::Imm`] would update by truncated normals. One slot costs 24 exponentials and some 600 other operations; the
+//! errors at equal bits are the same on recordings. Only arithmetic that is the same on every machine decides what is coded.
+//!
+//! Not here: loss models and the energy of a radio, baselines, files.
+
+mod bank;
+mod config;
+mod counts;
+mod error;
+mod fixed_rate;
+mod lattice;
+mod law;
+mod packet;
+mod receiver;
+mod replica;
+mod report;
+mod scheme;
+mod sensor;
+mod stream;
+
+pub use bank::{MODELS, SCALES};
+pub use config::Config;
+pub use error::Error;
+pub use fixed_rate::{FixedRate, Word};
+pub use packet::Packet;
+pub use receiver::{Receiver, Tracked};
+pub use scheme::SlotScheme;
+pub use sensor::{Report, Sensor};
+pub use stream::{Silence, StreamReader, StreamWriter};

@@ -1,0 +1,243 @@
+//! The receiver's half.
+
+use crate::config::Config;
+use crate::lattice::Lattice;
+use crate::packet::{Packet, PacketReader, read_number};
+use crate::replica::Replica;
+use crate::sensor::{MODEL_BITS, checked, next, scheduled};
+use crate::stream::StreamReader;
+use crate::{Error, MODELS, report};
+use fewbits_core::{CodecError, Observation};
+use fewbits_numerics::ArgumentError;
+use serde::{Deserialize, Serialize};
+
+/// What is known of a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Tracked {
+    /// The reconstruction; while not synchronised, the last one. `None` before the first report.
+    pub value: Option<f64>,
+    /// Whether the receiver is in step with the sensor as far as it can know. If it is, and no packet vanished since the last that
+    /// was received, the value is within `delta` of the sample.
+    pub synchronised: bool,
+}
+
+/// The receiver's half: reports or silence in, reconstructions out.
+///
+/// Over a link that loses packets ([`Config::resilient`]) a loss is noticed at the next packet, by its number, at the next
+/// scheduled refresh, if that is missing, or at once where the link says so ([`Observation::Erased`]). From the loss to the next
+/// refresh that arrives the error is not bounded; with a refresh every `R` slots that is at most `R - 1` slots plus `R` for each
+/// scheduled refresh that is lost in turn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct Receiver {
+    config: Config,
+    replica: Option<Replica>,
+    /// The number of the slot, where it is known.
+    slot: Option<u64>,
+    sequence: u32,
+    synchronised: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Receiver", deny_unknown_fields)]
+struct Stored {
+    config: Config,
+    replica: Option<Replica>,
+    slot: Option<u64>,
+    sequence: u32,
+    synchronised: bool,
+}
+
+impl From<Receiver> for Stored {
+    fn from(receiver: Receiver) -> Self {
+        Self {
+            config: receiver.config,
+            replica: receiver.replica,
+            slot: receiver.slot,
+            sequence: receiver.sequence,
+            synchronised: receiver.synchronised,
+        }
+    }
+}
+
+impl TryFrom<Stored> for Receiver {
+    type Error = ArgumentError;
+
+    fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
+        let replica = checked(stored.replica)?;
+        Ok(Self {
+            config: stored.config,
+            synchronised: stored.synchronised && replica.is_some(),
+            replica,
+            slot: stored.slot,
+            sequence: stored.sequence & ((1 << stored.config.sequence_bits()) - 1),
+        })
+    }
+}
+
+impl Receiver {
+    /// A receiver that is there from the sensor's first slot.
+    pub fn new(config: Config) -> Self {
+        Self {
+            config,
+            replica: None,
+            slot: Some(0),
+            sequence: 0,
+            synchronised: false,
+        }
+    }
+
+    /// A receiver that joins, or lost its memory, while the sensor is running: it starts at the next refresh.
+    pub fn joining(config: Config) -> Self {
+        Self {
+            slot: None,
+            ..Self::new(config)
+        }
+    }
+
+    /// The agreement with the sensor.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// What is known of the last sample.
+    pub fn tracked(&self) -> Tracked {
+        Tracked {
+            value: self.replica.as_ref().map(Replica::value),
+            synchronised: self.synchronised,
+        }
+    }
+
+    /// Weights of the models, as [`crate::Sensor::model_weights`].
+    pub fn model_weights(&self) -> [f64; MODELS] {
+        self.replica
+            .as_ref()
+            .map_or([1.0 / MODELS as f64; MODELS], |replica| *replica.bank.weights())
+    }
+
+    /// What arrived one slot after the last.
+    ///
+    /// # Errors
+    /// As [`receive_after`](Self::receive_after).
+    pub fn receive(&mut self, observation: &Observation<Packet>) -> Result<Tracked, Error> {
+        self.receive_after(1, observation)
+    }
+
+    /// What arrived `elapsed` slots after the last.
+    ///
+    /// # Errors
+    /// If `elapsed` is 0, or a packet is none that the sensor can have sent; the receiver is then as it was: a packet that is
+    /// known to be damaged should be observed as [`Observation::Erased`].
+    pub fn receive_after(&mut self, elapsed: u32, observation: &Observation<Packet>) -> Result<Tracked, Error> {
+        if elapsed == 0 {
+            return Err(ArgumentError::new("elapsed", 0, "at least 1 slot").into());
+        }
+        match observation {
+            Observation::Received(packet) => self.packet(elapsed, packet)?,
+            Observation::Erased => {
+                self.synchronised = false;
+                // The number of the packet that is gone is counted where the next one is compared.
+            }
+            Observation::Nothing => {
+                let missing = self.slot.is_some_and(|slot| scheduled(&self.config, slot));
+                match &mut self.replica {
+                    Some(replica) if self.synchronised && !missing => {
+                        let slot = replica.predict(elapsed);
+                        replica.silent(&slot);
+                    }
+                    _ => self.synchronised = false,
+                }
+            }
+        }
+        self.slot = self.slot.map(|slot| slot.wrapping_add(1));
+        Ok(self.tracked())
+    }
+
+    /// The next sample of a stream.
+    ///
+    /// # Errors
+    /// If `elapsed` is 0 or the stream is damaged; the receiver is then as it was.
+    pub fn read_after(&mut self, elapsed: u32, stream: &mut StreamReader<'_>) -> Result<f64, Error> {
+        if elapsed == 0 {
+            return Err(ArgumentError::new("elapsed", 0, "at least 1 slot").into());
+        }
+        let Some(replica) = &mut self.replica else {
+            let lattice = Lattice::new(&self.config, stream.first()?);
+            let replica = self.replica.insert(Replica::new(lattice, None));
+            self.synchronised = true;
+            return Ok(replica.value());
+        };
+        let saved = replica.bank;
+        let slot = replica.predict(elapsed);
+        let outcome = stream.get(replica, &slot).and_then(|content| match content {
+            Some(content) => {
+                let outside = replica.law(&slot).bank_outside();
+                content.apply(&self.config, replica, &slot, outside)
+            }
+            None => {
+                replica.silent(&slot);
+                Ok(())
+            }
+        });
+        if let Err(error) = outcome {
+            replica.bank = saved;
+            return Err(error.into());
+        }
+        Ok(replica.value())
+    }
+
+    fn packet(&mut self, elapsed: u32, packet: &Packet) -> Result<(), CodecError> {
+        let mut reader = packet.reader();
+        if !self.config.is_resilient() {
+            return match &self.replica {
+                None => self.refresh(&mut reader),
+                Some(_) => self.event(elapsed, &mut reader),
+            };
+        }
+        let sequence = reader.read(self.config.sequence_bits())? as u32;
+        if reader.read(1)? == 1 {
+            self.refresh(&mut reader)?;
+        } else if self.synchronised && sequence == self.sequence {
+            self.event(elapsed, &mut reader)?;
+        } else {
+            self.synchronised = false;
+        }
+        self.sequence = next(&self.config, sequence);
+        Ok(())
+    }
+
+    fn refresh(&mut self, reader: &mut PacketReader) -> Result<(), CodecError> {
+        let sample = read_number(reader)?;
+        let believed = if self.config.is_resilient() {
+            Some(reader.read(MODEL_BITS)? as usize)
+        } else {
+            None
+        };
+        reader.finish()?;
+        let sample = Lattice::reduce(&self.config, sample);
+        let lattice = Lattice::new(&self.config, sample);
+        match &mut self.replica {
+            Some(replica) => replica.restart(lattice, believed),
+            None => self.replica = Some(Replica::new(lattice, believed)),
+        }
+        self.synchronised = true;
+        Ok(())
+    }
+
+    fn event(&mut self, elapsed: u32, reader: &mut PacketReader) -> Result<(), CodecError> {
+        let Some(replica) = &mut self.replica else {
+            return Ok(());
+        };
+        let saved = replica.bank;
+        let slot = replica.predict(elapsed);
+        let law = replica.law(&slot);
+        let outside = law.bank_outside();
+        let outcome =
+            report::read(&law, reader).and_then(|content| content.apply(&self.config, replica, &slot, outside));
+        if outcome.is_err() {
+            replica.bank = saved;
+        }
+        outcome
+    }
+}

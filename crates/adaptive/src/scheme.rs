@@ -1,0 +1,138 @@
+//! One slot as a [`Scheme`]: what a report, or silence, says about the noise-free measurement.
+
+use crate::lattice::Lattice;
+use crate::packet::Packet;
+use crate::replica::{Replica, Slot};
+use crate::report::{self, Content};
+use crate::{Error, Sensor};
+use fewbits_core::factor::{Constant, InCell, Scalar};
+use fewbits_core::{Cell, Link, Observation, Scheme};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{finite, positive};
+use nalgebra::Vector1;
+use rand::Rng;
+
+/// The next slot of a sensor, for any filter of the workspace: a receiver that has a model of its own hears, beside the
+/// reconstruction, in which cell of width `2 delta` the noisy measurement lies.
+///
+/// The slot is what both ends know without data; make one for each slot, from the sensor in a simulation. Signals on a circle and
+/// links that invert bits have no such factor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SlotScheme {
+    sensor: Sensor,
+    replica: Replica,
+    slot: Slot,
+    noise_variance: f64,
+}
+
+impl SlotScheme {
+    /// The slot after the last of `sensor`, whose measurements have noise of the given variance.
+    ///
+    /// # Errors
+    /// If the sensor has not taken its first sample, its signal is circular, or the variance is not positive.
+    pub fn new(sensor: &Sensor, noise_variance: f64) -> Result<Self, Error> {
+        positive("noise_variance", noise_variance)?;
+        if let Some(period) = sensor.config().period() {
+            return Err(ArgumentError::new("period", period, "a signal on a line").into());
+        }
+        let none = || ArgumentError::new("sensor", "before its first sample", "a sensor that has started");
+        let (replica, slot) = sensor.ahead(1).ok_or_else(none)?;
+        Ok(Self {
+            sensor: sensor.clone(),
+            replica,
+            slot,
+            noise_variance,
+        })
+    }
+
+    /// The reconstruction that silence stands for.
+    pub fn prediction(&self) -> f64 {
+        self.replica.lattice.value(self.slot.prediction)
+    }
+
+    /// The packet that reports the lattice point `steps` from the prediction, for tests of the laws.
+    ///
+    /// # Errors
+    /// If `steps` is zero or beyond 4096.
+    pub fn packet(&self, steps: i64) -> Result<Packet, Error> {
+        let content = Content::Near(steps);
+        if steps == 0 || steps.abs() > crate::law::REACH {
+            return Err(ArgumentError::new("steps", steps, "1 to 4096 in size").into());
+        }
+        let mut packet = self.sensor.next_header();
+        report::push(&content, &self.replica.law(&self.slot), &mut packet);
+        Ok(packet)
+    }
+
+    fn cell(&self, j: i64) -> Result<Cell, ArgumentError> {
+        // Edges computed from their own numbers: neighbours share them to the bit.
+        let lattice: &Lattice = &self.replica.lattice;
+        let edge = |j: i64| 0.5 * (lattice.value(j - 1) + lattice.value(j));
+        Cell::new(edge(j), edge(j + 1))
+    }
+}
+
+impl Scheme<1> for SlotScheme {
+    type State = ();
+    type Feedback = ();
+    type Report = Packet;
+    type Factor = Scalar;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) {}
+
+    fn report_format(&self) {}
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        (): &(),
+    ) -> Result<Option<Packet>, fewbits_core::Error> {
+        let sample = finite("measurement", measurement[0])?;
+        Ok(Content::of(&self.replica, &self.slot, sample).map(|content| {
+            let mut packet = self.sensor.next_header();
+            report::push(&content, &self.replica.law(&self.slot), &mut packet);
+            packet
+        }))
+    }
+
+    fn factor(&self, (): &(), observation: &Observation<Packet>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
+        if link.crossover() > 0.0 {
+            let expected = "0: a packet with a wrong bit must be erased by a checksum of the link";
+            return Err(ArgumentError::new("crossover", link.crossover(), expected).into());
+        }
+        let packet = match observation {
+            Observation::Erased => return Ok(Constant::ONE.into()),
+            Observation::Nothing => {
+                let cell = self.cell(self.slot.prediction)?;
+                return Ok(InCell::silence(cell, self.noise_variance, link)?.into());
+            }
+            Observation::Received(packet) => packet,
+        };
+        let refused = |what: String| ArgumentError::new("report", what, "a report of this slot");
+        let mut reader = packet.reader();
+        let header = self.sensor.next_header();
+        let there = reader
+            .read(header.bits() as u32)
+            .map_err(|error| refused(error.to_string()))?;
+        if header.reader().read(header.bits() as u32) != Ok(there) {
+            return Err(refused("numbered for another slot".into()).into());
+        }
+        let law = self.replica.law(&self.slot);
+        let content = report::read(&law, &mut reader).map_err(|error| refused(error.to_string()))?;
+        Ok(match content {
+            Content::Near(k) | Content::Far(k) => {
+                let cell = self.cell(self.slot.prediction + k)?;
+                InCell::new(cell, self.noise_variance, 0.0, 1.0 - link.loss())?.into()
+            }
+            // No cell of the lattice: the sample itself.
+            Content::Whole(sample) => {
+                fewbits_core::factor::Value::new(Vector1::new(sample), Vector1::new(self.noise_variance).into())
+                    .map(Into::into)?
+            }
+        })
+    }
+}

@@ -1,0 +1,279 @@
+//! A whole recording as one range-coded stream, for storage or a reliable link.
+
+use crate::law::{ESCAPE, Law, PRECISION, Place};
+use crate::packet::{Packet, push_number, read_number};
+use crate::replica::{Replica, Slot};
+use crate::report::Content;
+use constriction::UnwrapInfallible;
+use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
+use constriction::stream::queue::{RangeDecoder, RangeEncoder};
+use constriction::stream::{Decode, Encode};
+use fewbits_core::CodecError;
+use serde::{Deserialize, Serialize};
+use std::borrow::Borrow;
+use std::num::NonZeroU32;
+
+const BITS: usize = PRECISION as usize;
+const TOTAL: u32 = 1 << PRECISION;
+
+/// How a stream tells which slots are silent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Silence {
+    /// It does not: the reader knows it, as the receiver of packets does.
+    Timed,
+    /// By a coded flag in each slot: the stream is the whole recording.
+    Coded,
+}
+
+/// Adaptive frequencies of reports and silences, given whether the last two slots were silent.
+#[derive(Debug, Clone, PartialEq)]
+struct Flags {
+    counts: [[u32; 2]; 4],
+    context: usize,
+}
+
+impl Flags {
+    fn new() -> Self {
+        Self {
+            counts: [[1; 2]; 4],
+            context: 0,
+        }
+    }
+
+    fn place(&self, silent: bool) -> Place {
+        let [reported, quiet] = self.counts[self.context];
+        let split = (u64::from(TOTAL) * u64::from(reported) / u64::from(reported + quiet)) as u32;
+        let split = split.clamp(1, TOTAL - 1);
+        if silent {
+            Place {
+                left: split,
+                width: TOTAL - split,
+            }
+        } else {
+            Place { left: 0, width: split }
+        }
+    }
+
+    fn add(&mut self, silent: bool) {
+        let counts = &mut self.counts[self.context];
+        counts[usize::from(silent)] += 1;
+        if counts.iter().sum::<u32>() > 1 << 16 {
+            counts.iter_mut().for_each(|c| *c = c.div_ceil(2));
+        }
+        self.context = (2 * self.context + usize::from(silent)) & 3;
+    }
+}
+
+/// A symbol whose place is known.
+#[derive(Debug, Clone, Copy)]
+struct Known(Place);
+
+impl EntropyModel<BITS> for Known {
+    type Symbol = ();
+    type Probability = u32;
+}
+
+impl EncoderModel<BITS> for Known {
+    fn left_cumulative_and_probability(&self, _: impl Borrow<()>) -> Option<(u32, NonZeroU32)> {
+        NonZeroU32::new(self.0.width).map(|width| (self.0.left, width))
+    }
+}
+
+/// What stands at a quantile.
+struct Search<F>(F);
+
+impl<F> EntropyModel<BITS> for Search<F> {
+    type Symbol = u32;
+    type Probability = u32;
+}
+
+impl<F: Fn(u32) -> (u32, Place)> DecoderModel<BITS> for Search<F> {
+    fn quantile_function(&self, quantile: u32) -> (u32, u32, NonZeroU32) {
+        let (symbol, place) = (self.0)(quantile);
+        (symbol, place.left, NonZeroU32::new(place.width).unwrap_or(NonZeroU32::MIN))
+    }
+}
+
+/// Bits of a raw digit.
+const DIGIT: u32 = 16;
+
+fn digit(value: u32, width: u32) -> Place {
+    Place {
+        left: value << (PRECISION - width),
+        width: 1 << (PRECISION - width),
+    }
+}
+
+/// Collects the reports of a [`Sensor`](crate::Sensor) in a stream.
+#[derive(Debug, Clone)]
+pub struct StreamWriter {
+    encoder: RangeEncoder<u32, u64>,
+    flags: Option<Flags>,
+}
+
+impl StreamWriter {
+    /// An empty stream.
+    pub fn new(silence: Silence) -> Self {
+        Self {
+            encoder: RangeEncoder::new(),
+            flags: (silence == Silence::Coded).then(Flags::new),
+        }
+    }
+
+    fn encode(&mut self, place: Place) -> Result<(), CodecError> {
+        self.encoder
+            .encode_symbol((), Known(place))
+            .map_err(|_| damaged("a symbol without frequency"))
+    }
+
+    fn raw(&mut self, packet: &Packet) -> Result<(), CodecError> {
+        let mut reader = packet.reader();
+        while reader.remaining() > 0 {
+            let width = reader.remaining().min(DIGIT);
+            let value = reader.read(width)? as u32;
+            self.encode(digit(value, width))?;
+        }
+        Ok(())
+    }
+
+    /// The first sample.
+    pub(crate) fn first(&mut self, sample: f64) -> Result<(), CodecError> {
+        let mut packet = Packet::default();
+        push_number(&mut packet, sample);
+        self.encode(digit(packet.bits() as u32, 8))?;
+        self.raw(&packet)
+    }
+
+    pub(crate) fn put(&mut self, content: Option<&Content>, replica: &Replica, slot: &Slot) -> Result<(), CodecError> {
+        if let Some(flags) = &mut self.flags {
+            let place = flags.place(content.is_none());
+            flags.add(content.is_none());
+            self.encode(place)?;
+        }
+        let Some(content) = content else {
+            return Ok(());
+        };
+        self.encode(content.place(&replica.law(slot)))?;
+        let mut rest = Packet::default();
+        content.push_rest(&mut rest);
+        if rest.bits() > 0 {
+            self.encode(digit(rest.bits() as u32, 8))?;
+            self.raw(&rest)?;
+        }
+        Ok(())
+    }
+
+    /// Bits so far, to be a whole number of 32-bit words at the end.
+    pub fn bits(&self) -> usize {
+        use constriction::stream::Code;
+        let _ = self.encoder.state();
+        self.encoder.num_bits()
+    }
+
+    /// The words of the finished stream.
+    pub fn finish(self) -> Vec<u32> {
+        self.encoder.into_compressed().unwrap_infallible()
+    }
+}
+
+/// Reads what a [`StreamWriter`] wrote. Total: any words give samples or errors.
+#[derive(Debug, Clone)]
+pub struct StreamReader<'a> {
+    decoder: RangeDecoder<u32, u64, constriction::backends::Cursor<u32, &'a [u32]>>,
+    flags: Option<Flags>,
+    /// Silent slots, where the stream does not tell.
+    silent: Option<bool>,
+}
+
+fn damaged(value: impl std::fmt::Display) -> CodecError {
+    CodecError::Invalid {
+        what: "stream",
+        value: value.to_string(),
+        expected: "what a writer of the same configuration wrote",
+    }
+}
+
+impl<'a> StreamReader<'a> {
+    /// A reader at the first word.
+    ///
+    /// # Errors
+    /// If there is nothing to read.
+    pub fn new(words: &'a [u32], silence: Silence) -> Result<Self, CodecError> {
+        Ok(Self {
+            decoder: RangeDecoder::from_compressed(words).unwrap_infallible(),
+            flags: (silence == Silence::Coded).then(Flags::new),
+            silent: None,
+        })
+    }
+
+    /// Tells a reader of [`Silence::Timed`] whether the next slot is silent.
+    pub fn next_slot(&mut self, silent: bool) {
+        self.silent = Some(silent);
+    }
+
+    fn decode(&mut self, find: impl Fn(u32) -> (u32, Place)) -> Result<u32, CodecError> {
+        self.decoder
+            .decode_symbol(Search(find))
+            .map_err(|_| damaged("not decodable"))
+    }
+
+    fn digit(&mut self, width: u32) -> Result<u32, CodecError> {
+        self.decode(|quantile| {
+            let value = quantile >> (PRECISION - width);
+            (value, digit(value, width))
+        })
+    }
+
+    fn raw(&mut self) -> Result<Packet, CodecError> {
+        let mut left = self.digit(8)?;
+        if left > 128 {
+            return Err(damaged(format!("{left} raw bits")));
+        }
+        let mut packet = Packet::default();
+        while left > 0 {
+            let width = left.min(DIGIT);
+            packet.push(u64::from(self.digit(width)?), width);
+            left -= width;
+        }
+        Ok(packet)
+    }
+
+    pub(crate) fn first(&mut self) -> Result<f64, CodecError> {
+        let packet = self.raw()?;
+        let mut reader = packet.reader();
+        let sample = read_number(&mut reader)?;
+        reader.finish()?;
+        Ok(sample)
+    }
+
+    pub(crate) fn get(&mut self, replica: &Replica, slot: &Slot) -> Result<Option<Content>, CodecError> {
+        let silent = match self.flags.take() {
+            Some(mut flags) => {
+                let reported = flags.place(false);
+                let silent = self.decode(|quantile| {
+                    let silent = quantile >= reported.width;
+                    (u32::from(silent), flags.place(silent))
+                });
+                let silent = silent? == 1;
+                flags.add(silent);
+                self.flags = Some(flags);
+                silent
+            }
+            None => self.silent.take().unwrap_or(false),
+        };
+        if silent {
+            return Ok(None);
+        }
+        let law: Law<'_> = replica.law(slot);
+        let symbol = self.decode(|quantile| law.find(quantile))?;
+        let rest = if symbol == ESCAPE {
+            self.raw()?
+        } else {
+            Packet::default()
+        };
+        let mut reader = rest.reader();
+        let content = Content::read(symbol, &mut reader)?;
+        reader.finish()?;
+        Ok(Some(content))
+    }
+}

@@ -1,0 +1,13 @@
+//! Tests of the public interface.
+
+// Helpers fail loudly, as tests do.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod bank;
+mod common;
+mod damage;
+mod guarantee;
+mod loss;
+mod recording;
+mod replicas;
+mod scheme;

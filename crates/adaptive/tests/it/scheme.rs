@@ -1,0 +1,43 @@
+//! The laws of schemes, slot by slot.
+
+use super::common::mixed;
+use fewbits_adaptive::{Config, Sensor, SlotScheme};
+use fewbits_core::{Link, Observation, Scheme, laws};
+use fewbits_monte_carlo::Stream;
+use nalgebra::Vector1;
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+
+#[test]
+fn slots_obey_the_laws_of_schemes() {
+    for (seed, config) in [
+        (1, Config::new(0.3).unwrap()),
+        (2, Config::new(0.3).unwrap().resilient(4, None).unwrap()),
+    ] {
+        let mut sensor = Sensor::new(config);
+        for x in mixed(seed, 200) {
+            sensor.encode(x).unwrap();
+        }
+        let scheme = SlotScheme::new(&sensor, 0.16).unwrap();
+        let reports = || (-40..=40).filter(|k| *k != 0).map(|k| scheme.packet(k).unwrap());
+        let centre = scheme.prediction();
+        let measurements = [-3.0, -0.4, 0.0, 0.29, 2.0].map(|d| Vector1::new(centre + d));
+        for link in [Link::PERFECT, Link::lossy(0.2).unwrap()] {
+            laws::scheme::total_probability(&scheme, &(), &link, reports(), &measurements).unwrap();
+            let noise = |rng: &mut _| Vector1::new(0.4 * normal(rng));
+            let few = (-3..=3).filter(|k| *k != 0).map(|k| scheme.packet(k).unwrap());
+            let mut rng = Stream::new(seed).rng();
+            laws::scheme::frequencies(&scheme, &(), &link, &mut rng, 20_000, &measurements[3], noise, few).unwrap();
+        }
+        assert!(
+            scheme
+                .factor(&(), &Observation::Nothing, &Link::flipping(0.1).unwrap())
+                .is_err()
+        );
+        assert!(SlotScheme::new(&Sensor::new(config), 0.1).is_err());
+    }
+}
+
+fn normal<R: Rng + ?Sized>(rng: &mut R) -> f64 {
+    rng.sample(StandardNormal)
+}

@@ -1,0 +1,270 @@
+//! Error against bits, for every signal and scheme.
+
+use super::baselines::{Played, delta_for, delta_modulation, dpcm, jayant, send_on_delta};
+use super::recordings::{Recording, Source};
+use super::tracking::{Tracked, best_within, stream_bits, words};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Cost, Error, Figure};
+use fewbits_adaptive::Silence;
+use garde::Validate;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+pub struct Parameters {
+    #[serde(flatten)]
+    #[garde(dive)]
+    source: Source,
+    /// Bits per sample, at most.
+    #[garde(length(min = 1, max = 20), inner(range(min = 0.02, max = 12.0)))]
+    rate: Vec<f64>,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            source: Source::default(),
+            rate: vec![0.25, 0.5, 1.0, 2.0],
+        }
+    }
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Every scheme at every rate that it can keep to.
+    schemes: Vec<Row>,
+    /// Ours beside the best of the baselines.
+    comparison: Vec<Pair>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    /// Signal.
+    column: String,
+    /// Bits per sample, at most.
+    rate: f64,
+    /// adaptive and words are ours; the others: send-on-delta (12-bit words), modulation (adaptive delta modulation), jayant,
+    /// dpcm-0 and dpcm-1 (deadband, order 0 and 1).
+    scheme: &'static str,
+    /// Half-width of the region of silence.
+    delta: Option<f64>,
+    /// Root mean square error.
+    rmse: f64,
+    /// Bits per sample: ideal code lengths where a code is adaptive.
+    #[schemars(extend("unit" = "bit"))]
+    bits: f64,
+    /// Packets per sample.
+    packets: f64,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Pair {
+    /// Signal.
+    column: String,
+    /// Bits per sample, at most.
+    rate: f64,
+    /// The best baseline, its order chosen in hindsight.
+    best: &'static str,
+    /// Its root mean square error.
+    best_rmse: f64,
+    /// Ours.
+    rmse: f64,
+    /// Ours over the best; errors below a millionth of the signal's range count as that.
+    ratio: f64,
+    /// Largest error of ours over its delta.
+    worst: f64,
+    /// Ideal bits per sample.
+    #[schemars(extend("unit" = "bit"))]
+    ideal: f64,
+    /// The same reports as one range-coded stream, whole 32-bit words.
+    #[schemars(extend("unit" = "bit"))]
+    stream: f64,
+    /// As packets of whole bits.
+    #[schemars(extend("unit" = "bit"))]
+    packed: f64,
+    /// As one stream that also tells which slots are silent.
+    #[schemars(extend("unit" = "bit"))]
+    with_silence: f64,
+}
+
+/// Errors below this share of the range are no errors.
+const EXACT: f64 = 1e-6;
+
+/// Error against bits.
+pub struct Bits;
+
+fn row(recording: &Recording, rate: f64, scheme: &'static str, delta: Option<f64>, played: &Played) -> Row {
+    let n = recording.samples.len() as f64;
+    Row {
+        column: recording.name.clone(),
+        rate,
+        scheme,
+        delta,
+        rmse: recording.rmse(&played.values),
+        bits: played.bits / n,
+        packets: played.packets as f64 / n,
+    }
+}
+
+/// The baselines at `rate` bits per sample.
+fn baselines(recording: &Recording, rate: f64) -> Result<Vec<Row>, Error> {
+    let (samples, n) = (&recording.samples, recording.samples.len() as f64);
+    let mut rows = Vec::new();
+    let mut searched = |scheme, steps, play: &dyn Fn(f64) -> Played| {
+        let delta = delta_for(recording.range(), rate, steps, |d| Ok::<_, Error>(play(d).bits / n))?;
+        rows.push(row(recording, rate, scheme, Some(delta), &play(delta)));
+        Ok::<_, Error>(())
+    };
+    searched("send-on-delta", 60, &|d| send_on_delta(samples, d))?;
+    searched("dpcm-0", 24, &|d| dpcm(samples, 0, d))?;
+    searched("dpcm-1", 24, &|d| dpcm(samples, 1, d))?;
+    if rate >= 1.0 {
+        rows.push(row(recording, rate, "modulation", None, &delta_modulation(samples)));
+    }
+    if rate >= 2.0 {
+        let bits = if rate >= 3.0 { 3 } else { 2 };
+        rows.push(row(recording, rate, "jayant", None, &jayant(samples, bits)));
+    }
+    // A range of zero: nothing to choose, nothing to send.
+    rows.retain(|r| r.rmse.is_finite());
+    Ok(rows)
+}
+
+fn compare(recording: &Recording, rate: f64, context: &Context<'_>) -> Result<(Vec<Row>, Pair), Error> {
+    let n = recording.samples.len() as f64;
+    let mut rows = baselines(recording, rate)?;
+    let kept = rows.iter().filter(|r| r.bits <= rate);
+    let best = kept.min_by(|a, b| a.rmse.total_cmp(&b.rmse)).or(rows.first());
+    let (best, best_rmse) = best.map_or(("none", f64::INFINITY), |r| (r.scheme, r.rmse));
+    let (delta, ours): (f64, Tracked) = best_within(recording, rate, context, |tracked| tracked.played.bits)?;
+    let ours_row = row(recording, rate, "adaptive", Some(delta), &ours.played);
+    let exact = EXACT * recording.range();
+    let pair = Pair {
+        column: recording.name.clone(),
+        rate,
+        best,
+        best_rmse,
+        rmse: ours_row.rmse,
+        ratio: ours_row.rmse.max(exact) / best_rmse.max(exact),
+        worst: ours.worst / delta,
+        ideal: ours.played.bits / n,
+        stream: stream_bits(recording, delta, Silence::Timed)? / n,
+        packed: ours.packet_bits / n,
+        with_silence: stream_bits(recording, delta, Silence::Coded)? / n,
+    };
+    rows.push(ours_row);
+    if [1.0, 2.0, 3.0].contains(&rate) {
+        let played = words(recording, rate as u32)?;
+        rows.push(row(recording, rate, "words", None, &played));
+    }
+    Ok((rows, pair))
+}
+
+/// `exp` of the mean logarithm.
+pub(super) fn geometric_mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let logs: Vec<f64> = values.into_iter().map(f64::ln).collect();
+    (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
+}
+
+pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    values.into_iter().max_by(f64::total_cmp)
+}
+
+impl Figure for Bits {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "real-bits",
+            title: "Real signals: error against bits",
+            caption: "Root mean square error against bits per sample on signals with the traits of recordings, or on the columns of \
+                      a file. The adaptive scheme needs no fit and bounds every error; the baselines are what an engineer would \
+                      try first, and deadband DPCM with an adaptive code, whose order is chosen in hindsight.",
+            source: "our own comparison",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.source.samples = 800;
+        p.rate = vec![0.5, 2.0];
+    }
+
+    fn cost(&self, p: &Parameters) -> Cost {
+        Cost {
+            seconds: 2e-4 * (p.source.samples * p.rate.len()) as f64,
+            bytes: 1e4 * p.source.samples as f64,
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let recordings = p.source.load("real-bits", context)?;
+        let points: Vec<(&Recording, f64)> = recordings
+            .iter()
+            .flat_map(|r| p.rate.iter().map(move |b| (r, *b)))
+            .collect();
+        let found: Vec<(Vec<Row>, Pair)> = points
+            .par_iter()
+            .map(|(recording, rate)| compare(recording, *rate, context))
+            .collect::<Result<_, _>>()?;
+        let (schemes, comparison): (Vec<Vec<Row>>, Vec<Pair>) = found.into_iter().unzip();
+        Ok(Rows {
+            schemes: schemes.into_iter().flatten().collect(),
+            comparison,
+        })
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let pairs = &rows.comparison;
+        claims.at_most("bounded", "no error exceeds delta", largest(pairs.iter().map(|p| p.worst)), 1.0);
+        let what = "at equal bits the error is 0.85 of that of the best baseline, in the geometric mean";
+        claims.at_most("mean", what, geometric_mean(pairs.iter().map(|p| p.ratio)), 0.85);
+        let what = "and nowhere above 1.1 of it";
+        claims.at_most("worst", what, largest(pairs.iter().map(|p| p.ratio)), 1.1);
+        let ours = || rows.schemes.iter().filter(|r| r.scheme == "adaptive");
+        claims.all("rate", "the rate is kept", ours(), |r| r.bits <= r.rate);
+        let what = "whole packets cost at most a bit each beyond the ideal length";
+        let packets = || pairs.iter().zip(ours());
+        claims.all("packets", what, packets(), |(p, r)| p.packed <= p.ideal + r.packets);
+        let what = "the stream costs at most one percent and 0.03 bits per sample beyond the ideal length";
+        claims
+            .all("stream", what, pairs, |p| p.stream <= 1.01 * p.ideal + 0.03)
+            .at_defaults();
+        let what = "telling the silences costs at most one bit per sample";
+        claims.all("silence", what, pairs, |p| p.with_silence <= p.stream + 1.0 + 0.03);
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
+        let mut columns: Vec<&str> = rows.comparison.iter().map(|p| p.column.as_str()).collect();
+        columns.dedup();
+        let schemes = [
+            "adaptive",
+            "dpcm-0",
+            "dpcm-1",
+            "send-on-delta",
+            "modulation",
+            "jayant",
+            "words",
+        ];
+        let panel = |column: &&str| {
+            let curve = |(colour, scheme): (usize, &&'static str)| {
+                let chosen = rows
+                    .schemes
+                    .iter()
+                    .filter(|r| r.column == **column && r.scheme == *scheme);
+                let curve = points(chosen, |r| (r.rate, r.rmse));
+                match *scheme {
+                    "adaptive" => Layer::line(*scheme, curve).coloured(colour),
+                    "dpcm-0" | "dpcm-1" | "send-on-delta" => Layer::dashed(*scheme, curve).coloured(colour),
+                    _ => Layer::points(*scheme, curve).coloured(colour),
+                }
+            };
+            Panel::new(*column, Axis::log("bits per sample"), Axis::log("rms error"))
+                .with_all(schemes.iter().enumerate().map(curve))
+        };
+        Plot::grid(3, columns.iter().map(panel).collect())
+    }
+}

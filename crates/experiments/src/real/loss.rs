@@ -1,0 +1,242 @@
+//! Loss and recovery.
+
+use super::recordings::{Recording, Source};
+use super::tracking::{best_within, config};
+use crate::plot::{Axis, Layer, Panel, Plot};
+use crate::{About, Claims, Context, Error, Figure, Measured, Tally};
+use fewbits_adaptive::{Receiver, Sensor};
+use fewbits_core::Link;
+use fewbits_monte_carlo::{Moments, Trial};
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+pub struct Parameters {
+    #[serde(flatten)]
+    #[garde(dive)]
+    source: Source,
+    /// Bits per sample over a perfect link, which choose delta.
+    #[garde(range(min = 0.02, max = 12.0))]
+    rate: f64,
+    /// Probabilities that a packet is lost.
+    #[garde(length(min = 1, max = 9), inner(range(min = 0.0, max = 0.5)))]
+    loss: Vec<f64>,
+    /// Slots from one refresh to the next.
+    #[garde(length(min = 1, max = 9), inner(range(min = 2, max = 100_000)))]
+    refresh: Vec<u64>,
+    /// Bits of the packets' counter.
+    #[garde(range(min = 1, max = 16))]
+    sequence_bits: u32,
+    /// Sequences of losses.
+    #[garde(range(min = 2, max = 100_000))]
+    trials: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            source: Source {
+                columns: vec!["bursts".into()],
+                ..Source::default()
+            },
+            rate: 0.5,
+            loss: vec![0.0, 0.01, 0.1],
+            refresh: vec![25, 100, 400],
+            sequence_bits: 4,
+            trials: 20,
+        }
+    }
+}
+
+/// One interval of refreshes at one rate of loss.
+#[derive(Serialize, JsonSchema)]
+pub struct Row {
+    /// Signal.
+    column: String,
+    /// Probability that a packet is lost.
+    loss: f64,
+    /// Slots from one refresh to the next.
+    refresh: u64,
+    /// Whole bits per sample, counters and refreshes included.
+    #[schemars(extend("unit" = "bit"))]
+    bits: Measured,
+    /// Root mean square error over delta.
+    rmse: Measured,
+    /// Share of the slots whose error exceeds delta.
+    beyond: Measured,
+    /// Share of the slots whose error exceeds delta although the receiver believes to be in step.
+    unnoticed: Measured,
+    /// Slots from the first packet lost to the next refresh received, at the longest, over the interval of refreshes.
+    longest: f64,
+    /// Errors beyond delta while no packet was lost since the last refresh that arrived: never.
+    violations: u64,
+}
+
+/// Loss and recovery.
+pub struct Loss;
+
+#[derive(Default)]
+struct Sums {
+    bits: Moments,
+    squares: Moments,
+    beyond: Moments,
+    unnoticed: Moments,
+    longest: u64,
+    violations: u64,
+}
+
+impl Tally for Sums {
+    fn merge(&mut self, part: &Self) {
+        self.bits.merge(&part.bits);
+        self.squares.merge(&part.squares);
+        self.beyond.merge(&part.beyond);
+        self.unnoticed.merge(&part.unnoticed);
+        self.longest = self.longest.max(part.longest);
+        self.violations += part.violations;
+    }
+}
+
+struct Point<'a> {
+    recording: &'a Recording,
+    delta: f64,
+    loss: f64,
+    refresh: u64,
+    sequence_bits: u32,
+}
+
+fn one(point: &Point<'_>, sums: &mut Sums, trial: Trial) -> Result<(), Error> {
+    let Point { recording, delta, .. } = *point;
+    let config = config(recording, delta)?.resilient(point.sequence_bits, Some(point.refresh))?;
+    let link = Link::lossy(point.loss)?;
+    let mut rng = trial.stream.rng();
+    let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
+    let n = recording.samples.len() as f64;
+    let (mut bits, mut squares, mut beyond, mut unnoticed) = (0.0, 0.0, 0.0, 0.0);
+    let mut lost: Option<u64> = None;
+    for (slot, x) in (0_u64..).zip(&recording.samples) {
+        let report = sensor.encode(*x)?;
+        bits += report.map_or(0.0, |r| r.packet.bits() as f64);
+        let observation = link
+            .transmit(&mut rng, report.map(|r| r.packet).as_ref(), &())
+            .map_err(Error::failed)?;
+        let arrived = observation.received().is_some();
+        if report.is_some() && !arrived {
+            lost.get_or_insert(slot);
+        } else if report.is_some_and(|r| r.refresh) {
+            lost = None;
+        }
+        let tracked = receiver.receive(&observation)?;
+        // Before anything arrived, the receiver knows nothing: an error of the sample's own size.
+        let straight = (x - tracked.value.unwrap_or(0.0)).abs();
+        let error = recording
+            .period
+            .map_or(straight, |p| straight.min((p - straight).abs()));
+        squares += (error / delta).powi(2) / n;
+        if error > delta {
+            beyond += 1.0 / n;
+            unnoticed += if tracked.synchronised { 1.0 / n } else { 0.0 };
+            sums.violations += u64::from(lost.is_none());
+        }
+        sums.longest = sums.longest.max(lost.map_or(0, |since| slot - since + 1));
+    }
+    sums.bits.add(bits / n);
+    sums.squares.add(squares);
+    sums.beyond.add(beyond);
+    sums.unnoticed.add(unnoticed);
+    Ok(())
+}
+
+impl Figure for Loss {
+    type Parameters = Parameters;
+    type Tables = Vec<Row>;
+
+    fn about(&self) -> About {
+        About {
+            id: "real-loss",
+            title: "Real signals: loss and recovery",
+            caption: "A lost packet leaves the receiver out of step until the next refresh that arrives. Frequent refreshes cost bits \
+                      and shorten that time; the counter of the packets tells the receiver in which slots it must not trust itself.",
+            source: "our own comparison",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.source.samples = 1000;
+        p.trials = 4;
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        let recordings = p.source.load("real-loss", context)?;
+        let mut points = Vec::new();
+        for recording in &recordings {
+            let (delta, _) = best_within(recording, p.rate, context, |tracked| tracked.played.bits)?;
+            for loss in &p.loss {
+                for refresh in &p.refresh {
+                    points.push(Point {
+                        recording,
+                        delta,
+                        loss: *loss,
+                        refresh: *refresh,
+                        sequence_bits: p.sequence_bits,
+                    });
+                }
+            }
+        }
+        let name = |p: &Point<'_>| format!("{} {} {}", p.recording.name, p.loss, p.refresh);
+        let sums = context.sweep("real-loss", p.trials, &points, name, |_| Sums::default(), one)?;
+        let row = |(point, sums): (&Point<'_>, &Sums)| Row {
+            column: point.recording.name.clone(),
+            loss: point.loss,
+            refresh: point.refresh,
+            bits: (&sums.bits).into(),
+            rmse: Measured::root_mean(&sums.squares),
+            beyond: (&sums.beyond).into(),
+            unnoticed: (&sums.unnoticed).into(),
+            longest: sums.longest as f64 / point.refresh as f64,
+            violations: sums.violations,
+        };
+        Ok(points.iter().zip(&sums).map(row).collect())
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let what = "no error exceeds delta but between a loss and the next refresh that arrives";
+        claims.all("bounded", what, rows, |r| r.violations == 0);
+        let what = "without loss no error exceeds delta";
+        claims
+            .all("perfect", what, rows.iter().filter(|r| r.loss == 0.0), |r| r.beyond.value == 0.0)
+            .at_defaults();
+        let what = "with frequent refreshes fewer slots are wrong";
+        let worst = || rows.iter().filter(|r| r.loss == 0.1);
+        claims
+            .increasing("refresh", what, worst().map(|r| r.beyond))
+            .at_defaults();
+        claims
+            .decreasing("price", "and more bits are spent", worst().map(|r| r.bits))
+            .at_defaults();
+        let what = "most wrong slots are known to be so";
+        claims
+            .all("noticed", what, worst(), |r| r.unnoticed.value < 0.5 * r.beyond.value)
+            .at_defaults();
+    }
+
+    fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
+        let panel = |label: &str, y: fn(&Row) -> Measured, axis: fn(String) -> Axis| {
+            let layer = |loss: &f64| {
+                let chosen = rows.iter().filter(move |r| r.loss == *loss);
+                Layer::measured(format!("loss {loss}"), chosen, |r| (r.refresh as f64, y(r)))
+            };
+            Panel::new("", Axis::log("slots from refresh to refresh"), axis(label.into()))
+                .with_all(p.loss.iter().map(layer))
+        };
+        Plot::grid(
+            3,
+            vec![
+                panel("bits per sample", |r| r.bits, Axis::linear),
+                panel("rms error / delta", |r| r.rmse, Axis::log),
+                panel("share of slots beyond delta", |r| r.beyond, Axis::linear),
+            ],
+        )
+    }
+}

@@ -1,0 +1,163 @@
+//! Which models the bank believed, over time.
+
+use super::recordings::{Recording, Source};
+use super::tracking::{best_within, config};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
+use fewbits_adaptive::{SCALES, Sensor};
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+pub struct Parameters {
+    #[serde(flatten)]
+    #[garde(dive)]
+    source: Source,
+    /// Bits per sample, at most.
+    #[garde(range(min = 0.02, max = 12.0))]
+    rate: f64,
+    /// Slots from one row to the next.
+    #[garde(range(min = 1, max = 10_000))]
+    every: usize,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            source: Source {
+                columns: vec!["bursts".into(), "drift".into(), "gusts".into()],
+                ..Source::default()
+            },
+            rate: 0.5,
+            every: 10,
+        }
+    }
+}
+
+/// One moment of one signal.
+#[derive(Serialize, JsonSchema)]
+pub struct Row {
+    /// Signal.
+    column: String,
+    /// Slot.
+    slot: usize,
+    /// Sample.
+    sample: f64,
+    /// Reconstruction.
+    value: f64,
+    /// Weight of the random walks.
+    walk: f64,
+    /// Weight of the velocities that decay by 0.6.
+    damped: f64,
+    /// Weight of the velocities that decay by 0.95.
+    smooth: f64,
+    /// Mean logarithm to base 2 of the driving noise, in steps of two delta.
+    scale: f64,
+}
+
+/// Models over time.
+pub struct Models;
+
+fn follow(recording: &Recording, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+    let (delta, _) = best_within(recording, p.rate, context, |tracked| tracked.played.bits)?;
+    let mut sensor = Sensor::new(config(recording, delta)?);
+    let mut rows = Vec::new();
+    for (slot, sample) in recording.samples.iter().enumerate() {
+        sensor.encode(*sample)?;
+        if slot % p.every != 0 {
+            continue;
+        }
+        let weights = sensor.model_weights();
+        let family = |f: usize| weights.iter().skip(f * SCALES).take(SCALES).sum();
+        rows.push(Row {
+            column: recording.name.clone(),
+            slot,
+            sample: *sample,
+            value: sensor.reconstruction().unwrap_or(*sample),
+            walk: family(0),
+            damped: family(1),
+            smooth: family(2),
+            scale: weights
+                .iter()
+                .enumerate()
+                .map(|(m, w)| w * (2.0 * (m % SCALES) as f64 - 6.0))
+                .sum(),
+        });
+    }
+    Ok(rows)
+}
+
+fn mean<'a>(rows: impl Iterator<Item = &'a Row>, of: impl Fn(&Row) -> f64) -> Option<f64> {
+    let values: Vec<f64> = rows.map(of).collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+impl Figure for Models {
+    type Parameters = Parameters;
+    type Tables = Vec<Row>;
+
+    fn about(&self) -> About {
+        About {
+            id: "real-models",
+            title: "Real signals: what the bank believed",
+            caption: "Weights of the three families of models, and the mean scale of their noise, over time: a plume raises the scale \
+                      within a few reports, a smooth drift is given to the velocities, a calm to the narrowest walks.",
+            source: "our own comparison",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.source.samples = 1000;
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        let recordings = p.source.load("real-models", context)?;
+        let found: Vec<Vec<Row>> = recordings
+            .iter()
+            .map(|r| follow(r, p, context))
+            .collect::<Result<_, _>>()?;
+        Ok(found.into_iter().flatten().collect())
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let sums = |r: &Row| (r.walk + r.damped + r.smooth - 1.0).abs() < 1e-9;
+        claims.all("weights", "weights sum to one", rows, sums);
+        let of = |column: &'static str| rows.iter().filter(move |r| r.column == column && r.slot > 300);
+        let velocity = |r: &Row| r.damped + r.smooth;
+        let what = "a smooth drift is given to the velocities";
+        claims
+            .above("drift", what, mean(of("drift"), velocity), 0.5)
+            .at_defaults();
+        let moving = mean(of("gusts").filter(|r| r.sample > 0.3), |r| r.scale);
+        let calm = mean(of("gusts").filter(|r| r.sample == 0.0), |r| r.scale);
+        let what = "gusts raise the scale by a factor of at least four over a calm";
+        let gap = moving.zip(calm).map(|(m, c)| m - c);
+        claims.above("gusts", what, gap, 2.0).at_defaults();
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
+        let mut columns: Vec<&str> = rows.iter().map(|r| r.column.as_str()).collect();
+        columns.dedup();
+        let panels = columns.iter().flat_map(|column| {
+            let of = |y: fn(&Row) -> f64| {
+                let chosen = rows.iter().filter(|r| r.column == *column);
+                points(chosen, move |r| (r.slot as f64, y(r)))
+            };
+            let slots = || Axis::linear("slot");
+            [
+                Panel::new(*column, slots(), Axis::linear("signal"))
+                    .with(Layer::line("sample", of(|r| r.sample)))
+                    .with(Layer::dashed("reconstruction", of(|r| r.value))),
+                Panel::new("models", slots(), Axis::linear("weight").between(0.0, 1.0))
+                    .with(Layer::line("walk", of(|r| r.walk)))
+                    .with(Layer::line("velocity 0.6", of(|r| r.damped)))
+                    .with(Layer::line("velocity 0.95", of(|r| r.smooth))),
+                Panel::new("scale", slots(), Axis::linear("log2 of the noise, steps"))
+                    .with(Layer::line("mean over models", of(|r| r.scale))),
+            ]
+        });
+        Plot::grid(3, panels.collect())
+    }
+}

@@ -1,0 +1,147 @@
+//! Error against packets: where a packet costs the same whatever is in it, prediction alone counts.
+
+use super::baselines::{Played, delta_for, dpcm, send_on_delta};
+use super::bits::{geometric_mean, largest};
+use super::recordings::{Recording, Source};
+use super::tracking::best_within;
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure};
+use garde::Validate;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+pub struct Parameters {
+    #[serde(flatten)]
+    #[garde(dive)]
+    source: Source,
+    /// Packets per sample, at most.
+    #[garde(length(min = 1, max = 20), inner(range(min = 0.005, max = 1.0)))]
+    packets: Vec<f64>,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            source: Source::default(),
+            packets: vec![0.03, 0.1, 0.3],
+        }
+    }
+}
+
+/// One scheme at one rate.
+#[derive(Serialize, JsonSchema)]
+pub struct Row {
+    /// Signal.
+    column: String,
+    /// Packets per sample, at most.
+    target: f64,
+    /// adaptive; send-on-delta, which is also DPCM of order 0 without a lattice; dpcm-0, dpcm-1.
+    scheme: &'static str,
+    /// Half-width of the region of silence.
+    delta: f64,
+    /// Root mean square error.
+    rmse: f64,
+    /// Packets per sample.
+    packets: f64,
+    /// Error over that of the best of the others.
+    ratio: Option<f64>,
+}
+
+/// Error against packets.
+pub struct Packets;
+
+fn compare(recording: &Recording, target: f64, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+    let (samples, n) = (&recording.samples, recording.samples.len() as f64);
+    let row = |scheme, delta, played: &Played| Row {
+        column: recording.name.clone(),
+        target,
+        scheme,
+        delta,
+        rmse: recording.rmse(&played.values),
+        packets: played.packets as f64 / n,
+        ratio: None,
+    };
+    let mut rows = Vec::new();
+    let mut searched = |scheme, play: &dyn Fn(f64) -> Played| {
+        let delta = delta_for(recording.range(), target, 24, |d| Ok::<_, Error>(play(d).packets as f64 / n))?;
+        rows.push(row(scheme, delta, &play(delta)));
+        Ok::<_, Error>(())
+    };
+    searched("send-on-delta", &|d| send_on_delta(samples, d))?;
+    searched("dpcm-0", &|d| dpcm(samples, 0, d))?;
+    searched("dpcm-1", &|d| dpcm(samples, 1, d))?;
+    let best = rows.iter().map(|r| r.rmse).min_by(f64::total_cmp);
+    let (delta, ours) = best_within(recording, target, context, |tracked| tracked.played.packets as f64)?;
+    let mut ours = row("adaptive", delta, &ours.played);
+    ours.ratio = best.map(|best| ours.rmse / best);
+    rows.push(ours);
+    Ok(rows)
+}
+
+impl Figure for Packets {
+    type Parameters = Parameters;
+    type Tables = Vec<Row>;
+
+    fn about(&self) -> About {
+        About {
+            id: "real-packets",
+            title: "Real signals: error against packets",
+            caption: "Root mean square error against packets per sample. Where a packet costs the same whatever it holds, codes gain \
+                      nothing and only the prediction counts: the bank gains where signals have a velocity, and is as good as \
+                      the last value elsewhere.",
+            source: "our own comparison",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.source.samples = 800;
+        p.packets = vec![0.1];
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+        let recordings = p.source.load("real-packets", context)?;
+        let points: Vec<(&Recording, f64)> = recordings
+            .iter()
+            .flat_map(|r| p.packets.iter().map(move |t| (r, *t)))
+            .collect();
+        let found: Vec<Vec<Row>> = points
+            .par_iter()
+            .map(|(recording, target)| compare(recording, *target, context))
+            .collect::<Result<_, _>>()?;
+        Ok(found.into_iter().flatten().collect())
+    }
+
+    fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let ratios = || rows.iter().filter_map(|r| r.ratio);
+        let what = "at equal packets the error is at most that of the best of the others, in the geometric mean";
+        claims.at_most("mean", what, geometric_mean(ratios()), 1.0);
+        claims
+            .at_most("worst", "and nowhere above 1.35 of it", largest(ratios()), 1.35)
+            .at_defaults();
+        claims.all("rate", "the rate is kept", rows.iter().filter(|r| r.ratio.is_some()), |r| r.packets <= r.target);
+    }
+
+    fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
+        let mut columns: Vec<&str> = rows.iter().map(|r| r.column.as_str()).collect();
+        columns.dedup();
+        let panel = |column: &&str| {
+            let curve = |(colour, scheme): (usize, &&'static str)| {
+                let chosen = rows.iter().filter(|r| r.column == **column && r.scheme == *scheme);
+                let curve = points(chosen, |r| (r.target, r.rmse));
+                let layer = if colour == 0 {
+                    Layer::line(*scheme, curve)
+                } else {
+                    Layer::dashed(*scheme, curve)
+                };
+                layer.coloured(colour)
+            };
+            let schemes = ["adaptive", "dpcm-0", "dpcm-1", "send-on-delta"];
+            Panel::new(*column, Axis::log("packets per sample"), Axis::log("rms error"))
+                .with_all(schemes.iter().enumerate().map(curve))
+        };
+        Plot::grid(3, columns.iter().map(panel).collect())
+    }
+}

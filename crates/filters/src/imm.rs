@@ -1,0 +1,333 @@
+//! The interacting-multiple-model filter: several models of one world, and any factor.
+
+use crate::closed_loop::Filter;
+use crate::{Error, assumed_density, extended_kalman};
+use fewbits_core::{Belief, ColumnsMut, Factor, Gaussian, GaussianDynamics, Observed, Sensing};
+use fewbits_numerics::error::{ArgumentError, at_least_one, probabilities, within};
+use nalgebra::{SMatrix, SVector};
+use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
+
+/// A filter for a world that moves by one of several models at a time and switches between them as a Markov chain.
+///
+/// Each model has its Gaussian belief and its probability. A slot (Blom and Bar-Shalom 1988; the measurement update is that of
+/// [`assumed_density`], so the observation may be a value, a sign bit, a cell, silence: any [`Factor`]):
+///
+/// ```text
+/// c_j = sum_i w_i T_ij                              predicted probability of model j
+/// mean_j, P_j = moments of sum_i (w_i T_ij / c_j) N(mean_i, P_i)             mixing
+/// predict each with its model; update each with the factor: evidence L_j = p(observation | j, past)
+/// w_j = c_j L_j / sum;   p(observation | past) = sum_j c_j L_j
+/// ```
+///
+/// With one model it is the assumed-density filter. Without mixing (`T` the identity) it is a bank of independent filters, whose
+/// probabilities are exact Bayes factors. The mixture of `K^n` histories is kept as `K` Gaussians: that is the approximation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Imm<G> {
+    models: Vec<G>,
+    /// `T_ij = p(next model j | model i)`, row by row.
+    transition: Vec<f64>,
+}
+
+/// What an [`Imm`] knows: a Gaussian and a probability for each model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored<D>")]
+pub struct ImmBelief<const D: usize> {
+    probabilities: Vec<f64>,
+    modes: Vec<Gaussian<D>>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename = "ImmBelief", deny_unknown_fields)]
+struct Stored<const D: usize> {
+    probabilities: Vec<f64>,
+    modes: Vec<Gaussian<D>>,
+}
+
+impl<const D: usize> TryFrom<Stored<D>> for ImmBelief<D> {
+    type Error = ArgumentError;
+
+    fn try_from(stored: Stored<D>) -> Result<Self, ArgumentError> {
+        Self::new(stored.probabilities, stored.modes)
+    }
+}
+
+impl<const D: usize> ImmBelief<D> {
+    /// A belief with a probability and a Gaussian for each model.
+    ///
+    /// # Errors
+    /// If the numbers differ, or the probabilities do not sum to one.
+    pub fn new(probabilities_: Vec<f64>, modes: Vec<Gaussian<D>>) -> Result<Self, ArgumentError> {
+        probabilities("probabilities", &probabilities_)?;
+        if modes.len() != probabilities_.len() {
+            let expected = format!("{}, one for each probability", probabilities_.len());
+            return Err(ArgumentError::new("modes", format!("{} Gaussians", modes.len()), expected));
+        }
+        Ok(Self {
+            probabilities: probabilities_,
+            modes,
+        })
+    }
+
+    /// `count` models of equal probability that agree on the state.
+    ///
+    /// # Errors
+    /// If `count` is 0.
+    pub fn agreed(belief: &Gaussian<D>, count: usize) -> Result<Self, ArgumentError> {
+        at_least_one("count", count)?;
+        Ok(Self {
+            probabilities: vec![1.0 / count as f64; count],
+            modes: vec![*belief; count],
+        })
+    }
+
+    /// Probability of each model.
+    pub fn probabilities(&self) -> &[f64] {
+        &self.probabilities
+    }
+
+    /// Belief under each model.
+    pub fn modes(&self) -> &[Gaussian<D>] {
+        &self.modes
+    }
+
+    /// Mean and covariance as one Gaussian.
+    pub fn moment_matched(&self) -> Gaussian<D> {
+        moments(self.probabilities.iter().copied().zip(&self.modes))
+    }
+}
+
+/// Moments of a mixture whose weights sum to one, the spread about the mean as a sum of squares.
+fn moments<'a, const D: usize>(parts: impl Iterator<Item = (f64, &'a Gaussian<D>)> + Clone) -> Gaussian<D> {
+    let mean = parts.clone().fold(SVector::zeros(), |sum, (w, g)| sum + g.mean() * w);
+    let covariance = parts.fold(SMatrix::zeros(), |sum, (w, g)| {
+        let d = g.mean() - mean;
+        sum + (g.covariance() + d * d.transpose()) * w
+    });
+    Gaussian::from_trusted_parts(mean, covariance)
+}
+
+impl<const D: usize> Belief<D> for ImmBelief<D> {
+    fn mean(&self) -> SVector<f64, D> {
+        *self.moment_matched().mean()
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        *self.moment_matched().covariance()
+    }
+
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+        let count = states.first().map_or(0, |column| column.len());
+        for i in 0..count {
+            let mut left: f64 = rng.random();
+            let mut chosen = 0;
+            for (m, p) in self.probabilities.iter().enumerate() {
+                if *p > 0.0 {
+                    chosen = m;
+                    left -= p;
+                    if left < 0.0 {
+                        break;
+                    }
+                }
+            }
+            if let Some(mode) = self.modes.get(chosen) {
+                let point = mode.sample(rng);
+                for d in 0..D {
+                    states[d][i] = point[d];
+                }
+            }
+        }
+    }
+}
+
+/// What a step reveals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ImmInfo {
+    /// `ln p(observation | past)`.
+    pub log_likelihood: f64,
+}
+
+/// Buffers kept from step to step.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ImmWorkspace<const D: usize> {
+    modes: Vec<Gaussian<D>>,
+    probabilities: Vec<f64>,
+}
+
+impl<G> Imm<G> {
+    /// The filter with transition probabilities `transition[i][j] = p(next model j | model i)`.
+    ///
+    /// # Errors
+    /// If there is no model, the matrix is not square of their number, or a row does not sum to one.
+    pub fn new(models: Vec<G>, transition: &[Vec<f64>]) -> Result<Self, ArgumentError> {
+        at_least_one("models", models.len())?;
+        if transition.len() != models.len() || transition.iter().any(|row| row.len() != models.len()) {
+            let rows: Vec<usize> = transition.iter().map(Vec::len).collect();
+            let expected = format!("{0} rows of {0}", models.len());
+            return Err(ArgumentError::new("transition", format!("rows of {rows:?}"), expected));
+        }
+        for row in transition {
+            probabilities("transition", row)?;
+        }
+        Ok(Self {
+            models,
+            transition: transition.concat(),
+        })
+    }
+
+    /// The filter whose model is drawn anew, evenly, with probability `switching` in each slot.
+    ///
+    /// # Errors
+    /// If there is no model, or `switching` is outside `[0, 1]`.
+    pub fn switching(models: Vec<G>, switching: f64) -> Result<Self, ArgumentError> {
+        within("switching", switching, 0.0, 1.0)?;
+        let n = models.len();
+        let row = |i| {
+            let at = |j| if i == j { 1.0 - switching } else { 0.0 };
+            (0..n).map(|j| at(j) + switching / n as f64).collect()
+        };
+        Self::new(models, &(0..n).map(row).collect::<Vec<Vec<f64>>>())
+    }
+
+    /// The models.
+    pub fn models(&self) -> &[G] {
+        &self.models
+    }
+
+    fn check<const D: usize>(&self, belief: &ImmBelief<D>) -> Result<(), ArgumentError> {
+        if belief.modes.len() == self.models.len() {
+            return Ok(());
+        }
+        let expected = format!("{}, as many as the filter has", self.models.len());
+        Err(ArgumentError::new("belief", format!("of {} models", belief.modes.len()), expected))
+    }
+
+    /// Mixing and time update.
+    ///
+    /// # Errors
+    /// If the belief is of another number of models.
+    pub fn predict_in_place<const D: usize>(
+        &self,
+        belief: &mut ImmBelief<D>,
+        workspace: &mut ImmWorkspace<D>,
+    ) -> Result<(), Error>
+    where
+        G: GaussianDynamics<D>,
+    {
+        self.check(belief)?;
+        let n = self.models.len();
+        workspace.modes.clear();
+        workspace.probabilities.clear();
+        for (j, model) in self.models.iter().enumerate() {
+            let joint = |i: usize| belief.probabilities[i] * self.transition[i * n + j];
+            let c: f64 = (0..n).map(joint).sum();
+            let mixed = if c > 0.0 {
+                moments((0..n).map(|i| (joint(i) / c, &belief.modes[i])))
+            } else {
+                belief.modes[j]
+            };
+            workspace.probabilities.push(c);
+            workspace.modes.push(extended_kalman::predict(model, &mixed));
+        }
+        std::mem::swap(&mut belief.modes, &mut workspace.modes);
+        std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
+        Ok(())
+    }
+
+    /// Measurement update.
+    ///
+    /// # Errors
+    /// [`fewbits_core::Error::Impossible`] if the observation is impossible under every model; the belief is then as it was.
+    /// A model under which alone it is impossible keeps its belief and loses its probability.
+    pub fn update_in_place<const D: usize, const M: usize>(
+        &self,
+        belief: &mut ImmBelief<D>,
+        observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
+        workspace: &mut ImmWorkspace<D>,
+    ) -> Result<ImmInfo, Error> {
+        self.check(belief)?;
+        workspace.modes.clear();
+        workspace.probabilities.clear();
+        for mode in &belief.modes {
+            let (next, log_evidence) = match assumed_density::update_through(mode, observed) {
+                Ok((next, info)) => (next, info.log_likelihood),
+                Err(Error::Core(fewbits_core::Error::Impossible)) => (*mode, f64::NEG_INFINITY),
+                Err(error) => return Err(error),
+            };
+            workspace.modes.push(next);
+            workspace.probabilities.push(log_evidence);
+        }
+        for (log, p) in workspace.probabilities.iter_mut().zip(&belief.probabilities) {
+            *log += p.ln();
+        }
+        let peak = workspace
+            .probabilities
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        if !peak.is_finite() {
+            return Err(Error::IMPOSSIBLE);
+        }
+        workspace
+            .probabilities
+            .iter_mut()
+            .for_each(|log| *log = (*log - peak).exp());
+        let total: f64 = workspace.probabilities.iter().sum();
+        workspace.probabilities.iter_mut().for_each(|p| *p /= total);
+        std::mem::swap(&mut belief.modes, &mut workspace.modes);
+        std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
+        Ok(ImmInfo {
+            log_likelihood: peak + total.ln(),
+        })
+    }
+
+    /// One slot: mixing, time update, measurement update.
+    ///
+    /// # Errors
+    /// As [`update_in_place`](Self::update_in_place), or if the belief is of another number of models.
+    pub fn step<const D: usize, const M: usize>(
+        &self,
+        belief: &ImmBelief<D>,
+        observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
+    ) -> Result<(ImmBelief<D>, ImmInfo), Error>
+    where
+        G: GaussianDynamics<D>,
+    {
+        let (mut next, mut workspace) = (belief.clone(), ImmWorkspace::default());
+        self.predict_in_place(&mut next, &mut workspace)?;
+        let info = self.update_in_place(&mut next, observed, &mut workspace)?;
+        Ok((next, info))
+    }
+}
+
+/// In a closed loop the models of the filter move the belief; the loop's own dynamics only move the world.
+impl<const D: usize, const M: usize, G, World, S, F> Filter<D, World, Observed<S, F, M>> for Imm<G>
+where
+    G: GaussianDynamics<D>,
+    S: Sensing<D, M>,
+    F: Factor<M>,
+{
+    type Belief = ImmBelief<D>;
+    type Workspace = ImmWorkspace<D>;
+
+    fn advance<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        _: &World,
+        belief: &mut ImmBelief<D>,
+        workspace: &mut ImmWorkspace<D>,
+    ) -> Result<(), Error> {
+        self.predict_in_place(belief, workspace)
+    }
+
+    fn absorb<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        belief: &mut ImmBelief<D>,
+        observed: &Observed<S, F, M>,
+        workspace: &mut ImmWorkspace<D>,
+    ) -> Result<f64, Error> {
+        Ok(self.update_in_place(belief, observed, workspace)?.log_likelihood)
+    }
+}
