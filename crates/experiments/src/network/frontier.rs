@@ -1,7 +1,7 @@
 //! Error against bits, transmitted bits and joules: every scheme on the same worlds.
 
 use super::worlds::{self, COEFFICIENT, Scheme};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Comparison, Context, Cost, Error, Figure, Measured};
 use garde::Validate;
 use schemars::JsonSchema;
@@ -233,10 +233,10 @@ impl Figure for Frontier {
         let mut panels = Vec::new();
         for world in ["scalar", "plane"] {
             for (i, (label, of, best)) in axes.iter().enumerate() {
-                let mut panel = Panel::new(world, Axis::log(*label), Axis::log("RMSE")).legend(match (world, i) {
-                    ("scalar", 2) => Legend::Outside,
-                    _ => Legend::Hidden,
-                });
+                let mut panel = Panel::new(world, Axis::log(*label), Axis::log("RMSE"));
+                if (world, i) != ("scalar", 2) {
+                    panel = panel.without_legend();
+                }
                 let here = || rows.iter().filter(|r| r.world == world);
                 if i == 0 {
                     let mut floor = points(here(), |r| (of(r), r.floor));

@@ -1,7 +1,7 @@
 //! Days on two AA cells.
 
 use super::worlds::{self, Scheme};
-use crate::plot::{Axis, Layer, Legend, Panel, Plot, points};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure, Measured};
 use fewbits_network::Radio;
 use garde::Validate;
@@ -179,11 +179,10 @@ impl Figure for Lifetime {
                 let here = || rows.iter().filter(|r| r.baseline == *baseline && r.period == *period);
                 let title = format!("{} ms a slot, {baseline} mW", period * 1e3);
                 let last = panels.len() + 1 == p.baseline.len() * p.period.len();
-                let mut panel = Panel::new(title, Axis::linear("days"), Axis::log("RMSE")).legend(if last {
-                    Legend::Outside
-                } else {
-                    Legend::Hidden
-                });
+                let mut panel = Panel::new(title, Axis::linear("days"), Axis::log("RMSE"));
+                if !last {
+                    panel = panel.without_legend();
+                }
                 for (colour, family) in families.iter().enumerate() {
                     let points = points(here().filter(|r| r.scheme == *family), |r| (r.days, r.rmse.value));
                     panel = panel.with(Layer::points(*family, points).coloured(colour));

@@ -321,7 +321,7 @@ fn a_strangers_scheme_with_an_exact_filter() {
 #[test]
 fn static_quantizers_with_a_table() {
     let deviation = start().covariance()[0].sqrt();
-    let system = System::lloyd_max(Scene::gaussian(deviation, &[1.0; 3]).unwrap(), 4).unwrap();
+    let system = System::lloyd_max(Scene::gaussian_with_deviations(deviation, &[1.0; 3]).unwrap(), 4).unwrap();
     let (decoder, measurements) = (MmseDecoder::new(&system, 1000).unwrap(), scalar(3, SLOTS, 5));
     let quantizer = &system.quantizers()[0];
     let alone: Vec<_> = measurements
@@ -346,10 +346,10 @@ fn static_quantizers_with_a_table() {
 
 #[test]
 fn binary_patterns_with_a_table() {
-    let source = Source::gaussian(start().covariance()[0].sqrt()).unwrap();
+    let source = Source::gaussian_with_deviation(start().covariance()[0].sqrt()).unwrap();
     let patterns = [vec![0.0], vec![-1.2, 1.2], vec![-1.8, 0.0, 1.8]];
     let sensors: Vec<_> = patterns
-        .map(|edges| PatternSensor::new(BinaryQuantizer::new(edges).unwrap(), 1.0).unwrap())
+        .map(|edges| PatternSensor::with_deviation(BinaryQuantizer::new(edges).unwrap(), 1.0).unwrap())
         .to_vec();
     let table = Bank::new(source, sensors.clone())
         .unwrap()
