@@ -493,7 +493,8 @@ impl Figure for Divergences {
         claims
             .references_at_most("kl_median", "median divergence", rows, |r| (key(r), r.kl_median))
             .at_full_trials();
-        claims.all("positive", "no mean divergence is negative", rows, |r| r.kl_mean >= 0.0);
+        let what = "no mean divergence is negative, but for what sums over cells leave (0.01 nats)";
+        claims.all("positive", what, rows, |r| r.kl_mean >= -0.01);
         let what = "after the first ring eight Gaussians are closer than two polynomial Gaussians";
         let gap = find(1, "gmm-8").zip(find(1, "lpg-2x5")).map(|(m, l)| m - l);
         claims.below("ring", what, gap, 0.0).at_full_trials();
