@@ -18,7 +18,7 @@ pub const PRINTED_GAIN: f64 = 0.55;
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
     /// `tanh(K D)`, `D = |t1 - zB| |t2 - zA| / (|t1 - zA| |t2 - zB|)`, as printed (`K = 0.55`). Not symmetric in the labels, blind to
-    /// `R` (erratum E12).
+    /// `R` (erratum `mpa-12`).
     Tanh {
         /// `K`.
         gain: f64,

@@ -104,7 +104,7 @@ pub enum IntervalRule {
     /// The cell: `centre + half_width (q -+ Delta / 2)`.
     #[default]
     Correct,
-    /// Equation 3.18 as printed, `centre (1 + q -+ Delta / 2)`: scaled by the range and not by its innovation (erratum E1).
+    /// Equation 3.18 as printed, `centre (1 + q -+ Delta / 2)`: scaled by the range and not by its innovation (erratum `mpa-1`).
     Printed,
 }
 
@@ -265,7 +265,7 @@ impl Scheme<1> for QuantizedRange {
     }
 }
 
-/// Terms of the published normalisation `N_f` (3.13), whose last one is dimensionally inconsistent (erratum E2).
+/// Terms of the published normalisation `N_f` (3.13), whose last one is dimensionally inconsistent (erratum `mpa-2`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Normalisation {

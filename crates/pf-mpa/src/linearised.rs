@@ -24,7 +24,7 @@ pub enum QuantizationNoise {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Velocity {
-    /// As printed: mean and covariance pass through, no correlation with the position is kept (erratum E7). The velocity is then
+    /// As printed: mean and covariance pass through, no correlation with the position is kept (erratum `mpa-7`). The velocity is then
     /// dead reckoning.
     Transfer,
     /// The position's correction moves the velocity by their correlation.

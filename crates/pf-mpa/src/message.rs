@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KernelRule {
-    /// `lambda = N^(-1/6)`, the printed factor: that of the standard deviation in two dimensions (erratum E5).
+    /// `lambda = N^(-1/6)`, the printed factor: that of the standard deviation in two dimensions (erratum `mpa-5`).
     Printed,
     /// `lambda = (4 / ((d + 2) N))^(2/(d + 4))` with the effective sample size.
     Silverman,

@@ -30,7 +30,7 @@ pub enum Ring {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RingWeight {
-    /// All the same: a uniform bearing makes the plane density proportional to `l(d) / d` (erratum E3).
+    /// All the same: a uniform bearing makes the plane density proportional to `l(d) / d` (erratum `mpa-3`).
     Uniform,
     /// The radius, so that the message is the likelihood `l(d)` over the plane.
     Jacobian,
@@ -42,9 +42,9 @@ pub enum RingWeight {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DynamicsWeight {
-    /// All the same: one draw from each component is an exact stratified sample (erratum E4).
+    /// All the same: one draw from each component is an exact stratified sample (erratum `mpa-4`).
     Uniform,
-    /// The printed ratio, evaluated on the position, where the transition has a density (erratum E4b).
+    /// The printed ratio, evaluated on the position, where the transition has a density (erratum `mpa-16`).
     PrintedRatio,
 }
 

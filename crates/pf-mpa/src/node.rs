@@ -33,7 +33,7 @@ pub enum WeightRule {
     #[default]
     DeterministicMixture,
     /// `(1/N) sum_j f(x_i | X_j) / f(x_i | X_i)` as printed: the same expectation, and a variance that explodes where components do
-    /// not overlap (erratum E4). Cost `N^2`.
+    /// not overlap (erratum `mpa-4`). Cost `N^2`.
     PrintedRatio,
 }
 

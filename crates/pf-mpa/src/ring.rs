@@ -9,7 +9,7 @@ use fewbits_numerics::quadrature::gauss_legendre;
 /// Radial laws of the message of a range in `[a, b)` with noise of constant deviation, `l(d) = P(d + v in [a, b))`, `d > 0`.
 ///
 /// As printed, points are drawn with a uniform bearing and a radius of density `l`: over the plane that is `l(d) / d`. The
-/// message is `l(d)` over the plane, a radial density proportional to `d l(d)` (erratum E3).
+/// message is `l(d)` over the plane, a radial density proportional to `d l(d)` (erratum `mpa-3`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RingBias {
     /// Mean radius as printed.
