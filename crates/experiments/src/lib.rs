@@ -23,6 +23,7 @@ pub mod handoff;
 pub mod legacy;
 mod measured;
 pub mod mi;
+pub mod mpa;
 mod parameters;
 pub mod plot;
 pub mod reference;
@@ -48,6 +49,7 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         cfwmd::figures(),
         diffusive::figures(),
         handoff::figures(),
+        mpa::figures(),
     ]
     .concat()
 }
