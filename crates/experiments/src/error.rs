@@ -97,6 +97,7 @@ wrapped!(
     fewbits_densities,
     fewbits_handoff,
     fewbits_models,
+    fewbits_pf_mpa,
     fewbits_quantizer_design,
     fewbits_quantizers,
     fewbits_sensor_assignment

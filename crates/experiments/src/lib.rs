@@ -22,6 +22,7 @@ mod figure;
 pub mod handoff;
 mod measured;
 pub mod mi;
+pub mod mpa;
 pub mod network;
 mod parameters;
 pub mod plot;
@@ -51,6 +52,7 @@ pub fn all() -> Vec<&'static dyn AnyFigure> {
         handoff::figures(),
         network::figures(),
         real::figures(),
+        mpa::figures(),
     ]
     .concat()
 }

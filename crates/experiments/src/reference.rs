@@ -42,7 +42,16 @@ macro_rules! systems {
         ]);
     };
 }
-systems!["assign", "binary", "cfwmd", "diffusive", "dymbo", "handoff", "mi"];
+systems![
+    "assign",
+    "binary",
+    "cfwmd",
+    "diffusive",
+    "dymbo",
+    "handoff",
+    "mi",
+    "mpa"
+];
 
 fn of(key: &str) -> Result<&'static [Reference], String> {
     let system = key.split('-').next().unwrap_or_default();

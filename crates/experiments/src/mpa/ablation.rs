@@ -1,0 +1,197 @@
+//! `mpa-ablation`: improved message passing with one erratum put back at a time.
+
+use super::scores::{Row, agree, mse};
+use super::sweeps::SPEED;
+use super::world::{Field, Method, Point, compare};
+use crate::plot::{Axis, Layer, Panel, Plot};
+use crate::{About, Claims, Context, Error, Figure};
+use fewbits_pf_mpa::{
+    DynamicsWeight, IntervalRule, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight, Velocity,
+};
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Particles.
+    #[garde(range(min = 3, max = 1000))]
+    particles: usize,
+    /// Trajectories.
+    #[garde(range(min = 2, max = 100_000))]
+    trials: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            particles: 40,
+            trials: 200,
+        }
+    }
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Variants.
+    variants: Vec<Row>,
+}
+
+/// `mpa-ablation`.
+pub struct Ablation;
+
+/// The variants by name.
+fn variants(n: usize) -> Result<Vec<(&'static str, MessagePassing, IntervalRule)>, Error> {
+    let base = MessagePassing::improved(n)?;
+    let sweeps = |sweeps| MessagePassing {
+        sampler: ProductSampler::Gibbs { sweeps },
+        ..base
+    };
+    let correct = [
+        ("1 sweep", sweeps(1)),
+        ("2 sweeps", sweeps(2)),
+        ("improved", base),
+        ("20 sweeps", sweeps(20)),
+        (
+            "importance",
+            MessagePassing {
+                sampler: ProductSampler::MixtureImportance { draws: 300 },
+                ..base
+            },
+        ),
+        (
+            "uniform ring",
+            MessagePassing {
+                ring_weight: RingWeight::Uniform,
+                ..base
+            },
+        ),
+        (
+            "ring ratio",
+            MessagePassing {
+                ring_weight: RingWeight::PrintedRatio,
+                ..base
+            },
+        ),
+        (
+            "dynamics ratio",
+            MessagePassing {
+                dynamics_weight: DynamicsWeight::PrintedRatio,
+                ..base
+            },
+        ),
+        (
+            "printed kernel",
+            MessagePassing {
+                kernel: KernelRule::Printed,
+                ..base
+            },
+        ),
+        (
+            "transfer",
+            MessagePassing {
+                velocity: Velocity::Transfer,
+                ..base
+            },
+        ),
+        (
+            "full ring",
+            MessagePassing {
+                ring: Ring::Full,
+                ..base
+            },
+        ),
+        ("published", MessagePassing::published(n)?),
+    ];
+    let mut all: Vec<_> = correct.map(|(name, m)| (name, m, IntervalRule::Correct)).to_vec();
+    all.push(("printed interval", base, IntervalRule::Printed));
+    Ok(all)
+}
+
+impl Figure for Ablation {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "mpa-ablation",
+            title: "Which erratum costs what",
+            caption: "Improved message passing with one printed choice put back at a time, 50 and 30 dB, four levels. Full rings, the \
+                      printed interval and transferred velocities cost most.",
+            source: "",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = p.trials.min(4);
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let mut rows = Vec::new();
+        for snr in [50.0, 30.0] {
+            for (name, messages, interval) in variants(p.particles)? {
+                let point = Point {
+                    interval,
+                    ..Point::published(snr, 4, SPEED)?
+                };
+                let method = Method::Messages(messages);
+                let score = compare(context, &point, Field::Confined, &[(method, p.trials)])?.remove(0);
+                rows.push(Row {
+                    point: format!("{snr}dB"),
+                    snr_db: snr,
+                    levels: 4,
+                    method: name.to_owned(),
+                    family: method.family(),
+                    size: method.size(),
+                    score,
+                });
+            }
+        }
+        Ok(Rows { variants: rows })
+    }
+
+    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+        agree(claims, &t.variants, "", true);
+        let ratio = |name: &str| Some(mse(&t.variants, "50dB", name)? / mse(&t.variants, "50dB", "improved")?);
+        claims
+            .above("transfer", "E7: transferring velocities costs half as much again", ratio("transfer"), 1.25)
+            .at_defaults()
+            .at_full_trials();
+        claims
+            .above("full-ring", "a full ring loses what its kernel cannot hold", ratio("full ring"), 4.0)
+            .at_defaults()
+            .at_full_trials();
+        claims
+            .above("interval", "E1: the printed interval costs a factor", ratio("printed interval"), 1.8)
+            .at_defaults()
+            .at_full_trials();
+        claims
+            .above("ratios", "E4: ratio weights of the dynamics only add noise", ratio("dynamics ratio"), 1.05)
+            .at_defaults()
+            .at_full_trials();
+        claims
+            .near("radius", "E3: the missing radius costs little here", ratio("uniform ring"), 1.04, 0.12)
+            .at_defaults()
+            .at_full_trials();
+    }
+
+    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
+        let panel = |snr: f64| {
+            let here: Vec<&Row> = t.variants.iter().filter(|r| r.snr_db == snr).collect();
+            let names = here.iter().enumerate().map(|(i, r)| (i as f64, r.method.clone()));
+            let marks: Vec<(usize, &Row)> = here.iter().copied().enumerate().collect();
+            let median = here
+                .iter()
+                .enumerate()
+                .map(|(i, r)| (i as f64, r.score.median))
+                .collect();
+            Panel::new(format!("{snr} dB"), Axis::linear("").named(names), Axis::log("mean squared error"))
+                .with(Layer::measured("mean", marks, |(i, r)| (i as f64, r.score.mse)))
+                .with(Layer::points("median", median))
+        };
+        Plot::grid(1, vec![panel(50.0), panel(30.0)])
+    }
+}

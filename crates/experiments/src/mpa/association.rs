@@ -1,0 +1,469 @@
+//! `mpa-fig3-7`, `mpa-table3-da`: two targets on a line, two measurements in unknown order.
+
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure, Measured};
+use fewbits_core::Gaussian;
+use fewbits_filters::Resampling;
+use fewbits_monte_carlo::{Moments, Stream, Trial};
+use fewbits_numerics::normal;
+use fewbits_pf_mpa::association::{Hypotheses, PRINTED_GAIN, PairTracker, Rule, separation, sigmoid, tanh_rule};
+use garde::Validate;
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Variance of a step.
+const WALK: f64 = 1e-4;
+/// Variance of the start.
+const START: f64 = 1e-6;
+/// Steps.
+const STEPS: usize = 100;
+
+/// One world.
+struct World {
+    targets: Vec<[f64; 2]>,
+    measured: Vec<[f64; 2]>,
+    straight: Vec<bool>,
+}
+
+impl World {
+    fn draw(stream: Stream, variance: f64, apart: f64) -> Self {
+        let mut rng = stream.named("truth").rng();
+        let mut normal = |variance: f64| variance.sqrt() * rng.sample::<f64, _>(StandardNormal);
+        let mut at = [1.0 + normal(START), 1.0 + apart + normal(START)];
+        let mut targets = Vec::new();
+        let mut noisy = Vec::new();
+        for _ in 0..STEPS {
+            at = at.map(|x| x + normal(WALK));
+            targets.push(at);
+            noisy.push(at.map(|x| x + normal(variance)));
+        }
+        let straight: Vec<bool> = (0..STEPS).map(|_| rng.random()).collect();
+        let order = |(z, s): (&[f64; 2], &bool)| if *s { *z } else { [z[1], z[0]] };
+        Self {
+            measured: noisy.iter().zip(&straight).map(order).collect(),
+            targets,
+            straight,
+        }
+    }
+}
+
+/// A way to associate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Method {
+    Pair(&'static str, PairTracker),
+    Hypotheses,
+    Cloud(&'static str, CloudRule),
+}
+
+/// How particles of pairs weigh the two orders.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum CloudRule {
+    /// Each by its own likelihood.
+    Exact,
+    /// All by the average of the printed rule over the pairs.
+    Tanh,
+}
+
+const METHODS: [Method; 8] = [
+    Method::Pair("genie", PairTracker::Genie),
+    Method::Hypotheses,
+    Method::Pair("jpda", PairTracker::Weighted(Rule::Exact)),
+    Method::Cloud("pf-exact", CloudRule::Exact),
+    Method::Pair("logistic", PairTracker::Weighted(Rule::Logistic)),
+    Method::Pair("tanh", PairTracker::Weighted(Rule::PRINTED)),
+    Method::Cloud("pf-tanh", CloudRule::Tanh),
+    Method::Pair("gnn", PairTracker::Nearest),
+];
+
+/// Pairs of particles.
+const PAIRS: usize = 300;
+
+impl Method {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Pair(name, _) | Self::Cloud(name, _) => name,
+            Self::Hypotheses => "mht",
+        }
+    }
+
+    /// Estimates and `P(r = 0)` of every step.
+    fn run(self, world: &World, variance: f64, apart: f64, stream: Stream) -> Result<Vec<([f64; 2], f64)>, Error> {
+        let prior = [Gaussian::scalar(1.0, START)?, Gaussian::scalar(1.0 + apart, START)?];
+        let steps = world.measured.iter().zip(&world.straight);
+        match self {
+            Self::Pair(_, tracker) => {
+                let mut targets = prior;
+                let step = |(z, s): (&[f64; 2], &bool)| {
+                    let after = tracker.step(&targets, *z, WALK, variance, *s)?;
+                    targets = after.targets;
+                    Ok((targets.map(|t| t.mean()[0]), after.straight))
+                };
+                steps.map(step).collect()
+            }
+            Self::Hypotheses => {
+                let mut kept = Hypotheses::new(16, prior)?;
+                let step = |(z, _): (&[f64; 2], &bool)| {
+                    let p = kept.step(*z, WALK, variance)?;
+                    Ok((kept.means(), p))
+                };
+                steps.map(step).collect()
+            }
+            Self::Cloud(name, rule) => {
+                let mut rng = stream.named(name).fast_rng();
+                let mut normal = |variance: f64| variance.sqrt() * rng.sample::<f64, _>(StandardNormal);
+                let mut cloud: Vec<[f64; 2]> = (0..PAIRS)
+                    .map(|_| [1.0 + normal(START), 1.0 + apart + normal(START)])
+                    .collect();
+                let mut out = Vec::new();
+                for (z, _) in steps {
+                    out.push(cloud_step(&mut rng, &mut cloud, *z, variance, rule)?);
+                }
+                Ok(out)
+            }
+        }
+    }
+}
+
+/// One step of the pairs.
+fn cloud_step<R: Rng>(
+    rng: &mut R,
+    cloud: &mut Vec<[f64; 2]>,
+    z: [f64; 2],
+    variance: f64,
+    rule: CloudRule,
+) -> Result<([f64; 2], f64), Error> {
+    for pair in cloud.iter_mut() {
+        *pair = pair.map(|x| x + WALK.sqrt() * rng.sample::<f64, _>(StandardNormal));
+    }
+    let fit = |t: f64, z: f64| normal::log_pdf_with(z, t, variance);
+    let orders = |t: &[f64; 2]| (fit(t[0], z[0]) + fit(t[1], z[1]), fit(t[0], z[1]) + fit(t[1], z[0]));
+    let common = match rule {
+        CloudRule::Exact => 0.5,
+        CloudRule::Tanh => {
+            cloud
+                .iter()
+                .map(|t| tanh_rule(separation(*t, z), PRINTED_GAIN))
+                .sum::<f64>()
+                / cloud.len() as f64
+        }
+    };
+    let logs: Vec<f64> = cloud
+        .iter()
+        .map(|t| {
+            let (straight, swapped) = orders(t);
+            let top = straight.max(swapped);
+            top + (common * (straight - top).exp() + (1.0 - common) * (swapped - top).exp()).ln()
+        })
+        .collect();
+    let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = logs.iter().map(|l| (l - top).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    let mean = [0, 1].map(|i| cloud.iter().zip(&weights).map(|(t, w)| t[i] * w).sum::<f64>() / total);
+    let probability = match rule {
+        CloudRule::Tanh => common,
+        CloudRule::Exact => {
+            let each = |(t, w): (&[f64; 2], &f64)| {
+                let (straight, swapped) = orders(t);
+                w * sigmoid(straight - swapped)
+            };
+            cloud.iter().zip(&weights).map(each).sum::<f64>() / total
+        }
+    };
+    let mut ancestors = vec![0; cloud.len()];
+    Resampling::Systematic.ancestors(rng, &weights, &mut ancestors)?;
+    *cloud = ancestors.iter().map(|a| cloud[*a as usize]).collect();
+    Ok((mean, probability))
+}
+
+/// `mpa-fig3-7`.
+pub struct Fig37;
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Variances of the measurements.
+    #[garde(length(min = 1, max = 4), inner(range(min = 1e-8, max = 1.0)))]
+    variance: Vec<f64>,
+    /// Distance of the targets at the start.
+    #[garde(range(min = 0.0, max = 10.0))]
+    apart: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            variance: vec![1e-4, 4e-4],
+            apart: 0.1,
+        }
+    }
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Step {
+    /// Variance of the measurements.
+    variance: f64,
+    /// Rule.
+    rule: String,
+    /// Step, from 1.
+    k: usize,
+    /// First target.
+    t1: f64,
+    /// Second target.
+    t2: f64,
+    /// First measurement received.
+    za: f64,
+    /// Second measurement received.
+    zb: f64,
+    /// Estimate of the first target.
+    estimate1: f64,
+    /// Estimate of the second.
+    estimate2: f64,
+    /// Probability that the first measurement is of the first target.
+    p0: f64,
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Steps {
+    /// Tracks.
+    tracks: Vec<Step>,
+}
+
+impl Figure for Fig37 {
+    type Parameters = Parameters;
+    type Tables = Steps;
+
+    fn about(&self) -> About {
+        About {
+            id: "mpa-fig3-7",
+            title: "Two targets, two measurements in unknown order",
+            caption: "Tracks with the printed rule of thumb and with the exact probability. After a crossing the labels cannot be told \
+                      apart, by any rule.",
+            source: "particle message passing, Figure 3.7",
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Steps, Error> {
+        let mut tracks = Vec::new();
+        for variance in &p.variance {
+            let stream = context.stream("mpa-fig3-7");
+            let world = World::draw(stream, *variance, p.apart);
+            for method in [METHODS[2], METHODS[5]] {
+                let run = method.run(&world, *variance, p.apart, stream)?;
+                for (k, (estimate, p0)) in run.into_iter().enumerate() {
+                    tracks.push(Step {
+                        variance: *variance,
+                        rule: method.name().to_owned(),
+                        k: k + 1,
+                        t1: world.targets[k][0],
+                        t2: world.targets[k][1],
+                        za: world.measured[k][0],
+                        zb: world.measured[k][1],
+                        estimate1: estimate[0],
+                        estimate2: estimate[1],
+                        p0,
+                    });
+                }
+            }
+        }
+        Ok(Steps { tracks })
+    }
+
+    fn claims(&self, _: &Parameters, t: &Steps, claims: &mut Claims) {
+        claims.all("probabilities", "rules give probabilities", &t.tracks, |r| (0.0..=1.0).contains(&r.p0));
+        let near = |r: &Step| {
+            let to = |x: f64| (x - r.t1).abs().min((x - r.t2).abs());
+            to(r.estimate1).max(to(r.estimate2)) < 8.0 * r.variance.sqrt()
+        };
+        claims
+            .all("follow", "every estimate follows one of the targets", &t.tracks, near)
+            .at_defaults();
+    }
+
+    fn plot(&self, p: &Parameters, t: &Steps) -> Plot {
+        let panel = |variance: &f64| {
+            let of = |rule: &'static str| {
+                t.tracks
+                    .iter()
+                    .filter(move |r| r.variance == *variance && r.rule == rule)
+            };
+            let k = |r: &Step| r.k as f64;
+            Panel::new(format!("R = {variance}"), Axis::linear("step"), Axis::linear("position"))
+                .with(Layer::line("target 1", points(of("jpda"), |r| (k(r), r.t1))).coloured(0))
+                .with(Layer::line("target 2", points(of("jpda"), |r| (k(r), r.t2))).coloured(1))
+                .with(Layer::points("printed, 1", points(of("tanh"), |r| (k(r), r.estimate1))).coloured(2))
+                .with(Layer::points("printed, 2", points(of("tanh"), |r| (k(r), r.estimate2))).coloured(3))
+                .with(Layer::dashed("exact, 1", points(of("jpda"), |r| (k(r), r.estimate1))).coloured(4))
+                .with(Layer::dashed("exact, 2", points(of("jpda"), |r| (k(r), r.estimate2))).coloured(5))
+        };
+        Plot::grid(1, p.variance.iter().map(panel).collect())
+    }
+}
+
+/// `mpa-table3-da`.
+pub struct Table;
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Effort {
+    /// Tracks of each setting.
+    #[garde(range(min = 2, max = 100_000))]
+    trials: u64,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self { trials: 400 }
+    }
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    /// Variance of the measurements.
+    variance: f64,
+    /// Distance of the targets at the start.
+    apart: f64,
+    /// Rule.
+    method: &'static str,
+    /// Mean squared error, both targets summed, labels counted.
+    labelled: Measured,
+    /// The same with the better labels of each step.
+    unlabelled: Measured,
+    /// Mean distance of the probability from what was.
+    association: Measured,
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Rules.
+    rules: Vec<Row>,
+}
+
+impl Figure for Table {
+    type Parameters = Effort;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "mpa-table3-da",
+            title: "Rules of association",
+            caption: "Labelled and unlabelled errors of two random walks, and how far the probabilities are from what was. The exact \
+                      likelihood is better than the printed rule, most of all inside a particle filter.",
+            source: "particle message passing, Section 3.5",
+        }
+    }
+
+    fn quicken(&self, p: &mut Effort) {
+        p.trials = p.trials.min(10);
+    }
+
+    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Rows, Error> {
+        let mut rules = Vec::new();
+        for variance in [1e-4, 4e-4] {
+            for apart in [0.1, 0.3] {
+                let one = |sums: &mut Vec<[Moments; 3]>, trial: Trial| -> Result<(), Error> {
+                    let world = World::draw(trial.stream, variance, apart);
+                    for (sum, method) in sums.iter_mut().zip(METHODS) {
+                        let run = method.run(&world, variance, apart, trial.stream)?;
+                        let mut means = [0.0; 3];
+                        for (k, (estimate, p0)) in run.iter().enumerate() {
+                            let t = world.targets[k];
+                            let squared = |a: f64, b: f64| (a - b) * (a - b);
+                            let labelled = squared(estimate[0], t[0]) + squared(estimate[1], t[1]);
+                            let swapped = squared(estimate[0], t[1]) + squared(estimate[1], t[0]);
+                            let truth = f64::from(u8::from(world.straight[k]));
+                            let all = [labelled, labelled.min(swapped), (p0 - truth).abs()];
+                            means.iter_mut().zip(all).for_each(|(m, x)| *m += x / STEPS as f64);
+                        }
+                        sum.iter_mut().zip(means).for_each(|(s, m)| s.add(m));
+                    }
+                    Ok(())
+                };
+                let empty = || vec![[Moments::default(); 3]; METHODS.len()];
+                let stream = context.stream("mpa-table3-da").named(&format!("{apart}"));
+                let sums = context.tally(stream, p.trials, empty, one)?;
+                for (method, sum) in METHODS.into_iter().zip(sums) {
+                    let [labelled, unlabelled, association] = sum.map(|m| Measured::from(&m));
+                    rules.push(Row {
+                        variance,
+                        apart,
+                        method: method.name(),
+                        labelled,
+                        unlabelled,
+                        association,
+                    });
+                }
+            }
+        }
+        Ok(Rows { rules })
+    }
+
+    fn claims(&self, _: &Effort, t: &Rows, claims: &mut Claims) {
+        let key = |r: &Row| format!("R{}-sep{}-{}", r.variance, r.apart, r.method);
+        claims
+            .references("labelled", "labelled error", &t.rules, |r| (key(r), r.labelled))
+            .at_full_trials();
+        claims
+            .references("unlabelled", "unlabelled error", &t.rules, |r| (key(r), r.unlabelled))
+            .at_full_trials();
+        claims
+            .references("association", "error of association", &t.rules, |r| (key(r), r.association))
+            .at_full_trials();
+        for variance in [1e-4, 4e-4] {
+            let of = |method: &str| {
+                t.rules
+                    .iter()
+                    .find(|r| r.variance == variance && r.apart == 0.1 && r.method == method)
+            };
+            let errors = ["jpda", "tanh", "pf-tanh"].map(|m| of(m).map(|r| r.association.value));
+            claims
+                .increasing(
+                    format!("order-{variance}"),
+                    "C10: exact < printed rule < printed rule over particles",
+                    errors,
+                )
+                .at_full_trials();
+            let ratio = of("pf-tanh")
+                .zip(of("pf-exact"))
+                .map(|(a, b)| a.unlabelled.value / b.unlabelled.value);
+            claims
+                .above(
+                    format!("particles-{variance}"),
+                    "C10: over particles the printed rule blurs the targets",
+                    ratio,
+                    3.0,
+                )
+                .at_full_trials();
+        }
+        let genie = |r: &Row| {
+            t.rules
+                .iter()
+                .find(|g| g.variance == r.variance && g.apart == r.apart && g.method == "genie")
+        };
+        let known = t.rules.iter().filter(|r| r.method != "genie");
+        claims.all("genie", "C10: no rule is below the genie", known, |r| {
+            genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
+        });
+    }
+
+    fn plot(&self, _: &Effort, t: &Rows) -> Plot {
+        let panel = |variance: f64| {
+            let here: Vec<&Row> = t
+                .rules
+                .iter()
+                .filter(|r| r.variance == variance && r.apart == 0.1)
+                .collect();
+            let names = here.iter().enumerate().map(|(i, r)| (i as f64, r.method.to_owned()));
+            let numbered: Vec<(usize, &Row)> = here.iter().copied().enumerate().collect();
+            Panel::new(format!("R = {variance}"), Axis::linear("").named(names), Axis::log("mean squared error"))
+                .with(Layer::measured("labelled", numbered.clone(), |(i, r)| (i as f64, r.labelled)))
+                .with(Layer::measured("unlabelled", numbered, |(i, r)| (i as f64, r.unlabelled)))
+        };
+        Plot::grid(2, vec![panel(1e-4), panel(4e-4)])
+    }
+}

@@ -1,0 +1,186 @@
+//! `mpa-crlb`: posterior Cramer-Rao bounds and what trackers reach on free trajectories.
+
+use super::sweeps::SPEED;
+use super::world::{Field, Method, Point, STEPS, Score, World, prior};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure, Measured};
+use fewbits_core::Gaussian;
+use fewbits_monte_carlo::{Moments, Trial};
+use fewbits_pf_mpa::{CramerRao, Target, position_information};
+use garde::Validate;
+use nalgebra::{Matrix4, Vector2};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Free trajectories.
+    #[garde(range(min = 2, max = 100_000))]
+    trials: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self { trials: 400 }
+    }
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    /// Ratio of the powers of range and noise.
+    #[schemars(extend("unit" = "dB"))]
+    snr_db: f64,
+    /// Levels of the quantizer.
+    levels: usize,
+    /// Bound for levels, mean over the steps.
+    quantized: f64,
+    /// Bound for the ranges themselves.
+    unquantized: f64,
+    /// Grid of 25 nodes an axis.
+    grid: Measured,
+    /// Gaussian message passing.
+    message_passing: Measured,
+    /// Extended Kalman filter of the ranges.
+    unquantized_filter: Measured,
+    /// Medians of the three.
+    grid_median: f64,
+    /// Median.
+    message_passing_median: f64,
+    /// Median.
+    unquantized_filter_median: f64,
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Bounds and errors.
+    bounds: Vec<Row>,
+}
+
+/// `mpa-crlb`.
+pub struct Bounds;
+
+const LEVELS: [usize; 3] = [2, 4, 16];
+const SNRS: [f64; 4] = [20.0, 30.0, 40.0, 50.0];
+
+/// Sums of both information matrices over trajectories, a step each.
+type Sums = Vec<[Matrix4<f64>; 2]>;
+
+impl Figure for Bounds {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "mpa-crlb",
+            title: "Bounds for quantized ranges",
+            caption: "Posterior Cramer-Rao bounds over free trajectories, accelerations known, with the references of the grid filter; \
+                      and what is reached. At 50 dB the bound is far below: information sits at the edges of the cells.",
+            source: "",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = p.trials.min(10);
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let target = Target::printed()?;
+        let mut bounds = Vec::new();
+        for snr_db in SNRS {
+            for levels in LEVELS {
+                let point = Point::published(snr_db, levels, SPEED)?;
+                let network = point.network()?;
+                let methods = [Method::Grid(25), Method::GMPA, Method::EKF_U];
+                let one = |trial: Trial| -> Result<(Vec<f64>, Sums), Error> {
+                    let world = World::draw(trial.stream, &target, Field::Free, 5)?;
+                    let mut runs = Vec::new();
+                    for method in &methods {
+                        runs.push(method.run(&world, &network, &target, trial.stream)?);
+                    }
+                    let mut sums = Vec::with_capacity(STEPS);
+                    let start = prior()?;
+                    for (k, x) in world.track.iter().enumerate() {
+                        let previous: &Gaussian<4> = if k == 0 { &start } else { &runs[0].estimates[k - 1] };
+                        let references = network.references(&target, k, previous)?;
+                        let place = Vector2::new(x[0], x[1]);
+                        sums.push([
+                            position_information(network.sensors(), &place, Some((&references, levels)))?,
+                            position_information(network.sensors(), &place, None)?,
+                        ]);
+                    }
+                    Ok((runs.iter().map(|r| r.mse(&world)).collect(), sums))
+                };
+                let all = context.monte_carlo(context.stream("mpa-free"), p.trials).run(one)?;
+                let bound = |which: usize| -> Result<f64, Error> {
+                    let mut bound = CramerRao::new(*prior()?.covariance());
+                    let mut mean = Moments::default();
+                    for k in 0..STEPS {
+                        let sum: Matrix4<f64> = all.iter().map(|(_, sums)| sums[k][which]).sum();
+                        bound.step_with(&target, &(sum / all.len() as f64))?;
+                        mean.add(bound.position());
+                    }
+                    Ok(mean.mean())
+                };
+                let score = |m: usize| Score::of(all.iter().map(|(errors, _)| errors[m]).collect());
+                let [grid, message_passing, filter] = [0, 1, 2].map(score);
+                bounds.push(Row {
+                    snr_db,
+                    levels,
+                    quantized: bound(0)?,
+                    unquantized: bound(1)?,
+                    grid: grid.mse,
+                    message_passing: message_passing.mse,
+                    unquantized_filter: filter.mse,
+                    grid_median: grid.median,
+                    message_passing_median: message_passing.median,
+                    unquantized_filter_median: filter.median,
+                });
+            }
+        }
+        Ok(Rows { bounds })
+    }
+
+    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+        let key = |r: &Row| format!("{}dB-L{}", r.snr_db, r.levels);
+        claims
+            .references("quantized", "bound for levels", &t.bounds, |r| (key(r), r.quantized))
+            .at_full_trials();
+        claims
+            .references("unquantized", "bound for ranges", &t.bounds, |r| (key(r), r.unquantized))
+            .at_full_trials();
+        claims
+            .references("grid-median", "median of the grid", &t.bounds, |r| (key(r), r.grid_median))
+            .at_full_trials();
+        claims.all("floor", "C7: no tracker of levels is below its bound", &t.bounds, |r| {
+            let above = |m: Measured| m.value > r.quantized - 3.0 * m.standard_error.unwrap_or(0.0);
+            above(r.grid) && above(r.message_passing)
+        });
+        claims.all("order", "levels never tell more than ranges", &t.bounds, |r| r.quantized > r.unquantized);
+        for snr in SNRS {
+            let of = t.bounds.iter().filter(|r| r.snr_db == snr).map(|r| r.quantized);
+            claims
+                .decreasing(format!("levels-{snr}"), "C7: fewer levels, larger bound", of)
+                .at_full_trials();
+        }
+        let loose = t.bounds.iter().find(|r| r.snr_db == 50.0 && r.levels == 4);
+        claims
+            .above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized), 5.0)
+            .at_full_trials();
+    }
+
+    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
+        let panel = |levels: usize| {
+            let here: Vec<&Row> = t.bounds.iter().filter(|r| r.levels == levels).collect();
+            let snr = |r: &&Row| r.snr_db;
+            Panel::new(format!("{levels} levels"), Axis::linear("SNR / dB"), Axis::log("mean squared error"))
+                .with(Layer::line("bound", points(&here, |r| (snr(r), r.quantized))).coloured(0))
+                .with(Layer::points("grid, median", points(&here, |r| (snr(r), r.grid_median))).coloured(1))
+                .with(Layer::measured("grid, mean", &here, |r| (snr(r), r.grid)).coloured(2))
+                .with(Layer::dashed("bound of ranges", points(&here, |r| (snr(r), r.unquantized))).coloured(3))
+        };
+        Plot::grid(3, LEVELS.map(panel).to_vec())
+    }
+}

@@ -1,0 +1,156 @@
+//! `mpa-encoder`: the published reference, the predicted one, and cells that adapt to what is known.
+
+use super::scores::{Row, agree, mse, rows};
+use super::sweeps::SPEED;
+use super::world::{Method, Point};
+use crate::plot::{Axis, Layer, Panel, Plot};
+use crate::{About, Claims, Context, Error, Figure};
+use fewbits_pf_mpa::Encoder;
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Trajectories.
+    #[garde(range(min = 2, max = 100_000))]
+    trials: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self { trials: 200 }
+    }
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Encoders over levels and noise.
+    encoders: Vec<Row>,
+    /// Other loadings of the adaptive encoder.
+    loadings: Vec<Row>,
+}
+
+/// `mpa-encoder`.
+pub struct Encoders;
+
+const LEVELS: [usize; 4] = [2, 4, 8, 16];
+const NAMES: [&str; 3] = ["published", "predicted", "adaptive"];
+
+impl Figure for Encoders {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "mpa-encoder",
+            title: "Where the cells should lie",
+            caption: "The grid of 15 and Gaussian message passing with the published encoder, with the predicted range as reference, \
+                      and with cells as wide as the innovation. Without one additional bit the error falls by up to thirty times, and \
+                      four bits reach the filter of unquantized ranges.",
+            source: "",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = p.trials.min(6);
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let methods = [
+            (Method::Grid(15), p.trials),
+            (Method::GMPA, p.trials),
+            (Method::EKF_U, p.trials),
+        ];
+        let (mut encoders, mut loadings) = (Vec::new(), Vec::new());
+        for snr in [50.0, 40.0, 30.0] {
+            for levels in LEVELS {
+                let all = [
+                    Encoder::published(SPEED)?,
+                    Encoder::predicted(SPEED)?,
+                    Encoder::adaptive(levels)?,
+                ];
+                for (name, encoder) in NAMES.into_iter().zip(all) {
+                    let point = Point {
+                        encoder,
+                        ..Point::published(snr, levels, SPEED)?
+                    };
+                    encoders.extend(rows(context, &format!("{name} {snr}dB-L{levels}"), &point, &methods)?);
+                }
+            }
+        }
+        let guided = [(Method::Guided(10), p.trials), (Method::Guided(40), p.trials)];
+        for (snr, levels, list) in [
+            (50.0, 4, &[1.2, 1.6, 2.5, 3.2][..]),
+            (30.0, 4, &[1.2, 1.6, 2.5, 3.2]),
+            (50.0, 8, &[1.8, 3.0, 4.0]),
+        ] {
+            for loading in list {
+                let point = Point {
+                    encoder: Encoder::Adaptive { loading: *loading },
+                    ..Point::published(snr, levels, SPEED)?
+                };
+                loadings.extend(rows(context, &format!("{loading} {snr}dB-L{levels}"), &point, &methods[..1])?);
+            }
+            let point = Point {
+                encoder: Encoder::adaptive(levels)?,
+                ..Point::published(snr, levels, SPEED)?
+            };
+            loadings.extend(rows(context, &format!("best {snr}dB-L{levels}"), &point, &guided)?);
+        }
+        Ok(Rows { encoders, loadings })
+    }
+
+    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+        agree(claims, &t.encoders, "", true);
+        agree(claims, &t.loadings, "loading-", true);
+        let grid = |name: &str, point: &str| mse(&t.encoders, &format!("{name} {point}"), "grid-15");
+        for (point, factor) in [("50dB-L4", 20.0), ("40dB-L4", 8.0), ("30dB-L4", 2.4)] {
+            let gain = grid("published", point)
+                .zip(grid("adaptive", point))
+                .map(|(a, b)| a / b);
+            claims
+                .at_least(format!("gain-{point}"), "the adaptive encoder divides the error", gain, factor)
+                .at_full_trials();
+        }
+        for snr in ["50dB", "40dB", "30dB"] {
+            let point = format!("{snr}-L16");
+            let ratio = grid("adaptive", &point).zip(mse(&t.encoders, &format!("adaptive {point}"), "EKF-U"));
+            claims
+                .at_most(
+                    format!("four-bits-{snr}"),
+                    "with the adaptive encoder four bits are as good as the unquantized extended Kalman filter",
+                    ratio.map(|(a, b)| a / b),
+                    1.15,
+                )
+                .at_full_trials();
+        }
+        let lost = t
+            .encoders
+            .iter()
+            .filter(|r| r.point.starts_with("adaptive") && r.method == "grid-15");
+        claims.all("lost", "the grid loses no track with it", lost, |r| r.score.lost == 0.0);
+    }
+
+    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
+        let panel = |snr: f64| {
+            let lines = NAMES.iter().enumerate().map(|(i, name)| {
+                let of: Vec<&Row> = t
+                    .encoders
+                    .iter()
+                    .filter(|r| r.snr_db == snr && r.method == "grid-15" && r.point.starts_with(name))
+                    .collect();
+                Layer::measured(*name, of, |r| ((r.levels as f64).log2(), r.score.mse)).coloured(i)
+            });
+            let reference = t.encoders.iter().find(|r| r.snr_db == snr && r.method == "EKF-U");
+            let level = reference.map_or(Vec::new(), |r| vec![(1.0, r.score.mse.value), (4.0, r.score.mse.value)]);
+            Panel::new(format!("{snr} dB"), Axis::linear("bits"), Axis::log("mean squared error"))
+                .with_all(lines)
+                .with(Layer::dashed("unquantized EKF", level))
+        };
+        Plot::grid(3, [50.0, 40.0, 30.0].map(panel).to_vec())
+    }
+}

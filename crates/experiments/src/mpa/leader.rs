@@ -1,0 +1,182 @@
+//! `mpa-leader`: every sensor runs message passing with its own seed; who claims the lead?
+
+use super::sweeps::SPEED;
+use super::world::{Field, Method, Point, STEPS, World, canonical};
+use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::{About, Claims, Context, Error, Figure, Measured};
+use fewbits_core::{Gaussian, NumberFormat};
+use fewbits_monte_carlo::{Moments, Trial};
+use fewbits_pf_mpa::leader::{Handover, elect, nearest};
+use fewbits_pf_mpa::{MessagePassing, Reports, Target, Tracker};
+use garde::Validate;
+use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Trajectories of 25 steps.
+    #[garde(range(min = 2, max = 100_000))]
+    trials: u64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self { trials: 160 }
+    }
+}
+
+#[derive(Serialize, JsonSchema)]
+struct Row {
+    /// Ratio of the powers of range and noise.
+    #[schemars(extend("unit" = "dB"))]
+    snr_db: f64,
+    /// Particles.
+    particles: usize,
+    /// Share of steps with one claimant.
+    one: Measured,
+    /// With none.
+    none: Measured,
+    /// With several.
+    several: Measured,
+    /// Share of steps in which the true nearest sensor leads.
+    nearest: Measured,
+    /// Mean squared position error of the leader's estimate.
+    mse: Measured,
+    /// Variance of the sensors' estimates about their mean, both axes.
+    spread: Measured,
+}
+
+/// All tables.
+#[derive(Serialize, JsonSchema)]
+pub struct Rows {
+    /// Elections.
+    elections: Vec<Row>,
+}
+
+/// `mpa-leader`.
+pub struct Leaders;
+
+const SETTINGS: [(f64, usize); 3] = [(50.0, 40), (50.0, 10), (30.0, 40)];
+
+impl Figure for Leaders {
+    type Parameters = Parameters;
+    type Tables = Rows;
+
+    fn about(&self) -> About {
+        About {
+            id: "mpa-leader",
+            title: "Elections among copies that drew for themselves",
+            caption: "Five sensors, each with its own message passing and its own seed; the leader's mean and covariance, rounded to \
+                      32 bits, are what all go on with. In 98 of 100 steps exactly one claims the lead. One shared seed, or a \
+                      deterministic tracker, would make it all of them.",
+            source: "particle message passing, Section 3.3",
+        }
+    }
+
+    fn quicken(&self, p: &mut Parameters) {
+        p.trials = p.trials.min(3);
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let (target, sensors) = (Target::printed()?, canonical());
+        let row = |(snr_db, particles): (f64, usize)| -> Result<Row, Error> {
+            let network = Point::published(snr_db, 4, SPEED)?.network()?;
+            let tracker = MessagePassing::improved(particles)?;
+            let one = |sums: &mut [Moments; 6], trial: Trial| -> Result<(), Error> {
+                let world = World::draw(trial.stream, &target, Field::Confined, sensors.len())?;
+                let name = Method::Messages(tracker).name();
+                let own = |i: usize| trial.stream.named(&name).indexed(i as u64);
+                let mut streams: Vec<_> = (0..sensors.len()).map(|i| own(i).fast_rng()).collect();
+                let mut shared: Gaussian<4> = super::world::prior()?;
+                // Steps of one trajectory depend on each other: a trajectory is one trial.
+                let mut means = [Moments::default(); 6];
+                for k in 0..STEPS {
+                    let ranges = world.ranges(&network, k);
+                    let observed = network.observe(&target, k, &shared, &ranges, Reports::Levels)?;
+                    let mut copies = Vec::with_capacity(sensors.len());
+                    for rng in &mut streams {
+                        let stepped = tracker.step(rng, &target, k, &shared, &observed);
+                        copies.push(stepped.map_or(shared, |s| s.0));
+                    }
+                    let places: Vec<Vector2<f64>> =
+                        copies.iter().map(|c| Vector2::new(c.mean()[0], c.mean()[1])).collect();
+                    let election = elect(&sensors, &places)?;
+                    let truth = Vector2::new(world.track[k][0], world.track[k][1]);
+                    let mean = places.iter().sum::<Vector2<f64>>() / places.len() as f64;
+                    let spread =
+                        places.iter().map(|p| (p - mean).norm_squared()).sum::<f64>() / (places.len() - 1) as f64;
+                    shared = Handover::new(&copies[election.leader], &NumberFormat::Single)?.belief();
+                    let is = |yes: bool| f64::from(u8::from(yes));
+                    let count = election.claimants.len();
+                    let error = (places[election.leader] - truth).norm_squared();
+                    let leads = election.leader == nearest(&sensors, &truth);
+                    let all = [is(count == 1), is(count == 0), is(count > 1), is(leads), error, spread];
+                    means.iter_mut().zip(all).for_each(|(m, x)| m.add(x));
+                }
+                sums.iter_mut().zip(means).for_each(|(s, m)| s.add(m.mean()));
+                Ok(())
+            };
+            let stream = context.stream("mpa-trajectories");
+            let sums = context.tally(stream, p.trials, || [Moments::default(); 6], one)?;
+            let [one, none, several, nearest, mse, spread] = sums.map(|m| Measured::from(&m));
+            Ok(Row {
+                snr_db,
+                particles,
+                one,
+                none,
+                several,
+                nearest,
+                mse,
+                spread,
+            })
+        };
+        Ok(Rows {
+            elections: SETTINGS.into_iter().map(row).collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+        let key = |r: &Row| format!("{}dB-N{}", r.snr_db, r.particles);
+        type Field = fn(&Row) -> Measured;
+        let fields: [(&str, &str, Field); 5] = [
+            ("one", "share with one claimant", |r| r.one),
+            ("none", "share without", |r| r.none),
+            ("several", "share with several", |r| r.several),
+            ("nearest", "share led by the truly nearest", |r| r.nearest),
+            ("spread", "variance between the copies", |r| r.spread),
+        ];
+        for (quantity, statement, field) in fields {
+            claims
+                .references(quantity, statement, &t.elections, |r| (key(r), field(r)))
+                .at_full_trials();
+        }
+        claims.all("sum", "every step has one, none or several", &t.elections, |r| {
+            (r.one.value + r.none.value + r.several.value - 1.0).abs() < 1e-9
+        });
+    }
+
+    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
+        let names = t
+            .elections
+            .iter()
+            .enumerate()
+            .map(|(i, r)| (i as f64, format!("{} dB, N = {}", r.snr_db, r.particles)));
+        let rows: Vec<(usize, &Row)> = t.elections.iter().enumerate().collect();
+        let others = points(&rows, |(i, r)| (*i as f64, r.none.value + r.several.value));
+        Plot::of(
+            Panel::new("Elections", Axis::linear("").named(names), Axis::linear("share of steps"))
+                .with(Layer::measured("none or several claim", rows.clone(), |(i, r)| (i as f64, r.none)))
+                .with(Layer::points("both together", others))
+                .with(Layer::measured("another than the nearest leads", rows, |(i, r)| {
+                    let share = Measured {
+                        value: 1.0 - r.nearest.value,
+                        ..r.nearest
+                    };
+                    (i as f64, share)
+                })),
+        )
+    }
+}

@@ -1,0 +1,152 @@
+//! Rows that hold a tracker's score, and what is claimed of all of them.
+
+use super::world::{Field, Method, Point, Score, compare};
+use crate::{Claims, Context, Error, Measured};
+use fewbits_pf_mpa::Reports;
+use garde::Validate;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How many trajectories.
+#[derive(Serialize, Deserialize, JsonSchema, Validate)]
+#[serde(deny_unknown_fields)]
+pub struct Effort {
+    /// Trajectories of every tracker but message passing with particles.
+    #[garde(range(min = 2, max = 100_000))]
+    pub(super) trials: u64,
+    /// Trajectories of message passing with particles, and of the finest grid and largest clouds; the first of the others'.
+    #[garde(range(min = 2, max = 100_000))]
+    pub(super) message_trials: u64,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self {
+            trials: 200,
+            message_trials: 60,
+        }
+    }
+}
+
+impl Effort {
+    pub(super) fn quicken(&mut self) {
+        self.trials = self.trials.min(8);
+        self.message_trials = self.message_trials.min(3);
+    }
+
+    /// The methods with their counts.
+    pub(super) fn of(&self, methods: &[Method]) -> Vec<(Method, u64)> {
+        let expensive = |m: &Method| match m {
+            Method::Messages(_) => true,
+            Method::Grid(n) => *n > 15,
+            Method::Bootstrap(n, _) | Method::RaoBlackwell(n) => *n > 500,
+            Method::Linear(..) | Method::Guided(_) => false,
+        };
+        let count = |m: &Method| if expensive(m) { self.message_trials } else { self.trials };
+        methods.iter().map(|m| (*m, count(m))).collect()
+    }
+}
+
+/// One tracker at one point.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub(super) struct Row {
+    /// Which setting.
+    pub(super) point: String,
+    /// Ratio of the powers of range and noise.
+    #[schemars(extend("unit" = "dB"))]
+    pub(super) snr_db: f64,
+    /// Levels of the quantizer.
+    pub(super) levels: usize,
+    /// Tracker and its particles, draws or nodes an axis.
+    pub(super) method: String,
+    /// Kind of tracker.
+    pub(super) family: String,
+    /// Particles, draws, or nodes an axis.
+    pub(super) size: Option<usize>,
+    #[serde(flatten)]
+    pub(super) score: Score,
+}
+
+impl Row {
+    pub(super) fn key(&self) -> String {
+        format!("{} {}", self.point, self.method)
+    }
+
+    pub(super) fn mse(&self) -> Measured {
+        self.score.mse
+    }
+}
+
+/// Every method at a point.
+pub(super) fn rows(
+    context: &Context<'_>,
+    name: &str,
+    point: &Point,
+    methods: &[(Method, u64)],
+) -> Result<Vec<Row>, Error> {
+    let scores = compare(context, point, Field::Confined, methods)?;
+    let row = |((method, _), score): (&(Method, u64), Score)| Row {
+        point: name.to_owned(),
+        snr_db: point.snr_db,
+        levels: point.levels,
+        method: method.name(),
+        family: method.family(),
+        size: method.size(),
+        score,
+    };
+    Ok(methods.iter().zip(scores).map(row).collect())
+}
+
+/// The references of means, medians and lost shares that a figure has. Those of heavy-tailed methods have no mean.
+pub(super) fn agree(claims: &mut Claims, rows: &[Row], prefix: &str, heavy_tailed: bool) {
+    let quantity = |what: &str| format!("{prefix}{what}");
+    claims
+        .references(&quantity("mse"), "mean squared position error", rows, |r| (r.key(), r.mse()))
+        .at_full_trials();
+    if heavy_tailed {
+        claims
+            .references(&quantity("median"), "median of the squared position error", rows, |r| {
+                (r.key(), r.score.median)
+            })
+            .at_full_trials();
+        claims
+            .references(&quantity("lost"), "share of lost tracks", rows, |r| (r.key(), r.score.lost))
+            .at_full_trials();
+    }
+}
+
+/// The score of a method at a point.
+pub(super) fn find<'a>(rows: &'a [Row], point: &str, method: &str) -> Option<&'a Row> {
+    rows.iter().find(|r| r.point == point && r.method == method)
+}
+
+/// Its mean squared error.
+pub(super) fn mse(rows: &[Row], point: &str, method: &str) -> Option<f64> {
+    find(rows, point, method).map(|r| r.score.mse.value)
+}
+
+/// All the cheap Gaussian trackers.
+pub(super) fn gaussian() -> Vec<Method> {
+    vec![
+        Method::EKF_U,
+        Method::EKF_NAIVE,
+        Method::EKF,
+        Method::GMPA,
+        Method::TRANSFER,
+    ]
+}
+
+/// The particle trackers of one size.
+pub(super) fn clouds(n: usize) -> Vec<Method> {
+    vec![
+        Method::Guided(n),
+        Method::Bootstrap(n, Reports::Levels),
+        Method::RaoBlackwell(n),
+        Method::Bootstrap(n, Reports::Ranges),
+    ]
+}
+
+/// Message passing of one size: as published, with narrow kernels, improved.
+pub(super) fn messages(n: usize) -> Result<Vec<Method>, Error> {
+    Ok(vec![Method::published(n)?, Method::narrow(n)?, Method::improved(n)?])
+}

@@ -1,0 +1,354 @@
+//! The canonical scenario, and every tracker on it.
+
+use crate::{Context, Error, Measured};
+use fewbits_core::{Belief, Gaussian};
+use fewbits_monte_carlo::{Moments, Stream, Trial};
+use fewbits_pf_mpa::{
+    Bootstrap, DynamicsWeight, Encoder, GridFilter, GuidedGaussian, IntervalRule, KernelRule, Linearised,
+    MessagePassing, Network, QuantizedRange, RangeNoise, RaoBlackwellGuided, Reports, Ring, RingWeight, StepInfo,
+    Target, Tracker, Velocity,
+};
+use nalgebra::{Matrix4, Vector2, Vector4};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Steps of a trajectory.
+pub(super) const STEPS: usize = 25;
+/// A trajectory with a larger mean squared error is lost.
+pub(super) const LOST: f64 = 4.0;
+/// Side of the field.
+const SIDE: f64 = 20.0;
+
+/// The canonical sensors.
+pub(super) fn canonical() -> Vec<Vector2<f64>> {
+    [[4.0, 4.0], [16.0, 4.0], [10.0, 10.0], [4.0, 16.0], [16.0, 16.0]]
+        .map(Vector2::from)
+        .to_vec()
+}
+
+/// Four further layouts, drawn once uniformly over the field by the program that made the references.
+pub(super) const LAYOUTS: [[[f64; 2]; 5]; 4] = [
+    [
+        [3.314263649845593, 9.98700152392207],
+        [11.82697043722044, 1.516402150695002],
+        [3.662669522394207, 17.70779841328665],
+        [2.267570370775543, 3.335931089187364],
+        [18.06991215925195, 12.19390467033489],
+    ],
+    [
+        [7.641876227136238, 10.20502039245873],
+        [12.93117314530239, 5.955558683700327],
+        [3.483425311605196, 15.18471270107185],
+        [13.06649051384471, 10.22288164269689],
+        [15.70125584745385, 10.88335483966047],
+    ],
+    [
+        [18.6564455073515, 4.681170303940808],
+        [10.9671465315741, 9.705244544620978],
+        [7.358947391088066, 11.64871547108278],
+        [5.23542217001645, 15.4396483080127],
+        [16.61200393316346, 3.317674082101319],
+    ],
+    [
+        [9.40731772128888, 5.988608065606678],
+        [2.496105959234363, 17.12699754850662],
+        [8.739076456861037, 3.658443399317693],
+        [13.12052243096639, 4.639888500184687],
+        [17.22575941638718, 4.908668633533507],
+    ],
+];
+
+pub(super) fn prior() -> Result<Gaussian<4>, Error> {
+    let covariance = Matrix4::from_diagonal(&Vector4::new(0.04, 0.04, 0.01, 0.01));
+    Ok(Gaussian::new(Vector4::new(13.0, 17.0, 0.0, -0.6), covariance)?)
+}
+
+/// Where trajectories may go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Field {
+    /// Only those that stay in the field count.
+    Confined,
+    /// Anywhere.
+    Free,
+}
+
+/// The world of one trial: a track and a standard normal for every sensor and step. The same for all methods and ratios.
+pub(super) struct World {
+    pub(super) track: Vec<Vector4<f64>>,
+    pub(super) normals: Vec<Vec<f64>>,
+}
+
+impl World {
+    pub(super) fn draw(stream: Stream, target: &Target, field: Field, sensors: usize) -> Result<Self, Error> {
+        let mut rng = stream.named("truth").rng();
+        let prior = prior()?;
+        let inside = |x: &Vector4<f64>| (0.0..=SIDE).contains(&x[0]) && (0.0..=SIDE).contains(&x[1]);
+        let track = loop {
+            let start = prior.sample(&mut rng);
+            let track = target.simulate(&mut rng, &start, STEPS);
+            if field == Field::Free || track.iter().all(inside) {
+                break track;
+            }
+        };
+        let mut noise = stream.named("noise").rng();
+        let normals = (0..STEPS)
+            .map(|_| (0..sensors).map(|_| noise.sample(StandardNormal)).collect())
+            .collect();
+        Ok(Self { track, normals })
+    }
+
+    /// What the sensors measure at step `k`.
+    pub(super) fn ranges(&self, network: &Network, k: usize) -> Vec<f64> {
+        let (x, y) = (self.track[k][0], self.track[k][1]);
+        let sensors = network.sensors().iter().zip(&self.normals[k]);
+        let measure = |(s, normal): (&fewbits_pf_mpa::RangeSensor, &f64)| {
+            let d = s.distance(x, y);
+            d + s.noise().deviation(d) * normal
+        };
+        sensors.map(measure).collect()
+    }
+}
+
+/// A tracker by its name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Method {
+    Linear(Linearised, Reports),
+    Grid(usize),
+    Guided(usize),
+    Bootstrap(usize, Reports),
+    RaoBlackwell(usize),
+    Messages(MessagePassing),
+}
+
+/// What one trajectory gave: the estimate after every step.
+pub(super) struct Run {
+    pub(super) estimates: Vec<Gaussian<4>>,
+    pub(super) infos: Vec<StepInfo>,
+}
+
+impl Method {
+    pub(super) const EKF_U: Self = Self::Linear(Linearised::EKF, Reports::Ranges);
+    pub(super) const EKF_NAIVE: Self = Self::Linear(Linearised::EKF_NAIVE, Reports::Levels);
+    pub(super) const EKF: Self = Self::Linear(Linearised::EKF, Reports::Levels);
+    pub(super) const GMPA: Self = Self::Linear(Linearised::MESSAGE_PASSING, Reports::Levels);
+    pub(super) const TRANSFER: Self = Self::Linear(Linearised::MESSAGE_PASSING_TRANSFER, Reports::Levels);
+
+    pub(super) fn improved(n: usize) -> Result<Self, Error> {
+        Ok(Self::Messages(MessagePassing::improved(n)?))
+    }
+
+    pub(super) fn published(n: usize) -> Result<Self, Error> {
+        Ok(Self::Messages(MessagePassing::published(n)?))
+    }
+
+    /// Full rings and transferred velocities, but narrow kernels and equal weights.
+    pub(super) fn narrow(n: usize) -> Result<Self, Error> {
+        Ok(Self::Messages(MessagePassing {
+            ring_weight: RingWeight::Uniform,
+            dynamics_weight: DynamicsWeight::Uniform,
+            kernel: KernelRule::Narrow,
+            ..MessagePassing::published(n)?
+        }))
+    }
+
+    /// The name in tables and keys.
+    pub(super) fn name(&self) -> String {
+        match *self {
+            Self::Linear(_, Reports::Ranges) => "EKF-U".into(),
+            Self::Linear(Linearised::EKF_NAIVE, _) => "EKF-Q-naive".into(),
+            Self::Linear(Linearised::EKF, _) => "EKF-Q".into(),
+            Self::Linear(l, _) if l.velocity == Velocity::Transfer => "GMPA-transfer".into(),
+            Self::Linear(..) => "GMPA".into(),
+            Self::Grid(n) => format!("grid-{n}"),
+            Self::Guided(n) => format!("guided-{n}"),
+            Self::Bootstrap(n, Reports::Levels) => format!("bootstrap-{n}"),
+            Self::Bootstrap(n, Reports::Ranges) => format!("unquantized-{n}"),
+            Self::RaoBlackwell(n) => format!("rao-blackwell-{n}"),
+            Self::Messages(m) if m.ring == Ring::Local => format!("improved-{}", m.particles),
+            Self::Messages(m) if m.kernel == KernelRule::Narrow => format!("narrow-{}", m.particles),
+            Self::Messages(m) => format!("published-{}", m.particles),
+        }
+    }
+
+    /// Its family, without the number of particles.
+    pub(super) fn family(&self) -> String {
+        let name = self.name();
+        match self {
+            Self::Linear(..) => name,
+            _ => name
+                .rsplit_once('-')
+                .map_or(name.clone(), |(family, _)| family.to_owned()),
+        }
+    }
+
+    /// Particles, draws or nodes an axis.
+    pub(super) fn size(&self) -> Option<usize> {
+        match self {
+            Self::Linear(..) => None,
+            Self::Grid(n) | Self::Guided(n) | Self::Bootstrap(n, _) | Self::RaoBlackwell(n) => Some(*n),
+            Self::Messages(m) => Some(m.particles),
+        }
+    }
+
+    fn reports(&self) -> Reports {
+        match self {
+            Self::Linear(_, reports) | Self::Bootstrap(_, reports) => *reports,
+            _ => Reports::Levels,
+        }
+    }
+
+    pub(super) fn run(&self, world: &World, network: &Network, target: &Target, stream: Stream) -> Result<Run, Error> {
+        let stream = stream.named(&self.name());
+        let reports = self.reports();
+        fn go<T: Tracker>(
+            tracker: Result<T, fewbits_pf_mpa::Error>,
+            (world, network, target): (&World, &Network, &Target),
+            reports: Reports,
+            stream: Stream,
+        ) -> Result<Run, Error> {
+            Ok(track(&tracker?, world, network, target, reports, stream)?)
+        }
+        let all = (world, network, target);
+        match self {
+            Self::Linear(l, _) => go(Ok(*l), all, reports, stream),
+            Self::Grid(n) => go(GridFilter::new(*n), all, reports, stream),
+            Self::Guided(n) => go(GuidedGaussian::new(*n), all, reports, stream),
+            Self::Bootstrap(n, _) => go(Bootstrap::new(*n), all, reports, stream),
+            Self::RaoBlackwell(n) => go(RaoBlackwellGuided::new(*n), all, reports, stream),
+            Self::Messages(m) => go(Ok(*m), all, reports, stream),
+        }
+    }
+}
+
+/// One trajectory. Where a step fails (a lost cloud in a region of probability zero, points without spread), the belief stays.
+pub(super) fn track<T: Tracker>(
+    tracker: &T,
+    world: &World,
+    network: &Network,
+    target: &Target,
+    reports: Reports,
+    stream: Stream,
+) -> Result<Run, fewbits_pf_mpa::Error> {
+    let mut rng = stream.fast_rng();
+    let prior = prior().map_err(|_| fewbits_core::Error::Impossible)?;
+    let mut belief = tracker.start(&mut rng, target, &prior)?;
+    let mut workspace = T::Workspace::default();
+    let mut run = Run {
+        estimates: Vec::with_capacity(STEPS),
+        infos: Vec::with_capacity(STEPS),
+    };
+    for k in 0..world.track.len() {
+        let ranges = world.ranges(network, k);
+        let observed = network.observe(target, k, &tracker.estimate(&belief), &ranges, reports);
+        let stepped =
+            observed.and_then(|o| tracker.step_in_place(&mut rng, target, k, &mut belief, &o, &mut workspace));
+        run.infos.push(stepped.unwrap_or_default());
+        run.estimates.push(tracker.estimate(&belief));
+    }
+    Ok(run)
+}
+
+impl Run {
+    /// Mean squared position error.
+    pub(super) fn mse(&self, world: &World) -> f64 {
+        let error = |(e, x): (&Gaussian<4>, &Vector4<f64>)| {
+            let (dx, dy) = (e.mean()[0] - x[0], e.mean()[1] - x[1]);
+            (dx * dx + dy * dy).min(1e12)
+        };
+        self.estimates.iter().zip(&world.track).map(error).sum::<f64>() / world.track.len() as f64
+    }
+}
+
+/// Where a comparison is held.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Point {
+    pub(super) snr_db: f64,
+    pub(super) levels: usize,
+    pub(super) encoder: Encoder,
+    pub(super) sensors: Vec<Vector2<f64>>,
+    pub(super) interval: IntervalRule,
+}
+
+impl Point {
+    /// The canonical sensors and the published encoder of the given speed.
+    pub(super) fn published(snr_db: f64, levels: usize, max_speed: f64) -> Result<Self, Error> {
+        Ok(Self {
+            snr_db,
+            levels,
+            encoder: Encoder::published(max_speed)?,
+            sensors: canonical(),
+            interval: IntervalRule::Correct,
+        })
+    }
+
+    pub(super) fn network(&self) -> Result<Network, Error> {
+        let noise = RangeNoise::from_snr_db(self.snr_db)?;
+        let scheme = QuantizedRange::new(self.levels, noise)?;
+        Ok(Network::new(&self.sensors, scheme.with_interval(self.interval), self.encoder)?)
+    }
+}
+
+/// What a method did on many trajectories.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub(super) struct Score {
+    /// Mean squared position error, averaged over trajectories.
+    pub(super) mse: Measured,
+    /// Median over trajectories of their mean squared error.
+    pub(super) median: f64,
+    /// Share of trajectories with a mean squared error above 4.
+    pub(super) lost: f64,
+    /// Trajectories.
+    pub(super) trajectories: u64,
+}
+
+impl Score {
+    /// From each trajectory's error.
+    pub(super) fn of(mut errors: Vec<f64>) -> Self {
+        let moments: Moments = errors.iter().copied().collect();
+        errors.sort_by(f64::total_cmp);
+        let n = errors.len();
+        let median = match n {
+            0 => f64::NAN,
+            _ if n % 2 == 1 => errors[n / 2],
+            _ => 0.5 * (errors[n / 2 - 1] + errors[n / 2]),
+        };
+        Self {
+            mse: (&moments).into(),
+            median,
+            lost: errors.iter().filter(|e| **e > LOST).count() as f64 / n.max(1) as f64,
+            trajectories: n as u64,
+        }
+    }
+}
+
+/// Runs every method on the same trajectories; those after `trials` are for it alone left out: each method has its own count.
+/// The trajectories are the same in all figures of the same field.
+pub(super) fn compare(
+    context: &Context<'_>,
+    point: &Point,
+    field: Field,
+    methods: &[(Method, u64)],
+) -> Result<Vec<Score>, Error> {
+    let (network, target) = (point.network()?, Target::printed()?);
+    let most = methods.iter().map(|m| m.1).max().unwrap_or(0);
+    let one = |trial: Trial| -> Result<Vec<f64>, Error> {
+        let world = World::draw(trial.stream, &target, field, network.sensors().len())?;
+        methods
+            .iter()
+            .filter(|(_, count)| trial.index < *count)
+            .map(|(method, _)| Ok(method.run(&world, &network, &target, trial.stream)?.mse(&world)))
+            .collect()
+    };
+    let stream = context.stream("mpa-trajectories");
+    let all = context.monte_carlo(stream, most).run(one)?;
+    let mut errors: Vec<Vec<f64>> = methods.iter().map(|_| Vec::new()).collect();
+    for (index, trial) in all.into_iter().enumerate() {
+        let taking = (0..methods.len()).filter(|m| (index as u64) < methods[*m].1);
+        for (m, error) in taking.zip(trial) {
+            errors[m].push(error);
+        }
+    }
+    Ok(errors.into_iter().map(Score::of).collect())
+}
