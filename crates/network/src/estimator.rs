@@ -100,6 +100,9 @@ pub trait Replicable: Estimator {
 }
 
 /// A belief that is sent whole: `D` means and `D (D + 1)/2` covariances in double precision.
+///
+/// # Errors
+/// If a number is not finite.
 pub fn gaussian_bits<const D: usize>(belief: &Gaussian<D>, writer: &mut BitWriter) -> Result<(), CodecError> {
     let format = NumberFormat::Double;
     belief.mean().iter().try_for_each(|x| format.write(*x, writer))?;

@@ -138,7 +138,10 @@ impl Kernel {
         let known = |id: SensorId| id.index() < nodes;
         let consistent = state.ledger.accounts.len() == nodes
             && state.out_until.len() == nodes
-            && state.queue.iter().all(|event| known(event.0.node));
+            && state.queue.iter().all(|event| known(event.0.node))
+            && state.free.iter().all(|place| (*place as usize) < state.arrivals.len())
+            && state.arrivals.iter().flatten().all(|arrival| known(arrival.from))
+            && state.outbox.keys().all(|(from, to)| known(*from) && to.is_none_or(known));
         if !consistent {
             return Err(Error::Stored(format!("a snapshot of another network: expected {nodes} nodes")));
         }
@@ -520,6 +523,7 @@ impl Kernel {
             + graph
             + state.queue.capacity() * size_of::<Reverse<Event>>()
             + state.arrivals.capacity() * size_of::<Option<Arrival>>()
+            + state.arrivals.iter().flatten().map(|a| a.bits.bytes().len()).sum::<usize>()
             + state.free.capacity() * size_of::<u32>()
             + state.out_until.capacity() * size_of::<Instant>()
             + state.ledger.accounts.capacity() * size_of::<crate::ledger::Account>()
@@ -529,7 +533,7 @@ impl Kernel {
 
 fn payload_bits(frame: &Stored) -> u64 {
     let overhead = Frame::kind_of(&frame.0).map_or(0, Frame::overhead);
-    frame.0.bits() as u64 - u64::from(overhead)
+    (frame.0.bits() as u64).saturating_sub(u64::from(overhead))
 }
 
 /// The frames of a batch as they arrive.
