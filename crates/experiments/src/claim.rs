@@ -565,9 +565,10 @@ mod tests {
         assert_eq!(judge(vec![("other", 0.130_486_15)]), Verdict::Fail);
         // A group without references is a mistake, not a success.
         assert_eq!(
-            verdict(|c| c
-                .references("nothing", "", [1.0], |v| (String::new(), v))
-                .at_full_trials()),
+            verdict(|c| {
+                c.references("nothing", "", [1.0], |v| (String::new(), v))
+                    .at_full_trials();
+            }),
             Verdict::Fail
         );
     }
