@@ -132,6 +132,9 @@ impl Settings {
             _ if text.trim_start().starts_with(['[', '{']) => {
                 serde_json::from_str(text).map_err(|error| refused(&error.to_string()))?
             }
+            Json::Array(list) if list.first().is_some_and(Json::is_string) => {
+                text.split(',').map(|word| Json::from(word.trim())).collect()
+            }
             Json::Array(_) if entries.is_empty() => text.split(',').map(scalar).collect(),
             Json::Array(_) => {
                 let point = |text: &str| -> Result<Json, Error> {
@@ -199,6 +202,9 @@ mod tests {
         /// Levels.
         #[garde(length(min = 1), inner(range(min = 2, max = 64)))]
         levels: Vec<u32>,
+        /// Patterns.
+        #[garde(length(min = 1), inner(length(min = 2)))]
+        patterns: Vec<String>,
         /// Trials.
         #[garde(range(min = 1, max = 1_000_000))]
         trials: u64,
@@ -208,6 +214,7 @@ mod tests {
         let start = map(&Parameters {
             points: vec![Point { a: 0.5, gamma: 0.1 }],
             levels: vec![4],
+            patterns: vec!["01".to_owned()],
             trials: 100,
         });
         let described = crate::schema::parameters::<Parameters>(&start);
@@ -227,6 +234,7 @@ mod tests {
         assert_eq!(set("points", r#"[{"a": 0.9, "gamma": 1}]"#).unwrap().points[0].a, 0.9);
         assert_eq!(set("levels", "2, 8").unwrap().levels, [2, 8]);
         assert_eq!(set("trials", "1e5").unwrap().trials, 100_000);
+        assert_eq!(set("patterns", "01, 10").unwrap().patterns, ["01", "10"]);
         let (_, described) = described();
         assert_eq!(described[0].default, "0.5:0.1");
         assert_eq!(described[0].range, "1 to 9 entries; a from -1.0 to 1.0; gamma from 1e-12 to 1000000000000.0");
@@ -247,7 +255,7 @@ mod tests {
             ("trials", "many", ["trials", "many", "whole"]),
             ("trials", "NaN", ["trials", "NaN", "whole"]),
             ("trials", "1e30", ["trials", "1e+30", "whole"]),
-            ("trail", "5", ["trail", "points, levels, trials", ""]),
+            ("trail", "5", ["trail", "points, levels, patterns, trials", ""]),
         ] {
             let message = set(name, text).err().map(|e| e.to_string()).unwrap_or_default();
             assert!(!message.is_empty() && words.iter().all(|w| message.contains(w)), "{name}={text}: {message}");

@@ -141,7 +141,10 @@ impl Kernel {
             && state.queue.iter().all(|event| known(event.0.node))
             && state.free.iter().all(|place| (*place as usize) < state.arrivals.len())
             && state.arrivals.iter().flatten().all(|arrival| known(arrival.from))
-            && state.outbox.keys().all(|(from, to)| known(*from) && to.is_none_or(known));
+            && state
+                .outbox
+                .keys()
+                .all(|(from, to)| known(*from) && to.is_none_or(known));
         if !consistent {
             return Err(Error::Stored(format!("a snapshot of another network: expected {nodes} nodes")));
         }
@@ -523,7 +526,12 @@ impl Kernel {
             + graph
             + state.queue.capacity() * size_of::<Reverse<Event>>()
             + state.arrivals.capacity() * size_of::<Option<Arrival>>()
-            + state.arrivals.iter().flatten().map(|a| a.bits.bytes().len()).sum::<usize>()
+            + state
+                .arrivals
+                .iter()
+                .flatten()
+                .map(|a| a.bits.bytes().len())
+                .sum::<usize>()
             + state.free.capacity() * size_of::<u32>()
             + state.out_until.capacity() * size_of::<Instant>()
             + state.ledger.accounts.capacity() * size_of::<crate::ledger::Account>()

@@ -88,7 +88,7 @@ impl<C: Case> Validate for Preset<C> {
 /// Whether the setting is the publication's but for effort and the choice of budgets.
 fn is_printed<C: Case>(setting: &C::Setting) -> bool {
     let (own, default) = (parameters::map(setting), parameters::map(&C::setting()));
-    let free = |name: &str| parameters::is_effort(name) || name == "messages";
+    let free = |name: &str| parameters::is_effort(name) || ["messages", "particles"].contains(&name);
     own.iter()
         .all(|(name, value)| free(name) || default.get(name) == Some(value))
 }

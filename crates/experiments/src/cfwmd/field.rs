@@ -309,8 +309,7 @@ impl Case for Table3 {
         id: "cfwmd-table3",
         title: "Rates among sensors of received power",
         caption: "Mean number of messages a step. The grid is not printed; a spacing of 10 m with the truth starting on the prior mean fits \
-                  best, and leaves the rates at l = 2 about 0.1 below the printed ones, unexplained. Drawn starts run a tenth of \
-                  the particles.",
+                  best, and leaves the rates at l = 2 about 0.1 below the printed ones, unexplained. Drawn starts run 1000 particles.",
         source: "CFwMD paper, table III",
     };
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
@@ -327,7 +326,7 @@ impl Case for Table3 {
         let mut all = setting.at_budgets(context, ON_MEAN, &FUSED)?;
         let drawn = Field {
             drawn_start: Some(true),
-            particles: (setting.particles / 10).max(2),
+            particles: setting.particles.min(1000),
             ..setting.clone()
         };
         all.extend(drawn.at_budgets(context, DRAWN, &FUSED)?);

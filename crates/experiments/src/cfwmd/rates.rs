@@ -37,9 +37,10 @@ pub(super) fn rates(figure: &str, ensembles: &[Ensemble], printed: bool) -> Vec<
     let row = |a: &Ensemble| {
         let same = |e: &&Ensemble| e.world == a.world && e.messages == a.messages;
         let b = ensembles.iter().filter(second).find(same)?;
+        // Those of the second kind are printed too, and not met.
         let print = |column: &str| {
-            let key = format!("{figure}/printed-{column}/l = {}", a.messages);
-            printed.then(|| reference::value(&key)).flatten()
+            let value = |kind| reference::value(&format!("{figure}/{kind}-{column}/l = {}", a.messages));
+            printed.then(|| value("printed").or_else(|| value("unmet"))).flatten()
         };
         Some(Rates {
             l: a.messages,

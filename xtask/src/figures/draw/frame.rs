@@ -160,7 +160,18 @@ pub(super) fn mark(area: &Area<'_>, place: Place, marker: Marker, colour: RGBCol
         Marker::Circle => area.draw(&Circle::new(round(place), MARK as i32, fill)),
         Marker::OpenCircle => area.draw(&Circle::new(round(place), MARK as i32, pen)),
         Marker::Square => area.draw(&Rectangle::new([at(-0.9, -0.9), at(0.9, 0.9)], fill)),
-        Marker::OpenSquare => area.draw(&Rectangle::new([at(-0.9, -0.9), at(0.9, 0.9)], pen)),
+        // A path: the SVG back end gives a rectangle's outline no width.
+        Marker::OpenSquare => {
+            let corners = [
+                (-0.9, -0.9),
+                (0.9, -0.9),
+                (0.9, 0.9),
+                (-0.9, 0.9),
+                (-0.9, -0.9),
+                (0.9, -0.9),
+            ];
+            area.draw(&PathElement::new(corners.map(|(x, y)| at(x, y)).to_vec(), pen))
+        }
         Marker::Triangle => area.draw(&Polygon::new(vec![at(0.0, -1.2), at(1.1, 0.8), at(-1.1, 0.8)], fill)),
         Marker::Diamond => {
             area.draw(&Polygon::new(vec![at(0.0, -1.3), at(1.1, 0.0), at(0.0, 1.3), at(-1.1, 0.0)], fill))

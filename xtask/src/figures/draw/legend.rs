@@ -18,7 +18,10 @@ const MARGIN: i32 = 60;
 fn lines(panel: &Panel, width: i32) -> Vec<Vec<(i32, usize)>> {
     let mut lines: Vec<Vec<(i32, usize)>> = Vec::new();
     let mut left = i32::MAX / 2;
-    let named = |layer: &Layer| !layer.label.is_empty() && !layer.inline && !matches!(layer.shape, Shape::Heat { .. });
+    let named = |layer: &Layer| {
+        let shown = !layer.label.is_empty() && !layer.inline && !layer.is_empty();
+        shown && !matches!(layer.shape, Shape::Heat { .. })
+    };
     for (position, layer) in panel.layers.iter().enumerate().filter(|(_, l)| named(l)) {
         let wide = SAMPLE + 50 + (f64::from(TEXT) * 0.56 * layer.label.chars().count() as f64) as i32;
         if left + wide > width - MARGIN {
@@ -53,12 +56,22 @@ pub(super) fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), String> {
         for (left, position) in line {
             let layer = &panel.layers[position];
             sample(area, layer, position, left, middle)?;
+            // A curve's marks are a layer of their own, without a name.
+            if let Some(marks) = panel.layers.get(position + 1).filter(|next| belongs(next, layer)) {
+                sample(area, marks, position + 1, left, middle)?;
+            }
             let style = text(TEXT).pos(Pos::new(HPos::Left, VPos::Center));
             let words = Text::new(layer.label.clone(), (left + SAMPLE, middle), style);
             area.draw(&words).map_err(|e| e.to_string())?;
         }
     }
     Ok(())
+}
+
+/// Whether marks without a name of their own are those of a curve.
+fn belongs(marks: &Layer, curve: &Layer) -> bool {
+    let kinds = matches!((&marks.shape, &curve.shape), (Shape::Points { .. }, Shape::Line { .. }));
+    kinds && marks.label.is_empty() && marks.colour.is_some() && marks.colour == curve.colour
 }
 
 /// What a layer looks like.
