@@ -64,8 +64,7 @@ impl Lattice {
     /// lattice is within `delta` of it or its index is too large.
     pub(crate) fn index(&self, sample: f64, near: i64) -> Option<i64> {
         let offset = (sample - self.anchor) / self.step;
-        // NaN and infinities fail this.
-        if !(offset.abs() < LARGEST as f64) {
+        if !offset.is_finite() || offset.abs() >= LARGEST as f64 {
             return None;
         }
         let nearest = offset.round() as i64;

@@ -130,7 +130,7 @@ impl Scheme<1> for SlotScheme {
             }
             // No cell of the lattice: the sample itself.
             Content::Whole(sample) => {
-                fewbits_core::factor::Value::new(Vector1::new(sample), Vector1::new(self.noise_variance).into())
+                fewbits_core::factor::Value::new(Vector1::new(sample), Vector1::new(self.noise_variance))
                     .map(Into::into)?
             }
         })

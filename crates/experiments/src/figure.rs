@@ -26,6 +26,9 @@ pub struct About {
     pub source: &'static str,
 }
 
+/// Reads a text file of the user's by its name.
+pub type ReadFile<'a> = dyn Fn(&str) -> std::io::Result<String> + Sync + 'a;
+
 /// The surroundings of a run: the seed, and who wants to know of progress.
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
@@ -36,7 +39,7 @@ pub struct Context<'a> {
     /// Set to stop early.
     pub cancel: Option<&'a AtomicBool>,
     /// Reads a user's file: figures open none themselves.
-    pub read: Option<&'a (dyn Fn(&str) -> std::io::Result<String> + Sync)>,
+    pub read: Option<&'a ReadFile<'a>>,
 }
 
 impl Context<'_> {

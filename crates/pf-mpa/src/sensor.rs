@@ -156,7 +156,7 @@ impl RangeSensor {
         let (dx, dy) = (x - self.position[0], y - self.position[1]);
         let squared = dx * dx + dy * dy;
         // Squares that leave the range of numbers.
-        if squared < 1e-280 || squared > 1e280 {
+        if !(1e-280..=1e280).contains(&squared) {
             dx.hypot(dy)
         } else {
             squared.sqrt()

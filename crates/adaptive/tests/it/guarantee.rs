@@ -55,7 +55,8 @@ proptest! {
 #[test]
 fn shapes_and_units() {
     for unit in [1e-300, 1e-4, 1.0, 1e4, 1e290] {
-        let shapes: [(&str, fn(f64) -> f64, usize); 5] = [
+        type Shape = fn(f64) -> f64;
+        let shapes: [(&str, Shape, usize); 5] = [
             ("constant", |_| 7.3, 80),
             ("ramp", |n| 0.37 * n, 400),
             ("square", |n| if (n / 50.0) % 2.0 < 1.0 { 0.0 } else { 1e3 }, 700),

@@ -219,7 +219,8 @@ impl Figure for Frontier {
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         type Of = fn(&Row) -> f64;
-        let axes: [(&str, Of, fn(&Row) -> &'static str); 3] = [
+        type Mark = fn(&Row) -> &'static str;
+        let axes: [(&str, Of, Mark); 3] = [
             ("payload / (bit/slot)", |r| r.payload.value, |r| r.best_by_payload),
             ("bits on air / (bit/slot)", |r| r.air.value, |r| r.best_by_air),
             ("radio energy / (mJ/slot)", |r| 1e3 * r.energy.value, |r| r.best_by_energy),

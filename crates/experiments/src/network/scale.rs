@@ -209,7 +209,7 @@ impl Figure for Scale {
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let nodes = || Axis::log("nodes");
         let memory = points(&rows.sizes, |r| (r.nodes as f64, r.bytes as f64 / 1e6));
-        let limit = points(&rows.sizes, |r| (r.nodes as f64, 1073.741_824));
+        let limit = points(&rows.sizes, |r| (r.nodes as f64, 1_073.741_824));
         let times = points(&rows.times, |r| (r.nodes as f64, r.event));
         Plot::grid(
             2,

@@ -8,6 +8,9 @@ use rand_distr::StandardNormal;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Samples of a synthetic signal, of the length asked for.
+type Synthesis = fn(&mut rand_pcg::Pcg64Dxsm, usize) -> Vec<f64>;
+
 /// One signal.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Recording {
@@ -140,7 +143,7 @@ fn rounded(x: f64, per_unit: f64) -> f64 {
 
 /// Six signals of `n` samples.
 fn synthetic(stream: &Stream, n: usize) -> Vec<Recording> {
-    let make: [(&str, fn(&mut rand_pcg::Pcg64Dxsm, usize) -> Vec<f64>); 6] = [
+    let make: [(&str, Synthesis); 6] = [
         ("bursts", bursts),
         ("drift", drift),
         ("steps", steps),
@@ -148,7 +151,7 @@ fn synthetic(stream: &Stream, n: usize) -> Vec<Recording> {
         ("direction", direction),
         ("gusts", gusts),
     ];
-    let one = |(name, samples): &(&str, fn(&mut rand_pcg::Pcg64Dxsm, usize) -> Vec<f64>)| Recording {
+    let one = |(name, samples): &(&str, Synthesis)| Recording {
         name: (*name).to_owned(),
         samples: samples(&mut stream.named(name).rng(), n),
         period: None,

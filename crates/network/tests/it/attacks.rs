@@ -15,9 +15,9 @@ use rand_pcg::Pcg64Dxsm;
 
 const SLOTS: u32 = 8;
 
-fn star(
-    feedback: fn(Counted, Vec<Vec<nalgebra::Vector1<f64>>>, Clock, Stream) -> Result<Star<Counted>, Error>,
-) -> Star<Counted> {
+type Feedback = fn(Counted, Vec<Vec<nalgebra::Vector1<f64>>>, Clock, Stream) -> Result<Star<Counted>, Error>;
+
+fn star(feedback: Feedback) -> Star<Counted> {
     feedback(counted(Link::PERFECT), scalar(3, SLOTS as usize, 1), clock(), Stream::new(1)).unwrap()
 }
 
