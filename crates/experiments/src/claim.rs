@@ -35,6 +35,16 @@ pub enum Expected {
     Condition(String),
 }
 
+impl Expected {
+    fn of(condition: impl fmt::Display) -> Self {
+        Self::Condition(condition.to_string())
+    }
+
+    fn none_broken() -> Self {
+        Self::of("0 violations")
+    }
+}
+
 impl fmt::Display for Expected {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -84,6 +94,14 @@ impl Claim {
     }
 }
 
+/// A text, owned or not.
+pub trait Text: Into<String> {}
+impl<T: Into<String>> Text for T {}
+
+/// A value that may be absent.
+pub trait Maybe<T = f64>: Into<Option<T>> {}
+impl<T, V: Into<Option<T>>> Maybe<T> for V {}
+
 /// Claims that were made together.
 pub struct Group<'a>(&'a mut [Claim]);
 
@@ -99,6 +117,16 @@ impl Group<'_> {
         self.0.iter_mut().for_each(|claim| claim.at_defaults = true);
         self
     }
+}
+
+macro_rules! comparisons {
+    ($($name:ident $operator:tt),*) => {$(
+        #[doc = concat!("`value ", stringify!($operator), " bound`.")]
+        pub fn $name(&mut self, id: impl Text, statement: impl Text, value: impl Maybe, bound: f64) -> &mut Claim {
+            let condition = Expected::of(format_args!(concat!(stringify!($operator), " {}"), bound));
+            self.decide(id, statement, value.into(), condition, |v| v $operator bound)
+        }
+    )*};
 }
 
 /// The claims of one figure as they are made. Every method adds one claim (or one for each reference) and returns it, so that
@@ -125,8 +153,8 @@ impl Claims {
 
     fn decide(
         &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
+        id: impl Text,
+        statement: impl Text,
         value: Option<f64>,
         expected: Expected,
         holds: impl FnOnce(f64) -> bool,
@@ -150,22 +178,11 @@ impl Claims {
         &mut self.made[last]
     }
 
-    fn condition(
-        &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
-        value: Option<f64>,
-        condition: String,
-        holds: impl FnOnce(f64) -> bool,
-    ) -> &mut Claim {
-        self.decide(id, statement, value, Expected::Condition(condition), holds)
-    }
-
     /// Every row satisfies `holds`; the value is the number of rows that do not. No rows: nothing was shown.
     pub fn all<R>(
         &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
+        id: impl Text,
+        statement: impl Text,
         rows: impl IntoIterator<Item = R>,
         holds: impl Fn(R) -> bool,
     ) -> &mut Claim {
@@ -174,15 +191,15 @@ impl Claims {
         for row in rows {
             broken += f64::from(u8::from(!holds(row)));
         }
-        self.condition(id, statement, any.then_some(broken), "0 violations".to_owned(), |v| v == 0.0)
+        self.decide(id, statement, any.then_some(broken), Expected::none_broken(), |v| v == 0.0)
     }
 
     /// `|value - expected| <= tolerance`.
     pub fn near(
         &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
-        value: impl Into<Option<f64>>,
+        id: impl Text,
+        statement: impl Text,
+        value: impl Maybe,
         expected: f64,
         tolerance: f64,
     ) -> &mut Claim {
@@ -192,68 +209,26 @@ impl Claims {
         claim
     }
 
-    /// `value <= bound`.
-    pub fn at_most(
-        &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
-        value: impl Into<Option<f64>>,
-        bound: f64,
-    ) -> &mut Claim {
-        self.condition(id, statement, value.into(), format!("<= {bound}"), |v| v <= bound)
-    }
-
-    /// `value >= bound`.
-    pub fn at_least(
-        &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
-        value: impl Into<Option<f64>>,
-        bound: f64,
-    ) -> &mut Claim {
-        self.condition(id, statement, value.into(), format!(">= {bound}"), |v| v >= bound)
-    }
-
-    /// `value < bound`.
-    pub fn below(
-        &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
-        value: impl Into<Option<f64>>,
-        bound: f64,
-    ) -> &mut Claim {
-        self.condition(id, statement, value.into(), format!("< {bound}"), |v| v < bound)
-    }
-
-    /// `value > bound`.
-    pub fn above(
-        &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
-        value: impl Into<Option<f64>>,
-        bound: f64,
-    ) -> &mut Claim {
-        self.condition(id, statement, value.into(), format!("> {bound}"), |v| v > bound)
-    }
+    comparisons! { at_most <=, at_least >=, below <, above > }
 
     /// Each value is strictly smaller than the next; the value is the number of neighbours that are not. At least two values.
     pub fn increasing<V: Into<Option<f64>>>(
         &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
+        id: impl Text,
+        statement: impl Text,
         values: impl IntoIterator<Item = V>,
     ) -> &mut Claim {
         let values: Option<Vec<f64>> = values.into_iter().map(Into::into).collect();
         let values = values.filter(|v| v.len() > 1);
         let broken = values.map(|v| v.windows(2).filter(|pair| !increases(pair[0], pair[1])).count() as f64);
-        self.condition(id, statement, broken, "0 violations".to_owned(), |v| v == 0.0)
+        self.decide(id, statement, broken, Expected::none_broken(), |v| v == 0.0)
     }
 
     /// Each value is strictly larger than the next.
     pub fn decreasing<V: Into<Option<f64>>>(
         &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
+        id: impl Text,
+        statement: impl Text,
         values: impl IntoIterator<Item = V>,
     ) -> &mut Claim {
         self.increasing(id, statement, values.into_iter().map(|v| v.into().map(|v: f64| -v)))
@@ -262,24 +237,28 @@ impl Claims {
     /// The estimate is within `errors` of its standard errors of `expected`; the value is its deviation in standard errors.
     pub fn within(
         &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
-        estimate: impl Into<Option<Measured>>,
+        id: impl Text,
+        statement: impl Text,
+        estimate: impl Maybe<Measured>,
         expected: f64,
         errors: f64,
     ) -> &mut Claim {
         let z = estimate.into().and_then(|e| e.z_score(expected));
-        self.condition(id, statement, z, format!("{} within {errors} standard errors", Value::Number(expected)), |z| {
-            z.abs() <= errors
-        })
+        self.decide(
+            id,
+            statement,
+            z,
+            Expected::of(format_args!("{} within {errors} standard errors", Value::Number(expected))),
+            |z| z.abs() <= errors,
+        )
     }
 
     /// Every row's estimate is within `errors` of its standard errors of the row's expectation; the value is the largest
     /// deviation in standard errors.
     pub fn all_within<R>(
         &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
+        id: impl Text,
+        statement: impl Text,
         rows: impl IntoIterator<Item = R>,
         pair: impl Fn(R) -> (Measured, f64),
         errors: f64,
@@ -291,19 +270,19 @@ impl Claims {
         let scores: Option<Vec<f64>> = scores.map(|z| z.map(f64::abs)).collect();
         // NaN must survive: `f64::max` would drop it.
         let worst = scores.and_then(|z| z.into_iter().reduce(|a, b| if a.is_nan() || a >= b { a } else { b }));
-        self.condition(id, statement, worst, format!("<= {errors} standard errors"), |z| z <= errors)
+        self.decide(id, statement, worst, Expected::of(format_args!("<= {errors} standard errors")), |z| z <= errors)
     }
 
     /// The (paired) difference is negative by at least `errors` of its standard errors: the first is smaller than the second.
     pub fn less(
         &mut self,
-        id: impl Into<String>,
-        statement: impl Into<String>,
-        difference: impl Into<Option<Measured>>,
+        id: impl Text,
+        statement: impl Text,
+        difference: impl Maybe<Measured>,
         errors: f64,
     ) -> &mut Claim {
         let z = difference.into().and_then(|d| d.z_score(0.0));
-        self.condition(id, statement, z, format!("< -{errors} standard errors"), |z| z < -errors)
+        self.decide(id, statement, z, Expected::of(format_args!("< -{errors} standard errors")), |z| z < -errors)
     }
 
     /// One claim for each reference `<figure>/<quantity>/<key>`: the row of that key has that value, within the reference's
@@ -349,17 +328,18 @@ impl Claims {
                 return Group(&mut self.made[first..]);
             }
             Err(error) => {
-                self.condition(format!("{quantity}-references"), error, None, "to be read".to_owned(), |_| false);
+                self.decide(format!("{quantity}-references"), error, None, Expected::of("to be read"), |_| false);
                 return Group(&mut self.made[first..]);
             }
         };
         for (key, known) in known {
-            let found = rows.iter().find(|(name, _)| name == key).map(|(_, value)| value);
-            let own = found.and_then(Cell::standard_error).unwrap_or(0.0);
+            let found = rows.iter().find(|(name, _)| name == key);
+            let found = found.and_then(|(_, value)| value.measured());
+            let own = found.and_then(|found| found.standard_error).unwrap_or(0.0);
             let tolerance = known.tolerance + 4.0 * known.standard_error.unwrap_or(0.0).hypot(own);
             let id = format!("{quantity}/{key}").replace(' ', "-");
             let statement = format!("{statement}, {key}");
-            let number = found.and_then(Cell::number);
+            let number = found.map(|found| found.value);
             if one_sided {
                 let statement = format!("{statement}: no more than the reference {}", known.value);
                 self.at_most(id, statement, number, known.value + tolerance)
@@ -374,19 +354,10 @@ impl Claims {
     /// The claims with the verdicts of a run: undecided ones are skipped.
     pub(crate) fn judged(self, defaults: bool, full_effort: bool) -> Vec<Claim> {
         let undecided = |c: &Claim| ((c.at_defaults || c.absent) && !defaults) || (c.full_effort && !full_effort);
-        self.made
-            .into_iter()
-            .map(|claim| {
-                if undecided(&claim) {
-                    Claim {
-                        verdict: Verdict::Skipped,
-                        ..claim
-                    }
-                } else {
-                    claim
-                }
-            })
-            .collect()
+        let mut judged = self.made;
+        let open = judged.iter_mut().filter(|claim| undecided(claim));
+        open.for_each(|claim| claim.verdict = Verdict::Skipped);
+        judged
     }
 }
 
@@ -397,43 +368,28 @@ fn increases(a: f64, b: f64) -> bool {
 
 /// What a reference can be compared with: a number, perhaps missing, perhaps with a standard error.
 pub trait Cell {
-    /// The number.
-    fn number(&self) -> Option<f64>;
-    /// Its standard error.
-    fn standard_error(&self) -> Option<f64> {
-        None
-    }
+    /// The number with its standard error.
+    fn measured(&self) -> Option<Measured>;
 }
 
 impl Cell for f64 {
-    fn number(&self) -> Option<f64> {
-        Some(*self)
-    }
-}
-
-impl Cell for Option<f64> {
-    fn number(&self) -> Option<f64> {
-        *self
-    }
-}
-
-impl Cell for Option<Measured> {
-    fn number(&self) -> Option<f64> {
-        self.map(|m| m.value)
-    }
-
-    fn standard_error(&self) -> Option<f64> {
-        self.and_then(|m| m.standard_error)
+    fn measured(&self) -> Option<Measured> {
+        Some(Measured {
+            value: *self,
+            standard_error: None,
+        })
     }
 }
 
 impl Cell for Measured {
-    fn number(&self) -> Option<f64> {
-        Some(self.value)
+    fn measured(&self) -> Option<Measured> {
+        Some(*self)
     }
+}
 
-    fn standard_error(&self) -> Option<f64> {
-        self.standard_error
+impl<T: Cell> Cell for Option<T> {
+    fn measured(&self) -> Option<Measured> {
+        self.as_ref()?.measured()
     }
 }
 
@@ -453,6 +409,8 @@ mod tests {
         }
     }
 
+    fn done(_: &mut Claim) {}
+
     fn measured(value: f64, error: f64) -> Measured {
         Measured {
             value,
@@ -463,90 +421,31 @@ mod tests {
     /// Every kind: an example that holds, one that does not, and one about nothing.
     #[test]
     fn every_kind_can_hold_and_can_fail() {
-        type Make = Box<dyn Fn(&mut Claims, usize)>;
-        let none: Option<f64> = None;
-        let kinds: Vec<(&str, Make)> = vec![
-            (
-                "all",
-                Box::new(|c, i| {
-                    drop(
-                        c.all("x", "", [vec![1, 2], vec![1, -2], vec![]][i].iter(), |v| *v > 0)
-                            .id
-                            .clone(),
-                    )
-                }),
-            ),
-            (
-                "near",
-                Box::new(move |c, i| drop(c.near("x", "", [Some(1.05), Some(1.2), none][i], 1.0, 0.1).id.clone())),
-            ),
-            (
-                "at_most",
-                Box::new(move |c, i| drop(c.at_most("x", "", [Some(1.0), Some(1.1), none][i], 1.0).id.clone())),
-            ),
-            (
-                "at_least",
-                Box::new(move |c, i| drop(c.at_least("x", "", [Some(1.0), Some(0.9), none][i], 1.0).id.clone())),
-            ),
-            (
-                "below",
-                Box::new(move |c, i| drop(c.below("x", "", [Some(0.9), Some(1.0), none][i], 1.0).id.clone())),
-            ),
-            (
-                "above",
-                Box::new(move |c, i| drop(c.above("x", "", [Some(1.1), Some(1.0), none][i], 1.0).id.clone())),
-            ),
-            (
-                "increasing",
-                Box::new(|c, i| {
-                    drop(
-                        c.increasing("x", "", [vec![1.0, 2.0], vec![1.0, 1.0], vec![1.0]][i].clone())
-                            .id
-                            .clone(),
-                    )
-                }),
-            ),
-            (
-                "decreasing",
-                Box::new(|c, i| {
-                    drop(
-                        c.decreasing("x", "", [vec![2.0, 1.0], vec![1.0, 1.0], vec![]][i].clone())
-                            .id
-                            .clone(),
-                    )
-                }),
-            ),
-            (
-                "within",
-                Box::new(|c, i| {
-                    drop(
-                        c.within("x", "", [Some(measured(1.3, 0.1)), Some(measured(1.5, 0.1)), None][i], 1.0, 4.0)
-                            .id
-                            .clone(),
-                    )
-                }),
-            ),
-            (
-                "less",
-                Box::new(|c, i| {
-                    drop(
-                        c.less("x", "", [Some(measured(-0.4, 0.1)), Some(measured(-0.2, 0.1)), None][i], 3.0)
-                            .id
-                            .clone(),
-                    )
-                }),
-            ),
-            (
-                "all_within",
-                Box::new(|c, i| {
-                    let rows = [
-                        vec![measured(1.3, 0.1)],
-                        vec![measured(1.0, 0.1), measured(1.5, 0.1)],
-                        vec![],
-                    ];
-                    c.all_within("x", "", &rows[i], |r| (*r, 1.0), 4.0);
-                }),
-            ),
+        type Make = fn(&mut Claims, usize);
+        const NONE: Option<f64> = None;
+        let kinds: [(&str, Make); 11] = [
+            ("all", |c, i| done(c.all("x", "", [vec![1, 2], vec![1, -2], vec![]][i].iter(), |v| *v > 0))),
+            ("near", |c, i| done(c.near("x", "", [Some(1.05), Some(1.2), NONE][i], 1.0, 0.1))),
+            ("at_most", |c, i| done(c.at_most("x", "", [Some(1.0), Some(1.1), NONE][i], 1.0))),
+            ("at_least", |c, i| done(c.at_least("x", "", [Some(1.0), Some(0.9), NONE][i], 1.0))),
+            ("below", |c, i| done(c.below("x", "", [Some(0.9), Some(1.0), NONE][i], 1.0))),
+            ("above", |c, i| done(c.above("x", "", [Some(1.1), Some(1.0), NONE][i], 1.0))),
+            ("increasing", |c, i| {
+                done(c.increasing("x", "", [vec![1.0, 2.0], vec![1.0, 1.0], vec![1.0]][i].clone()))
+            }),
+            ("decreasing", |c, i| {
+                done(c.decreasing("x", "", [vec![2.0, 1.0], vec![1.0, 1.0], vec![]][i].clone()))
+            }),
+            ("within", |c, i| {
+                done(c.within("x", "", [Some(measured(1.3, 0.1)), Some(measured(1.5, 0.1)), None][i], 1.0, 4.0))
+            }),
+            ("less", |c, i| {
+                done(c.less("x", "", [Some(measured(-0.4, 0.1)), Some(measured(-0.2, 0.1)), None][i], 3.0))
+            }),
+            ("all_within", |c, i| {
+                let rows = [vec![1.3], vec![1.0, 1.5], vec![]];
+                done(c.all_within("x", "", &rows[i], |r| (measured(*r, 0.1), 1.0), 4.0))
+            }),
         ];
         for (kind, make) in kinds {
             assert_eq!(verdict(|c| make(c, 0)), Verdict::Pass, "{kind}");
@@ -558,18 +457,18 @@ mod tests {
     #[test]
     fn what_is_not_finite_fails_every_kind() {
         let nan = f64::NAN;
-        assert_eq!(verdict(|c| drop(c.near("x", "", nan, 0.0, 1.0).id.clone())), Verdict::Fail);
-        assert_eq!(verdict(|c| drop(c.at_most("x", "", f64::NEG_INFINITY, 1.0).id.clone())), Verdict::Fail);
-        assert_eq!(verdict(|c| drop(c.increasing("x", "", [0.0, nan, 1.0]).id.clone())), Verdict::Fail);
-        assert_eq!(verdict(|c| drop(c.within("x", "", measured(nan, 1.0), 0.0, 4.0).id.clone())), Verdict::Fail);
+        assert_eq!(verdict(|c| done(c.near("x", "", nan, 0.0, 1.0))), Verdict::Fail);
+        assert_eq!(verdict(|c| done(c.at_most("x", "", f64::NEG_INFINITY, 1.0))), Verdict::Fail);
+        assert_eq!(verdict(|c| done(c.increasing("x", "", [0.0, nan, 1.0]))), Verdict::Fail);
+        assert_eq!(verdict(|c| done(c.within("x", "", measured(nan, 1.0), 0.0, 4.0))), Verdict::Fail);
         let rows = [measured(nan, 1.0), measured(0.0, 1.0)];
-        assert_eq!(verdict(|c| drop(c.all_within("x", "", rows, |r| (r, 0.0), 4.0).id.clone())), Verdict::Fail);
+        assert_eq!(verdict(|c| done(c.all_within("x", "", rows, |r| (r, 0.0), 4.0))), Verdict::Fail);
         // A single trial has no standard error and shows nothing.
         let single = Measured {
             value: 1.0,
             standard_error: None,
         };
-        assert_eq!(verdict(|c| drop(c.within("x", "", single, 0.9, 4.0).id.clone())), Verdict::Fail);
+        assert_eq!(verdict(|c| done(c.within("x", "", single, 0.9, 4.0))), Verdict::Fail);
     }
 
     #[test]

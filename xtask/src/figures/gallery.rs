@@ -1,5 +1,6 @@
 //! `index.html`: the state of this run, failures first; figures of earlier runs stand greyed behind it.
 
+use super::draw::typeset;
 use super::record::{Judged, Record};
 use fewbits_experiments::{Verdict, plain};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -141,7 +142,7 @@ fn figure(standing: Standing, r: &Record) -> Markup {
     let downloads = r.files.iter().cloned().chain([format!("{}.json", r.id)]);
     html! {
         article id=(r.id) class=(standing.word()) data-system=(r.system()) aria-labelledby={ (r.id) "-title" } {
-            h2 id={ (r.id) "-title" } { (r.title) " " small { (r.id) } }
+            h2 id={ (r.id) "-title" } { (typeset(&r.title)) " " small { (r.id) } }
             p.standing {
                 span class={ "badge " (standing.word()) } { (standing.word()) }
                 @if r.quick { " " span.badge { "quick" } }
@@ -153,7 +154,7 @@ fn figure(standing: Standing, r: &Record) -> Markup {
                     @for svg in r.files.iter().filter(|name| name.ends_with(".svg")) {
                         a href=(svg) { img src=(svg) alt={ "Plot: " (r.title) } loading="lazy"; }
                     }
-                    figcaption { (r.caption) @if !r.source.is_empty() { " " cite { (r.source) } } }
+                    figcaption { (typeset(&r.caption)) @if !r.source.is_empty() { " " cite { (r.source) } } }
                 }
                 section aria-label={ "Claims of " (r.id) } {
                     @if !failing.is_empty() { (claims(&failing)) }
@@ -188,7 +189,7 @@ fn claims(claims: &[&Judged]) -> Markup {
                         tr {
                             @let verdict = match c.verdict { Verdict::Pass => "pass", Verdict::Fail => "fail", Verdict::Skipped => "skipped" };
                             td class=(verdict) { (verdict) }
-                            td { (c.statement) " " small { (c.id) } }
+                            td { (typeset(&c.statement)) " " small { (c.id) } }
                             td.number { (c.measured()) }
                             td.number { (c.expectation()) }
                         }

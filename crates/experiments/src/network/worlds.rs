@@ -15,11 +15,12 @@ use fewbits_filters::{AssumedDensity, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::{Bits, Censors, Counted, Leaders, LookUp, Patterns, Reporting, SendAll};
+use fewbits_network::estimators::{Bits, Censors, Counted, Followers, Leaders, LookUp, Patterns, Reporting, SendAll};
 use fewbits_network::{Clock, Field, Ledger, Radio, Replicable, Seconds, SensorId, Setup, Star, Walk};
+use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
 use fewbits_quantizer_design::{Criterion, Newton, Scene, System, design};
 use fewbits_quantizers::{Labelling, Quantizer, QuantizingSensor, lloyd_max};
-use nalgebra::{Matrix4, SVector, Vector1, Vector4};
+use nalgebra::{Matrix1, Matrix4, RowVector2, RowVector4, SVector, Vector1, Vector2, Vector4};
 use serde::Serialize;
 
 /// Sensors of either world; their noise has unit variance.
@@ -36,6 +37,9 @@ const WARM_UP: usize = 20;
 const PERIOD: f64 = 0.1;
 /// Distance of the sensors from the centre, metres.
 pub(super) const RADIUS: f64 = 20.0;
+
+/// Distance of the range sensors from where the target starts; it covers some 300 in the standard run.
+const FAR: f64 = 10_000.0;
 
 /// How sensors learn the question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -67,6 +71,10 @@ pub(super) enum Scheme {
     Filtered { levels: usize },
     /// A coded mixture from leader to leader.
     Handoff { components: usize, resolution: f64 },
+    /// Measurements within a guaranteed error, by sensors that know no model.
+    Followed { delta: f64 },
+    /// Quantized ranges from far sensors on the axes, which measure about what the others do.
+    Ranges { bits: usize, talk: Talk },
 }
 
 impl Scheme {
@@ -84,13 +92,16 @@ impl Scheme {
             Self::Patterned => "patterns-table",
             Self::Filtered { .. } => "Lloyd-Max-filter",
             Self::Handoff { .. } => "hand-off",
+            Self::Followed { .. } => "adaptive",
+            Self::Ranges { .. } => "quantized-ranges",
         }
     }
 
     pub(super) fn setting(&self) -> String {
         match self {
             Self::SignBits { sensors, .. } => format!("K={sensors}"),
-            Self::Word { bits, .. } | Self::Words { bits, .. } => format!("m={bits}"),
+            Self::Word { bits, .. } | Self::Words { bits, .. } | Self::Ranges { bits, .. } => format!("m={bits}"),
+            Self::Followed { delta } => format!("delta={delta}"),
             Self::Censored { messages, .. } => format!("n={messages}"),
             Self::AllSend { coarse } => if *coarse { "few bits" } else { "32 bit" }.to_owned(),
             Self::LloydMax { levels } | Self::Information { levels } | Self::Filtered { levels } => {
@@ -106,6 +117,7 @@ impl Scheme {
             Self::SignBits { talk, .. }
             | Self::Word { talk, .. }
             | Self::Words { talk, .. }
+            | Self::Ranges { talk, .. }
             | Self::Censored { talk, .. } => match talk {
                 Talk::Told => "told",
                 Talk::Echoed => "echoed",
@@ -114,6 +126,7 @@ impl Scheme {
             | Self::LloydMax { .. }
             | Self::Information { .. }
             | Self::Patterned
+            | Self::Followed { .. }
             | Self::Filtered { .. } => "none",
             Self::Handoff { .. } => "travels",
         }
@@ -122,7 +135,7 @@ impl Scheme {
 
 /// The schemes of the scalar world.
 pub(super) fn scalar_schemes() -> Vec<Scheme> {
-    let mut all = plane_schemes();
+    let mut all = common_schemes();
     for talk in [Talk::Told, Talk::Echoed] {
         all.extend([1, 2, 4].map(|sensors| Scheme::SignBits { sensors, talk }));
         all.extend([2, 3, 4].map(|bits| Scheme::Word { bits, talk }));
@@ -134,8 +147,16 @@ pub(super) fn scalar_schemes() -> Vec<Scheme> {
     all
 }
 
-/// The schemes that the plane has too.
+/// The schemes of the plane.
 pub(super) fn plane_schemes() -> Vec<Scheme> {
+    let mut all = common_schemes();
+    for talk in [Talk::Told, Talk::Echoed] {
+        all.extend([1, 2, 3, 4].map(|bits| Scheme::Ranges { bits, talk }));
+    }
+    all
+}
+
+fn common_schemes() -> Vec<Scheme> {
     let mut all = Vec::new();
     for talk in [Talk::Told, Talk::Echoed] {
         all.extend([1, 2, 3, 4].map(|bits| Scheme::Words { bits, talk }));
@@ -144,6 +165,7 @@ pub(super) fn plane_schemes() -> Vec<Scheme> {
         }
     }
     all.extend([true, false].map(|coarse| Scheme::AllSend { coarse }));
+    all.extend([0.25, 0.5, 1.0, 2.0, 4.0].map(|delta| Scheme::Followed { delta }));
     for components in [1, 3] {
         all.extend([1.0, 0.25].map(|resolution| Scheme::Handoff { components, resolution }));
     }
@@ -257,12 +279,12 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
         Ok(last)
     }
 
-    fn draw(&self, stream: Stream, slots: usize) -> (Truths<D>, Measurements) {
+    fn draw(&self, sensors: &[impl Sensing<D, 1>], stream: Stream, slots: usize) -> (Truths<D>, Measurements) {
         let mut rng = stream.named("world").rng();
         let mut state = self.start.sample(&mut rng);
         let slot = |_| {
             state = self.dynamics.propagate(&mut rng, &state);
-            let measured = self.sensors.iter().map(|sensor| sensor.sample(&mut rng, &state));
+            let measured = sensors.iter().map(|sensor| sensor.sample(&mut rng, &state));
             (state, measured.collect())
         };
         (0..slots).map(slot).unzip()
@@ -282,7 +304,22 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
     where
         E: Replicable<Measurement = Vector1<f64>>,
     {
-        let (truths, mut measurements) = self.draw(stream, slots);
+        self.over_star_of(&self.sensors, e, talk, stream, slots)
+    }
+
+    /// The same with measurements of other sensors.
+    fn over_star_of<E>(
+        &self,
+        sensors: &[impl Sensing<D, 1>],
+        e: E,
+        talk: Talk,
+        stream: Stream,
+        slots: usize,
+    ) -> Result<Bill, Error>
+    where
+        E: Replicable<Measurement = Vector1<f64>>,
+    {
+        let (truths, mut measurements) = self.draw(sensors, stream, slots);
         measurements.iter_mut().for_each(|slot| slot.truncate(e.sensors()));
         let clock = clock()?;
         let own = stream.named("filter");
@@ -325,7 +362,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
     }
 
     fn handed(&self, components: usize, resolution: f64, stream: Stream, slots: usize) -> Result<Bill, Error> {
-        let (truths, measurements) = self.draw(stream, slots);
+        let (truths, measurements) = self.draw(&self.sensors, stream, slots);
         let reading =
             |(i, z): (usize, &Vector1<f64>)| Ok(Observed::new(self.sensors[i], Value::new(*z, [[1.0]].into())?));
         let readings = measurements
@@ -387,6 +424,16 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
                 self.over_star(all, Talk::Told, stream, slots)?
             }
             Scheme::Handoff { components, resolution } => self.handed(components, resolution, stream, slots)?,
+            Scheme::Followed { delta } => {
+                let followers = Followers {
+                    dynamics: self.dynamics.clone(),
+                    sensors: self.sensors.clone(),
+                    noise_variance: 1.0,
+                    config: fewbits_adaptive::Config::new(delta)?,
+                    start: self.start,
+                };
+                self.over_star(followers, Talk::Told, stream, slots)?
+            }
             _ => return Ok(None),
         }))
     }
@@ -394,8 +441,66 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
 
 impl World<4, LinearGaussian<4, 2>> {
     pub(super) fn run(&self, scheme: Scheme, stream: Stream, slots: usize) -> Result<Bill, Error> {
+        if let Scheme::Ranges { bits, talk } = scheme {
+            return self.ranges(bits, talk, stream, slots);
+        }
         let only = || fewbits_numerics::ArgumentError::new("scheme", scheme.family(), "one of the plane");
         Ok(self.shared(scheme, stream, slots)?.ok_or_else(only)?)
+    }
+
+    /// Range sensors of unit noise at [`FAR`] on the axes: to first order each has the coordinate that the world's own sensors have.
+    fn ranges(&self, bits: usize, talk: Talk, stream: Stream, slots: usize) -> Result<Bill, Error> {
+        let noise = RangeNoise::constant(1.0).map_err(Error::failed)?;
+        let places = [[-FAR, 0.0], [0.0, -FAR], [FAR, 0.0], [0.0, FAR]];
+        let sensor = |place: [f64; 2]| {
+            RangeSensor::new(place.into(), noise)
+                .map(InPlane)
+                .map_err(Error::failed)
+        };
+        let sensors = places.map(sensor).into_iter().collect::<Result<Vec<_>, _>>()?;
+        let loading = optimal_loading(1 << bits).map_err(Error::failed)?;
+        let ranges = Reporting {
+            dynamics: self.dynamics.clone(),
+            sensors: sensors.clone(),
+            scheme: QuantizedRange::new(1 << bits, noise).map_err(Error::failed)?,
+            link: Link::PERFECT,
+            filter: AssumedDensity,
+            broadcast: move |expected: &Gaussian<1>| RangeReference {
+                centre: expected.mean()[0],
+                half_width: loading * (expected.covariance()[0] + 1.0).sqrt(),
+            },
+            start: self.start,
+        };
+        self.over_star_of(&sensors, ranges, talk, stream, slots)
+    }
+}
+
+/// A range sensor of states that alternate position and velocity.
+#[derive(Debug, Clone, Copy)]
+struct InPlane(RangeSensor);
+
+impl InPlane {
+    fn place(state: &Vector4<f64>) -> Vector2<f64> {
+        Vector2::new(state[0], state[2])
+    }
+}
+
+impl Sensing<4, 1> for InPlane {
+    fn mean(&self, state: &Vector4<f64>) -> Vector1<f64> {
+        self.0.mean(&Self::place(state))
+    }
+
+    fn jacobian(&self, state: &Vector4<f64>) -> RowVector4<f64> {
+        let slope: RowVector2<f64> = self.0.jacobian(&Self::place(state));
+        RowVector4::new(slope[0], 0.0, slope[1], 0.0)
+    }
+
+    fn noise_covariance_at(&self, state: &Vector4<f64>) -> Matrix1<f64> {
+        self.0.noise_covariance_at(&Self::place(state))
+    }
+
+    fn sample<R: rand::Rng + ?Sized>(&self, rng: &mut R, state: &Vector4<f64>) -> Vector1<f64> {
+        self.0.sample(rng, &Self::place(state))
     }
 }
 

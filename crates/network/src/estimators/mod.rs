@@ -1,5 +1,7 @@
 //! The library's estimators, each as an [`Estimator`](crate::Estimator) or [`Walker`](crate::Walker).
 
+#[cfg(feature = "adaptive")]
+mod adaptive;
 #[cfg(feature = "cfwmd")]
 mod censoring;
 #[cfg(feature = "diffusive")]
@@ -14,6 +16,8 @@ mod scheme;
 #[cfg(feature = "cfwmd")]
 mod send_all;
 
+#[cfg(feature = "adaptive")]
+pub use adaptive::{Followed, Followers};
 #[cfg(feature = "cfwmd")]
 pub use censoring::{Broadcast, Censors};
 #[cfg(feature = "diffusive")]
@@ -29,6 +33,7 @@ pub use scheme::Reporting;
 pub use send_all::SendAll;
 
 #[cfg(any(
+    feature = "adaptive",
     feature = "cfwmd",
     feature = "diffusive",
     feature = "dymbo",
@@ -39,6 +44,7 @@ use crate::error::Error;
 
 /// An estimator's own error, in words.
 #[cfg(any(
+    feature = "adaptive",
     feature = "cfwmd",
     feature = "diffusive",
     feature = "dymbo",

@@ -1,11 +1,14 @@
 //! A network without faults gives, to the last bit, the estimates of the estimator alone, and its ledger has the estimator's bits.
 
 use crate::worlds::{TwoSided, clock, counted, plane, plane_sensors, plane_start, plant, scalar, setup, start};
+use fewbits_adaptive::{Config, Receiver};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
-use fewbits_core::factor::Value;
-use fewbits_core::{Gaussian, Link, Message, NumberFormat, Observation, Observed, Scheme, Sign};
+use fewbits_core::factor::{InCell, Value};
+use fewbits_core::{
+    BitString, Cell, Dynamics, Gaussian, Link, Message, NumberFormat, Observation, Observed, Scheme, Sensing, Sign,
+};
 use fewbits_densities::wire::WireFormat;
 use fewbits_densities::{Grid, Mixture, PointMass, Reduction};
 use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SourceSensor, Status};
@@ -15,15 +18,16 @@ use fewbits_dymbo::{
 use fewbits_filters::{AssumedDensity, PointMassFilter, assumed_density, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
 use fewbits_models::diffusion::{Air, Ground};
-use fewbits_models::{Ar1, LinearSensor, constant_velocity_2d};
+use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::{Bits, Censors, Leaders, LookUp, Patterns, Reporting, SourceChain};
+use fewbits_network::estimators::{Bits, Censors, Followers, Leaders, LookUp, Patterns, Reporting, SourceChain};
 use fewbits_network::{AdHoc, Estimator, Field, Ledger, Replicable, SensorId, Star, Walk};
+use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::{Scene, System};
 use fewbits_quantizers::Symbol;
 use fewbits_topology::{Deployment, Graph};
-use nalgebra::{Vector1, Vector2, Vector3};
+use nalgebra::{Matrix4, RowVector4, Vector1, Vector2, Vector3};
 
 const SLOTS: usize = 40;
 
@@ -501,4 +505,110 @@ fn questions_and_reports_have_the_lengths_of_their_codecs() {
     let word = scheme.word(1.0, &told).unwrap();
     assert_eq!(word.to_bits(&scheme.report_format()).unwrap().bits(), 3);
     assert_eq!(told.to_bits(&scheme.feedback_format()).unwrap().bits(), 128);
+}
+
+#[test]
+fn followed_signals() {
+    let (measurements, config) = (scalar(3, SLOTS, 8), Config::new(0.7).unwrap());
+    let mut sensors = vec![fewbits_adaptive::Sensor::new(config); 3];
+    let mut receivers = vec![Receiver::new(config); 3];
+    let (dynamics, direct) = (Ar1::new(0.9, 0.5).unwrap(), LinearSensor::<1, 1>::direct(1.0).unwrap());
+    let (mut belief, mut sent) = (start(), 0);
+    let alone: Vec<_> = measurements
+        .iter()
+        .map(|z| {
+            belief = kalman::predict(&dynamics, &belief);
+            for ((sensor, receiver), z) in sensors.iter_mut().zip(&mut receivers).zip(z) {
+                let packet = sensor.encode(z[0]).unwrap().map(|report| report.packet);
+                sent += packet.as_ref().map_or(0, |packet| packet.bits() as u64);
+                let value = receiver.receive(&packet.into()).unwrap().value.unwrap();
+                assert!((value - z[0]).abs() <= 0.7);
+                let factor = InCell::new(Cell::new(value - 0.7, value + 0.7).unwrap(), 1.0, 0.0, 1.0).unwrap();
+                belief = assumed_density::update(&belief, direct.matrix(), &factor).unwrap().0;
+            }
+            mean(&belief)
+        })
+        .collect();
+    let followers = Followers {
+        dynamics,
+        sensors: vec![direct; 3],
+        noise_variance: 1.0,
+        config,
+        start: start(),
+    };
+    let (estimates, price) = told(followers.clone(), &measurements);
+    assert_eq!(estimates, alone);
+    assert_eq!(price, Price { up: sent, down: 0 });
+    let known = followers.start();
+    assert_eq!(followers.belief_of(&followers.belief_bits(&known).unwrap()).unwrap(), known);
+    assert!(followers.belief_of(&BitString::default()).is_err());
+    everywhere(&followers, &measurements, &alone, sent);
+}
+
+#[test]
+fn quantized_ranges_in_the_plane() {
+    let noise = RangeNoise::from_snr_db(40.0).unwrap();
+    let sensors: Vec<_> = [[4.0, 4.0], [16.0, 4.0], [10.0, 16.0]]
+        .map(|place| RangeSensor::new(place.into(), noise).unwrap())
+        .to_vec();
+    let scheme = QuantizedRange::new(4, noise).unwrap();
+    let broadcast = move |expected: &Gaussian<1>| RangeReference {
+        centre: expected.mean()[0],
+        half_width: 2.0 * (expected.covariance()[0] + noise.deviation(expected.mean()[0]).powi(2)).sqrt(),
+    };
+    let start = Gaussian::new([9.0, 9.0, 0.0, 0.5].into(), Matrix4::identity() * 0.1).unwrap();
+    let mut transition = Matrix4::identity();
+    (transition[(0, 2)], transition[(1, 3)]) = (1.0, 1.0);
+    let dynamics = LinearGaussian::with_covariance(transition, Matrix4::identity() * 0.01).unwrap();
+    let (mut rng, mut state) = (Stream::new(3).rng(), *start.mean());
+    let measurements: Vec<Vec<Vector1<f64>>> = (0..SLOTS)
+        .map(|_| {
+            state = dynamics.propagate(&mut rng, &state);
+            sensors.iter().map(|sensor| sensor.sample(&mut rng, &state)).collect()
+        })
+        .collect();
+    let mut belief = start;
+    let alone: Vec<_> = measurements
+        .iter()
+        .map(|z| {
+            let predicted = kalman::predict(&dynamics, &belief);
+            belief = predicted;
+            for (sensor, z) in sensors.iter().zip(z) {
+                let row: RowVector4<f64> = sensor.jacobian(predicted.mean());
+                let expected = Gaussian::from_trusted_parts(
+                    sensor.mean(predicted.mean()),
+                    row * predicted.covariance() * row.transpose(),
+                );
+                let told = broadcast(&expected);
+                let told =
+                    RangeReference::from_bits(&NumberFormat::Single, &told.to_bits(&NumberFormat::Single).unwrap())
+                        .unwrap();
+                let level = Observation::Received(scheme.level(z[0], &told).unwrap());
+                let factor = scheme.factor(&told, &level, &Link::PERFECT).unwrap();
+                belief = assumed_density::update_through(&belief, &Observed::new(*sensor, factor))
+                    .unwrap()
+                    .0;
+            }
+            belief.mean().as_slice().to_vec()
+        })
+        .collect();
+    let estimator = Reporting {
+        dynamics,
+        sensors,
+        scheme,
+        link: Link::PERFECT,
+        filter: AssumedDensity,
+        broadcast,
+        start,
+    };
+    let (estimates, price) = told(estimator.clone(), &measurements);
+    assert_eq!(estimates, alone);
+    assert_eq!(
+        price,
+        Price {
+            up: 3 * 2 * SLOTS as u64,
+            down: 3 * 64 * SLOTS as u64
+        }
+    );
+    everywhere(&estimator, &measurements, &alone, 3 * 2 * SLOTS as u64);
 }

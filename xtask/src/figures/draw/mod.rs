@@ -5,6 +5,7 @@ mod legend;
 mod marks;
 mod scale;
 mod style;
+mod typeset;
 
 use super::Error;
 use fewbits_experiments::plot::{Panel, Plot, Shape};
@@ -17,6 +18,7 @@ use plotters::drawing::{DrawingArea, IntoDrawingArea};
 use plotters::style::ShapeStyle;
 use scale::Scaled;
 use style::{GRID, INK, PANEL_HEIGHT, PANEL_WIDTH, PAPER, TEXT, TICK, text, title};
+pub(super) use typeset::typeset;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
@@ -30,6 +32,7 @@ const COLUMNS: usize = 2;
 /// # Errors
 /// If the back end refuses an element.
 pub fn to_svg(id: &str, plot: &Plot) -> Result<String, Error> {
+    let plot = &typeset::words(plot.clone());
     let columns = plot.columns.min(plot.panels.len()).clamp(1, COLUMNS);
     let rows: Vec<&[Panel]> = plot.panels.chunks(columns).collect();
     let width = PANEL_WIDTH as i32;
