@@ -249,7 +249,8 @@ impl Figure for Widths {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let label = |r: &Row| format!("{} c={}{}", r.filter, r.factor, if r.shrunk { " shrunk" } else { "" });
+        let label =
+            |r: &Row| format!("{}, c = {}{}", super::title(r.filter), r.factor, if r.shrunk { ", shrunk" } else { "" });
         let mut sorted: Vec<&Row> = rows.iter().collect();
         sorted.sort_by(|a, b| b.kl.value.total_cmp(&a.kl.value));
         let names: Vec<(f64, String)> = sorted.iter().enumerate().map(|(i, r)| (i as f64, label(r))).collect();

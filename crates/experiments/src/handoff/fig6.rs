@@ -408,10 +408,10 @@ impl Figure for Fig6 {
                 Axis::log("bound (KL in nats)").between(1e-2, 1e6),
             )
             .with(Layer::line("ML, printed", points(&under, |b| (b.t as f64, b.ml_printed.value))))
-            .with(Layer::line("KL, printed / nat", of(|b| b.log10_kl_printed.value)))
-            .with(Layer::dashed("KL, corrected / nat", of(|b| b.log10_kl_corrected)))
+            .with(Layer::line("KL, printed", of(|b| b.log10_kl_printed.value)))
+            .with(Layer::dashed("KL, corrected", of(|b| b.log10_kl_corrected)))
             .with(Layer::line("L1, printed", of(|b| b.log10_l1_printed.value)))
-            .with(Layer::measured("KL from DR / nat", &under, |b| (b.t as f64, b.kl_from_dr)))
+            .with(Layer::measured("KL from DR", &under, |b| (b.t as f64, b.kl_from_dr)))
             .with(
                 Layer::measured("L1 from DR", &under, |b| (b.t as f64, b.l1_from_dr))
                     .coloured(6)

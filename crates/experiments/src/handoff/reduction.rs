@@ -255,7 +255,7 @@ impl Figure for Reductions {
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let layers = methods().into_iter().enumerate().map(|(i, (method, _))| {
             let of = rows.errors.iter().filter(|r| r.method == method);
-            Layer::line(method, of.map(|r| (r.components as f64, r.kl.value)).collect()).coloured(i)
+            Layer::measured(super::title(method), of, |r| (r.components as f64, r.kl)).coloured(i)
         });
         let panel =
             Panel::new("KL of the reduced mixture", Axis::log("components M"), Axis::log("KL / nat")).with_all(layers);

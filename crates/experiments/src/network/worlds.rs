@@ -217,6 +217,8 @@ pub(super) struct World<const D: usize, G> {
     /// What all-send and the censoring sensors send in.
     fine: NumberFormat,
     coarse: NumberFormat,
+    /// How far from its start the state may get, for codes of where it is.
+    reach: f64,
     /// Coordinates that count.
     counted: &'static [usize],
 }
@@ -234,6 +236,7 @@ pub(super) fn scalar() -> Result<World<1, Ar1>, Error> {
         start: Gaussian::scalar(0.0, variance)?,
         fine: NumberFormat::Single,
         coarse: NumberFormat::fixed(-8.0, 8.0, 8)?,
+        reach: 16.0,
         counted: &[0],
     })
 }
@@ -248,6 +251,8 @@ pub(super) fn plane() -> Result<World<4, LinearGaussian<4, 2>>, Error> {
         start: Gaussian::new(Vector4::new(0.0, 1.0, 0.0, -1.0), Matrix4::identity() * 0.5)?,
         fine: NumberFormat::Single,
         coarse: NumberFormat::fixed(-256.0, 256.0, 10)?,
+        // The acceleration takes it 700 away in 300 slots, one standard deviation.
+        reach: 1e4,
         counted: &[0, 2],
     })
 }
@@ -368,7 +373,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
         let readings = measurements
             .iter()
             .map(|slot| slot.iter().enumerate().map(reading).collect());
-        let format = WireFormat::new(SVector::zeros(), 1e3, 1.0, &[resolution])?;
+        let format = WireFormat::new(SVector::zeros(), self.reach, 1.0, &[resolution])?;
         let reducer = Coded {
             components,
             reduction: Reduction::default(),
@@ -465,9 +470,10 @@ impl World<4, LinearGaussian<4, 2>> {
             scheme: QuantizedRange::new(1 << bits, noise).map_err(Error::failed)?,
             link: Link::PERFECT,
             filter: AssumedDensity,
+            // In single precision, as it travels.
             broadcast: move |expected: &Gaussian<1>| RangeReference {
-                centre: expected.mean()[0],
-                half_width: loading * (expected.covariance()[0] + 1.0).sqrt(),
+                centre: f64::from(expected.mean()[0] as f32),
+                half_width: f64::from((loading * (expected.covariance()[0] + 1.0).sqrt()) as f32),
             },
             start: self.start,
         };

@@ -14,6 +14,9 @@ use serde::{Deserialize, Serialize};
 /// Sensors that each follow their own measurements by [`fewbits_adaptive`], knowing no model and told nothing, and a centre that
 /// knows one: the reconstruction `v` says that the measurement lies in `[v - delta, v + delta)`, silence included.
 ///
+/// Reports have no length of their own, which their frames have; so [`Star::told`](crate::Star::told) and
+/// [`AdHoc`](crate::AdHoc) carry them, and [`Star::echoed`](crate::Star::echoed), which repeats several in one frame, does not.
+///
 /// While a receiver is out of step with its sensor, its reconstructions say nothing. Over links that lose packets, take a
 /// [`Config::resilient`].
 #[derive(Debug, Clone, PartialEq)]

@@ -72,6 +72,15 @@ where
         let (slot, belief) = sensor.belief().unwrap();
         assert_eq!((slot, estimator.mean(belief)), (slots - 1, alone[slots as usize - 2].clone()));
     }
+    among_peers(estimator, measurements, alone, up);
+}
+
+/// The same without a centre.
+fn among_peers<E: Replicable + Clone>(estimator: &E, measurements: &[Vec<E::Measurement>], alone: &[Vec<f64>], up: u64)
+where
+    E::Measurement: Clone,
+{
+    let slots = measurements.len() as u32;
     let peers = AdHoc::new(estimator.clone(), measurements.to_vec(), clock(), 10, Stream::new(9)).unwrap();
     let mut network = peers.simulate(10.0, setup(3)).unwrap();
     network.run_until(clock().end(slots)).unwrap();
@@ -542,7 +551,7 @@ fn followed_signals() {
     let known = followers.start();
     assert_eq!(followers.belief_of(&followers.belief_bits(&known).unwrap()).unwrap(), known);
     assert!(followers.belief_of(&BitString::default()).is_err());
-    everywhere(&followers, &measurements, &alone, sent);
+    among_peers(&followers, &measurements, &alone, sent);
 }
 
 #[test]
@@ -552,9 +561,16 @@ fn quantized_ranges_in_the_plane() {
         .map(|place| RangeSensor::new(place.into(), noise).unwrap())
         .to_vec();
     let scheme = QuantizedRange::new(4, noise).unwrap();
-    let broadcast = move |expected: &Gaussian<1>| RangeReference {
-        centre: expected.mean()[0],
-        half_width: 2.0 * (expected.covariance()[0] + noise.deviation(expected.mean()[0]).powi(2)).sqrt(),
+    // As it travels: in single precision.
+    let single = |x: f64| f64::from(x as f32);
+    let broadcast = move |expected: &Gaussian<1>| {
+        let deviation = expected.covariance()[0]
+            .sqrt()
+            .hypot(noise.deviation(expected.mean()[0]));
+        RangeReference {
+            centre: single(expected.mean()[0]),
+            half_width: single(2.0 * deviation),
+        }
     };
     let start = Gaussian::new([9.0, 9.0, 0.0, 0.5].into(), Matrix4::identity() * 0.1).unwrap();
     let mut transition = Matrix4::identity();
@@ -580,9 +596,6 @@ fn quantized_ranges_in_the_plane() {
                     row * predicted.covariance() * row.transpose(),
                 );
                 let told = broadcast(&expected);
-                let told =
-                    RangeReference::from_bits(&NumberFormat::Single, &told.to_bits(&NumberFormat::Single).unwrap())
-                        .unwrap();
                 let level = Observation::Received(scheme.level(z[0], &told).unwrap());
                 let factor = scheme.factor(&told, &level, &Link::PERFECT).unwrap();
                 belief = assumed_density::update_through(&belief, &Observed::new(*sensor, factor))

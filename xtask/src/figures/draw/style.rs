@@ -32,22 +32,21 @@ const PALETTE: [RGBColor; 8] = [
     RGBColor(130, 130, 130),
 ];
 
-/// Lengths of dashes and gaps of curves, by colour; empty is solid.
-const CURVES: [&[f64]; 8] = [
+/// Lengths of dashes and gaps of curves, by place; empty is solid. One fewer than colours, so that the second round differs.
+const CURVES: [&[f64]; 7] = [
     &[],
     &[84.0, 30.0],
     &[40.0, 26.0],
     &[84.0, 26.0, 14.0, 26.0],
     &[150.0, 36.0],
     &[40.0, 20.0, 14.0, 20.0, 14.0, 20.0],
-    &[],
     &[24.0, 20.0],
 ];
 
 /// The same for bounds and references, which are thinner.
 const BOUNDS: [&[f64]; 4] = [&[14.0, 22.0], &[50.0, 22.0], &[50.0, 22.0, 14.0, 22.0], &[90.0, 40.0]];
 
-const MARKERS: [Marker; 8] = [
+const MARKERS: [Marker; 7] = [
     Marker::Circle,
     Marker::Square,
     Marker::Triangle,
@@ -55,7 +54,6 @@ const MARKERS: [Marker; 8] = [
     Marker::OpenCircle,
     Marker::OpenSquare,
     Marker::Cross,
-    Marker::Plus,
 ];
 
 pub(super) fn text(size: i32) -> TextStyle<'static> {
