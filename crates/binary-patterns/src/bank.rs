@@ -6,6 +6,7 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::binomial;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Most outcomes that may be enumerated.
@@ -37,30 +38,10 @@ pub(crate) struct Exchangeable {
     pub count: usize,
 }
 
-/// The stored form of a bank.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredBank {
-    source: Source,
-    sensors: Vec<PatternSensor>,
-}
-
-impl From<Bank> for StoredBank {
-    fn from(bank: Bank) -> Self {
-        Self {
-            source: bank.source,
-            sensors: (0..bank.sensors()).map(|n| bank.sensor(n).clone()).collect(),
-        }
-    }
-}
-
-impl TryFrom<StoredBank> for Bank {
-    type Error = Error;
-
-    fn try_from(stored: StoredBank) -> Result<Self, Error> {
-        Self::new(stored.source, stored.sensors)
-    }
-}
+stored! { Bank as StoredBank |bank| {
+    source: Source = bank.source,
+    sensors: Vec<PatternSensor> = (0..bank.sensors()).map(|n| bank.sensor(n).clone()).collect(),
+} => Bank::new(source, sensors), Error }
 
 impl Bank {
     /// From the sensors in the order in which their bits will be decoded.

@@ -2,6 +2,7 @@
 
 use crate::source::noise_in_range;
 use crate::{BinaryQuantizer, Error};
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// One sensor: what it measures is `Y = X + N(0, noise_std^2)`, what it reports is the bit of its quantizer.
@@ -12,30 +13,10 @@ pub struct PatternSensor {
     noise_std: f64,
 }
 
-/// The stored form of a sensor.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredSensor {
-    quantizer: BinaryQuantizer,
-    noise_std: f64,
-}
-
-impl From<PatternSensor> for StoredSensor {
-    fn from(sensor: PatternSensor) -> Self {
-        Self {
-            quantizer: sensor.quantizer,
-            noise_std: sensor.noise_std,
-        }
-    }
-}
-
-impl TryFrom<StoredSensor> for PatternSensor {
-    type Error = Error;
-
-    fn try_from(stored: StoredSensor) -> Result<Self, Error> {
-        Self::with_deviation(stored.quantizer, stored.noise_std)
-    }
-}
+stored! { PatternSensor as StoredSensor |sensor| {
+    quantizer: BinaryQuantizer = sensor.quantizer,
+    noise_std: f64 = sensor.noise_std,
+} => PatternSensor::with_deviation(quantizer, noise_std), Error }
 
 impl PatternSensor {
     /// A sensor from its quantizer and the standard deviation (not the variance) of its noise.

@@ -4,6 +4,7 @@ use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::normal;
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// How often the network may report: `messages` per step on average, from `sensors` sensors (the paper's `l` of `N`).
@@ -14,20 +15,7 @@ pub struct Budget {
     sensors: usize,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    messages: f64,
-    sensors: usize,
-}
-
-impl TryFrom<Numbers> for Budget {
-    type Error = Error;
-
-    fn try_from(numbers: Numbers) -> Result<Self, Error> {
-        Self::new(numbers.messages, numbers.sensors)
-    }
-}
+stored! { Budget as Numbers { messages: f64, sensors: usize } => Budget::new(messages, sensors), Error }
 
 impl Budget {
     /// A budget of `messages` in `(0, sensors]`.

@@ -6,6 +6,7 @@ use fewbits_core::factor::{Tilted, Value};
 use fewbits_core::{Columns, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
+use fewbits_numerics::stored;
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -21,19 +22,7 @@ pub struct StochasticTrigger {
     precision: f64,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    precision: f64,
-}
-
-impl TryFrom<Numbers> for StochasticTrigger {
-    type Error = Error;
-
-    fn try_from(numbers: Numbers) -> Result<Self, Error> {
-        Self::new(numbers.precision)
-    }
-}
+stored! { StochasticTrigger as Numbers { precision: f64 } => StochasticTrigger::new(precision), Error }
 
 impl StochasticTrigger {
     /// The trigger with precision `Y > 0` (inverse measurement units squared).

@@ -4,6 +4,8 @@ use crate::bits::{BitReader, BitWriter, CodecError};
 use crate::cell::Cell;
 use crate::message::Message;
 use fewbits_numerics::error::{ArgumentError, finite, within};
+#[cfg(feature = "serde")]
+use fewbits_numerics::stored;
 use nalgebra::SVector;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -34,22 +36,7 @@ pub struct Levels {
 }
 
 #[cfg(feature = "serde")]
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    lower: f64,
-    upper: f64,
-    bits: u32,
-}
-
-#[cfg(feature = "serde")]
-impl TryFrom<Numbers> for Levels {
-    type Error = ArgumentError;
-
-    fn try_from(numbers: Numbers) -> Result<Self, ArgumentError> {
-        Self::new(numbers.lower, numbers.upper, numbers.bits)
-    }
-}
+stored! { Levels as Numbers { lower: f64, upper: f64, bits: u32 } => Levels::new(lower, upper, bits), ArgumentError }
 
 impl Levels {
     /// The levels from `lower` to `upper` (measurement units), `bits` of 1 to 32.

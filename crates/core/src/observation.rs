@@ -3,6 +3,8 @@
 use crate::bits::BitString;
 use crate::message::Message;
 use fewbits_numerics::ArgumentError;
+#[cfg(feature = "serde")]
+use fewbits_numerics::stored;
 use rand::{Rng, RngExt};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -59,21 +61,7 @@ pub struct Link {
 }
 
 #[cfg(feature = "serde")]
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    loss: f64,
-    crossover: f64,
-}
-
-#[cfg(feature = "serde")]
-impl TryFrom<Numbers> for Link {
-    type Error = ArgumentError;
-
-    fn try_from(numbers: Numbers) -> Result<Self, ArgumentError> {
-        Self::new(numbers.loss, numbers.crossover)
-    }
-}
+stored! { Link as Numbers { loss: f64, crossover: f64 } => Link::new(loss, crossover), ArgumentError }
 
 impl Link {
     /// A link that delivers every report as it was sent.

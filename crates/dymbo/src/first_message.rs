@@ -7,6 +7,7 @@ use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Message, Observation, Scheme};
 use fewbits_numerics::error::{ArgumentError, finite, positive, within};
 use fewbits_numerics::normal;
+use fewbits_numerics::stored;
 use nalgebra::Vector1;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -56,31 +57,11 @@ pub struct RoundedSample {
     bits: u32,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    noise_variance: f64,
-    resolution: f64,
-    bits: u32,
-}
-
-impl From<RoundedSample> for Numbers {
-    fn from(scheme: RoundedSample) -> Self {
-        Self {
-            noise_variance: scheme.noise_variance,
-            resolution: scheme.resolution,
-            bits: scheme.bits,
-        }
-    }
-}
-
-impl TryFrom<Numbers> for RoundedSample {
-    type Error = Error;
-
-    fn try_from(numbers: Numbers) -> Result<Self, Error> {
-        Self::new(numbers.noise_variance, numbers.resolution)?.with_bits(numbers.bits)
-    }
-}
+stored! { RoundedSample as Numbers |scheme| {
+    noise_variance: f64 = scheme.noise_variance,
+    resolution: f64 = scheme.resolution,
+    bits: u32 = scheme.bits,
+} => RoundedSample::new(noise_variance, resolution)?.with_bits(bits), Error }
 
 /// Longest word whose cells are enumerated, as a link that inverts bits asks for.
 const LONGEST_NOISY: u32 = 12;

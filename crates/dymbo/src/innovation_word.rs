@@ -5,6 +5,7 @@ use crate::sign_bit::missing_probability;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Link, Message, NumberFormat, Observation, Scheme};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
+use fewbits_numerics::stored;
 use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};
 use nalgebra::Vector1;
 use rand::Rng;
@@ -69,29 +70,10 @@ pub struct InnovationWord {
     quantizer: &'static LloydMax,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    noise_variance: f64,
-    bits: u32,
-}
-
-impl From<InnovationWord> for Numbers {
-    fn from(word: InnovationWord) -> Self {
-        Self {
-            noise_variance: word.noise_variance,
-            bits: word.bits,
-        }
-    }
-}
-
-impl TryFrom<Numbers> for InnovationWord {
-    type Error = Error;
-
-    fn try_from(numbers: Numbers) -> Result<Self, Error> {
-        Self::new(numbers.noise_variance, numbers.bits as usize)
-    }
-}
+stored! { InnovationWord as Numbers |word| {
+    noise_variance: f64 = word.noise_variance,
+    bits: u32 = word.bits,
+} => InnovationWord::new(noise_variance, bits as usize), Error }
 
 impl InnovationWord {
     /// A sensor with measurement variance `sigma^2 > 0` and words of 1 to 8 bits.

@@ -4,6 +4,7 @@ use crate::filter::{Report, ScalarFilter, StepInfo, without_report};
 use crate::plant::{filtered_variance, innovation_gain};
 use crate::{CellIndex, Error, InnovationWord, Prediction, ScalarPlant};
 use fewbits_core::{Gaussian, Link, Observation};
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// The filter for sensors that report `m` bits of the normalised innovation.
@@ -30,31 +31,11 @@ pub struct MultibitFilter {
     information: f64,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    plant: ScalarPlant,
-    bits: u32,
-    link: Link,
-}
-
-impl From<MultibitFilter> for Numbers {
-    fn from(filter: MultibitFilter) -> Self {
-        Self {
-            plant: filter.plant,
-            bits: filter.scheme.bits(),
-            link: filter.link,
-        }
-    }
-}
-
-impl TryFrom<Numbers> for MultibitFilter {
-    type Error = Error;
-
-    fn try_from(numbers: Numbers) -> Result<Self, Error> {
-        Ok(Self::new(numbers.plant, numbers.bits as usize)?.with_link(numbers.link))
-    }
-}
+stored! { MultibitFilter as Numbers |filter| {
+    plant: ScalarPlant = filter.plant,
+    bits: u32 = filter.scheme.bits(),
+    link: Link = filter.link,
+} => Ok(MultibitFilter::new(plant, bits as usize)?.with_link(link)), Error }
 
 impl MultibitFilter {
     /// The filter for words of 1 to 8 bits over a perfect link. One bit is the Dymbo filter.

@@ -14,6 +14,7 @@ use fewbits_numerics::binomial::log_row;
 use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::normal::{self, SQRT_2_OVER_PI};
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
 
@@ -47,33 +48,12 @@ pub struct ParallelFilter {
     link: Link,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    plant: ScalarPlant,
-    sensors: usize,
-    fusion: CountFusion,
-    link: Link,
-}
-
-impl From<ParallelFilter> for Numbers {
-    fn from(filter: ParallelFilter) -> Self {
-        Self {
-            plant: filter.plant,
-            sensors: filter.sensors,
-            fusion: filter.fusion,
-            link: filter.link,
-        }
-    }
-}
-
-impl TryFrom<Numbers> for ParallelFilter {
-    type Error = Error;
-
-    fn try_from(numbers: Numbers) -> Result<Self, Error> {
-        Ok(Self::new(numbers.plant, numbers.sensors, numbers.fusion)?.with_link(numbers.link))
-    }
-}
+stored! { ParallelFilter as Numbers |filter| {
+    plant: ScalarPlant = filter.plant,
+    sensors: usize = filter.sensors,
+    fusion: CountFusion = filter.fusion,
+    link: Link = filter.link,
+} => Ok(ParallelFilter::new(plant, sensors, fusion)?.with_link(link)), Error }
 
 impl ParallelFilter {
     /// The filter for 1 to 1000 sensors over perfect links.

@@ -4,6 +4,7 @@ use crate::Error;
 use fewbits_core::Gaussian;
 use fewbits_filters::{ScalarSteadyState, scalar_steady_state};
 use fewbits_models::{Ar1, LinearSensor};
+use fewbits_numerics::stored;
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -20,31 +21,11 @@ pub struct ScalarPlant {
     sensor: LinearSensor<1, 1>,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    coefficient: f64,
-    process_variance: f64,
-    measurement_variance: f64,
-}
-
-impl From<ScalarPlant> for Numbers {
-    fn from(plant: ScalarPlant) -> Self {
-        Self {
-            coefficient: plant.coefficient(),
-            process_variance: plant.process_variance(),
-            measurement_variance: plant.measurement_variance(),
-        }
-    }
-}
-
-impl TryFrom<Numbers> for ScalarPlant {
-    type Error = Error;
-
-    fn try_from(numbers: Numbers) -> Result<Self, Error> {
-        Self::new(numbers.coefficient, numbers.process_variance, numbers.measurement_variance)
-    }
-}
+stored! { ScalarPlant as Numbers |plant| {
+    coefficient: f64 = plant.coefficient(),
+    process_variance: f64 = plant.process_variance(),
+    measurement_variance: f64 = plant.measurement_variance(),
+} => ScalarPlant::new(coefficient, process_variance, measurement_variance), Error }
 
 impl ScalarPlant {
     /// The plant with coefficient `a` in `[-1, 1]`, process variance `sigma_u^2 >= 0` and measurement variance

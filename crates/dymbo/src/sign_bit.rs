@@ -5,6 +5,7 @@ use fewbits_core::factor::{Constant, InCell, Scalar};
 use fewbits_core::{Link, NumberFormat, Observation, Scheme, Sign};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal;
+use fewbits_numerics::stored;
 use nalgebra::Vector1;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -31,19 +32,7 @@ pub struct SignBit {
     noise_variance: f64,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    noise_variance: f64,
-}
-
-impl TryFrom<Numbers> for SignBit {
-    type Error = Error;
-
-    fn try_from(numbers: Numbers) -> Result<Self, Error> {
-        Self::new(numbers.noise_variance)
-    }
-}
+stored! { SignBit as Numbers { noise_variance: f64 } => SignBit::new(noise_variance), Error }
 
 impl SignBit {
     /// A sensor with measurement variance `sigma^2 > 0`.

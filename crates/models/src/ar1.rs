@@ -4,6 +4,7 @@ use crate::{Error, LinearGaussian};
 use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::error::{finite, non_negative};
 use fewbits_numerics::kernels::StandardNormals;
+use fewbits_numerics::stored;
 use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -17,30 +18,10 @@ pub struct Ar1 {
     noise_covariance: Matrix1<f64>,
 }
 
-/// The stored form, checked when it is read.
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "Ar1", deny_unknown_fields)]
-struct Parameters {
-    coefficient: f64,
-    noise_variance: f64,
-}
-
-impl From<Ar1> for Parameters {
-    fn from(model: Ar1) -> Self {
-        Self {
-            coefficient: model.coefficient(),
-            noise_variance: model.noise_variance(),
-        }
-    }
-}
-
-impl TryFrom<Parameters> for Ar1 {
-    type Error = Error;
-
-    fn try_from(stored: Parameters) -> Result<Self, Error> {
-        Self::new_unstable(stored.coefficient, stored.noise_variance)
-    }
-}
+stored! { Ar1 as Parameters |model| {
+    coefficient: f64 = model.coefficient(),
+    noise_variance: f64 = model.noise_variance(),
+} => Ar1::new_unstable(coefficient, noise_variance), Error }
 
 impl Ar1 {
     /// The model with coefficient `a` in `[-1, 1]` and noise variance `q >= 0` (state units squared).

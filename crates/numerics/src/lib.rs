@@ -7,6 +7,7 @@
 //! | [`kernels`] | the same functions, sums and exponentials over whole columns, in vector registers |
 //! | [`linalg`], [`tridiagonal`] | square roots of singular covariances, tridiagonal systems |
 //! | [`roots`], [`binomial`] | roots inside a bracket, binomial coefficients |
+//! | [`stored!`] | how types with checking constructors are written and read |
 //! | [`error`] | the argument error all constructors share, and the checks that raise it |
 //!
 //! The central choice: **probabilities of intervals live in the log domain, and nowhere else is one formed.** It costs an
@@ -28,6 +29,7 @@ pub mod newton;
 pub mod normal;
 pub mod quadrature;
 pub mod roots;
+mod stored;
 pub mod tridiagonal;
 
 pub use error::ArgumentError;

@@ -6,6 +6,7 @@ use crate::error::{Error, refuse};
 use crate::law::Reports;
 use crate::scene::Scene;
 use crate::system::System;
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Most entries of a table (outcomes times values of the unknown).
@@ -68,26 +69,9 @@ pub struct JointTable {
     log_multiplicity: Vec<f64>,
 }
 
-/// The stored form: the system; the probabilities are computed again.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredTable {
-    system: System,
-}
-
-impl From<JointTable> for StoredTable {
-    fn from(table: JointTable) -> Self {
-        Self { system: table.system }
-    }
-}
-
-impl TryFrom<StoredTable> for JointTable {
-    type Error = Error;
-
-    fn try_from(stored: StoredTable) -> Result<Self, Error> {
-        Self::new(&stored.system)
-    }
-}
+stored! { JointTable as StoredTable |table| {
+    system: System = table.system,
+} => JointTable::new(&system), Error }
 
 impl JointTable {
     /// Tabulates a system.

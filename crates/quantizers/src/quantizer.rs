@@ -6,6 +6,7 @@ use crate::error::{Error, refuse};
 use fewbits_core::Cell;
 use fewbits_core::factor::{Constant, Partition, Scalar};
 use fewbits_numerics::error::{all_finite, finite, positive};
+use fewbits_numerics::stored;
 use fewbits_numerics::{ArgumentError, normal};
 use serde::{Deserialize, Serialize};
 
@@ -29,30 +30,10 @@ pub struct Quantizer {
     pub(crate) levels: usize,
 }
 
-/// The stored form.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Stored {
-    breakpoints: Vec<f64>,
-    labels: Vec<usize>,
-}
-
-impl From<Quantizer> for Stored {
-    fn from(quantizer: Quantizer) -> Self {
-        Self {
-            breakpoints: quantizer.breakpoints,
-            labels: quantizer.labels,
-        }
-    }
-}
-
-impl TryFrom<Stored> for Quantizer {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        Self::with_labels(stored.breakpoints, stored.labels)
-    }
-}
+stored! { Quantizer as Stored |quantizer| {
+    breakpoints: Vec<f64> = quantizer.breakpoints,
+    labels: Vec<usize> = quantizer.labels,
+} => Quantizer::with_labels(breakpoints, labels), Error }
 
 /// Whether the numbers are finite and strictly increasing.
 pub(crate) fn increasing(b: &[f64]) -> bool {

@@ -9,6 +9,7 @@ use fewbits_core::nalgebra::SVector;
 use fewbits_core::rand::Rng;
 use fewbits_core::{Link, Observation, Scheme};
 use fewbits_numerics::error::positive;
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// A sensor that reports the level of its scalar sample in every slot: a [`Scheme`], so that every filter takes it.
@@ -36,32 +37,11 @@ pub struct QuantizingSensor {
     noise_variance: f64,
 }
 
-/// The stored form.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Stored {
-    quantizer: Quantizer,
-    labelling: Labelling,
-    noise_variance: f64,
-}
-
-impl From<QuantizingSensor> for Stored {
-    fn from(sensor: QuantizingSensor) -> Self {
-        Self {
-            quantizer: sensor.quantizer,
-            labelling: sensor.labelling,
-            noise_variance: sensor.noise_variance,
-        }
-    }
-}
-
-impl TryFrom<Stored> for QuantizingSensor {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        Self::with_variance(stored.quantizer, stored.labelling, stored.noise_variance)
-    }
-}
+stored! { QuantizingSensor as Stored |sensor| {
+    quantizer: Quantizer = sensor.quantizer,
+    labelling: Labelling = sensor.labelling,
+    noise_variance: f64 = sensor.noise_variance,
+} => QuantizingSensor::with_variance(quantizer, labelling, noise_variance), Error }
 
 impl QuantizingSensor {
     /// A sensor with this quantizer and these words, whose samples have noise of the given variance.

@@ -8,6 +8,7 @@ use fewbits_core::Observation;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::positive;
 use fewbits_numerics::quadrature::gauss_legendre;
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Most sensors: there are `2^N` cells.
@@ -33,30 +34,10 @@ pub struct CodedSensors {
     probability: Vec<Vec<[Vec<f64>; 2]>>,
 }
 
-/// The stored form; the tables are computed again.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredSensors {
-    half_width: f64,
-    noise_deviations: Vec<f64>,
-}
-
-impl From<CodedSensors> for StoredSensors {
-    fn from(sensors: CodedSensors) -> Self {
-        Self {
-            half_width: sensors.half_width,
-            noise_deviations: sensors.noise_stds,
-        }
-    }
-}
-
-impl TryFrom<StoredSensors> for CodedSensors {
-    type Error = Error;
-
-    fn try_from(stored: StoredSensors) -> Result<Self, Error> {
-        Self::with_deviations(stored.half_width, &stored.noise_deviations)
-    }
-}
+stored! { CodedSensors as StoredSensors |sensors| {
+    half_width: f64 = sensors.half_width,
+    noise_deviations: Vec<f64> = sensors.noise_stds,
+} => CodedSensors::with_deviations(half_width, &noise_deviations), Error }
 
 impl CodedSensors {
     /// From the half width of the uniform source and each sensor's noise VARIANCE.

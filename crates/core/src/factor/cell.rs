@@ -10,6 +10,8 @@ use crate::sign::Sign;
 use fewbits_numerics::error::{ArgumentError, positive};
 use fewbits_numerics::kernels::{self, scalar};
 use fewbits_numerics::normal;
+#[cfg(feature = "serde")]
+use fewbits_numerics::stored;
 use nalgebra::SVector;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -34,35 +36,12 @@ pub struct InCell {
 }
 
 #[cfg(feature = "serde")]
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    cell: Cell,
-    noise_variance: f64,
-    floor: f64,
-    share: f64,
-}
-
-#[cfg(feature = "serde")]
-impl From<InCell> for Numbers {
-    fn from(factor: InCell) -> Self {
-        Self {
-            cell: factor.cell,
-            noise_variance: factor.variance,
-            floor: factor.floor,
-            share: factor.share,
-        }
-    }
-}
-
-#[cfg(feature = "serde")]
-impl TryFrom<Numbers> for InCell {
-    type Error = ArgumentError;
-
-    fn try_from(numbers: Numbers) -> Result<Self, ArgumentError> {
-        Self::new(numbers.cell, numbers.noise_variance, numbers.floor, numbers.share)
-    }
-}
+stored! { InCell as Numbers |factor| {
+    cell: Cell = factor.cell,
+    noise_variance: f64 = factor.variance,
+    floor: f64 = factor.floor,
+    share: f64 = factor.share,
+} => InCell::new(cell, noise_variance, floor, share), ArgumentError }
 
 impl InCell {
     /// `floor + share P(m + n in cell)` with noise variance `r`.

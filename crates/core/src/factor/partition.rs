@@ -6,6 +6,8 @@ use crate::columns::Columns;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, all_finite, positive};
+#[cfg(feature = "serde")]
+use fewbits_numerics::stored;
 use fewbits_numerics::{kernels, normal};
 use nalgebra::SVector;
 #[cfg(feature = "serde")]
@@ -27,33 +29,11 @@ pub struct Partition {
 }
 
 #[cfg(feature = "serde")]
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Numbers {
-    edges: Vec<f64>,
-    given_cell: Vec<f64>,
-    noise_variance: f64,
-}
-
-#[cfg(feature = "serde")]
-impl From<Partition> for Numbers {
-    fn from(factor: Partition) -> Self {
-        Self {
-            edges: factor.edges,
-            given_cell: factor.given_cell,
-            noise_variance: factor.variance,
-        }
-    }
-}
-
-#[cfg(feature = "serde")]
-impl TryFrom<Numbers> for Partition {
-    type Error = ArgumentError;
-
-    fn try_from(numbers: Numbers) -> Result<Self, ArgumentError> {
-        Self::new(numbers.edges, numbers.given_cell, numbers.noise_variance)
-    }
-}
+stored! { Partition as Numbers |factor| {
+    edges: Vec<f64> = factor.edges,
+    given_cell: Vec<f64> = factor.given_cell,
+    noise_variance: f64 = factor.variance,
+} => Partition::new(edges, given_cell, noise_variance), ArgumentError }
 
 impl Partition {
     /// The factor with `edges` (measurement units, strictly increasing) and one probability for each of the

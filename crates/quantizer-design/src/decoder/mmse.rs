@@ -7,6 +7,7 @@ use crate::scene::{Feature, Scene};
 use crate::system::System;
 use crate::table::Layout;
 use fewbits_core::Observation;
+use fewbits_numerics::stored;
 use fewbits_quantizers::Symbol;
 use serde::{Deserialize, Serialize};
 
@@ -52,30 +53,10 @@ pub struct MmseDecoder {
     symbols: Vec<Table>,
 }
 
-/// The stored form: the system; the entries are computed again.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredDecoder {
-    system: System,
-    limit: usize,
-}
-
-impl From<MmseDecoder> for StoredDecoder {
-    fn from(decoder: MmseDecoder) -> Self {
-        Self {
-            system: decoder.system,
-            limit: decoder.limit,
-        }
-    }
-}
-
-impl TryFrom<StoredDecoder> for MmseDecoder {
-    type Error = Error;
-
-    fn try_from(stored: StoredDecoder) -> Result<Self, Error> {
-        Self::new(&stored.system, stored.limit)
-    }
-}
+stored! { MmseDecoder as StoredDecoder |decoder| {
+    system: System = decoder.system,
+    limit: usize = decoder.limit,
+} => MmseDecoder::new(&system, limit), Error }
 
 impl MmseDecoder {
     /// Tabulates the posterior of every joint outcome, at most `limit` of them.

@@ -5,6 +5,7 @@ use crate::law::log_likelihoods;
 use crate::system::System;
 use crate::table::JointTable;
 use fewbits_core::Observation;
+use fewbits_numerics::stored;
 use fewbits_quantizers::Symbol;
 use serde::{Deserialize, Serialize};
 
@@ -22,30 +23,10 @@ pub struct NeymanPearson {
     detection: f64,
 }
 
-/// The stored form of a test; its table is computed again.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredTest {
-    system: System,
-    false_alarm: f64,
-}
-
-impl From<NeymanPearson> for StoredTest {
-    fn from(test: NeymanPearson) -> Self {
-        Self {
-            system: test.table.system().clone(),
-            false_alarm: test.false_alarm,
-        }
-    }
-}
-
-impl TryFrom<StoredTest> for NeymanPearson {
-    type Error = Error;
-
-    fn try_from(stored: StoredTest) -> Result<Self, Error> {
-        Self::new(&stored.system, stored.false_alarm)
-    }
-}
+stored! { NeymanPearson as StoredTest |test| {
+    system: System = test.table.system().clone(),
+    false_alarm: f64 = test.false_alarm,
+} => NeymanPearson::new(&system, false_alarm), Error }
 
 impl NeymanPearson {
     /// The most powerful test of the second value of the prior against the first with false-alarm probability `false_alarm`.

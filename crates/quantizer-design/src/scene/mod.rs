@@ -16,6 +16,7 @@ pub use prior::Prior;
 
 use crate::error::Error;
 use fewbits_numerics::normal;
+use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
 
 /// Half-width of the Gaussian prior's rule, in standard deviations.
@@ -61,30 +62,10 @@ pub struct Scene {
     pub(crate) variance: f64,
 }
 
-/// The stored form of a scene; its nodes are computed again.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredScene {
-    prior: Prior,
-    noise: Noise,
-}
-
-impl From<Scene> for StoredScene {
-    fn from(scene: Scene) -> Self {
-        Self {
-            prior: scene.prior,
-            noise: scene.noise,
-        }
-    }
-}
-
-impl TryFrom<StoredScene> for Scene {
-    type Error = Error;
-
-    fn try_from(stored: StoredScene) -> Result<Self, Error> {
-        Self::new(stored.prior, stored.noise)
-    }
-}
+stored! { Scene as StoredScene |scene| {
+    prior: Prior = scene.prior,
+    noise: Noise = scene.noise,
+} => Scene::new(prior, noise), Error }
 
 impl Scene {
     /// Discretises a prior and the noise of all sensors.

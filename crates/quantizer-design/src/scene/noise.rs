@@ -1,6 +1,7 @@
 //! The noise of all sensors.
 
 use crate::error::{Error, refuse};
+use fewbits_numerics::stored;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -15,30 +16,10 @@ pub struct Noise {
     pub(super) residuals: Vec<f64>,
 }
 
-/// The stored form of the noise.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredNoise {
-    loadings: Vec<f64>,
-    residual_deviations: Vec<f64>,
-}
-
-impl From<Noise> for StoredNoise {
-    fn from(noise: Noise) -> Self {
-        Self {
-            loadings: noise.loadings,
-            residual_deviations: noise.residuals,
-        }
-    }
-}
-
-impl TryFrom<StoredNoise> for Noise {
-    type Error = Error;
-
-    fn try_from(stored: StoredNoise) -> Result<Self, Error> {
-        Self::one_factor_with_deviations(&stored.loadings, &stored.residual_deviations)
-    }
-}
+stored! { Noise as StoredNoise |noise| {
+    loadings: Vec<f64> = noise.loadings,
+    residual_deviations: Vec<f64> = noise.residuals,
+} => Noise::one_factor_with_deviations(&loadings, &residual_deviations), Error }
 
 impl Noise {
     /// Independent noise with the given standard deviations.

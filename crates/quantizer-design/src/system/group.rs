@@ -2,6 +2,7 @@
 
 use crate::compositions::count;
 use crate::error::{Error, refuse};
+use fewbits_numerics::stored;
 use fewbits_quantizers::{Channel, Quantizer};
 use serde::{Deserialize, Serialize};
 
@@ -14,32 +15,11 @@ pub struct SensorGroup {
     pub(super) sensors: Vec<usize>,
 }
 
-/// The stored form of a group.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredGroup {
-    quantizer: Quantizer,
-    channel: Channel,
-    sensors: Vec<usize>,
-}
-
-impl From<SensorGroup> for StoredGroup {
-    fn from(group: SensorGroup) -> Self {
-        Self {
-            quantizer: group.quantizer,
-            channel: group.channel,
-            sensors: group.sensors,
-        }
-    }
-}
-
-impl TryFrom<StoredGroup> for SensorGroup {
-    type Error = Error;
-
-    fn try_from(stored: StoredGroup) -> Result<Self, Error> {
-        Self::new(stored.quantizer, stored.channel, stored.sensors)
-    }
-}
+stored! { SensorGroup as StoredGroup |group| {
+    quantizer: Quantizer = group.quantizer,
+    channel: Channel = group.channel,
+    sensors: Vec<usize> = group.sensors,
+} => SensorGroup::new(quantizer, channel, sensors), Error }
 
 impl SensorGroup {
     /// The sensors with the given numbers, each with this quantizer, each behind its own copy of the channel.

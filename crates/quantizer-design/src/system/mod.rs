@@ -7,6 +7,7 @@ pub use group::SensorGroup;
 use crate::compositions::count;
 use crate::error::{Error, refuse};
 use crate::scene::Scene;
+use fewbits_numerics::stored;
 use fewbits_quantizers::Channel;
 use fewbits_quantizers::Quantizer;
 use fewbits_quantizers::lloyd_max;
@@ -32,32 +33,11 @@ pub struct System {
     outcome_limit: u64,
 }
 
-/// The stored form of a system.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredSystem {
-    scene: Scene,
-    groups: Vec<SensorGroup>,
-    outcome_limit: u64,
-}
-
-impl From<System> for StoredSystem {
-    fn from(system: System) -> Self {
-        Self {
-            scene: system.scene,
-            groups: system.groups,
-            outcome_limit: system.outcome_limit,
-        }
-    }
-}
-
-impl TryFrom<StoredSystem> for System {
-    type Error = Error;
-
-    fn try_from(stored: StoredSystem) -> Result<Self, Error> {
-        Ok(Self::new(stored.scene, stored.groups)?.with_outcome_limit(stored.outcome_limit))
-    }
-}
+stored! { System as StoredSystem |system| {
+    scene: Scene = system.scene,
+    groups: Vec<SensorGroup> = system.groups,
+    outcome_limit: u64 = system.outcome_limit,
+} => Ok(System::new(scene, groups)?.with_outcome_limit(outcome_limit)), Error }
 
 impl System {
     /// A system of groups.
