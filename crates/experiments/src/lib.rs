@@ -26,6 +26,7 @@ pub mod mpa;
 pub mod network;
 mod parameters;
 pub mod plot;
+mod prelude;
 pub mod real;
 pub mod reference;
 mod schema;

@@ -1,16 +1,12 @@
 //! `assign-fig6-3` and `assign-fig6-4`: random networks of given mean and spread of their noise variances.
 
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_sensor_assignment::{
     CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
     variances_with_moments,
 };
-use garde::Validate;
 use rand_distr::{Distribution, StandardNormal};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Least variance of a sensor in a random network.
 const SMALLEST: f64 = 1e-4;

@@ -1,11 +1,7 @@
 //! `assign-fig6-1` and `assign-figC-1`: where a wrong bit lands, and how likely it is.
 
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_sensor_assignment::{CodedSensors, bit_error, flipped_estimate};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 const BITS: usize = 4;
 

@@ -1,14 +1,10 @@
 //! `assign-table6-1`: eight sensors, three assignments.
 
-use crate::plot::{Axis, Layer, Marker, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_sensor_assignment::{
     CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, pair_costs,
     quantization_error,
 };
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// `assign-table6-1`.
 pub struct Table;

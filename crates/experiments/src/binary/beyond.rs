@@ -2,18 +2,14 @@
 
 use super::feedback::descend;
 use super::{Scene, quantizers};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_binary_patterns::baselines::{AdaptiveRule, adaptive};
 use fewbits_binary_patterns::search::{Descent, free_breakpoints};
 use fewbits_binary_patterns::{BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source, gray_basis};
 use fewbits_sensor_assignment::{
     CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, brute_force, exchange, pair_costs,
 };
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// `binary-beyond`.
 pub struct Beyond;

@@ -1,13 +1,10 @@
 //! `binary-fig5-6`: equation 5.13 for three sets of patterns, and why it misleads.
 
 use super::{Scene, crossing, each, not_below, sweep};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, reference};
+use crate::prelude::*;
+use crate::reference;
 use fewbits_binary_patterns::bounds::printed_crlb;
 use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-6`.
 pub struct PrintedBounds;

@@ -1,14 +1,11 @@
 //! `binary-fig5-8`: decoders and bounds for three Gray bits.
 
 use super::{Ratios, Scene, each, sweep};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
 };
 use fewbits_binary_patterns::{Decoder, gray_basis};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// `binary-fig5-8`.
 pub struct Decoders;

@@ -1,14 +1,10 @@
 //! `binary-fig5-10`: ten sensors, with and without feedback.
 
 use super::{Scene, descent_from, each, mask_text, not_below, sweep};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_binary_patterns::baselines::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
 use fewbits_binary_patterns::bounds::ConditionalMean;
 use fewbits_binary_patterns::{Mask, gray_basis};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-10`.
 pub struct Feedback;

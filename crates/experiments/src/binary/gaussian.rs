@@ -1,12 +1,9 @@
 //! `binary-fig5-9`: a Gaussian source, three sensors of three bits.
 
 use super::{Ratios, Scene, crossing, each, mask_text, sweep};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// `binary-fig5-9`.
 pub struct GaussianSource;

@@ -12,14 +12,11 @@ mod patterns;
 mod table5_1;
 mod table5_2;
 
-use crate::plot::{Axis, Layer, Panel};
-use crate::{AnyFigure, Error};
+use crate::AnyFigure;
+use crate::prelude::*;
 use fewbits_binary_patterns::search::{Descent, LinearSearch};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Grid, Mask, Pattern, Source, linear_pattern, rank};
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {

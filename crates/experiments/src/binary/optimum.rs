@@ -1,14 +1,10 @@
 //! `binary-fig5-7`: optimal linear patterns against the signal-to-noise ratio, shortcuts, and Luo's scheme.
 
 use super::{Scene, crossing, descent_from, each, mask_text, not_below, sweep};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_binary_patterns::baselines::Luo;
 use fewbits_binary_patterns::search::{by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-7`.
 pub struct Optimum;

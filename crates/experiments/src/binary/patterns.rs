@@ -1,15 +1,11 @@
 //! `binary-fig5-2` to `binary-fig5-5` and `binary-figB-1`: the grid, its patterns, and what noise makes of one.
 
 use super::{Scene, pattern, pattern_panel};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_binary_patterns::{
     BinaryQuantizer, Grid, Mask, Pattern, check_separation, generator_matrix, gray_basis, natural_basis,
 };
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// `binary-fig5-2`.
 pub struct Clipping;

@@ -1,15 +1,11 @@
 //! `binary-table5-1`: eight patterns of three bits at 18.2 dB.
 
 use super::{Scene, mask_text, pattern, pattern_panel};
-use crate::plot::Plot;
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_binary_patterns::bounds::{optimal_weight_van_trees, printed_crlb};
 use fewbits_binary_patterns::search::MaskSet;
 use fewbits_binary_patterns::{Decoder, Mask, count};
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// `binary-table5-1`.
 pub struct Table;

@@ -1,13 +1,9 @@
 //! `binary-table5-2`: three patterns for a Gaussian source at 5.2 dB.
 
 use super::{Scene, each, pattern, pattern_panel, sweep};
-use crate::plot::Plot;
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_binary_patterns::{Decoder, Pattern, check_separation, count, mask_of};
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// `binary-table5-2`.
 pub struct Table;

@@ -6,8 +6,7 @@ use super::pictures::{by_budget, curve};
 use super::rows::{Ensemble, Nothing, Part, Rows, Step, Summary, steps};
 use super::scalar::{BUDGETS, CENSORED};
 use super::setting::{Linear, Setting};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error};
+use crate::prelude::*;
 use fewbits_cfwmd::information::fisher_information;
 use fewbits_cfwmd::rule::Weighing;
 use fewbits_filters::cramer_rao;
@@ -15,8 +14,6 @@ use fewbits_models::constant_velocity_1d;
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::Matrix2;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// Links that lose messages.
 pub(super) struct Lossy;

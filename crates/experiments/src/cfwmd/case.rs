@@ -3,11 +3,8 @@
 use super::rows::{Ensemble, Rows};
 use super::setting::Setting;
 use crate::parameters;
-use crate::plot::Plot;
-use crate::{About, Claims, Context, Cost, Error, Figure};
-use garde::Validate;
+use crate::prelude::*;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
-use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::marker::PhantomData;
 

@@ -6,11 +6,7 @@ use super::pictures::{BOTH, by_budget, by_step};
 use super::rates::{Rates, as_printed, misses, rate_plot, rates};
 use super::rows::{Ensemble, Nothing, Part, Rows, Step, Summary, steps, summary};
 use super::setting::{Field, Setting};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::prelude::*;
 
 const FOUR: [(&str, Scheme); 4] = [
     ("all", Scheme::All),

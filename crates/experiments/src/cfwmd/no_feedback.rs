@@ -5,15 +5,12 @@ use super::linear::{Method, Scheme, start};
 use super::pictures::{BOTH, by_step};
 use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
 use super::setting::{Linear, Setting};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Error};
+use crate::prelude::*;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_models::{LinearSensor, constant_velocity_1d};
 use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::Vector2;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// Figure 3.
 pub(super) struct Fig3;

@@ -1,8 +1,7 @@
 //! The pictures of the simulated figures.
 
 use super::rows::{Part, Step, Summary};
-use crate::Measured;
-use crate::plot::{Axis, Layer, Panel, Plot, points};
+use crate::prelude::*;
 
 pub(super) const BOTH: [Part; 2] = [Part::Position, Part::Velocity];
 

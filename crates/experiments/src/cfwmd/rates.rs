@@ -2,10 +2,8 @@
 
 use super::pictures::{curve, distinct};
 use super::rows::{Ensemble, rate};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{Claims, Measured, reference};
-use schemars::JsonSchema;
-use serde::Serialize;
+use crate::prelude::*;
+use crate::reference;
 
 /// Rates of one budget in one setting.
 #[derive(Debug, Serialize, JsonSchema)]

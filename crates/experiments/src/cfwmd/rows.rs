@@ -1,9 +1,7 @@
 //! What the simulated figures have in common: runs of schemes on common trials, and the rows that come of them.
 
-use crate::{Claims, Context, Error, Measured};
+use crate::prelude::*;
 use fewbits_monte_carlo::{Moments, Stream, Trial};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// One trial of one scheme, one entry a step.
 #[derive(Debug, Clone, Default)]

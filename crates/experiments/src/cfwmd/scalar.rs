@@ -6,8 +6,7 @@ use super::pictures::{BOTH, by_step};
 use super::rates::{Rates, as_printed, misses, rate_plot, rates};
 use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
 use super::setting::{Linear, Setting};
-use crate::plot::Plot;
-use crate::{About, Claims, Context, Error};
+use crate::prelude::*;
 use fewbits_cfwmd::rule::Weighing;
 
 pub(super) const CENSORED: [(&str, Scheme); 2] = [

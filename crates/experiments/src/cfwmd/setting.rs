@@ -1,11 +1,8 @@
 //! Parameters of the simulated figures.
 
 use super::rows::Ensemble;
-use crate::{Context, Cost, Error};
-use garde::Validate;
-use schemars::JsonSchema;
+use crate::prelude::*;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 
 /// Parameters of an experiment whose schemes are simulated on common trials.
 pub trait Setting:

@@ -7,8 +7,7 @@ use super::rates::{Rates, as_printed, rate_plot, rates};
 use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
 use super::scalar::CENSORED;
 use super::setting::{Linear, Setting};
-use crate::plot::Plot;
-use crate::{About, Claims, Context, Error};
+use crate::prelude::*;
 use fewbits_cfwmd::rule::Weighing;
 
 /// The acceleration variance that the text states; the setting's own, 1, is the one that fits the printed table.

@@ -1,13 +1,9 @@
 //! How many bits a sample are worth sending.
 
 use super::common::{Plant, plants};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain, iterated};
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Plants and word lengths.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -2,13 +2,9 @@
 
 use super::common::{Plant, each};
 use super::gap::steady_excess;
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::Link;
 use fewbits_dymbo::{DymboFilter, ScalarFilter, chain};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-bsc";
 

@@ -1,11 +1,8 @@
 //! What the Dymbo figures share.
 
-use crate::Error;
+use crate::prelude::*;
 use fewbits_core::Gaussian;
 use fewbits_dymbo::ScalarPlant;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
 
 /// A plant of unit measurement noise.

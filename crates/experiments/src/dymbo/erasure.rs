@@ -1,15 +1,11 @@
 //! Lost bits.
 
 use super::common::{Plant, each};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing, Sign};
 use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant, steady};
 use fewbits_monte_carlo::{Moments, Stream};
-use garde::Validate;
 use rand::RngExt;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-erasure";
 

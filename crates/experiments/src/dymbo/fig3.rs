@@ -1,11 +1,7 @@
 //! How much of the measurement noise the filters remove, against the noise ratio.
 
 use super::common::{Plant, log_spaced};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::prelude::*;
 
 /// Coefficients and noise ratios.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

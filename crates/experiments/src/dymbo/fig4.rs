@@ -1,13 +1,9 @@
 //! What the missing bits cost: the loss over the plane of plants.
 
 use super::common::{Plant, each, log_spaced};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_dymbo::{chain, filtered_variance, steady};
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_2_PI, PI};
 
 /// The grid and the contour levels.

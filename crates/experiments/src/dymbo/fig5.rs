@@ -1,8 +1,7 @@
 //! Convergence from the first message: simulated, exact and predicted.
 
 use super::common::{Plant, each, plants};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Sensing, Sign};
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{
@@ -10,10 +9,7 @@ use fewbits_dymbo::{
 };
 use fewbits_filters::kalman;
 use fewbits_monte_carlo::{Moments, Stream};
-use garde::Validate;
 use nalgebra::Vector1;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
 
 const ID: &str = "dymbo-fig5";

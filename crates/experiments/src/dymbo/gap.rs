@@ -1,16 +1,12 @@
 //! How much any estimator could gain from the same bits.
 
 use super::common::{Plant, plants};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::Link;
 use fewbits_dymbo::chain::{self, MessageLaw};
 use fewbits_dymbo::gap::{Twin, exact_filter};
 use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, innovation_gain, tree};
 use fewbits_monte_carlo::{Moments, Stream};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-gap";
 

@@ -1,14 +1,10 @@
 //! How normal the posterior of one bit is.
 
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Gaussian, Link, Sign};
 use fewbits_dymbo::skew_normal::{distance_from_normal, posterior_density};
 use fewbits_numerics::normal::log_pdf_with;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Noise deviations, and that of the prior.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -1,13 +1,9 @@
 //! The fine first message: what it brings, and the variance to start from.
 
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_core::Gaussian;
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{RoundedSample, ScalarPlant, first_message_mse};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Noise deviation and resolutions; the plant of the start-up comparison.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

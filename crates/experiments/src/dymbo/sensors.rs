@@ -1,13 +1,9 @@
 //! Several one-bit sensors in each slot.
 
 use super::common::{Plant, each};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant, chain, steady};
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Plant and numbers of sensors.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -2,15 +2,11 @@
 
 use super::common::{Plant, plants};
 use super::gap::BURN;
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_dymbo::gap::{Twin, exact_filter};
 use fewbits_dymbo::{DymboFilter, ScalarFilter};
 use fewbits_filters::scalar_fixed_lag_variance;
 use fewbits_monte_carlo::Moments;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-smoother";
 

@@ -1,16 +1,12 @@
 //! Where the threshold belongs, and what an unstable plant does.
 
 use super::common::{Plant, plants};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Scheme, Sensing, Sign};
 use fewbits_dymbo::{DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant};
 use fewbits_filters::assumed_density;
 use fewbits_monte_carlo::{Estimate, Moments, Stream};
-use garde::Validate;
 use nalgebra::{Matrix1, Vector1};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 const ID: &str = "dymbo-threshold";
 

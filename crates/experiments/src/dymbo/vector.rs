@@ -1,17 +1,13 @@
 //! A two-dimensional state watched by one or three one-bit sensors.
 
-use crate::plot::{Axis, Layer, Marker, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing, Sign};
 use fewbits_dymbo::SignFilter;
 use fewbits_filters::{PlaneFilter, SteadyState, steady_state};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
 use fewbits_monte_carlo::{Moments, Stream};
-use garde::Validate;
 use nalgebra::{Matrix2, SMatrix, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 const ID: &str = "dymbo-vector";

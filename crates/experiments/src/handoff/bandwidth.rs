@@ -3,15 +3,11 @@
 use super::exact::{Lattice, StepLaw};
 use super::filters::{PARTICLES, REFERENCE, plain_step, prior, world};
 use super::world::Walk;
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_densities::tree::{At, Axis as SplitAxis};
 use fewbits_densities::{Bandwidth, Criterion, Reduction, Split};
 use fewbits_handoff::{Components, HandoffFilter, Reducer, Whole};
 use fewbits_monte_carlo::Moments;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -1,10 +1,6 @@
 //! Figure 1: which density is which.
 
-use crate::plot::{Axis, Layer, Marker, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::prelude::*;
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

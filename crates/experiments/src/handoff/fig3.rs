@@ -1,14 +1,10 @@
 //! Figure 3: one bit turns a small error into the largest.
 
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_core::Columns;
 use fewbits_densities::quadrature::QuadratureGrid;
 use fewbits_densities::{Component, Mixture};
-use garde::Validate;
 use nalgebra::{Matrix1, Vector1};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

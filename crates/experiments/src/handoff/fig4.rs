@@ -1,11 +1,7 @@
 //! Figure 4: the field, the target's way, the leaders.
 
 use super::world::{STAND_OFF, STEP, World};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::prelude::*;
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

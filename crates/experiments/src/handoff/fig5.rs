@@ -2,13 +2,9 @@
 
 use super::filters::{PARTICLES, STEPS, Smoothing, Truth, posteriors, prior, single};
 use super::world::World;
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_densities::{Reduction, ellipse};
 use fewbits_monte_carlo::Moments;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

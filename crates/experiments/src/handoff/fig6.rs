@@ -2,13 +2,9 @@
 
 use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, paper_cut, prior, world};
 use super::world::Walk;
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_handoff::{Accounting, Amplification, StepError};
 use fewbits_monte_carlo::{Moments, Trial};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::LN_10;
 
 /// Settings.

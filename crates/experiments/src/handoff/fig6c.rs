@@ -4,17 +4,13 @@ use super::filters::{
     CRITERIA, PARTICLES, REFERENCE, STEPS, Smoothing, estimate, paper_cut, plain_step, prior, single, world,
 };
 use super::world::{Reading, Walk};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::Columns;
 use fewbits_densities::{KernelEstimate, Mixture, Particles};
 use fewbits_handoff::{HandoffFilter, StepError, Whole};
 use fewbits_monte_carlo::{Moments, Stream, Trial};
-use garde::Validate;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

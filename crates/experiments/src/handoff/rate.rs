@@ -1,16 +1,12 @@
 //! KL against bits.
 
 use super::filters::{Truth, as_f32, posteriors};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::Message;
 use fewbits_densities::wire::{CodedMixture, WireFormat};
 use fewbits_densities::{Bandwidth, Criterion, KernelEstimate, Mixture, Reduction};
 use fewbits_monte_carlo::Moments;
-use garde::Validate;
 use nalgebra::Vector2;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

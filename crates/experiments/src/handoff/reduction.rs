@@ -1,15 +1,11 @@
 //! KL against components for every reduction.
 
 use super::filters::{Truth, posteriors};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_densities::merge::{MergeCost, merge};
 use fewbits_densities::tree::{At, Axis as SplitAxis};
 use fewbits_densities::{Criterion, KernelEstimate, Mixture, Reduction, Split};
 use fewbits_monte_carlo::Moments;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Settings.

@@ -1,13 +1,9 @@
 //! Beyond the publication: folded cells, broken symmetry, words, bounds, effort.
 
 use super::common::{MI, MSE, breakpoints, bsc, lloyd, lloyd_system, name, scene};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_quantizer_design::design::{self, Discovery};
 use fewbits_quantizer_design::{Channel, Criterion, Newton, Quantizer, SensorGroup, System, bounds};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings of the searches.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

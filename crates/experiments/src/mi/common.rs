@@ -1,10 +1,8 @@
 //! What the tables of this system share: scenes, starting quantizers and rows of designs.
 
-use crate::Error;
+use crate::prelude::*;
 use fewbits_quantizer_design::design::Design;
 use fewbits_quantizer_design::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 pub(super) const MI: Criterion = Criterion::MutualInformation;
 pub(super) const MSE: Criterion = Criterion::MeanSquaredError;

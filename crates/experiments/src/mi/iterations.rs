@@ -2,13 +2,9 @@
 //! channels) show two columns of the same run; each judges its own.
 
 use super::common::{MI, MSE, bsc, lloyd_system, scene};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_quantizer_design::{System, design};
-use garde::Validate;
-use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::LN_2;
 use std::marker::PhantomData;
 

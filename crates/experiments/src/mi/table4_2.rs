@@ -2,12 +2,9 @@
 
 use super::common::{MI, MSE, Pair, lloyd_system, odd, scene};
 use super::plots::errors;
-use crate::plot::Plot;
-use crate::{About, Claims, Context, Error, Figure, reference};
+use crate::prelude::*;
+use crate::reference;
 use fewbits_quantizer_design::{Newton, System, bounds, design};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings of Table 4.2.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -1,12 +1,9 @@
 //! Table 4.3: nine sensors.
 
 use super::common::{MI, MSE, lloyd, scene};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, reference};
+use crate::prelude::*;
+use crate::reference;
 use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings of Table 4.3.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -1,15 +1,12 @@
 //! Table 4.4: detection of a constant in noise by five sensors.
 
 use super::common::MI;
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, reference};
+use crate::prelude::*;
+use crate::reference;
 use fewbits_numerics::normal;
 use fewbits_quantizer_design::decoder::NeymanPearson;
 use fewbits_quantizer_design::design::{self, Separation};
 use fewbits_quantizer_design::{Channel, Criterion, JointTable, Newton, Noise, Prior, Quantizer, Scene, System};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 const PE: Criterion = Criterion::BayesError;
 

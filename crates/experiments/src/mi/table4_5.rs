@@ -1,12 +1,9 @@
 //! Table 4.5: words over a binary symmetric channel, and what a wrong assumption about it costs.
 
 use super::common::{MI, MSE, Pair, bsc, lloyd_system, odd, scene};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, reference};
+use crate::prelude::*;
+use crate::reference;
 use fewbits_quantizer_design::{Newton, System, design};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Name, title and words of the four levels.
 const LABELLINGS: [(&str, &str, [u32; 4]); 3] = [

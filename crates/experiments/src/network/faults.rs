@@ -1,18 +1,14 @@
 //! What faults do to the error, and how long a restarted sensor is out of step.
 
 use super::worlds::{self, RADIUS};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Sensing};
 use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_network::estimators::Counted;
 use fewbits_network::{Channel, Fault, Loss, Mishap, Seconds, SensorId, Setup, Star};
-use garde::Validate;
 use nalgebra::Vector1;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 const SENSORS: usize = 4;
 const WARM_UP: usize = 20;

@@ -1,11 +1,7 @@
 //! Error against bits, transmitted bits and joules: every scheme on the same worlds.
 
 use super::worlds::{self, COEFFICIENT, Scheme};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Comparison, Context, Cost, Error, Figure, Measured};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::prelude::*;
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -1,12 +1,8 @@
 //! Days on two AA cells.
 
 use super::worlds::{self, Scheme};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_network::Radio;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

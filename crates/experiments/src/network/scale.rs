@@ -1,15 +1,11 @@
 //! Time and memory of the runner against the number of nodes.
 
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Cost, Error, Figure};
+use crate::prelude::*;
 use fewbits_core::BitString;
 use fewbits_network::{
     Context as Air, Field, Frame, Instant, Kind, Protocol, Radio, Seconds, SensorId, Setup, Simulator,
 };
 use fewbits_topology::Deployment;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

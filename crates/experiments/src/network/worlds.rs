@@ -2,7 +2,7 @@
 //!
 //! A scheme that is added here is in all figures: give it a [`Scheme`], its label, and an arm of [`World::run`].
 
-use crate::Error;
+use crate::prelude::*;
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::threshold::Budget;
@@ -21,7 +21,6 @@ use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, op
 use fewbits_quantizer_design::{Criterion, Newton, Scene, System, design};
 use fewbits_quantizers::{Labelling, Quantizer, QuantizingSensor, lloyd_max};
 use nalgebra::{Matrix1, Matrix4, RowVector2, RowVector4, SVector, Vector1, Vector2, Vector4};
-use serde::Serialize;
 
 /// Sensors of either world; their noise has unit variance.
 pub(super) const SENSORS: usize = 4;
