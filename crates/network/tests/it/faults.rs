@@ -2,9 +2,11 @@
 
 use crate::books::conserves;
 use crate::worlds::{clock, counted, scalar, setup, start};
+use fewbits_adaptive::Config;
 use fewbits_core::{BitString, Gaussian, Link};
+use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::Counted;
+use fewbits_network::estimators::{Counted, Followers};
 use fewbits_network::{
     AdHoc, Channel, Check, Error, Fault, Field, Lead, Log, Loss, Mishap, Note, Seconds, SensorId, Setup, Simulator,
     Star, StarNode, Walk, Walker,
@@ -102,6 +104,43 @@ proptest! {
         conserves(network.ledger());
         let seen = disagreements(network.log()) as u64;
         prop_assert_eq!(seen, network.ledger().faults().disagreements);
+    }
+
+    #[test]
+    fn followed_signals_survive(setup in schedules()) {
+        let slots = FAULTY + QUIET;
+        let followers = Followers {
+            dynamics: Ar1::new(0.9, 0.5).unwrap(),
+            sensors: vec![LinearSensor::<1, 1>::direct(1.0).unwrap(); 3],
+            noise_variance: 1.0,
+            config: Config::new(0.5).and_then(|c| c.resilient(4, Some(4))).unwrap(),
+            start: start(),
+        };
+        // A damaged packet can be one that the sensor might have sent: its check covers all of it.
+        let setup = Setup { report_check: Check::Whole, ..setup };
+        let measurements = scalar(3, slots as usize, 1);
+        let star = Star::told(followers, measurements.clone(), clock(), Stream::new(1)).unwrap();
+        let mut network = star.simulate(10.0, setup.clone()).unwrap();
+        network.run_until(clock().end(FAULTY)).unwrap();
+        let mut stored = Vec::new();
+        network.snapshot(&mut stored).unwrap();
+        let star = network.protocol().clone();
+        let quiet = Setup { channel: Channel::PERFECT, faults: Vec::new(), ..setup };
+        let mut network = Simulator::restore(star, Field::star(3, 10.0).unwrap(), quiet, stored.as_slice()).unwrap();
+        network.run_until(clock().end(slots)).unwrap();
+        prop_assert!(finite(network.nodes()[0].estimates()));
+        conserves(network.ledger());
+        // After a refresh over clear air, whoever lives is followed within delta again.
+        if let Some((slot, followed)) = network.nodes()[0].belief()
+            && slot == slots
+        {
+            let last = &measurements[slots as usize - 1];
+            for ((receiver, z), sensor) in followed.receivers().iter().zip(last).zip(&network.nodes()[1..]) {
+                if sensor.answered() == Some(slots) && receiver.tracked().synchronised {
+                    prop_assert!((receiver.tracked().value.unwrap() - z[0]).abs() <= 0.5);
+                }
+            }
+        }
     }
 
     #[test]
