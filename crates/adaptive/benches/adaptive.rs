@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::counter::ItemsCount;
-use divan::{Bencher, black_box};
+use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_adaptive::{Config, Packet, Receiver, Sensor};
 use fewbits_core::Observation;
 use fewbits_monte_carlo::Stream;
@@ -11,6 +11,9 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 
 const COUNT: usize = 4000;
+
+#[global_allocator]
+static ALLOC: AllocProfiler = AllocProfiler::system();
 
 fn main() {
     divan::main();

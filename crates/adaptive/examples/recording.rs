@@ -10,7 +10,7 @@
 //! column; the second half, which that choice has not seen, is judged apart. With `words` every sample takes that many bits. Errors
 //! are those of the receiver's reconstruction, beside holding the last of as many evenly spaced 12-bit samples.
 
-use fewbits_adaptive::{Config, FixedRate, Receiver, Sensor, Silence, StreamWriter};
+use fewbits_adaptive::{Config, FixedRate, Receiver, Replay, Sensor, Silence, StreamWriter, best_within, replay};
 use std::error::Error;
 use std::fmt::Write;
 use std::path::Path;
@@ -99,21 +99,6 @@ pub fn read_column(file: &Path, column: &str) -> Result<Vec<f64>, Box<dyn Error>
     Ok(samples)
 }
 
-/// What a run over a recording gave.
-#[derive(Debug, Clone, Default)]
-pub struct Run {
-    /// Reconstruction error of each sample.
-    pub errors: Vec<f64>,
-    /// Ideal code length spent on each sample.
-    pub information: Vec<f64>,
-    /// Whole bits of all packets.
-    pub packet_bits: usize,
-    /// Packets.
-    pub packets: usize,
-    /// Bits of one stream that also tells the silences.
-    pub stream_bits: usize,
-}
-
 /// Root mean square.
 pub fn rms(errors: &[f64]) -> f64 {
     (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
@@ -123,47 +108,20 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Sensor, packets and receiver over a recording.
-pub fn run(samples: &[f64], config: Config) -> Result<Run, Box<dyn Error>> {
+/// The largest error over a recording as the receiver sees it, and the bits of one stream that also tells the silences.
+fn received(samples: &[f64], config: Config) -> Result<(f64, usize), Box<dyn Error>> {
     let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
     let (mut writer, mut stream) = (Sensor::new(config), StreamWriter::new(Silence::Coded));
-    let mut run = Run::default();
+    let mut worst = 0.0_f64;
     for sample in samples {
         let report = sensor.encode(*sample)?;
-        run.information.push(report.map_or(0.0, |report| report.information));
-        run.packet_bits += report.map_or(0, |report| report.packet.bits());
-        run.packets += usize::from(report.is_some());
         let tracked = receiver.receive(&report.map(|report| report.packet).into())?;
-        let straight = tracked.value.ok_or("nothing received")? - sample;
-        let error = config
-            .period()
-            .map_or(straight, |period| straight - period * (straight / period).round());
-        run.errors.push(error);
+        let straight = (tracked.value.ok_or("nothing received")? - sample).abs();
+        let turn = |period: f64| (straight - period * (straight / period).round()).abs();
+        worst = worst.max(config.period().map_or(straight, turn));
         writer.write_after(1, *sample, &mut stream)?;
     }
-    run.stream_bits = 32 * stream.finish().len();
-    Ok(run)
-}
-
-/// The smallest error, by bisection on its logarithm, at which the ideal rate is at most `rate`.
-pub fn delta_for(samples: &[f64], rate: f64, period: Option<f64>) -> Result<f64, Box<dyn Error>> {
-    let (low, high) = samples
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-    let range = period.unwrap_or(high - low);
-    if !(range.is_finite() && range > 0.0) {
-        return Err("the column is constant: any delta will do".into());
-    }
-    let (mut low, mut high) = (1e-5 * range, range);
-    for _ in 0..16 {
-        let middle = (low * high).sqrt();
-        if mean(&run(samples, configured(middle, period)?)?.information) <= rate {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    Ok(high)
+    Ok((worst, 32 * stream.finish().len()))
 }
 
 fn configured(delta: f64, period: Option<f64>) -> Result<Config, Box<dyn Error>> {
@@ -181,13 +139,18 @@ pub fn report(samples: &[f64], task: &Task) -> Result<String, Box<dyn Error>> {
     }
     let half = samples.len() / 2;
     let mut text = String::new();
-    let delta = match task.goal {
+    let config = match task.goal {
         Goal::Words(bits) => return words(samples, bits),
-        Goal::Delta(delta) => delta,
-        Goal::Rate(rate) => delta_for(&samples[..half], rate, task.period)?,
+        Goal::Delta(delta) => configured(delta, task.period)?,
+        Goal::Rate(rate) => {
+            let price = |replay: &Replay| Ok::<_, fewbits_adaptive::Error>(replay.rate());
+            best_within(configured(1.0, task.period)?, &samples[..half], rate, price)?.0
+        }
     };
-    let run = run(samples, configured(delta, task.period)?)?;
-    writeln!(text, "{} samples, every error at most {delta:.6}", samples.len())?;
+    let run = replay(config, samples)?;
+    let (worst, stream_bits) = received(samples, config)?;
+    let delta = config.delta();
+    writeln!(text, "{} samples, every error at most {delta:.6}; at the receiver {worst:.6}", samples.len())?;
     writeln!(text, "{:>12} {:>12} {:>12} {:>12}", "", "bits/sample", "rms error", "worst error")?;
     for (name, part) in [("first half", 0..half), ("second half", half..samples.len())] {
         let worst = run.errors[part.clone()].iter().fold(0.0_f64, |w, e| w.max(e.abs()));
@@ -199,11 +162,11 @@ pub fn report(samples: &[f64], task: &Task) -> Result<String, Box<dyn Error>> {
         text,
         "{} packets; per sample {:.4} bits ideal, {:.4} in whole packets, {:.4} as one stream with its silences",
         run.packets,
-        mean(&run.information),
+        run.rate(),
         run.packet_bits as f64 / n,
-        run.stream_bits as f64 / n
+        stream_bits as f64 / n
     )?;
-    let every = ((12.0 / mean(&run.information).max(1e-9)).round() as usize).clamp(1, samples.len());
+    let every = ((12.0 / run.rate().max(1e-9)).round() as usize).clamp(1, samples.len());
     writeln!(text, "one 12-bit sample in {every}, held: rms error {:.6}", rms(&held(samples, every)))?;
     Ok(text)
 }

@@ -35,7 +35,7 @@ const FARTHEST: f64 = 50.0;
 /// The least evidence, so that a wild value does not decide everything.
 const LEAST: f64 = 1e-15;
 /// Longer gaps between samples count as this many slots.
-const LONGEST_GAP: u32 = 64;
+pub(crate) const LONGEST_GAP: u32 = 64;
 
 /// Standard deviation of the driving noise of a scale, in steps of `2 delta`.
 fn noise_of(scale: usize) -> f64 {
@@ -131,11 +131,9 @@ impl Bank {
     /// All models at index 0; `believed` has half of the weight, if any does.
     pub(crate) fn new(believed: Option<usize>) -> Self {
         let mut w = [1.0 / MODELS as f64; MODELS];
-        if let Some(best) = believed {
+        if let Some(best) = believed.filter(|best| *best < MODELS) {
             w = [0.5 / MODELS as f64; MODELS];
-            if let Some(weight) = w.get_mut(best) {
-                *weight += 0.5;
-            }
+            w[best] += 0.5;
         }
         Self {
             x: [0.0; MODELS],
@@ -154,7 +152,7 @@ impl Bank {
     }
 
     pub(crate) fn is_valid(&self) -> bool {
-        let finite = self.x.iter().chain(&self.v).all(|x| x.is_finite());
+        let finite = self.x.iter().chain(&self.v).all(|x| x.abs() < 1e30);
         finite && self.w.iter().all(|w| *w > 0.0 && *w < 1.0 + 1e-9)
     }
 
@@ -240,7 +238,7 @@ impl Bank {
 /// A slot ahead of the last update.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Ahead {
-    slots: u32,
+    pub(crate) slots: u32,
     /// Mean of the bank.
     pub(crate) mean: f64,
 }

@@ -12,6 +12,7 @@ pub struct Config {
     sequence_bits: u32,
     refresh_every: Option<u64>,
     resilient: bool,
+    exact: bool,
 }
 
 impl Config {
@@ -30,7 +31,38 @@ impl Config {
             sequence_bits: 0,
             refresh_every: None,
             resilient: false,
+            exact: false,
         })
+    }
+
+    /// For an instrument whose samples are decimal numbers a multiple of `resolution` apart: these return exactly, to the last
+    /// bit. Other samples are reconstructed within `resolution / 2`, but cost more than with [`new`](Self::new) where they lie
+    /// half-way. Around a circle this is the same as `new(resolution / 2)`.
+    ///
+    /// # Errors
+    /// If `resolution` is not positive and finite, or half of it 0.
+    pub fn exact(resolution: f64) -> Result<Self, ArgumentError> {
+        positive("resolution", resolution)?;
+        Ok(Self {
+            exact: true,
+            ..Self::new(0.5 * resolution)?
+        })
+    }
+
+    /// The same agreement with another bound.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new) and [`circular`](Self::circular).
+    pub fn with_delta(self, delta: f64) -> Result<Self, ArgumentError> {
+        let config = Self {
+            delta: Self::new(delta)?.delta,
+            exact: false,
+            ..self
+        };
+        match self.period {
+            Some(period) => config.circular(period),
+            None => Ok(config),
+        }
     }
 
     /// The signal lives on a circle: samples are taken modulo `period` (360 for degrees), reconstructions lie in `[0, period)`,
@@ -70,6 +102,15 @@ impl Config {
         self.delta
     }
 
+    pub(crate) fn made_exact(self) -> Self {
+        Self { exact: true, ..self }
+    }
+
+    /// What samples are a multiple of apart, if [`exact`](Self::exact).
+    pub fn resolution(&self) -> Option<f64> {
+        self.exact.then_some(2.0 * self.delta)
+    }
+
     /// The period of a circular signal.
     pub fn period(&self) -> Option<f64> {
         self.period
@@ -98,6 +139,8 @@ struct Stored {
     period: Option<f64>,
     sequence_bits: u32,
     refresh_every: Option<u64>,
+    #[serde(default)]
+    exact: bool,
 }
 
 impl From<Config> for Stored {
@@ -107,6 +150,7 @@ impl From<Config> for Stored {
             period: config.period,
             sequence_bits: config.sequence_bits,
             refresh_every: config.refresh_every,
+            exact: config.exact,
         }
     }
 }
@@ -115,7 +159,10 @@ impl TryFrom<Stored> for Config {
     type Error = ArgumentError;
 
     fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
-        let mut config = Self::new(stored.delta)?;
+        let mut config = Self {
+            exact: stored.exact,
+            ..Self::new(stored.delta)?
+        };
         if let Some(period) = stored.period {
             config = config.circular(period)?;
         }

@@ -125,12 +125,19 @@ impl Values {
             .map_or(0, |e| e.1)
     }
 
-    /// Counts of the indices that `chosen` accepts.
-    pub(crate) fn sum(&self, chosen: impl Fn(i64) -> bool) -> u32 {
-        self.entries
-            .iter()
-            .map(|(j, count)| if chosen(*j) { *count } else { 0 })
-            .sum()
+    /// Entries before index `j`.
+    pub(crate) fn rank(&self, j: i64) -> usize {
+        self.entries.partition_point(|e| e.0 < j)
+    }
+
+    /// Counts of the first `n` entries, for every `n`.
+    pub(crate) fn sums(&self) -> [u32; CAPACITY + 1] {
+        let (mut sums, mut total) = ([0; CAPACITY + 1], 0);
+        for (sum, entry) in sums.iter_mut().skip(1).zip(&self.entries) {
+            total += entry.1;
+            *sum = total;
+        }
+        sums
     }
 
     pub(crate) fn add(&mut self, j: i64, weight: u32) {
@@ -193,7 +200,8 @@ mod tests {
             assert!(seen.is_valid());
         }
         assert!(seen.count(-7) > 100 && seen.count(9_999) == REPORTED);
-        let all = seen.sum(|_| true);
-        assert_eq!(all, seen.total());
+        let sums = seen.sums();
+        assert_eq!(sums[seen.rank(i64::MAX)], seen.total());
+        assert_eq!(sums[seen.rank(0)], seen.count(-7));
     }
 }

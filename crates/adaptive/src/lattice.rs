@@ -1,6 +1,7 @@
 //! Where reconstructions lie: a lattice through the first sample.
 
 use crate::Config;
+use crate::packet::TENS;
 use serde::{Deserialize, Serialize};
 
 /// Indices beyond this size are no longer exact sums: such samples travel whole.
@@ -16,13 +17,47 @@ pub(crate) struct Lattice {
     delta: f64,
     /// The period, and its number of points.
     circle: Option<(f64, i64)>,
+    decimal: Option<Decimal>,
+}
+
+/// Points that are decimal numbers to the last bit: `(anchor + step j) / ten`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Decimal {
+    anchor: i64,
+    step: i64,
+    ten: f64,
+}
+
+impl Decimal {
+    /// The fewest decimals that write both numbers, if fifteen digits do.
+    fn find(step: f64, anchor: f64) -> Option<Self> {
+        let whole = |x: f64, ten: f64| {
+            let digits = (x * ten).round();
+            (digits.abs() < 1e15 && digits / ten == x).then_some(digits as i64)
+        };
+        TENS.into_iter().find_map(|ten| {
+            Some(Self {
+                anchor: whole(anchor, ten)?,
+                step: whole(step, ten)?,
+                ten,
+            })
+        })
+    }
+
+    fn value(&self, j: i64) -> f64 {
+        (i128::from(self.anchor) + i128::from(self.step) * i128::from(j)) as f64 / self.ten
+    }
 }
 
 impl Lattice {
     pub(crate) fn new(config: &Config, anchor: f64) -> Self {
         let longest = 2.0 * config.delta() * (1.0 - SLACK);
+        let decimal = config
+            .resolution()
+            .filter(|_| config.period().is_none())
+            .and_then(|step| Decimal::find(step, anchor));
         let (step, circle) = match config.period() {
-            None => (longest, None),
+            None => (decimal.map_or(longest, |_| 2.0 * config.delta()), None),
             Some(period) => {
                 let cells = (period / longest).ceil().max(1.0);
                 (period / cells, Some((period, cells as i64)))
@@ -33,6 +68,7 @@ impl Lattice {
             step,
             delta: config.delta(),
             circle,
+            decimal,
         }
     }
 
@@ -56,8 +92,21 @@ impl Lattice {
 
     /// The reconstruction of an index.
     pub(crate) fn value(&self, j: i64) -> f64 {
-        let value = self.anchor + self.step * self.canonical(j) as f64;
+        let value = match &self.decimal {
+            Some(decimal) => decimal.value(j),
+            None => self.anchor + self.step * self.canonical(j) as f64,
+        };
+        // Damaged reports can mean indices that no sample has.
+        let value = value.clamp(f64::MIN, f64::MAX);
         self.circle.map_or(value, |(period, _)| wrap(value, period))
+    }
+
+    /// A difference of indices, the shortest way around the circle.
+    pub(crate) fn shortest(&self, difference: i64) -> i64 {
+        self.cells().map_or(difference, |cells| {
+            let k = difference.rem_euclid(cells);
+            if 2 * k > cells { k - cells } else { k }
+        })
     }
 
     /// The index nearest to a sample (of its names around the circle, the one nearest to `near`); `None` if no point of the
@@ -70,13 +119,7 @@ impl Lattice {
         let nearest = offset.round() as i64;
         let fits = |j: &i64| self.distance(self.value(*j), sample) <= self.delta;
         let j = [nearest, nearest - 1, nearest + 1].into_iter().find(fits)?;
-        Some(match self.cells() {
-            None => j,
-            Some(cells) => {
-                let k = (j - near).rem_euclid(cells);
-                near + if 2 * k > cells { k - cells } else { k }
-            }
-        })
+        Some(near + self.shortest(j - near))
     }
 
     /// Distance of two values, around the circle if there is one.
@@ -86,9 +129,15 @@ impl Lattice {
             .map_or(straight, |(period, _)| straight.min((period - straight).abs()))
     }
 
-    pub(crate) fn is_valid(&self) -> bool {
-        let numbers = [self.anchor, self.step, self.delta].iter().all(|x| x.is_finite());
-        numbers && self.step > 0.0 && self.circle.is_none_or(|(period, cells)| period > 0.0 && cells > 0)
+    pub(crate) fn is_valid(&self, config: &Config) -> bool {
+        let agreed = self.delta == config.delta() && self.circle.map(|circle| circle.0) == config.period();
+        let numbers = [self.anchor, self.step].iter().all(|x| x.is_finite());
+        let decimal = self.decimal.is_none_or(|d| d.step > 0 && TENS.contains(&d.ten));
+        agreed
+            && numbers
+            && decimal
+            && self.step > 0.0
+            && self.circle.is_none_or(|(period, cells)| period > 0.0 && cells > 0)
     }
 }
 
@@ -126,6 +175,22 @@ mod tests {
         for i in -5000..5000 {
             assert!(lattice.index(22.0 + f64::from(i) / 1000.0, 0).is_some(), "{i}");
         }
+    }
+
+    #[test]
+    fn an_instruments_own_numbers_return_exactly() {
+        for (resolution, anchor) in [(0.001, 22.0), (0.0625, -3.25), (1.0, 279.0), (0.1, 1e6)] {
+            let lattice = Lattice::new(&Config::exact(resolution).unwrap(), anchor);
+            let per_unit = (1.0 / resolution).round();
+            for i in -20_000..20_000 {
+                let sample = ((anchor * per_unit).round() + f64::from(i)) / per_unit;
+                let j = lattice.index(sample, 0).unwrap();
+                assert_eq!((j, lattice.value(j)), (i64::from(i), sample));
+            }
+        }
+        // Numbers that no decimals write: the bound alone.
+        let lattice = Lattice::new(&Config::exact(1.0 / 3.0).unwrap(), 0.1);
+        assert!(lattice.decimal.is_none() && lattice.index(7.0, 0).is_some());
     }
 
     #[test]

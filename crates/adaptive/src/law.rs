@@ -11,7 +11,7 @@
 //! The mixture loses at most `log2(1 / weight)` bits in all against the best of the three, and a little at each change of the
 //! best. Two units each are more than the rounding of the cumulative sums, so every residual keeps a frequency above zero.
 
-use crate::counts::REPORTED;
+use crate::counts::{CAPACITY, REPORTED};
 use crate::replica::{Replica, Slot};
 
 /// Bits of a frequency.
@@ -34,6 +34,9 @@ pub(crate) struct Law<'a> {
     /// The bank's probability of an index other than the prediction, below it and above it.
     lower: f64,
     upper: f64,
+    /// Counts of the values before each, and of the prediction.
+    sums: [u32; CAPACITY + 1],
+    silent: u32,
 }
 
 /// A symbol's place among the frequencies.
@@ -77,6 +80,8 @@ impl<'a> Law<'a> {
             slot,
             lower: replica.bank.below(&slot.ahead, p - 0.5),
             upper: replica.bank.above(&slot.ahead, p + 0.5),
+            sums: replica.values.sums(),
+            silent: replica.values.count(replica.lattice.canonical(slot.prediction)),
         }
     }
 
@@ -101,13 +106,29 @@ impl<'a> Law<'a> {
         }
     }
 
-    /// An index around the circle relative to the prediction.
-    fn relative(&self, j: i64) -> i64 {
-        let k = j - self.slot.prediction;
-        self.replica.lattice.cells().map_or(k, |cells| {
-            let k = k.rem_euclid(cells);
-            if 2 * k > cells { k - cells } else { k }
-        })
+    /// Counts of the values whose residual is in `-REACH..k` and not 0.
+    fn values_below(&self, k: i64) -> u32 {
+        let (values, p) = (&self.replica.values, self.slot.prediction);
+        let before = |j: i64| self.sums.get(values.rank(j)).copied().unwrap_or_default();
+        let (low, high, count) = match self.replica.lattice.cells() {
+            None => (-REACH, k, before(p + k) - before(p - REACH)),
+            Some(cells) => {
+                // Residuals around the circle are the shortest way.
+                let (low, high) = ((cells / 2 + 1 - cells).max(-REACH), k.min(cells / 2 + 1));
+                if high <= low {
+                    return 0;
+                }
+                let first = (p + low).rem_euclid(cells);
+                let end = first + high - low;
+                let around = if end > cells { before(end - cells) } else { 0 };
+                (low, high, before(end.min(cells)) - before(first) + around)
+            }
+        };
+        if low <= 0 && high > 0 {
+            count - self.silent
+        } else {
+            count
+        }
     }
 
     /// Total frequency below `symbol`.
@@ -129,13 +150,8 @@ impl<'a> Law<'a> {
             1.0 - replica.bank.above(&slot.ahead, edge) / outside
         };
         let residuals = replica.residuals[slot.pick].below(k);
-        let chosen = |j| {
-            let r = self.relative(j);
-            (-REACH..k).contains(&r) && r != 0
-        };
-        let silent = replica.values.count(replica.lattice.canonical(slot.prediction));
-        let seen = f64::from(replica.values.total() - silent + REPORTED);
-        let values = (f64::from(replica.values.sum(chosen)) + f64::from(REPORTED) * bank) / seen;
+        let seen = f64::from(replica.values.total() - self.silent + REPORTED);
+        let values = (f64::from(self.values_below(k)) + f64::from(REPORTED) * bank) / seen;
         let [a, b, c] = replica.coders;
         let share = (a * bank + b * residuals + c * values).clamp(0.0, 1.0);
         EACH * symbol + (f64::from(TOTAL - EACH * ESCAPE - ESCAPE_SHARE) * share) as u32
@@ -150,22 +166,74 @@ impl<'a> Law<'a> {
         }
     }
 
-    /// The symbol at a quantile.
+    /// The symbol at a quantile: outwards from the prediction in doubling steps, then by bisection.
     pub(crate) fn find(&self, quantile: u32) -> (u32, Place) {
-        let (mut low, mut high) = (0, ESCAPE + 1);
-        while high - low > 1 {
-            let middle = low + (high - low) / 2;
-            if self.cumulative(middle) <= quantile {
-                low = middle;
+        let middle = REACH as u32;
+        let (mut low, mut high) = ((0, 0), (ESCAPE + 1, TOTAL));
+        let start = self.cumulative(middle);
+        let upwards = start <= quantile;
+        *(if upwards { &mut low } else { &mut high }) = (middle, start);
+        let mut step = 1;
+        while high.0 - low.0 > 1 {
+            let probe = if step < high.0 - low.0 {
+                if upwards { low.0 + step } else { high.0 - step }
             } else {
-                high = middle;
-            }
+                low.0 + (high.0 - low.0) / 2
+            };
+            let left = self.cumulative(probe);
+            let below = left <= quantile;
+            *(if below { &mut low } else { &mut high }) = (probe, left);
+            step = if below == upwards {
+                step.saturating_mul(2)
+            } else {
+                u32::MAX
+            };
         }
-        (low, self.place(low))
+        let width = high.1.saturating_sub(low.1).max(1);
+        (low.0, Place { left: low.1, width })
     }
 
     /// The residual of a symbol, if it has one.
     pub(crate) fn residual_of(symbol: u32) -> Option<i64> {
         (symbol < ESCAPE).then(|| Self::residual(symbol))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::{Config, Sensor};
+
+    /// Frequencies rise, fill the total, and are found again, on a line, on circles of few and many points, and far out.
+    #[test]
+    fn every_symbol_is_found_where_it_lies() {
+        let line = Config::new(0.01).unwrap();
+        let circle = |delta: f64| Config::new(delta).unwrap().circular(360.0).unwrap();
+        for config in [line, circle(0.001), circle(0.4), circle(100.0), circle(400.0)] {
+            let mut sensor = Sensor::new(config);
+            for n in 0..700 {
+                let x = f64::from(n);
+                sensor
+                    .encode((x * 0.3).sin() * 7.0 + f64::from(n % 7) + 0.1 * x)
+                    .unwrap();
+                if n % 60 != 59 {
+                    continue;
+                }
+                let (replica, slot) = sensor.ahead(1).unwrap();
+                let law = replica.law(&slot);
+                let mut end = 0;
+                for symbol in 0..=ESCAPE {
+                    let place = law.place(symbol);
+                    assert!(place.left == end && place.width >= 1, "{symbol}");
+                    end = place.left + place.width;
+                    let near = (i64::from(symbol) - REACH).abs() < 40 || symbol % 97 == 0 || symbol == ESCAPE;
+                    for quantile in [place.left, end - 1].into_iter().filter(|_| near) {
+                        assert_eq!(law.find(quantile), (symbol, place));
+                    }
+                }
+                assert_eq!(end, TOTAL);
+            }
+        }
     }
 }

@@ -27,6 +27,7 @@
 //! | whole bits in a slot, and a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
 //! | a slot for other filters | [`SlotScheme`] |
 //! | the same number of bits in every slot | [`FixedRate`] |
+//! | `delta` for a rate, on a recording | [`best_within`], [`replay`] |
 //!
 //! The central choice: **replicas hold integers.** Reconstructions lie on a lattice `anchor + 2 delta j` through the first sample, so
 //! that values which return are the same integer again, an instrument's own steps stay aligned, and both ends update from the same
@@ -53,6 +54,7 @@ mod report;
 mod scheme;
 mod sensor;
 mod stream;
+mod tuning;
 
 pub use bank::{MODELS, SCALES};
 pub use config::Config;
@@ -63,3 +65,4 @@ pub use receiver::{Receiver, Tracked};
 pub use scheme::SlotScheme;
 pub use sensor::{Report, Sensor};
 pub use stream::{Silence, StreamReader, StreamWriter};
+pub use tuning::{Replay, best_within, own_steps, replay};

@@ -1,14 +1,35 @@
 //! Packets: whole bits, at most 128.
 
 use fewbits_core::{BitReader, BitWriter, CodecError, Message};
+use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
 /// What a sensor sends in one slot. Its length is known from its frame, so no bit is spent on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(try_from = "Stored")]
 pub struct Packet {
     /// The bits, the last one lowest.
     word: u128,
     bits: u32,
+}
+
+#[derive(Deserialize)]
+#[serde(rename = "Packet", deny_unknown_fields)]
+struct Stored {
+    word: u128,
+    bits: u32,
+}
+
+impl TryFrom<Stored> for Packet {
+    type Error = ArgumentError;
+
+    fn try_from(Stored { word, bits }: Stored) -> Result<Self, ArgumentError> {
+        let beyond = word.checked_shr(bits).unwrap_or(0);
+        if bits > 128 || beyond != 0 {
+            return Err(ArgumentError::new("bits", bits, "at most 128, as many as the word has"));
+        }
+        Ok(Self { word, bits })
+    }
 }
 
 fn invalid(what: &'static str, value: impl std::fmt::Display, expected: &'static str) -> CodecError {
@@ -109,7 +130,7 @@ impl PacketReader {
 }
 
 /// Powers of ten that are whole doubles.
-const TENS: [f64; 16] = [
+pub(crate) const TENS: [f64; 16] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
 ];
 

@@ -65,7 +65,7 @@ impl TryFrom<Stored> for Receiver {
     type Error = ArgumentError;
 
     fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
-        let replica = checked(stored.replica)?;
+        let replica = checked(stored.replica, &stored.config)?;
         Ok(Self {
             config: stored.config,
             synchronised: stored.synchronised && replica.is_some(),
@@ -210,7 +210,15 @@ impl Receiver {
     fn refresh(&mut self, reader: &mut PacketReader) -> Result<(), CodecError> {
         let sample = read_number(reader)?;
         let believed = if self.config.is_resilient() {
-            Some(reader.read(MODEL_BITS)? as usize)
+            let model = reader.read(MODEL_BITS)? as usize;
+            if model > MODELS {
+                return Err(CodecError::Invalid {
+                    what: "model",
+                    value: model.to_string(),
+                    expected: "one of the bank, or none",
+                });
+            }
+            Some(model)
         } else {
             None
         };

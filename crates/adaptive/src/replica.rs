@@ -1,6 +1,7 @@
 //! What both ends hold and move alike: the lattice, the bank, the predictors and the frequencies.
 
-use crate::bank::{Ahead, Bank};
+use crate::Config;
+use crate::bank::{Ahead, Bank, LONGEST_GAP};
 use crate::counts::{REPORTED, Residuals, Values};
 use crate::lattice::Lattice;
 use crate::law::Law;
@@ -20,6 +21,9 @@ const CODER_SWITCHING: f64 = 0.02;
 /// Unwrapped indices of a circular signal are brought back beyond this size.
 const TURN: i64 = 1 << 38;
 
+/// Predictions are no larger: far beyond any index, and far from the ends of an `i64`.
+const FARTHEST: i64 = 1 << 42;
+
 /// The state that sensor and receiver share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Replica {
@@ -27,6 +31,8 @@ pub(crate) struct Replica {
     pub(crate) bank: Bank,
     last: i64,
     before: i64,
+    /// Slots between them.
+    gap: u32,
     predictors: [f64; PREDICTORS],
     pub(crate) residuals: [Residuals; PREDICTORS],
     pub(crate) values: Values,
@@ -51,6 +57,7 @@ impl Replica {
             bank: Bank::new(believed),
             last: 0,
             before: 0,
+            gap: 1,
             predictors: [1.0; PREDICTORS],
             residuals: std::array::from_fn(|_| Residuals::new()),
             values: Values::new(),
@@ -75,10 +82,11 @@ impl Replica {
     /// The time update over `elapsed` slots.
     pub(crate) fn predict(&mut self, elapsed: u32) -> Slot {
         let ahead = self.bank.predict(elapsed);
-        // Far beyond any index, and far from the ends of an i64.
-        let rounded = ahead.mean.round().clamp(-(TURN as f64) * 16.0, TURN as f64 * 16.0) as i64;
-        let slope = (self.last - self.before).saturating_mul(i64::from(elapsed.clamp(1, 64)));
-        let candidates = [rounded, self.last, self.last + slope];
+        let rounded = ahead.mean.round().clamp(-(FARTHEST as f64), FARTHEST as f64) as i64;
+        let (slots, gap) = (i64::from(ahead.slots), i64::from(self.gap));
+        let step = (self.lattice.shortest(self.last - self.before) * slots + gap / 2).div_euclid(gap);
+        let line = (self.last + step).clamp(-FARTHEST, FARTHEST);
+        let candidates = [rounded, self.last, line];
         let pick = (1..PREDICTORS).fold(0, |best, i| {
             if self.predictors[i] >= self.predictors[best] {
                 i
@@ -122,7 +130,7 @@ impl Replica {
         }
         let mut factors = [1.0; PREDICTORS];
         for (i, candidate) in slot.candidates.iter().enumerate() {
-            let k = j - candidate;
+            let k = self.lattice.shortest(j - candidate);
             if k != 0 {
                 factors[i] = self.residuals[i].probability(k).max(LEAST_FACTOR);
                 self.residuals[i].add(k);
@@ -130,7 +138,7 @@ impl Replica {
         }
         spread(&mut self.predictors, factors, PREDICTOR_SWITCHING);
         self.values.add(name, if reported { REPORTED } else { 1 });
-        (self.before, self.last) = (self.last, j);
+        (self.before, self.last, self.gap) = (self.last, j, slot.ahead.slots);
         if let (Some(cells), true) = (self.lattice.cells(), j.abs() > TURN) {
             let turns = j - j.rem_euclid(cells);
             self.bank.shift(turns);
@@ -144,13 +152,14 @@ impl Replica {
         self.lattice = lattice;
         self.bank = Bank::new(Some(self.bank.best()));
         self.values.clear();
-        (self.last, self.before) = (0, 0);
+        (self.last, self.before, self.gap) = (0, 0, 1);
     }
 
-    pub(crate) fn is_valid(&self) -> bool {
+    pub(crate) fn is_valid(&self, config: &Config) -> bool {
         let weights = self.predictors.iter().chain(&self.coders);
-        let indices = [self.last, self.before].iter().all(|j| j.abs() <= 4 * TURN);
-        self.lattice.is_valid()
+        let indices = [self.last, self.before].iter().all(|j| j.abs() <= 2 * FARTHEST);
+        self.lattice.is_valid(config)
+            && (1..=LONGEST_GAP).contains(&self.gap)
             && self.bank.is_valid()
             && indices
             && weights.into_iter().all(|w| *w > 0.0 && *w <= 1.0)

@@ -97,11 +97,15 @@ impl Content {
         match self {
             Self::Near(k) | Self::Far(k) => {
                 let j = slot.prediction + k;
-                if replica.lattice.cells().is_none() && j.abs() > LARGEST {
+                let sent = match replica.lattice.cells() {
+                    None => j.abs() <= LARGEST,
+                    Some(_) => replica.lattice.shortest(*k) == *k,
+                };
+                if !sent {
                     return Err(CodecError::Invalid {
                         what: "index",
                         value: j.to_string(),
-                        expected: "at most 2^40 in size",
+                        expected: "at most 2^40 in size, the shortest way around a circle",
                     });
                 }
                 replica.update(slot, j, outside);

@@ -68,7 +68,7 @@ impl TryFrom<Stored> for Sensor {
     fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
         Ok(Self {
             config: stored.config,
-            replica: checked(stored.replica)?,
+            replica: checked(stored.replica, &stored.config)?,
             slot: stored.slot,
             sequence: stored.sequence & ((1 << stored.config.sequence_bits()) - 1),
             refresh_requested: stored.refresh_requested,
@@ -77,9 +77,9 @@ impl TryFrom<Stored> for Sensor {
 }
 
 /// A stored replica that a sensor can have left.
-pub(crate) fn checked(replica: Option<Replica>) -> Result<Option<Replica>, ArgumentError> {
+pub(crate) fn checked(replica: Option<Replica>, config: &Config) -> Result<Option<Replica>, ArgumentError> {
     match replica {
-        Some(replica) if !replica.is_valid() => {
+        Some(replica) if !replica.is_valid(config) => {
             Err(ArgumentError::new("replica", "inconsistent", "the state that was stored"))
         }
         Some(mut replica) => {

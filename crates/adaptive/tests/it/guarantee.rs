@@ -39,6 +39,7 @@ proptest! {
     fn any_finite_samples(samples in prop::collection::vec(wild(), 1..120), exponent in -300..300_i32, near in any::<bool>()) {
         let delta = if near { 0.125 } else { 10.0_f64.powi(exponent) };
         check(Config::new(delta).unwrap(), &samples);
+        check(Config::exact(2.0 * delta).unwrap(), &samples);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod allocation;
 mod bank;
 mod common;
 mod damage;
@@ -11,3 +12,4 @@ mod loss;
 mod recording;
 mod replicas;
 mod scheme;
+mod tuning;

@@ -4,8 +4,8 @@
 #[path = "../../examples/recording.rs"]
 mod example;
 
-use example::{Goal, Task, delta_for, read_column, report, rms, run};
-use fewbits_adaptive::Config;
+use example::{Goal, Task, read_column, report, rms};
+use fewbits_adaptive::{Config, Error, best_within, replay};
 use std::path::Path;
 
 fn samples() -> Vec<f64> {
@@ -17,10 +17,11 @@ fn samples() -> Vec<f64> {
 fn a_rate_is_met_and_the_error_is_bounded() {
     let samples = samples();
     for rate in [0.5, 1.0, 2.0] {
-        let delta = delta_for(&samples, rate, None).unwrap();
-        let run = run(&samples, Config::new(delta).unwrap()).unwrap();
-        assert!(run.information.iter().sum::<f64>() / 300.0 <= rate);
-        assert!(run.errors.iter().all(|e| e.abs() <= delta) && rms(&run.errors) < 0.7 * delta);
+        let (config, run) =
+            best_within(Config::new(1.0).unwrap(), &samples, rate, |r| Ok::<_, Error>(r.rate())).unwrap();
+        assert!(run.rate() <= rate && run.worst_error() <= config.delta());
+        assert!(rms(&run.errors) < 0.7 * config.delta());
+        assert_eq!(replay(config, &samples).unwrap(), run);
     }
 }
 

@@ -27,6 +27,37 @@ fn replicas_agree_to_the_bit_across_restarts() {
     }
 }
 
+/// As above, over ten million samples; two minutes.
+#[test]
+#[ignore = "long: cargo test -p fewbits-adaptive --release -- --ignored ten_million"]
+fn replicas_agree_to_the_bit_over_ten_million_samples() {
+    let config = Config::new(0.05).unwrap();
+    let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
+    let (mut n, mut reports) = (0_u64, 0_u64);
+    for seed in 0..100 {
+        for sample in mixed(seed, 100_000) {
+            let report = sensor.encode(sample).unwrap();
+            reports += u64::from(report.is_some());
+            let tracked = receiver.receive(&report.map(|r| r.packet).into()).unwrap();
+            assert_eq!(tracked.value.map(f64::to_bits), sensor.reconstruction().map(f64::to_bits));
+            assert!((tracked.value.unwrap() - sample).abs() <= 0.05);
+            n += 1;
+        }
+        let bits = |weights: [f64; 24]| weights.map(f64::to_bits);
+        assert_eq!(bits(sensor.model_weights()), bits(receiver.model_weights()));
+        let stored = [
+            serde_json::to_value(&sensor).unwrap(),
+            serde_json::to_value(&receiver).unwrap(),
+        ];
+        assert_eq!(stored[0]["replica"], stored[1]["replica"]);
+        let [left, right] = stored;
+        sensor = serde_json::from_value(left).unwrap();
+        receiver = serde_json::from_value(right).unwrap();
+    }
+    assert_eq!(n, 10_000_000);
+    println!("{reports} reports");
+}
+
 #[test]
 fn what_was_not_stored_by_a_sensor_is_refused() {
     let mut sensor = Sensor::new(Config::new(0.1).unwrap());
@@ -38,6 +69,9 @@ fn what_was_not_stored_by_a_sensor_is_refused() {
         ("/config/delta", serde_json::json!(0.0)),
         ("/replica/lattice/step", serde_json::json!(0.0)),
         ("/replica/last", serde_json::json!(i64::MAX)),
+        ("/replica/gap", serde_json::json!(0)),
+        ("/replica/lattice/delta", serde_json::json!(0.2)),
+        ("/replica/bank/x/0", serde_json::json!(1e300)),
     ] {
         let mut broken = stored.clone();
         *broken.pointer_mut(path).unwrap() = value;

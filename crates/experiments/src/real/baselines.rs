@@ -1,5 +1,6 @@
 //! What an engineer would try first, and the strong baseline.
 
+use super::recordings::Recording;
 use std::collections::BTreeMap;
 
 /// What a scheme does with a signal.
@@ -52,29 +53,35 @@ fn every_slot(samples: &[f64], bits: f64, mut next: impl FnMut(f64) -> f64) -> P
     }
 }
 
-/// One bit a sample, up or down; the step grows by 1.5 where a bit repeats the last and shrinks by it elsewhere.
+/// One bit a sample, up or down; the step grows by 1.5 where a bit repeats the last and shrinks by it elsewhere, down to `1e-6`
+/// (or a thousandth of the first, if that is less).
 pub(super) fn delta_modulation(samples: &[f64]) -> Played {
-    let (mut step, mut value, mut last) = (increments_deviation(samples), samples[0], true);
+    let first = increments_deviation(samples);
+    let least = (1e-3 * first).min(1e-6);
+    let (mut step, mut value, mut last) = (first, samples[0], true);
     every_slot(samples, 1.0, |x| {
         let up = x >= value;
-        step = if up == last { step * 1.5 } else { step / 1.5 };
+        step = (step * if up == last { 1.5 } else { 1.0 / 1.5 }).max(least);
         value += if up { step } else { -step };
         last = up;
         value
     })
 }
 
-/// Jayant's adaptive quantizer of the residual, 2 or 3 bits: levels `(q + 1/2) step`, and the step times a factor of `q`.
+/// Jayant's adaptive quantizer of the residual, 2 or 3 bits: levels `(q + 1/2) step`, and the step times a factor of `q`, down to
+/// `1e-7` (or a ten-thousandth of the first, if that is less).
 pub(super) fn jayant(samples: &[f64], bits: u32) -> Played {
     let factors: &[f64] = if bits == 2 { &[0.8, 1.6] } else { &[0.85, 1.0, 1.0, 1.5] };
-    let (mut step, mut value) = (increments_deviation(samples), samples[0]);
+    let first = increments_deviation(samples);
+    let least = (1e-4 * first).min(1e-7);
+    let (mut step, mut value) = (first, samples[0]);
     every_slot(samples, f64::from(bits), |x| {
         let residual = x - value;
         let q = ((residual.abs() / step) as usize).min(factors.len() - 1);
         if residual != 0.0 {
             value += residual.signum() * (q as f64 + 0.5) * step;
         }
-        step *= factors[q];
+        step = (step * factors[q]).max(least);
         value
     })
 }
@@ -105,28 +112,45 @@ pub(super) fn dpcm(samples: &[f64], order: usize, delta: f64) -> Played {
     Played { values, bits, packets }
 }
 
-/// The smallest `delta` between `1e-5` and 1 times `range`, by `steps` bisections of its logarithm, whose cost is at most `most`.
-pub(super) fn delta_for<E>(
-    range: f64,
-    most: f64,
-    steps: usize,
-    mut cost: impl FnMut(f64) -> Result<f64, E>,
-) -> Result<f64, E> {
-    let (mut low, mut high) = (1e-5 * range, range);
+/// The smallest `delta` between `low` and `high`, by `steps` bisections of its logarithm, whose cost is at most `most`.
+pub(super) fn delta_for(low: f64, high: f64, most: f64, steps: usize, cost: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (low, high);
     for _ in 0..steps {
         let middle = (low * high).sqrt();
-        if cost(middle)? <= most {
+        if cost(middle) <= most {
             high = middle;
         } else {
             low = middle;
         }
     }
-    Ok(high)
+    high
+}
+
+/// The schemes with a `delta`, at the smallest whose cost per sample is at most `most`; its search is that of the reference.
+pub(super) fn searched(
+    recording: &Recording,
+    most: f64,
+    cost: impl Fn(&Played) -> f64,
+) -> [(&'static str, f64, Played); 3] {
+    let (samples, range) = (&recording.samples, recording.straight_range());
+    let n = samples.len() as f64;
+    let found = |scheme, low: f64, steps, play: &dyn Fn(f64) -> Played| {
+        let delta = delta_for(low, range, most, steps, |d| cost(&play(d)) / n);
+        (scheme, delta, play(delta))
+    };
+    [
+        found("send-on-delta", (1e-3 * range).min(1e-6), 60, &|d| send_on_delta(samples, d)),
+        found("dpcm-0", 1e-5 * range, 24, &|d| dpcm(samples, 0, d)),
+        found("dpcm-1", 1e-5 * range, 24, &|d| dpcm(samples, 1, d)),
+    ]
 }
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::recordings::parse;
     use super::*;
+    use serde_json::Value;
 
     /// By hand.
     #[test]
@@ -144,6 +168,44 @@ mod tests {
         let line = dpcm(&[0.0, 5.0, 8.5], 1, 1.0);
         assert_eq!((line.values, line.packets), (vec![0.0, 4.0, 8.0], 2));
         assert!((line.bits - (12.0 - (0.0625_f64 / 0.5).log2())).abs() < 1e-12);
-        assert_eq!(delta_for(1.0, 0.5, 40, |d| Ok::<_, ()>(1.0 - d)).map(|d| (d * 1e6).round()), Ok(5e5));
+        assert!((delta_for(1e-5, 1.0, 0.5, 40, |d| 1.0 - d) - 0.5).abs() < 1e-9);
+    }
+    /// Everything as in the reference, if the recording that it was computed on is at hand.
+    #[test]
+    #[ignore = "set FEWBITS_RECORDING to the CSV file that the reference was computed on"]
+    fn the_reference_is_reproduced() {
+        let path = std::env::var("FEWBITS_RECORDING").unwrap();
+        let text = std::fs::read_to_string(path).unwrap();
+        let reference: Value = serde_json::from_str(include_str!("../../references/real_signals.json")).unwrap();
+        let columns = reference["columns"].as_array().unwrap();
+        for column in columns {
+            let name = column["column"].as_str().unwrap();
+            let recording = parse(&text, &[name.to_owned()]).unwrap().remove(0);
+            let check = |what: &str, value: f64, expected: &Value| {
+                let expected = expected.as_f64().unwrap();
+                assert!((value - expected).abs() <= 1e-6 * expected, "{name} {what}: {value}, expected {expected}");
+            };
+            let rmse = |played: &Played| recording.rmse(&played.values);
+            check("modulation", rmse(&delta_modulation(&recording.samples)), &column["adaptive_delta_modulation_1bit"]);
+            check("jayant 2", rmse(&jayant(&recording.samples, 2)), &column["jayant_2bit"]);
+            check("jayant 3", rmse(&jayant(&recording.samples, 3)), &column["jayant_3bit"]);
+            for rate in ["0.25", "0.5", "1", "2"] {
+                let [sod, zero, one] = searched(&recording, rate.parse().unwrap(), |played| played.bits);
+                let dpcm = &column["deadband_dpcm"][rate];
+                for ((scheme, delta, played), expected) in [
+                    (sod, &column["send_on_delta_12bit_words"][rate]),
+                    (zero, &dpcm["order0"]),
+                    (one, &dpcm["order1"]),
+                ] {
+                    let what = format!("{scheme} at {rate}");
+                    check(&what, rmse(&played), &expected["rmse"]);
+                    check(&what, played.bits / recording.samples.len() as f64, &expected["bits_per_sample"]);
+                    if expected.get("delta").is_some() {
+                        check(&what, delta, &expected["delta"]);
+                    }
+                }
+            }
+        }
+        assert_eq!(columns.len(), 12);
     }
 }

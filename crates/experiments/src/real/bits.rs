@@ -1,11 +1,11 @@
 //! Error against bits, for every signal and scheme.
 
-use super::baselines::{Played, delta_for, delta_modulation, dpcm, jayant, send_on_delta};
+use super::baselines::{Played, delta_modulation, jayant, searched};
 use super::recordings::{Recording, Source};
-use super::tracking::{Tracked, best_within, stream_bits, words};
+use super::tracking::{best_for, stream_bits, words};
 use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Cost, Error, Figure};
-use fewbits_adaptive::Silence;
+use fewbits_adaptive::{Replay, Silence};
 use garde::Validate;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -72,8 +72,10 @@ struct Pair {
     best_rmse: f64,
     /// Ours.
     rmse: f64,
-    /// Ours over the best; errors below a millionth of the signal's range count as that.
+    /// Ours over the best; smaller errors than the negligible one count as that.
     ratio: f64,
+    /// A millionth of the signal's range.
+    negligible: f64,
     /// Largest error of ours over its delta.
     worst: f64,
     /// Ideal bits per sample.
@@ -90,8 +92,8 @@ struct Pair {
     with_silence: f64,
 }
 
-/// Errors below this share of the range are no errors.
-const EXACT: f64 = 1e-6;
+/// Errors below this share of the range count as that.
+pub(super) const NEGLIGIBLE: f64 = 1e-6;
 
 /// Error against bits.
 pub struct Bits;
@@ -110,17 +112,12 @@ fn row(recording: &Recording, rate: f64, scheme: &'static str, delta: Option<f64
 }
 
 /// The baselines at `rate` bits per sample.
-fn baselines(recording: &Recording, rate: f64) -> Result<Vec<Row>, Error> {
-    let (samples, n) = (&recording.samples, recording.samples.len() as f64);
-    let mut rows = Vec::new();
-    let mut searched = |scheme, steps, play: &dyn Fn(f64) -> Played| {
-        let delta = delta_for(recording.range(), rate, steps, |d| Ok::<_, Error>(play(d).bits / n))?;
-        rows.push(row(recording, rate, scheme, Some(delta), &play(delta)));
-        Ok::<_, Error>(())
-    };
-    searched("send-on-delta", 60, &|d| send_on_delta(samples, d))?;
-    searched("dpcm-0", 24, &|d| dpcm(samples, 0, d))?;
-    searched("dpcm-1", 24, &|d| dpcm(samples, 1, d))?;
+fn baselines(recording: &Recording, rate: f64) -> Vec<Row> {
+    let samples = &recording.samples;
+    let mut rows: Vec<Row> = searched(recording, rate, |played| played.bits)
+        .iter()
+        .map(|(scheme, delta, played)| row(recording, rate, scheme, Some(*delta), played))
+        .collect();
     if rate >= 1.0 {
         rows.push(row(recording, rate, "modulation", None, &delta_modulation(samples)));
     }
@@ -130,30 +127,36 @@ fn baselines(recording: &Recording, rate: f64) -> Result<Vec<Row>, Error> {
     }
     // A range of zero: nothing to choose, nothing to send.
     rows.retain(|r| r.rmse.is_finite());
-    Ok(rows)
+    rows
 }
 
 fn compare(recording: &Recording, rate: f64, context: &Context<'_>) -> Result<(Vec<Row>, Pair), Error> {
     let n = recording.samples.len() as f64;
-    let mut rows = baselines(recording, rate)?;
+    let mut rows = baselines(recording, rate);
     let kept = rows.iter().filter(|r| r.bits <= rate);
     let best = kept.min_by(|a, b| a.rmse.total_cmp(&b.rmse)).or(rows.first());
     let (best, best_rmse) = best.map_or(("none", f64::INFINITY), |r| (r.scheme, r.rmse));
-    let (delta, ours): (f64, Tracked) = best_within(recording, rate, context, |tracked| tracked.played.bits)?;
-    let ours_row = row(recording, rate, "adaptive", Some(delta), &ours.played);
-    let exact = EXACT * recording.range();
+    let (config, ours) = best_for(recording, rate, context, Replay::rate)?;
+    let played = Played {
+        bits: ours.information.iter().sum(),
+        packets: ours.packets,
+        values: ours.values.clone(),
+    };
+    let ours_row = row(recording, rate, "adaptive", Some(config.delta()), &played);
+    let negligible = NEGLIGIBLE * recording.range();
     let pair = Pair {
         column: recording.name.clone(),
         rate,
         best,
         best_rmse,
         rmse: ours_row.rmse,
-        ratio: ours_row.rmse.max(exact) / best_rmse.max(exact),
-        worst: ours.worst / delta,
-        ideal: ours.played.bits / n,
-        stream: stream_bits(recording, delta, Silence::Timed)? / n,
-        packed: ours.packet_bits / n,
-        with_silence: stream_bits(recording, delta, Silence::Coded)? / n,
+        ratio: ours_row.rmse.max(negligible) / best_rmse.max(negligible),
+        negligible,
+        worst: ours.worst_error() / config.delta(),
+        ideal: ours.rate(),
+        stream: stream_bits(recording, config, Silence::Timed)? / n,
+        packed: ours.packet_bits as f64 / n,
+        with_silence: stream_bits(recording, config, Silence::Coded)? / n,
     };
     rows.push(ours_row);
     if [1.0, 2.0, 3.0].contains(&rate) {
@@ -183,7 +186,8 @@ impl Figure for Bits {
             title: "Real signals: error against bits",
             caption: "Root mean square error against bits per sample on signals with the traits of recordings, or on the columns of \
                       a file. The adaptive scheme needs no fit and bounds every error; the baselines are what an engineer would \
-                      try first, and deadband DPCM with an adaptive code, whose order is chosen in hindsight.",
+                      try first, and deadband DPCM with an adaptive code, whose order is chosen in hindsight. Errors below a \
+                      millionth of the signal's range are drawn there.",
             source: "our own comparison",
         }
     }
@@ -250,12 +254,14 @@ impl Figure for Bits {
             "words",
         ];
         let panel = |column: &&str| {
+            let pair = rows.comparison.iter().find(|p| p.column == **column);
+            let negligible = pair.map_or(0.0, |p| p.negligible);
             let curve = |(colour, scheme): (usize, &&'static str)| {
                 let chosen = rows
                     .schemes
                     .iter()
                     .filter(|r| r.column == **column && r.scheme == *scheme);
-                let curve = points(chosen, |r| (r.rate, r.rmse));
+                let curve = points(chosen, |r| (r.rate, r.rmse.max(negligible)));
                 match *scheme {
                     "adaptive" => Layer::line(*scheme, curve).coloured(colour),
                     "dpcm-0" | "dpcm-1" | "send-on-delta" => Layer::dashed(*scheme, curve).coloured(colour),

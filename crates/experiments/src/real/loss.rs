@@ -1,10 +1,10 @@
 //! Loss and recovery.
 
 use super::recordings::{Recording, Source};
-use super::tracking::{best_within, config};
+use super::tracking::best_for;
 use crate::plot::{Axis, Layer, Panel, Plot};
 use crate::{About, Claims, Context, Error, Figure, Measured, Tally};
-use fewbits_adaptive::{Receiver, Sensor};
+use fewbits_adaptive::{Config, Receiver, Replay, Sensor};
 use fewbits_core::Link;
 use fewbits_monte_carlo::{Moments, Trial};
 use garde::Validate;
@@ -100,15 +100,16 @@ impl Tally for Sums {
 
 struct Point<'a> {
     recording: &'a Recording,
-    delta: f64,
+    config: Config,
     loss: f64,
     refresh: u64,
     sequence_bits: u32,
 }
 
 fn one(point: &Point<'_>, sums: &mut Sums, trial: Trial) -> Result<(), Error> {
-    let Point { recording, delta, .. } = *point;
-    let config = config(recording, delta)?.resilient(point.sequence_bits, Some(point.refresh))?;
+    let recording = point.recording;
+    let config = point.config.resilient(point.sequence_bits, Some(point.refresh))?;
+    let delta = config.delta();
     let link = Link::lossy(point.loss)?;
     let mut rng = trial.stream.rng();
     let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
@@ -171,12 +172,12 @@ impl Figure for Loss {
         let recordings = p.source.load("real-loss", context)?;
         let mut points = Vec::new();
         for recording in &recordings {
-            let (delta, _) = best_within(recording, p.rate, context, |tracked| tracked.played.bits)?;
+            let (config, _) = best_for(recording, p.rate, context, Replay::rate)?;
             for loss in &p.loss {
                 for refresh in &p.refresh {
                     points.push(Point {
                         recording,
-                        delta,
+                        config,
                         loss: *loss,
                         refresh: *refresh,
                         sequence_bits: p.sequence_bits,
@@ -236,6 +237,7 @@ impl Figure for Loss {
                 panel("bits per sample", |r| r.bits, Axis::linear),
                 panel("rms error / delta", |r| r.rmse, Axis::log),
                 panel("share of slots beyond delta", |r| r.beyond, Axis::linear),
+                panel("of which taken to be in step", |r| r.unnoticed, Axis::linear),
             ],
         )
     }

@@ -1,10 +1,10 @@
 //! Which models the bank believed, over time.
 
 use super::recordings::{Recording, Source};
-use super::tracking::{best_within, config};
+use super::tracking::best_for;
 use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
-use fewbits_adaptive::{SCALES, Sensor};
+use fewbits_adaptive::{Replay, SCALES, Sensor};
 use garde::Validate;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,7 @@ impl Default for Parameters {
         Self {
             source: Source {
                 columns: vec!["bursts".into(), "drift".into(), "gusts".into()],
+                samples: 1500,
                 ..Source::default()
             },
             rate: 0.5,
@@ -61,8 +62,8 @@ pub struct Row {
 pub struct Models;
 
 fn follow(recording: &Recording, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
-    let (delta, _) = best_within(recording, p.rate, context, |tracked| tracked.played.bits)?;
-    let mut sensor = Sensor::new(config(recording, delta)?);
+    let (config, _) = best_for(recording, p.rate, context, Replay::rate)?;
+    let mut sensor = Sensor::new(config);
     let mut rows = Vec::new();
     for (slot, sample) in recording.samples.iter().enumerate() {
         sensor.encode(*sample)?;
@@ -147,17 +148,21 @@ impl Figure for Models {
             };
             let slots = || Axis::linear("slot");
             [
-                Panel::new(*column, slots(), Axis::linear("signal"))
+                Panel::new(format!("{column}: signal"), slots(), Axis::linear("signal"))
                     .with(Layer::line("sample", of(|r| r.sample)))
                     .with(Layer::dashed("reconstruction", of(|r| r.value))),
-                Panel::new("models", slots(), Axis::linear("weight").between(0.0, 1.0))
+                Panel::new(format!("{column}: models"), slots(), Axis::linear("weight").between(0.0, 1.0))
                     .with(Layer::line("walk", of(|r| r.walk)))
                     .with(Layer::line("velocity 0.6", of(|r| r.damped)))
                     .with(Layer::line("velocity 0.95", of(|r| r.smooth))),
-                Panel::new("scale", slots(), Axis::linear("log2 of the noise, steps"))
-                    .with(Layer::line("mean over models", of(|r| r.scale))),
             ]
         });
-        Plot::grid(3, panels.collect())
+        let scale = |column: &&str| {
+            let chosen = rows.iter().filter(|r| r.column == **column);
+            Layer::line(*column, points(chosen, |r| (r.slot as f64, r.scale)))
+        };
+        let scales = Panel::new("scale of the models", Axis::linear("slot"), Axis::linear("log2 of the noise, steps"))
+            .with_all(columns.iter().map(scale));
+        Plot::grid(2, panels.chain([scales]).collect())
     }
 }

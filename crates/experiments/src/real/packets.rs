@@ -1,11 +1,12 @@
 //! Error against packets: where a packet costs the same whatever is in it, prediction alone counts.
 
-use super::baselines::{Played, delta_for, dpcm, send_on_delta};
-use super::bits::{geometric_mean, largest};
+use super::baselines::{Played, searched};
+use super::bits::{NEGLIGIBLE, geometric_mean, largest};
 use super::recordings::{Recording, Source};
-use super::tracking::best_within;
+use super::tracking::best_for;
 use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
+use fewbits_adaptive::Replay;
 use garde::Validate;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -46,38 +47,43 @@ pub struct Row {
     rmse: f64,
     /// Packets per sample.
     packets: f64,
-    /// Error over that of the better of both orders of DPCM, whose packets hold a lattice point too; none if that is without error.
+    /// Error over that of the better of both orders of DPCM, whose packets hold a lattice point too; smaller errors than the
+    /// negligible one count as that.
     ratio: Option<f64>,
+    /// A millionth of the signal's range.
+    negligible: f64,
 }
 
 /// Error against packets.
 pub struct Packets;
 
 fn compare(recording: &Recording, target: f64, context: &Context<'_>) -> Result<Vec<Row>, Error> {
-    let (samples, n) = (&recording.samples, recording.samples.len() as f64);
+    let negligible = NEGLIGIBLE * recording.range();
     let row = |scheme, delta, played: &Played| Row {
         column: recording.name.clone(),
         target,
         scheme,
         delta,
         rmse: recording.rmse(&played.values),
-        packets: played.packets as f64 / n,
+        packets: played.packets as f64 / recording.samples.len() as f64,
         ratio: None,
+        negligible,
     };
-    let mut rows = Vec::new();
-    let mut searched = |scheme, play: &dyn Fn(f64) -> Played| {
-        let delta = delta_for(recording.range(), target, 24, |d| Ok::<_, Error>(play(d).packets as f64 / n))?;
-        rows.push(row(scheme, delta, &play(delta)));
-        Ok::<_, Error>(())
-    };
-    searched("send-on-delta", &|d| send_on_delta(samples, d))?;
-    searched("dpcm-0", &|d| dpcm(samples, 0, d))?;
-    searched("dpcm-1", &|d| dpcm(samples, 1, d))?;
+    let mut rows: Vec<Row> = searched(recording, target, |played| played.packets as f64)
+        .iter()
+        .map(|(scheme, delta, played)| row(*scheme, *delta, played))
+        .collect();
     let rivals = rows.iter().filter(|r| r.scheme.starts_with("dpcm"));
     let best = rivals.map(|r| r.rmse).min_by(f64::total_cmp);
-    let (delta, ours) = best_within(recording, target, context, |tracked| tracked.played.packets as f64)?;
-    let mut ours = row("adaptive", delta, &ours.played);
-    ours.ratio = best.filter(|best| *best > 0.0).map(|best| ours.rmse / best);
+    let price = |replay: &Replay| replay.packets as f64 / recording.samples.len() as f64;
+    let (config, ours) = best_for(recording, target, context, price)?;
+    let played = Played {
+        bits: ours.information.iter().sum(),
+        packets: ours.packets,
+        values: ours.values,
+    };
+    let mut ours = row("adaptive", config.delta(), &played);
+    ours.ratio = best.map(|best| ours.rmse.max(negligible) / best.max(negligible));
     rows.push(ours);
     Ok(rows)
 }
@@ -92,7 +98,8 @@ impl Figure for Packets {
             title: "Real signals: error against packets",
             caption: "Root mean square error against packets per sample. Where a packet costs the same whatever it holds, codes gain \
                       nothing: only the prediction counts, and what a packet holds. Send-on-delta sends the sample itself, and is \
-                      ahead where signals jump and rest; the bank is ahead where they have a velocity.",
+                      ahead where signals jump and rest; the bank is ahead where they have a velocity. Errors below a \
+                      millionth of the signal's range are drawn there.",
             source: "our own comparison",
         }
     }
@@ -131,7 +138,7 @@ impl Figure for Packets {
         let panel = |column: &&str| {
             let curve = |(colour, scheme): (usize, &&'static str)| {
                 let chosen = rows.iter().filter(|r| r.column == **column && r.scheme == *scheme);
-                let curve = points(chosen, |r| (r.target, r.rmse));
+                let curve = points(chosen, |r| (r.target, r.rmse.max(r.negligible)));
                 let layer = if colour == 0 {
                     Layer::line(*scheme, curve)
                 } else {

@@ -23,11 +23,16 @@ pub(super) struct Recording {
 impl Recording {
     /// Largest minus smallest sample, or the period.
     pub fn range(&self) -> f64 {
+        self.period.unwrap_or_else(|| self.straight_range())
+    }
+
+    /// Largest minus smallest sample.
+    pub fn straight_range(&self) -> f64 {
         let (low, high) = self
             .samples
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-        self.period.unwrap_or(high - low)
+        high - low
     }
 
     /// Root mean square of the errors of `values`, around the circle if there is one.
@@ -97,7 +102,7 @@ impl Source {
 }
 
 /// Numeric columns of a CSV text: the named ones, or all but the first.
-fn parse(text: &str, columns: &[String]) -> Result<Vec<Recording>, String> {
+pub(super) fn parse(text: &str, columns: &[String]) -> Result<Vec<Recording>, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let headers = reader.headers().map_err(|error| error.to_string())?.clone();
     let wanted = |(i, name): &(usize, &str)| {

@@ -1,0 +1,30 @@
+//! Neither half allocates once it has started.
+
+use super::common::mixed;
+use allocation_counter::measure;
+use fewbits_adaptive::{Config, Receiver, Sensor};
+
+#[test]
+fn samples_and_reports_allocate_nothing() {
+    let line = Config::new(0.05).unwrap();
+    for config in [line, line.circular(7.0).unwrap(), line.resilient(4, Some(100)).unwrap()] {
+        let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
+        let samples = mixed(9, 20_000);
+        let mut one = |sample: f64| {
+            let report = sensor.encode(sample).unwrap();
+            receiver.receive(&report.map(|r| r.packet).into()).unwrap();
+        };
+        one(samples[0]);
+        let used = measure(|| {
+            samples
+                .iter()
+                .chain(&[1e300, 1.0 / 3.0, 0.0])
+                .for_each(|sample| one(*sample))
+        });
+        assert_eq!(used.count_total, 0);
+        let stored = serde_json::to_string(&sensor).unwrap();
+        let mut sensor: Sensor = serde_json::from_str(&stored).unwrap();
+        let used = measure(|| samples.iter().map(|sample| sensor.encode(*sample).unwrap()).count());
+        assert_eq!(used.count_total, 0);
+    }
+}
