@@ -17,10 +17,8 @@ use serde::{Deserialize, Serialize};
 const REACH: f64 = 4.0;
 /// The second grid covers this multiple of the first posterior's deviations.
 const MARGIN: f64 = 1.2;
-/// Deviations of the posterior, in those of the prediction, below which a second grid pays ...
+/// Deviations of the posterior, in those of the prediction, below which a second grid pays.
 const NARROW: f64 = 0.5;
-/// ... unless the first grid has this many steps in one of them.
-const FINE: f64 = 4.0;
 /// Smallest scale of the second grid, in deviations of the prediction.
 const FINEST: f64 = 0.02;
 /// Below this share of its Gaussian peak (in logarithms) the posterior counts as underflown.
@@ -32,7 +30,7 @@ const UNDERFLOW: f64 = -690.0;
 /// ```text
 /// m_K, P_K = L L'            the predicted belief of the first K coordinates
 /// pass 1:  u on n^K nodes over +-4;  p = m_K + L u;  weights exp(-u'u/2) p(observed | p);  moments of u
-/// pass 2:  if a deviation is below 1/2 (and 4 steps): re-centred on the first posterior, +-4 x 1.2 deviations
+/// pass 2:  if all deviations are below 1/2: re-centred on the first posterior, +-4 x 1.2 of the largest
 /// variances at least spacing^2 / 12;  the other coordinates follow by regression on the first K
 /// ```
 /// Deterministic: no draws, no seeds. All nodes that receive the same reports hold the same belief, to the last bit.
@@ -150,15 +148,13 @@ impl GridFilter {
         {
             buffer.resize(count, 0.0);
         }
-        let pass = |centre: &SVector<f64, K>, scale: &SVector<f64, K>, workspace: &mut GridWorkspace<K>| {
+        let pass = |centre: &SVector<f64, K>, scale: f64, workspace: &mut GridWorkspace<K>| {
             self.pass(&prior_mean, &lower, centre, scale, observed, workspace)
         };
-        let mut posterior = pass(&SVector::zeros(), &SVector::repeat(1.0), workspace)?;
+        let mut posterior = pass(&SVector::zeros(), 1.0, workspace)?;
         let deviations = posterior.covariance.diagonal().map(f64::sqrt);
-        let step = 2.0 * self.reach / (self.nodes - 1) as f64;
-        if deviations.iter().any(|s| *s < NARROW.min(FINE * step)) {
-            let scale = deviations.map(|s| (MARGIN * s).clamp(FINEST, 1.0));
-            posterior = pass(&posterior.mean, &scale, workspace)?;
+        if deviations.max() < NARROW {
+            posterior = pass(&posterior.mean, (MARGIN * deviations.max()).max(FINEST), workspace)?;
         }
         let mean = lower * posterior.mean;
         let covariance = lower * posterior.covariance * lower.transpose();
@@ -186,13 +182,13 @@ impl GridFilter {
         origin: &SVector<f64, K>,
         lower: &SMatrix<f64, K, K>,
         centre: &SVector<f64, K>,
-        scale: &SVector<f64, K>,
+        scale: f64,
         observed: &(impl Likelihood<K> + ?Sized),
         workspace: &mut GridWorkspace<K>,
     ) -> Result<Pass<K>, Error> {
         let GridWorkspace { columns, logs, weights } = workspace;
         let step = 2.0 * self.reach / (self.nodes - 1) as f64;
-        let node = |axis: usize, i: usize| centre[axis] + scale[axis] * (step * i as f64 - self.reach);
+        let node = |axis: usize, i: usize| centre[axis] + scale * (step * i as f64 - self.reach);
         let mut index = [0_usize; K];
         let advance = |index: &mut [usize; K]| {
             for i in index.iter_mut().rev() {
@@ -238,12 +234,10 @@ impl GridFilter {
         for axis in 0..K {
             covariance[(axis, axis)] = covariance[(axis, axis)].max(step * step / 12.0);
         }
-        let scaling = SMatrix::<f64, K, K>::from_diagonal(scale);
-        let cell: f64 = scale.iter().map(|s| (s * step).ln()).sum();
         Ok(Pass {
-            log_evidence: peak + total.ln() + cell - K as f64 * LN_SQRT_2PI,
-            mean: centre + scaling * mean,
-            covariance: scaling * covariance * scaling,
+            log_evidence: peak + total.ln() + K as f64 * ((scale * step).ln() - LN_SQRT_2PI),
+            mean: centre + mean * scale,
+            covariance: covariance * (scale * scale),
         })
     }
 }

@@ -109,6 +109,18 @@ impl KernelMessage {
             .min(self.cumulative.len().saturating_sub(1))
     }
 
+    /// Systematic draws by weight; equal weights give every point once.
+    pub(crate) fn resample<R: Rng + ?Sized>(&self, rng: &mut R, labels: &mut [usize]) {
+        let (offset, count, last) = (rng.random::<f64>(), labels.len() as f64, self.x.len().saturating_sub(1));
+        let mut label = 0;
+        for (n, drawn) in labels.iter_mut().enumerate() {
+            while label < last && self.cumulative[label] * count <= n as f64 + offset {
+                label += 1;
+            }
+            *drawn = label;
+        }
+    }
+
     fn point(&self, i: usize) -> Vector2<f64> {
         Vector2::new(self.x[i], self.y[i])
     }

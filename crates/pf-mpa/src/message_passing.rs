@@ -359,6 +359,9 @@ impl Tracker for MessagePassing {
         let [x, y] = places;
         let mut drawn = Drawn { x, y, labels };
         self.sampler.draw(rng, &mut messages[..used], product, &mut drawn)?;
+        if self.velocity == Velocity::Transfer {
+            messages[0].resample(rng, drawn.labels);
+        }
         // The velocity given the position, from the joint covariance of the predicted particles.
         let position: Matrix2<f64> = whole.fixed_view::<2, 2>(0, 0).into();
         let cross: Matrix2<f64> = whole.fixed_view::<2, 2>(2, 0).into();
@@ -370,10 +373,7 @@ impl Tracker for MessagePassing {
         let mut sum = Vector4::zeros();
         for i in 0..n {
             let place = Vector2::new(drawn.x[i], drawn.y[i]);
-            let from = match self.velocity {
-                Velocity::Transfer => i,
-                Velocity::Joint => drawn.labels[i],
-            };
+            let from = drawn.labels[i];
             let mut velocity = Vector2::new(states[2][from], states[3][from]);
             if self.velocity == Velocity::Joint {
                 let behind = Vector2::new(states[0][from], states[1][from]);

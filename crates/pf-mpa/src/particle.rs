@@ -26,10 +26,10 @@ pub struct Bootstrap {
 ///
 /// ```text
 /// particle (p, v, a), common velocity variance s;  s_0 from the prior, decoupled from the position
-/// p' | particle ~ N(p + ts v + ts^2/2 a, d),  d = ts^2 s + ts^4/4 q
+/// a ~ the chain;  p' | particle ~ N(p + ts v + ts^2/2 a, d),  d = ts^2 s + ts^4/4 q
 /// proposal: that law times the linearised cells;  w *= N(p'; .) p(observed | p') / proposal
 /// g = (ts s + ts^3/2 q) / d;  v' = v + ts a + g (p' - mean);  s' = s + ts^2 q - g (ts s + ts^3/2 q)
-/// a' ~ the chain;  systematic resampling below half the sample size
+/// systematic resampling below half the sample size
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored")]
@@ -96,19 +96,13 @@ fn estimate(particles: &Particles<6>) -> Gaussian<4> {
     Gaussian::from_trusted_parts(Vector4::from_fn(|i, _| mean[i]), Matrix4::from_fn(|i, j| covariance[(i, j)]))
 }
 
-fn start<R: Rng + ?Sized>(
-    rng: &mut R,
-    target: &Target,
-    prior: &Gaussian<4>,
-    count: usize,
-) -> Result<Particles<6>, Error> {
-    let model = WithManoeuvre(*target);
+fn start<R: Rng + ?Sized>(rng: &mut R, prior: &Gaussian<4>, count: usize) -> Result<Particles<6>, Error> {
     let states: Particles<4> = Particles::from_belief(rng, prior, count)?;
     let mut i = 0;
     Ok(Particles::from_draws(count, || {
         let state = states.point(i).unwrap_or_else(|| *prior.mean());
         i += 1;
-        model.start(rng, &state)
+        WithManoeuvre::start(&state)
     })?)
 }
 
@@ -116,8 +110,8 @@ impl Tracker for Bootstrap {
     type Belief = Particles<6>;
     type Workspace = Workspace<6>;
 
-    fn start<R: Rng + ?Sized>(&self, rng: &mut R, target: &Target, prior: &Gaussian<4>) -> Result<Particles<6>, Error> {
-        start(rng, target, prior, self.particles)
+    fn start<R: Rng + ?Sized>(&self, rng: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<Particles<6>, Error> {
+        start(rng, prior, self.particles)
     }
 
     fn estimate(&self, belief: &Particles<6>) -> Gaussian<4> {
@@ -128,13 +122,13 @@ impl Tracker for Bootstrap {
         &self,
         rng: &mut R,
         target: &Target,
-        _: usize,
+        k: usize,
         belief: &mut Particles<6>,
         observed: &[Ranged],
         workspace: &mut Workspace<6>,
     ) -> Result<StepInfo, Error> {
         let filter = ParticleFilter::default();
-        let info = filter.step_in_place(rng, &WithManoeuvre(*target), belief, observed, workspace)?;
+        let info = filter.step_in_place(rng, &WithManoeuvre::at(*target, k), belief, observed, workspace)?;
         Ok(StepInfo {
             log_likelihood: Some(info.log_likelihood),
             effective_sample_size: Some(info.effective_sample_size),
@@ -177,7 +171,7 @@ impl Tracker for RaoBlackwellGuided {
     fn start<R: Rng + ?Sized>(
         &self,
         rng: &mut R,
-        target: &Target,
+        _: &Target,
         prior: &Gaussian<4>,
     ) -> Result<VelocityCloud, Error> {
         let covariance = prior.covariance();
@@ -189,7 +183,7 @@ impl Tracker for RaoBlackwellGuided {
         known.fixed_view_mut::<2, 2>(2, 0).fill(0.0);
         let positions = Gaussian::new(*prior.mean(), known)?;
         Ok(VelocityCloud {
-            particles: start(rng, target, &positions, self.particles)?,
+            particles: start(rng, &positions, self.particles)?,
             velocity_variance,
         })
     }
@@ -206,7 +200,7 @@ impl Tracker for RaoBlackwellGuided {
         &self,
         rng: &mut R,
         target: &Target,
-        _: usize,
+        k: usize,
         belief: &mut VelocityCloud,
         observed: &[Ranged],
         workspace: &mut VelocityWorkspace,
@@ -217,19 +211,18 @@ impl Tracker for RaoBlackwellGuided {
         let gain = if spread > 0.0 { cross / spread } else { 0.0 };
         let next = workspace.next.get_or_insert_with(|| belief.particles.clone());
         next.clone_from(&belief.particles);
-        let filter = ParticleFilter::default();
+        let (filter, manoeuvre) = (ParticleFilter::default(), WithManoeuvre::at(*target, k));
         filter.resample(rng, next, &mut workspace.filter)?;
         workspace.increments.clear();
         let mut columns = next.columns_mut();
         for i in 0..columns[0].len() {
             let state = Vector6::from_fn(|d, _| columns[d][i]);
-            let acceleration = Vector2::new(state[4], state[5]);
+            let acceleration = Vector2::new(manoeuvre.next(rng, state[4]), manoeuvre.next(rng, state[5]));
             let velocity = Vector2::new(state[2], state[3]);
             let mean = Vector2::new(state[0], state[1]) + velocity * ts + acceleration * (0.5 * ts * ts);
             let (place, increment) = propose(rng, &mean, spread, observed);
             let velocity = velocity + acceleration * ts + (place - mean) * gain;
-            let a = acceleration.map(|a| target.chain().next(rng, a));
-            let moved = Vector6::new(place[0], place[1], velocity[0], velocity[1], a[0], a[1]);
+            let moved = Vector6::new(place[0], place[1], velocity[0], velocity[1], acceleration[0], acceleration[1]);
             set_state(&mut columns, i, &moved);
             workspace.increments.push(increment);
         }

@@ -291,37 +291,59 @@ pub enum Manoeuvres {
     AsNoise,
 }
 
-/// The target with the accelerations that act next as part of the state, `[x, y, vx, vy, ax, ay]`: dynamics for any particle
-/// filter, whose particles then remember their manoeuvre.
+/// The target with the accelerations that acted last as part of the state, `[x, y, vx, vy, ax, ay]`: dynamics of one step for any
+/// particle filter, whose particles then remember their manoeuvre. Copies of a resampled particle draw their next acceleration
+/// each for itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct WithManoeuvre(pub Target);
+pub struct WithManoeuvre {
+    target: Target,
+    step: usize,
+}
 
 impl WithManoeuvre {
-    /// A state with accelerations drawn for the first step.
-    pub fn start<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector4<f64>) -> Vector6<f64> {
-        let chain = &self.0.chain;
-        let (ax, ay) = (chain.sample(rng, 0), chain.sample(rng, 0));
-        Vector6::new(state[0], state[1], state[2], state[3], ax, ay)
+    /// The dynamics of step `k`, counted from zero; all but the first are the same.
+    pub fn at(target: Target, k: usize) -> Self {
+        Self { target, step: k }
+    }
+
+    /// A state before the first step, whose accelerations have no meaning.
+    pub fn start(state: &Vector4<f64>) -> Vector6<f64> {
+        Vector6::new(state[0], state[1], state[2], state[3], 0.0, 0.0)
+    }
+
+    /// The acceleration that acts in this step after `last`.
+    pub(crate) fn next<R: Rng + ?Sized>(&self, rng: &mut R, last: f64) -> f64 {
+        match self.step {
+            0 => self.target.chain.sample(rng, 0),
+            _ => self.target.chain.next(rng, last),
+        }
+    }
+
+    /// Its mean.
+    fn expected(&self, last: f64) -> f64 {
+        let chain = &self.target.chain;
+        let from = chain.values().iter().position(|v| *v == last).unwrap_or(0);
+        let law = if self.step == 0 {
+            chain.initial
+        } else {
+            chain.transition[from]
+        };
+        chain.magnitude * (law[1] - law[2])
     }
 }
 
 impl Dynamics<6> for WithManoeuvre {
     fn mean(&self, state: &Vector6<f64>) -> Vector6<f64> {
-        let chain = &self.0.chain;
-        let moved = self.0.transition() * state.fixed_rows::<4>(0) + self.0.gain() * state.fixed_rows::<2>(4);
-        let next = |a: f64| {
-            let from = chain.values().iter().position(|v| *v == a).unwrap_or(0);
-            let row = chain.transition[from];
-            chain.magnitude * (row[1] - row[2])
-        };
-        Vector6::new(moved[0], moved[1], moved[2], moved[3], next(state[4]), next(state[5]))
+        let acceleration = Vector2::new(self.expected(state[4]), self.expected(state[5]));
+        let moved = self.target.transition() * state.fixed_rows::<4>(0) + self.target.gain() * acceleration;
+        Vector6::new(moved[0], moved[1], moved[2], moved[3], acceleration[0], acceleration[1])
     }
 
     fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector6<f64>) -> Vector6<f64> {
+        let acceleration = Vector2::new(self.next(rng, state[4]), self.next(rng, state[5]));
         let own = Vector4::new(state[0], state[1], state[2], state[3]);
-        let moved = self.0.moved(rng, &own, &Vector2::new(state[4], state[5]));
-        let (ax, ay) = (self.0.chain.next(rng, state[4]), self.0.chain.next(rng, state[5]));
-        Vector6::new(moved[0], moved[1], moved[2], moved[3], ax, ay)
+        let moved = self.target.moved(rng, &own, &acceleration);
+        Vector6::new(moved[0], moved[1], moved[2], moved[3], acceleration[0], acceleration[1])
     }
 }
 
@@ -343,14 +365,16 @@ mod tests {
 
     #[test]
     fn particles_with_manoeuvres_have_their_mean() {
-        let target = WithManoeuvre(Target::printed().unwrap());
         let mut rng = Stream::new(5).rng();
         let state = Vector6::new(1.0, 2.0, 0.3, -0.6, 0.1, -0.1);
-        let mean = Dynamics::mean(&target, &state);
-        for d in 0..6 {
-            let draws = (0..20_000).map(|_| target.propagate(&mut rng, &state)[d]);
-            let moments: fewbits_monte_carlo::Moments = draws.collect();
-            assert!(moments.estimate().z_score(mean[d]).abs() < 4.0, "{d}");
+        for k in [0, 1] {
+            let target = WithManoeuvre::at(Target::printed().unwrap(), k);
+            let mean = Dynamics::mean(&target, &state);
+            for d in 0..6 {
+                let draws = (0..20_000).map(|_| target.propagate(&mut rng, &state)[d]);
+                let moments: fewbits_monte_carlo::Moments = draws.collect();
+                assert!(moments.estimate().z_score(mean[d]).abs() < 4.0, "{k} {d}");
+            }
         }
     }
 

@@ -186,7 +186,7 @@ impl Figure for Ablation {
             let median = here
                 .iter()
                 .enumerate()
-                .map(|(i, r)| (i as f64, r.score.median))
+                .map(|(i, r)| (i as f64, r.score.median.value))
                 .collect();
             Panel::new(format!("{snr} dB"), Axis::linear("").named(names), Axis::log("mean squared error"))
                 .with(Layer::measured("mean", marks, |(i, r)| (i as f64, r.score.mse)))

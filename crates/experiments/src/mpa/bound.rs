@@ -134,9 +134,9 @@ impl Figure for Bounds {
                     grid: grid.mse,
                     message_passing: message_passing.mse,
                     unquantized_filter: filter.mse,
-                    grid_median: grid.median,
-                    message_passing_median: message_passing.median,
-                    unquantized_filter_median: filter.median,
+                    grid_median: grid.median.value,
+                    message_passing_median: message_passing.median.value,
+                    unquantized_filter_median: filter.median.value,
                 });
             }
         }

@@ -106,6 +106,11 @@ pub(super) fn agree(claims: &mut Claims, rows: &[Row], prefix: &str, heavy_taile
     if heavy_tailed {
         claims
             .references(&quantity("median"), "median of the squared position error", rows, |r| {
+                (r.key(), r.score.median.value)
+            })
+            .at_full_trials();
+        claims
+            .references(&quantity("median-few"), "median over few or heavy-tailed trajectories", rows, |r| {
                 (r.key(), r.score.median)
             })
             .at_full_trials();

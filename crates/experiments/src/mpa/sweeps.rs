@@ -121,7 +121,7 @@ impl Figure for Mse {
                 printed,
             )
             .at_full_trials();
-        let median = |method: &str| find(&t.trackers, "50dB-L4", method).map(|r| r.score.median);
+        let median = |method: &str| find(&t.trackers, "50dB-L4", method).map(|r| r.score.median.value);
         claims
             .increasing(
                 "naive",
@@ -186,7 +186,7 @@ impl Figure for Mse {
                 shown
                     .iter()
                     .enumerate()
-                    .map(|(i, r)| (i as f64, r.score.median))
+                    .map(|(i, r)| (i as f64, r.score.median.value))
                     .collect(),
             ));
         let families = ["EKF-Q", "GMPA", "GMPA-transfer", "guided"];
@@ -393,7 +393,7 @@ impl Figure for Fig35 {
         claims
             .above("four-bits", "C4: four bits are not nearly unquantized with the published encoder", ratio, 5.0)
             .at_full_trials();
-        let median = |levels: usize, method: &str| of(levels, method).map(|r| r.score.median);
+        let median = |levels: usize, method: &str| of(levels, method).map(|r| r.score.median.value);
         claims
             .increasing(
                 "eight-bits",

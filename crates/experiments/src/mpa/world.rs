@@ -296,7 +296,7 @@ pub(super) struct Score {
     /// Mean squared position error, averaged over trajectories.
     pub(super) mse: Measured,
     /// Median over trajectories of their mean squared error.
-    pub(super) median: f64,
+    pub(super) median: Measured,
     /// Share of trajectories with a mean squared error above 4.
     pub(super) lost: f64,
     /// Trajectories.
@@ -309,10 +309,13 @@ impl Score {
         let moments: Moments = errors.iter().copied().collect();
         errors.sort_by(f64::total_cmp);
         let n = errors.len();
-        let median = match n {
-            0 => f64::NAN,
-            _ if n % 2 == 1 => errors[n / 2],
-            _ => 0.5 * (errors[n / 2 - 1] + errors[n / 2]),
+        // Ranks: half the trajectories are below the median, give or take sqrt(n) / 2.
+        let at = |rank: f64| errors.get(rank.max(0.0) as usize).or(errors.last()).copied();
+        let (middle, give) = (0.5 * n as f64 - 0.5, 0.5 * (n as f64).sqrt());
+        let between = |low: f64, high: f64| Some((at(low.floor())?, at(high.ceil())?));
+        let median = Measured {
+            value: between(middle, middle).map_or(f64::NAN, |(a, b)| 0.5 * (a + b)),
+            standard_error: between(middle - give, middle + give).filter(|_| n > 1).map(|(a, b)| 0.5 * (b - a)),
         };
         Self {
             mse: (&moments).into(),
