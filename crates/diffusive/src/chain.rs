@@ -1,7 +1,8 @@
 //! The search: a belief travels from node to node until it is sharp.
 
+use crate::belief::{PositionBelief, Prior, SearchBox};
 use crate::message::{Packet, Wire};
-use crate::posterior::{Posterior, Prior, SearchBox};
+use crate::posterior::Posterior;
 use crate::project::{Form, Travelling, project};
 use crate::select::{Rule, Selector};
 use crate::{Error, RateModel, Record, SourceLikelihood, SourceSensor};
@@ -265,9 +266,10 @@ impl Search {
                     .map(|posterior| posterior.around(&self.search));
                 (Prior::Exact(self.prior), outcome.records.as_slice(), near)
             }
-            (Some(Travelling::WithRate(mixture)), Some(range)) => (Prior::WithRate(mixture.clone(), range), last, None),
-            (Some(Travelling::WithRate(mixture)), None) => {
-                (Prior::Position(crate::PositionBelief::Mixture(mixture.marginal([0, 1])?)), last, None)
+            (Some(Travelling::WithRate(belief)), Some(range)) => (Prior::WithRate(belief.clone(), range), last, None),
+            (Some(Travelling::WithRate(belief)), None) => {
+                let position = Mixture::single(&belief.position())?;
+                (Prior::Position(PositionBelief::Mixture(position)), last, None)
             }
             (Some(Travelling::Position(position)), _) => (Prior::Position(position.clone()), last, None),
         };
@@ -301,7 +303,7 @@ impl Search {
         let [x, y] = posterior.cells.columns();
         let scale = Vector2::repeat(posterior.cells.width());
         match Peak::climb(&log, &Vector2::new(x[best], y[best]), &scale) {
-            Ok(peak) => Ok(Travelling::Position(crate::PositionBelief::Mixture(Mixture::single(&peak.gaussian())?))),
+            Ok(peak) => Ok(Travelling::Position(PositionBelief::Mixture(Mixture::single(&peak.gaussian())?))),
             Err(_) => Ok(moments),
         }
     }

@@ -48,24 +48,40 @@ impl Predictions {
         })
     }
 
+    /// Predictions over the noise, of equal lengths, with weights that sum to one.
+    pub(crate) fn in_units_of_noise(means: &[DVector<f64>], weights: Vec<f64>) -> Self {
+        let samples = means.first().map_or(0, DVector::len);
+        Self {
+            means: DMatrix::from_fn(means.len(), samples, |i, j| means[i][j]),
+            weights,
+        }
+    }
+
     /// `-sum_i w_i ln sum_j w_j exp(-D_ij / 8)` and the same with `D_ij / 2`, `D_ij` the squared distance of predictions in noise
     /// standard deviations (Kolchinsky and Tracey 2017): bounds of the mutual information, nats.
     pub fn pairwise_bounds(&self) -> Bounds {
-        let bound = |divisor: f64| {
-            let mut total = 0.0;
-            for (i, w) in self.weights.iter().enumerate() {
-                let mut inner = 0.0;
-                for (j, v) in self.weights.iter().enumerate() {
-                    inner += v * (-(self.means.row(i) - self.means.row(j)).norm_squared() / divisor).exp();
+        let points = self.means.transpose();
+        let count = self.weights.len();
+        let mut inner = [self.weights.clone(), self.weights.clone()];
+        for i in 0..count {
+            for j in 0..i {
+                let squared = (points.column(i) - points.column(j)).norm_squared();
+                for (sums, divisor) in inner.iter_mut().zip([8.0, 2.0]) {
+                    let overlap = (-squared / divisor).exp();
+                    sums[i] += self.weights[j] * overlap;
+                    sums[j] += self.weights[i] * overlap;
                 }
-                total -= w * inner.ln();
             }
-            total
-        };
-        Bounds {
-            lower: bound(8.0),
-            upper: bound(2.0),
         }
+        let [lower, upper] = inner.map(|sums| {
+            -self
+                .weights
+                .iter()
+                .zip(&sums)
+                .map(|(w, sum)| if *w > 0.0 { w * sum.ln() } else { 0.0 })
+                .sum::<f64>()
+        });
+        Bounds { lower, upper }
     }
 
     /// `(1/2) ln det(I + Cov / sigma^2)`: the mutual information if the predictions were Gaussian, and an upper bound of it, nats.

@@ -1,7 +1,7 @@
 //! What travels, as bits.
 
-use crate::posterior::PositionBelief;
-use crate::project::Travelling;
+use crate::belief::{JointBelief, PositionBelief};
+use crate::project::{Travelling, lpg_scalars};
 use crate::{Error, Record};
 use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
 use fewbits_densities::{Component, Lpg, Mixture};
@@ -116,38 +116,27 @@ impl Packet {
         let round = |numbers: Vec<f64>| -> Result<Vec<f64>, ArgumentError> {
             numbers.into_iter().map(|x| wire.numbers.rounded(x)).collect()
         };
-        Ok(match belief {
-            None => Self::Raw {
+        let Some(belief) = belief else {
+            return Ok(Self::Raw {
                 records: nodes
                     .iter()
                     .zip(records)
                     .map(|(node, r)| (*node, r.samples().to_vec()))
                     .collect(),
                 noise: records.first().map_or(1.0, |r| r.sensor().noise()),
-            },
-            Some(Travelling::WithRate(mixture)) => Self::Belief {
-                components: mixture.len(),
-                degree: None,
-                with_rate: true,
-                numbers: round(numbers_of(mixture.components()))?,
-            },
-            Some(Travelling::Position(PositionBelief::Mixture(mixture))) => Self::Belief {
-                components: mixture.len(),
-                degree: None,
-                with_rate: false,
-                numbers: round(numbers_of(mixture.components()))?,
-            },
-            Some(Travelling::Position(PositionBelief::Lpg(lpg))) => {
-                let mut numbers = Vec::new();
-                lpg.gaussians().for_each(|c| push_gaussian(c, &mut numbers));
-                lpg.coefficients().for_each(|list| numbers.extend_from_slice(list));
-                Self::Belief {
-                    components: lpg.gaussians().count(),
-                    degree: Some(lpg.degree()),
-                    with_rate: false,
-                    numbers: round(numbers)?,
-                }
-            }
+            });
+        };
+        let (components, degree, numbers) = match belief {
+            Travelling::Position(PositionBelief::Mixture(mixture)) => numbers_of(mixture.components()),
+            Travelling::Position(PositionBelief::Lpg(lpg)) => numbers_of_lpg(lpg),
+            Travelling::WithRate(JointBelief::Mixture(mixture)) => numbers_of(mixture.components()),
+            Travelling::WithRate(JointBelief::Lpg(lpg)) => numbers_of_lpg(lpg),
+        };
+        Ok(Self::Belief {
+            components,
+            degree,
+            with_rate: matches!(belief, Travelling::WithRate(_)),
+            numbers: round(numbers)?,
         })
     }
 
@@ -165,29 +154,12 @@ impl Packet {
         else {
             return Ok(None);
         };
-        let count = *components;
-        if *with_rate {
-            return Ok(Some(Travelling::WithRate(mixture_of::<3>(count, numbers)?)));
-        }
-        let position = match degree {
-            None => PositionBelief::Mixture(mixture_of::<2>(count, numbers)?),
-            Some(degree) => {
-                let gaussians: Vec<_> = numbers
-                    .chunks(5)
-                    .take(count)
-                    .map(|chunk| read_gaussian::<2>(1.0, chunk))
-                    .collect::<Result<_, _>>()?;
-                let size = (degree + 1) * (degree + 2) / 2;
-                let lists: Vec<Vec<f64>> = numbers
-                    .get(5 * count..)
-                    .unwrap_or_default()
-                    .chunks(size)
-                    .map(<[f64]>::to_vec)
-                    .collect();
-                PositionBelief::Lpg(Lpg::new(&gaussians, *degree, &lists)?)
-            }
-        };
-        Ok(Some(Travelling::Position(position)))
+        Ok(Some(match (*with_rate, *degree) {
+            (false, None) => Travelling::Position(PositionBelief::Mixture(mixture_of(*components, numbers)?)),
+            (false, Some(degree)) => Travelling::Position(PositionBelief::Lpg(lpg_of(*components, degree, numbers)?)),
+            (true, None) => Travelling::WithRate(JointBelief::Mixture(mixture_of(*components, numbers)?)),
+            (true, Some(degree)) => Travelling::WithRate(JointBelief::Lpg(lpg_of(*components, degree, numbers)?)),
+        }))
     }
 
     /// Length of the message in bits.
@@ -287,7 +259,7 @@ impl Message for Packet {
         let degree = Some(reader.read(COUNT_BITS)? as usize).filter(|d| *d != 31);
         let with_rate = reader.read_bit()?;
         let count = match (degree, with_rate) {
-            (Some(d), _) => components * (5 + (d + 1) * (d + 2) / 2),
+            (Some(degree), _) => components * lpg_scalars(degree, with_rate),
             (None, true) => (components * 10).saturating_sub(1),
             (None, false) => (components * 6).saturating_sub(1),
         };
@@ -311,10 +283,32 @@ fn invalid(error: Error) -> CodecError {
     }
 }
 
-fn numbers_of<const D: usize>(components: &[Component<D>]) -> Vec<f64> {
+fn numbers_of<const D: usize>(components: &[Component<D>]) -> (usize, Option<usize>, Vec<f64>) {
     let mut numbers: Vec<f64> = components.iter().skip(1).map(Component::weight).collect();
     components.iter().for_each(|c| push_gaussian(c, &mut numbers));
-    numbers
+    (components.len(), None, numbers)
+}
+
+fn numbers_of_lpg<const D: usize>(lpg: &Lpg<D>) -> (usize, Option<usize>, Vec<f64>) {
+    let mut numbers = Vec::new();
+    lpg.gaussians().for_each(|c| push_gaussian(c, &mut numbers));
+    lpg.coefficients().for_each(|list| numbers.extend_from_slice(list));
+    (lpg.gaussians().count(), Some(lpg.degree()), numbers)
+}
+
+fn lpg_of<const D: usize>(count: usize, degree: usize, numbers: &[f64]) -> Result<Lpg<D>, Error> {
+    let (gaussian, all) = (D + D * (D + 1) / 2, lpg_scalars(degree, D == 3));
+    let gaussians: Vec<_> = numbers
+        .chunks(gaussian)
+        .take(count)
+        .map(|chunk| read_gaussian::<D>(1.0, chunk))
+        .collect::<Result<_, _>>()?;
+    let coefficients = numbers
+        .get(gaussian * count..)
+        .unwrap_or_default()
+        .chunks(all - gaussian);
+    let lists: Vec<Vec<f64>> = coefficients.map(<[f64]>::to_vec).collect();
+    Ok(Lpg::new(&gaussians, degree, &lists)?)
 }
 
 fn push_gaussian<const D: usize>(c: &Component<D>, numbers: &mut Vec<f64>) {

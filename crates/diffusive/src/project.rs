@@ -1,12 +1,13 @@
 //! From an exact posterior to what travels on.
 
-use crate::posterior::{PositionBelief, Posterior};
+use crate::belief::{JointBelief, PositionBelief};
+use crate::posterior::Posterior;
 use crate::{Error, RateModel};
 use fewbits_core::Gaussian;
-use fewbits_densities::{Component, Lpg, Mixture, MixtureFit};
+use fewbits_densities::lpg::LpgFit;
+use fewbits_densities::{Clumps, Component, Lpg, Mixture, MixtureFit};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
-use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 /// Clumps that a mixture is fitted to.
@@ -50,11 +51,9 @@ impl Form {
             }
             Self::Raw | Self::Gaussian | Self::Laplace => {}
         }
-        let carries_rate = matches!(self, Self::Raw | Self::Gaussian | Self::Mixture(_));
-        if matches!(rate, RateModel::Joint(_)) && !carries_rate {
-            return Err(
-                ArgumentError::new("form", format!("{self:?}"), "Raw, Gaussian or Mixture with a joint rate").into()
-            );
+        if matches!(rate, RateModel::Joint(_)) && matches!(self, Self::Particles(_) | Self::Laplace) {
+            let expected = "Raw, Gaussian, Mixture or Lpg with a joint rate";
+            return Err(ArgumentError::new("form", format!("{self:?}"), expected).into());
         }
         Ok(())
     }
@@ -66,9 +65,19 @@ impl Form {
             Self::Raw => None,
             Self::Gaussian | Self::Laplace => Some(if carried { 9 } else { 5 }),
             Self::Mixture(n) => Some(n * if carried { 10 } else { 6 } - 1),
-            Self::Lpg { components, degree } => Some(components * (5 + (degree + 1) * (degree + 2) / 2) - 1),
+            Self::Lpg { components, degree } => Some(components * lpg_scalars(degree, carried) - 1),
             Self::Particles(n) => Some(2 * n),
         }
+    }
+}
+
+/// Numbers of one polynomial Gaussian over the position, or over position and rate.
+pub(crate) fn lpg_scalars(degree: usize, with_rate: bool) -> usize {
+    let plane = (degree + 1) * (degree + 2) / 2;
+    if with_rate {
+        9 + plane * (degree + 3) / 3
+    } else {
+        5 + plane
     }
 }
 
@@ -78,7 +87,7 @@ pub enum Travelling {
     /// A belief about the position.
     Position(PositionBelief),
     /// A belief about position and rate.
-    WithRate(Mixture<3>),
+    WithRate(JointBelief),
 }
 
 impl Travelling {
@@ -86,11 +95,7 @@ impl Travelling {
     pub fn gaussian(&self) -> Gaussian<2> {
         match self {
             Self::Position(belief) => belief.gaussian(),
-            Self::WithRate(mixture) => {
-                let s = mixture.covariance();
-                let m = mixture.mean();
-                Gaussian::from_trusted_parts(Vector2::new(m[0], m[1]), s.fixed_view::<2, 2>(0, 0).into_owned())
-            }
+            Self::WithRate(belief) => belief.position(),
         }
     }
 }
@@ -103,14 +108,14 @@ pub fn project(posterior: &Posterior, form: Form, rate: &RateModel) -> Result<Op
     let carried = matches!(rate, RateModel::Joint(_));
     let components = match form {
         Form::Raw => return Ok(None),
-        Form::Lpg { components, degree } => return Ok(Some(lpg(posterior, components, degree)?)),
+        Form::Lpg { components, degree } => return Ok(Some(lpg(posterior, components, degree, rate)?)),
         Form::Particles(count) => return Ok(Some(particles(posterior, count)?)),
         Form::Gaussian | Form::Laplace => 1,
         Form::Mixture(components) => components,
     };
     if carried {
         let clumps = posterior.clumps_with_rate(rate.typical(), if components == 1 { 1 } else { CLUMPS })?;
-        return Ok(Some(Travelling::WithRate(clumps.fit(&MixtureFit::new(components)?)?)));
+        return Ok(Some(joint(clumps.fit(&MixtureFit::new(components)?)?)));
     }
     if components == 1 {
         return Ok(Some(position(Mixture::single(&posterior.gaussian())?)));
@@ -122,23 +127,41 @@ fn position(mixture: Mixture<2>) -> Travelling {
     Travelling::Position(PositionBelief::Mixture(mixture))
 }
 
-/// Polynomial Gaussians about the components of a mixture, widened.
-fn lpg(posterior: &Posterior, components: usize, degree: usize) -> Result<Travelling, Error> {
-    let mixture = posterior.clumps(CLUMPS)?.fit(&MixtureFit::new(components)?)?;
-    let widened: Vec<Component<2>> = mixture
-        .components()
-        .iter()
-        .map(|c| Component::new(c.weight(), *c.mean(), c.covariance() * LPG_WIDENING))
-        .collect::<Result<_, _>>()?;
-    let fit = match Lpg::fit(&posterior.cells, &widened, degree) {
-        Ok(fit) => fit,
-        // Gaussians too much alike: one does.
-        Err(_) => {
-            let g = posterior.gaussian();
-            Lpg::fit(&posterior.cells, &[Component::new(1.0, *g.mean(), g.covariance() * LPG_WIDENING)?], degree)?
-        }
-    };
+fn joint(mixture: Mixture<3>) -> Travelling {
+    Travelling::WithRate(JointBelief::Mixture(mixture))
+}
+
+fn lpg(posterior: &Posterior, components: usize, degree: usize, rate: &RateModel) -> Result<Travelling, Error> {
+    let cells = &posterior.cells;
+    if let (RateModel::Joint(_), Some((means, variances))) = (rate, &posterior.rates) {
+        let clumps = posterior.clumps_with_rate(rate.typical(), CLUMPS)?;
+        let fit = about_components(&clumps, components, |gaussians| {
+            Lpg::fit_lifted(cells, means, variances, gaussians, degree)
+        })?;
+        return Ok(Travelling::WithRate(JointBelief::Lpg(fit.belief)));
+    }
+    let fit = about_components(&posterior.clumps(CLUMPS)?, components, |g| Lpg::fit(cells, g, degree))?;
     Ok(Travelling::Position(PositionBelief::Lpg(fit.belief)))
+}
+
+/// Polynomial Gaussians about the components of a mixture, widened; about fewer where these are too much alike.
+fn about_components<const D: usize>(
+    clumps: &Clumps<D>,
+    components: usize,
+    fit: impl Fn(&[Component<D>]) -> Result<LpgFit<D>, fewbits_densities::Error>,
+) -> Result<LpgFit<D>, Error> {
+    let about = |count: usize| {
+        let mixture = clumps.fit(&MixtureFit::new(count)?)?;
+        let widened = mixture
+            .components()
+            .iter()
+            .map(|c| Component::new(c.weight(), *c.mean(), c.covariance() * LPG_WIDENING));
+        fit(&widened.collect::<Result<Vec<_>, _>>()?)
+    };
+    Ok(match about(components) {
+        Err(_) if components > 1 => about(1)?,
+        other => other?,
+    })
 }
 
 /// Points at equal steps of the cumulative weight along the cells' order, under a Gaussian kernel of the normal-reference width;

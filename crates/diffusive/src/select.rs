@@ -1,6 +1,6 @@
 //! Which node is asked next.
 
-use crate::information::{fisher_information, half_log_det_plus_one};
+use crate::information::{Predictions, fisher_information, half_log_det_plus_one};
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceSensor};
 use fewbits_core::Gaussian;
@@ -15,6 +15,11 @@ pub enum Rule {
     /// The largest mutual information of samples and (position, rate), by its Gaussian bound `(1/2) ln det(I + Cov / sigma^2)`.
     #[default]
     MutualInformation,
+    /// The largest pairwise lower bound of the same information. Ranks better than the Gaussian bound where the belief has several
+    /// peaks, at some twenty times the cost of the samples' covariance.
+    PairwiseInformation,
+    /// The largest mutual information by quadrature, over fewer points: tens of milliseconds for each candidate.
+    ExactInformation,
     /// The smallest posterior Cramer-Rao bound (equations 40 to 44, conditional on the belief): the expected Fisher information is
     /// added to that of the belief, and the rate eliminated by a Schur complement afterwards.
     CramerRao,
@@ -24,8 +29,11 @@ pub enum Rule {
     Covariance,
 }
 
-/// Clumps that stand for the belief.
+/// Clumps that stand for the belief, and for the quadrature.
 const CLUMPS: usize = 96;
+const FEW_CLUMPS: usize = 48;
+/// A clump whose rate moves the samples by more than this share of the noise variance becomes two points.
+const SPLIT: f64 = 0.05;
 
 /// A belief, ready to score candidates.
 #[derive(Debug, Clone)]
@@ -42,9 +50,14 @@ impl Selector {
     /// # Errors
     /// If the covariance of the estimate is singular.
     pub fn new(rule: Rule, posterior: &Posterior, estimate: &Gaussian<2>, rate: &RateModel) -> Result<Self, Error> {
+        let count = match rule {
+            Rule::Mahalanobis => 1,
+            Rule::ExactInformation => FEW_CLUMPS,
+            _ => CLUMPS,
+        };
         Ok(Self {
             rule,
-            clumps: posterior.clumps_with_rate(rate.typical(), if rule == Rule::Mahalanobis { 1 } else { CLUMPS })?,
+            clumps: posterior.clumps_with_rate(rate.typical(), count)?,
             precision: estimate.cholesky()?.inverse(),
             estimate: *estimate,
         })
@@ -70,6 +83,8 @@ impl Selector {
                 -d.dot(&(self.precision * d))
             }
             Rule::MutualInformation => self.information(sensor, node),
+            Rule::PairwiseInformation => self.predictions(sensor, node).pairwise_bounds().lower,
+            Rule::ExactInformation => self.predictions(sensor, node).exact(),
             Rule::CramerRao => self.cramer_rao(sensor, node),
             Rule::Covariance => -self.covariance(sensor, node).ln(),
         }
@@ -87,6 +102,25 @@ impl Selector {
         }
         second.ger(-1.0, &mean, &mean, 1.0);
         half_log_det_plus_one(second)
+    }
+
+    /// The samples that clumps predict; a clump of uncertain rate is two points, one deviation on either side.
+    fn predictions(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> Predictions {
+        let (mut means, mut weights) = (Vec::new(), Vec::new());
+        for clump in self.clumps.clumps() {
+            let a = self.predicted(sensor, node, clump);
+            let (rate, variance) = (clump.mean[2], clump.covariance[(2, 2)]);
+            if variance * a.norm_squared() > SPLIT {
+                for rate in [rate - variance.sqrt(), rate + variance.sqrt()] {
+                    means.push(&a * rate);
+                    weights.push(0.5 * clump.weight);
+                }
+            } else {
+                means.push(a * rate);
+                weights.push(clump.weight);
+            }
+        }
+        Predictions::in_units_of_noise(&means, weights)
     }
 
     /// Responses in units of the noise.

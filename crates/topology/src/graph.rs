@@ -34,13 +34,16 @@ impl Graph {
             });
         }
         let cells = Cells::new(positions, range, count);
+        // A power of two: squares neither overflow nor vanish, and nothing is rounded.
+        let scale = 2.0_f64.powi(-(range.log2().floor().clamp(-1000.0, 1000.0) as i32));
+        let limit = (range * scale) * (range * scale);
         let mut starts = Vec::with_capacity(positions.len() + 1);
         let mut neighbours = Vec::new();
         starts.push(0);
         for position in positions {
             let from = neighbours.len();
             cells.visit_around(position, |other| {
-                if (positions[other as usize] - position).norm_squared() <= range * range {
+                if ((positions[other as usize] - position) * scale).norm_squared() <= limit {
                     neighbours.push(other);
                 }
             });

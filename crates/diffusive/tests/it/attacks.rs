@@ -7,7 +7,8 @@ use fewbits_densities::laplace::Peak;
 use fewbits_densities::{CellOptions, Cells, Clumps, Lpg, MixtureFit};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{
-    Form, Posterior, Prior, RateModel, RateRange, RateSums, Search, SearchBox, SourceLikelihood, SourceSensor,
+    Form, Posterior, Prior, RateModel, RateRange, RateSums, Rule, Search, SearchBox, SourceLikelihood, SourceSensor,
+    Status,
 };
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_topology::{Deployment, Graph};
@@ -88,31 +89,22 @@ fn runs_refuse_what_they_cannot_do() {
     assert!(run(search(|_| ()), 0, vec![f64::NAN; 5]).is_err());
     assert!(run(search(|s| s.most_nodes = 0), 0, vec![0.0; 5]).is_err());
     assert!(run(search(|s| s.form = Form::Mixture(0)), 0, vec![0.0; 5]).is_err());
-    assert!(
-        run(
-            search(|s| s.form = Form::Lpg {
-                components: 2,
-                degree: 5
-            }),
-            0,
-            vec![0.0; 5]
-        )
-        .is_err()
-    );
-    assert!(
-        run(
-            search(|s| {
-                s.form = Form::Lpg {
-                    components: 2,
-                    degree: 21,
-                };
-                s.rate = RateModel::Known(1.0)
-            }),
-            0,
-            vec![0.0; 5]
-        )
-        .is_err()
-    );
+    for form in [
+        Form::Particles(25),
+        Form::Laplace,
+        Form::Lpg {
+            components: 0,
+            degree: 5,
+        },
+        Form::Lpg {
+            components: 2,
+            degree: 21,
+        },
+    ] {
+        let mut search = search(|_| ());
+        search.form = form;
+        assert!(run(search, 0, vec![0.0; 5]).is_err(), "{form:?}");
+    }
     let other = Graph::within(&[Vector2::zeros()], 1.0).unwrap();
     assert!(
         search(|_| ())
@@ -128,8 +120,13 @@ fn absurd_samples() {
         Deployment::uniform(&mut fewbits_monte_carlo::Stream::new(2).rng(), [0.0; 2], [100.0; 2], 60).unwrap();
     let graph = Graph::within(field_of.positions(), 25.0).unwrap();
     let sensor = sensor(1.0, false);
-    for form in [Form::Raw, Form::Mixture(4)] {
-        for level in [0.0, -1.0, 1e-9, 1e-3, 1.0, 1e6, 1e150] {
+    let all = [0.0, -1.0, 1e-9, 1e-3, 1.0, 1e6, 1e150];
+    let lpg = Form::Lpg {
+        components: 2,
+        degree: 1,
+    };
+    for (form, levels) in [(Form::Raw, &all[..]), (Form::Mixture(4), &all), (lpg, &[-1.0, 1e-3, 1e150])] {
+        for &level in levels {
             let mut search = Search::new(&Vector2::new(44.0, 52.0), 50.0, field(1.0), joint(), 1e-5).unwrap();
             (search.form, search.most_nodes) = (form, 4);
             let outcome = search.run(&sensor, &field_of, &graph, 0, |_| vec![level; 5]).unwrap();
@@ -197,4 +194,64 @@ fn polynomial_gaussians_refuse_bad_parts() {
     assert!(Lpg::fit(&cells, &[one, one], 3).is_err());
     assert!(Lpg::new(&[one], 1, &[vec![0.0; 3]]).is_err() && Lpg::new(&[one], 1, &[vec![1.0; 2]]).is_err());
     assert!(Lpg::new(&[one], 1, &[vec![1.0, f64::NAN, 0.0]]).is_err());
+}
+
+/// Nodes that stand together, one of them on the source, samples of any size: statuses, no panic, nothing that is no number.
+#[test]
+fn coincident_nodes_and_a_source_on_a_node() {
+    let place = Vector2::new(50.0, 50.0);
+    let mut positions = vec![place; 6];
+    positions.extend([Vector2::new(58.0, 50.0), Vector2::new(50.0, 58.0)]);
+    let field_of = Deployment::given(positions).unwrap();
+    let graph = Graph::within(field_of.positions(), 10.0).unwrap();
+    let sensor = sensor(1.0, false);
+    for rule in [
+        Rule::MutualInformation,
+        Rule::PairwiseInformation,
+        Rule::CramerRao,
+        Rule::Mahalanobis,
+        Rule::Covariance,
+    ] {
+        let mut search = Search::new(&place, 50.0, field(1.0), joint(), 1e-5).unwrap();
+        search.rule = rule;
+        let mut rng = fewbits_monte_carlo::Stream::new(7).rng();
+        let outcome = search
+            .run(&sensor, &field_of, &graph, 0, |node| {
+                sensor.sample(&mut rng, &field_of.positions()[node], &place, 1.0)
+            })
+            .unwrap();
+        for step in &outcome.steps {
+            assert!(step.estimate.mean().iter().all(|x| x.is_finite()) && step.log10_determinant.is_finite());
+        }
+        if let Some(estimate) = outcome.estimate() {
+            assert!((estimate.mean() - place).norm() < 0.1, "{rule:?}: {:?} {}", outcome.status, estimate.mean());
+        }
+    }
+}
+
+/// Sources far outside, at every unit: the search says that it has not found them.
+#[test]
+fn sources_outside_the_field_are_not_found() {
+    for unit in [1e-4, 1.0, 1e4] {
+        let mut rng = fewbits_monte_carlo::Stream::new(8).rng();
+        let field_of = Deployment::uniform(&mut rng, [0.0; 2], [100.0 * unit; 2], 200).unwrap();
+        let graph = Graph::within(field_of.positions(), 15.0 * unit).unwrap();
+        let sensor = sensor(unit, false);
+        for place in [[190.0, 50.0], [-60.0, -60.0], [1e4, 0.0]] {
+            let source = Vector2::from(place) * unit;
+            for form in [Form::Raw, Form::Mixture(4)] {
+                let start = field_of.nearest_to(&(Vector2::new(50.0, 50.0) * unit));
+                let mut search =
+                    Search::new(&field_of.positions()[start], 50.0 * unit, field(unit), joint(), 1e-5 * unit.powi(4))
+                        .unwrap();
+                (search.form, search.most_nodes) = (form, 12);
+                let outcome = search
+                    .run(&sensor, &field_of, &graph, start, |node| {
+                        sensor.sample(&mut rng, &field_of.positions()[node], &source, 1.0)
+                    })
+                    .unwrap();
+                assert_ne!(outcome.status, Status::Converged, "{place:?} {unit} {form:?}");
+            }
+        }
+    }
 }

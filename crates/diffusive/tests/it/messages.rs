@@ -50,6 +50,13 @@ fn beliefs_arrive_as_they_were_sent() {
                 },
                 RateModel::Known(1.0),
             ),
+            (
+                Form::Lpg {
+                    components: 2,
+                    degree: 3,
+                },
+                joint(),
+            ),
             (Form::Particles(25), RateModel::Known(1.0)),
         ] {
             let (posterior, likelihood) = posterior(rate);
@@ -62,9 +69,16 @@ fn beliefs_arrive_as_they_were_sent() {
             assert!((received.mean() - sent.gaussian().mean()).amax() < 100.0 * tolerance);
             let off = (received.covariance() - sent.gaussian().covariance()).amax();
             assert!(off < 10.0 * tolerance * sent.gaussian().covariance().amax(), "{form:?} {off}");
-            if form == Form::Gaussian {
-                // Kind, components, degree, rate: 12 bits before nine numbers.
-                assert_eq!(bits, 12 + 9 * numbers.bits() as usize);
+            // Kind, components, degree, rate: 12 bits before the numbers.
+            let count = (bits - 12) / numbers.bits() as usize;
+            match form {
+                Form::Gaussian => assert_eq!(count, 9),
+                // Mean, covariance and polynomials, norm included: one component may be all there is.
+                Form::Lpg { .. } => {
+                    let own = form.scalars(&rate).unwrap() + 1;
+                    assert!(count == own || 2 * count == own, "{count} {own}");
+                }
+                _ => {}
             }
         }
     }

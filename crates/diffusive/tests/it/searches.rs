@@ -47,6 +47,15 @@ fn every_form_and_rule_finds_the_source() {
             Rule::Mahalanobis,
             false,
         ),
+        (
+            Form::Lpg {
+                components: 2,
+                degree: 5,
+            },
+            joint(),
+            Rule::PairwiseInformation,
+            false,
+        ),
         (Form::Particles(25), RateModel::Known(1.0), Rule::MutualInformation, false),
     ] {
         let outcome = run(3, 1.0, windy, 300, |search| {
@@ -154,8 +163,22 @@ fn selectors_score_candidates() {
     let outcome = run(3, 1.0, false, 300, |search| search.most_nodes = 2);
     let posterior = outcome.posterior.unwrap();
     let estimate = posterior.gaussian();
+    let score = |rule, x: f64| {
+        let selector = Selector::new(rule, &posterior, &estimate, &joint()).unwrap();
+        selector.score(&sensor(1.0, false), &Vector2::new(x, 50.0))
+    };
+    for x in [48.0, 56.0, 70.0] {
+        // Of the same belief, though over fewer points.
+        let (lower, exact, upper) = (
+            score(Rule::PairwiseInformation, x),
+            score(Rule::ExactInformation, x),
+            score(Rule::MutualInformation, x),
+        );
+        assert!(lower < exact + 0.1 && exact < upper + 0.1, "{lower} {exact} {upper}");
+    }
     for rule in [
         Rule::MutualInformation,
+        Rule::PairwiseInformation,
         Rule::CramerRao,
         Rule::Mahalanobis,
         Rule::Covariance,

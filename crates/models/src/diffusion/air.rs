@@ -36,6 +36,11 @@ pub struct Air {
     ground: Ground,
     closest: f64,
     space: Space,
+    /// Norm of the wind.
+    speed: f64,
+    /// `1 / (2 diffusivity)` and `1 / (8 pi diffusivity)`.
+    half_resistance: f64,
+    strength: f64,
 }
 
 /// A concentration and how it changes with the place of the source.
@@ -69,6 +74,9 @@ impl Air {
             ground,
             closest: CLOSEST,
             space: Space::new([open(wind.x)?, open(wind.y)?, vertical])?,
+            speed: wind.norm(),
+            half_resistance: 0.5 / diffusivity,
+            strength: 0.125 / (PI * diffusivity),
         })
     }
 
@@ -117,7 +125,7 @@ impl Air {
         let Some(sign) = self.image() else {
             return step_response(&self.space, field, source, age, self.closest);
         };
-        let direct = self.at_offset(&(field - source), age).0;
+        let direct = self.terms(&(field - source), age).sum;
         if sign == 0.0 {
             return direct;
         }
@@ -126,7 +134,7 @@ impl Air {
             return (1.0 + sign) * direct;
         }
         let mirrored = Vector3::new(source.x, source.y, -source.z);
-        (direct + sign * self.at_offset(&(field - mirrored), age).0).max(0.0)
+        (direct + sign * self.terms(&(field - mirrored), age).sum).max(0.0)
     }
 
     /// Concentration and its gradient with respect to the source position.
@@ -184,46 +192,78 @@ impl Air {
         }
     }
 
-    /// Concentration in unbounded air and its gradient with respect to the offset `field - source`.
+    /// Concentration in unbounded air at an offset `field - source`, and the parts of which it is made.
     ///
     /// `c = e^{v.d/2k} [e^{-rV/2k} erfc(zm) + e^{rV/2k} erfc(zp)] / (8 pi k r)`, `zm, zp = (r -+ V t) / sqrt(4 k t)`. Both terms
-    /// hold the factor `g = exp(-|d - v t|^2 / 4 k t)`, which leaves `erfcx` of the arguments: nothing overflows.
+    /// hold the factor `g = exp(-|d - v t|^2 / 4 k t)`, which leaves `erfcx` of the arguments: nothing overflows. At most two
+    /// exponentials and two `erfcx`, one of each without wind.
+    #[inline]
+    fn terms(&self, offset: &Vector3<f64>, age: f64) -> Terms {
+        let distance = offset.norm();
+        let r = distance.max(self.closest);
+        let prefactor = self.strength / r;
+        let narrowness = (4.0 * self.diffusivity * age).sqrt().recip();
+        if self.speed == 0.0 {
+            let z = r * narrowness;
+            let g = (-z * z).exp();
+            let term = prefactor * g * erfcx(z);
+            return Terms {
+                distance,
+                narrowness,
+                g: prefactor * g,
+                sum: 2.0 * term,
+                difference: 0.0,
+            };
+        }
+        let mut along = self.wind.dot(offset);
+        if distance < r {
+            // An offset moved out to the closest distance keeps its direction.
+            along *= if distance > 0.0 { r / distance } else { 0.0 };
+        }
+        let drift = self.speed * age;
+        let (minus, plus) = ((r - drift) * narrowness, (r + drift) * narrowness);
+        // |d - v t|^2 = minus^2 spread^2 + 2 (r V - v.d) t, without the cancellation of the difference of vectors.
+        let lag = (along - r * self.speed) * self.half_resistance;
+        let g = (lag - minus * minus).exp();
+        let near = g * erfcx(minus.abs());
+        // erfc(-x) = 2 - erfc(x).
+        let first = if minus >= 0.0 { near } else { 2.0 * lag.exp() - near };
+        let second = g * erfcx(plus);
+        Terms {
+            distance,
+            narrowness,
+            g: prefactor * g,
+            sum: prefactor * (first + second),
+            difference: prefactor * (second - first),
+        }
+    }
+
+    /// Concentration in unbounded air and its gradient with respect to the offset `field - source`.
     fn at_offset(&self, offset: &Vector3<f64>, age: f64) -> (f64, Vector3<f64>) {
-        let k = self.diffusivity;
-        let true_distance = offset.norm();
-        let r = true_distance.max(self.closest);
-        let spread = (4.0 * k * age).sqrt();
-        let speed = self.wind.norm();
-        let prefactor = 1.0 / (8.0 * PI * k * r);
-        let direction = if true_distance > 0.0 {
-            offset / true_distance
+        let terms = self.terms(offset, age);
+        let direction = if terms.distance > 0.0 {
+            offset / terms.distance
         } else {
             Vector3::zeros()
         };
-        if speed == 0.0 {
-            let z = r / spread;
-            let g = (-z * z).exp();
-            let both = 2.0 * prefactor * g * erfcx(z);
-            let slope = -both / r - prefactor * 4.0 * g / (SQRT_PI * spread);
-            return (both, direction * slope);
-        }
-        // An offset moved out to the closest distance keeps its direction.
-        let along = self.wind.dot(&direction) * r;
-        let (minus, plus) = ((r - speed * age) / spread, (r + speed * age) / spread);
-        // |d - v t|^2 = minus^2 spread^2 + 2 (r V - v.d) t, without the cancellation of the difference of vectors.
-        let lag = (along - r * speed) / (2.0 * k);
-        let g = (lag - minus * minus).exp();
-        let first = if minus >= 0.0 {
-            g * erfcx(minus)
-        } else {
-            // erfc(-x) = 2 - erfc(x).
-            2.0 * lag.exp() - g * erfcx(-minus)
-        };
-        let second = g * erfcx(plus);
-        let sum = prefactor * (first + second);
-        let radial = -sum / r + prefactor * (speed / (2.0 * k) * (second - first) - 4.0 * g / (SQRT_PI * spread));
-        (sum, self.wind * (sum / (2.0 * k)) + direction * radial)
+        let radial = -terms.sum / terms.distance.max(self.closest)
+            + self.speed * self.half_resistance * terms.difference
+            - terms.g * terms.narrowness * (4.0 / SQRT_PI);
+        (terms.sum, self.wind * (terms.sum * self.half_resistance) + direction * radial)
     }
+}
+
+/// What concentration and gradient share.
+struct Terms {
+    distance: f64,
+    /// `1 / sqrt(4 k t)`.
+    narrowness: f64,
+    /// `exp(-|d - v t|^2 / 4 k t) / (8 pi k r)`.
+    g: f64,
+    /// Concentration.
+    sum: f64,
+    /// The term of `zp` less that of `zm`.
+    difference: f64,
 }
 
 impl ImpulseResponse for Air {

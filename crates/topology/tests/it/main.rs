@@ -117,3 +117,34 @@ fn bad_input_is_refused() {
     assert!(Graph::within(&[Vector2::new(f64::INFINITY, 0.0)], 1.0).is_err());
     assert!(Graph::within(&[], 1.0).unwrap().is_empty());
 }
+
+/// Coincident nodes, ranges and fields of extreme size: graphs by distance, never a panic.
+#[test]
+fn extremes() {
+    let at = |x: f64, y: f64| Vector2::new(x, y);
+    let neighbours = |positions: &[Vector2<f64>], range: f64| -> Vec<Vec<u32>> {
+        let graph = Graph::within(positions, range).unwrap();
+        (0..positions.len())
+            .map(|node| graph.neighbours(node).to_vec())
+            .collect()
+    };
+    let coincident = neighbours(&[at(3.0, 4.0); 5], 1e-300);
+    assert!(coincident.iter().all(|list| list.len() == 4));
+    // Squares of these would vanish, or overflow.
+    assert_eq!(neighbours(&[at(0.0, 0.0), at(1e-170, 0.0), at(1e-201, 0.0)], 1e-200), [vec![2], vec![], vec![0]]);
+    assert_eq!(neighbours(&[at(0.0, 0.0), at(1e250, 0.0), at(1e199, 0.0)], 1e200), [vec![2], vec![], vec![0]]);
+    assert_eq!(neighbours(&[at(-1.7e308, 0.0), at(1.7e308, 0.0)], 1.0), [vec![], vec![]]);
+    assert_eq!(neighbours(&[at(0.0, 0.0), at(1.0, 0.0)], f64::MAX), [vec![1], vec![0]]);
+    assert_eq!(neighbours(&[at(0.0, 0.0), at(1e300, 1.0), at(1e300, 1.5)], 1.0), [vec![], vec![2], vec![1]]);
+    for range in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(Graph::within(&[at(0.0, 0.0)], range).is_err(), "{range}");
+    }
+    let one = Graph::within(&[at(0.0, 0.0)], 1.0).unwrap();
+    assert_eq!(
+        (one.edges(), one.components().sizes(), one.hops_from(0).unwrap().route(0)),
+        (0, &[1][..], Some(vec![0]))
+    );
+    let none = Graph::within(&[], 1.0).unwrap();
+    assert!(none.hops_from(0).is_err() && none.nearest(0, |_| true).is_err() && none.components().is_connected());
+    assert_eq!(none.components().largest_share(), 0.0);
+}

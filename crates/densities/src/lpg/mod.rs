@@ -1,5 +1,9 @@
 //! Linear combinations of polynomial Gaussians.
 
+mod lifted;
+
+pub use lifted::{Slice, SliceMoments};
+
 use crate::hermite::{check_degree, multi_indices};
 use crate::{Cells, Component, Error};
 use fewbits_core::columns::state_at;
@@ -82,7 +86,7 @@ impl<const D: usize> Lpg<D> {
     /// # Errors
     /// If there is no Gaussian, `degree` exceeds 20, or the basis is singular (two equal Gaussians).
     pub fn fit(cells: &Cells<D>, gaussians: &[Component<D>], degree: usize) -> Result<LpgFit<D>, Error> {
-        let mut belief = Self::skeleton(gaussians, degree)?;
+        let belief = Self::skeleton(gaussians, degree)?;
         let gram = belief.gram()?;
         let size = belief.indices.len();
         let mut b = DVector::zeros(gram.nrows());
@@ -105,24 +109,7 @@ impl<const D: usize> Lpg<D> {
                 }
             }
         }
-        // The basis of each Gaussian is orthonormal: the diagonal is one, and a tiny pivot is rounding.
-        let independent = |factor: &Cholesky<f64, Dyn>| factor.l_dirty().diagonal().min() > DEPENDENT;
-        let Some(factor) = gram.clone().cholesky().filter(independent) else {
-            return Err(ArgumentError::new("gaussians", "a dependent set", "Gaussians that differ").into());
-        };
-        let c = factor.solve(&b);
-        let norm = c.dot(&(&gram * &c)).sqrt();
-        if !(norm > 0.0 && norm.is_finite()) {
-            return Err(Error::IMPOSSIBLE);
-        }
-        for (l, term) in belief.terms.iter_mut().enumerate() {
-            term.coefficients = c.rows(l * size, size).iter().map(|c| c / norm).collect();
-        }
-        belief.settle()?;
-        Ok(LpgFit {
-            belief,
-            affinity: b.dot(&c) / norm,
-        })
+        belief.project(&gram, &b)
     }
 
     /// The smallest degree up to `highest` whose affinity reaches `1 - tolerance`, or the best found.
@@ -143,6 +130,29 @@ impl<const D: usize> Lpg<D> {
             best = Self::fit(cells, gaussians, degree)?;
         }
         Ok(best)
+    }
+
+    /// The belief whose coefficients are the projection `G^-1 b`, normalised.
+    fn project(mut self, gram: &DMatrix<f64>, b: &DVector<f64>) -> Result<LpgFit<D>, Error> {
+        // The basis of each Gaussian is orthonormal: the diagonal is one, and a tiny pivot is rounding.
+        let independent = |factor: &Cholesky<f64, Dyn>| factor.l_dirty().diagonal().min() > DEPENDENT;
+        let Some(factor) = gram.clone().cholesky().filter(independent) else {
+            return Err(ArgumentError::new("gaussians", "a dependent set", "Gaussians that differ").into());
+        };
+        let c = factor.solve(b);
+        let norm = c.dot(&(gram * &c)).sqrt();
+        if !(norm > 0.0 && norm.is_finite()) {
+            return Err(Error::IMPOSSIBLE);
+        }
+        let size = self.indices.len();
+        for (l, term) in self.terms.iter_mut().enumerate() {
+            term.coefficients = c.rows(l * size, size).iter().map(|c| c / norm).collect();
+        }
+        self.settle()?;
+        Ok(LpgFit {
+            belief: self,
+            affinity: b.dot(&c) / norm,
+        })
     }
 
     fn skeleton(gaussians: &[Component<D>], degree: usize) -> Result<Self, Error> {
@@ -459,14 +469,22 @@ fn log_add(a: f64, b: f64) -> f64 {
 fn polynomials<const D: usize>(indices: &[[usize; D]], degree: usize, u: &SVector<f64, D>, out: &mut [f64]) {
     let mut table = [[0.0; crate::hermite::HIGHEST_DEGREE + 1]; D];
     for (row, x) in table.iter_mut().zip(u.iter()) {
-        row[0] = 1.0;
-        for n in 0..degree {
-            let below = if n > 0 { (n as f64).sqrt() * row[n - 1] } else { 0.0 };
-            row[n + 1] = (x * row[n] - below) / ((n + 1) as f64).sqrt();
-        }
+        row_of_polynomials(*x, &mut row[..=degree]);
     }
     for (value, index) in out.iter_mut().zip(indices) {
         *value = (0..D).map(|d| table[d][index[d]]).product();
+    }
+}
+
+/// Orthonormal Hermite polynomials `he_n(x) / sqrt(n!)` of increasing degree.
+#[inline]
+fn row_of_polynomials(x: f64, row: &mut [f64]) {
+    for n in 0..row.len() {
+        row[n] = match n {
+            0 => 1.0,
+            1 => x,
+            _ => (x * row[n - 1] - ((n - 1) as f64).sqrt() * row[n - 2]) / (n as f64).sqrt(),
+        };
     }
 }
 

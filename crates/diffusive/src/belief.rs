@@ -1,0 +1,121 @@
+//! Beliefs that travel, apart from raw records, and what an update starts from.
+
+use crate::rate::RateRange;
+use fewbits_core::{Belief, Density, Gaussian};
+use fewbits_densities::{Component, Lpg, Mixture};
+use nalgebra::Vector2;
+
+/// A Gaussian ends here, in standard deviations.
+const ENDS: f64 = 6.5;
+/// A polynomial of the degrees in use reaches a little farther than its Gaussian: as one of this many times the variance.
+const LPG_REACH: f64 = 1.7;
+
+/// Where the source can be, m: the box that the first cells cover, and to which all later ones are cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchBox {
+    /// Lower corner.
+    pub lower: [f64; 2],
+    /// Upper corner.
+    pub upper: [f64; 2],
+}
+
+impl SearchBox {
+    /// The part that lies within another box; the nearest corner of the other, if none does.
+    pub(crate) fn within(&self, other: &Self) -> Self {
+        let lower: [f64; 2] = std::array::from_fn(|d| self.lower[d].max(other.lower[d]));
+        let upper: [f64; 2] = std::array::from_fn(|d| self.upper[d].min(other.upper[d]));
+        if lower[0] < upper[0] && lower[1] < upper[1] {
+            Self { lower, upper }
+        } else {
+            *other
+        }
+    }
+}
+
+/// A belief about the position that travels, apart from raw records.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PositionBelief {
+    /// A Gaussian mixture.
+    Mixture(Mixture<2>),
+    /// Polynomial Gaussians.
+    Lpg(Lpg<2>),
+}
+
+/// A belief about position and rate that travels.
+#[derive(Debug, Clone, PartialEq)]
+pub enum JointBelief {
+    /// A Gaussian mixture.
+    Mixture(Mixture<3>),
+    /// Polynomial Gaussians.
+    Lpg(Lpg<3>),
+}
+
+/// What the cells are an update of.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Prior {
+    /// A position prior and all records at once: nothing approximated.
+    Exact(Gaussian<2>),
+    /// A position belief that was sent on.
+    Position(PositionBelief),
+    /// A belief over position and rate that was sent on, and the range of the rate.
+    WithRate(JointBelief, RateRange),
+}
+
+/// The box of all Gaussians' first two coordinates, their variances taken `widening` times.
+fn bounds<'a, const D: usize>(parts: impl Iterator<Item = &'a Component<D>>, widening: f64) -> SearchBox {
+    let mut hull = SearchBox {
+        lower: [f64::INFINITY; 2],
+        upper: [f64::NEG_INFINITY; 2],
+    };
+    for part in parts {
+        for d in 0..2 {
+            let reach = ENDS * (widening * part.covariance()[(d, d)]).sqrt();
+            hull.lower[d] = hull.lower[d].min(part.mean()[d] - reach);
+            hull.upper[d] = hull.upper[d].max(part.mean()[d] + reach);
+        }
+    }
+    hull
+}
+
+impl PositionBelief {
+    pub(crate) fn bounds(&self) -> SearchBox {
+        match self {
+            Self::Mixture(mixture) => bounds(mixture.components().iter(), 1.0),
+            Self::Lpg(lpg) => bounds(lpg.gaussians(), LPG_REACH),
+        }
+    }
+
+    /// Mean and covariance.
+    pub fn gaussian(&self) -> Gaussian<2> {
+        match self {
+            Self::Mixture(mixture) => mixture.moment_matched(),
+            Self::Lpg(lpg) => Gaussian::from_trusted_parts(lpg.mean(), lpg.covariance()),
+        }
+    }
+
+    /// Log density.
+    pub fn log_density(&self, x: &Vector2<f64>) -> f64 {
+        match self {
+            Self::Mixture(mixture) => mixture.log_pdf(x),
+            Self::Lpg(lpg) => lpg.log_density(x),
+        }
+    }
+}
+
+impl JointBelief {
+    pub(crate) fn bounds(&self) -> SearchBox {
+        match self {
+            Self::Mixture(mixture) => bounds(mixture.components().iter(), 1.0),
+            Self::Lpg(lpg) => bounds(lpg.gaussians(), LPG_REACH),
+        }
+    }
+
+    /// Mean and covariance of the position.
+    pub fn position(&self) -> Gaussian<2> {
+        let (mean, covariance) = match self {
+            Self::Mixture(mixture) => (mixture.mean(), mixture.covariance()),
+            Self::Lpg(lpg) => (lpg.mean(), lpg.covariance()),
+        };
+        Gaussian::from_trusted_parts(mean.xy(), covariance.fixed_view::<2, 2>(0, 0).into_owned())
+    }
+}

@@ -1,0 +1,378 @@
+//! A belief times the likelihood of records, cell by cell.
+
+use crate::belief::{JointBelief, PositionBelief, Prior};
+use crate::rate::{Intervals, RateModel, RateRange, cut_normal, ends_about};
+use crate::{Error, SourceLikelihood};
+use fewbits_core::Columns;
+use fewbits_densities::lpg::Slice;
+use fewbits_densities::{CellTarget, Cells};
+use fewbits_numerics::kernels::largest;
+use fewbits_numerics::normal::log_interval;
+use nalgebra::{Matrix2, Vector2};
+
+/// A Gaussian over the plane, ready to be blurred over cells of any width.
+#[derive(Debug, Clone, Copy)]
+struct Lobe {
+    log_scale: f64,
+    mean: Vector2<f64>,
+    covariance: Matrix2<f64>,
+}
+
+impl Lobe {
+    fn new(weight: f64, mean: Vector2<f64>, covariance: Matrix2<f64>) -> Self {
+        Self {
+            log_scale: weight.ln() - 0.5 * covariance.determinant().ln() - std::f64::consts::TAU.ln(),
+            mean,
+            covariance,
+        }
+    }
+
+    /// Inverse covariance with `extra` on the diagonal, as (xx, xy, yy).
+    fn precision(&self, extra: f64) -> [f64; 3] {
+        let c = &self.covariance;
+        let (a, b, d) = (c[(0, 0)] + extra, c[(0, 1)], c[(1, 1)] + extra);
+        let determinant = a * d - b * b;
+        [d / determinant, -b / determinant, a / determinant]
+    }
+}
+
+#[inline]
+fn quadratic(p: &[f64; 3], d: &Vector2<f64>) -> f64 {
+    p[0] * d.x * d.x + 2.0 * p[1] * d.x * d.y + p[2] * d.y * d.y
+}
+
+/// The rate given the position, in one lobe of a belief over both.
+#[derive(Debug, Clone, Copy)]
+struct Conditional {
+    mean: f64,
+    gain: Vector2<f64>,
+    variance: f64,
+}
+
+pub(crate) struct Target<'a> {
+    prior: &'a Prior,
+    likelihood: &'a SourceLikelihood,
+    lobes: Vec<Lobe>,
+    conditionals: Vec<Conditional>,
+}
+
+impl<'a> Target<'a> {
+    pub(crate) fn new(prior: &'a Prior, likelihood: &'a SourceLikelihood) -> Result<Self, Error> {
+        let (mut lobes, mut conditionals) = (Vec::new(), Vec::new());
+        match prior {
+            Prior::Exact(gaussian) => lobes.push(Lobe::new(1.0, *gaussian.mean(), *gaussian.covariance())),
+            Prior::Position(PositionBelief::Mixture(mixture)) => {
+                lobes.extend(
+                    mixture
+                        .components()
+                        .iter()
+                        .map(|c| Lobe::new(c.weight(), *c.mean(), *c.covariance())),
+                );
+            }
+            Prior::Position(PositionBelief::Lpg(_)) | Prior::WithRate(JointBelief::Lpg(_), _) => {}
+            Prior::WithRate(JointBelief::Mixture(mixture), _) => {
+                for c in mixture.components() {
+                    let s = c.covariance();
+                    let position = s.fixed_view::<2, 2>(0, 0).into_owned();
+                    let cross = Vector2::new(s[(2, 0)], s[(2, 1)]);
+                    let lobe = Lobe::new(c.weight(), Vector2::new(c.mean()[0], c.mean()[1]), position);
+                    let p = lobe.precision(0.0);
+                    let gain = Vector2::new(p[0] * cross.x + p[1] * cross.y, p[1] * cross.x + p[2] * cross.y);
+                    // A Cholesky factor exists, so that the Schur complement is positive; rounding may bring it to zero.
+                    let variance = (s[(2, 2)] - gain.dot(&cross)).max(1e-14 * s[(2, 2)]);
+                    lobes.push(lobe);
+                    conditionals.push(Conditional {
+                        mean: c.mean()[2],
+                        gain,
+                        variance,
+                    });
+                }
+            }
+        }
+        Ok(Self {
+            prior,
+            likelihood,
+            lobes,
+            conditionals,
+        })
+    }
+
+    /// Mean and variance of the rate at every cell.
+    pub(crate) fn rates(&self, cells: &Cells<2>) -> Option<(Vec<f64>, Vec<f64>)> {
+        let [x, y] = cells.columns();
+        let positions = x.iter().zip(y).map(|(x, y)| Vector2::new(*x, *y));
+        match (self.prior, self.likelihood.rate()) {
+            (Prior::WithRate(JointBelief::Lpg(lpg), range), _) => {
+                let mut slice = Slice::default();
+                let moments = positions.map(|at| {
+                    let sums = self.likelihood.sums(&at);
+                    lpg.slice(&at, 0.0, &mut slice);
+                    slice.tilted([sums.response, sums.correlation, sums.energy], [range.low(), range.high()])
+                });
+                Some(moments.map(|m| (m.mean, m.variance)).unzip())
+            }
+            (Prior::WithRate(_, range), _) => Some(positions.map(|at| self.rate_of_mixture(&at, range)).unzip()),
+            (Prior::Exact(_), RateModel::Joint(range)) => Some(
+                positions
+                    .map(|at| self.likelihood.sums(&at).rate_given_position(range))
+                    .unzip(),
+            ),
+            _ => None,
+        }
+    }
+
+    fn rate_of_mixture(&self, at: &Vector2<f64>, range: &RateRange) -> (f64, f64) {
+        let sums = self.likelihood.sums(at);
+        let (mut total, mut first, mut second, mut best) = (0.0, 0.0, 0.0, f64::NEG_INFINITY);
+        let middle = range.middle();
+        for (lobe, given) in self.lobes.iter().zip(&self.conditionals) {
+            let d = at - lobe.mean;
+            let log = lobe.log_scale - 0.5 * quadratic(&lobe.precision(0.0), &d);
+            let (evidence, mean, variance) = updated(given, &d, [sums.response, sums.correlation, sums.energy]);
+            // The evidence is at most zero, and the cut takes more off.
+            if log + evidence < best - FAINT {
+                continue;
+            }
+            let inside = ends_about(mean, variance, range).map_or(0.0, |(from, to)| log_interval(from, to));
+            let log = log + evidence + inside;
+            if log < best - FAINT || !log.is_finite() {
+                continue;
+            }
+            if log > best {
+                let shrink = (best - log).exp();
+                total *= shrink;
+                first *= shrink;
+                second *= shrink;
+                best = log;
+            }
+            let weight = (log - best).exp();
+            let (m, v) = cut_normal(mean, variance, range);
+            let m = m - middle;
+            total += weight;
+            first += weight * m;
+            second += weight * (v + m * m);
+        }
+        let mean = first / total;
+        if total > 0.0 {
+            (mean + middle, (second / total - mean * mean).max(0.0))
+        } else {
+            (middle, 0.0)
+        }
+    }
+}
+
+/// Log evidence of sums `[A, B, C]` under a Gaussian rate (without the constant of the cut prior and of the noise, and without
+/// what the cut takes off), and the updated mean and variance.
+#[inline]
+fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3]) -> (f64, f64, f64) {
+    let (m, v) = (given.mean + given.gain.dot(d), given.variance);
+    let spread = 1.0 + v * a;
+    let residual = b - a * m;
+    let variance = v / spread;
+    let mean = m + residual * variance;
+    let log = -0.5 * (c - m * (2.0 * b - m * a)) + 0.5 * residual * residual * variance - 0.5 * spread.ln();
+    (log, mean, variance)
+}
+
+/// Cells of a run: their numbers stay in the nearest caches.
+const RUN: usize = 1024;
+
+impl CellTarget<2> for Target<'_> {
+    fn evaluate(&self, centres: &Columns<'_, 2>, half_width: f64, logs: &mut [f64], scores: &mut [f64]) {
+        let extra = half_width * half_width;
+        let precisions: Vec<[[f64; 3]; 2]> = self
+            .lobes
+            .iter()
+            .map(|l| [l.precision(0.0), l.precision(extra)])
+            .collect();
+        // Cells that score far below the best so far will be dropped: their log density need not be exact.
+        let mut floor = f64::NEG_INFINITY;
+        let mut scratch = Vec::new();
+        let mut room = [vec![0.0; RUN], vec![0.0; RUN]];
+        for (run, (logs, scores)) in logs.chunks_mut(RUN).zip(scores.chunks_mut(RUN)).enumerate() {
+            let count = logs.len();
+            let centres: [&[f64]; 2] = centres.map(|c| &c[run * RUN..run * RUN + count]);
+            let at = |i: usize| Vector2::new(centres[0][i], centres[1][i]);
+            if let Prior::WithRate(belief, range) = self.prior {
+                let out = [&mut *logs, &mut *scores];
+                self.with_rate((belief, range), &centres, half_width, &precisions, floor, out);
+            } else {
+                let [own, wide] = &mut room;
+                let (own, wide) = (&mut own[..count], &mut wide[..count]);
+                for i in 0..count {
+                    (own[i], wide[i]) = match self.prior {
+                        Prior::Position(PositionBelief::Lpg(lpg)) => {
+                            lpg.log_density_and_bound(&at(i), half_width, &mut scratch)
+                        }
+                        _ => log_mixture(&self.lobes, &precisions, &at(i)),
+                    };
+                }
+                let limits = (floor, DROPPED);
+                self.likelihood
+                    .blurred(&centres, half_width, wide, limits, [&mut *logs, &mut *scores]);
+                logs.iter_mut().zip(own.iter()).for_each(|(log, own)| *log += own);
+                scores
+                    .iter_mut()
+                    .zip(wide.iter())
+                    .for_each(|(score, wide)| *score += wide);
+            }
+            floor = floor.max(largest(scores) - DROPPED);
+        }
+    }
+}
+
+/// Cells this far below the best, in nats, are dropped by any cover; their mass is nothing.
+const DROPPED: f64 = 26.0;
+/// Lobes this far below another, in nats, do not count.
+const FAINT: f64 = 30.0;
+
+impl Target<'_> {
+    /// Log density and score of a run of cells under a belief over position and rate.
+    fn with_rate(
+        &self,
+        (belief, range): (&JointBelief, &RateRange),
+        centres: &[&[f64]; 2],
+        half: f64,
+        precisions: &[[[f64; 3]; 2]],
+        floor: f64,
+        [logs, scores]: [&mut [f64]; 2],
+    ) {
+        let count = logs.len();
+        let (mut plain, mut blurred) = (vec![[0.0; 3]; count], vec![[0.0; 3]; count]);
+        let at = |i: usize| Vector2::new(centres[0][i], centres[1][i]);
+        let log_noise: f64 = self.likelihood.records().iter().map(|r| r.sums(&at(0)).log_noise).sum();
+        for record in self.likelihood.records() {
+            for i in 0..count {
+                let (sums, share) = record.blurred_sums(&at(i), half);
+                for (k, value) in [sums.response, sums.correlation, sums.energy].into_iter().enumerate() {
+                    plain[i][k] += value;
+                    blurred[i][k] += share * value;
+                }
+            }
+        }
+        let all: Vec<usize> = (0..count).collect();
+        let mut slice = Slice::default();
+        let mut evaluate = |cells: &[usize], which: usize, sums: &[[f64; 3]], out: &mut [f64]| match belief {
+            JointBelief::Mixture(_) => self.log_sums(cells, &at, precisions, (which, sums), range, out),
+            JointBelief::Lpg(lpg) => {
+                for i in cells {
+                    lpg.slice(&at(*i), if which == 1 { half } else { 0.0 }, &mut slice);
+                    out[*i] = slice.tilted(sums[*i], [range.low(), range.high()]).log_mass;
+                }
+            }
+        };
+        evaluate(&all, 1, &blurred, scores);
+        let floor = floor.max(largest(scores) - log_noise - DROPPED);
+        scores.iter_mut().for_each(|score| *score -= log_noise);
+        logs.copy_from_slice(scores);
+        let kept: Vec<usize> = all.into_iter().filter(|i| scores[*i] > floor).collect();
+        evaluate(&kept, 0, &plain, logs);
+        kept.iter().for_each(|i| logs[*i] -= log_noise);
+    }
+
+    /// Writes `ln sum over lobes` of the chosen cells to `out`: of every cell the nearest lobe first, then those that can still
+    /// matter beside it. Cuts of the rate are computed in sweeps.
+    fn log_sums(
+        &self,
+        cells: &[usize],
+        at: &impl Fn(usize) -> Vector2<f64>,
+        precisions: &[[[f64; 3]; 2]],
+        (which, sums): (usize, &[[f64; 3]]),
+        range: &RateRange,
+        out: &mut [f64],
+    ) {
+        let mut intervals = Intervals::default();
+        let own = |k: usize, d: &Vector2<f64>| self.lobes[k].log_scale - 0.5 * quadratic(&precisions[k][which], d);
+        let term = |k: usize, d: &Vector2<f64>, cell: usize, place: usize, intervals: &mut Intervals| {
+            let (log, mean, variance) = updated(&self.conditionals[k], d, sums[cell]);
+            intervals.push(place, ends_about(mean, variance, range));
+            own(k, d) + log
+        };
+        let mut nearest = Vec::with_capacity(cells.len());
+        let mut first = Vec::with_capacity(cells.len());
+        for (place, cell) in cells.iter().enumerate() {
+            let x = at(*cell);
+            let heights = (0..self.lobes.len()).map(|k| (k, own(k, &(x - self.lobes[k].mean))));
+            let (best, _) =
+                heights.fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best });
+            nearest.push(best);
+            first.push(term(best, &(x - self.lobes[best].mean), *cell, place, &mut intervals));
+        }
+        intervals.add_to(&mut first);
+        // The evidence is at most zero: lobes that cannot matter are not evaluated.
+        let (mut others, mut terms) = (Vec::new(), Vec::new());
+        for (place, cell) in cells.iter().enumerate() {
+            let x = at(*cell);
+            for k in 0..self.lobes.len() {
+                let d = x - self.lobes[k].mean;
+                if k != nearest[place] && own(k, &d) > first[place] - FAINT {
+                    others.push(place);
+                    terms.push(term(k, &d, *cell, terms.len(), &mut intervals));
+                }
+            }
+        }
+        intervals.add_to(&mut terms);
+        let mut results = vec![LogSum::default(); cells.len()];
+        results
+            .iter_mut()
+            .zip(&first)
+            .for_each(|(result, log)| result.add(*log));
+        others
+            .iter()
+            .zip(&terms)
+            .for_each(|(place, log)| results[*place].add(*log));
+        for (cell, result) in cells.iter().zip(&results) {
+            out[*cell] = result.log();
+        }
+    }
+}
+
+/// A sum of exponentials, kept scaled by its largest term.
+#[derive(Clone, Copy)]
+struct LogSum {
+    largest: f64,
+    scaled: f64,
+}
+
+impl Default for LogSum {
+    fn default() -> Self {
+        Self {
+            largest: f64::NEG_INFINITY,
+            scaled: 0.0,
+        }
+    }
+}
+
+impl LogSum {
+    #[inline]
+    fn add(&mut self, log: f64) {
+        if log > self.largest {
+            self.scaled = self.scaled * (self.largest - log).exp() + 1.0;
+            self.largest = log;
+        } else if log > self.largest - 40.0 {
+            self.scaled += (log - self.largest).exp();
+        }
+    }
+
+    #[inline]
+    fn log(&self) -> f64 {
+        if self.largest == f64::NEG_INFINITY {
+            self.largest
+        } else {
+            self.largest + self.scaled.ln()
+        }
+    }
+}
+
+/// Log density of a mixture and of the same blurred.
+#[inline]
+fn log_mixture(lobes: &[Lobe], precisions: &[[[f64; 3]; 2]], at: &Vector2<f64>) -> (f64, f64) {
+    let mut results = [LogSum::default(), LogSum::default()];
+    for (lobe, precision) in lobes.iter().zip(precisions) {
+        let d = at - lobe.mean;
+        for (result, p) in results.iter_mut().zip(precision) {
+            result.add(lobe.log_scale - 0.5 * quadratic(p, &d));
+        }
+    }
+    (results[0].log(), results[1].log())
+}
