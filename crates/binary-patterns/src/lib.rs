@@ -25,7 +25,8 @@
 //! # Ok::<(), fewbits_binary_patterns::Error>(())
 //! ```
 //!
-//! Source: Movaghati, thesis, section 2.3, chapter 5 and appendix B; errata are numbered as in `docs/errata.md`. Not here: random
+//! Source: Movaghati, thesis, section 2.3, chapter 5 and appendix B; errata are numbered as in `docs/errata.md`. Searches draw their
+//! further starts from fixed streams: the same call gives the same design. Not here: other random
 //! numbers, sources that are not symmetric about zero.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]

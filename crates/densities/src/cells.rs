@@ -371,6 +371,14 @@ mod tests {
         assert!((cells.log_evidence() - exact).abs() < 1e-3, "{} {exact}", cells.log_evidence());
         // The stop rule promises the determinant to 2 per cent and no more.
         assert!(cells.mean().norm() < 0.1 && (cells.covariance()[(0, 0)] / 200.0 - 1.0).abs() < 1e-2);
+        // Every cell has its own density, at its centre and off it.
+        for (i, off) in [(0, 0.0), (cells.len() / 2, 0.4), (cells.len() - 1, -0.4)] {
+            let centre = Vector2::new(cells.columns()[0][i], cells.columns()[1][i]);
+            let density = cells.weights()[i].ln() - 2.0 * cells.width().ln();
+            let found = cells.log_density(&centre.add_scalar(off * cells.width()));
+            assert!((found - density).abs() < 1e-9 * density.abs().max(1.0), "{found} {density}");
+        }
+        assert_eq!(cells.log_density(&Vector2::zeros()), f64::NEG_INFINITY);
         // With cells that resolve the profile the midpoint rule is exact: E r^2 = 20^2 + 3 sd^2.
         let fine = CellOptions {
             evidence_tolerance: 1e-9,

@@ -210,3 +210,55 @@ fn williams<const D: usize>(original: Vec<Part<D>>, components: usize) -> (Vec<P
     }
     (parts, error * scale.exp())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fewbits_monte_carlo::Stream;
+    use nalgebra::Vector2;
+    use rand::RngExt;
+
+    /// All pairs priced anew before every merge.
+    fn plainly(
+        mut parts: Vec<Part<2>>,
+        components: usize,
+        cost: impl Fn(&Part<2>, &Part<2>) -> f64,
+    ) -> (Vec<Part<2>>, f64) {
+        let mut total = 0.0;
+        while parts.len() > components {
+            let pairs = (0..parts.len()).flat_map(|i| (i + 1..parts.len()).map(move |j| (i, j)));
+            let priced = pairs.map(|(i, j)| (cost(&parts[i], &parts[j]), i, j));
+            let (price, i, j) = priced.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+            total += price;
+            parts[i] = parts[i].joined(&parts[j]);
+            parts.remove(j);
+        }
+        (parts, total)
+    }
+
+    #[test]
+    fn remembered_partners_are_the_cheapest() {
+        for seed in 0..40 {
+            let mut rng = Stream::new(seed).rng();
+            let parts: Vec<Part<2>> = (0..14)
+                .map(|_| {
+                    let mean = Vector2::from_fn(|_, _| rng.random_range(-3.0..3.0));
+                    let covariance = SMatrix::from_diagonal(&Vector2::from_fn(|_, _| rng.random_range(0.1..2.0)));
+                    Part::new(rng.random_range(0.1..1.0), mean, covariance)
+                })
+                .collect();
+            // Not symmetric in its arguments and not monotone under merging, as a price may be.
+            let cost = |a: &Part<2>, b: &Part<2>| {
+                let gap = a.mean - b.mean;
+                gap.dot(&((a.covariance * 0.7 + b.covariance).try_inverse().unwrap() * gap)) * a.weight * b.weight
+            };
+            for components in 1..14 {
+                let (fast, slow) =
+                    (pairwise(parts.clone(), components, cost), plainly(parts.clone(), components, cost));
+                assert!((fast.1 - slow.1).abs() < 1e-12 * slow.1.max(1.0), "{} {}", fast.1, slow.1);
+                let pairs = fast.0.iter().zip(&slow.0);
+                assert!(fast.0.len() == slow.0.len() && pairs.clone().all(|(a, b)| a.mean == b.mean));
+            }
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Weights of particles: draws in proportion, rows that travel along, normalisation.
 
 use crate::Error;
-use fewbits_numerics::kernels::{exp_minus, largest_number};
+use fewbits_numerics::kernels::{exp_minus, largest_number, vectorised};
 use rand::{Rng, RngExt};
 
 /// Running sums of weights, for draws in proportion to them.
@@ -49,9 +49,14 @@ pub(crate) fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f
     let sums = exp_minus(logs, largest, weights);
     let log_sum = largest + sums.sum.ln();
     let scale = 1.0 / sums.sum;
-    for (log, weight) in logs.iter_mut().zip(weights) {
-        *log -= log_sum;
-        *weight *= scale;
-    }
+    vectorised(
+        #[inline(always)]
+        || {
+            for (log, weight) in logs.iter_mut().zip(weights) {
+                *log -= log_sum;
+                *weight *= scale;
+            }
+        },
+    );
     Ok((log_sum, sums.sum * sums.sum / sums.sum_of_squares))
 }

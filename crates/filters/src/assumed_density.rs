@@ -3,6 +3,7 @@
 use crate::linalg::solve_semidefinite;
 use crate::{Error, extended_kalman};
 use fewbits_core::{Factor, Gaussian, GaussianDynamics, Observed, Sensing};
+use fewbits_numerics::linalg::{congruence, congruence_of, times_transposed};
 use nalgebra::{SMatrix, SVector};
 
 /// What an update reveals besides the new belief.
@@ -70,13 +71,13 @@ fn update_at<const D: usize, const M: usize>(
     matrix: &SMatrix<f64, M, D>,
     factor: &impl Factor<M>,
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
-    let cross = belief.covariance() * matrix.transpose();
-    let prior = Gaussian::from_trusted_parts(predicted, matrix * cross);
+    let cross = times_transposed(belief.covariance(), matrix);
+    let prior = Gaussian::from_symmetric_parts(predicted, congruence_of(matrix, &cross));
     let tilted = factor.tilted(&prior)?;
     let correction = tilted.mean - prior.mean();
     let gain = solve_semidefinite(prior.covariance(), &cross.transpose())?.transpose();
-    let keep = SMatrix::<f64, D, D>::identity() - gain * matrix;
-    let covariance = keep * belief.covariance() * keep.transpose() + gain * tilted.covariance * gain.transpose();
+    let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
+    let covariance = congruence(&keep, belief.covariance()) + congruence(&gain, &tilted.covariance);
     let info = UpdateInfo {
         log_likelihood: tilted.log_evidence,
         correction,
@@ -86,5 +87,5 @@ fn update_at<const D: usize, const M: usize>(
     if !mean.iter().chain(covariance.iter()).all(|x| x.is_finite()) {
         return Err(Error::IMPOSSIBLE);
     }
-    Ok((Gaussian::from_trusted_parts(mean, covariance), info))
+    Ok((Gaussian::from_symmetric_parts(mean, covariance), info))
 }

@@ -13,6 +13,10 @@ pub(crate) fn solve_semidefinite<const D: usize, const N: usize>(
     covariance: &SMatrix<f64, D, D>,
     right: &SMatrix<f64, D, N>,
 ) -> Result<SMatrix<f64, D, N>, Error> {
+    if D == 1 {
+        let v = covariance[0];
+        return Ok(if v > 0.0 { right / v } else { SMatrix::zeros() });
+    }
     let scale = covariance
         .diagonal()
         .map(|v| if v > 0.0 { 1.0 / v.sqrt() } else { 0.0 });

@@ -1,11 +1,10 @@
 //! Resampling: from weighted particles to equally weighted ones.
 
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::kernels::sum;
+use fewbits_numerics::kernels::{sum, vectorised};
 use rand::{Rng, RngExt};
 use rand_distr::Open01;
 use serde::{Deserialize, Serialize};
-use std::hint::select_unpredictable;
 
 /// A law that draws `M` ancestors from `N` weighted particles; `M` and `N` are independent.
 ///
@@ -89,7 +88,7 @@ impl Resampling {
         let count = ancestors.len();
         let step = total / count as f64;
         match self {
-            Self::Systematic => systematic(rng.sample(Open01), weights, 1.0 / step, last, ancestors),
+            Self::Systematic => systematic(rng.sample(Open01), &weights[..=last], total, ancestors),
             Self::Stratified => pick(weights, last, ancestors, |m| (m as f64 + rng.random::<f64>()) * step),
             Self::Multinomial => {
                 let mut points = OrderedUniforms::new(count);
@@ -115,28 +114,95 @@ fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
     }
 }
 
-/// Systematic resampling without a branch that depends on the weights: particle `i` gets the places between
-/// `floor(offset + cumulative_{i-1}/step)` and `floor(offset + cumulative_i/step)`.
-///
-/// Each particle writes its index at its first place; one without a place is overwritten by the next. A running maximum then
-/// fills the places between.
-fn systematic(offset: f64, weights: &[f64], per_weight: f64, last: usize, ancestors: &mut [u32]) {
-    ancestors.fill(0);
-    let mut cumulative = 0.0;
-    let mut first = 0_usize;
-    for (i, weight) in weights[..=last].iter().enumerate() {
-        // Rounding may give the last particles a first place beyond the end.
-        if let Some(place) = ancestors.get_mut(first) {
-            *place = i as u32;
-        }
-        cumulative += weight;
-        first = (cumulative * per_weight + offset) as u32 as usize;
+/// Weights taken at once by [`systematic`].
+const BLOCK: usize = 128;
+/// Neighbours whose running sums are formed side by side.
+const GROUP: usize = 8;
+/// `2^52`: added to a number below it, it leaves the nearest integer in the mantissa.
+const INTEGERS: f64 = 4_503_599_627_370_496.0;
+/// `1.5 * 2^52`: the same for numbers that may be below zero.
+const ROUNDER: f64 = 1.5 * INTEGERS;
+/// All bits where the element so many places before is of the same group.
+const SAME_GROUP: [[u64; BLOCK]; 3] = [same_group(1), same_group(2), same_group(4)];
+
+const fn same_group(back: usize) -> [u64; BLOCK] {
+    let mut mask = [0; BLOCK];
+    let mut j = 0;
+    while j < BLOCK {
+        mask[j] = if j % GROUP >= back { u64::MAX } else { 0 };
+        j += 1;
     }
+    mask
+}
+
+/// Systematic resampling without a branch that depends on the weights: particle `i` gets the places between
+/// `round(places_per_weight * cumulative_{i-1} + offset - 1/2)` and the same of `cumulative_i`.
+///
+/// The weights become integers of 51 bits first: their running sums are exact in any order, so that they can be formed side by
+/// side, never fall, and do not move at a weight of zero. Each particle writes its index at its first place; one without a
+/// place is overwritten by the next. A running maximum then fills the places between.
+fn systematic(offset: f64, weights: &[f64], total: f64, ancestors: &mut [u32]) {
+    let scale = 0.5 * INTEGERS / total;
+    vectorised(
+        #[inline(always)]
+        || {
+            let integer = |weight: &f64| (weight * scale + INTEGERS).to_bits() - INTEGERS.to_bits();
+            let per_weight = ancestors.len() as f64 / weights.iter().map(integer).sum::<u64>() as f64;
+            ancestors.fill(0);
+            let (mut carry, mut index, mut first) = (0, 0, 0_u32);
+            for weights in weights.chunks(BLOCK) {
+                let mut sums = [0; GROUP + BLOCK];
+                for (sum, weight) in sums[GROUP..].iter_mut().zip(weights) {
+                    *sum = integer(weight);
+                }
+                for (same_group, back) in SAME_GROUP.iter().zip([1, 2, 4]) {
+                    let before = sums;
+                    for j in 0..BLOCK {
+                        sums[GROUP + j] += before[GROUP + j - back] & same_group[j];
+                    }
+                }
+                let mut firsts = [0_u32; BLOCK];
+                for (firsts, sums) in firsts.chunks_exact_mut(GROUP).zip(sums[GROUP..].chunks_exact(GROUP)) {
+                    for j in 0..GROUP {
+                        let cumulative = f64::from_bits((carry + sums[j]) | INTEGERS.to_bits()) - INTEGERS;
+                        firsts[j] = (cumulative * per_weight + (offset - 0.5) + ROUNDER).to_bits() as u32;
+                    }
+                    carry += sums[GROUP - 1];
+                }
+                for next in &firsts[..weights.len()] {
+                    // The last particles may have their first place beyond the end.
+                    if let Some(place) = ancestors.get_mut(first as usize) {
+                        *place = index;
+                    }
+                    (index, first) = (index + 1, *next);
+                }
+            }
+            fill_up(ancestors);
+        },
+    );
+}
+
+/// Every entry becomes the largest up to its place.
+#[inline(always)]
+fn fill_up(entries: &mut [u32]) {
+    const LANES: usize = 16;
     let mut so_far = 0;
-    for ancestor in ancestors {
-        // A branch here would be mispredicted wherever weights are uneven.
-        so_far = select_unpredictable(*ancestor > so_far, *ancestor, so_far);
-        *ancestor = so_far;
+    let mut chunks = entries.chunks_exact_mut(LANES);
+    for chunk in &mut chunks {
+        for back in [1, 2, 4, 8] {
+            let before: [u32; LANES] = std::array::from_fn(|j| chunk[j]);
+            for j in back..LANES {
+                chunk[j] = before[j].max(before[j - back]);
+            }
+        }
+        for entry in chunk.iter_mut() {
+            *entry = so_far.max(*entry);
+        }
+        so_far = chunk[LANES - 1];
+    }
+    for entry in chunks.into_remainder() {
+        so_far = so_far.max(*entry);
+        *entry = so_far;
     }
 }
 

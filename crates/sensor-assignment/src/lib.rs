@@ -34,5 +34,5 @@ pub use coded::CodedSensors;
 pub use cost::{bit_error, flipped_estimate, pair_cost, pair_costs, quantization_error};
 pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, brute_force, exchange};
 pub use error::Error;
-pub use linear::{Certificate, CostMatrix, JonkerVolgenant, LinearAssignment};
+pub use linear::{CostMatrix, DualCertificate, JonkerVolgenant, LinearAssignment};
 pub use setup::{by_precision, variances_with_moments};

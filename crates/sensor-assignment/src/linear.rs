@@ -81,7 +81,7 @@ impl CostMatrix {
     ///
     /// # Errors
     /// If the assignment is not a permutation.
-    pub fn certificate(&self, assignment: &[usize]) -> Result<Certificate, Error> {
+    pub fn certificate(&self, assignment: &[usize]) -> Result<DualCertificate, Error> {
         let cost = self.cost(assignment)?;
         let n = self.size();
         let scale = self.costs.iter().fold(0.0f64, |m, c| m.max(c.abs()));
@@ -114,7 +114,7 @@ impl CostMatrix {
             }
         }
         let dual: f64 = rows.iter().sum::<f64>() + columns.iter().sum::<f64>();
-        Ok(Certificate {
+        Ok(DualCertificate {
             rows,
             columns,
             cost,
@@ -127,7 +127,7 @@ impl CostMatrix {
 
 /// Dual variables of an assignment, and how far they are from proving it optimal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Certificate {
+pub struct DualCertificate {
     /// Dual variable `u_i` of each row.
     pub rows: Vec<f64>,
     /// Dual variable `v_j` of each column.
@@ -141,7 +141,7 @@ pub struct Certificate {
     tolerance: f64,
 }
 
-impl Certificate {
+impl DualCertificate {
     /// True if the duals are feasible and their sum is the cost, to `1e-12` of the largest cost (a row).
     pub fn is_optimal(&self) -> bool {
         self.violation <= self.tolerance && self.gap.abs() <= self.tolerance * self.rows.len() as f64

@@ -6,8 +6,6 @@ use fewbits_core::{BitString, Message, Observation, laws};
 use proptest::prelude::*;
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
-
     #[test]
     fn any_packet(bytes in prop::collection::vec(any::<u8>(), 0..16), short in 0..8_usize, resilient in any::<bool>()) {
         let mut config = Config::new(0.1).unwrap();

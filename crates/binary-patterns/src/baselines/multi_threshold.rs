@@ -55,6 +55,10 @@ fn log_information(u: f64, noise_std: f64) -> f64 {
 /// If there is no sensor or `noise_std` is not finite or below `1e-4` of the source's reach; [`Error::NotConverged`] if the gap is
 /// not closed in 200000 updates.
 pub fn multi_threshold_bound(source: &Source, noise_std: f64, sensors: usize) -> Result<MultiThreshold, Error> {
+    optimum(source, noise_std, sensors, MAX_UPDATES)
+}
+
+fn optimum(source: &Source, noise_std: f64, sensors: usize, most_updates: usize) -> Result<MultiThreshold, Error> {
     let total = at_least_one("sensors", sensors)? as f64;
     let noise_std = source.resolvable(noise_std)?;
     let nodes = source.nodes(noise_std, gauss_legendre::<8>());
@@ -79,7 +83,7 @@ pub fn multi_threshold_bound(source: &Source, noise_std: f64, sensors: usize) ->
         .collect();
     let mut rho = vec![total / THRESHOLDS as f64; THRESHOLDS];
     let mut state = Objective::of(&rows, &rho, &nodes);
-    for _ in 0..MAX_UPDATES {
+    for _ in 0..most_updates {
         if state.gap(total) < GAP {
             break;
         }
@@ -95,7 +99,7 @@ pub fn multi_threshold_bound(source: &Source, noise_std: f64, sensors: usize) ->
     if gap.is_nan() || gap >= GAP {
         return Err(Error::NotConverged {
             algorithm: "multiplicative updates of the thresholds",
-            iterations: MAX_UPDATES,
+            iterations: most_updates,
             change: gap,
         });
     }
@@ -158,5 +162,18 @@ mod tests {
         let source = Source::uniform(1.0).unwrap();
         let found = multi_threshold_bound(&source, 20.0, 4).unwrap();
         assert_relative_eq!(found.bound, 400.0 * std::f64::consts::FRAC_PI_2 / 4.0, max_relative = 2e-3);
+    }
+
+    /// What the last update left open is an error, not a bound.
+    #[test]
+    fn an_open_gap_is_an_error() {
+        let stopped = optimum(&Source::uniform(1.0).unwrap(), 0.3, 10, 3);
+        let Err(Error::NotConverged {
+            iterations: 3, change, ..
+        }) = stopped
+        else {
+            panic!("{stopped:?}");
+        };
+        assert!(change > GAP);
     }
 }

@@ -50,12 +50,10 @@ pub fn optimal_weight_van_trees(bank: &Bank) -> Result<f64, Error> {
     // Nodes and the middles between them alternate.
     let mut points = mesh.points(2 * intervals);
     let mut rates: Vec<f64> = points.iter().step_by(2).map(|&x| rate(x)).collect();
-    let mut extrapolated: Vec<f64> = Vec::with_capacity(LEVELS);
-    let mut change = f64::INFINITY;
-    for level in 0..LEVELS {
+    extrapolated(|level| {
         if level > 0 {
             if 2 * intervals > FINEST {
-                break;
+                return None;
             }
             // The old middles become nodes.
             intervals *= 2;
@@ -64,17 +62,26 @@ pub fn optimal_weight_van_trees(bank: &Bank) -> Result<f64, Error> {
                 .collect();
             points = mesh.points(2 * intervals);
         }
-        let last = extrapolated.last().copied();
-        let mut value = weighted_mean(&mesh, &points, &rates, clamped, |x| source.density(x));
+        Some(weighted_mean(&mesh, &points, &rates, clamped, |x| source.density(x)))
+    })
+}
+
+/// The limit of values on grids of doubling fineness, of which the error falls by fours, by Romberg's extrapolation.
+fn extrapolated(mut on_grid: impl FnMut(usize) -> Option<f64>) -> Result<f64, Error> {
+    let mut row: Vec<f64> = Vec::with_capacity(LEVELS);
+    let mut change = f64::INFINITY;
+    for level in 0..LEVELS {
+        let Some(mut value) = on_grid(level) else { break };
+        let last = row.last().copied();
         // One row of the Romberg table, in place.
         let mut power = 1.0;
-        for entry in &mut extrapolated {
+        for entry in &mut row {
             power *= 4.0;
             let next = value + (value - *entry) / (power - 1.0);
             *entry = value;
             value = next;
         }
-        extrapolated.push(value);
+        row.push(value);
         if let Some(last) = last
             && level > 1
         {
@@ -84,11 +91,11 @@ pub fn optimal_weight_van_trees(bank: &Bank) -> Result<f64, Error> {
             }
         }
     }
-    match extrapolated.last() {
-        Some(bound) if change <= ACCEPTED => Ok(*bound),
+    match row.last() {
+        Some(limit) if change <= ACCEPTED => Ok(*limit),
         _ => Err(Error::NotConverged {
             algorithm: "van Trees boundary-value problem",
-            iterations: extrapolated.len(),
+            iterations: row.len(),
             change,
         }),
     }
@@ -225,6 +232,20 @@ mod tests {
         let bound = optimal_weight_van_trees(&bank(Source::uniform(1.0).unwrap(), 1e-4)).unwrap();
         assert!(bound <= 1.0 / 12.0);
         assert_relative_eq!(bound, 1.0 / 12.0, max_relative = 2e-3);
+    }
+
+    /// Grids that do not agree, or too few of them, are an error, not a bound.
+    #[test]
+    fn grids_that_disagree_are_an_error() {
+        let limit = extrapolated(|level| Some(2.0 + 0.25_f64.powi(level as i32))).unwrap();
+        assert_relative_eq!(limit, 2.0, max_relative = 1e-14);
+        for unsettled in [
+            extrapolated(|level| Some(if level % 2 == 0 { 1.0 } else { 1.001 })),
+            extrapolated(|level| (level < 2).then_some(1.0)),
+            extrapolated(|_| Some(f64::NAN)),
+        ] {
+            assert!(matches!(unsettled, Err(Error::NotConverged { .. })), "{unsettled:?}");
+        }
     }
 
     #[test]

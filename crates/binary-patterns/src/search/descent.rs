@@ -1,15 +1,17 @@
 //! Coordinate descent: one sensor at a time takes its best pattern, all candidates in one matrix product.
 
-use super::outcomes::{Outcomes, SEARCH_PANEL, scattered};
+use super::outcomes::{Outcomes, SEARCH_PANEL};
 use crate::Error;
 use crate::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
 use crate::source::noise_in_range;
 use crate::source::{Blur, Nodes};
 use crate::{Bank, BinaryQuantizer, Grid, Pattern, PatternSensor, Source};
+use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::DMatrix;
+use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 /// Relative improvement that counts as one.
@@ -125,8 +127,9 @@ impl Descent {
         let kernel = Kernel::new(self);
         let sensors = self.noise.len();
         let kinds = self.candidates.len();
-        let draw = |index: usize| (scattered(index) * kinds as f64) as usize;
-        let more = (0..extra).map(|start| (0..sensors).map(|n| draw(start * sensors + n)).collect());
+        let mut rng = Stream::new(0).named("descent-starts").rng();
+        let mut draw = || (rng.random::<f64>() * kinds as f64) as usize;
+        let more = (0..extra).map(|_| (0..sensors).map(|_| draw()).collect());
         let mut best: Option<Descended> = None;
         for start in starts.iter().cloned().chain(more) {
             self.check(&start)?;

@@ -1,17 +1,19 @@
 //! Thresholds that are free of any grid, by descent along the exact gradient.
 
 use super::lbfgs::{Stop, minimise};
-use super::outcomes::{SEARCH_PANEL, scattered};
+use super::outcomes::SEARCH_PANEL;
 use crate::Error;
 use crate::bank::IMPOSSIBLE;
 use crate::decoder::moments;
 use crate::linear::grid_bits;
 use crate::source::Nodes;
 use crate::{Bank, BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source};
+use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, non_negative};
 use fewbits_numerics::normal::pdf;
 use fewbits_numerics::quadrature::gauss_legendre;
+use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 /// Most sensors: the outcome tree of distinct sensors has `2^N` leaves.
@@ -109,7 +111,7 @@ fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: 
         sensors: sensors.to_vec(),
         mse: Bank::new(*source, sensors.to_vec())?.mmse()?,
     };
-    let mut index = 0;
+    let mut rng = Stream::new(0).named("free-breakpoints").rng();
     for start in 0..starts {
         let from: Vec<Vec<f64>> = sensors
             .iter()
@@ -119,11 +121,10 @@ fn from_starts(source: &Source, sensors: &[PatternSensor], jitter: f64, starts: 
                     .breakpoints()
                     .iter()
                     .map(|t| {
-                        index += 1;
                         if start == 0 {
                             *t
                         } else {
-                            t + jitter * (2.0 * scattered(index) - 1.0)
+                            t + jitter * (2.0 * rng.random::<f64>() - 1.0)
                         }
                     })
                     .collect();

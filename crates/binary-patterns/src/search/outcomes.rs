@@ -1,19 +1,10 @@
-//! Joint outcomes on the nodes of a search, and the starting points that searches share.
+//! Joint outcomes on the nodes of a search.
 
 use crate::bank::CountTable;
 use nalgebra::{DMatrixView, DMatrixViewMut, Dyn, Matrix, Storage};
 
 /// Nodes for searching: half the width of the final ones suffices with fewer points, to about `1e-10`.
 pub(crate) const SEARCH_PANEL: f64 = 1.6;
-
-/// A fixed sequence of scattered numbers in `[0, 1)` for starting points: designs use no random numbers.
-pub(crate) fn scattered(index: usize) -> f64 {
-    // The mixing function of SplitMix64: neighbouring indices must not make related starts.
-    let mut z = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-}
 
 /// All outcomes of some groups of exchangeable sensors, on the nodes of a search.
 pub(crate) struct Outcomes {

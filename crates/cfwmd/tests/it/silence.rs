@@ -1,22 +1,24 @@
 //! Moments after silence against brute force.
 
 use crate::Silence;
+use fewbits_cfwmd::censored::EllipsoidSilence;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::CensoringRule;
+use fewbits_cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_core::laws::factor::{is_a_number, sweep_is_scalar};
-use fewbits_core::{Dynamics, Factor, Gaussian, Link, Sensing};
+use fewbits_core::{Dynamics, Factor, Gaussian, Link, Observation, Scheme, Sensing};
 use fewbits_filters::kalman;
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::normal::log_pdf_with;
-use nalgebra::Vector1;
+use nalgebra::{Matrix2, Vector1, Vector2};
 use proptest::prelude::*;
 
 /// Mass, mean and variance by a fine trapezoid over everything that matters.
 fn brute(s: &Silence, mean: f64, variance: f64) -> [f64; 3] {
     let factor = s.factor();
     let reach = 12.0 * variance.sqrt();
-    let (n, low) = (40_000, mean - reach);
+    let (n, low) = (6_000, mean - reach);
     let step = 2.0 * reach / n as f64;
     let log_terms: Vec<f64> = (0..=n)
         .map(|i| {
@@ -39,7 +41,6 @@ fn brute(s: &Silence, mean: f64, variance: f64) -> [f64; 3] {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
     #[test]
     fn scalar_moments_are_the_integrals(
         mean in -4.0..4.0f64, variance in 0.05..60.0f64, centre in -3.0..3.0f64, half_width in 0.05..4.0f64,
@@ -225,4 +226,27 @@ fn silence_is_a_lawful_factor() {
     // The square root covers eta s only: an offset beyond eta s is no NaN.
     let rule = CensoringRule::scalar(1.0, 1.0).unwrap();
     assert_eq!(rule.half_width(), 1.0);
+}
+
+/// Sweeps over vectors and over random triggers, more than one block long, with loss and without.
+#[test]
+fn sweeps_of_ellipsoids_and_triggers_are_the_scalar() {
+    let rule = CensoringRule::new(&Matrix2::new(3.0, 0.4, 0.4, 2.0), 1.4).unwrap();
+    let planes: Vec<_> = (0..150)
+        .map(|i| Vector2::new(0.1 * f64::from(i) - 7.0, (f64::from(i) * 0.7).sin()))
+        .collect();
+    let lines: Vec<_> = planes.iter().map(|m| Vector1::new(m[0])).collect();
+    let sensing = LinearSensor::direct(0.8).unwrap();
+    let trigger = StochasticTrigger::for_rate(0.4, 2.0).unwrap();
+    let triggered: Triggered<_, 1> = Triggered { sensing, trigger };
+    for loss in [0.0, 0.3] {
+        let link = Link::lossy(loss).unwrap();
+        let region = EllipsoidSilence::new(&rule, &Vector2::new(0.3, 0.1), &Matrix2::identity(), &link).unwrap();
+        is_a_number(&region, &planes).unwrap();
+        sweep_is_scalar(&region, &planes).unwrap();
+        for observation in [Observation::Nothing, Observation::Received(0.7), Observation::Erased] {
+            let bump = triggered.factor(&Vector1::new(0.2), &observation, &link).unwrap();
+            sweep_is_scalar(&bump, &lines).unwrap();
+        }
+    }
 }

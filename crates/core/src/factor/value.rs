@@ -5,6 +5,7 @@ use crate::columns::Columns;
 use crate::error::Error;
 use crate::gaussian::{FactoredGaussian, Gaussian};
 use fewbits_numerics::error::{ArgumentError, all_finite};
+use fewbits_numerics::kernels::vectorised;
 use nalgebra::{Cholesky, SMatrix, SVector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -80,9 +81,14 @@ impl<const M: usize> Factor<M> for Value<M> {
             // A plain quadratic: kept free of branches so that it vectorises.
             let value = self.value()[0];
             let (half_precision, constant) = (0.5 / self.noise_covariance()[0], self.noise.log_peak());
-            for (log_weight, m) in log_weights.iter_mut().zip(means[0]) {
-                *log_weight += constant - half_precision * (value - m) * (value - m);
-            }
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (log_weight, m) in log_weights.iter_mut().zip(means[0]) {
+                        *log_weight += constant - half_precision * (value - m) * (value - m);
+                    }
+                },
+            );
         } else {
             self.noise.add_log_pdfs(means, log_weights);
         }

@@ -242,7 +242,7 @@ pub(super) struct Fig10;
 
 const THREE: [f64; 3] = [2.0, 4.0, 6.0];
 /// Where the first budget runs again, to see a small gain.
-const MANY: &str = "15 times the trials, a tenth of the particles";
+const MANY: &str = "60 times the trials, a tenth of the particles";
 
 impl Case for Fig10 {
     type Setting = Field;
@@ -253,7 +253,7 @@ impl Case for Fig10 {
         id: "cfwmd-fig10",
         title: "Received power, state against covariance feedback",
         caption: "Feeding the particles' covariance back (CFwMD2) pays at four and six messages per step, more as time goes on. At two it gains \
-                  a twentieth of the squared position error, which 200 trials do not tell from nothing; 3000 with fewer particles \
+                  a twentieth of the squared position error, which 200 trials do not tell from nothing; 12000 with fewer particles \
                   do (table `summary`).",
         source: "CFwMD paper, figure 10",
     };
@@ -266,7 +266,7 @@ impl Case for Fig10 {
     fn simulate(setting: &Field, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         let mut all = setting.at_budgets(context, "", &FUSED)?;
         let many = Field {
-            trials: 15 * setting.trials,
+            trials: 60 * setting.trials,
             particles: (setting.particles / 10).max(2),
             ..setting.clone()
         };

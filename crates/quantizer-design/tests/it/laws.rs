@@ -107,7 +107,8 @@ fn agree_with_differences(system: &System, criterion: Criterion) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(6))]
+    // One case in 40 of `PROPTEST_CASES`: they are dear.
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(40), ..ProptestConfig::default() })]
 
     #[test]
     fn derivatives_of_pairs_agree_with_central_differences(system in pair()) {
