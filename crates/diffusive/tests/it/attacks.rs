@@ -125,7 +125,11 @@ fn absurd_samples() {
         components: 2,
         degree: 1,
     };
-    for (form, levels) in [(Form::Raw, &all[..]), (Form::Mixture(4), &all), (lpg, &[-1.0, 1e-3, 1e150])] {
+    for (form, levels) in [
+        (Form::Raw, &all[..]),
+        (Form::Mixture(4), &all),
+        (lpg, &[-1.0, 1e-3, 1e150]),
+    ] {
         for &level in levels {
             let mut search = Search::new(&Vector2::new(44.0, 52.0), 50.0, field(1.0), joint(), 1e-5).unwrap();
             (search.form, search.most_nodes) = (form, 4);

@@ -249,7 +249,7 @@ pub(super) fn plane() -> Result<World<4, LinearGaussian<4, 2>>, Error> {
         sensors: (0..SENSORS).map(sensor).collect::<Result<_, _>>()?,
         start: Gaussian::new(Vector4::new(0.0, 1.0, 0.0, -1.0), Matrix4::identity() * 0.5)?,
         fine: NumberFormat::Single,
-        coarse: NumberFormat::fixed(-256.0, 256.0, 10)?,
+        coarse: NumberFormat::fixed(-4096.0, 4096.0, 13)?,
         // The acceleration takes it 700 away in 300 slots, one standard deviation.
         reach: 1e4,
         counted: &[0, 2],
