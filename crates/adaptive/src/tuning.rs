@@ -22,8 +22,13 @@ pub struct Replay {
 impl Replay {
     /// Root mean square error.
     pub fn rms_error(&self) -> f64 {
-        let squares: f64 = self.errors.iter().map(|e| e * e).sum();
-        (squares / self.errors.len().max(1) as f64).sqrt()
+        let worst = self.worst_error();
+        if worst == 0.0 {
+            return 0.0;
+        }
+        // In units of the worst, so that no square overflows.
+        let squares: f64 = self.errors.iter().map(|e| (e / worst).powi(2)).sum();
+        worst * (squares / self.errors.len() as f64).sqrt()
     }
 
     /// Largest error.
@@ -62,9 +67,8 @@ pub fn replay(config: Config, samples: &[f64]) -> Result<Replay, Error> {
 
 /// Bisections of the logarithm of `delta`.
 const BISECTIONS: usize = 12;
-/// Further values on each side, this far apart.
-const AROUND: i32 = 8;
-const APART: f64 = 0.035;
+/// Further values on each side, so far apart on a logarithmic scale: about where the price is met, then about the best.
+const AROUND: [(i32, f64); 2] = [(24, 0.012), (8, 0.001)];
 
 /// The configuration of least error among those that cost at most `most`, and its replay.
 ///
@@ -93,7 +97,7 @@ pub fn best_within<E: From<Error>>(
     }
     let with = |delta: f64| config.with_delta(delta).map_err(|error| E::from(error.into()));
     for _ in 0..BISECTIONS {
-        let middle = (low * high).sqrt();
+        let middle = low.sqrt() * high.sqrt();
         if price(&replay(with(middle)?, samples)?)? <= most {
             high = middle;
         } else {
@@ -103,25 +107,25 @@ pub fn best_within<E: From<Error>>(
     let first = with(high)?;
     let mut best = (first, replay(first, samples)?);
     let mut candidates: Vec<Config> = Vec::new();
-    for i in (-AROUND..=AROUND).filter(|i| *i != 0) {
-        candidates.push(with(high * (f64::from(i) * APART).exp())?);
-    }
     for step in own_steps(samples) {
         candidates.push(with(0.5 * step)?.made_exact());
         // Multiples of the step, a little above: their cells stay aligned with the instrument's.
         let middle = (2.0 * high / step).round();
-        for multiple in (-3..=3)
-            .map(|i| middle + f64::from(i))
-            .chain([1.0])
-            .filter(|m| *m >= 1.0)
-        {
+        let multiples = (-3..=3).map(|i| middle + f64::from(i)).chain([1.0]);
+        for multiple in multiples.filter(|m| *m >= 1.0) {
             candidates.push(with(0.5 * step * multiple * (1.0 + 2.0 * f64::EPSILON.sqrt()))?);
         }
     }
-    for candidate in candidates {
-        let replay = replay(candidate, samples)?;
-        if price(&replay)? <= most && replay.rms_error() < best.1.rms_error() {
-            best = (candidate, replay);
+    for (count, apart) in AROUND {
+        let centre = best.0.delta();
+        for i in (-count..=count).filter(|i| *i != 0) {
+            candidates.extend(config.with_delta(centre * (f64::from(i) * apart).exp()).ok());
+        }
+        for candidate in candidates.drain(..) {
+            let replay = replay(candidate, samples)?;
+            if price(&replay)? <= most && replay.rms_error() < best.1.rms_error() {
+                best = (candidate, replay);
+            }
         }
     }
     Ok(best)

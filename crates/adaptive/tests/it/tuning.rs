@@ -60,6 +60,24 @@ fn a_converters_steps_return_exactly() {
 }
 
 #[test]
+fn units_do_not_matter() {
+    let samples = mixed(2, 1500);
+    let delta = |unit: f64| {
+        let scaled: Vec<f64> = samples.iter().map(|x| x * unit).collect();
+        let rate = |r: &fewbits_adaptive::Replay| Ok::<_, Error>(r.rate());
+        best_within(Config::new(1.0).unwrap(), &scaled, 0.7, rate)
+            .unwrap()
+            .0
+            .delta()
+            / unit
+    };
+    for power in [-900, -40, 40, 900] {
+        let ratio = delta(2.0_f64.powi(power)) / delta(1.0);
+        assert!((0.7..1.4).contains(&ratio), "{power}: {ratio}");
+    }
+}
+
+#[test]
 fn hopeless_recordings_are_met_with_an_answer() {
     let rate = |r: &fewbits_adaptive::Replay| Ok::<_, Error>(r.rate());
     let any = Config::new(1.0).unwrap();

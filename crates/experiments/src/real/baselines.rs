@@ -38,11 +38,28 @@ pub(super) fn send_on_delta(samples: &[f64], delta: f64) -> Played {
     }
 }
 
+/// Sum in the order of NumPy: in a modulator that quantises its own output, the last bit of the first step decides everything.
+fn sum(terms: &[f64]) -> f64 {
+    if terms.len() > 128 {
+        let half = terms.len() / 2;
+        let (left, right) = terms.split_at(half - half % 8);
+        return sum(left) + sum(right);
+    }
+    let (rows, rest) = terms.as_chunks::<8>();
+    let mut r = [0.0; 8];
+    for row in rows {
+        r.iter_mut().zip(row).for_each(|(r, x)| *r += x);
+    }
+    let total = ((r[0] + r[1]) + (r[2] + r[3])) + ((r[4] + r[5]) + (r[6] + r[7]));
+    rest.iter().fold(total, |total, x| total + x)
+}
+
 /// Deviation of the increments about their mean.
 fn increments_deviation(samples: &[f64]) -> f64 {
     let steps: Vec<f64> = samples.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-    (steps.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / steps.len() as f64).sqrt()
+    let mean = sum(&steps) / steps.len() as f64;
+    let squares: Vec<f64> = steps.iter().map(|s| (s - mean) * (s - mean)).collect();
+    (sum(&squares) / steps.len() as f64).sqrt()
 }
 
 fn every_slot(samples: &[f64], bits: f64, mut next: impl FnMut(f64) -> f64) -> Played {

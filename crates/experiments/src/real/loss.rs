@@ -237,7 +237,7 @@ impl Figure for Loss {
                 panel("bits per sample", |r| r.bits, Axis::linear),
                 panel("rms error / delta", |r| r.rmse, Axis::log),
                 panel("share of slots beyond delta", |r| r.beyond, Axis::linear),
-                panel("of which taken to be in step", |r| r.unnoticed, Axis::linear),
+                panel("share beyond delta, unnoticed", |r| r.unnoticed, Axis::linear),
             ],
         )
     }
