@@ -209,27 +209,43 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         observations: &[Observation<SVector<f64, M>>],
     ) -> Result<(Gaussian<D>, FusionInfo), Error> {
         self.count(rules.len(), observations.len())?;
-        let (mut belief, mut info) = (*predicted, FusionInfo::default());
-        let mut update = |belief: &mut Gaussian<D>, i: usize, factor: Censored<M>| -> Result<(), Error> {
+        let (mut belief, mut log_likelihood) = (*predicted, 0.0);
+        let update = |belief: &mut Gaussian<D>, i: usize, factor: Censored<M>| -> Result<f64, Error> {
             let (next, step) = assumed_density::update(belief, self.sensors[i].matrix(), &factor)?;
             *belief = next;
-            info.log_likelihood += step.log_likelihood;
-            Ok(())
+            Ok(step.log_likelihood)
         };
         for (i, observation) in observations.iter().enumerate() {
-            if let Observation::Received(value) = observation {
-                let factor = self.scheme(i, &rules[i])?.received(i, broadcast, value, &self.link)?;
-                update(&mut belief, i, factor)?;
+            let Observation::Received(value) = observation else {
+                continue;
+            };
+            let scheme = self.scheme(i, &rules[i])?;
+            if matches!(self.format, NumberFormat::Fixed(_)) || self.link.loss() == 1.0 {
+                log_likelihood += update(&mut belief, i, scheme.received(i, broadcast, value, &self.link)?)?;
+            } else {
+                // The factor of a value: the closed form of its update.
+                let sensor = &self.sensors[i];
+                scheme.check_value(i, &sensor.mean(broadcast), value, &self.link)?;
+                let (next, step) = kalman::update(sensor, &belief, value)?;
+                belief = next;
+                log_likelihood += step.log_likelihood + (-self.link.loss()).ln_1p();
             }
         }
         for i in 0..self.sensors.len() {
             let count = self.silent_together(rules, observations, i);
             if count > 0 {
-                update(&mut belief, i, self.scheme(i, &rules[i])?.silence(broadcast, &self.link, count)?)?;
+                let silence = self.scheme(i, &rules[i])?.silence(broadcast, &self.link, count)?;
+                log_likelihood += update(&mut belief, i, silence)?;
             }
         }
-        info.received = observations.iter().filter(|o| o.received().is_some()).count();
-        Ok((belief, info))
+        let received = observations.iter().filter(|o| o.received().is_some()).count();
+        Ok((
+            belief,
+            FusionInfo {
+                log_likelihood,
+                received,
+            },
+        ))
     }
 
     /// The baseline (the paper's CFoMD, and all-send and random censoring): a Kalman filter on what was received, to which

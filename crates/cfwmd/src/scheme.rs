@@ -64,12 +64,10 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         value: &SVector<f64, M>,
         link: &Link,
     ) -> Result<Censored<M>, Error> {
-        all_finite("report", value.as_slice())?;
-        fewbits_numerics::error::within("crossover", link.crossover(), 0.0, 0.0)?;
         let (prediction, arrival) = (self.sensing.mean(broadcast), 1.0 - link.loss());
-        all_finite("prediction", prediction.as_slice())?;
         let noise = self.sensing.noise_covariance_at(broadcast);
         if let NumberFormat::Fixed(levels) = &self.format {
+            finite_over(link, value, &prediction)?;
             let factor = Censored::level(value[0], levels, &self.rule, prediction[0], noise[(0, 0)], arrival);
             let innovation = value - prediction;
             return factor.or_else(|_| {
@@ -77,12 +75,35 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
                 Err(Error::IMPOSSIBLE)
             });
         }
+        self.check_value(sensor, &prediction, value, link)?;
+        Ok(Censored::value(value, &noise, arrival)?)
+    }
+
+    /// Refuses a value that is no number, or that the rule would not have sent against this prediction, or that the link may have
+    /// inverted.
+    pub(crate) fn check_value(
+        &self,
+        sensor: usize,
+        prediction: &SVector<f64, M>,
+        value: &SVector<f64, M>,
+        link: &Link,
+    ) -> Result<(), Error> {
+        finite_over(link, value, prediction)?;
         // Half the spacing of single precision.
         let share = if self.format == NumberFormat::Single { 6e-8 } else { 0.0 };
         self.rule
-            .check(sensor, &(value - prediction), &value.map(|z| z.abs() * share))?;
-        Ok(Censored::value(value, &noise, arrival)?)
+            .check(sensor, &(value - prediction), &value.map(|z| z.abs() * share))
     }
+}
+
+fn finite_over<const M: usize>(
+    link: &Link,
+    value: &SVector<f64, M>,
+    prediction: &SVector<f64, M>,
+) -> Result<(), Error> {
+    all_finite("report", value.as_slice())?;
+    fewbits_numerics::error::within("crossover", link.crossover(), 0.0, 0.0)?;
+    Ok(all_finite("prediction", prediction.as_slice())?)
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S, D, M> {

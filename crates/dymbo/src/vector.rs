@@ -11,7 +11,9 @@ use fewbits_filters::{SteadyState, assumed_density, kalman};
 use fewbits_models::ScalarSensor;
 use fewbits_numerics::error::{ArgumentError, finite};
 use fewbits_numerics::linalg::symmetrised;
+use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
+use std::f64::consts::LN_2;
 
 /// What an update reveals besides the new belief.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,8 +28,9 @@ pub struct VectorInfo {
 
 /// The filter for `M` one-bit sensors of a `D`-dimensional linear system.
 ///
-/// Each update is the assumed-density update with the factor of a [`SignBit`]. With the threshold at the prediction and a
-/// perfect link it is `mean + b sqrt(2/pi) P h/s`, `P - (2/pi) P h h' P/s^2` with `s^2 = h'Ph + sigma^2`.
+/// Each update is the assumed-density update with the factor of a [`SignBit`]. With the threshold at the prediction it has the closed
+/// form `mean + b c sqrt(2/pi) P h/s`, `P - c^2 (2/pi) P h h' P/s^2` with `s^2 = h'Ph + sigma^2` and, for a link of crossover `e`,
+/// `c = 1 - 2 e`.
 ///
 /// ```
 /// use fewbits_core::{Gaussian, Observation, Sign};
@@ -108,11 +111,28 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         sensor: usize,
         observation: &Observation<Sign>,
     ) -> Result<(Gaussian<D>, VectorInfo), Error> {
-        let threshold = self.threshold(predicted, sensor)?;
-        self.update_at(predicted, sensor, threshold, observation)
+        let &Observation::Received(bit) = observation else {
+            let threshold = self.threshold(predicted, sensor)?;
+            return self.update_at(predicted, sensor, threshold, observation);
+        };
+        let (sensor, clean) = (self.sensor(sensor)?, 1.0 - 2.0 * self.link.crossover());
+        let cross = predicted.covariance() * sensor.direction();
+        let variance = sensor.direction().dot(&cross) + sensor.noise_variance();
+        let step = cross * (clean * SQRT_2_OVER_PI / variance.sqrt());
+        let mean = predicted.mean() + step * bit.value();
+        // Both bits are equally likely at the prediction, whatever the crossover.
+        let info = VectorInfo {
+            log_likelihood: -LN_2 + (-self.link.loss()).ln_1p(),
+            bits: 1,
+        };
+        let covariance = predicted.covariance() - step * step.transpose();
+        if !(info.log_likelihood.is_finite() && mean.iter().chain(covariance.iter()).all(|x| x.is_finite())) {
+            return Err(Error::IMPOSSIBLE);
+        }
+        Ok((Gaussian::from_symmetric_parts(mean, covariance), info))
     }
 
-    /// The same for any threshold.
+    /// The same for any threshold, by the assumed-density update with the factor of a [`SignBit`].
     ///
     /// # Errors
     /// As [`SignFilter::update`]; if the threshold is not finite.
@@ -294,6 +314,14 @@ mod tests {
             prop_assert!((posterior.mean() - prior.mean() - step * sign).amax() <= 1e-13 * scale);
             prop_assert!((posterior.covariance() - expected).amax() <= 1e-13 * prior.covariance().amax());
             prop_assert!((info.log_likelihood - 0.5_f64.ln()).abs() < 1e-12 && info.bits == 1);
+            // The general update, over a link that loses and inverts.
+            let filter = filter.with_link(Link::new(0.2, 0.1).unwrap());
+            let bit = if above { &ABOVE } else { &BELOW };
+            let (closed, one) = filter.update(&prior, 0, bit).unwrap();
+            let (general, same) = filter.update_at(&prior, 0, filter.threshold(&prior, 0).unwrap(), bit).unwrap();
+            prop_assert!((closed.mean() - general.mean()).amax() <= 1e-13 * scale);
+            prop_assert!((closed.covariance() - general.covariance()).amax() <= 1e-13 * prior.covariance().amax());
+            prop_assert!((one.log_likelihood - same.log_likelihood).abs() < 1e-12);
         }
     }
 

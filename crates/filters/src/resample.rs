@@ -118,6 +118,8 @@ fn check(weights: &[f64]) -> Result<(f64, usize), ArgumentError> {
 const BLOCK: usize = 128;
 /// Neighbours whose running sums are formed side by side.
 const GROUP: usize = 8;
+/// Entries of which [`fill_up`] takes the running maximum side by side.
+const LANES: usize = 16;
 /// `2^52`: added to a number below it, it leaves the nearest integer in the mantissa.
 const INTEGERS: f64 = 4_503_599_627_370_496.0;
 /// `1.5 * 2^52`: the same for numbers that may be below zero.
@@ -135,6 +137,12 @@ const fn same_group(back: usize) -> [u64; BLOCK] {
     mask
 }
 
+/// The integer nearest to `x` in `0..=2^51`.
+#[inline(always)]
+fn integer(x: f64) -> u64 {
+    (x + INTEGERS).to_bits() - INTEGERS.to_bits()
+}
+
 /// Systematic resampling without a branch that depends on the weights: particle `i` gets the places between
 /// `round(places_per_weight * cumulative_{i-1} + offset - 1/2)` and the same of `cumulative_i`.
 ///
@@ -146,21 +154,21 @@ fn systematic(offset: f64, weights: &[f64], total: f64, ancestors: &mut [u32]) {
     vectorised(
         #[inline(always)]
         || {
-            let integer = |weight: &f64| (weight * scale + INTEGERS).to_bits() - INTEGERS.to_bits();
-            let per_weight = ancestors.len() as f64 / weights.iter().map(integer).sum::<u64>() as f64;
+            let mut whole = 0;
+            for weight in weights {
+                whole += integer(*weight * scale);
+            }
+            let per_weight = ancestors.len() as f64 / whole as f64;
             ancestors.fill(0);
             let (mut carry, mut index, mut first) = (0, 0, 0_u32);
             for weights in weights.chunks(BLOCK) {
                 let mut sums = [0; GROUP + BLOCK];
                 for (sum, weight) in sums[GROUP..].iter_mut().zip(weights) {
-                    *sum = integer(weight);
+                    *sum = integer(*weight * scale);
                 }
-                for (same_group, back) in SAME_GROUP.iter().zip([1, 2, 4]) {
-                    let before = sums;
-                    for j in 0..BLOCK {
-                        sums[GROUP + j] += before[GROUP + j - back] & same_group[j];
-                    }
-                }
+                add_before::<1>(&mut sums, &SAME_GROUP[0]);
+                add_before::<2>(&mut sums, &SAME_GROUP[1]);
+                add_before::<4>(&mut sums, &SAME_GROUP[2]);
                 let mut firsts = [0_u32; BLOCK];
                 for (firsts, sums) in firsts.chunks_exact_mut(GROUP).zip(sums[GROUP..].chunks_exact(GROUP)) {
                     for j in 0..GROUP {
@@ -185,24 +193,41 @@ fn systematic(offset: f64, weights: &[f64], total: f64, ancestors: &mut [u32]) {
 /// Every entry becomes the largest up to its place.
 #[inline(always)]
 fn fill_up(entries: &mut [u32]) {
-    const LANES: usize = 16;
     let mut so_far = 0;
     let mut chunks = entries.chunks_exact_mut(LANES);
     for chunk in &mut chunks {
-        for back in [1, 2, 4, 8] {
-            let before: [u32; LANES] = std::array::from_fn(|j| chunk[j]);
-            for j in back..LANES {
-                chunk[j] = before[j].max(before[j - back]);
-            }
+        let mut rising = [0; LANES];
+        rising.copy_from_slice(chunk);
+        rising = raised::<1>(rising);
+        rising = raised::<2>(rising);
+        rising = raised::<4>(rising);
+        rising = raised::<8>(rising);
+        for j in 0..LANES {
+            chunk[j] = rising[j].max(so_far);
         }
-        for entry in chunk.iter_mut() {
-            *entry = so_far.max(*entry);
-        }
-        so_far = chunk[LANES - 1];
+        so_far = so_far.max(rising[LANES - 1]);
     }
     for entry in chunks.into_remainder() {
         so_far = so_far.max(*entry);
         *entry = so_far;
+    }
+}
+
+/// The larger of each entry and of that so many places before.
+#[inline(always)]
+fn raised<const BACK: usize>(x: [u32; LANES]) -> [u32; LANES] {
+    std::array::from_fn(
+        #[inline(always)]
+        |j| if j >= BACK { x[j].max(x[j - BACK]) } else { x[j] },
+    )
+}
+
+/// Adds to each sum that of so many places before, within its group.
+#[inline(always)]
+fn add_before<const BACK: usize>(sums: &mut [u64; GROUP + BLOCK], same_group: &[u64; BLOCK]) {
+    let before = *sums;
+    for j in 0..BLOCK {
+        sums[GROUP + j] += before[GROUP + j - BACK] & same_group[j];
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::{Error, LinearGaussian};
 use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::error::{finite, non_negative};
-use fewbits_numerics::kernels::StandardNormals;
+use fewbits_numerics::kernels::{StandardNormals, vectorised};
 use fewbits_numerics::stored;
 use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
@@ -97,9 +97,14 @@ impl Dynamics<1> for Ar1 {
         let (coefficient, deviation) = (self.coefficient(), self.noise_variance().sqrt());
         for states in states.chunks_mut(BLOCK) {
             normals.fill(&mut draws[..states.len()]);
-            for (x, z) in states.iter_mut().zip(&draws) {
-                *x = coefficient * *x + deviation * z;
-            }
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (x, z) in states.iter_mut().zip(&draws) {
+                        *x = coefficient * *x + deviation * z;
+                    }
+                },
+            );
         }
     }
 }
