@@ -167,14 +167,15 @@ pub fn report(samples: &[f64], task: &Task) -> Result<String, Box<dyn Error>> {
         stream_bits as f64 / n
     )?;
     let every = ((12.0 / run.rate().max(1e-9)).round() as usize).clamp(1, samples.len());
-    writeln!(text, "one 12-bit sample in {every}, held: rms error {:.6}", rms(&held(samples, every)))?;
+    writeln!(text, "one 12-bit sample in {every}, held: rms error {:.6}", rms(&held(samples, every, task.period)))?;
     Ok(text)
 }
 
-fn held(samples: &[f64], every: usize) -> Vec<f64> {
+fn held(samples: &[f64], every: usize, period: Option<f64>) -> Vec<f64> {
+    let error = |straight: f64| period.map_or(straight, |p| straight - p * (straight / p).round());
     samples
         .chunks(every)
-        .flat_map(|chunk| chunk.iter().map(|x| x - chunk[0]))
+        .flat_map(|chunk| chunk.iter().map(|x| error(x - chunk[0])))
         .collect()
 }
 

@@ -85,31 +85,37 @@ const MOST_SEEN: u32 = 1 << 22;
 /// How often each index occurred, for the indices worth remembering, in increasing order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Values {
-    entries: Vec<(i64, u32)>,
+    indices: Vec<i64>,
+    counts: Vec<u32>,
     total: u32,
 }
 
 impl Values {
     pub(crate) fn new() -> Self {
         Self {
-            entries: Vec::with_capacity(CAPACITY),
+            indices: Vec::with_capacity(CAPACITY),
+            counts: Vec::with_capacity(CAPACITY),
             total: 0,
         }
     }
 
     pub(crate) fn is_valid(&self) -> bool {
-        let sum: u64 = self.entries.iter().map(|e| u64::from(e.1)).sum();
-        let ordered = self.entries.windows(2).all(|pair| pair[0].0 < pair[1].0);
-        ordered && self.entries.len() <= CAPACITY && sum == u64::from(self.total) && self.total <= MOST_SEEN
+        let sum: u64 = self.counts.iter().map(|c| u64::from(*c)).sum();
+        let ordered = self.indices.is_sorted_by(|a, b| a < b);
+        let sized = self.indices.len() == self.counts.len() && self.counts.len() <= CAPACITY;
+        ordered && sized && sum == u64::from(self.total) && self.total <= MOST_SEEN
     }
 
     /// Restores the room that a stored table lost.
     pub(crate) fn reserve(&mut self) {
-        self.entries.reserve_exact(CAPACITY.saturating_sub(self.entries.len()));
+        let room = CAPACITY.saturating_sub(self.counts.len());
+        self.indices.reserve_exact(room);
+        self.counts.reserve_exact(room);
     }
 
     pub(crate) fn clear(&mut self) {
-        self.entries.clear();
+        self.indices.clear();
+        self.counts.clear();
         self.total = 0;
     }
 
@@ -117,43 +123,31 @@ impl Values {
         self.total
     }
 
+    fn rank(&self, j: i64) -> usize {
+        self.indices.partition_point(|i| *i < j)
+    }
+
     pub(crate) fn count(&self, j: i64) -> u32 {
-        self.entries
-            .binary_search_by_key(&j, |e| e.0)
-            .ok()
-            .and_then(|i| self.entries.get(i))
-            .map_or(0, |e| e.1)
+        self.between(j, j.saturating_add(1))
     }
 
-    /// Entries before index `j`.
-    pub(crate) fn rank(&self, j: i64) -> usize {
-        self.entries.partition_point(|e| e.0 < j)
-    }
-
-    /// Counts of the first `n` entries, for every `n`.
-    pub(crate) fn sums(&self) -> [u32; CAPACITY + 1] {
-        let (mut sums, mut total) = ([0; CAPACITY + 1], 0);
-        for (sum, entry) in sums.iter_mut().skip(1).zip(&self.entries) {
-            total += entry.1;
-            *sum = total;
-        }
-        sums
+    /// Counts of the indices in `first..end`.
+    pub(crate) fn between(&self, first: i64, end: i64) -> u32 {
+        let chosen = self.counts.get(self.rank(first)..self.rank(end));
+        chosen.map_or(0, |counts| counts.iter().sum())
     }
 
     pub(crate) fn add(&mut self, j: i64, weight: u32) {
-        match self.entries.binary_search_by_key(&j, |e| e.0) {
-            Ok(i) => {
-                if let Some(entry) = self.entries.get_mut(i) {
-                    entry.1 += weight;
-                }
+        let mut at = self.rank(j);
+        if self.indices.get(at) == Some(&j) {
+            self.counts[at] += weight;
+        } else {
+            while self.counts.len() >= CAPACITY {
+                self.halve();
+                at = self.rank(j);
             }
-            Err(_) => {
-                while self.entries.len() >= CAPACITY {
-                    self.halve();
-                }
-                let at = self.entries.partition_point(|e| e.0 < j);
-                self.entries.insert(at, (j, weight));
-            }
+            self.indices.insert(at, j);
+            self.counts.insert(at, weight);
         }
         self.total += weight;
         while self.total > MOST_SEEN {
@@ -162,9 +156,17 @@ impl Values {
     }
 
     fn halve(&mut self) {
-        self.entries.iter_mut().for_each(|e| e.1 /= 2);
-        self.entries.retain(|e| e.1 > 0);
-        self.total = self.entries.iter().map(|e| e.1).sum();
+        let (mut kept, mut total) = (0, 0);
+        for i in 0..self.counts.len() {
+            let half = self.counts[i] / 2;
+            if half > 0 {
+                (self.indices[kept], self.counts[kept]) = (self.indices[i], half);
+                (kept, total) = (kept + 1, total + half);
+            }
+        }
+        self.indices.truncate(kept);
+        self.counts.truncate(kept);
+        self.total = total;
     }
 }
 
@@ -200,8 +202,7 @@ mod tests {
             assert!(seen.is_valid());
         }
         assert!(seen.count(-7) > 100 && seen.count(9_999) == REPORTED);
-        let sums = seen.sums();
-        assert_eq!(sums[seen.rank(i64::MAX)], seen.total());
-        assert_eq!(sums[seen.rank(0)], seen.count(-7));
+        assert_eq!(seen.between(i64::MIN, i64::MAX), seen.total());
+        assert_eq!(seen.between(i64::MIN, 0), seen.count(-7));
     }
 }

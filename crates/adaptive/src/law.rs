@@ -11,7 +11,7 @@
 //! The mixture loses at most `log2(1 / weight)` bits in all against the best of the three, and a little at each change of the
 //! best. Two units each are more than the rounding of the cumulative sums, so every residual keeps a frequency above zero.
 
-use crate::counts::{CAPACITY, REPORTED};
+use crate::counts::REPORTED;
 use crate::replica::{Replica, Slot};
 
 /// Bits of a frequency.
@@ -34,8 +34,7 @@ pub(crate) struct Law<'a> {
     /// The bank's probability of an index other than the prediction, below it and above it.
     lower: f64,
     upper: f64,
-    /// Counts of the values before each, and of the prediction.
-    sums: [u32; CAPACITY + 1],
+    /// Count of the prediction among the values.
     silent: u32,
 }
 
@@ -80,7 +79,6 @@ impl<'a> Law<'a> {
             slot,
             lower: replica.bank.below(&slot.ahead, p - 0.5),
             upper: replica.bank.above(&slot.ahead, p + 0.5),
-            sums: replica.values.sums(),
             silent: replica.values.count(replica.lattice.canonical(slot.prediction)),
         }
     }
@@ -109,9 +107,8 @@ impl<'a> Law<'a> {
     /// Counts of the values whose residual is in `-REACH..k` and not 0.
     fn values_below(&self, k: i64) -> u32 {
         let (values, p) = (&self.replica.values, self.slot.prediction);
-        let before = |j: i64| self.sums.get(values.rank(j)).copied().unwrap_or_default();
         let (low, high, count) = match self.replica.lattice.cells() {
-            None => (-REACH, k, before(p + k) - before(p - REACH)),
+            None => (-REACH, k, values.between(p - REACH, p + k)),
             Some(cells) => {
                 // Residuals around the circle are the shortest way.
                 let (low, high) = ((cells / 2 + 1 - cells).max(-REACH), k.min(cells / 2 + 1));
@@ -120,8 +117,8 @@ impl<'a> Law<'a> {
                 }
                 let first = (p + low).rem_euclid(cells);
                 let end = first + high - low;
-                let around = if end > cells { before(end - cells) } else { 0 };
-                (low, high, before(end.min(cells)) - before(first) + around)
+                let around = if end > cells { values.between(0, end - cells) } else { 0 };
+                (low, high, values.between(first, end.min(cells)) + around)
             }
         };
         if low <= 0 && high > 0 {

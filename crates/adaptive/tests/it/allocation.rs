@@ -17,7 +17,7 @@ fn samples_and_reports_allocate_nothing() {
         };
         let first = measure(|| one(samples[0]));
         // Values and residuals of both.
-        assert_eq!(first.bytes_total, 2 * (256 * 16 + 3 * 129 * 2));
+        assert_eq!(first.bytes_total, 2 * (256 * (8 + 4) + 3 * 129 * 2));
         let used = measure(|| {
             samples
                 .iter()
