@@ -168,12 +168,7 @@ impl Tracker for RaoBlackwellGuided {
     type Belief = VelocityCloud;
     type Workspace = VelocityWorkspace;
 
-    fn start<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        _: &Target,
-        prior: &Gaussian<4>,
-    ) -> Result<VelocityCloud, Error> {
+    fn start<R: Rng + ?Sized>(&self, rng: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<VelocityCloud, Error> {
         let covariance = prior.covariance();
         let velocity_variance = 0.5 * (covariance[(2, 2)] + covariance[(3, 3)]);
         // Positions are drawn, velocities start at their mean given the position.

@@ -140,7 +140,10 @@ fn cloud_step<R: Rng>(
     let fit = |t: f64, z: f64| normal::log_pdf_with(z, t, variance);
     let pairs: Vec<[f64; 2]> = clouds[0].iter().zip(&clouds[1]).map(|(a, b)| [*a, *b]).collect();
     let straight: Vec<f64> = match rule {
-        CloudRule::Tanh => pairs.iter().map(|t| tanh_rule(separation(*t, z), PRINTED_GAIN)).collect(),
+        CloudRule::Tanh => pairs
+            .iter()
+            .map(|t| tanh_rule(separation(*t, z), PRINTED_GAIN))
+            .collect(),
         CloudRule::Exact => {
             let evidence = |z: [f64; 2]| {
                 let logs: Vec<f64> = pairs.iter().map(|t| fit(t[0], z[0]) + fit(t[1], z[1])).collect();

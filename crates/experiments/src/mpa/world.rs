@@ -315,7 +315,9 @@ impl Score {
         let between = |low: f64, high: f64| Some((at(low.floor())?, at(high.ceil())?));
         let median = Measured {
             value: between(middle, middle).map_or(f64::NAN, |(a, b)| 0.5 * (a + b)),
-            standard_error: between(middle - give, middle + give).filter(|_| n > 1).map(|(a, b)| 0.5 * (b - a)),
+            standard_error: between(middle - give, middle + give)
+                .filter(|_| n > 1)
+                .map(|(a, b)| 0.5 * (b - a)),
         };
         Self {
             mse: (&moments).into(),
