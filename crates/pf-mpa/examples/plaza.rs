@@ -28,6 +28,8 @@ type Failure = Box<dyn Error>;
 const NOISE: f64 = 1.5;
 /// Share of ranges that have nothing to do with the distance.
 const OUTLIERS: f64 = 0.02;
+/// Width of where they lie, in metres.
+const STRAY: f64 = 40.0;
 /// Deviation of the velocity along each axis, in metres per second, and how long it lasts, in seconds.
 const SPEED: f64 = 0.8;
 const PERSISTENCE: f64 = 6.0;
@@ -105,7 +107,10 @@ impl Recording {
             if !places.contains_key(&id) {
                 return Err(format!("{}: row {}: there is no anchor `{id}`", ranges.display(), i + 2).into());
             }
-            all.push((number(ranges, i, &t)?, id, number(ranges, i, &range)?));
+            // A range that is missing says nothing.
+            if !range.is_empty() && !range.eq_ignore_ascii_case("nan") {
+                all.push((number(ranges, i, &t)?, id, number(ranges, i, &range)?));
+            }
         }
         let mut track = Vec::new();
         for (i, [t, x, y]) in columns(truth, ["t_s", "x_m", "y_m"])?.into_iter().enumerate() {
@@ -305,15 +310,22 @@ pub fn track(recording: &Recording, travel: Travel) -> Result<Track, Failure> {
         let row = fewbits_core::Sensing::jacobian(&sensor, prediction.mean());
         let spread = (row * prediction.covariance() * row.transpose())[0].sqrt();
         let (factor, log_outlier) = match &quantizer {
-            // An outlier is off by tens of metres.
-            None => (RangeFactor::value(*range, noise)?, (OUTLIERS / 40.0).ln()),
+            None => (RangeFactor::value(*range, noise)?, (OUTLIERS / STRAY).ln()),
             Some((scheme, loading)) => {
                 let reference = RangeReference {
                     centre: mean,
                     half_width: loading * spread.hypot(NOISE),
                 };
-                let level = scheme.level(*range, &reference)?;
-                (scheme.received(level, &reference)?, (OUTLIERS / scheme.levels() as f64).ln())
+                let (level, levels) = (scheme.level(*range, &reference)?, scheme.levels());
+                // An outlier seldom falls into an inner cell.
+                let inner = (2.0 * reference.half_width / STRAY).min(1.0) / levels as f64;
+                let outer = 0.5 * (1.0 - (levels - 2) as f64 * inner);
+                let share = if level.0 == 0 || level.0 + 1 == levels {
+                    outer
+                } else {
+                    inner
+                };
+                (scheme.received(level, &reference)?, (OUTLIERS * share).ln())
             }
         };
         track.bits += quantizer.as_ref().map_or(32, |q| q.0.bits() as usize);

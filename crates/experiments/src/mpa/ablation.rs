@@ -1,9 +1,9 @@
 //! `mpa-ablation`: improved message passing with one erratum put back at a time.
 
-use super::scores::{Row, agree, mse};
+use super::scores::{Row, agree, ladder, mse};
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, compare};
-use crate::plot::{Axis, Layer, Panel, Plot};
+use crate::plot::Plot;
 use crate::{About, Claims, Context, Error, Figure};
 use fewbits_pf_mpa::{
     DynamicsWeight, IntervalRule, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight, Velocity,
@@ -179,19 +179,7 @@ impl Figure for Ablation {
     }
 
     fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
-        let panel = |snr: f64| {
-            let here: Vec<&Row> = t.variants.iter().filter(|r| r.snr_db == snr).collect();
-            let names = here.iter().enumerate().map(|(i, r)| (i as f64, r.method.clone()));
-            let marks: Vec<(usize, &Row)> = here.iter().copied().enumerate().collect();
-            let median = here
-                .iter()
-                .enumerate()
-                .map(|(i, r)| (i as f64, r.score.median.value))
-                .collect();
-            Panel::new(format!("{snr} dB"), Axis::linear("").named(names), Axis::log("mean squared error"))
-                .with(Layer::measured("mean", marks, |(i, r)| (i as f64, r.score.mse)))
-                .with(Layer::points("median", median))
-        };
-        Plot::grid(1, vec![panel(50.0), panel(30.0)])
+        let panel = |snr: f64| ladder(&format!("{snr} dB"), t.variants.iter().filter(|r| r.snr_db == snr));
+        Plot::grid(2, vec![panel(50.0), panel(30.0)])
     }
 }

@@ -609,8 +609,8 @@ impl Figure for Graphs {
             };
             Panel::new(
                 format!("Figure {name}"),
-                Axis::linear("").between(0.0, 1.0).named([]),
-                Axis::linear("").between(-0.4, 1.4).named([]),
+                Axis::linear("").between(0.0, 1.0).named([(0.0, String::new())]),
+                Axis::linear("").between(-0.4, 1.4).named([(0.0, String::new())]),
             )
             .with_all(lines)
             .with(Layer::points("variables", marks(&variables, 0.0)).coloured(0))

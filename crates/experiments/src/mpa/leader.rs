@@ -167,16 +167,22 @@ impl Figure for Leaders {
         let rows: Vec<(usize, &Row)> = t.elections.iter().enumerate().collect();
         let others = points(&rows, |(i, r)| (*i as f64, r.none.value + r.several.value));
         Plot::of(
-            Panel::new("Elections", Axis::linear("").named(names), Axis::linear("share of steps"))
-                .with(Layer::measured("none or several claim", rows.clone(), |(i, r)| (i as f64, r.none)))
-                .with(Layer::points("both together", others))
-                .with(Layer::measured("another than the nearest leads", rows, |(i, r)| {
-                    let share = Measured {
-                        value: 1.0 - r.nearest.value,
-                        ..r.nearest
-                    };
-                    (i as f64, share)
-                })),
+            Panel::new(
+                "Elections",
+                Axis::linear("")
+                    .named(names)
+                    .between(-0.5, t.elections.len() as f64 - 0.5),
+                Axis::linear("share of steps"),
+            )
+            .with(Layer::measured("none claims", rows.clone(), |(i, r)| (i as f64, r.none)))
+            .with(Layer::points("none or several claim", others))
+            .with(Layer::measured("another than the nearest leads", rows, |(i, r)| {
+                let share = Measured {
+                    value: 1.0 - r.nearest.value,
+                    ..r.nearest
+                };
+                (i as f64, share)
+            })),
         )
     }
 }

@@ -1,6 +1,7 @@
 //! Rows that hold a tracker's score, and what is claimed of all of them.
 
 use super::world::{Field, Method, Point, Score, compare};
+use crate::plot::{Axis, Layer, Panel, points};
 use crate::{Claims, Context, Error, Measured};
 use fewbits_pf_mpa::Reports;
 use garde::Validate;
@@ -106,11 +107,6 @@ pub(super) fn agree(claims: &mut Claims, rows: &[Row], prefix: &str, heavy_taile
     if heavy_tailed {
         claims
             .references(&quantity("median"), "median of the squared position error", rows, |r| {
-                (r.key(), r.score.median.value)
-            })
-            .at_full_trials();
-        claims
-            .references(&quantity("median-few"), "median over few or heavy-tailed trajectories", rows, |r| {
                 (r.key(), r.score.median)
             })
             .at_full_trials();
@@ -128,6 +124,17 @@ pub(super) fn find<'a>(rows: &'a [Row], point: &str, method: &str) -> Option<&'a
 /// Its mean squared error.
 pub(super) fn mse(rows: &[Row], point: &str, method: &str) -> Option<f64> {
     find(rows, point, method).map(|r| r.score.mse.value)
+}
+
+/// Means and medians, a tracker a line.
+pub(super) fn ladder<'a>(title: &str, rows: impl IntoIterator<Item = &'a Row>) -> Panel {
+    let rows: Vec<&Row> = rows.into_iter().collect();
+    let numbered = || rows.iter().enumerate().map(|(i, r)| (-(i as f64), *r));
+    let names = numbered().map(|(at, r)| (at, r.method.clone()));
+    let y = Axis::linear("").named(names).between(0.6 - rows.len() as f64, 0.6);
+    Panel::new(title, Axis::log("mean squared error"), y)
+        .with(Layer::points("mean", points(numbered(), |(at, r)| (r.score.mse.value, at))))
+        .with(Layer::points("median", points(numbered(), |(at, r)| (r.score.median.value, at))))
 }
 
 /// All the cheap Gaussian trackers.

@@ -1,6 +1,6 @@
 //! `mpa-table3-mse`, `mpa-fig3-4`, `mpa-fig3-5`, `mpa-table3-low`: all trackers over particles, levels and noise.
 
-use super::scores::{Effort, Row, agree, clouds, find, gaussian, messages, mse, rows};
+use super::scores::{Effort, Row, agree, clouds, find, gaussian, ladder, messages, mse, rows};
 use super::world::{LAYOUTS, Method, Point};
 use crate::plot::{Axis, Layer, Panel, Plot, points};
 use crate::{About, Claims, Context, Error, Figure};
@@ -168,27 +168,11 @@ impl Figure for Mse {
     }
 
     fn plot(&self, _: &Effort, t: &Mses) -> Plot {
-        let shown: Vec<&Row> = t
+        let shown = t
             .trackers
             .iter()
-            .filter(|r| !matches!(r.family.as_str(), "published" | "narrow" | "EKF-Q-naive" | "unquantized" | "EKF-U"))
-            .collect();
-        let names = shown.iter().enumerate().map(|(i, r)| (i as f64, r.method.clone()));
-        let bars = shown
-            .iter()
-            .enumerate()
-            .map(|(i, r)| (i as f64, r.score.mse.value))
-            .collect();
-        let first = Panel::new("50 dB, four levels", Axis::linear("").named(names), Axis::log("mean squared error"))
-            .with(Layer::points("mean", bars))
-            .with(Layer::points(
-                "median",
-                shown
-                    .iter()
-                    .enumerate()
-                    .map(|(i, r)| (i as f64, r.score.median.value))
-                    .collect(),
-            ));
+            .filter(|r| !matches!(r.family.as_str(), "published" | "narrow" | "EKF-Q-naive" | "unquantized" | "EKF-U"));
+        let first = ladder("50 dB, four levels", shown);
         let families = ["EKF-Q", "GMPA", "GMPA-transfer", "guided"];
         let speed = |r: &Row| r.point.trim_start_matches('V').parse().unwrap_or(f64::NAN);
         let lines = families.map(|f| {
@@ -196,7 +180,8 @@ impl Figure for Mse {
             Layer::measured(f, of, |r| (speed(r), r.score.mse))
         });
         let second =
-            Panel::new("speed of the encoder", Axis::linear("V"), Axis::log("mean squared error")).with_all(lines);
+            Panel::new("speed of the encoder", Axis::linear("V").between(0.8, 4.2), Axis::log("mean squared error"))
+                .with_all(lines);
         Plot::grid(1, vec![first, second])
     }
 }

@@ -1,11 +1,14 @@
 //! Bad input is a typed error, extreme input an answer.
 
 use fewbits_core::Gaussian;
+use fewbits_densities::Particles;
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{
     AccelerationChain, Bootstrap, Encoder, Error, GridFilter, GridWorkspace, GuidedGaussian, Linearised,
-    MessagePassing, Network, QuantizedRange, RangeNoise, RaoBlackwellGuided, Reports, Target, Tracker,
+    MessagePassing, Network, ProductSampler, QuantizedRange, RangeNoise, RangeReference, RaoBlackwellGuided, Reports,
+    Target, Tracker,
 };
+use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, Vector2, Vector4};
 
 fn network(scale: f64, levels: usize, snr: f64, encoder: Encoder) -> Network {
@@ -151,4 +154,94 @@ fn settings_are_checked() {
     broken.particles = 1;
     let mut rng = Stream::new(1).rng();
     assert!(broken.start(&mut rng, &target(1.0), &prior(1.0)).is_err());
+}
+
+#[test]
+fn every_kind_of_bad_input_is_a_typed_error() {
+    let (noise, nan) = (RangeNoise::from_snr_db(40.0).unwrap(), f64::NAN);
+    let printed = AccelerationChain::printed(0.1).unwrap();
+    let (initial, transition) = ([0.7, 0.15, 0.15], [[0.6, 0.2, 0.2], [0.4, 0.5, 0.1], [0.4, 0.1, 0.5]]);
+    let scheme = QuantizedRange::new(4, noise).unwrap();
+    let reference = |half_width: f64| RangeReference {
+        centre: 5.0,
+        half_width,
+    };
+    let mut crooked = Matrix4::identity();
+    crooked[(0, 1)] = 0.5;
+    let mut indefinite = Matrix4::identity();
+    indefinite[(0, 0)] = -1e-3;
+    let refused = [
+        ("one particle", MessagePassing::improved(1).is_err()),
+        ("no particle", Bootstrap::new(0).is_err() && RaoBlackwellGuided::new(0).is_err()),
+        ("one draw", GuidedGaussian::new(1).is_err()),
+        ("two nodes", GridFilter::new(2).is_err()),
+        ("one level", QuantizedRange::new(1, noise).is_err() && QuantizedRange::new(0, noise).is_err()),
+        (
+            "speed",
+            [0.0, -1.0, nan]
+                .iter()
+                .all(|v| Encoder::published(*v).is_err() && Encoder::predicted(*v).is_err()),
+        ),
+        ("interval", [0.0, -1.0, nan].iter().all(|t| Target::new(*t, 0.02, printed).is_err())),
+        (
+            "signal-to-noise ratio",
+            [nan, f64::INFINITY]
+                .iter()
+                .all(|r| RangeNoise::from_snr_db(*r).is_err()),
+        ),
+        ("deviation", [0.0, -1.0, nan].iter().all(|s| RangeNoise::constant(*s).is_err())),
+        (
+            "range",
+            [nan, f64::INFINITY]
+                .iter()
+                .all(|z| scheme.level(*z, &reference(1.0)).is_err()),
+        ),
+        (
+            "half width",
+            [0.0, -1.0, nan]
+                .iter()
+                .all(|w| scheme.level(5.0, &reference(*w)).is_err()),
+        ),
+        ("level", scheme.received(Symbol(4), &reference(1.0)).is_err()),
+        ("initial law", AccelerationChain::new(0.1, [0.7, 0.2, 0.2], transition).is_err()),
+        ("transition", AccelerationChain::new(0.1, initial, [initial, initial, [0.5, 0.6, -0.1]]).is_err()),
+        ("no sensor", Network::new(&[], scheme.clone(), Encoder::adaptive(4).unwrap()).is_err()),
+        ("asymmetric", Gaussian::new(Vector4::zeros(), crooked).is_err()),
+        ("indefinite", Gaussian::new(Vector4::zeros(), indefinite).is_err()),
+        (
+            "weights",
+            [f64::NEG_INFINITY, f64::INFINITY, nan]
+                .iter()
+                .all(|w| weighted(*w).is_err()),
+        ),
+    ];
+    let missed: Vec<&str> = refused
+        .iter()
+        .filter(|(_, refused)| !refused)
+        .map(|(what, _)| *what)
+        .collect();
+    assert!(missed.is_empty(), "{missed:?}");
+    // Forty points to the power of six: beyond enumeration, and the belief stays.
+    let exhaustive = MessagePassing {
+        sampler: ProductSampler::Exact,
+        ..MessagePassing::improved(40).unwrap()
+    };
+    let (target, network) = (target(1.0), network(1.0, 4, 40.0, Encoder::published(3.0).unwrap()));
+    let observed = network
+        .observe(&target, 0, &prior(1.0), &[9.0; 5], Reports::Levels)
+        .unwrap();
+    let mut belief = prior(1.0);
+    let mut rng = Stream::new(4).rng();
+    let failed = exhaustive.step_in_place(&mut rng, &target, 0, &mut belief, &observed, &mut Default::default());
+    assert!(failed.is_err());
+    assert_eq!(belief, prior(1.0));
+    // Points without spread have no kernel.
+    let still = Target::new(1.0, 0.0, AccelerationChain::printed(0.0).unwrap()).unwrap();
+    let known = Gaussian::known(*prior(1.0).mean()).unwrap();
+    assert!(exhaustive.step(&mut rng, &still, 0, &known, &observed).is_err());
+    assert!(still.simulate(&mut rng, known.mean(), 0).is_empty());
+}
+
+fn weighted(log_weight: f64) -> Result<Particles<1>, fewbits_densities::Error> {
+    Particles::new([vec![0.0, 1.0]], &[log_weight; 2])
 }
