@@ -15,10 +15,10 @@ const PE: Criterion = Criterion::BayesError;
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// The signals to detect, in noise standard deviations.
-    #[garde(length(min = 1, max = 20), inner(range(min = 0.1, max = 8.0)))]
+    #[garde(length(min = 1, max = 20), inner(range(min = 0.1, max = 16.0)))]
     signals: Vec<f64>,
     /// Number of sensors; the greedy chain enumerates `4^sensors` outcomes.
-    #[garde(range(min = 2, max = 8))]
+    #[garde(range(min = 2, max = 9))]
     sensors: usize,
     /// False-alarm probability of the randomised test.
     #[garde(range(min = 1e-9, max = 0.999))]
