@@ -128,7 +128,11 @@ impl Values {
     }
 
     pub(crate) fn count(&self, j: i64) -> u32 {
-        self.between(j, j.saturating_add(1))
+        let at = self.rank(j);
+        match self.indices.get(at) {
+            Some(index) if *index == j => self.counts[at],
+            _ => 0,
+        }
     }
 
     /// Counts of the indices in `first..end`.

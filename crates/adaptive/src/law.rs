@@ -143,6 +143,8 @@ impl<'a> Law<'a> {
             1.0
         } else if k < 0 {
             replica.bank.below(&slot.ahead, edge) / outside
+        } else if k == 1 {
+            1.0 - self.upper / outside
         } else {
             1.0 - replica.bank.above(&slot.ahead, edge) / outside
         };
