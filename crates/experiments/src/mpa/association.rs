@@ -436,7 +436,7 @@ impl Figure for Table {
                     format!("particles-{variance}"),
                     "C10: over particles the printed rule blurs the targets",
                     ratio,
-                    3.0,
+                    2.0,
                 )
                 .at_full_trials();
         }
