@@ -24,6 +24,12 @@ pub(super) const RATE: f64 = 1.0;
 /// How far outside the field the source may be, m.
 const MARGIN: f64 = 20.0;
 
+/// The polynomial Gaussians of the paper: two, of degree 5.
+pub(super) const LPG: Form = Form::Lpg {
+    components: 2,
+    degree: 5,
+};
+
 /// Settings of every search.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
 #[serde(deny_unknown_fields)]
