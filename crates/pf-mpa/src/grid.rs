@@ -9,6 +9,7 @@ use fewbits_core::{Gaussian, Likelihood};
 use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
 use fewbits_numerics::normal::LN_SQRT_2PI;
+use fewbits_numerics::stored;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -41,20 +42,7 @@ pub struct GridFilter {
     reach: f64,
 }
 
-#[derive(Deserialize)]
-#[serde(rename = "GridFilter", deny_unknown_fields)]
-struct Stored {
-    nodes: usize,
-    reach: f64,
-}
-
-impl TryFrom<Stored> for GridFilter {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        Self::new(stored.nodes)?.with_reach(stored.reach)
-    }
-}
+stored! { GridFilter as Stored { nodes: usize, reach: f64 } => GridFilter::new(nodes)?.with_reach(reach), Error }
 
 impl Default for GridFilter {
     /// 15 nodes an axis.

@@ -9,6 +9,7 @@ use fewbits_core::columns::set_state;
 use fewbits_core::{Gaussian, Likelihood};
 use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
+use fewbits_numerics::stored;
 use nalgebra::{Matrix2, Vector2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -32,19 +33,7 @@ pub struct GuidedGaussian {
     draws: usize,
 }
 
-#[derive(Deserialize)]
-#[serde(rename = "GuidedGaussian", deny_unknown_fields)]
-struct Stored {
-    draws: usize,
-}
-
-impl TryFrom<Stored> for GuidedGaussian {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        Self::new(stored.draws)
-    }
-}
+stored! { GuidedGaussian as Stored { draws: usize } => GuidedGaussian::new(draws), Error }
 
 /// Buffers kept from step to step.
 #[derive(Debug, Clone, Default)]

@@ -9,6 +9,7 @@ use fewbits_core::{Gaussian, Likelihood};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::stored;
 use nalgebra::{Cholesky, Matrix2, Matrix4, SMatrix, Vector2, Vector4, Vector6};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -37,11 +38,7 @@ pub struct RaoBlackwellGuided {
     particles: usize,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Stored {
-    particles: usize,
-}
+stored! { Bootstrap as Stored { particles: usize } => Bootstrap::new(particles), Error }
 
 fn checked(particles: usize) -> Result<usize, Error> {
     if u32::try_from(particles).is_err() {
@@ -71,14 +68,6 @@ impl RaoBlackwellGuided {
         Ok(Self {
             particles: checked(particles)?,
         })
-    }
-}
-
-impl TryFrom<Stored> for Bootstrap {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        Self::new(stored.particles)
     }
 }
 

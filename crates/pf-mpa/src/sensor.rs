@@ -5,6 +5,7 @@ use crate::error::refuse;
 use fewbits_core::{Columns, ColumnsMut, Sensing};
 use fewbits_numerics::error::{all_finite, finite, non_negative};
 use fewbits_numerics::kernels::vectorised;
+use fewbits_numerics::stored;
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -18,29 +19,10 @@ pub struct RangeNoise {
     relative: f64,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "RangeNoise", deny_unknown_fields)]
-struct Stored {
-    constant: f64,
-    relative: f64,
-}
-
-impl From<RangeNoise> for Stored {
-    fn from(noise: RangeNoise) -> Self {
-        Self {
-            constant: noise.constant,
-            relative: noise.relative,
-        }
-    }
-}
-
-impl TryFrom<Stored> for RangeNoise {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        Self::new(stored.constant, stored.relative)
-    }
-}
+stored! { RangeNoise as Stored |noise| {
+    constant: f64 = noise.constant,
+    relative: f64 = noise.relative,
+} => RangeNoise::new(constant, relative), Error }
 
 impl RangeNoise {
     /// Standard deviation `constant` (length) at the sensor, growing by `relative` = `1 / c` of the distance.

@@ -5,6 +5,7 @@ use crate::error::refuse;
 use fewbits_core::{Dynamics, Gaussian};
 use fewbits_models::LinearGaussian;
 use fewbits_numerics::error::{non_negative, positive, probabilities};
+use fewbits_numerics::stored;
 use nalgebra::{Matrix4, Matrix4x2, SVector, Vector2, Vector4, Vector6};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -19,31 +20,11 @@ pub struct AccelerationChain {
     transition: [[f64; 3]; 3],
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "AccelerationChain", deny_unknown_fields)]
-struct StoredChain {
-    magnitude: f64,
-    initial: [f64; 3],
-    transition: [[f64; 3]; 3],
-}
-
-impl From<AccelerationChain> for StoredChain {
-    fn from(chain: AccelerationChain) -> Self {
-        Self {
-            magnitude: chain.magnitude,
-            initial: chain.initial,
-            transition: chain.transition,
-        }
-    }
-}
-
-impl TryFrom<StoredChain> for AccelerationChain {
-    type Error = Error;
-
-    fn try_from(stored: StoredChain) -> Result<Self, Error> {
-        Self::new(stored.magnitude, stored.initial, stored.transition)
-    }
-}
+stored! { AccelerationChain as StoredChain |chain| {
+    magnitude: f64 = chain.magnitude,
+    initial: [f64; 3] = chain.initial,
+    transition: [[f64; 3]; 3] = chain.transition,
+} => AccelerationChain::new(magnitude, initial, transition), Error }
 
 impl AccelerationChain {
     /// A chain with accelerations `0`, `+magnitude`, `-magnitude` (length per time squared), the law `initial` of the one that

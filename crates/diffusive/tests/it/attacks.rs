@@ -4,13 +4,13 @@ use super::{field, joint, sensor};
 use fewbits_core::Gaussian;
 use fewbits_densities::hermite::{hermite, multi_indices};
 use fewbits_densities::laplace::Peak;
-use fewbits_densities::{CellOptions, Cells, Clumps, Lpg, MixtureFit};
+use fewbits_densities::{CellOptions, Cells, Clumps, Component, Lpg, MixtureFit};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{
     Form, Posterior, Prior, RateModel, RateRange, RateSums, Rule, Search, SearchBox, SourceLikelihood, SourceSensor,
     Status,
 };
-use fewbits_models::diffusion::{Air, Ground};
+use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -70,6 +70,35 @@ fn arguments_are_refused() {
             && Predictions::new(&[vec![1.0], vec![1.0, 2.0]], &[0.5, 0.5], 1.0).is_err()
     );
     assert!(Predictions::new(&[vec![1.0]], &[0.7], 1.0).is_err());
+}
+
+/// The physics and the densities under a search refuse theirs; what is not yet released is no error but nothing.
+#[test]
+fn physics_and_covariances_are_refused() {
+    for diffusivity in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(Air::new(diffusivity, Vector3::zeros(), Ground::Impermeable).is_err(), "{diffusivity}");
+    }
+    assert!(Wall::permeable(-1e-300).is_err() && Wall::permeable(f64::NAN).is_err());
+    assert!(Air::new(40.0, Vector3::new(f64::NAN, 0.0, 0.0), Ground::Impermeable).is_err());
+    let air = Air::new(40.0, Vector3::zeros(), Ground::Impermeable).unwrap();
+    let (field, source) = (Vector3::new(1.0, 0.0, 0.0), Vector3::zeros());
+    for age in [0.0, -1.0, f64::NEG_INFINITY] {
+        assert_eq!(air.concentration(&field, &source, age), 0.0);
+    }
+    for covariance in [
+        Matrix2::new(1.0, 2.0, 2.0, 1.0),
+        Matrix2::zeros(),
+        -Matrix2::identity(),
+        Matrix2::new(f64::NAN, 0.0, 0.0, 1.0),
+    ] {
+        assert!(
+            Gaussian::new(Vector2::zeros(), covariance)
+                .and_then(|g| g.factored())
+                .is_err(),
+            "{covariance}"
+        );
+        assert!(Component::new(1.0, Vector2::zeros(), covariance).is_err(), "{covariance}");
+    }
 }
 
 #[test]
@@ -138,6 +167,8 @@ fn absurd_samples() {
                 assert!(step.estimate.mean().iter().all(|x| x.is_finite()), "{form:?} {level} {:?}", outcome.status);
                 assert!(step.log10_determinant.is_finite() && !step.log_evidence.is_nan());
             }
+            // Squares overflow: the likelihood is zero everywhere.
+            assert!(level < 1e150 || (outcome.status == Status::BeliefMiss && outcome.steps.is_empty()));
         }
     }
 }

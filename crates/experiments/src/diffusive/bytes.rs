@@ -1,33 +1,10 @@
 //! Bytes until the threshold is reached.
 
-use super::common::{B, Scheme, Settings, Track, fraction, median, tracks};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use super::common::{B, LPG, Scheme, Settings, tracks};
+use super::summary::{Summary, summaries};
+use crate::prelude::*;
 use fewbits_diffusive::Form;
 use fewbits_diffusive::message::{SampleCode, Wire};
-use schemars::JsonSchema;
-use serde::Serialize;
-
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// What travels.
-    scheme: &'static str,
-    /// Share of the searches that reach the threshold.
-    reach: Measured,
-    /// Median nodes of those that do.
-    nodes_median: Option<Measured>,
-    /// Median size of all messages together, over all hops.
-    #[schemars(extend("unit" = "bytes"))]
-    bytes_median: Option<Measured>,
-    /// The same for every node after the first.
-    #[schemars(extend("unit" = "bytes"))]
-    bytes_per_message: Option<f64>,
-    /// Median distance of estimate and source at the end.
-    #[schemars(extend("unit" = "m"))]
-    final_err_median: Option<Measured>,
-    /// Share of the searches that end more than a metre off.
-    wrong: Measured,
-}
 
 fn schemes() -> Vec<Scheme> {
     let nine_bits = Wire {
@@ -46,12 +23,7 @@ fn schemes() -> Vec<Scheme> {
         Scheme::new("gaussian-9", B).of(Form::Gaussian),
         Scheme::new("gaussian known rate", B).of(Form::Gaussian).known(),
         Scheme::new("gmm-4 known rate", B).of(Form::Mixture(4)).known(),
-        Scheme::new("lpg-2x5 known rate", B)
-            .of(Form::Lpg {
-                components: 2,
-                degree: 5,
-            })
-            .known(),
+        Scheme::new("lpg-2x5 known rate", B).of(LPG).known(),
     ]
 }
 
@@ -60,7 +32,7 @@ pub struct Bytes;
 
 impl Figure for Bytes {
     type Parameters = Settings;
-    type Tables = Vec<Row>;
+    type Tables = Vec<Summary>;
 
     fn about(&self) -> About {
         About {
@@ -84,36 +56,15 @@ impl Figure for Bytes {
         }
     }
 
-    fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+    fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Vec<Summary>, Error> {
         let schemes = schemes();
         let all = tracks(context, "diffusive-chains", p, &schemes)?;
-        let row = |(i, scheme): (usize, &Scheme)| {
-            let own: Vec<&Track> = all.iter().map(|tracks| &tracks[i]).collect();
-            let reached: Vec<&&Track> = own.iter().filter(|t| t.converged()).collect();
-            let over = |f: fn(&Track) -> f64| -> Vec<f64> { reached.iter().map(|t| f(t)).collect() };
-            let finals: Vec<f64> = own.iter().map(|t| t.final_error()).collect();
-            let each = over(|t| t.bits as f64 / 8.0 / (t.nodes() as f64 - 1.0).max(1.0));
-            Row {
-                scheme: scheme.name,
-                reach: fraction(reached.len(), own.len()),
-                nodes_median: median(&over(|t| t.nodes() as f64)),
-                bytes_median: median(&over(|t| t.bits as f64 / 8.0)),
-                bytes_per_message: median(&each).map(|m| m.value),
-                final_err_median: median(&finals),
-                wrong: fraction(own.iter().filter(|t| t.final_error() > 1.0).count(), own.len()),
-            }
-        };
-        Ok(schemes.iter().enumerate().map(row).collect())
+        summaries(&schemes, p, &all)
     }
 
-    fn claims(&self, _: &Settings, rows: &Vec<Row>, claims: &mut Claims) {
-        let none = Measured {
-            value: f64::NAN,
-            standard_error: None,
-        };
-        claims.references("nodes_median", "median nodes to the threshold", rows, |r| {
-            (r.scheme.to_owned(), r.nodes_median.unwrap_or(none))
-        });
+    fn claims(&self, _: &Settings, rows: &Vec<Summary>, claims: &mut Claims) {
+        let nodes = |r: &Summary| (r.scheme.to_owned(), r.nodes_median);
+        claims.references("nodes_median", "median nodes to the threshold", rows, nodes);
         claims.references("reach", "share that reaches the threshold", rows, |r| (r.scheme.to_owned(), r.reach));
         let find = |name: &str| rows.iter().find(|r| r.scheme == name);
         let bytes = |name: &str| find(name).and_then(|r| r.bytes_median).map(|m| m.value);
@@ -131,7 +82,7 @@ impl Figure for Bytes {
             .at_full_trials();
     }
 
-    fn plot(&self, _: &Settings, rows: &Vec<Row>) -> Plot {
+    fn plot(&self, _: &Settings, rows: &Vec<Summary>) -> Plot {
         let mut panel = Panel::new(
             "Cost and accuracy",
             Axis::log("bytes of all messages (median)"),

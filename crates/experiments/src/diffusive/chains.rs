@@ -1,87 +1,10 @@
 //! Figures 3, 4, 7 to 10: error and determinant along many searches.
 
-use super::common::{A, B, Scheme, Settings, Track, fraction, median, quantile, tracks};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use super::chain_claims;
+use super::common::{A, B, LPG, Scheme, Settings, Track, tracks};
+use super::summary::{Rows, curve, summaries};
+use crate::prelude::*;
 use fewbits_diffusive::{Form, Rule};
-use schemars::JsonSchema;
-use serde::Serialize;
-
-/// Both tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Medians and bands over the deployments, node by node; searches that have ended keep their last values.
-    curves: Vec<Curve>,
-    /// How the searches ended.
-    summary: Vec<Summary>,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Curve {
-    /// What travels, and how nodes are chosen.
-    scheme: &'static str,
-    /// Radio range.
-    #[schemars(extend("unit" = "m"))]
-    range: f64,
-    /// Nodes that have sampled.
-    step: usize,
-    /// Median distance of estimate and source.
-    #[schemars(extend("unit" = "m"))]
-    err_med: f64,
-    /// Its lower decile.
-    #[schemars(extend("unit" = "m"))]
-    err_q10: f64,
-    /// Its upper decile.
-    #[schemars(extend("unit" = "m"))]
-    err_q90: f64,
-    /// Median of the root of the distance: the paper's "bias", read literally.
-    #[schemars(extend("unit" = "m^0.5"))]
-    sqrt_err_med: f64,
-    /// Median decimal logarithm of the covariance's determinant (of m^4).
-    log10det_med: f64,
-    /// Median squared error in units of the covariance, 1.39 if the belief is calibrated.
-    nees_med: f64,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Summary {
-    /// What travels, and how nodes are chosen.
-    scheme: &'static str,
-    /// Radio range.
-    #[schemars(extend("unit" = "m"))]
-    range: f64,
-    /// Numbers in one message; none for raw records, which grow.
-    scalars: Option<usize>,
-    /// Share of the searches that reach the threshold.
-    reach: Measured,
-    /// Median nodes of those that do.
-    nodes_median: Option<Measured>,
-    /// Lower decile.
-    nodes_q10: Option<f64>,
-    /// Upper decile.
-    nodes_q90: Option<f64>,
-    /// Median distance of estimate and source at the end.
-    #[schemars(extend("unit" = "m"))]
-    final_err_median: Option<Measured>,
-    /// Share of all searches that end more than a metre off.
-    wrong: Measured,
-    /// Share of those that report convergence and are more than a metre off.
-    converged_wrong: Measured,
-    /// Median squared error in units of the covariance at the end, 1.39 if calibrated.
-    nees_median: Option<f64>,
-    /// Median distance of estimate and source after three nodes.
-    #[schemars(extend("unit" = "m"))]
-    err_after_3: Option<Measured>,
-    /// Median size of all messages together.
-    #[schemars(extend("unit" = "bytes"))]
-    bytes_median: Option<f64>,
-}
-
-impl Summary {
-    fn key(&self) -> String {
-        format!("{} {}", self.scheme, self.range)
-    }
-}
 
 /// One of these figures.
 pub struct Chains {
@@ -89,11 +12,6 @@ pub struct Chains {
     schemes: fn() -> Vec<Scheme>,
     claims: fn(&Rows, &mut Claims),
 }
-
-const LPG: Form = Form::Lpg {
-    components: 2,
-    degree: 5,
-};
 
 fn schemes_a_few() -> Vec<Scheme> {
     [15.0, 10.0]
@@ -126,6 +44,7 @@ fn schemes_b_few() -> Vec<Scheme> {
         Scheme::new("lpg-2x5 known rate", B).of(LPG).known(),
         Scheme::new("gaussian known rate", B).of(Form::Gaussian).known(),
         Scheme::new("gaussian-9", B).of(Form::Gaussian),
+        Scheme::new("lpg-2x5", B).of(LPG),
         Scheme::new("exact known rate", B).known().up_to(30),
     ]
 }
@@ -167,182 +86,6 @@ fn windy(example: super::common::Example) -> Vec<Scheme> {
     .to_vec()
 }
 
-fn find<'a>(rows: &'a Rows, key: &str) -> Option<&'a Summary> {
-    rows.summary.iter().find(|s| s.key() == key)
-}
-
-fn nodes(rows: &Rows, key: &str) -> Option<f64> {
-    Some(find(rows, key)?.nodes_median?.value)
-}
-
-fn references(rows: &Rows, claims: &mut Claims) {
-    let summary = || rows.summary.iter();
-    claims.references("reach", "share that reaches the threshold", summary(), |r| (r.key(), r.reach));
-    claims.references("nodes_median", "median nodes to the threshold", summary(), |r| (r.key(), r.nodes_median));
-    claims.references("final_err_median", "median error at the end", summary(), |r| (r.key(), r.final_err_median));
-}
-
-fn calibrated(rows: &Rows, claims: &mut Claims, key: &str) {
-    let nees = find(rows, key).and_then(|s| s.nees_median);
-    let what = "the exact belief is calibrated: the median squared error is 1.39 covariances";
-    claims.near("calibrated", what, nees, 1.386, 0.4).at_full_trials();
-    // A small determinant allows a long thin belief: a metre along it is no error of the belief (errata diffusive-15).
-    let wrong = find(rows, key).map(|s| s.converged_wrong.value);
-    let what = "at most one in a hundred exact beliefs converges more than a metre off";
-    claims.at_most("exact-is-right", what, wrong, 0.01).at_full_trials();
-}
-
-fn claims_fig3(rows: &Rows, claims: &mut Claims) {
-    for key in ["exact 15", "exact 10", "gmm-4 15", "gmm-4 10"] {
-        let end = find(rows, key).and_then(|s| s.final_err_median).map(|m| m.value);
-        let what = format!("the search ends at the source: {key}");
-        claims
-            .below(format!("arrives/{}", key.replace(' ', "-")), what, end, 0.1)
-            .at_full_trials();
-    }
-    let at = |scheme: &str, range: f64, step: usize| {
-        rows.curves
-            .iter()
-            .find(|c| (c.scheme, c.range, c.step) == (scheme, range, step))
-            .map(|c| c.err_med)
-    };
-    for range in [15.0, 10.0] {
-        let errors = [1, 3, 6].map(|step| at("exact", range, step));
-        claims
-            .decreasing(format!("falls/{range}"), "the error falls as nodes are added", errors)
-            .at_full_trials();
-    }
-    let shorter = at("exact", 15.0, 6)
-        .zip(at("exact", 10.0, 6))
-        .map(|(wide, narrow)| wide - narrow);
-    claims
-        .below("range", "after six nodes 15 m of range are ahead of 10 m", shorter, 0.0)
-        .at_full_trials();
-    calibrated(rows, claims, "exact 15");
-    let wrong = find(rows, "gaussian known rate 15").map(|s| s.wrong.value);
-    let what = "one Gaussian stops more than a metre off in a good part of the searches; the paper shows none (errata diffusive-12)";
-    claims
-        .at_least("gaussian-is-often-wrong", what, wrong, 0.1)
-        .at_full_trials();
-}
-
-fn claims_fig4(rows: &Rows, claims: &mut Claims) {
-    references(rows, claims);
-    for scheme in ["exact", "gmm-4", "gaussian known rate", "gaussian-9"] {
-        let (wide, narrow) = (nodes(rows, &format!("{scheme} 15")), nodes(rows, &format!("{scheme} 10")));
-        let id = format!("range/{}", scheme.replace(' ', "-"));
-        let what = format!("15 m of range need fewer nodes than 10 m: {scheme}");
-        claims
-            .below(id, what, wide.zip(narrow).map(|(w, n)| w - n), 0.0)
-            .at_full_trials();
-    }
-    let what = "the printed 14 nodes are below almost every single-Gaussian search (errata diffusive-12)";
-    let lowest = find(rows, "gaussian known rate 15").and_then(|s| s.nodes_q10);
-    claims
-        .above("printed-14", what, lowest, 14.0)
-        .at_defaults()
-        .at_full_trials();
-    calibrated(rows, claims, "exact 15");
-}
-
-fn claims_fig7(rows: &Rows, claims: &mut Claims) {
-    let at = |scheme: &str, step: usize| rows.curves.iter().find(|c| c.scheme == scheme && c.step == step);
-    let difference = |step| {
-        at("lpg-2x5 known rate", step)
-            .zip(at("gaussian known rate", step))
-            .map(|(l, g)| l.err_med - g.err_med)
-    };
-    for step in [4, 6, 8] {
-        let what = format!("polynomial Gaussians are nearer than one Gaussian after {step} nodes");
-        claims
-            .below(format!("lpg-ahead/{step}"), what, difference(step), 0.0)
-            .at_full_trials();
-    }
-    let determinant = |scheme| at(scheme, 5).map(|c| c.log10det_med);
-    let what = "after five nodes polynomial Gaussians are as sharp as the other program's (log10 det -3.8) or sharper";
-    claims
-        .at_most("det5/lpg", what, determinant("lpg-2x5 known rate"), -3.8)
-        .at_defaults()
-        .at_full_trials();
-    let what = "and no sharper than the exact belief with the rate known";
-    let gap = determinant("lpg-2x5 known rate")
-        .zip(determinant("exact known rate"))
-        .map(|(l, e)| l - e);
-    claims
-        .at_least("det5/honest", what, gap, 0.0)
-        .at_defaults()
-        .at_full_trials();
-    let what = "log10 det after five nodes, one Gaussian";
-    claims
-        .near("det5/gaussian", what, determinant("gaussian known rate"), 3.6, 1.0)
-        .at_defaults()
-        .at_full_trials();
-    calibrated(rows, claims, "exact 15");
-}
-
-fn claims_fig8(rows: &Rows, claims: &mut Claims) {
-    references(rows, claims);
-    let median = |key: &str| nodes(rows, &format!("{key} 15"));
-    let what = "polynomial Gaussians reach the threshold with the printed 7 nodes or fewer";
-    claims
-        .at_most("printed-7", what, median("lpg-2x5 known rate"), 7.0)
-        .at_full_trials();
-    let gap = median("lpg-2x5 known rate")
-        .zip(median("exact known rate"))
-        .map(|(l, e)| l - e);
-    let what = "and with no more than one node beyond the exact belief";
-    claims.at_most("lpg-near-exact", what, gap, 1.0).at_full_trials();
-    let what = "one Gaussian with the rate carried takes about the printed 20";
-    claims
-        .near("printed-20", what, median("gaussian-9"), 20.0, 4.0)
-        .at_full_trials();
-    let gap = |other: &str| median("lpg-2x5 known rate").zip(median(other)).map(|(l, g)| l - g);
-    claims
-        .below(
-            "lpg-first",
-            "polynomial Gaussians need fewer nodes than one Gaussian",
-            gap("gaussian known rate"),
-            0.0,
-        )
-        .at_full_trials();
-    let what = "a mixture of 23 numbers is as good, within a node, as 51 of polynomial Gaussians (errata diffusive-9)";
-    let difference = median("gmm-4 known rate")
-        .zip(median("lpg-2x5 known rate"))
-        .map(|(m, l)| m - l);
-    claims.at_most("mixtures-do", what, difference, 1.0).at_full_trials();
-    let wrong = find(rows, "mode and curvature known rate 15").map(|s| s.wrong.value);
-    let what = "mode and curvature report convergence in the wrong place in most searches: never trust a determinant from them";
-    claims.at_least("curvature-misleads", what, wrong, 0.5).at_full_trials();
-    calibrated(rows, claims, "exact 15");
-}
-
-fn claims_wind(rows: &Rows, claims: &mut Claims) {
-    let summary = || rows.summary.iter();
-    claims.references("reach", "share that reaches the threshold", summary(), |r| (r.key(), r.reach));
-    // The other program's mixtures are farther from the exact belief (diffusive-kl), and its searches longer.
-    claims
-        .references_at_most("nodes_median", "median nodes to the threshold", summary(), |r| (r.key(), r.nodes_median));
-    claims.references_at_most("final_err_median", "median error at the end", summary(), |r| {
-        (r.key(), r.final_err_median)
-    });
-    let reach = |key: &str| find(rows, key).map(|s| s.reach.value);
-    for (rule, id) in [
-        ("covariance 15", "covariance-first"),
-        ("information 15", "information-first"),
-    ] {
-        let gap = reach(rule).zip(reach("mahalanobis 15")).map(|(a, b)| a - b);
-        let what = format!("in wind the rule reaches the threshold more often than Mahalanobis: {rule}");
-        claims.above(id, what, gap, 0.1).at_full_trials();
-    }
-    let error = |key: &str| find(rows, key).and_then(|s| s.err_after_3).map(|m| m.value);
-    for other in ["covariance 15", "mahalanobis 15"] {
-        let id = format!("information-after-3/{}", other.replace(' ', "-"));
-        let gap = error("information 15").zip(error(other)).map(|(a, b)| a - b);
-        let what = format!("after three nodes information has the smaller median error than {other}");
-        claims.below(id, what, gap, 0.0).at_full_trials();
-    }
-}
-
 /// Figure 3: error, example A.
 pub static FIG3: Chains = Chains {
     about: About {
@@ -353,7 +96,7 @@ pub static FIG3: Chains = Chains {
         source: "Zhao and Nehorai 2007, Fig. 3",
     },
     schemes: schemes_a_few,
-    claims: claims_fig3,
+    claims: chain_claims::fig3,
 };
 
 /// Figure 4: determinant, example A.
@@ -367,7 +110,7 @@ pub static FIG4: Chains = Chains {
         source: "Zhao and Nehorai 2007, Fig. 4",
     },
     schemes: schemes_a,
-    claims: claims_fig4,
+    claims: chain_claims::fig4,
 };
 
 /// Figure 7: error, example B.
@@ -380,7 +123,7 @@ pub static FIG7: Chains = Chains {
         source: "Zhao and Nehorai 2007, Fig. 7",
     },
     schemes: schemes_b_few,
-    claims: claims_fig7,
+    claims: chain_claims::fig7,
 };
 
 /// Figure 8: determinant, example B.
@@ -393,7 +136,7 @@ pub static FIG8: Chains = Chains {
         source: "Zhao and Nehorai 2007, Fig. 8",
     },
     schemes: schemes_b,
-    claims: claims_fig8,
+    claims: chain_claims::fig8,
 };
 
 /// Figure 9: wind, sensors and source of example B.
@@ -407,7 +150,7 @@ pub static FIG9: Chains = Chains {
         source: "Zhao and Nehorai 2007, Figs. 9 and 10",
     },
     schemes: || windy(B),
-    claims: claims_wind,
+    claims: chain_claims::wind,
 };
 
 /// Figure 10: wind, sensors and source of example A.
@@ -419,7 +162,7 @@ pub static FIG10: Chains = Chains {
         source: "Zhao and Nehorai 2007, Figs. 9 and 10",
     },
     schemes: || windy(A),
-    claims: claims_wind,
+    claims: chain_claims::wind,
 };
 
 impl Figure for Chains {
@@ -445,13 +188,15 @@ impl Figure for Chains {
         let schemes = (self.schemes)();
         // One name for all: every figure sees the same deployments and noise.
         let all = tracks(context, "diffusive-chains", p, &schemes)?;
-        let (mut curves, mut summary) = (Vec::new(), Vec::new());
-        for (i, scheme) in schemes.iter().enumerate() {
-            let own: Vec<&Track> = all.iter().map(|tracks| &tracks[i]).collect();
-            curves.extend(curve(scheme, &own));
-            summary.push(summarise(scheme, p, &own)?);
-        }
-        Ok(Rows { curves, summary })
+        let own = |i: usize| all.iter().map(|tracks| &tracks[i]).collect::<Vec<&Track>>();
+        let curves = schemes
+            .iter()
+            .enumerate()
+            .flat_map(|(i, scheme)| curve(scheme, &own(i)));
+        Ok(Rows {
+            curves: curves.collect(),
+            summary: summaries(&schemes, p, &all)?,
+        })
     }
 
     fn claims(&self, _: &Settings, rows: &Rows, claims: &mut Claims) {
@@ -479,7 +224,7 @@ impl Figure for Chains {
             let axis = Axis::linear("log10 det of the covariance (m^4)");
             let mut panel = Panel::new(title, Axis::linear("nodes"), axis).with(limit());
             for (i, scheme) in schemes.iter().filter(|s| chosen(s)).enumerate() {
-                let line = points(of(scheme), |c| (c.step as f64, c.log10det_med));
+                let line = points(of(scheme), |c| (c.step as f64, c.log10det_med.map_or(f64::NAN, |m| m.value)));
                 panel = panel.with(Layer::line(label(scheme), line).coloured(i));
             }
             panel
@@ -508,52 +253,4 @@ impl Figure for Chains {
         let determinants = determinants("Determinant", &|_| true);
         Plot::grid(2, vec![errors, determinants])
     }
-}
-
-fn curve(scheme: &Scheme, tracks: &[&Track]) -> Vec<Curve> {
-    let longest = tracks.iter().map(|t| t.nodes()).max().unwrap_or(0);
-    (1..=longest)
-        .filter_map(|step| {
-            let at = |values: &Vec<f64>| values.get(step - 1).or(values.last()).copied();
-            let errors = || tracks.iter().filter_map(|t| at(&t.errors));
-            Some(Curve {
-                scheme: scheme.name,
-                range: scheme.range,
-                step,
-                err_med: quantile(errors(), 0.5)?,
-                err_q10: quantile(errors(), 0.1)?,
-                err_q90: quantile(errors(), 0.9)?,
-                sqrt_err_med: quantile(errors().map(f64::sqrt), 0.5)?,
-                log10det_med: quantile(tracks.iter().filter_map(|t| at(&t.log10_determinants)), 0.5)?,
-                nees_med: quantile(tracks.iter().filter_map(|t| at(&t.nees)), 0.5)?,
-            })
-        })
-        .collect()
-}
-
-fn summarise(scheme: &Scheme, settings: &Settings, tracks: &[&Track]) -> Result<Summary, Error> {
-    let reached: Vec<&&Track> = tracks.iter().filter(|t| t.converged()).collect();
-    let counts: Vec<f64> = reached.iter().map(|t| t.nodes() as f64).collect();
-    let finals: Vec<f64> = tracks.iter().map(|t| t.final_error()).collect();
-    let third: Vec<f64> = tracks
-        .iter()
-        .filter_map(|t| t.errors.get(2).or(t.errors.last()).copied())
-        .collect();
-    let wrong = |t: &Track| t.final_error() > 1.0;
-    let rate = scheme.search(settings)?.rate;
-    Ok(Summary {
-        scheme: scheme.name,
-        range: scheme.range,
-        scalars: scheme.form.scalars(&rate),
-        reach: fraction(reached.len(), tracks.len()),
-        nodes_median: median(&counts),
-        nodes_q10: quantile(counts.iter().copied(), 0.1),
-        nodes_q90: quantile(counts.iter().copied(), 0.9),
-        final_err_median: median(&finals),
-        wrong: fraction(tracks.iter().filter(|t| wrong(t)).count(), tracks.len()),
-        converged_wrong: fraction(reached.iter().filter(|t| wrong(t)).count(), reached.len()),
-        nees_median: quantile(tracks.iter().filter_map(|t| t.nees.last().copied()), 0.5),
-        err_after_3: median(&third),
-        bytes_median: quantile(tracks.iter().map(|t| t.bits as f64 / 8.0), 0.5),
-    })
 }

@@ -1,15 +1,12 @@
 //! What the figures of this system share: the two examples, networks, searches, and statistics of many searches.
 
-use crate::{Context, Error, Measured};
+use crate::prelude::*;
 use fewbits_diffusive::message::Wire;
 use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Rule, Search, SearchBox, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::{Stream, Trial};
 use fewbits_topology::{Deployment, Graph};
-use garde::Validate;
 use nalgebra::{Vector2, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Diffusivity, m^2/s.
 pub(super) const DIFFUSIVITY: f64 = 40.0;
@@ -23,6 +20,12 @@ const BIAS: f64 = 1e-5;
 pub(super) const RATE: f64 = 1.0;
 /// How far outside the field the source may be, m.
 const MARGIN: f64 = 20.0;
+
+/// The polynomial Gaussians of the paper: two, of degree 5.
+pub(super) const LPG: Form = Form::Lpg {
+    components: 2,
+    degree: 5,
+};
 
 /// Settings of every search.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]

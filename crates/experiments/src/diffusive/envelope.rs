@@ -1,14 +1,10 @@
 //! The area above a threshold, with credible bands.
 
 use super::common::{ALARM, B, DIFFUSIVITY, RATE, Scheme, Settings, fraction, median, trials};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_diffusive::{Envelope as Area, SourceLikelihood};
 use fewbits_models::diffusion::contour_radius;
-use garde::Validate;
 use nalgebra::Vector2;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings of the envelope.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]

@@ -2,11 +2,14 @@
 
 mod beliefs;
 mod bytes;
+mod chain_claims;
 mod chains;
 mod common;
+mod divergences;
 mod envelope;
 mod route;
 mod selection;
+mod summary;
 mod table1;
 mod two_phase;
 mod unknowns;
@@ -27,7 +30,7 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &chains::FIG9,
         &chains::FIG10,
         &table1::Table1,
-        &beliefs::Divergences,
+        &divergences::Divergences,
         &bytes::Bytes,
         &envelope::Envelope,
         &selection::Selection,

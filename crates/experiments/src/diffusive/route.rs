@@ -1,14 +1,10 @@
 //! Figures 1 and 2: one search, event by event and on the map.
 
 use super::common::{A, ALARM, Network, Scheme, Settings};
-use crate::plot::{Axis, Layer, Marker, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_densities::ellipse;
 use fewbits_diffusive::{Form, Outcome, Rule};
 use fewbits_monte_carlo::Trial;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Which deployment is shown.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]

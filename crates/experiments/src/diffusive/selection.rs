@@ -1,17 +1,14 @@
 //! Rules that choose the next node: how well they rank it, and what that saves.
 
-use super::common::{A, B, Network, Scheme, Settings, fraction, tracks, trials};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use super::common::{A, B, Example, Network, Scheme, Settings, tracks, trials};
+use super::summary::{Summary, summaries};
+use crate::prelude::*;
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{Posterior, Rule, Selector, SourceSensor};
 use fewbits_monte_carlo::Moments;
-use garde::Validate;
 use nalgebra::Vector2;
 use rand::RngExt;
 use rand_distr::StandardNormal;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings of the comparison.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
@@ -35,7 +32,7 @@ impl Default for Parameters {
     fn default() -> Self {
         Self {
             trials: 200,
-            ranking_trials: 24,
+            ranking_trials: 60,
             points: 200,
             draws: 200,
         }
@@ -46,29 +43,9 @@ impl Default for Parameters {
 #[derive(Serialize, JsonSchema)]
 pub struct Rows {
     /// Searches with the exact belief, by rule.
-    searches: Vec<Search>,
+    searches: Vec<Summary>,
     /// How rules rank the neighbours after three nodes, against the mutual information by draws.
     rankings: Vec<Ranking>,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Search {
-    /// Example and range.
-    setting: &'static str,
-    /// Rule.
-    rule: &'static str,
-    /// Share of the searches that reach the threshold within 30 nodes.
-    reach: Measured,
-    /// Mean nodes of those that do.
-    nodes_mean: Measured,
-    /// Share of all searches that end more than a metre off.
-    wrong: Measured,
-}
-
-impl Search {
-    fn key(&self) -> String {
-        format!("{} {}", self.setting, self.rule)
-    }
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -95,17 +72,26 @@ const RULES: [&str; 7] = [
     "mahalanobis",
 ];
 
-fn schemes() -> Vec<(&'static str, &'static str, Scheme)> {
-    let mut all = Vec::new();
-    for (setting, example, range) in [("B15", B, 15.0), ("A15", A, 15.0), ("A10", A, 10.0)] {
-        for (name, rule) in [
-            ("information", Rule::MutualInformation),
-            ("mahalanobis", Rule::Mahalanobis),
-        ] {
-            all.push((setting, name, Scheme::new(name, example).at(range).by(rule).up_to(30)));
-        }
-    }
-    all
+/// Example and range, each with the names of its searches by rule.
+const SETTINGS: [(&str, Example, f64, [&str; 3]); 3] = [
+    ("B15", B, 15.0, ["B15 information", "B15 pairwise", "B15 mahalanobis"]),
+    ("A15", A, 15.0, ["A15 information", "A15 pairwise", "A15 mahalanobis"]),
+    ("A10", A, 10.0, ["A10 information", "A10 pairwise", "A10 mahalanobis"]),
+];
+const SEARCH_RULES: [(&str, Rule); 3] = [
+    ("information", Rule::MutualInformation),
+    ("pairwise", Rule::PairwiseInformation),
+    ("mahalanobis", Rule::Mahalanobis),
+];
+
+fn schemes() -> Vec<Scheme> {
+    let of = |(_, example, range, names): &(&str, Example, f64, [&'static str; 3])| {
+        let (example, range) = (*example, *range);
+        let all = names.iter().zip(SEARCH_RULES);
+        all.map(move |(name, (_, rule))| Scheme::new(name, example).at(range).by(rule).up_to(30))
+            .collect::<Vec<_>>()
+    };
+    SETTINGS.iter().flat_map(of).collect()
 }
 
 /// The comparison of rules.
@@ -119,8 +105,8 @@ impl Figure for Selection {
         About {
             id: "diffusive-selection",
             title: "Choosing the next node",
-            caption: "Left: mean nodes to the threshold with the exact belief, by mutual information (its Gaussian bound) and by \
-                      Mahalanobis distance. Right: how rules rank the neighbours after three nodes of example B, as rank \
+            caption: "Left: mean nodes to the threshold with the exact belief, by mutual information (its Gaussian bound, \
+                      and its pairwise bound) and by Mahalanobis distance. Right: how rules rank the neighbours after three nodes of example B, as rank \
                       correlation with the exact mutual information.",
             source: "",
         }
@@ -144,20 +130,8 @@ impl Figure for Selection {
             ..Settings::default()
         };
         let schemes = schemes();
-        let plain: Vec<Scheme> = schemes.iter().map(|s| s.2).collect();
-        let all = tracks(context, "diffusive-chains", &settings, &plain)?;
-        let mut searches = Vec::new();
-        for (i, (setting, rule, _)) in schemes.iter().enumerate() {
-            let own: Vec<_> = all.iter().map(|tracks| &tracks[i]).collect();
-            let nodes: Moments = own.iter().filter(|t| t.converged()).map(|t| t.nodes() as f64).collect();
-            searches.push(Search {
-                setting,
-                rule,
-                reach: fraction(own.iter().filter(|t| t.converged()).count(), own.len()),
-                nodes_mean: Measured::mean(&nodes),
-                wrong: fraction(own.iter().filter(|t| t.final_error() > 1.0).count(), own.len()),
-            });
-        }
+        let all = tracks(context, "diffusive-chains", &settings, &schemes)?;
+        let searches = summaries(&schemes, &settings, &all)?;
         let ranked = trials(context, "diffusive-chains", p.ranking_trials, |trial| rank(p, &settings, trial))?;
         let mut rankings = Vec::new();
         for (r, rule) in RULES.iter().enumerate() {
@@ -173,17 +147,24 @@ impl Figure for Selection {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims
-            .references("nodes_mean", "mean nodes to the threshold", rows.searches.iter(), |s| (s.key(), s.nodes_mean));
-        claims.references("reach", "share that reaches the threshold", rows.searches.iter(), |s| (s.key(), s.reach));
-        let reach = |key: &str| rows.searches.iter().find(|s| s.key() == key).map(|s| s.reach.value);
-        for setting in ["B15", "A15", "A10"] {
-            let gap = reach(&format!("{setting} information"))
-                .zip(reach(&format!("{setting} mahalanobis")))
-                .map(|(a, b)| a - b);
+        let searches = || rows.searches.iter();
+        claims.references("nodes_mean", "mean nodes to the threshold", searches(), |s| {
+            (s.scheme.to_owned(), s.nodes_mean)
+        });
+        claims.references("reach", "share that reaches the threshold", searches(), |s| (s.scheme.to_owned(), s.reach));
+        let find = |setting: &str, rule: &str| searches().find(|s| s.scheme == format!("{setting} {rule}"));
+        for (setting, ..) in SETTINGS {
+            let reach = |rule| find(setting, rule).map(|s| s.reach.value);
+            let gap = reach("information").zip(reach("mahalanobis")).map(|(a, b)| a - b);
             let what = format!("information reaches the threshold at least as often as Mahalanobis: {setting}");
             claims
                 .at_least(format!("no-stall/{setting}"), what, gap, 0.0)
+                .at_full_trials();
+            let mean = |rule| find(setting, rule).and_then(|s| s.nodes_mean).map(|m| m.value);
+            let gap = mean("pairwise").zip(mean("information")).map(|(a, b)| (a - b).abs());
+            let what = format!("the better ranking of the pairwise bound saves less than half a node: {setting}");
+            claims
+                .at_most(format!("bound-suffices/{setting}"), what, gap, 0.5)
                 .at_full_trials();
         }
         let rank = |rule: &str| {
@@ -217,24 +198,18 @@ impl Figure for Selection {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let names = rows
-            .searches
-            .iter()
-            .step_by(2)
-            .enumerate()
-            .map(|(i, s)| (i as f64, s.setting.to_owned()));
+        let names = SETTINGS.iter().enumerate().map(|(i, s)| (i as f64, s.0.to_owned()));
         let mut nodes = Panel::new(
             "Nodes to the threshold",
             Axis::linear("example and range (m)")
                 .named(names)
-                .between(-0.5, rows.searches.len() as f64 / 2.0 - 0.5),
+                .between(-0.5, SETTINGS.len() as f64 - 0.5),
             Axis::linear("mean nodes").between(0.0, 11.0),
         );
-        for (c, rule) in ["information", "mahalanobis"].into_iter().enumerate() {
-            let of = rows.searches.iter().filter(|s| s.rule == rule).enumerate();
-            nodes = nodes.with(
-                Layer::measured(rule, of, |(i, s)| (i as f64 + 0.1 * (c as f64 - 0.5), s.nodes_mean)).coloured(c),
-            );
+        for (c, (rule, _)) in SEARCH_RULES.into_iter().enumerate() {
+            let of = rows.searches.iter().skip(c).step_by(SEARCH_RULES.len()).enumerate();
+            let place = |(i, s): (usize, &Summary)| (i as f64 + 0.1 * (c as f64 - 1.0), s.nodes_mean);
+            nodes = nodes.with(Layer::measured(rule, of, place).coloured(c));
         }
         // Rules downwards, best at the top, so that their names have room.
         let mut sorted: Vec<&Ranking> = rows.rankings.iter().collect();
@@ -267,7 +242,7 @@ fn rank(
     settings: &Settings,
     trial: fewbits_monte_carlo::Trial,
 ) -> Result<Option<Vec<[f64; 3]>>, Error> {
-    let endless = super::common::Example { threshold: 1e-300, ..B };
+    let endless = Example { threshold: 1e-300, ..B };
     let scheme = Scheme::new("exact", endless).up_to(3);
     let outcome = scheme.run(settings, trial)?;
     let (Some(posterior), Some(last)) = (&outcome.posterior, outcome.steps.last()) else {

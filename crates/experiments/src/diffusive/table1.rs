@@ -1,12 +1,8 @@
 //! Table I: Hermite polynomials of two variables.
 
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_densities::hermite::{gaussian_moment, hermite_terms, multi_indices};
-use garde::Validate;
 use nalgebra::{Matrix2, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// The covariance at which the table is evaluated.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]

@@ -27,6 +27,8 @@ pub(super) struct TwoPhase {
     indices: Vec<[usize; 2]>,
     terms: Vec<Term>,
     least: f64,
+    /// Share of the terms whose peak has no definite curvature.
+    pub no_answer: f64,
 }
 
 impl TwoPhase {
@@ -55,12 +57,15 @@ impl TwoPhase {
         let cells = &posterior.cells;
         let scale = log_scale(cells, log_density);
         let density = |x: &Vector2<f64>| (log_density(x) - scale).exp();
-        let (mut terms, mut meshes) = (Vec::new(), Vec::new());
+        let (mut terms, mut meshes, mut unanswered) = (Vec::new(), Vec::new(), 0);
         for component in mixture.components() {
             let extent = component.covariance().diagonal().map(f64::sqrt);
             let (mean, covariance) = match Peak::climb(log_density, component.mean(), &extent) {
                 Ok(peak) => (peak.mode, peak.covariance),
-                Err(_) => (*component.mean(), *component.covariance()),
+                Err(_) => {
+                    unanswered += 1;
+                    (*component.mean(), *component.covariance())
+                }
             };
             let Some(factor) = Cholesky::new(covariance) else {
                 continue;
@@ -84,6 +89,7 @@ impl TwoPhase {
         }
         let mut own = Self {
             indices,
+            no_answer: f64::from(unanswered) / mixture.len() as f64,
             terms,
             least: 0.0,
         };

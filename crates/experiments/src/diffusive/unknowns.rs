@@ -1,18 +1,14 @@
 //! What else could be unknown, and what the model of the rate does to the estimate.
 
 use super::common::{B, Settings, search_box, trials};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Cost, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::{Belief, Gaussian};
 use fewbits_densities::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information_of};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLikelihood};
 use fewbits_monte_carlo::Moments;
-use garde::Validate;
 use nalgebra::{Matrix2, Vector2};
 use rand::RngExt;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings of both tables.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]

@@ -3,14 +3,10 @@
 use super::scores::{Row, agree, ladder, mse};
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, compare};
-use crate::plot::Plot;
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_pf_mpa::{
     DynamicsWeight, IntervalRule, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight, Velocity,
 };
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

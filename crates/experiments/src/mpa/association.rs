@@ -1,19 +1,15 @@
 //! `mpa-fig3-7`, `mpa-table3-da`: two targets on a line, two measurements in unknown order.
 
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::Gaussian;
 use fewbits_filters::Resampling;
 use fewbits_monte_carlo::{Moments, Stream, Trial};
 use fewbits_numerics::kernels::log_sum_exp;
 use fewbits_numerics::normal;
 use fewbits_pf_mpa::association::{Hypotheses, PRINTED_GAIN, PairTracker, Rule, separation, sigmoid, tanh_rule};
-use garde::Validate;
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Variance of a step.
 const WALK: f64 = 1e-4;

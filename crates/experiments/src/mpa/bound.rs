@@ -2,15 +2,11 @@
 
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, Score, World, prior};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::{Moments, Trial};
 use fewbits_pf_mpa::{CramerRao, Target, position_information};
-use garde::Validate;
 use nalgebra::{Matrix4, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

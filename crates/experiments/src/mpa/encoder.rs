@@ -3,12 +3,8 @@
 use super::scores::{Row, agree, mse, rows};
 use super::sweeps::SPEED;
 use super::world::{Method, Point};
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_pf_mpa::Encoder;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

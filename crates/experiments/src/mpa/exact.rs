@@ -1,17 +1,13 @@
 //! `mpa-gibbs`, `mpa-ring`, `mpa-bits`, `mpa-graphs`: what needs no trajectories.
 
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::NumberFormat;
 use fewbits_densities::{Component, Mixture, product};
 use fewbits_monte_carlo::Moments;
 use fewbits_pf_mpa::graph::{self, FactorGraph};
 use fewbits_pf_mpa::leader::StepBits;
 use fewbits_pf_mpa::{LabelChain, RingBias, kernel_error, ratio_second_moments};
-use garde::Validate;
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// `mpa-gibbs`.
 pub struct Gibbs;

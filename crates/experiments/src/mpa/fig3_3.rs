@@ -2,12 +2,8 @@
 
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, World, canonical};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_pf_mpa::Target;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -2,16 +2,12 @@
 
 use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure, Measured};
+use crate::prelude::*;
 use fewbits_core::{Gaussian, NumberFormat};
 use fewbits_monte_carlo::{Moments, Trial};
 use fewbits_pf_mpa::leader::{Handover, elect, nearest};
 use fewbits_pf_mpa::{MessagePassing, Reports, Target, Tracker};
-use garde::Validate;
 use nalgebra::Vector2;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

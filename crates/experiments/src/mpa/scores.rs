@@ -1,12 +1,8 @@
 //! Rows that hold a tracker's score, and what is claimed of all of them.
 
 use super::world::{Field, Method, Point, Score, compare};
-use crate::plot::{Axis, Layer, Panel, points};
-use crate::{Claims, Context, Error, Measured};
+use crate::prelude::*;
 use fewbits_pf_mpa::Reports;
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// How many trajectories.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

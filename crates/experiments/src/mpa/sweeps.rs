@@ -2,12 +2,9 @@
 
 use super::scores::{Effort, Row, agree, clouds, find, gaussian, ladder, messages, mse, rows};
 use super::world::{LAYOUTS, Method, Point};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_pf_mpa::Reports;
 use nalgebra::Vector2;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// The speed of the canonical scenario.
 pub(super) const SPEED: f64 = 3.0;

@@ -1,6 +1,6 @@
 //! The canonical scenario, and every tracker on it.
 
-use crate::{Context, Error, Measured};
+use crate::prelude::*;
 use fewbits_core::{Belief, Gaussian};
 use fewbits_monte_carlo::{Moments, Stream, Trial};
 use fewbits_pf_mpa::{
@@ -11,8 +11,6 @@ use fewbits_pf_mpa::{
 use nalgebra::{Matrix4, Vector2, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 /// Steps of a trajectory.
 pub(super) const STEPS: usize = 25;

@@ -3,13 +3,9 @@
 use super::baselines::{Played, delta_modulation, jayant, searched};
 use super::recordings::{Recording, Source};
 use super::tracking::{best_for, stream_bits, words};
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Cost, Error, Figure};
+use crate::prelude::*;
 use fewbits_adaptive::{Replay, Silence};
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -2,14 +2,10 @@
 
 use super::recordings::{Recording, Source};
 use super::tracking::best_for;
-use crate::plot::{Axis, Layer, Panel, Plot};
-use crate::{About, Claims, Context, Error, Figure, Measured, Tally};
+use crate::prelude::*;
 use fewbits_adaptive::{Config, Receiver, Replay, Sensor};
 use fewbits_core::Link;
 use fewbits_monte_carlo::{Moments, Trial};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

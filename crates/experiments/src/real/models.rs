@@ -2,12 +2,8 @@
 
 use super::recordings::{Recording, Source};
 use super::tracking::best_for;
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_adaptive::{Replay, SCALES, Sensor};
-use garde::Validate;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

@@ -4,13 +4,9 @@ use super::baselines::{Played, searched};
 use super::bits::{NEGLIGIBLE, geometric_mean, largest};
 use super::recordings::{Recording, Source};
 use super::tracking::best_for;
-use crate::plot::{Axis, Layer, Panel, Plot, points};
-use crate::{About, Claims, Context, Error, Figure};
+use crate::prelude::*;
 use fewbits_adaptive::Replay;
-use garde::Validate;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Settings.
 #[derive(Serialize, Deserialize, JsonSchema, Validate)]

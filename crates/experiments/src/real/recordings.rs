@@ -1,12 +1,9 @@
 //! Signals: synthetic ones with the traits of recordings, or columns of a user's file.
 
-use crate::{Context, Error};
+use crate::prelude::*;
 use fewbits_monte_carlo::Stream;
-use garde::Validate;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Samples of a synthetic signal, of the length asked for.
 type Synthesis = fn(&mut rand_pcg::Pcg64Dxsm, usize) -> Vec<f64>;
