@@ -295,7 +295,30 @@ impl Claims {
         rows: impl IntoIterator<Item = R>,
         key_and_value: impl Fn(R) -> (String, V),
     ) -> Group<'_> {
-        let rows: Vec<(String, V)> = rows.into_iter().map(key_and_value).collect();
+        let rows = rows.into_iter().map(key_and_value).collect();
+        self.against_references(quantity, statement, rows, false)
+    }
+
+    /// The same where less is better and the other program is not known to be the best: no row is above its reference by more
+    /// than the tolerance and four combined standard errors.
+    pub fn references_at_most<R, V: Cell>(
+        &mut self,
+        quantity: &str,
+        statement: &str,
+        rows: impl IntoIterator<Item = R>,
+        key_and_value: impl Fn(R) -> (String, V),
+    ) -> Group<'_> {
+        let rows = rows.into_iter().map(key_and_value).collect();
+        self.against_references(quantity, statement, rows, true)
+    }
+
+    fn against_references<V: Cell>(
+        &mut self,
+        quantity: &str,
+        statement: &str,
+        rows: Vec<(String, V)>,
+        one_sided: bool,
+    ) -> Group<'_> {
         let first = self.made.len();
         let known = match reference::group(self.figure, quantity) {
             Ok(known) if !known.is_empty() => known,
@@ -317,7 +340,13 @@ impl Claims {
             let id = format!("{quantity}/{key}").replace(' ', "-");
             let statement = format!("{statement}, {key}");
             let number = found.map(|found| found.value);
-            self.near(id, statement, number, known.value, tolerance).at_defaults();
+            if one_sided {
+                let statement = format!("{statement}: no more than the reference {}", known.value);
+                self.at_most(id, statement, number, known.value + tolerance)
+                    .at_defaults();
+            } else {
+                self.near(id, statement, number, known.value, tolerance).at_defaults();
+            }
         }
         Group(&mut self.made[first..])
     }
@@ -472,6 +501,13 @@ mod tests {
         assert_eq!(judge(vec![("other", 1.0), ("lloyd-x", 0.130_486_15)]), Verdict::Pass);
         assert_eq!(judge(vec![("lloyd-x", 0.130_487)]), Verdict::Fail);
         assert_eq!(judge(vec![("other", 0.130_486_15)]), Verdict::Fail);
+        let one_sided = |value: f64| {
+            let mut claims = Claims::about("mi-table4-3");
+            claims.references_at_most("mse", "squared error", [value], |value| ("lloyd-x".to_owned(), Some(value)));
+            let of = |c: Claim| (c.id == "mse/lloyd-x").then_some(c.verdict);
+            claims.judged(true, true).into_iter().find_map(of).unwrap()
+        };
+        assert_eq!((one_sided(0.1), one_sided(0.130_487)), (Verdict::Pass, Verdict::Fail));
         // A group without references is a mistake, not a success.
         assert_eq!(
             verdict(|c| {
