@@ -75,7 +75,7 @@ impl Lpg<3> {
             (vec![0.0; degree + 1], vec![0.0; degree + 1], vec![0.0; degree + 1], vec![0.0; degree + 1]);
         for (i, weight) in cells.weights().iter().enumerate() {
             let (mean, variance) = (means[i], variances[i]);
-            if !(variance > 0.0) {
+            if variance.is_nan() || variance <= 0.0 {
                 // No width: no overlap.
                 continue;
             }

@@ -398,7 +398,8 @@ impl Figure for Table {
         claims
             .references("labelled", "labelled error", &t.rules, |r| (key(r), r.labelled))
             .at_full_trials();
-        let two: [(&str, &str, fn(&Row) -> Measured); 2] = [
+        type Of = fn(&Row) -> Measured;
+        let two: [(&str, &str, Of); 2] = [
             ("unlabelled", "unlabelled error", |r| r.unlabelled),
             ("association", "error of association", |r| r.association),
         ];

@@ -464,7 +464,7 @@ impl World<4, LinearGaussian<4, 2>> {
         let sensors = places.map(sensor).into_iter().collect::<Result<Vec<_>, _>>()?;
         let loading = optimal_loading(1 << bits).map_err(Error::failed)?;
         let ranges = Reporting {
-            dynamics: self.dynamics.clone(),
+            dynamics: self.dynamics,
             sensors: sensors.clone(),
             scheme: QuantizedRange::new(1 << bits, noise).map_err(Error::failed)?,
             link: Link::PERFECT,
