@@ -411,7 +411,7 @@ impl Figure for Table {
                 .references_at_most(&format!("{id}-most"), what, &t.rules, |r| (key(r), value(r)))
                 .at_full_trials();
         }
-        for variance in [1e-4, 4e-4] {
+        for (variance, blur) in [(1e-4, 3.0), (4e-4, 2.0)] {
             let of = |method: &str| {
                 t.rules
                     .iter()
@@ -433,7 +433,7 @@ impl Figure for Table {
                     format!("particles-{variance}"),
                     "C10: over particles the printed rule blurs the targets",
                     ratio,
-                    2.0,
+                    blur,
                 )
                 .at_full_trials();
         }

@@ -112,6 +112,13 @@ pub(super) fn agree(claims: &mut Claims, rows: &[Row], prefix: &str, heavy_taile
     }
 }
 
+/// The references of shares that ours stay below, of three particles: where the other program loses more tracks.
+pub(super) fn loses_no_more(claims: &mut Claims, rows: &[Row]) {
+    claims
+        .references_at_most("lost-most", "share of lost tracks", rows, |r| (r.key(), r.score.lost))
+        .at_full_trials();
+}
+
 /// The score of a method at a point.
 pub(super) fn find<'a>(rows: &'a [Row], point: &str, method: &str) -> Option<&'a Row> {
     rows.iter().find(|r| r.point == point && r.method == method)

@@ -1,6 +1,6 @@
 //! `mpa-table3-mse`, `mpa-fig3-4`, `mpa-fig3-5`, `mpa-table3-low`: all trackers over particles, levels and noise.
 
-use super::scores::{Effort, Row, agree, clouds, find, gaussian, ladder, messages, mse, rows};
+use super::scores::{Effort, Row, agree, clouds, find, gaussian, ladder, loses_no_more, messages, mse, rows};
 use super::world::{LAYOUTS, Method, Point};
 use crate::prelude::*;
 use fewbits_pf_mpa::Reports;
@@ -241,6 +241,7 @@ impl Figure for Fig34 {
 
     fn claims(&self, _: &Effort, t: &Sweep, claims: &mut Claims) {
         agree(claims, &t.trackers, "", true);
+        loses_no_more(claims, &t.trackers);
         let value = |method: String| mse(&t.trackers, "40dB-L4", &method);
         let improved = [10, 20, 40, 100].map(|n| value(format!("improved-{n}")));
         claims
@@ -443,6 +444,7 @@ impl Figure for Low {
 
     fn claims(&self, _: &Effort, t: &Sweep, claims: &mut Claims) {
         agree(claims, &t.trackers, "", true);
+        loses_no_more(claims, &t.trackers);
         let gmpa = |snr: u32, levels: usize| mse(&t.trackers, &format!("{snr}dB-L{levels}"), "GMPA");
         claims
             .decreasing("30dB", "C5: at 30 dB more levels help", [4, 8, 16, 64].map(|l| gmpa(30, l)))
