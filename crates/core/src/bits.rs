@@ -16,6 +16,7 @@
 //! # Ok::<(), fewbits_core::bits::CodecError>(())
 //! ```
 
+use smallvec::SmallVec;
 use thiserror::Error;
 
 /// Why bits could not be written or read.
@@ -62,11 +63,21 @@ pub enum CodecError {
     },
 }
 
-/// A finished sequence of bits.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+/// A finished sequence of bits; up to 16 bytes need no memory of the heap.
+#[derive(Debug, PartialEq, Eq, Default)]
 pub struct BitString {
-    bytes: Vec<u8>,
+    bytes: SmallVec<[u8; 16]>,
     bits: usize,
+}
+
+impl Clone for BitString {
+    #[inline]
+    fn clone(&self) -> Self {
+        Self {
+            bytes: SmallVec::from_slice(&self.bytes),
+            bits: self.bits,
+        }
+    }
 }
 
 impl BitString {
@@ -81,7 +92,10 @@ impl BitString {
                 available: bytes.len() * 8,
             });
         }
-        Ok(Self { bytes, bits })
+        Ok(Self {
+            bytes: bytes.into(),
+            bits,
+        })
     }
 
     /// Length in bits: the price of the message.
@@ -103,7 +117,7 @@ impl BitString {
     }
 }
 
-/// Appends fields of 0 to 64 bits. Allocates once a message if made [`with_capacity`](Self::with_capacity).
+/// Appends fields of 0 to 64 bits. Allocates at most once a message if made [`with_capacity`](Self::with_capacity).
 #[derive(Debug, Clone, Default)]
 pub struct BitWriter {
     message: BitString,
@@ -119,7 +133,7 @@ impl BitWriter {
     pub fn with_capacity(bits: usize) -> Self {
         Self {
             message: BitString {
-                bytes: Vec::with_capacity(bits.div_ceil(8)),
+                bytes: SmallVec::with_capacity(bits.div_ceil(8)),
                 bits: 0,
             },
         }
@@ -134,6 +148,7 @@ impl BitWriter {
     ///
     /// # Errors
     /// If `width > 64` or `value >= 2^width`; nothing is written then.
+    #[inline]
     pub fn write(&mut self, value: u64, width: u32) -> Result<(), CodecError> {
         if width > 64 {
             return Err(CodecError::FieldTooWide { width });
@@ -141,17 +156,44 @@ impl BitWriter {
         if width < 64 && value >> width != 0 {
             return Err(CodecError::ValueTooLarge { value, width });
         }
-        for shift in (0..width).rev() {
-            if self.message.bits.is_multiple_of(8) {
-                self.message.bytes.push(0);
+        // The field behind the bits that the last byte holds already.
+        let (bytes, held) = (&mut self.message.bytes, self.message.bits % 8);
+        let end = held + width as usize;
+        self.message.bits += width as usize;
+        match bytes.last_mut() {
+            Some(last) if held > 0 && end <= 8 => *last |= (value << (8 - end)) as u8,
+            Some(last) if held > 0 => {
+                *last |= (value >> (end - 8)) as u8;
+                let left = end - 8;
+                bytes.extend_from_slice(&(value << (64 - left)).to_be_bytes()[..left.div_ceil(8)]);
             }
-            let bit = (value >> shift & 1) as u8;
-            if let Some(last) = self.message.bytes.last_mut() {
-                *last |= bit << (7 - self.message.bits % 8);
-            }
-            self.message.bits += 1;
+            _ if width == 0 => {}
+            _ if end <= 8 => bytes.push((value << (8 - end)) as u8),
+            _ => bytes.extend_from_slice(&(value << (64 - end)).to_be_bytes()[..end.div_ceil(8)]),
         }
         Ok(())
+    }
+
+    /// Writes all bits of a message.
+    pub fn append(&mut self, message: &BitString) {
+        let whole = if self.message.bits.is_multiple_of(8) {
+            message.bits / 8
+        } else {
+            0
+        };
+        if whole > 0 {
+            self.message.bytes.extend_from_slice(&message.bytes[..whole]);
+            self.message.bits += 8 * whole;
+        }
+        let mut reader = BitReader {
+            message,
+            position: 8 * whole,
+        };
+        while reader.remaining() > 0 {
+            let width = reader.remaining().min(64) as u32;
+            // What was read with a width fits it.
+            let _ = reader.read(width).and_then(|field| self.write(field, width));
+        }
     }
 
     /// Writes one bit.
@@ -199,6 +241,7 @@ impl<'a> BitReader<'a> {
     ///
     /// # Errors
     /// If `width > 64` or fewer bits are left; nothing is consumed then.
+    #[inline]
     pub fn read(&mut self, width: u32) -> Result<u64, CodecError> {
         if width > 64 {
             return Err(CodecError::FieldTooWide { width });
@@ -209,13 +252,50 @@ impl<'a> BitReader<'a> {
                 available: self.remaining(),
             });
         }
-        let mut value = 0;
-        for _ in 0..width {
-            let bit = self.message.bytes[self.position / 8] >> (7 - self.position % 8) & 1;
-            value = value << 1 | u64::from(bit);
-            self.position += 1;
+        if width == 0 {
+            return Ok(0);
         }
-        Ok(value)
+        let (rest, skipped) = (&self.message.bytes[self.position / 8..], self.position % 8);
+        self.position += width as usize;
+        let word = rest.first_chunk().copied().unwrap_or_else(|| {
+            let mut padded = [0; 8];
+            padded[..rest.len()].copy_from_slice(rest);
+            padded
+        });
+        let mut field = u64::from_be_bytes(word) << skipped;
+        if skipped + width as usize > 64 {
+            field |= u64::from(rest[8]) >> (8 - skipped);
+        }
+        Ok(field >> (64 - width))
+    }
+
+    /// Reads the next `bits` bits as a message.
+    ///
+    /// # Errors
+    /// If fewer are left; nothing is consumed then.
+    pub fn read_message(&mut self, bits: usize) -> Result<BitString, CodecError> {
+        if self.remaining() < bits {
+            return Err(CodecError::EndOfMessage {
+                requested: u32::try_from(bits).unwrap_or(u32::MAX),
+                available: self.remaining(),
+            });
+        }
+        let mut writer = BitWriter::with_capacity(bits);
+        let whole = if self.position.is_multiple_of(8) { bits / 8 } else { 0 };
+        if whole > 0 {
+            let first = self.position / 8;
+            writer
+                .message
+                .bytes
+                .extend_from_slice(&self.message.bytes[first..first + whole]);
+            writer.message.bits = 8 * whole;
+            self.position += 8 * whole;
+        }
+        while writer.bits() < bits {
+            let width = (bits - writer.bits()).min(64) as u32;
+            writer.write(self.read(width)?, width)?;
+        }
+        Ok(writer.finish())
     }
 
     /// Reads one bit.

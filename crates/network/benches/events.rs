@@ -1,7 +1,7 @@
 //! What an event costs, against a push and a pop of a bare binary heap of as many entries.
 
 use divan::counter::ItemsCount;
-use fewbits_core::BitString;
+use fewbits_core::BitWriter;
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{Context, Error, Field, Frame, Instant, Kind, Protocol, Radio, SensorId, Setup, Simulator};
 use fewbits_topology::Deployment;
@@ -47,8 +47,9 @@ impl Protocol for Ticking {
         let now = context.now();
         context.at(Instant(next(now.0)), token);
         if self.reports {
-            let bit = BitString::from_bytes(vec![0x80], 1)?;
-            context.send(SensorId(token ^ 1), Frame::new(Kind::Report, 1, 0, bit))?;
+            let mut bit = BitWriter::new();
+            bit.write_bit(true);
+            context.send(SensorId(token ^ 1), Frame::new(Kind::Report, 1, 0, bit.finish()))?;
         }
         Ok(())
     }

@@ -89,7 +89,7 @@ pub(crate) fn echo_bits(arrived: &[Arrived]) -> Result<BitString, CodecError> {
             Arrived::Erased => writer.write(0b10, 2)?,
             Arrived::Report(bits) => {
                 writer.write(0b11, 2)?;
-                crate::frame::copy(bits, bits.bits(), &mut writer)?;
+                writer.append(bits);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Frames: real bits with a header that lets two ends see whether they still agree.
 
 use crate::channel::Check;
+use crc::{CRC_16_XMODEM, Crc};
 use fewbits_core::{BitReader, BitString, BitWriter, CodecError};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -37,6 +38,7 @@ const KINDS: [Kind; 7] = [
 const KIND_BITS: u32 = 3;
 const SLOT_BITS: u32 = 29;
 const DIGEST_BITS: u32 = 32;
+const FIXED_BITS: u32 = KIND_BITS + SLOT_BITS + DIGEST_BITS;
 const DESTINATION_BITS: u32 = 32;
 const CHECK_BITS: u32 = 16;
 
@@ -69,7 +71,7 @@ impl Frame {
 
     /// Bits of the header of a frame of this kind.
     pub fn header_bits(kind: Kind) -> u32 {
-        KIND_BITS + SLOT_BITS + DIGEST_BITS + if kind == Kind::Handover { DESTINATION_BITS } else { 0 }
+        FIXED_BITS + if kind == Kind::Handover { DESTINATION_BITS } else { 0 }
     }
 
     /// Bits of a frame of this kind besides its payload.
@@ -79,8 +81,8 @@ impl Frame {
 
     /// What a frame says it carries, unchecked.
     pub(crate) fn kind_of(bits: &BitString) -> Option<Kind> {
-        let kind = BitReader::new(bits).read(KIND_BITS).ok()?;
-        KINDS.get(kind as usize).copied()
+        let first = bits.bytes().first().filter(|_| bits.bits() >= KIND_BITS as usize)?;
+        KINDS.get(usize::from(first >> (8 - KIND_BITS))).copied()
     }
 
     /// The bits that travel.
@@ -88,21 +90,26 @@ impl Frame {
     /// # Errors
     /// If the slot does not fit 29 bits.
     pub fn to_bits(&self, check: Check) -> Result<BitString, CodecError> {
-        let length = self.payload.bits();
-        let mut writer = BitWriter::with_capacity(length + Self::overhead(self.kind) as usize);
+        let mut writer = BitWriter::with_capacity(self.payload.bits() + Self::overhead(self.kind) as usize);
         let kind = KINDS.iter().position(|kind| *kind == self.kind).unwrap_or(0);
-        writer.write(kind as u64, KIND_BITS)?;
-        writer.write(u64::from(self.slot), SLOT_BITS)?;
-        writer.write(u64::from(self.digest), DIGEST_BITS)?;
+        if self.slot >> SLOT_BITS != 0 {
+            return Err(CodecError::ValueTooLarge {
+                value: u64::from(self.slot),
+                width: SLOT_BITS,
+            });
+        }
+        let start = (kind as u64) << SLOT_BITS | u64::from(self.slot);
+        writer.write(start << DIGEST_BITS | u64::from(self.digest), FIXED_BITS)?;
         if self.kind == Kind::Handover {
             writer.write(u64::from(self.destination), DESTINATION_BITS)?;
         }
-        let header = crc(writer.as_bit_string(), writer.bits());
-        copy(&self.payload, length, &mut writer)?;
-        let sum = match check {
+        let header = writer.bits();
+        writer.append(&self.payload);
+        let covered = match check {
             Check::Header => header,
-            Check::Whole => crc(writer.as_bit_string(), writer.bits()),
+            Check::Whole => writer.bits(),
         };
+        let sum = crc(writer.as_bit_string(), covered);
         writer.write(u64::from(sum), CHECK_BITS)?;
         Ok(writer.finish())
     }
@@ -113,10 +120,11 @@ impl Frame {
     /// If the bits end early, the check fails or there is no such kind of frame.
     pub fn from_bits(bits: &BitString, check: Check) -> Result<Self, CodecError> {
         let mut reader = BitReader::new(bits);
-        let kind = reader.read(KIND_BITS)? as usize;
+        let fixed = reader.read(FIXED_BITS)?;
+        let kind = (fixed >> (SLOT_BITS + DIGEST_BITS)) as usize;
         let kind = *KINDS.get(kind).ok_or_else(|| invalid("kind", kind, "below 7"))?;
-        let slot = reader.read(SLOT_BITS)? as u32;
-        let digest = reader.read(DIGEST_BITS)? as u32;
+        let slot = (fixed >> DIGEST_BITS) as u32 & ((1 << SLOT_BITS) - 1);
+        let digest = fixed as u32;
         let destination = match kind {
             Kind::Handover => reader.read(DESTINATION_BITS)? as u32,
             _ => 0,
@@ -128,8 +136,7 @@ impl Frame {
                 requested: CHECK_BITS,
                 available: reader.remaining(),
             })?;
-        let mut writer = BitWriter::with_capacity(length);
-        take(&mut reader, length, &mut writer)?;
+        let payload = reader.read_message(length)?;
         let covered = match check {
             Check::Header => Self::header_bits(kind) as usize,
             Check::Whole => bits.bits() - CHECK_BITS as usize,
@@ -143,7 +150,7 @@ impl Frame {
             slot,
             digest,
             destination,
-            payload: writer.finish(),
+            payload,
         })
     }
 }
@@ -156,31 +163,15 @@ fn invalid(what: &'static str, value: usize, expected: &'static str) -> CodecErr
     }
 }
 
-/// Appends the first `length` bits of `bits`.
-pub(crate) fn copy(bits: &BitString, length: usize, writer: &mut BitWriter) -> Result<(), CodecError> {
-    take(&mut BitReader::new(bits), length, writer)
-}
-
-/// Moves `length` bits from a reader to a writer.
-pub(crate) fn take(reader: &mut BitReader<'_>, length: usize, writer: &mut BitWriter) -> Result<(), CodecError> {
-    let mut left = length;
-    while left > 0 {
-        let width = left.min(64) as u32;
-        writer.write(reader.read(width)?, width)?;
-        left -= width as usize;
-    }
-    Ok(())
-}
-
 /// The frame check of IEEE 802.15.4, CRC-16 with polynomial `x^16 + x^12 + x^5 + 1` from zero, over the first `covered` bits.
 fn crc(bits: &BitString, covered: usize) -> u16 {
-    let bytes = bits.bytes();
-    let step = |register: u16, bit: bool| {
-        let carry = (register >> 15 == 1) != bit;
-        (register << 1) ^ if carry { 0x1021 } else { 0 }
-    };
-    (0..covered)
-        .fold(0, |register, i| step(register, bytes.get(i / 8).is_some_and(|byte| byte >> (7 - i % 8) & 1 == 1)))
+    const SUM: Crc<u16> = Crc::<u16>::new(&CRC_16_XMODEM);
+    let (whole, rest) = bits.bytes().split_at(covered / 8);
+    let left = covered % 8;
+    let last = rest.first().map_or(0, |byte| byte & !(0xff >> left));
+    (0..left).fold(SUM.checksum(whole) ^ u16::from(last) << 8, |register, _| {
+        register << 1 ^ if register >> 15 == 1 { 0x1021 } else { 0 }
+    })
 }
 
 /// Digest of 32 bits of shared state: FNV-1a over slot, length and bytes, folded.
@@ -215,10 +206,8 @@ mod tests {
     fn bit_string() -> impl Strategy<Value = BitString> {
         (prop::collection::vec(any::<u8>(), 0..40), 0_usize..8).prop_map(|(bytes, less)| {
             let bits = (bytes.len() * 8).saturating_sub(less);
-            let mut writer = BitWriter::new();
             let whole = BitString::from_bytes(bytes, bits).unwrap();
-            copy(&whole, bits, &mut writer).unwrap();
-            writer.finish()
+            BitReader::new(&whole).read_message(bits).unwrap()
         })
     }
 

@@ -18,7 +18,7 @@ use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 /// Bits of a frame's length in a batch.
 const LENGTH_BITS: u64 = 16;
 
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum What {
     Timer(u32),
     Arrival(u32),
@@ -26,19 +26,48 @@ pub(crate) enum What {
     Mishap(u32),
 }
 
-/// Events are ordered by time, then by when they were scheduled.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+/// Events are ordered by time, then by when they were scheduled. Small, since the queue moves them: `rank` is the place in the
+/// order of scheduling, then three bits of what it is.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct Event {
     time: Instant,
-    sequence: u64,
+    rank: u64,
     pub(crate) node: SensorId,
-    pub(crate) what: What,
+    argument: u32,
+}
+
+impl Event {
+    fn new(time: Instant, sequence: u64, node: SensorId, what: What) -> Self {
+        let (kind, argument) = match what {
+            What::Timer(token) => (0, token),
+            What::Arrival(place) => (1, place),
+            What::Mishap(index) => (2, index),
+            What::Flush(None) => (3, 0),
+            What::Flush(Some(to)) => (4, to.0),
+        };
+        Self {
+            time,
+            rank: sequence << 3 | kind,
+            node,
+            argument,
+        }
+    }
+
+    pub(crate) fn what(&self) -> What {
+        match self.rank & 7 {
+            0 => What::Timer(self.argument),
+            1 => What::Arrival(self.argument),
+            2 => What::Mishap(self.argument),
+            3 => What::Flush(None),
+            _ => What::Flush(Some(SensorId(self.argument))),
+        }
+    }
 }
 
 impl Ord for Event {
     #[inline]
     fn cmp(&self, other: &Self) -> Ordering {
-        (self.time, self.sequence).cmp(&(other.time, other.sequence))
+        (self.time, self.rank).cmp(&(other.time, other.rank))
     }
 }
 
@@ -71,6 +100,8 @@ struct Arrival {
 pub(crate) struct State {
     pub(crate) now: Instant,
     sequence: u64,
+    /// An event before all of the queue: most frames arrive before anything else happens.
+    front: Option<Event>,
     queue: BinaryHeap<Reverse<Event>>,
     arrivals: Vec<Option<Arrival>>,
     free: Vec<u32>,
@@ -90,6 +121,14 @@ pub(crate) struct Kernel {
     air: Stream,
     pub(crate) state: State,
     pub(crate) recorded: Option<VecDeque<Transmission>>,
+    spare: Spare,
+}
+
+/// Memory of transmissions that are over.
+#[derive(Debug, Default)]
+struct Spare {
+    receptions: Vec<Reception>,
+    copies: Vec<Vec<Copy>>,
 }
 
 /// What happened to a transmission.
@@ -110,6 +149,7 @@ impl Kernel {
             state: State {
                 now: Instant::default(),
                 sequence: 0,
+                front: None,
                 queue: BinaryHeap::new(),
                 arrivals: Vec::new(),
                 free: Vec::new(),
@@ -122,6 +162,7 @@ impl Kernel {
             field,
             setup,
             recorded: None,
+            spare: Spare::default(),
         };
         for index in 0..kernel.setup.faults.len() {
             let fault = kernel.setup.faults[index];
@@ -138,6 +179,9 @@ impl Kernel {
         let known = |id: SensorId| id.index() < nodes;
         let consistent = state.ledger.accounts.len() == nodes
             && state.out_until.len() == nodes
+            && state
+                .front
+                .is_none_or(|front| known(front.node) && state.queue.iter().all(|event| front < event.0))
             && state.queue.iter().all(|event| known(event.0.node))
             && state.free.iter().all(|place| (*place as usize) < state.arrivals.len())
             && state.arrivals.iter().flatten().all(|arrival| known(arrival.from))
@@ -156,22 +200,31 @@ impl Kernel {
     pub(crate) fn schedule(&mut self, time: Instant, node: SensorId, what: What) {
         let sequence = self.state.sequence;
         self.state.sequence += 1;
-        let time = time.max(self.state.now);
-        self.state.queue.push(Reverse(Event {
-            time,
-            sequence,
-            node,
-            what,
-        }));
+        let mut event = Event::new(time.max(self.state.now), sequence, node, what);
+        let first = self
+            .state
+            .front
+            .or_else(|| self.state.queue.peek().map(|event| event.0));
+        if first.is_none_or(|first| event < first) {
+            match self.state.front.replace(event) {
+                Some(front) => event = front,
+                None => return,
+            }
+        }
+        self.state.queue.push(Reverse(event));
     }
 
     /// The next event up to `end`; time moves on to it.
     #[inline]
     pub(crate) fn next(&mut self, end: Instant) -> Option<Event> {
-        if self.state.queue.peek()?.0.time > end {
-            return None;
-        }
-        let Reverse(event) = self.state.queue.pop()?;
+        let front = self.state.front.take_if(|front| front.time <= end);
+        let event = match self.state.queue.peek() {
+            _ if front.is_some() => front,
+            Some(Reverse(first)) if self.state.front.is_none() && first.time <= end => {
+                self.state.queue.pop().map(|event| event.0)
+            }
+            _ => None,
+        }?;
         self.state.now = event.time;
         Some(event)
     }
@@ -262,7 +315,7 @@ impl Kernel {
     pub(crate) fn submit(&mut self, from: SensorId, to: Option<SensorId>, frame: Frame) -> Result<bool, Error> {
         let batching = self.setup.batching;
         if batching.most <= 1 {
-            return self.transmit(from, to, &[frame]);
+            return self.transmit(from, to, &frame);
         }
         let bits = Stored(frame.to_bits(self.check_of(frame.kind))?);
         let waiting = self.state.outbox.entry((from, to)).or_default();
@@ -281,18 +334,17 @@ impl Kernel {
     /// Sends what waits.
     pub(crate) fn flush(&mut self, from: SensorId, to: Option<SensorId>) -> Result<(), Error> {
         match self.state.outbox.remove(&(from, to)) {
-            Some(frames) if !frames.is_empty() => self.put_on_air(from, to, frames).map(|_| ()),
+            Some(frames) if !frames.is_empty() => self.put_on_air(from, to, &frames).map(|_| ()),
             _ => Ok(()),
         }
     }
 
-    pub(crate) fn transmit(&mut self, from: SensorId, to: Option<SensorId>, frames: &[Frame]) -> Result<bool, Error> {
-        let bits = |frame: &Frame| Ok(Stored(frame.to_bits(self.check_of(frame.kind))?));
-        let frames = frames.iter().map(bits).collect::<Result<Vec<_>, Error>>()?;
-        self.put_on_air(from, to, frames)
+    pub(crate) fn transmit(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame) -> Result<bool, Error> {
+        let bits = Stored(frame.to_bits(self.check_of(frame.kind))?);
+        self.put_on_air(from, to, std::slice::from_ref(&bits))
     }
 
-    fn put_on_air(&mut self, from: SensorId, to: Option<SensorId>, frames: Vec<Stored>) -> Result<bool, Error> {
+    fn put_on_air(&mut self, from: SensorId, to: Option<SensorId>, frames: &[Stored]) -> Result<bool, Error> {
         self.drain(from);
         if !self.listens(from) {
             self.state.ledger.faults.lost += 1;
@@ -306,35 +358,42 @@ impl Kernel {
         };
         let payload: u64 = frames.iter().map(payload_bits).sum();
         let whole = self.setup.radio.preamble + self.setup.radio.header + Bits(own + lengths);
-        let outcome = match &mut self.recorded {
-            None => self.draw(from, to, &frames, own as usize),
-            Some(recorded) => replayed(recorded.pop_front(), from, to, &frames, self.state.transmissions)?,
+        let mut spare = std::mem::take(&mut self.spare);
+        let mut outcome = match &mut self.recorded {
+            None => self.draw(from, to, frames, own as usize, &mut spare),
+            Some(recorded) => replayed(recorded.pop_front(), from, to, frames, self.state.transmissions)?,
         };
         self.state.transmissions += 1;
         let (sending, receiving, air) = self.charge(from, to.is_none(), whole, payload, &outcome);
-        self.launch(from, whole, &frames, &outcome);
-        let acknowledged = outcome.acknowledged;
+        self.launch(from, whole, frames, &outcome);
         if self.setup.detail >= Detail::Everything {
             self.state.log.entries.push(Entry::Sent(Transmission {
                 at: self.state.now,
                 from,
                 to,
-                frames,
+                frames: frames.to_vec(),
                 payload,
                 air: air.0,
                 attempts: outcome.attempts,
                 answers: outcome.answers,
-                acknowledged,
-                receptions: outcome.receptions,
+                acknowledged: outcome.acknowledged,
+                receptions: std::mem::take(&mut outcome.receptions),
                 sending,
                 receiving,
             }));
         }
-        Ok(acknowledged)
+        for reception in outcome.receptions.drain(..) {
+            let mut copies = reception.copies;
+            copies.clear();
+            spare.copies.push(copies);
+        }
+        spare.receptions = outcome.receptions;
+        self.spare = spare;
+        Ok(outcome.acknowledged)
     }
 
     /// What happens on air.
-    fn draw(&self, from: SensorId, to: Option<SensorId>, frames: &[Stored], bits: usize) -> Outcome {
+    fn draw(&self, from: SensorId, to: Option<SensorId>, frames: &[Stored], bits: usize, spare: &mut Spare) -> Outcome {
         let sent = u64::from(self.state.ledger.accounts[from.index()].frames);
         let stream = || self.air.indexed(u64::from(from.0)).indexed(sent);
         let copies = |receiver: u32, attempt: u32, copies: &mut Vec<Copy>| {
@@ -348,37 +407,27 @@ impl Kernel {
                 .channel
                 .copies(rng, self.field.distance(from.0, receiver), bits, copies);
         };
-        let Some(to) = to else {
-            let receptions = self
-                .field
-                .graph()
-                .neighbours(from.index())
-                .iter()
-                .filter_map(|receiver| {
-                    let id = SensorId(*receiver);
-                    self.listens(id).then(|| {
-                        let mut arrived = Vec::new();
-                        copies(*receiver, 0, &mut arrived);
-                        Reception {
-                            to: id,
-                            copies: arrived,
-                        }
-                    })
-                });
-            return Outcome {
-                attempts: 1,
-                acknowledged: false,
-                answers: 0,
-                receptions: receptions.collect(),
-            };
-        };
         let mut outcome = Outcome {
             attempts: 0,
             acknowledged: false,
             answers: 0,
-            receptions: Vec::new(),
+            receptions: std::mem::take(&mut spare.receptions),
         };
-        let (mut arrived, listens) = (Vec::new(), self.listens(to));
+        let Some(to) = to else {
+            outcome.attempts = 1;
+            let neighbours = self.field.graph().neighbours(from.index());
+            for to in neighbours
+                .iter()
+                .map(|receiver| SensorId(*receiver))
+                .filter(|to| self.listens(*to))
+            {
+                let mut arrived = spare.copies.pop().unwrap_or_default();
+                copies(to.0, 0, &mut arrived);
+                outcome.receptions.push(Reception { to, copies: arrived });
+            }
+            return outcome;
+        };
+        let (mut arrived, listens) = (spare.copies.pop().unwrap_or_default(), self.listens(to));
         let most = self.setup.retries.map_or(1, |retries| retries.saturating_add(1));
         while outcome.attempts < most && !outcome.acknowledged {
             let before = arrived.len();
@@ -481,13 +530,19 @@ impl Kernel {
     }
 
     /// A node whose batteries are empty dies: when they were, if it has only idled since.
+    #[inline]
     pub(crate) fn drain(&mut self, node: SensorId) {
         let radio = &self.setup.radio;
         let account = &self.state.ledger.accounts[node.index()];
         let spent = account.total(radio, self.state.now);
-        if account.died.is_some() || spent < radio.battery {
-            return;
+        if account.died.is_none() && spent >= radio.battery {
+            self.exhaust(node, spent);
         }
+    }
+
+    #[cold]
+    fn exhaust(&mut self, node: SensorId, spent: Joules) {
+        let radio = &self.setup.radio;
         let idle = (radio.baseline + radio.sleep).value();
         let since = if idle > 0.0 {
             (spent - radio.battery).value() / idle

@@ -185,7 +185,7 @@ impl Context<'_> {
     /// As [`Context::send`].
     pub fn send_now(&mut self, to: SensorId, frame: Frame) -> Result<bool, Error> {
         self.kernel.field.check_link(self.node, to)?;
-        self.kernel.transmit(self.node, Some(to), &[frame])
+        self.kernel.transmit(self.node, Some(to), &frame)
     }
 
     /// Sends to all neighbours, perhaps later in a batch.
@@ -264,7 +264,7 @@ impl<P: Protocol> Simulator<P> {
     pub fn run_until(&mut self, end: Instant) -> Result<u64, Error> {
         let mut events = 0;
         while let Some(event) = self.kernel.next(end) {
-            self.handle(&event)?;
+            self.handle(event)?;
             events += 1;
         }
         self.kernel.state.now = self.kernel.state.now.max(end);
@@ -279,16 +279,16 @@ impl<P: Protocol> Simulator<P> {
     pub fn run_events(&mut self, count: u64) -> Result<u64, Error> {
         for handled in 0..count {
             match self.kernel.next(Instant(u64::MAX)) {
-                Some(event) => self.handle(&event)?,
+                Some(event) => self.handle(event)?,
                 None => return Ok(handled),
             }
         }
         Ok(count)
     }
 
-    fn handle(&mut self, event: &Event) -> Result<(), Error> {
+    fn handle(&mut self, event: Event) -> Result<(), Error> {
         let id = event.node;
-        match event.what {
+        match event.what() {
             What::Mishap(index) => {
                 if self.kernel.mishap(index as usize) {
                     let mut context = Context {

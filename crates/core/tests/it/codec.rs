@@ -25,6 +25,32 @@ proptest! {
         prop_assert!(reader.finish().is_ok());
     }
 
+    /// Messages within messages, at any place of a byte.
+    #[test]
+    fn messages_are_appended_and_read_back(parts in prop::collection::vec((prop::collection::vec(any::<u8>(), 0..40), 0_usize..8), 0..6)) {
+        let parts: Vec<BitString> = parts
+            .into_iter()
+            .map(|(bytes, less)| {
+                let bits = (bytes.len() * 8).saturating_sub(less);
+                let whole = BitString::from_bytes(bytes, bits).unwrap();
+                let mut writer = BitWriter::new();
+                for bit in 0..bits {
+                    writer.write_bit(whole.bytes()[bit / 8] >> (7 - bit % 8) & 1 == 1);
+                }
+                writer.finish()
+            })
+            .collect();
+        let mut writer = BitWriter::new();
+        parts.iter().for_each(|part| writer.append(part));
+        let message = writer.finish();
+        let mut reader = BitReader::new(&message);
+        for part in &parts {
+            prop_assert_eq!(&reader.read_message(part.bits()).unwrap(), part);
+        }
+        prop_assert!(reader.read_message(1).is_err());
+        prop_assert!(reader.finish().is_ok());
+    }
+
     #[test]
     fn reading_arbitrary_bits_is_total(bytes in prop::collection::vec(any::<u8>(), 0..8), widths in prop::collection::vec(0_u32..80, 0..8)) {
         let bits = bytes.len() * 8;
