@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod allocation;
 mod attacks;
 mod fixtures;
 mod laws;
