@@ -164,7 +164,7 @@ impl InCell {
             return Ok((below.log_probability, -below.mean, below.variance));
         }
         let inside = normal::truncated_moments(a, b).map_err(|_| Error::Impossible)?;
-        Ok((normal::log_interval(a, b), inside.mean, inside.variance))
+        Ok((inside.log_probability, inside.mean, inside.variance))
     }
 }
 

@@ -6,6 +6,7 @@ use super::space::{ImpulseResponse, Space, step_response};
 use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive};
+use fewbits_numerics::kernels::scalar::exp;
 use fewbits_numerics::normal::erfcx;
 use nalgebra::Vector3;
 use std::f64::consts::PI;
@@ -197,7 +198,7 @@ impl Air {
     /// `c = e^{v.d/2k} [e^{-rV/2k} erfc(zm) + e^{rV/2k} erfc(zp)] / (8 pi k r)`, `zm, zp = (r -+ V t) / sqrt(4 k t)`. Both terms
     /// hold the factor `g = exp(-|d - v t|^2 / 4 k t)`, which leaves `erfcx` of the arguments: nothing overflows. At most two
     /// exponentials and two `erfcx`, one of each without wind.
-    #[inline]
+    #[inline(always)]
     fn terms(&self, offset: &Vector3<f64>, age: f64) -> Terms {
         let distance = offset.norm();
         let r = distance.max(self.closest);
@@ -205,7 +206,7 @@ impl Air {
         let narrowness = (4.0 * self.diffusivity * age).sqrt().recip();
         if self.speed == 0.0 {
             let z = r * narrowness;
-            let g = (-z * z).exp();
+            let g = exp(-z * z);
             let term = prefactor * g * erfcx(z);
             return Terms {
                 distance,
@@ -224,10 +225,10 @@ impl Air {
         let (minus, plus) = ((r - drift) * narrowness, (r + drift) * narrowness);
         // |d - v t|^2 = minus^2 spread^2 + 2 (r V - v.d) t, without the cancellation of the difference of vectors.
         let lag = (along - r * self.speed) * self.half_resistance;
-        let g = (lag - minus * minus).exp();
+        let g = exp(lag - minus * minus);
         let near = g * erfcx(minus.abs());
         // erfc(-x) = 2 - erfc(x).
-        let first = if minus >= 0.0 { near } else { 2.0 * lag.exp() - near };
+        let first = if minus >= 0.0 { near } else { 2.0 * exp(lag) - near };
         let second = g * erfcx(plus);
         Terms {
             distance,

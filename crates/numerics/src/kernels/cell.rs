@@ -9,8 +9,8 @@
 
 use super::elementary::{exp_sum, half_square, ln_corrected, select};
 use super::tail::scaled_tail;
+use crate::normal::INV_SQRT_2PI;
 
-const INV_SQRT_2PI: f64 = 0.398_942_280_401_432_7;
 /// Cells narrower than this, in local decay lengths, are summed as a series.
 const NARROW: f64 = 1.0;
 /// Terms of the series after the first; with [`NARROW`] the next is below 1e-17.

@@ -66,6 +66,7 @@ pub fn log_pdf_with(x: f64, mean: f64, variance: f64) -> f64 {
 /// `erfcx(x) = exp(x^2) erfc(x)`, within six units in the last place for arguments of either sign.
 ///
 /// Positive and decreasing; `+inf` below `x = -26.62`, `~ 1/(x sqrt(pi))` for large `x`. NaN in, NaN out.
+#[inline]
 pub fn erfcx(x: f64) -> f64 {
     // The same bits as the branch-free form; what that would discard is not computed.
     if x >= 0.0 {

@@ -1,14 +1,19 @@
 //! A standard normal variable known to lie in a cell.
 
-use super::{cdf, log_interval, log_pdf, quantile};
+use super::{INV_SQRT_2PI, cdf, log_pdf, quantile};
 use crate::error::ArgumentError;
+use crate::kernels;
+use crate::kernels::tail::cut;
 use crate::quadrature::gauss_legendre;
 use rand::distr::Open01;
 use rand::{Rng, RngExt};
 
-/// Mean and variance of `N(0, 1)` truncated to a cell.
+/// Probability of a cell under `N(0, 1)`, and mean and variance in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct TruncatedMoments {
+    /// `ln P(lower <= X < upper)`.
+    pub log_probability: f64,
     /// `E[X | lower <= X < upper]`, inside the closed cell.
     pub mean: f64,
     /// `Var[X | lower <= X < upper]`, in `(0, 1]`.
@@ -40,7 +45,7 @@ pub fn truncated_moments(lower: f64, upper: f64) -> Result<TruncatedMoments, Arg
         let mirrored = leaning_right(-upper, -lower);
         Ok(TruncatedMoments {
             mean: -mirrored.mean,
-            variance: mirrored.variance,
+            ..mirrored
         })
     } else {
         Ok(leaning_right(lower, upper))
@@ -69,18 +74,21 @@ fn right_moments(lower: f64, upper: f64) -> TruncatedMoments {
 }
 
 fn closed_form(lower: f64, upper: f64) -> TruncatedMoments {
-    let log_mass = log_interval(lower, upper);
-    let ratio = |edge: f64| {
-        if edge.is_finite() {
-            (log_pdf(edge) - log_mass).exp()
-        } else {
-            0.0
-        }
+    let (near, far) = (cut(lower), cut(upper));
+    // Everything as multiples of exp(-lower^2 / 2) where that is what the cell's probability falls with.
+    let (unit, decay, mass, log_probability) = if lower >= 0.0 {
+        let decay = far.decay / near.decay;
+        let mass = near.scaled - far.scaled * decay;
+        (1.0, decay, mass, kernels::scalar::ln(mass) - 0.5 * lower * lower)
+    } else {
+        let outside = near.outside + far.outside;
+        (near.decay, far.decay, 1.0 - outside, (-outside).ln_1p())
     };
     let times = |edge: f64, density: f64| if density > 0.0 { edge * density } else { 0.0 };
-    let (at_lower, at_upper) = (ratio(lower), ratio(upper));
+    let (at_lower, at_upper) = (INV_SQRT_2PI * unit / mass, INV_SQRT_2PI * decay / mass);
     let mean = at_lower - at_upper;
     TruncatedMoments {
+        log_probability,
         mean,
         variance: 1.0 + times(lower, at_lower) - times(upper, at_upper) - mean * mean,
     }
@@ -95,19 +103,26 @@ fn by_quadrature(lower: f64, width: f64) -> TruncatedMoments {
         gauss_legendre::<64>()
     };
     // Offsets from the lower edge keep the digits of a narrow cell.
-    let density = |t: f64| (-t * (lower + 0.5 * t)).exp();
+    let mut densities = [0.0; 64];
+    let densities = &mut densities[..rule.nodes().len()];
+    for (density, (t, _)) in densities.iter_mut().zip(rule.on(0.0, width)) {
+        *density = -t * (lower + 0.5 * t);
+    }
+    kernels::exp(densities);
     let (mut mass, mut first) = (0.0, 0.0);
-    for (t, w) in rule.on(0.0, width) {
-        let p = w * density(t);
-        mass += p;
-        first += p * t;
+    for (density, (t, w)) in densities.iter_mut().zip(rule.on(0.0, width)) {
+        *density *= w;
+        mass += *density;
+        first += *density * t;
     }
     let centre = first / mass;
-    let second: f64 = rule
-        .on(0.0, width)
-        .map(|(t, w)| w * density(t) * (t - centre) * (t - centre))
+    let second: f64 = densities
+        .iter()
+        .zip(rule.on(0.0, width))
+        .map(|(p, (t, _))| p * (t - centre) * (t - centre))
         .sum();
     TruncatedMoments {
+        log_probability: log_pdf(lower) + mass.ln(),
         mean: lower + centre,
         variance: second / mass,
     }

@@ -169,6 +169,8 @@ proptest! {
         prop_assume!(a < b);
         let m = truncated_moments(a, b).unwrap();
         prop_assert!(a <= m.mean && m.mean <= b);
+        let log_probability = normal::log_interval(a, b);
+        prop_assert!((m.log_probability - log_probability).abs() <= 1e-13 * (1.0 + log_probability.abs()));
         let widest = (0.25 * (b - a) * (b - a)).min(1.0);
         prop_assert!(m.variance > 0.0 && m.variance <= widest * (1.0 + 1e-12));
         let mirrored = truncated_moments(-b, -a).unwrap();

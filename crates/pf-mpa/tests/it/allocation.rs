@@ -4,8 +4,8 @@ use allocation_counter::measure;
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{
-    Bootstrap, Encoder, GridFilter, GuidedGaussian, Linearised, MessagePassing, Network, QuantizedRange,
-    RaoBlackwellGuided, RangeNoise, Reports, Target, Tracker,
+    Bootstrap, Encoder, GridFilter, GuidedGaussian, Linearised, MessagePassing, Network, QuantizedRange, RangeNoise,
+    RaoBlackwellGuided, Reports, Target, Tracker,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
 
@@ -22,7 +22,9 @@ fn allocates_nothing<T: Tracker>(name: &str, tracker: &T) {
     for (k, state) in target.simulate(&mut rng, prior.mean(), 12).iter().enumerate() {
         let ranges = network.measure(&mut rng, state[0], state[1]);
         let estimate = tracker.estimate(&belief);
-        let observed = network.observe(&target, k, &estimate, &ranges, Reports::Levels).unwrap();
+        let observed = network
+            .observe(&target, k, &estimate, &ranges, Reports::Levels)
+            .unwrap();
         let used = measure(|| {
             tracker
                 .step_in_place(&mut rng, &target, k, &mut belief, &observed, &mut workspace)
