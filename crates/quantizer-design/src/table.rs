@@ -172,7 +172,8 @@ impl JointTable {
                 let joint = w * q;
                 if k != best && joint > 0.0 {
                     others += joint;
-                    total += joint * (mass / joint).ln();
+                    // Of a quotient that is at most 1: its inverse overflows for the smallest numbers.
+                    total -= joint * (joint / mass).ln();
                 }
             }
             // -(1 - d) ln(1 - d) of the favourite.

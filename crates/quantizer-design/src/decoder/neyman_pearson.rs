@@ -166,6 +166,19 @@ mod tests {
         assert!(NeymanPearson::new(&system, 1.0).is_err());
     }
 
+    /// Where the wrong value's probability is among the smallest numbers, its share of the entropy is nothing, not infinite.
+    #[test]
+    fn equivocation_is_finite_where_probabilities_are_subnormal() {
+        for tenth in 700..800 {
+            let signal = f64::from(tenth) * 0.1;
+            let noise = Noise::independent_with_deviations(&[1.0; 2]).unwrap();
+            let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
+            let system = System::identical(scene, Quantizer::new(vec![0.5 * signal]).unwrap()).unwrap();
+            let equivocation = JointTable::new(&system).unwrap().equivocation().unwrap();
+            assert!((0.0..1e-200).contains(&equivocation), "{equivocation} at {signal}");
+        }
+    }
+
     #[test]
     fn equivocation_and_information_make_up_the_prior_entropy() {
         let scene =
