@@ -171,7 +171,7 @@ mod tests {
     fn equivocation_is_finite_where_probabilities_are_subnormal() {
         for tenth in 700..800 {
             let signal = f64::from(tenth) * 0.1;
-            let noise = Noise::independent_with_deviations(&[1.0; 2]).unwrap();
+            let noise = Noise::independent_with_deviations(&[1.0]).unwrap();
             let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
             let system = System::identical(scene, Quantizer::new(vec![0.5 * signal]).unwrap()).unwrap();
             let equivocation = JointTable::new(&system).unwrap().equivocation().unwrap();
