@@ -38,7 +38,7 @@ pub fn predict<const D: usize>(dynamics: &impl LinearDynamics<D>, belief: &Gauss
 /// S = H P H' + R
 /// K = P H' S^-1                      (Cholesky of S)
 /// mean = mean + K innovation
-/// P = (I - K H) P (I - K H)' + K R K'
+/// P = (I - K H) P (I - K H)' + K R K'         (P - K S K' where that cannot cancel)
 /// log_likelihood = ln N(innovation; 0, S)
 /// ```
 ///
@@ -54,13 +54,20 @@ pub fn update<const D: usize, const M: usize>(
     let noise = sensing.noise_covariance();
     let cross = times_transposed(belief.covariance(), matrix);
     let innovation_covariance = congruence_of(matrix, &cross) + noise;
-    let factor = Cholesky::new(innovation_covariance).ok_or(Error::SingularInnovation)?;
-    let gain = factor.solve(&cross.transpose()).transpose();
+    let lower = Cholesky::new(innovation_covariance)
+        .ok_or(Error::SingularInnovation)?
+        .unpack();
+    let roots = lower.diagonal();
+    let gain = over(&cross, &lower);
     let innovation = measurement - matrix * belief.mean();
-    let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
-    let covariance = congruence(&keep, belief.covariance()) + congruence(&gain, noise);
-    let squared = innovation.dot(&factor.solve(&innovation));
-    let log_root_determinant = log_product(factor.l_dirty().diagonal().as_slice());
+    let covariance = if is_mild(roots.as_slice(), noise) {
+        less_product(belief.covariance(), &gain, &cross)
+    } else {
+        let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
+        congruence(&keep, belief.covariance()) + congruence(&gain, noise)
+    };
+    let log_root_determinant = log_product(roots.as_slice());
+    let squared = innovation.dot(&over(&innovation.transpose(), &lower).transpose());
     let info = KalmanInfo {
         innovation,
         innovation_covariance,
@@ -69,6 +76,62 @@ pub fn update<const D: usize, const M: usize>(
         normalised_innovation_squared: squared / M as f64,
     };
     Ok((Gaussian::from_symmetric_parts(belief.mean() + gain * innovation, covariance), info))
+}
+
+/// `a (l l')^-1` of a lower triangular `l`, with one division for each of its columns.
+#[inline(always)]
+fn over<const D: usize, const M: usize>(a: &SMatrix<f64, D, M>, l: &SMatrix<f64, M, M>) -> SMatrix<f64, D, M> {
+    let mut out = *a;
+    let reciprocals = SVector::<f64, M>::from_fn(|k, _| 1.0 / l[(k, k)]);
+    for k in 0..M {
+        for j in 0..k {
+            for i in 0..D {
+                out[(i, k)] -= l[(k, j)] * out[(i, j)];
+            }
+        }
+        (0..D).for_each(|i| out[(i, k)] *= reciprocals[k]);
+    }
+    for k in (0..M).rev() {
+        for j in k + 1..M {
+            for i in 0..D {
+                out[(i, k)] -= l[(j, k)] * out[(i, j)];
+            }
+        }
+        (0..D).for_each(|i| out[(i, k)] *= reciprocals[k]);
+    }
+    out
+}
+
+/// What `det S / det R` may be for `P - K S K'` to lose no more than two digits of any variance: no direction shrinks by more.
+const MILD: f64 = 100.0;
+
+/// Whether one or two measurements say little enough beside what was known; `roots` is the diagonal of the factor of `S`.
+fn is_mild<const M: usize>(roots: &[f64], noise: &SMatrix<f64, M, M>) -> bool {
+    let noise = match M {
+        1 => noise[(0, 0)],
+        2 => noise[(0, 0)] * noise[(1, 1)] - noise[(1, 0)] * noise[(0, 1)],
+        _ => return false,
+    };
+    let root: f64 = roots.iter().product();
+    root * root < MILD * noise
+}
+
+/// `p - a b'` of a symmetric result, symmetric to the last bit.
+#[inline(always)]
+fn less_product<const D: usize, const M: usize>(
+    p: &SMatrix<f64, D, D>,
+    a: &SMatrix<f64, D, M>,
+    b: &SMatrix<f64, D, M>,
+) -> SMatrix<f64, D, D> {
+    let mut out = *p;
+    for j in 0..D {
+        for i in j..D {
+            let product: f64 = (0..M).map(|k| a[(i, k)] * b[(j, k)]).sum();
+            out[(i, j)] -= product;
+            out[(j, i)] = out[(i, j)];
+        }
+    }
+    out
 }
 
 /// `ln` of a product of positive numbers: one logarithm where the product is within range.

@@ -1,110 +1,30 @@
-//! Queue, air and books: what the runner knows that the nodes do not.
+//! What the runner knows that the nodes do not: time, books, who is alive.
 
-use crate::channel::{Check, Copy};
+use crate::air::{Outcome, Spare, frames_of, replayed};
+use crate::channel::Check;
 use crate::error::Error;
 use crate::field::Field;
-use crate::frame::{Frame, Kind, stored};
+use crate::frame::{Frame, Kind};
 use crate::ledger::Ledger;
-use crate::log::{Detail, Entry, Log, Note, Reception, Stored, Transmission};
+use crate::log::{Detail, Entry, Log, Note, Stored, Transmission};
+use crate::queue::{Event, Queue, What};
 use crate::simulator::{Mishap, Setup};
 use crate::units::{Bits, Instant, Joules, Seconds, SensorId};
 use fewbits_core::BitString;
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
-use std::cmp::{Ordering, Reverse};
-use std::collections::{BTreeMap, BinaryHeap, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 
 /// Bits of a frame's length in a batch.
 const LENGTH_BITS: u64 = 16;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum What {
-    Timer(u32),
-    Arrival(u32),
-    Flush(Option<SensorId>),
-    Mishap(u32),
-}
-
-/// Events are ordered by time, then by when they were scheduled. Small, since the queue moves them: `rank` is the place in the
-/// order of scheduling, then three bits of what it is.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub(crate) struct Event {
-    time: Instant,
-    rank: u64,
-    pub(crate) node: SensorId,
-    argument: u32,
-}
-
-impl Event {
-    fn new(time: Instant, sequence: u64, node: SensorId, what: What) -> Self {
-        let (kind, argument) = match what {
-            What::Timer(token) => (0, token),
-            What::Arrival(place) => (1, place),
-            What::Mishap(index) => (2, index),
-            What::Flush(None) => (3, 0),
-            What::Flush(Some(to)) => (4, to.0),
-        };
-        Self {
-            time,
-            rank: sequence << 3 | kind,
-            node,
-            argument,
-        }
-    }
-
-    pub(crate) fn what(&self) -> What {
-        match self.rank & 7 {
-            0 => What::Timer(self.argument),
-            1 => What::Arrival(self.argument),
-            2 => What::Mishap(self.argument),
-            3 => What::Flush(None),
-            _ => What::Flush(Some(SensorId(self.argument))),
-        }
-    }
-}
-
-impl Ord for Event {
-    #[inline]
-    fn cmp(&self, other: &Self) -> Ordering {
-        (self.time, self.rank).cmp(&(other.time, other.rank))
-    }
-}
-
-impl PartialOrd for Event {
-    #[inline]
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Event {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Event {}
-
-/// Bits on their way to a node.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Arrival {
-    from: SensorId,
-    #[serde(with = "stored")]
-    bits: BitString,
-}
 
 /// What a snapshot holds besides the nodes.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct State {
     pub(crate) now: Instant,
-    sequence: u64,
-    /// An event before all of the queue: most frames arrive before anything else happens.
-    front: Option<Event>,
-    queue: BinaryHeap<Reverse<Event>>,
-    arrivals: Vec<Option<Arrival>>,
-    free: Vec<u32>,
+    pub(crate) queue: Queue,
     /// For each node the end of its last outage.
     out_until: Vec<Instant>,
     outbox: BTreeMap<(SensorId, Option<SensorId>), Vec<Stored>>,
@@ -118,25 +38,10 @@ pub(crate) struct State {
 pub(crate) struct Kernel {
     pub(crate) field: Field,
     pub(crate) setup: Setup,
-    air: Stream,
+    pub(crate) air: Stream,
     pub(crate) state: State,
     pub(crate) recorded: Option<VecDeque<Transmission>>,
     spare: Spare,
-}
-
-/// Memory of transmissions that are over.
-#[derive(Debug, Default)]
-struct Spare {
-    receptions: Vec<Reception>,
-    copies: Vec<Vec<Copy>>,
-}
-
-/// What happened to a transmission.
-struct Outcome {
-    attempts: u32,
-    acknowledged: bool,
-    answers: u32,
-    receptions: Vec<Reception>,
 }
 
 impl Kernel {
@@ -148,11 +53,7 @@ impl Kernel {
             air: setup.stream.named("air"),
             state: State {
                 now: Instant::default(),
-                sequence: 0,
-                front: None,
-                queue: BinaryHeap::new(),
-                arrivals: Vec::new(),
-                free: Vec::new(),
+                queue: Queue::default(),
                 out_until: vec![Instant::default(); nodes],
                 outbox: BTreeMap::new(),
                 transmissions: 0,
@@ -179,12 +80,7 @@ impl Kernel {
         let known = |id: SensorId| id.index() < nodes;
         let consistent = state.ledger.accounts.len() == nodes
             && state.out_until.len() == nodes
-            && state
-                .front
-                .is_none_or(|front| known(front.node) && state.queue.iter().all(|event| front < event.0))
-            && state.queue.iter().all(|event| known(event.0.node))
-            && state.free.iter().all(|place| (*place as usize) < state.arrivals.len())
-            && state.arrivals.iter().flatten().all(|arrival| known(arrival.from))
+            && state.queue.is_consistent(known)
             && state
                 .outbox
                 .keys()
@@ -198,33 +94,13 @@ impl Kernel {
 
     #[inline]
     pub(crate) fn schedule(&mut self, time: Instant, node: SensorId, what: What) {
-        let sequence = self.state.sequence;
-        self.state.sequence += 1;
-        let mut event = Event::new(time.max(self.state.now), sequence, node, what);
-        let first = self
-            .state
-            .front
-            .or_else(|| self.state.queue.peek().map(|event| event.0));
-        if first.is_none_or(|first| event < first) {
-            match self.state.front.replace(event) {
-                Some(front) => event = front,
-                None => return,
-            }
-        }
-        self.state.queue.push(Reverse(event));
+        self.state.queue.push(time.max(self.state.now), node, what);
     }
 
     /// The next event up to `end`; time moves on to it.
     #[inline]
     pub(crate) fn next(&mut self, end: Instant) -> Option<Event> {
-        let front = self.state.front.take_if(|front| front.time <= end);
-        let event = match self.state.queue.peek() {
-            _ if front.is_some() => front,
-            Some(Reverse(first)) if self.state.front.is_none() && first.time <= end => {
-                self.state.queue.pop().map(|event| event.0)
-            }
-            _ => None,
-        }?;
+        let event = self.state.queue.pop(end)?;
         self.state.now = event.time;
         Some(event)
     }
@@ -242,7 +118,7 @@ impl Kernel {
         self.setup.report_check
     }
 
-    fn check_of(&self, kind: Kind) -> Check {
+    pub(crate) fn check_of(&self, kind: Kind) -> Check {
         match kind {
             Kind::Report => self.setup.report_check,
             _ => Check::Whole,
@@ -294,21 +170,7 @@ impl Kernel {
     }
 
     pub(crate) fn deliver(&mut self, at: Instant, from: SensorId, to: SensorId, bits: BitString) {
-        let arrival = Some(Arrival { from, bits });
-        let place = if let Some(place) = self.state.free.pop() {
-            self.state.arrivals[place as usize] = arrival;
-            place
-        } else {
-            self.state.arrivals.push(arrival);
-            (self.state.arrivals.len() - 1) as u32
-        };
-        self.schedule(at, to, What::Arrival(place));
-    }
-
-    pub(crate) fn take(&mut self, place: u32) -> Option<(SensorId, BitString)> {
-        let arrival = self.state.arrivals.get_mut(place as usize)?.take()?;
-        self.state.free.push(place);
-        Some((arrival.from, arrival.bits))
+        self.state.queue.deliver(at.max(self.state.now), from, to, bits);
     }
 
     /// Sends now, or puts into the outbox.
@@ -390,72 +252,6 @@ impl Kernel {
         spare.receptions = outcome.receptions;
         self.spare = spare;
         Ok(outcome.acknowledged)
-    }
-
-    /// What happens on air.
-    fn draw(&self, from: SensorId, to: Option<SensorId>, frames: &[Stored], bits: usize, spare: &mut Spare) -> Outcome {
-        let sent = u64::from(self.state.ledger.accounts[from.index()].frames);
-        let stream = || self.air.indexed(u64::from(from.0)).indexed(sent);
-        let copies = |receiver: u32, attempt: u32, copies: &mut Vec<Copy>| {
-            let rng = || {
-                stream()
-                    .indexed(u64::from(receiver))
-                    .indexed(u64::from(attempt))
-                    .fast_rng()
-            };
-            self.setup
-                .channel
-                .copies(rng, self.field.distance(from.0, receiver), bits, copies);
-        };
-        let mut outcome = Outcome {
-            attempts: 0,
-            acknowledged: false,
-            answers: 0,
-            receptions: std::mem::take(&mut spare.receptions),
-        };
-        let Some(to) = to else {
-            outcome.attempts = 1;
-            let neighbours = self.field.graph().neighbours(from.index());
-            for to in neighbours
-                .iter()
-                .map(|receiver| SensorId(*receiver))
-                .filter(|to| self.listens(*to))
-            {
-                let mut arrived = spare.copies.pop().unwrap_or_default();
-                copies(to.0, 0, &mut arrived);
-                outcome.receptions.push(Reception { to, copies: arrived });
-            }
-            return outcome;
-        };
-        let (mut arrived, listens) = (spare.copies.pop().unwrap_or_default(), self.listens(to));
-        let most = self.setup.retries.map_or(1, |retries| retries.saturating_add(1));
-        while outcome.attempts < most && !outcome.acknowledged {
-            let before = arrived.len();
-            if listens {
-                copies(to.0, 2 * outcome.attempts, &mut arrived);
-            }
-            outcome.attempts += 1;
-            let intact = arrived[before..].iter().any(|copy| self.is_intact(frames, copy));
-            if self.setup.retries.is_some() && intact {
-                outcome.answers += 1;
-                // The answer crosses the same air.
-                let mut answer = Vec::new();
-                copies(to.0, 2 * outcome.attempts - 1, &mut answer);
-                outcome.acknowledged = answer.iter().any(|copy| copy.flipped.is_empty());
-            }
-        }
-        if listens {
-            outcome.receptions.push(Reception { to, copies: arrived });
-        }
-        outcome
-    }
-
-    fn is_intact(&self, frames: &[Stored], copy: &Copy) -> bool {
-        copy.flipped.is_empty()
-            || frames_of(frames, copy).all(|bits| {
-                let check = Frame::kind_of(&bits).map_or(Check::Whole, |kind| self.check_of(kind));
-                Frame::from_bits(&bits, check).is_ok()
-            })
     }
 
     /// Enters a transmission into the books; energies of senders and receivers, bits on air.
@@ -579,15 +375,7 @@ impl Kernel {
         let graph = (nodes + 1) * size_of::<usize>() + 2 * self.field.graph().edges() * size_of::<u32>();
         nodes * size_of::<[f64; 2]>()
             + graph
-            + state.queue.capacity() * size_of::<Reverse<Event>>()
-            + state.arrivals.capacity() * size_of::<Option<Arrival>>()
-            + state
-                .arrivals
-                .iter()
-                .flatten()
-                .map(|a| a.bits.bytes().len())
-                .sum::<usize>()
-            + state.free.capacity() * size_of::<u32>()
+            + state.queue.memory()
             + state.out_until.capacity() * size_of::<Instant>()
             + state.ledger.accounts.capacity() * size_of::<crate::ledger::Account>()
             + state.log.entries.capacity() * size_of::<Entry>()
@@ -597,44 +385,4 @@ impl Kernel {
 fn payload_bits(frame: &Stored) -> u64 {
     let overhead = Frame::kind_of(&frame.0).map_or(0, Frame::overhead);
     (frame.0.bits() as u64).saturating_sub(u64::from(overhead))
-}
-
-/// The frames of a batch as they arrive.
-fn frames_of<'a>(frames: &'a [Stored], copy: &'a Copy) -> impl Iterator<Item = BitString> + 'a {
-    let mut start = 0;
-    frames.iter().map(move |Stored(frame)| {
-        let from = start;
-        start += frame.bits();
-        copy.flipped
-            .iter()
-            .filter_map(|bit| (*bit as usize).checked_sub(from))
-            .filter(|bit| *bit < frame.bits())
-            .fold(frame.clone(), BitString::with_flipped)
-    })
-}
-
-fn replayed(
-    recorded: Option<Transmission>,
-    from: SensorId,
-    to: Option<SensorId>,
-    frames: &[Stored],
-    transmission: usize,
-) -> Result<Outcome, Error> {
-    let left = |difference| Error::LeftLog {
-        transmission,
-        difference,
-    };
-    let recorded = recorded.ok_or_else(|| left("the log has ended"))?;
-    if (recorded.from, recorded.to) != (from, to) {
-        return Err(left("sender or receiver"));
-    }
-    if recorded.frames != frames {
-        return Err(left("the bits"));
-    }
-    Ok(Outcome {
-        attempts: recorded.attempts,
-        acknowledged: recorded.acknowledged,
-        answers: recorded.answers,
-        receptions: recorded.receptions,
-    })
 }

@@ -44,6 +44,7 @@
 //! Not here: contention for the channel (slots are taken to be divided among the nodes), clock drift, new estimation mathematics.
 
 mod adhoc;
+mod air;
 mod channel;
 mod clock;
 mod error;
@@ -55,6 +56,7 @@ mod frame;
 mod kernel;
 mod ledger;
 mod log;
+mod queue;
 mod radio;
 mod simulator;
 mod star;

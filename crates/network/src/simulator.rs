@@ -4,9 +4,10 @@ use crate::channel::{Channel, Check};
 use crate::error::Error;
 use crate::field::Field;
 use crate::frame::{Frame, Kind};
-use crate::kernel::{Event, Kernel, What};
+use crate::kernel::Kernel;
 use crate::ledger::{Account, Ledger};
 use crate::log::{Detail, Log, Note};
+use crate::queue::{Event, What};
 use crate::radio::Radio;
 use crate::units::{Instant, Joules, Seconds, SensorId};
 use fewbits_core::BitString;
@@ -311,7 +312,7 @@ impl<P: Protocol> Simulator<P> {
                 self.protocol.on_timer(&mut self.nodes[id.index()], &mut context, token)
             }
             What::Arrival(place) => {
-                let Some((from, bits)) = self.kernel.take(place) else {
+                let Some((from, bits)) = self.kernel.state.queue.take(place) else {
                     return Ok(());
                 };
                 self.kernel.drain(id);

@@ -149,6 +149,7 @@ impl<const D: usize> JointBelief<D> {
         } else if rule.threshold() > 0.0 {
             let inside = rule.region().under(&spread)?.moments(&mu);
             let p = inside.map_or(0.0, |inside| inside.log_mass.exp());
+            log_likelihood += (1.0 - p).max(f64::EPSILON).ln();
             if let Some(inside) = inside.filter(|_| p < IMPLAUSIBLE) {
                 let outside = (mu - inside.mean * p) / (1.0 - p);
                 let apart = inside.mean - outside;
@@ -159,7 +160,6 @@ impl<const D: usize> JointBelief<D> {
                 self.shift(&gains, &(mu - outside));
                 self.detach(&gains, &rows);
                 self.append(&[columns(&gains * square_root(&left))]);
-                log_likelihood += (-p).ln_1p();
             }
         }
 

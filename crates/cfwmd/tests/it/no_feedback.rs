@@ -243,6 +243,34 @@ fn any_ratio_of_variances_keeps_the_joint_belief_definite() {
     }
 }
 
+/// Over all that one sensor can cause, messages and silence, the evidence of a step is one.
+#[test]
+fn the_evidence_of_all_that_can_come_is_one() {
+    let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
+    let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
+    let start = Gaussian::new(Vector2::new(0.0, 1.0), SMatrix::identity()).unwrap();
+    for loss in [0.0, 0.3] {
+        let network = Network::new(vec![sensor], 0.8, Link::lossy(loss).unwrap()).unwrap();
+        let step = |belief: &JointBelief<2>, observation| joint::step(&network, &dynamics, belief, &[observation]);
+        // At first the sensor's estimate is known and the density of messages jumps; after a silence it is smooth.
+        let mut belief = JointBelief::new(&start, 1).unwrap();
+        for observation in [
+            Observation::Nothing,
+            Observation::Received(Vector1::new(4.0)),
+            Observation::Nothing,
+        ] {
+            belief = step(&belief, observation).unwrap().0;
+            let evidence = |observation| step(&belief, observation).unwrap().1.log_likelihood.exp();
+            let width = 0.02;
+            let heard: f64 = (-2000..2000)
+                .map(|i| evidence(Observation::Received(Vector1::new(width * f64::from(i)))) * width)
+                .sum();
+            let sum = heard + evidence(Observation::Nothing);
+            assert!((sum - 1.0).abs() < 1e-6, "{sum} with loss {loss}");
+        }
+    }
+}
+
 #[test]
 fn beliefs_stay_covariances_from_a_singular_start() {
     // Process noise of rank one and a known start keep the joint covariance singular for several steps.

@@ -1,8 +1,11 @@
 //! The laws of factors, on every one, and what was once wrong.
 
-use fewbits_core::factor::{Constant, Factor, InCell, Partition, Product, Repeated, Scalar, Value};
+use fewbits_core::factor::{
+    Constant, Factor, Feature, InCell, Partition, Product, Repeated, Scalar, Value, tilted_by_quadrature,
+};
 use fewbits_core::laws::{factor, likelihood};
 use fewbits_core::{Cell, Error, Gaussian, Link, Observed, Sensing, Sign};
+use fewbits_numerics::normal;
 use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
 use proptest::prelude::*;
 use rand::Rng;
@@ -213,4 +216,26 @@ proptest! {
         prop_assert!((numeric.mean[0] - closed.mean[0]).abs() < 1e-8 * deviation, "{numeric:?} {closed:?}");
         prop_assert!((numeric.covariance[0] / closed.covariance[0] - 1.0).abs() < 1e-7, "{numeric:?} {closed:?}");
     }
+}
+
+/// A kink that no feature announces: panels are split until they have found it.
+#[test]
+fn quadrature_finds_what_nobody_told_it() {
+    let (slope, at) = (40.0_f64, 0.377_f64);
+    let prior = Gaussian::scalar(0.0, 1.0).unwrap();
+    let elsewhere = Feature {
+        location: 2.0,
+        width: 0.01,
+    };
+    let tilted = tilted_by_quadrature(&prior, [elsewhere], |m, logs| {
+        logs.iter_mut()
+            .zip(m)
+            .for_each(|(log, m)| *log -= slope * (m - at).abs());
+    })
+    .unwrap();
+    // Two halves of a Laplace kernel under a normal density.
+    let half = |sign: f64| 0.5 * slope * slope - sign * slope * at + normal::log_cdf(sign * at - slope);
+    let (below, above) = (half(1.0), half(-1.0));
+    let exact = below.max(above) + (-(below - above).abs()).exp().ln_1p();
+    assert!((tilted.log_evidence - exact).abs() < 1e-10, "{} against {exact}", tilted.log_evidence);
 }

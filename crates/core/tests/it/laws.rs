@@ -184,6 +184,41 @@ impl Likelihood<2> for Plane {
     }
 }
 
+/// A density that leaves the sweep to the trait.
+struct Plain(Gaussian<2>);
+
+impl Belief<2> for Plain {
+    fn mean(&self) -> Vector2<f64> {
+        *self.0.mean()
+    }
+
+    fn covariance(&self) -> Matrix2<f64> {
+        *self.0.covariance()
+    }
+
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, columns: ColumnsMut<'_, 2>) {
+        self.0.sample_columns(rng, columns);
+    }
+}
+
+impl Density<2> for Plain {
+    fn log_density(&self, state: &Vector2<f64>) -> f64 {
+        self.0.log_pdf(state).unwrap()
+    }
+}
+
+/// Sweeps that a trait provides are those of its scalar function.
+#[test]
+fn a_sweep_that_nobody_wrote_is_the_scalar_function() {
+    let plain = Plain(Gaussian::new(HERE, NOISE).unwrap());
+    let (x, y) = ([0.0, 1.0, -3.0], [2.0, -1.0, 0.5]);
+    let mut logs = [0.25, 0.0, -1.0];
+    plain.add_log_densities(&[&x, &y], &mut logs);
+    for (i, start) in [0.25, 0.0, -1.0].into_iter().enumerate() {
+        assert_eq!(logs[i], start + plain.log_density(&Vector2::new(x[i], y[i])));
+    }
+}
+
 /// Which faults a law refuses; it must take all others.
 fn refuses(law: &str, with_noise: bool, faults: &[Fault], check: impl Fn(&Plane) -> Result<(), laws::Violation>) {
     for unit in [1e-4, 1.0, 1e4] {

@@ -7,6 +7,7 @@ mod beliefs;
 mod bounds;
 mod common;
 mod fixtures;
+mod laplace;
 mod laws;
 mod particles;
 mod products;

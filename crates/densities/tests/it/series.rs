@@ -1,6 +1,7 @@
 //! Polynomial Gaussians against closed forms.
 
 use fewbits_core::{Belief, Columns, Density};
+use fewbits_densities::hermite::gaussian_moment;
 use fewbits_densities::{CellOptions, CellTarget, Cells, Component, Lpg, Mixture};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Vector2};
@@ -123,4 +124,18 @@ fn a_series_about_two_gaussians_is_one_density() {
             assert!(density <= bound + 1e-9, "{density} {bound}");
         }
     }
+}
+
+/// Moments of a pair of normal variables by their textbook formulas.
+#[test]
+fn gaussian_moments_are_the_textbooks() {
+    let (m, n, s, t, c) = (0.7, -1.3, 2.0, 0.5, 0.4);
+    let (mean, covariance) = (Vector2::new(m, n), Matrix2::new(s, c, c, t));
+    let moment = |i, j| gaussian_moment([i, j], &mean, &covariance).unwrap();
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * (1.0 + b.abs()), "{a} against {b}");
+    near(moment(4, 0), m.powi(4) + 6.0 * m * m * s + 3.0 * s * s);
+    near(moment(0, 3), n.powi(3) + 3.0 * n * t);
+    near(moment(1, 1), m * n + c);
+    near(moment(2, 2), m * m * n * n + m * m * t + n * n * s + 4.0 * m * n * c + s * t + 2.0 * c * c);
+    assert!(gaussian_moment([21, 20], &mean, &covariance).is_err());
 }

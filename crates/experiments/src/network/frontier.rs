@@ -1,6 +1,7 @@
 //! Error against bits, transmitted bits and joules: every scheme on the same worlds.
 
-use super::worlds::{self, COEFFICIENT, Scheme};
+use super::schemes::{self, Scheme};
+use super::worlds::{self, COEFFICIENT};
 use crate::prelude::*;
 
 /// Settings.
@@ -126,7 +127,7 @@ impl Figure for Frontier {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (scalar, plane) = (worlds::scalar()?, worlds::plane()?);
-        let (of_scalar, of_plane) = (worlds::scalar_schemes(), worlds::plane_schemes());
+        let (of_scalar, of_plane) = (schemes::scalar_schemes(), schemes::plane_schemes());
         let one =
             |name: &str,
              schemes: &[Scheme],

@@ -1,6 +1,7 @@
 //! Days on two AA cells.
 
-use super::worlds::{self, Scheme};
+use super::schemes::{self, Scheme};
+use super::worlds;
 use crate::prelude::*;
 use fewbits_network::Radio;
 
@@ -87,7 +88,7 @@ impl Figure for Lifetime {
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
-        let (world, schemes) = (worlds::scalar()?, worlds::scalar_schemes());
+        let (world, schemes) = (worlds::scalar()?, schemes::scalar_schemes());
         let runs = context.compare(
             "network-lifetime",
             p.trials,

@@ -4,6 +4,7 @@ mod faults;
 mod frontier;
 mod lifetime;
 mod scale;
+mod schemes;
 mod worlds;
 
 use crate::AnyFigure;
