@@ -2,7 +2,9 @@
 
 use crate::common::{crescent, d1, random_mixture};
 use fewbits_core::{Density, Gaussian, laws};
-use fewbits_densities::{Component, HighestDensity, KernelEstimate, Mixture, TabulatedEstimate, ellipse};
+use fewbits_densities::{
+    Component, Grid, HighestDensity, KernelEstimate, Mixture, PointMass, TabulatedEstimate, ellipse,
+};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix1, SVector, Vector1};
 
@@ -174,6 +176,18 @@ fn storage_keeps_every_bit_and_checks() {
         serde_json::from_str::<Mixture<1>>(r#"{"weights":[-1.0],"means":[[0.0]],"covariances":[[[1.0]]]}"#).is_err()
     );
     let estimate = d1();
+    // Rows too few, too short, too many; means of another dimension.
+    for (means, covariances) in [
+        ("[[0.0,0.0]]", "[[[1.0,0.0]]]"),
+        ("[[0.0,0.0]]", "[[[1.0,0.0],[0.0]]]"),
+        ("[[0.0,0.0]]", "[[[1.0,0.0],[0.0,1.0],[0.0,0.0]]]"),
+        ("[[0.0]]", "[[[1.0,0.0],[0.0,1.0]]]"),
+        ("[]", "[[[1.0,0.0],[0.0,1.0]]]"),
+    ] {
+        let text = format!(r#"{{"weights":[1.0],"means":{means},"covariances":{covariances}}}"#);
+        let error = serde_json::from_str::<Mixture<2>>(&text).unwrap_err().to_string();
+        assert!(error.contains("2 by 2"), "{error}");
+    }
     let text = serde_json::to_string(&estimate).unwrap();
     let restored: KernelEstimate<2> = serde_json::from_str(&text).unwrap();
     assert!((restored.mean() - estimate.mean()).amax() < 1e-14 && restored.kernel() == estimate.kernel());
@@ -192,4 +206,14 @@ fn bad_mixtures_are_refused_by_name() {
     assert!(new(1.0, 0.0, 0.0).contains("covariance"));
     let zero = Component::new(0.0, Vector1::new(0.0), Matrix1::new(1.0)).unwrap();
     assert!(Mixture::new(vec![zero]).is_err() && Mixture::<1>::new(vec![]).is_err());
+}
+
+#[test]
+fn a_grid_holds_the_density_at_its_nodes() {
+    let belief = PointMass::normal(Grid::symmetric(8.0, 0.1).unwrap(), 0.3, 1.5).unwrap();
+    assert_eq!(belief.density().len(), belief.grid().nodes().count());
+    for (x, density) in belief.grid().nodes().zip(belief.density()) {
+        let exact = (-0.5 * (x - 0.3_f64).powi(2) / 1.5).exp() / (std::f64::consts::TAU * 1.5).sqrt();
+        assert!((density - exact).abs() < 1e-6, "{density} against {exact} at {x}");
+    }
 }

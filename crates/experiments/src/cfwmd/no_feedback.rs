@@ -202,3 +202,17 @@ impl Case for NoFeedbackFigure {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Who always sends is never silent: probability zero, not a quotient of nothing by nothing.
+    #[test]
+    fn the_printed_likelihood_of_silence_at_rate_one_is_zero() {
+        let setting = Linear::scalar(2, &[2.0]);
+        let rows = printed_likelihood(&setting).unwrap();
+        assert_eq!(rows.len(), 5 * setting.steps as usize);
+        assert!(rows.iter().all(|row| row.probability == 0.0));
+    }
+}
