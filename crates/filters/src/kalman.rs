@@ -165,7 +165,7 @@ mod tests {
     use fewbits_core::Gaussian;
     use fewbits_core::factor::Value;
     use fewbits_models::{LinearSensor, constant_velocity_1d};
-    use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
+    use nalgebra::{Matrix2, Matrix2x4, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
 
     /// The posterior of a linear-Gaussian problem in information form, an independent formula.
     #[test]
@@ -185,6 +185,50 @@ mod tests {
         assert!((posterior.mean() - mean).amax() < 1e-13);
         let predicted = Gaussian::new(h * prior.mean(), info.innovation_covariance).unwrap();
         assert!((info.log_likelihood - predicted.log_pdf(&z).unwrap()).abs() < 1e-12);
+    }
+
+    /// A constant measured again and again: the variance is that of all measurements at once, whichever form was used.
+    #[test]
+    fn ten_thousand_measurements_of_a_constant_leave_the_exact_variance() {
+        for (start, noise) in [(1.0, 1.0), (1e8, 1.0), (1.0, 1e6), (1e-9, 1e3)] {
+            let sensor = LinearSensor::new(Matrix2::identity(), Matrix2::identity() * noise).unwrap();
+            let mut belief = Gaussian::new(Vector2::zeros(), Matrix2::new(1.0, 0.5, 0.5, 1.0) * start).unwrap();
+            let prior = belief.covariance().try_inverse().unwrap();
+            for n in 1..=10_000 {
+                belief = update(&sensor, &belief, &Vector2::new(1.0, -1.0)).unwrap().0;
+                if n % 2500 == 1 {
+                    let exact = (prior + Matrix2::identity() * (f64::from(n) / noise))
+                        .try_inverse()
+                        .unwrap();
+                    let off = (belief.covariance() - exact).amax() / exact.amax();
+                    assert!(off < 1e-9, "{off} after {n} from {start} with noise {noise}");
+                }
+            }
+        }
+    }
+
+    /// What one or two measurements leave, either side of where the short form ends, against the information form.
+    #[test]
+    fn the_short_form_is_the_long_one() {
+        let h = Matrix2x4::new(1.0, 0.0, 0.3, 0.0, 0.0, 1.0, 0.0, -0.2);
+        let l = SMatrix::<f64, 4, 4>::from_fn(|i, j| {
+            if i >= j {
+                1.0 / (1.0 + i as f64 + 2.0 * j as f64)
+            } else {
+                0.0
+            }
+        });
+        let prior = Gaussian::new(SVector::zeros(), l * l.transpose()).unwrap();
+        for noise in [100.0, 1.0, 0.1, 0.03, 0.01, 1e-4] {
+            let r = Matrix2::new(1.0, 0.4, 0.4, 0.7) * noise;
+            let own = update(&LinearSensor::new(h, r).unwrap(), &prior, &Vector2::zeros())
+                .unwrap()
+                .0;
+            let information = prior.covariance().try_inverse().unwrap() + h.transpose() * r.try_inverse().unwrap() * h;
+            let exact = information.try_inverse().unwrap();
+            assert!((own.covariance() - exact).amax() < 1e-11 * exact.amax(), "noise {noise}");
+            assert_eq!(own.covariance(), &own.covariance().transpose());
+        }
     }
 
     /// The Kalman filter is the assumed-density update with a value, at every scale.

@@ -162,3 +162,54 @@ impl Queue {
             + self.free.capacity() * size_of::<u32>()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Pushes and pops in any order give the events by time, of one time by when they were pushed; a stored queue goes on alike.
+        #[test]
+        fn events_come_by_time_and_then_as_they_were_pushed(work in prop::collection::vec((0_u64..6, any::<bool>()), 1..60)) {
+            let mut queue = Queue::default();
+            let mut waiting: Vec<(u64, u32)> = Vec::new();
+            for (token, (time, pop)) in work.into_iter().enumerate() {
+                let token = token as u32;
+                queue.push(Instant(time), SensorId(token), What::Timer(token));
+                waiting.push((time, token));
+                if pop {
+                    let mut stored = Vec::new();
+                    ciborium::into_writer(&queue, &mut stored).unwrap();
+                    queue = ciborium::from_reader(stored.as_slice()).unwrap();
+                    prop_assert!(queue.is_consistent(|_| true));
+                    waiting.sort_unstable();
+                    let first = waiting.remove(0);
+                    prop_assert!(first.0 == 0 || queue.pop(Instant(first.0 - 1)).is_none());
+                    let event = queue.pop(Instant(first.0)).unwrap();
+                    prop_assert_eq!((event.time.0, event.what()), (first.0, What::Timer(first.1)));
+                }
+            }
+            waiting.sort_unstable();
+            for (time, token) in waiting {
+                let event = queue.pop(Instant(u64::MAX)).unwrap();
+                prop_assert_eq!((event.time.0, event.node, event.what()), (time, SensorId(token), What::Timer(token)));
+            }
+            prop_assert!(queue.pop(Instant(u64::MAX)).is_none());
+        }
+    }
+
+    #[test]
+    fn what_happens_is_kept_in_the_event() {
+        let all = [
+            What::Timer(u32::MAX),
+            What::Arrival(7),
+            What::Mishap(0),
+            What::Flush(None),
+            What::Flush(Some(SensorId(3))),
+        ];
+        for what in all {
+            assert_eq!(Event::new(Instant(1), 1 << 60, SensorId(2), what).what(), what);
+        }
+    }
+}

@@ -106,6 +106,7 @@ proptest! {
 fn decoding_is_total() {
     let mut rng = Stream::new(41).fast_rng();
     let format = WireFormat::<2>::new(SVector::zeros(), 20.0, 1.0, &[0.5, 0.25, 0.15]).unwrap();
+    assert_eq!(format.resolutions(), [0.5, 0.25, 0.15]);
     let good: Vec<BitString> = (0..8)
         .map(|k| {
             let mixture = random_mixture::<2, _>(&mut rng, k + 1, 1.0);
