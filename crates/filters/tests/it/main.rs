@@ -9,4 +9,5 @@ mod imm;
 mod particle;
 mod rao_blackwell;
 mod resample;
+mod state_noise;
 mod tangent;
