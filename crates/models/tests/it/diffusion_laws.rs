@@ -90,7 +90,7 @@ fn slab_mass() {
     ] {
         let axis = Axis::slab(0.5, 2.0, walls).unwrap();
         // Before the walls are felt the substance is where it was released, in units of the slab's own.
-        let free = (-0.1_f64.powi(2) / 0.04).exp() / (0.04 * std::f64::consts::PI).sqrt();
+        let free = (-0.1_f64.powi(2) / 0.04).exp() / (0.04 * PI).sqrt();
         assert!((axis.green(0.7, 0.6, 0.02) / free - 1.0).abs() < 1e-12);
         let mut before = 1.0;
         for t in [0.02, 0.2, 1.0, 1.7, 4.0] {
