@@ -176,24 +176,8 @@ impl BitWriter {
 
     /// Writes all bits of a message.
     pub fn append(&mut self, message: &BitString) {
-        let whole = if self.message.bits.is_multiple_of(8) {
-            message.bits / 8
-        } else {
-            0
-        };
-        if whole > 0 {
-            self.message.bytes.extend_from_slice(&message.bytes[..whole]);
-            self.message.bits += 8 * whole;
-        }
-        let mut reader = BitReader {
-            message,
-            position: 8 * whole,
-        };
-        while reader.remaining() > 0 {
-            let width = reader.remaining().min(64) as u32;
-            // What was read with a width fits it.
-            let _ = reader.read(width).and_then(|field| self.write(field, width));
-        }
+        // All of a message can be read.
+        let _ = BitReader::new(message).read_into(message.bits, self);
     }
 
     /// Writes one bit.
@@ -281,21 +265,27 @@ impl<'a> BitReader<'a> {
             });
         }
         let mut writer = BitWriter::with_capacity(bits);
-        let whole = if self.position.is_multiple_of(8) { bits / 8 } else { 0 };
-        if whole > 0 {
-            let first = self.position / 8;
-            writer
-                .message
-                .bytes
-                .extend_from_slice(&self.message.bytes[first..first + whole]);
-            writer.message.bits = 8 * whole;
-            self.position += 8 * whole;
-        }
-        while writer.bits() < bits {
-            let width = (bits - writer.bits()).min(64) as u32;
-            writer.write(self.read(width)?, width)?;
-        }
+        self.read_into(bits, &mut writer)?;
         Ok(writer.finish())
+    }
+
+    /// Moves bits to a writer: whole bytes where both stand at the beginning of one.
+    fn read_into(&mut self, bits: usize, writer: &mut BitWriter) -> Result<(), CodecError> {
+        let (first, whole) = (self.position / 8, bits / 8);
+        let mut left = bits;
+        if whole > 0 && (self.position | writer.message.bits).is_multiple_of(8) {
+            let bytes = &self.message.bytes[first..first + whole];
+            writer.message.bytes.extend_from_slice(bytes);
+            writer.message.bits += 8 * whole;
+            self.position += 8 * whole;
+            left %= 8;
+        }
+        while left > 0 {
+            let width = left.min(64) as u32;
+            writer.write(self.read(width)?, width)?;
+            left -= width as usize;
+        }
+        Ok(())
     }
 
     /// Reads one bit.

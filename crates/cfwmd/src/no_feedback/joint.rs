@@ -149,6 +149,7 @@ impl<const D: usize> JointBelief<D> {
         } else if rule.threshold() > 0.0 {
             let inside = rule.region().under(&spread)?.moments(&mu);
             let p = inside.map_or(0.0, |inside| inside.log_mass.exp());
+            // What rounding leaves of a contradiction is improbable, not impossible.
             log_likelihood += (1.0 - p).max(f64::EPSILON).ln();
             if let Some(inside) = inside.filter(|_| p < IMPLAUSIBLE) {
                 let outside = (mu - inside.mean * p) / (1.0 - p);
