@@ -220,7 +220,7 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
                 continue;
             };
             let scheme = self.scheme(i, &rules[i])?;
-            if matches!(self.format, NumberFormat::Fixed(_)) || self.link.loss() == 1.0 {
+            if matches!(self.format, NumberFormat::Fixed(_)) {
                 log_likelihood += update(&mut belief, i, scheme.received(i, broadcast, value, &self.link)?)?;
             } else {
                 // The factor of a value: the closed form of its update.

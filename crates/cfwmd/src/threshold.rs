@@ -3,8 +3,7 @@
 use crate::Error;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
-use fewbits_numerics::normal;
-use fewbits_numerics::stored;
+use fewbits_numerics::{newton, normal, stored};
 use serde::{Deserialize, Serialize};
 
 /// How often the network may report: `messages` per step on average, from `sensors` sensors (the paper's `l` of `N`).
@@ -57,7 +56,7 @@ impl Budget {
 
 /// The `eta` that a chi-square variable of `dimension` degrees of freedom reaches with probability `rate`.
 ///
-/// One degree: `(Phi^-1(rate/2))^2`. Two: `-2 ln rate`. More: Newton steps on the upper tail of the chi-square law.
+/// One degree: `(Phi^-1(rate/2))^2`. Two: `-2 ln rate`. More: Newton's method on the upper tail of the chi-square law.
 ///
 /// # Errors
 /// If `rate` is outside `(0, 1]` or `dimension` is zero.
@@ -94,33 +93,17 @@ fn chi_square_upper_tail(x: f64, dimension: usize) -> (f64, f64) {
     (tail, density)
 }
 
-/// Bracketing, then Newton steps on `ln P(chi^2 > x)` kept inside the bracket.
+/// The root of `ln P(chi^2 > x) - ln rate` in `x`.
 fn chi_square_upper_quantile(rate: f64, dimension: usize) -> f64 {
-    let (mut low, mut high) = (0.0, dimension as f64);
+    let mut high = dimension as f64;
     while chi_square_upper_tail(high, dimension).0 > rate {
-        low = high;
         high *= 2.0;
     }
-    let mut x = 0.5 * (low + high);
-    for _ in 0..200 {
-        let (p, density) = chi_square_upper_tail(x, dimension);
-        if p > rate {
-            low = x
-        } else {
-            high = x
-        }
-        let step = x + (p.ln() - rate.ln()) * p / density;
-        let next = if step > low && step < high {
-            step
-        } else {
-            0.5 * (low + high)
-        };
-        if (next - x).abs() <= 1e-15 * x {
-            return next;
-        }
-        x = next;
-    }
-    x
+    let excess = |x: f64| {
+        let (tail, density) = chi_square_upper_tail(x, dimension);
+        (rate.ln() - tail.ln(), density / tail)
+    };
+    newton::increasing(excess, 0.0, high, 0.5 * high, 1e-15 * high)
 }
 
 #[cfg(test)]
@@ -148,6 +131,8 @@ mod tests {
 
     #[test]
     fn budgets_outside_the_range_are_refused() {
+        let budget = Budget::new(1.5, 4).unwrap();
+        assert_eq!((budget.messages(), budget.sensors(), budget.rate()), (1.5, 4, 0.375));
         for messages in [0.0, -1.0, 4.01, f64::NAN, f64::INFINITY] {
             assert!(Budget::new(messages, 4).is_err());
         }

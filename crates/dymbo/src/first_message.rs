@@ -383,6 +383,28 @@ mod tests {
         }
     }
 
+    /// By the law of total variance over the cells of a wide prior, and by the entropy of a finely rounded Gaussian.
+    #[test]
+    fn what_a_message_is_worth_under_a_wide_prior() {
+        let (r, tau, mean, p) = (1.3, 0.7, 0.4, 900.0);
+        let value =
+            first_message_value(&RoundedSample::new(r, tau).unwrap(), &Gaussian::scalar(mean, p).unwrap()).unwrap();
+        // E var = p - var E, and E(theta | cell) = mean + p/(p + r) (E(x | cell) - mean).
+        let (s, total) = (f64::sqrt(p + r), p + r);
+        let spread: f64 = (-600..=600)
+            .map(|k| {
+                let ends = [-0.5, 0.5].map(|half| (tau * (f64::from(k) + half) - mean) / s);
+                let share = normal::interval(ends[0], ends[1]);
+                let first = normal::pdf(ends[0]) - normal::pdf(ends[1]);
+                if share > 0.0 { first * first / share } else { 0.0 }
+            })
+            .sum();
+        let expected = p - p * p / total * spread;
+        assert!((value.expected_variance / expected - 1.0).abs() < 1e-6, "{value:?} {expected}");
+        let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E * total).log2() - tau.log2();
+        assert!((value.entropy_bits - entropy).abs() < 1e-4, "{value:?} {entropy}");
+    }
+
     #[test]
     fn a_prior_can_only_help() {
         let scheme = RoundedSample::new(1.0, 1.0).unwrap();

@@ -204,6 +204,32 @@ mod tests {
         adds_up(words, exact_mse);
     }
 
+    /// The averages over a run are those of the same run taken step by step.
+    #[test]
+    fn averages_are_of_the_steps() {
+        let plant = ScalarPlant::new(0.9, 0.5, 1.0).unwrap();
+        let exact = exact_filter(&plant, 100).unwrap();
+        let run = || {
+            let mut rng = Stream::new(5).rng();
+            (Twin::new(&mut rng, DymboFilter::new(plant), &exact).unwrap(), rng)
+        };
+        let (mut twin, mut rng) = run();
+        let steps: Vec<(f64, f64)> = (0..12)
+            .map(|_| {
+                let now = (twin.density().variance(), twin.excess());
+                twin.step(&mut rng).unwrap();
+                now
+            })
+            .collect();
+        let (mut twin, mut rng) = run();
+        let gap = twin.smoothed(&mut rng, &[0], 3, 4).unwrap()[0];
+        let mean = |f: fn(&(f64, f64)) -> f64| [0, 4, 8].map(|n| f(&steps[n])).iter().sum::<f64>() / 3.0;
+        assert!((gap.exact_variance - mean(|s| s.0)).abs() < 1e-12 && (gap.excess - mean(|s| s.1)).abs() < 1e-12);
+        let (mut twin, mut rng) = run();
+        let excess = twin.steady_excess(&mut rng, 4, 5).unwrap();
+        assert!((excess - steps[5..10].iter().map(|s| s.1).sum::<f64>() / 5.0).abs() < 1e-14);
+    }
+
     #[test]
     fn smoothing_without_lag_is_filtering() {
         let plant = ScalarPlant::new(0.9, 0.5, 1.0).unwrap();

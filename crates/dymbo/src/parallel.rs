@@ -252,6 +252,29 @@ mod tests {
         }
     }
 
+    /// Probabilities that all bits agree, by the orthant probabilities of two and three normal variables of equal correlation,
+    /// and the mean beside one bit, whichever of prior and noise is the wider.
+    #[test]
+    fn few_bits_have_closed_forms() {
+        use std::f64::consts::{PI, TAU};
+        for (p, r) in [(1.0, 1.0), (4e4, 0.9), (0.003, 1.7), (30.0, 2.0), (1e-9, 1e3)] {
+            for crossover in [0.0, 0.2] {
+                let link = Link::flipping(crossover).unwrap();
+                let clean = 1.0 - 2.0 * crossover;
+                let all = |k: usize| count_moments(k, p, r, &link)[k];
+                let (share, mean) = all(1);
+                assert!((share - 0.5).abs() < 1e-12);
+                let expected = clean * p / (p + r).sqrt() * (2.0 / PI).sqrt();
+                assert!((mean / expected - 1.0).abs() < 1e-9, "{p} {r}: {mean} {expected}");
+                let arc = (p / (p + r)).asin() * clean * clean;
+                assert!((all(2).0 - (0.25 + arc / TAU)).abs() < 1e-11, "{p} {r}");
+                assert!((all(3).0 - (0.125 + 1.5 * arc / TAU)).abs() < 1e-11, "{p} {r}");
+                let total: f64 = count_moments(7, p, r, &link).iter().map(|(share, _)| share).sum();
+                assert!((total - 1.0).abs() < 1e-11, "{p} {r}: {total}");
+            }
+        }
+    }
+
     #[test]
     fn counts_are_a_distribution_and_the_table_beats_the_line() {
         for (k, link) in [

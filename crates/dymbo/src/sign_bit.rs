@@ -166,6 +166,7 @@ mod tests {
     #[test]
     fn refuses_what_is_no_number() {
         assert!(SignBit::new(0.0).is_err() && expected_information(f64::NAN, &Link::PERFECT).is_err());
+        assert_eq!(SignBit::new(1.7).unwrap().noise_variance(), 1.7);
         let scheme = SignBit::new(1.0).unwrap();
         for observation in [
             Observation::Received(Sign::Above),

@@ -42,3 +42,35 @@ pub(crate) fn solve_semidefinite<const D: usize, const N: usize>(
     };
     Ok(SMatrix::from_fn(|i, j| solution[(i, j)] * scale[i]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::solve_semidefinite;
+    use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, SMatrix};
+
+    /// The coordinates of the three unknowns differ by ten orders of magnitude in their units.
+    #[test]
+    fn solutions_solve_whatever_the_unit_and_the_rank() {
+        let units = Matrix3::from_diagonal(&[1e-5, 1.0, 1e5].into());
+        let regular = Matrix3::new(2.0, 0.3, -0.4, 0.3, 1.1, 0.5, -0.4, 0.5, 1.7);
+        let columns = Matrix3x2::new(1.0, 0.5, -0.7, 2.0, 0.4, -1.3);
+        for (s, solution) in [
+            (regular, Matrix3x2::new(0.3, -1.0, 1.9, 0.2, -0.6, 0.8)),
+            // Of rank two and one: the minimum-norm solution is looked for in the range.
+            (columns * columns.transpose(), Matrix3x2::new(0.3, -1.0, 1.9, 0.2, -0.6, 0.8)),
+            (columns.column(0) * columns.column(0).transpose(), Matrix3x2::new(0.3, -1.0, 1.9, 0.2, -0.6, 0.8)),
+        ] {
+            let (s, right) = (units * s * units, units * s * solution);
+            let x = solve_semidefinite(&s, &right).unwrap();
+            let off = (s * x - right).component_div(&(units * Matrix3x2::repeat(1.0)));
+            assert!(off.amax() < 1e-9, "{off}");
+        }
+        let line = solve_semidefinite(
+            &SMatrix::<f64, 1, 1>::new(4.0),
+            &Matrix2x3::repeat(2.0).fixed_view::<1, 3>(0, 0).into(),
+        );
+        assert_eq!(line.unwrap(), SMatrix::<f64, 1, 3>::repeat(0.5));
+        let nothing = solve_semidefinite(&SMatrix::<f64, 1, 1>::new(0.0), &SMatrix::<f64, 1, 1>::new(0.0));
+        assert_eq!(nothing.unwrap()[0], 0.0);
+    }
+}

@@ -134,3 +134,39 @@ fn lagrange(share: f64) -> [f64; ORDER] {
     let total: f64 = terms.iter().sum();
     terms.map(|term| term / total)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::between;
+    use fewbits_core::Gaussian;
+    use fewbits_densities::PlaneMass;
+    use nalgebra::{Matrix2, Vector2};
+
+    #[test]
+    fn a_density_is_interpolated_between_its_nodes_and_zero_outside() {
+        let belief = Gaussian::new(Vector2::new(3.1, -7.3), Matrix2::new(1.3, 0.4, 0.4, 0.8)).unwrap();
+        let basis = Matrix2::new(0.3, 0.05, 0.0, 0.25);
+        let plane = PlaneMass::normal(&basis, &belief).unwrap();
+        let back = basis.try_inverse().unwrap();
+        let peak = belief.log_pdf(belief.mean()).unwrap().exp();
+        for offset in [[0.0, 0.0], [0.37, -0.61], [-1.9, 0.83], [2.77, 2.13], [-4.2, -2.9]] {
+            let at = belief.mean() + Vector2::from(offset);
+            let expected = belief.log_pdf(&at).unwrap().exp();
+            let ours = between(&plane, &(back * at));
+            assert!((ours - expected).abs() < 1e-6 * peak, "{offset:?}: {ours} {expected}");
+        }
+        // Up to the edge of the lattice there are values, a node beyond it there are none.
+        let [first, size] = [plane.first().map(|k| k as f64), plane.size().map(|n| n as f64)];
+        let middle = [0, 1].map(|axis| first[axis] + (0.5 * size[axis]).floor());
+        for axis in 0..2 {
+            for (end, outwards) in [(first[axis], -1.0), (first[axis] + size[axis] - 1.0, 1.0)] {
+                let mut at = Vector2::from(middle);
+                at[axis] = end;
+                assert!(between(&plane, &at) > 0.0);
+                at[axis] = end + 1.5 * outwards;
+                assert_eq!(between(&plane, &at), 0.0);
+            }
+        }
+        assert_eq!(between(&plane, &Vector2::new(f64::NAN, 0.0)), 0.0);
+    }
+}

@@ -288,6 +288,31 @@ mod tests {
         }
     }
 
+    /// Only the shapes of likelihoods count, however long the future is.
+    #[test]
+    fn smoothing_has_no_scale() {
+        let filter = PointMassFilter::new(&Ar1::new(0.9, 0.5).unwrap(), Grid::symmetric(12.0, 0.25).unwrap()).unwrap();
+        let belief = PointMass::normal(*filter.grid(), 0.4, 2.0).unwrap();
+        let future = |scale: f64| -> Vec<Vec<f64>> {
+            (0..200)
+                .map(|n| {
+                    filter
+                        .grid()
+                        .nodes()
+                        .map(|x| scale * log_pdf_with((f64::from(n)).sin(), x, 1.3).exp())
+                        .collect()
+                })
+                .collect()
+        };
+        let plain = filter.smooth(&belief, &future(1.0)).unwrap();
+        for scale in [1e-30, 1e30] {
+            let scaled = filter.smooth(&belief, &future(scale)).unwrap();
+            assert!(
+                (scaled.mean() - plain.mean()).abs() < 1e-12 && (scaled.variance() - plain.variance()).abs() < 1e-12
+            );
+        }
+    }
+
     /// Issue: the grid filters refused noise-free dynamics.
     #[test]
     fn narrow_noise_and_none_agree_with_kalman() {

@@ -326,3 +326,16 @@ impl Schedule {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::pick;
+
+    #[test]
+    fn points_at_the_total_go_to_the_last_particle_with_weight() {
+        let mut ancestors = [9; 5];
+        let points = [0.0, 0.25, 0.5, 1.0, 1.0 + 1e-9];
+        pick(&[0.25, 0.0, 0.75, 0.0, 0.0], 2, &mut ancestors, |m| points[m]);
+        assert_eq!(ancestors, [0, 2, 2, 2, 2]);
+    }
+}

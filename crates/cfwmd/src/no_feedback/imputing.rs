@@ -213,3 +213,114 @@ fn in_unit_ball<const M: usize, R: Rng + ?Sized>(rng: &mut R) -> SVector<f64, M>
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{CensoringRule, impute, impute_scalar, in_unit_ball, noise};
+    use fewbits_core::{FactoredGaussian, Gaussian};
+    use fewbits_monte_carlo::{Moments, Stream};
+    use nalgebra::{Matrix2, SVector, Vector1, Vector2};
+    use rand::Rng;
+
+    const DRAWS: usize = 20_000;
+
+    /// Mean of each entry over draws, with its standard error.
+    fn means<const K: usize>(mut draw: impl FnMut() -> [f64; K]) -> [(f64, f64); K] {
+        let mut moments = [Moments::default(); K];
+        for _ in 0..DRAWS {
+            moments.iter_mut().zip(draw()).for_each(|(m, x)| m.add(x));
+        }
+        moments.map(|m| (m.mean(), m.standard_error()))
+    }
+
+    /// Mass and moments under the law of what did not arrive, by imputed values with their weights and by weighing draws from
+    /// the innovation's law.
+    fn check<const M: usize>(
+        innovation: &FactoredGaussian<M>,
+        rule: &CensoringRule<M>,
+        loss: f64,
+        central: SVector<f64, M>,
+        own: SVector<f64, M>,
+    ) {
+        let mut rng = Stream::new(7).rng();
+        let [first, last] = [0, M - 1];
+        let features = |z: &SVector<f64, M>, w: f64| {
+            [
+                w,
+                w * z[first],
+                w * z[last],
+                w * z[first] * z[last],
+                w * z[last] * z[last],
+            ]
+        };
+        let imputed = means(|| {
+            let (z, log_weight) = impute(&mut rng, innovation, rule, loss, &central, &own);
+            features(&z, log_weight.exp())
+        });
+        let weighed = means(|| {
+            let z = central + noise(&mut rng, innovation);
+            let withheld = rule.statistic(&(z - own)) < rule.threshold();
+            features(&z, loss + if withheld { 1.0 - loss } else { 0.0 })
+        });
+        for (k, (a, b)) in imputed.iter().zip(&weighed).enumerate() {
+            assert!((a.0 - b.0).abs() < 4.5 * a.1.hypot(b.1) + 1e-12, "{k}, loss {loss}: {a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn imputed_values_have_the_law_of_what_did_not_arrive() {
+        let plane = Gaussian::new(Vector2::zeros(), Matrix2::new(2.1, 0.7, 0.7, 0.9))
+            .unwrap()
+            .factored()
+            .unwrap();
+        let line = Gaussian::new(Vector1::zeros(), Vector1::new(2.1))
+            .unwrap()
+            .factored()
+            .unwrap();
+        for loss in [0.0, 0.3] {
+            for threshold in [0.0, 1.7] {
+                if loss == 0.0 && threshold == 0.0 {
+                    continue;
+                }
+                let rule = CensoringRule::new(&Matrix2::new(1.3, -0.4, -0.4, 2.2), threshold).unwrap();
+                check(&plane, &rule, loss, Vector2::new(0.6, -1.1), Vector2::new(1.2, 0.3));
+                let rule = CensoringRule::new(&Vector1::new(1.3), threshold).unwrap();
+                check(&line, &rule, loss, Vector1::new(0.6), Vector1::new(1.9));
+            }
+        }
+        // Nothing is withheld and nothing lost: impossible.
+        let rule = CensoringRule::new(&Matrix2::identity(), 0.0).unwrap();
+        let (z, log_weight) =
+            impute(&mut Stream::new(1).rng(), &plane, &rule, 0.0, &Vector2::zeros(), &Vector2::zeros());
+        assert!(z.iter().all(|z| z.is_finite()) && log_weight == f64::NEG_INFINITY);
+    }
+
+    /// At 45 deviations the interval's probability is no longer a number above zero, but its logarithm is.
+    #[test]
+    fn an_interval_in_the_far_tail_is_still_met() {
+        let (z, log_weight) = impute_scalar(&mut Stream::new(2).rng(), 2.0, (90.0, 91.0), 0.0, 0.0);
+        assert!((90.0..91.0).contains(&z));
+        // Mills' ratio: ln Phi(-45) to 1/45^2.
+        let expected = -0.5 * 45.0 * 45.0 - (45.0 * std::f64::consts::TAU.sqrt()).ln();
+        assert!((log_weight - expected).abs() < 6e-4, "{log_weight} {expected}");
+        // With loss the value is out of reach of the interval, and the weight is the loss.
+        let (z, log_weight) = impute_scalar(&mut Stream::new(2).rng(), 2.0, (90.0, 91.0), 0.25, 0.0);
+        assert!(z < 90.0 && (log_weight - 0.25_f64.ln()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn points_are_uniform_in_the_ball() {
+        fn check<const M: usize>(rng: &mut impl Rng) {
+            let [(share, error), (sum, sum_error)] = means(|| {
+                let x: SVector<f64, M> = in_unit_ball(rng);
+                // The radius to the power of M is uniform, the direction symmetric.
+                [x.norm().powi(M as i32), x.sum()]
+            });
+            assert!((share - 0.5).abs() < 4.5 * error && error < 0.003, "{M}: {share}");
+            assert!(sum.abs() < 4.5 * sum_error);
+        }
+        let mut rng = Stream::new(3).rng();
+        check::<2>(&mut rng);
+        check::<3>(&mut rng);
+    }
+}

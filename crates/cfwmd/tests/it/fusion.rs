@@ -6,7 +6,9 @@ use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
-use fewbits_core::{Belief, Cell, Dynamics, Factor, Gaussian, Likelihood, Link, Observation, Observed, Sensing};
+use fewbits_core::{
+    Belief, Cell, Dynamics, Factor, Gaussian, Likelihood, Link, NumberFormat, Observation, Observed, Sensing,
+};
 use fewbits_densities::{GaussianCloud, Particles};
 use fewbits_filters::{CloudWorkspace, ParticleFilter, RaoBlackwellised, Resampling, Schedule, Workspace, kalman};
 use fewbits_models::{LinearSensor, ReceivedPower, constant_velocity_1d, constant_velocity_2d};
@@ -232,6 +234,44 @@ fn all_send_is_the_kalman_filter() {
         assert!((ours.covariance() - exact.covariance()).amax() < 1e-13);
     }
     assert!((ours.standard_deviations()[0] - 0.669_070_886_207).abs() < 1e-11);
+}
+
+/// Values that all arrive have the joint density of a Gaussian vector, lossy links take their share of it, and a fine format
+/// turns densities into probabilities of its cells.
+#[test]
+fn the_evidence_of_values_is_their_joint_density() {
+    let belief = prior();
+    let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.5), 1.7).unwrap();
+    let values = Vector2::new(5.1, 8.4);
+    let observations = [0, 1].map(|i| Observation::Received(Vector1::new(values[i])));
+    let h = Matrix2::new(1.0, 0.5, 1.0, 0.5);
+    let joint = Gaussian::new(h * belief.mean(), h * belief.covariance() * h.transpose() + Matrix2::identity() * 1.7);
+    let expected = joint.unwrap().log_pdf(&values).unwrap();
+    let network = |loss: f64, format: NumberFormat| {
+        Network::new(vec![sensor; 2], 0.0, Link::lossy(loss).unwrap())
+            .unwrap()
+            .with_format(format)
+    };
+    let fuse = |network: &Sensors<1>| {
+        let rules = network.rules_under(&belief).unwrap();
+        network
+            .fuse(&belief, &rules, belief.mean(), &observations)
+            .map(|(_, info)| info)
+    };
+    let fine = NumberFormat::fixed(-32.0, 32.0, 16).unwrap();
+    for loss in [0.0, 0.3] {
+        let arrival = 2.0 * f64::ln(1.0 - loss);
+        let info = fuse(&network(loss, NumberFormat::Double)).unwrap();
+        assert!((info.log_likelihood - expected - arrival).abs() < 1e-12 && info.received == 2);
+        let cells = 2.0 * (64.0 / f64::from(1 << 16)).ln();
+        let info = fuse(&network(loss, fine)).unwrap();
+        assert!((info.log_likelihood - expected - arrival - cells).abs() < 1e-3, "{info:?}");
+    }
+    // The baseline takes densities and does not ask how often values arrive.
+    let (_, info) = network(0.3, NumberFormat::Double)
+        .fuse_received(&belief, &observations)
+        .unwrap();
+    assert!((info.log_likelihood - expected).abs() < 1e-12 && info.received == 2);
 }
 
 #[test]

@@ -167,6 +167,44 @@ fn fusing_silence_pays() {
     assert!((errors[1] / errors[2] - 1.0).abs() < 0.06, "{errors:?}");
 }
 
+/// An erased report says that there was one and nothing else: the belief is the prediction.
+#[test]
+fn erased_reports_leave_the_prediction() {
+    fn check<const M: usize>(network: &Sensors<M>) {
+        let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
+        let start = Gaussian::new(Vector2::new(3.0, -2.0), Matrix2::new(2.0, 0.4, 0.4, 1.0)).unwrap();
+        let expected = kalman::predict(&dynamics, &start);
+        let n = 20_000;
+        let mut rng = Stream::new(11).rng();
+        let belief = ImputedBelief::new(&start, 2, n).unwrap();
+        let (next, _) = imputing::step(&mut rng, network, &dynamics, &belief, &[Observation::Erased; 2]).unwrap();
+        let (mean, covariance) = (*next.state().mean(), *next.state().covariance());
+        let slack = 4.5 * (expected.covariance().amax() / n as f64).sqrt();
+        assert!((mean - expected.mean()).amax() < slack, "{mean} {}", expected.mean());
+        let relative = (covariance - expected.covariance()).amax() / expected.covariance().amax();
+        assert!(relative < 4.5 * (2.0 / n as f64).sqrt(), "{covariance} {}", expected.covariance());
+    }
+    check(&scalar(0.3));
+    check(&vector());
+}
+
+/// What the centre knows of each sensor's own estimate: all of it once every report has come from a common start, and less of
+/// that which was silent.
+#[test]
+fn own_estimates_are_known_as_far_as_reports_came() {
+    let (network, dynamics, start) = (scalar(0.0), constant_velocity_1d(1.0, 4.0).unwrap(), known());
+    let mut own = LocalSensor::new(network.sensors()[1], network.threshold(), NumberFormat::Double, &start).unwrap();
+    let z = Vector1::new(21.0);
+    assert!(own.step(&mut Stream::new(1).rng(), &dynamics, &z).unwrap().is_some());
+    let belief = JointBelief::new(&start, 2).unwrap();
+    let (after, _) =
+        joint::step(&network, &dynamics, &belief, &[Observation::Nothing, Observation::Received(z)]).unwrap();
+    let [silent, sent] = [0, 1].map(|i| after.estimate(i).unwrap());
+    assert!((sent.mean() - own.estimate()).amax() < 1e-9 && sent.covariance().amax() < 1e-9);
+    assert!(silent.covariance()[(0, 0)] > 0.01);
+    assert!(after.estimate(2).is_none());
+}
+
 #[test]
 fn a_first_report_that_breaks_the_rule_is_noticed() {
     // From a known start the first prediction of every sensor is known exactly.

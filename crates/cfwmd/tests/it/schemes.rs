@@ -227,6 +227,14 @@ fn ties_are_sent_and_breaches_refused() {
     let rule = CensoringRule::scalar(4.0, 1.0).unwrap();
     assert!(rule.sends(&Vector1::new(2.0)) && !rule.sends(&Vector1::new(1.999)));
     assert!(CensoringRule::scalar(4.0, 0.0).unwrap().sends(&Vector1::new(0.0)));
+    // Rounding of 1e-9 of the statistic is forgiven, and what the format moved.
+    let none = Vector1::zeros();
+    assert!(
+        rule.check(0, &Vector1::new(2.0), &none).is_ok() && rule.check(0, &Vector1::new(2.0 - 1e-10), &none).is_ok()
+    );
+    assert!(rule.check(0, &Vector1::new(2.0 - 1e-8), &none).is_err());
+    assert!(rule.check(0, &Vector1::new(1.9), &Vector1::new(0.11)).is_ok());
+    assert!(rule.check(0, &Vector1::new(1.9), &Vector1::new(0.09)).is_err());
     let vector = CensoringRule::new(&Matrix2::new(4.0, 0.0, 0.0, 1.0), 1.0).unwrap();
     assert!(vector.sends(&Vector2::new(2.0, 0.0)) && !vector.sends(&Vector2::new(1.9, 0.1)));
     let scheme = Censoring::new(position(), rule, NumberFormat::Double).unwrap();

@@ -168,6 +168,30 @@ mod tests {
         }
     }
 
+    /// Bits that are pure noise push a trusting filter about: by `d = sqrt(2/pi) P/sqrt(P + r)` each time, so that the error's
+    /// variance is `(a^2 d^2 + q)/(1 - a^2) + d^2`, far above what the grid was first made for.
+    #[test]
+    fn a_filter_that_trusts_noise_walks_wide() {
+        for (a, q) in [(0.9, 1.0), (-0.9, 50.0)] {
+            let filter = DymboFilter::new(ScalarPlant::new(a, q, 1.0).unwrap());
+            let p = filter.plant().steady_state(filter.information()).unwrap().predicted_variance;
+            let step = std::f64::consts::FRAC_2_PI * p * p / (p + 1.0);
+            let expected = (a * a * step + q) / (1.0 - a * a) + step;
+            let ours = crossover_mse(&filter, &Link::flipping(0.5).unwrap()).unwrap();
+            assert!((ours / expected - 1.0).abs() < 1e-9, "{ours} {expected}");
+        }
+    }
+
+    /// A rounded sample of a state of unknown place errs by noise and rounding: `r + tau^2/12`.
+    #[test]
+    fn a_chain_starts_from_the_first_message() {
+        for (a, q, r, tau) in [(0.9, 0.5, 1.3, 0.7), (-0.6, 0.2, 0.8, 9.0), (1.0, 1.5, 2.0, 30.0)] {
+            let chain = ErrorChain::from_first_message(&ScalarPlant::new(a, q, r).unwrap(), tau).unwrap();
+            let expected = a * a * (r + tau * tau / 12.0) + q;
+            assert!((chain.predicted_mse() / expected - 1.0).abs() < 1e-6, "{} {expected}", chain.predicted_mse());
+        }
+    }
+
     #[test]
     fn true_losses_lie_on_their_contours() {
         let gamma = noise_ratio_at_loss(2.0, 0.95).unwrap().unwrap();
