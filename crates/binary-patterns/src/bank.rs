@@ -233,7 +233,7 @@ const LOG_COUNT: usize = 60;
 
 impl CountTable {
     pub fn new(sensor: &PatternSensor, count: usize, nodes: &Nodes) -> Self {
-        let p: Vec<[f64; 2]> = nodes.x.iter().map(|&x| sensor.probabilities(x)).collect();
+        let p = sensor.quantizer().probabilities_at(&nodes.x, sensor.noise_std());
         Self::from_probabilities(&p, count)
     }
 

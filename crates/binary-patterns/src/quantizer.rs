@@ -2,6 +2,7 @@
 
 use crate::Error;
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::kernels;
 use fewbits_numerics::normal::{interval, log_interval, pdf};
 use fewbits_quantizers::Quantizer;
 use fewbits_quantizers::quantizer::{cell_of, check_increasing};
@@ -59,6 +60,22 @@ impl BinaryQuantizer {
                 mass[bit] += interval(low, high);
             }
         });
+        mass
+    }
+
+    /// [`probabilities`](Self::probabilities) at many points, in vector registers.
+    pub fn probabilities_at(&self, points: &[f64], noise_std: f64) -> Vec<[f64; 2]> {
+        let mut mass = vec![[0.0; 2]; points.len()];
+        let (mut edges, mut inside) = (vec![f64::NEG_INFINITY; points.len()], vec![0.0; points.len()]);
+        for (cell, t) in self.breakpoints.iter().copied().chain([f64::INFINITY]).enumerate() {
+            inside.copy_from_slice(&edges);
+            edges
+                .iter_mut()
+                .zip(points)
+                .for_each(|(edge, x)| *edge = (t - x) / noise_std);
+            kernels::interval(&mut inside, &edges);
+            mass.iter_mut().zip(&inside).for_each(|(mass, p)| mass[cell % 2] += p);
+        }
         mass
     }
 
@@ -139,6 +156,18 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
+
+    #[test]
+    fn many_points_are_one_after_the_other() {
+        let quantizer = BinaryQuantizer::new(vec![-1.0, 0.5, 0.6, 9.0]).unwrap();
+        let points: Vec<f64> = (-300..300).map(|i| 0.37 * f64::from(i)).collect();
+        for noise in [1e-2, 0.7, 30.0] {
+            let one_by_one: Vec<_> = points.iter().map(|x| quantizer.probabilities(*x, noise)).collect();
+            for (many, one) in quantizer.probabilities_at(&points, noise).iter().zip(&one_by_one) {
+                assert!((0..2).all(|bit| (many[bit] - one[bit]).abs() <= 1e-15 * one[bit] + f64::MIN_POSITIVE));
+            }
+        }
+    }
 
     #[test]
     fn edges_belong_to_the_cell_above() {

@@ -20,6 +20,7 @@ impl Cell {
     ///
     /// # Errors
     /// If `lower < upper` does not hold (NaN included).
+    #[inline]
     pub fn new(lower: f64, upper: f64) -> Result<Self, ArgumentError> {
         if lower < upper {
             Ok(Self { lower, upper })
@@ -32,6 +33,7 @@ impl Cell {
     ///
     /// # Errors
     /// If the threshold is not finite.
+    #[inline]
     pub fn of_sign(sign: Sign, threshold: f64) -> Result<Self, ArgumentError> {
         error::finite("threshold", threshold)?;
         match sign {

@@ -75,6 +75,14 @@ impl<const D: usize> Gaussian<D> {
         &self.covariance
     }
 
+    /// Whether all numbers are finite: an update may run out of range.
+    #[inline]
+    pub fn is_finite(&self) -> bool {
+        // Without an early end it is a few vector instructions.
+        let finite = |numbers: &[f64]| numbers.iter().fold(true, |finite, x| finite & x.is_finite());
+        finite(self.mean.as_slice()) & finite(self.covariance.as_slice())
+    }
+
     /// Square roots of the variances.
     pub fn standard_deviations(&self) -> SVector<f64, D> {
         self.covariance.diagonal().map(|v| v.max(0.0).sqrt())

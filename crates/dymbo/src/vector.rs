@@ -6,7 +6,7 @@
 
 use crate::sign_bit::SignBit;
 use crate::{Error, sign_bit};
-use fewbits_core::{Gaussian, LinearDynamics, Link, Observation, Scheme, Sign};
+use fewbits_core::{Factor, Gaussian, LinearDynamics, Link, Observation, Scheme, Sign};
 use fewbits_filters::{SteadyState, assumed_density, kalman};
 use fewbits_models::ScalarSensor;
 use fewbits_numerics::error::{ArgumentError, finite};
@@ -126,10 +126,11 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
             bits: 1,
         };
         let covariance = predicted.covariance() - step * step.transpose();
-        if !(info.log_likelihood.is_finite() && mean.iter().chain(covariance.iter()).all(|x| x.is_finite())) {
+        let posterior = Gaussian::from_symmetric_parts(mean, covariance);
+        if !posterior.is_finite() {
             return Err(Error::IMPOSSIBLE);
         }
-        Ok((Gaussian::from_symmetric_parts(mean, covariance), info))
+        Ok((posterior, info))
     }
 
     /// The same for any threshold, by the assumed-density update with the factor of a [`SignBit`].
@@ -165,27 +166,49 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         predicted: &Gaussian<D>,
         observations: &[Observation<Sign>; M],
     ) -> Result<(Gaussian<D>, VectorInfo), Error> {
-        let (gain, covariance) = self.parallel_gain(predicted, observations)?;
+        let (crosses, mut spread) = self.innovations(predicted);
+        let (gain, covariance) = self.parallel_gain(predicted, &crosses, &spread, observations)?;
         let signs = SVector::<f64, M>::from_fn(|i, _| observations[i].received().map_or(0.0, |bit| bit.value()));
         let mut info = VectorInfo {
             log_likelihood: 0.0,
             bits: 0,
         };
-        let mut so_far = *predicted;
+        // The assumed-density update of what the sensors measure, without the state.
+        let mut mean = SVector::<f64, M>::zeros();
         for (i, observation) in observations.iter().enumerate() {
-            let threshold = self.threshold(predicted, i)?;
-            let (next, step) = self.update_at(&so_far, i, threshold, observation)?;
-            so_far = next;
-            info.log_likelihood += step.log_likelihood;
-            info.bits += step.bits;
+            let noise = self.sensors[i].noise_variance();
+            let seen = (spread[(i, i)] - noise).max(0.0);
+            let prior = Gaussian::from_symmetric_parts([mean[i]].into(), [[seen]].into());
+            let tilted = SignBit::new(noise)?
+                .factor(&0.0, observation, &self.link)?
+                .tilted(&prior)?;
+            if seen > 0.0 {
+                let gain = spread.column(i) / seen;
+                mean += gain * (tilted.mean[0] - mean[i]);
+                spread -= gain * gain.transpose() * (seen - tilted.covariance[0]);
+            }
+            info.log_likelihood += tilted.log_evidence;
+            info.bits += u32::from(observation.received().is_some());
         }
         Ok((Gaussian::from_trusted_parts(predicted.mean() + gain * signs, covariance), info))
+    }
+
+    /// Covariances of the innovations with the state, and with one another.
+    fn innovations(&self, predicted: &Gaussian<D>) -> ([SVector<f64, D>; M], SMatrix<f64, M, M>) {
+        let crosses = self.sensors.map(|sensor| predicted.covariance() * sensor.direction());
+        let spread = SMatrix::from_fn(|i, j| {
+            let noise = if i == j { self.sensors[i].noise_variance() } else { 0.0 };
+            self.sensors[i].direction().dot(&crosses[j]) + noise
+        });
+        (crosses, spread)
     }
 
     /// Gain and posterior covariance; sensors that were not received have no gain.
     fn parallel_gain(
         &self,
         predicted: &Gaussian<D>,
+        crosses: &[SVector<f64, D>; M],
+        spread: &SMatrix<f64, M, M>,
         observations: &[Observation<Sign>; M],
     ) -> Result<(SMatrix<f64, D, M>, SMatrix<f64, D, D>), Error> {
         if M == 0 {
@@ -193,10 +216,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         }
         let information = sign_bit::information(&self.link);
         let received = |i: usize| observations[i].received().is_some();
-        let crosses = self.sensors.map(|sensor| predicted.covariance() * sensor.direction());
-        let deviations = SVector::<f64, M>::from_fn(|i, _| {
-            (self.sensors[i].direction().dot(&crosses[i]) + self.sensors[i].noise_variance()).sqrt()
-        });
+        let deviations = spread.diagonal().map(f64::sqrt);
         let with_state = SMatrix::<f64, D, M>::from_fn(|d, i| {
             if received(i) {
                 crosses[i][d] * (information.sqrt() / deviations[i])
@@ -204,18 +224,15 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
                 0.0
             }
         });
-        let bits = SMatrix::<f64, M, M>::from_fn(|i, j| {
-            if i == j {
-                // asin near 1 would turn a rounding error of 1e-16 into 1e-8.
-                return 1.0;
+        // Cholesky reads the lower triangle. asin near 1 would turn a rounding error of 1e-16 into 1e-8.
+        let mut bits = SMatrix::<f64, M, M>::identity();
+        for (i, j) in (0..M).flat_map(|i| (0..i).map(move |j| (i, j))) {
+            if received(i) && received(j) {
+                let correlation = spread[(i, j)] / (deviations[i] * deviations[j]);
+                bits[(i, j)] = information * correlation.clamp(-1.0, 1.0).asin();
             }
-            if !(received(i) && received(j)) {
-                return 0.0;
-            }
-            let correlation = self.sensors[i].direction().dot(&crosses[j]) / (deviations[i] * deviations[j]);
-            information * correlation.clamp(-1.0, 1.0).asin()
-        });
-        let factor = Cholesky::new(symmetrised(&bits)).ok_or(fewbits_filters::Error::SingularInnovation)?;
+        }
+        let factor = Cholesky::new(bits).ok_or(fewbits_filters::Error::SingularInnovation)?;
         let gain = factor.solve(&with_state.transpose()).transpose();
         Ok((gain, predicted.covariance() - gain * with_state.transpose()))
     }
@@ -238,7 +255,10 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
     /// [`Error::NotConverged`].
     pub fn parallel_steady_state(&self) -> Result<SteadyState<D>, Error> {
         let bits = [Observation::Received(Sign::Above); M];
-        self.settle(|predicted| Ok(self.parallel_gain(predicted, &bits)?.1))
+        self.settle(|predicted| {
+            let (crosses, spread) = self.innovations(predicted);
+            Ok(self.parallel_gain(predicted, &crosses, &spread, &bits)?.1)
+        })
     }
 
     fn settle(
@@ -383,6 +403,27 @@ mod tests {
         assert_eq!(blind.update_parallel(&belief(), &[]).unwrap().0, belief());
         let alone = blind.sequential_steady_state().unwrap();
         assert!((alone.filtered_covariance - dynamics().stationary_covariance().unwrap()).amax() < 1e-11);
+    }
+
+    /// The likelihood of several bits is that of one after the other, each folded into the state.
+    #[test]
+    fn several_bits_are_as_likely_as_one_after_the_other() {
+        let sensors =
+            [[1.0, 0.5], [-0.3, 2.0], [0.0, 0.0], [0.8, 0.8]].map(|h| ScalarSensor::scalar(h.into(), 0.7).unwrap());
+        for link in [Link::PERFECT, Link::new(0.2, 0.1).unwrap()] {
+            let filter = SignFilter::new(dynamics(), sensors).with_link(link);
+            for last in [ABOVE, BELOW, Observation::Erased] {
+                let bits = [ABOVE, BELOW, ABOVE, last];
+                let (mut belief_so_far, mut log_likelihood) = (belief(), 0.0);
+                for (i, bit) in bits.iter().enumerate() {
+                    let threshold = filter.threshold(&belief(), i).unwrap();
+                    let (next, info) = filter.update_at(&belief_so_far, i, threshold, bit).unwrap();
+                    (belief_so_far, log_likelihood) = (next, log_likelihood + info.log_likelihood);
+                }
+                let together = filter.update_parallel(&belief(), &bits).unwrap().1;
+                assert!((together.log_likelihood - log_likelihood).abs() < 1e-13);
+            }
+        }
     }
 
     #[test]

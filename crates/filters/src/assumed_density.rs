@@ -84,8 +84,9 @@ fn update_at<const D: usize, const M: usize>(
         gain,
     };
     let mean = belief.mean() + gain * correction;
-    if !mean.iter().chain(covariance.iter()).all(|x| x.is_finite()) {
+    let posterior = Gaussian::from_symmetric_parts(mean, covariance);
+    if !posterior.is_finite() {
         return Err(Error::IMPOSSIBLE);
     }
-    Ok((Gaussian::from_symmetric_parts(mean, covariance), info))
+    Ok((posterior, info))
 }

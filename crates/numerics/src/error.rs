@@ -19,6 +19,7 @@ pub struct ArgumentError {
 
 impl ArgumentError {
     /// Builds the error from any printable value.
+    #[cold]
     pub fn new(name: &'static str, value: impl std::fmt::Display, expected: impl Into<String>) -> Self {
         Self {
             name,
@@ -29,6 +30,7 @@ impl ArgumentError {
 }
 
 /// Returns `value` if `accepted` holds of it, the error otherwise.
+#[inline]
 fn require(
     name: &'static str,
     value: f64,
@@ -43,21 +45,25 @@ fn require(
 }
 
 /// Accepts any finite number.
+#[inline]
 pub fn finite(name: &'static str, value: f64) -> Result<f64, ArgumentError> {
     require(name, value, f64::is_finite, "a finite number")
 }
 
 /// Accepts finite numbers above zero.
+#[inline]
 pub fn positive(name: &'static str, value: f64) -> Result<f64, ArgumentError> {
     require(name, value, |v| v.is_finite() && v > 0.0, "a finite number above 0")
 }
 
 /// Accepts finite numbers from zero up.
+#[inline]
 pub fn non_negative(name: &'static str, value: f64) -> Result<f64, ArgumentError> {
     require(name, value, |v| v.is_finite() && v >= 0.0, "a finite number, 0 or above")
 }
 
 /// Accepts numbers in the closed interval `[low, high]`.
+#[inline]
 pub fn within(name: &'static str, value: f64, low: f64, high: f64) -> Result<f64, ArgumentError> {
     if (low..=high).contains(&value) {
         Ok(value)

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::moments::{Table, moments};
 use crate::scene::Feature;
 use crate::system::{SensorGroup, System};
-use fewbits_numerics::normal;
+use fewbits_numerics::{kernels, normal};
 
 /// A group whose breakpoints may move.
 #[derive(Debug, Clone)]
@@ -72,8 +72,10 @@ impl<'a> Active<'a> {
             .map(|cell| {
                 let lower = if cell == 0 { f64::NEG_INFINITY } else { b[cell - 1] };
                 let upper = b.get(cell).copied().unwrap_or(f64::INFINITY);
-                let inside = |m: &f64| normal::interval((lower - m) / self.sd, (upper - m) / self.sd);
-                self.means.iter().map(inside).collect()
+                let standardised = |edge: f64| self.means.iter().map(move |m| (edge - m) / self.sd).collect();
+                let (mut inside, upper): (Vec<f64>, Vec<f64>) = (standardised(lower), standardised(upper));
+                kernels::interval(&mut inside, &upper);
+                inside
             })
             .collect()
     }

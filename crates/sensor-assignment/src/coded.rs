@@ -87,7 +87,7 @@ impl CodedSensors {
                 noise_stds
                     .iter()
                     .map(|&noise| {
-                        let p: Vec<[f64; 2]> = nodes.x.iter().map(|&x| quantizer.probabilities(x, noise)).collect();
+                        let p = quantizer.probabilities_at(&nodes.x, noise);
                         [p.iter().map(|p| p[0]).collect(), p.iter().map(|p| p[1]).collect()]
                     })
                     .collect()

@@ -78,17 +78,24 @@ pub fn pair_cost(sensors: &CodedSensors, bit: usize, sensor: usize) -> f64 {
     } else {
         gauss_legendre::<12>()
     };
-    let mut cost = 0.0;
+    let (mut points, mut weights) = (Vec::new(), Vec::new());
     // The code is symmetric up to its first bit, and so is the cost.
     for cell in cells / 2..cells {
         let landing = flipped_centre(cell, bit, cells, v);
         let low = v * (2.0 * cell as f64 - cells as f64) / cells as f64;
         let middle = low + 0.5 * width;
         let right = quantizer.breakpoints().partition_point(|&t| t <= middle) % 2;
-        cost += rule.composite(low, low + width, panels, |x| {
-            (x - landing) * (x - landing) * quantizer.probabilities(x, noise)[1 - right]
-        });
+        for (x, w) in rule.panels(low, low + width, panels) {
+            points.push(x);
+            weights.push((1 - right, w * (x - landing) * (x - landing)));
+        }
     }
+    let probabilities = quantizer.probabilities_at(&points, noise);
+    let cost: f64 = weights
+        .iter()
+        .zip(&probabilities)
+        .map(|((wrong, w), p)| w * p[*wrong])
+        .sum();
     cost / v
 }
 

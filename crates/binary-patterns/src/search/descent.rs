@@ -203,7 +203,7 @@ impl<'a> Kernel<'a> {
                 descent
                     .candidates
                     .iter()
-                    .map(|q| nodes.x.iter().map(|&x| q.probabilities(x, noise)).collect())
+                    .map(|q| q.probabilities_at(&nodes.x, noise))
                     .collect()
             })
             .collect();

@@ -229,8 +229,11 @@ impl OutcomeTree {
                 gradient.fill(0.0);
                 return f64::INFINITY;
             };
-            for (i, &x) in self.nodes.x.iter().enumerate() {
-                let [p0, p1] = quantizer.probabilities(x, self.noise[n]);
+            for (i, [p0, p1]) in quantizer
+                .probabilities_at(&self.nodes.x, self.noise[n])
+                .into_iter()
+                .enumerate()
+            {
                 self.p[n][0][i] = p0;
                 self.p[n][1][i] = p1;
             }

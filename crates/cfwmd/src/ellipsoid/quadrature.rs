@@ -33,9 +33,9 @@ fn tame(variances: &[f64], means: &[f64], eta: f64, reach: f64) -> bool {
 }
 
 /// Visits nodes and weights of a quadrature over `theta` in `[-pi/2, pi/2]` that integrates `exp(f)`, a function with one mode,
-/// for independent components `q_j ~ N(b_j, w_j)` in a ball of squared radius `eta`. Hands on `f` and the logarithm of the weight.
-fn integrate(variances: &[f64], means: &[f64], eta: f64, f: impl Fn(f64) -> f64, mut visit: impl FnMut(f64, f64, f64)) {
-    let mut node = |(theta, w): (f64, f64)| visit(theta, f(theta), w.ln());
+/// for independent components `q_j ~ N(b_j, w_j)` in a ball of squared radius `eta`.
+fn integrate(variances: &[f64], means: &[f64], eta: f64, f: impl Fn(f64) -> f64, mut visit: impl FnMut(f64, f64)) {
+    let mut node = |(theta, w): (f64, f64)| visit(theta, w);
     if tame(variances, means, eta, NEAR) {
         return panel(-FRAC_PI_2, FRAC_PI_2).for_each(node);
     }
@@ -142,8 +142,8 @@ pub(super) fn log_mass(variances: &[f64], means: &[f64], eta: f64) -> f64 {
         log_density + log_mass(inner_variances, inner_means, left)
     };
     let mut sum = LogSum::default();
-    integrate(variances, means, eta, integrand, |_, log_value, log_weight| {
-        sum.add(log_value + log_weight);
+    integrate(variances, means, eta, &integrand, |theta, weight| {
+        sum.add(integrand(theta) + weight.ln());
     });
     sum.value()
 }
@@ -242,11 +242,12 @@ pub(super) fn moments<const M: usize>(
     if inner.is_empty() {
         let (radius, deviation) = (eta.sqrt(), w.sqrt());
         let (low, high) = ((-radius - b) / deviation, (radius - b) / deviation);
-        let mut interval = Moments::with_mass(normal::log_interval(low, high));
-        if let Ok(cut) = normal::truncated_moments(low, high) {
-            interval.mean[first] = b + deviation * cut.mean;
-            interval.covariance[(first, first)] = w * cut.variance;
-        }
+        let Ok(cut) = normal::truncated_moments(low, high) else {
+            return Moments::with_mass(f64::NEG_INFINITY);
+        };
+        let mut interval = Moments::with_mass(cut.log_probability);
+        interval.mean[first] = b + deviation * cut.mean;
+        interval.covariance[(first, first)] = w * cut.variance;
         return interval;
     }
     let leading = leading(*w, *b, eta);
@@ -256,11 +257,11 @@ pub(super) fn moments<const M: usize>(
     };
     let mut sum = LogSum::default();
     let mut total = Moments::with_mass(0.0);
-    integrate(variances, tail, eta, integrand, |theta, log_value, log_weight| {
-        let share = sum.add(log_value + log_weight);
+    integrate(variances, tail, eta, integrand, |theta, weight| {
+        let (q, left, log_density) = leading(theta);
+        let mut slice: Moments<M> = moments(inner, means, first + 1, left);
+        let share = sum.add(slice.log_mass + log_density + weight.ln());
         if share > 0.0 {
-            let (q, left, _) = leading(theta);
-            let mut slice: Moments<M> = moments(inner, means, first + 1, left);
             slice.mean[first] = q;
             // The mixture of what was there and the slice, free of the cancellation of raw moments.
             let step = slice.mean - total.mean;

@@ -48,6 +48,7 @@ impl InCell {
     ///
     /// # Errors
     /// If `r` is not positive, `floor` or `share` is negative, their sum exceeds one, or both are zero.
+    #[inline]
     pub fn new(cell: Cell, noise_variance: f64, floor: f64, share: f64) -> Result<Self, ArgumentError> {
         positive("noise_variance", noise_variance)?;
         fewbits_numerics::error::within("floor", floor, 0.0, 1.0)?;
@@ -60,7 +61,7 @@ impl InCell {
             deviation: noise_variance.sqrt(),
             floor,
             share,
-            log_share: share.ln(),
+            log_share: if share < 1.0 { share.ln() } else { 0.0 },
         })
     }
 
@@ -76,6 +77,7 @@ impl InCell {
     ///
     /// # Errors
     /// If `threshold` is not finite or `r` not positive.
+    #[inline]
     pub fn sign(sign: Sign, threshold: f64, noise_variance: f64, link: &Link) -> Result<Self, ArgumentError> {
         let (arrives, crossover) = (1.0 - link.loss(), link.crossover());
         let cell = Cell::of_sign(sign, threshold)?;
@@ -140,31 +142,22 @@ impl InCell {
         }
     }
 
-    /// `ln(floor + share exp(log_inside))`.
+    /// `ln P`, mean and variance of a standard normal variable in `[a, b)`, if the cell is within reach of the numbers.
     #[inline]
-    fn mixed(&self, log_inside: f64) -> f64 {
-        if self.floor == 0.0 {
-            self.log_share + log_inside
-        } else {
-            (self.floor + self.share * log_inside.exp()).ln()
-        }
-    }
-
-    /// `ln P`, mean and variance of a standard normal variable in `[a, b)`.
-    fn standard(a: f64, b: f64) -> Result<(f64, f64, f64), Error> {
+    fn standard(a: f64, b: f64) -> Option<(f64, f64, f64)> {
         if b == f64::INFINITY && a == f64::NEG_INFINITY {
-            return Ok((0.0, 0.0, 1.0));
+            return Some((0.0, 0.0, 1.0));
         }
         if b == f64::INFINITY {
             let above = normal::one_sided(-a);
-            return Ok((above.log_probability, above.mean, above.variance));
+            return Some((above.log_probability, above.mean, above.variance));
         }
         if a == f64::NEG_INFINITY {
             let below = normal::one_sided(b);
-            return Ok((below.log_probability, -below.mean, below.variance));
+            return Some((below.log_probability, -below.mean, below.variance));
         }
-        let inside = normal::truncated_moments(a, b).map_err(|_| Error::Impossible)?;
-        Ok((inside.log_probability, inside.mean, inside.variance))
+        let inside = normal::truncated_moments(a, b).ok()?;
+        Some((inside.log_probability, inside.mean, inside.variance))
     }
 }
 
@@ -225,31 +218,28 @@ impl Factor<1> for InCell {
 
     /// The measurement `m + n ~ N(mu, s^2)`, `s^2 = v + r`, is truncated to the cell; `m` follows it with gain `v / s^2` and is
     /// mixed with the prior where the floor may have caused the observation.
+    #[inline]
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         let (mean, v) = (prior.mean()[0], prior.covariance()[0]);
         let total = v + self.variance;
         let s = total.sqrt();
-        let (log_inside, inside_mean, inside_variance) =
-            Self::standard((self.cell.lower() - mean) / s, (self.cell.upper() - mean) / s).or_else(|error| {
-                // A cell out of reach of the numbers can still be blamed on the floor.
-                if self.floor > 0.0 {
-                    Ok((f64::NEG_INFINITY, 0.0, 1.0))
-                } else {
-                    Err(error)
-                }
-            })?;
-        let log_evidence = self.mixed(log_inside);
+        let standard = Self::standard((self.cell.lower() - mean) / s, (self.cell.upper() - mean) / s);
+        // A cell out of reach of the numbers can still be blamed on the floor.
+        let out_of_reach = (self.floor > 0.0).then_some((f64::NEG_INFINITY, 0.0, 1.0));
+        let (log_inside, inside_mean, inside_variance) = standard.or(out_of_reach).ok_or(Error::Impossible)?;
         let gain = v / total;
         let shift = gain * s * inside_mean;
         let inside = gain * (self.variance + v * inside_variance);
         if self.floor == 0.0 {
-            return Tilted::scalar(log_evidence, mean + shift, inside);
+            return Tilted::scalar(self.log_share + log_inside, mean + shift, inside);
         }
-        let blame = (self.log_share + log_inside - log_evidence).exp().min(1.0);
+        let by_cell = self.share * log_inside.exp();
+        let evidence = self.floor + by_cell;
+        let blame = by_cell / evidence;
         if blame == 0.0 {
-            return Tilted::scalar(log_evidence, mean, v);
+            return Tilted::scalar(evidence.ln(), mean, v);
         }
         let variance = (1.0 - blame) * v + blame * inside + blame * (1.0 - blame) * shift * shift;
-        Tilted::scalar(log_evidence, mean + blame * shift, variance)
+        Tilted::scalar(evidence.ln(), mean + blame * shift, variance)
     }
 }

@@ -84,6 +84,7 @@ impl<const M: usize> Tilted<M> {
 
 impl Tilted<1> {
     /// A scalar posterior, if its numbers are numbers.
+    #[inline]
     pub(crate) fn scalar(log_evidence: f64, mean: f64, variance: f64) -> Result<Self, Error> {
         if !(log_evidence.is_finite() && mean.is_finite() && variance.is_finite()) {
             return Err(Error::Impossible);

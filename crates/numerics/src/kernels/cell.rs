@@ -52,41 +52,63 @@ fn series(middle: f64, half_width: f64) -> f64 {
     1.0 + rest
 }
 
-/// `WIDE` promises that no cell is narrow: the series is then left out, and the bits are the same.
+/// A narrow cell.
 #[inline(always)]
-fn parts<const WIDE: bool>(a: f64, b: f64) -> Parts {
-    let leans_right = a + b > 0.0;
-    let (lower, upper) = (select(leans_right, -b, a), select(leans_right, -a, b));
+fn thin(lower: f64, upper: f64) -> Parts {
     let (width, sum) = (upper - lower, lower + upper);
     let middle = 0.5 * sum;
-    // |middle| = -middle here, and 1 where that is less.
-    let steepness = select(middle < -1.0, -middle, 1.0);
-    let narrow = !WIDE && width * steepness < NARROW;
-    let left = upper <= 0.0;
     // Two-sum: what rounding took from the middle matters once its square is in the exponent.
     let virtual_lower = sum - upper;
     let middle_lost = 0.5 * ((lower - virtual_lower) + (upper - (sum - virtual_lower)));
+    let (high, low) = half_square(middle);
+    Parts {
+        mass: INV_SQRT_2PI * width * series(middle, 0.5 * width),
+        lost: 0.0,
+        high,
+        low: low + middle * middle_lost,
+    }
+}
 
+/// `WIDE` promises that no cell is narrow: the series is then left out. `ALONE` computes only the form that is kept. The bits are the
+/// same.
+#[inline(always)]
+fn parts<const WIDE: bool, const ALONE: bool>(a: f64, b: f64) -> Parts {
+    let leans_right = a + b > 0.0;
+    let (lower, upper) = (select(leans_right, -b, a), select(leans_right, -a, b));
+    let (width, sum) = (upper - lower, lower + upper);
+    // |middle| = -middle here, and 1 where that is less.
+    let steepness = select(sum < -2.0, -0.5 * sum, 1.0);
+    let narrow = !WIDE && width * steepness < NARROW;
+    if ALONE && narrow {
+        return thin(lower, upper);
+    }
+    let left = upper <= 0.0;
     let (near, far) = (scaled_tail(upper.abs()), scaled_tail(lower.abs()));
     let (lower_high, lower_low) = half_square(lower);
     let (upper_high, upper_low) = half_square(upper);
     let far_decay = exp_sum(select(left, 0.5 * width * sum, -lower_high), select(left, 0.0, -lower_low));
-    let near_decay = exp_sum(-upper_high, -upper_low);
-    let outside = far * far_decay + near * near_decay;
-    let rest = 1.0 - outside;
-    let wide = select(left, near - far * far_decay, rest);
-    let wide_lost = select(left, 0.0, (1.0 - rest) - outside);
-    let (middle_high, middle_low) = half_square(middle);
-    let thin = if WIDE {
+    let near_decay = if ALONE && left {
         0.0
     } else {
-        INV_SQRT_2PI * width * series(middle, 0.5 * width)
+        exp_sum(-upper_high, -upper_low)
     };
+    let outside = far * far_decay + near * near_decay;
+    let rest = 1.0 - outside;
+    let wide = Parts {
+        mass: select(left, near - far * far_decay, rest),
+        lost: select(left, 0.0, (1.0 - rest) - outside),
+        high: select(left, upper_high, 0.0),
+        low: select(left, upper_low, 0.0),
+    };
+    if WIDE || ALONE {
+        return wide;
+    }
+    let thin = thin(lower, upper);
     Parts {
-        mass: select(narrow, thin, wide),
-        lost: select(narrow, 0.0, wide_lost),
-        high: select(narrow, middle_high, select(left, upper_high, 0.0)),
-        low: select(narrow, middle_low + middle * middle_lost, select(left, upper_low, 0.0)),
+        mass: select(narrow, thin.mass, wide.mass),
+        lost: select(narrow, thin.lost, wide.lost),
+        high: select(narrow, thin.high, wide.high),
+        low: select(narrow, thin.low, wide.low),
     }
 }
 
@@ -96,18 +118,18 @@ pub const WIDE: f64 = 1.0 + 1e-9;
 /// `ln(Phi(b) - Phi(a))`: within eight units in the last place for cells given exactly; `-inf` for `a >= b`.
 #[inline(always)]
 pub fn log_interval(a: f64, b: f64) -> f64 {
-    log_interval_of::<false>(a, b)
+    log_interval_of::<false, false>(a, b)
 }
 
 /// The same bits, cheaper, for `b - a` of at least [`WIDE`] before rounding.
 #[inline(always)]
 pub fn log_interval_wide(a: f64, b: f64) -> f64 {
-    log_interval_of::<true>(a, b)
+    log_interval_of::<true, false>(a, b)
 }
 
 #[inline(always)]
-fn log_interval_of<const WIDE: bool>(a: f64, b: f64) -> f64 {
-    let Parts { mass, lost, high, low } = parts::<WIDE>(a, b);
+pub(crate) fn log_interval_of<const WIDE: bool, const ALONE: bool>(a: f64, b: f64) -> f64 {
+    let Parts { mass, lost, high, low } = parts::<WIDE, ALONE>(a, b);
     let low = select(high == f64::INFINITY, 0.0, low);
     let value = ln_corrected(mass, lost * (2.0 - mass)) - (high + low);
     select(a >= b, f64::NEG_INFINITY, value)
@@ -116,18 +138,18 @@ fn log_interval_of<const WIDE: bool>(a: f64, b: f64) -> f64 {
 /// `Phi(b) - Phi(a)`: within ten units in the last place for cells given exactly; 0 for `a >= b`.
 #[inline(always)]
 pub fn interval(a: f64, b: f64) -> f64 {
-    interval_of::<false>(a, b)
+    interval_of::<false, false>(a, b)
 }
 
 /// The same bits, cheaper, for `b - a` of at least [`WIDE`] before rounding.
 #[inline(always)]
 pub fn interval_wide(a: f64, b: f64) -> f64 {
-    interval_of::<true>(a, b)
+    interval_of::<true, false>(a, b)
 }
 
 #[inline(always)]
-fn interval_of<const WIDE: bool>(a: f64, b: f64) -> f64 {
-    let Parts { mass, high, low, .. } = parts::<WIDE>(a, b);
+pub(crate) fn interval_of<const WIDE: bool, const ALONE: bool>(a: f64, b: f64) -> f64 {
+    let Parts { mass, high, low, .. } = parts::<WIDE, ALONE>(a, b);
     select(a >= b, 0.0, mass * exp_sum(-high, -low))
 }
 

@@ -4,8 +4,8 @@
 //! slice. The central choice: **every function exists once, as a scalar function without branches, calls or tables**
 //! ([`scalar`]), and a sweep is a plain loop over it, compiled for each instruction set and dispatched once per slice
 //! ([`vectorised`]). The compiler turns the loop into vector code because nothing in it forbids that; selects take the place
-//! of branches, so both sides of a case distinction are computed and one is kept. Its cost: a single scalar call computes both
-//! sides too. Its gain: scalar functions, sweeps of any length and machines of any width give **the same bits**, since
+//! of branches, so both sides of a case distinction are computed and one is kept; single calls of [`normal`](crate::normal) branch
+//! where that saves work. The gain: scalar functions, sweeps of any length and machines of any width give **the same bits**, since
 //! elementwise arithmetic is the same in a vector register, nothing is contracted to fused multiply-adds, and reductions run in
 //! a fixed number of lanes.
 //!

@@ -34,6 +34,7 @@ pub use one_sided::{OneSided, one_sided, one_sided_variance};
 pub use quantile::quantile;
 pub use truncated::{TruncatedMoments, sample_truncated, truncated_moments};
 
+use crate::kernels::cell::{interval_of, log_interval_of};
 use crate::kernels::elementary::{ln_corrected, ln_one_minus};
 use crate::kernels::scalar;
 use crate::kernels::tail::{cut, scaled_tail};
@@ -93,7 +94,7 @@ pub fn log_cdf(x: f64) -> f64 {
 
 /// `Phi(b) - Phi(a)` for `a <= b`, accurate relative to itself; 0 for `a >= b`.
 pub fn interval(a: f64, b: f64) -> f64 {
-    scalar::interval(a, b)
+    interval_of::<false, true>(a, b)
 }
 
 /// `ln(Phi(b) - Phi(a))` for `a < b`, exact in both tails and for narrow intervals; `-inf` for `a >= b`.
@@ -102,7 +103,7 @@ pub fn interval(a: f64, b: f64) -> f64 {
 /// `exp(-b^2/2)` of its inner edge is taken out; what remains is a difference of two scaled tails or, where these would cancel,
 /// a power series around the middle.
 pub fn log_interval(a: f64, b: f64) -> f64 {
-    scalar::log_interval(a, b)
+    log_interval_of::<false, true>(a, b)
 }
 
 /// Inverse Mills ratio `phi(x) / Phi(x)`, positive and decreasing; `~ -x` in the left tail.

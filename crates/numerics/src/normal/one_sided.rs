@@ -1,8 +1,8 @@
 //! The variance of a normal variable beyond a cut.
 
-use super::inverse_mills;
+use super::{INV_SQRT_2PI, inverse_mills};
 use crate::kernels::elementary::polynomial;
-use crate::kernels::tail::cut;
+use crate::kernels::tail::{cut, scaled_tail};
 
 /// Where the rational approximation in the cut hands over to the one in its inverse square.
 const SPLIT: f64 = 4.0;
@@ -85,7 +85,7 @@ fn variance_with_mean(x: f64, mean: f64) -> f64 {
 /// What is known of a standard normal variable that exceeds `-x`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OneSided {
-    /// `ln Phi(x)`, as [`log_cdf`](super::log_cdf) gives it.
+    /// `ln Phi(x)`, as [`log_cdf`](super::log_cdf) gives it, to rounding.
     pub log_probability: f64,
     /// Its mean `phi(x)/Phi(x)`, as [`inverse_mills`] gives it.
     pub mean: f64,
@@ -93,17 +93,22 @@ pub struct OneSided {
     pub variance: f64,
 }
 
-/// Probability, mean and variance beyond a cut together, for the price of one scaled tail and one exponential.
+/// Probability, mean and variance beyond a cut together, for the price of one scaled tail and at most one exponential.
+#[inline]
 pub fn one_sided(x: f64) -> OneSided {
+    if x <= 0.0 {
+        let scaled = scaled_tail(-x);
+        return OneSided {
+            log_probability: scaled.ln() - 0.5 * x * x,
+            mean: INV_SQRT_2PI / scaled,
+            variance: one_sided_variance(x),
+        };
+    }
     let cut = cut(x);
     let mean = cut.inverse_mills(x);
     OneSided {
-        log_probability: cut.log_cdf(x),
+        log_probability: (-cut.outside).ln_1p(),
         mean,
-        variance: if x > 0.0 {
-            variance_with_mean(x, mean)
-        } else {
-            one_sided_variance(x)
-        },
+        variance: variance_with_mean(x, mean),
     }
 }

@@ -92,11 +92,7 @@ impl<'a> Walk<'a> {
         let mut tables = Vec::with_capacity(kinds);
         for mask in 1..=kinds {
             let quantizer = linear_pattern(mask as Mask, search.bits)?.on(&search.grid)?;
-            let p: Vec<[f64; 2]> = nodes
-                .x
-                .iter()
-                .map(|&x| quantizer.probabilities(x, search.noise_std))
-                .collect();
+            let p = quantizer.probabilities_at(&nodes.x, search.noise_std);
             tables.push(
                 (1..=search.sensors)
                     .map(|count| CountTable::from_probabilities(&p, count))
