@@ -142,7 +142,7 @@ pub(super) fn log_mass(variances: &[f64], means: &[f64], eta: f64) -> f64 {
         log_density + log_mass(inner_variances, inner_means, left)
     };
     let mut sum = LogSum::default();
-    integrate(variances, means, eta, &integrand, |theta, weight| {
+    integrate(variances, means, eta, integrand, |theta, weight| {
         sum.add(integrand(theta) + weight.ln());
     });
     sum.value()

@@ -4,6 +4,7 @@ use crate::Silence;
 use fewbits_cfwmd::censored::EllipsoidSilence;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::CensoringRule;
+use fewbits_cfwmd::threshold::threshold;
 use fewbits_cfwmd::trigger::{StochasticTrigger, Triggered};
 use fewbits_core::laws::factor::{is_a_number, sweep_is_scalar};
 use fewbits_core::{Dynamics, Factor, Gaussian, Link, Observation, Scheme, Sensing};
@@ -249,4 +250,56 @@ fn sweeps_of_ellipsoids_and_triggers_are_the_scalar() {
             sweep_is_scalar(&bump, &lines).unwrap();
         }
     }
+}
+
+/// Evidence and moments of a silent vector sensor under a belief of its measurement, by summing over a lattice.
+#[test]
+fn vector_moments_are_the_sums_over_a_lattice() {
+    let rule = CensoringRule::new(&Matrix2::new(2.0, 0.5, 0.5, 1.2), 1.9).unwrap();
+    let noise = Matrix2::new(0.9, -0.2, -0.2, 0.6);
+    let prior = Gaussian::new(Vector2::new(1.1, -0.4), Matrix2::new(1.5, 0.6, 0.6, 2.1)).unwrap();
+    for loss in [0.0, 0.3] {
+        let link = Link::lossy(loss).unwrap();
+        let silence = EllipsoidSilence::new(&rule, &Vector2::new(0.2, 0.5), &noise, &link).unwrap();
+        let (n, h) = (110, 0.15);
+        let (mut mass, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
+        for m in (-n..=n).flat_map(|i| (-n..=n).map(move |j| Vector2::new(f64::from(i), f64::from(j)) * h)) {
+            let p = h * h * (prior.log_pdf(&m).unwrap() + silence.log_likelihood(&m)).exp();
+            mass += p;
+            first += m * p;
+            second += m * m.transpose() * p;
+        }
+        let mean = first / mass;
+        let tilted = silence.tilted(&prior).unwrap();
+        assert!((tilted.log_evidence - mass.ln()).abs() < 1e-8, "{loss}: {}", tilted.log_evidence - mass.ln());
+        assert!((tilted.mean - mean).amax() < 1e-8);
+        assert!((tilted.covariance - (second / mass - mean * mean.transpose())).amax() < 1e-8);
+    }
+}
+
+/// Under the broadcast's own belief a sensor is silent with one less its rate; an erased report changes nothing.
+#[test]
+fn silence_has_the_probability_of_the_rule() {
+    let belief = Gaussian::new(Vector2::new(1.0, 10.0), Matrix2::new(3.0, 1.0, 1.0, 2.0)).unwrap();
+    let (rate, loss) = (0.35, 0.2);
+    let link = Link::lossy(loss).unwrap();
+    let expected = f64::ln(loss + (1.0 - loss) * (1.0 - rate));
+    let line = LinearSensor::scalar(Vector2::new(1.0, 0.3), 1.7).unwrap();
+    let one = Network::new(vec![line], threshold(rate, 1).unwrap(), link).unwrap();
+    let rules = one.rules_under(&belief).unwrap();
+    let (_, info) = one
+        .fuse(&belief, &rules, belief.mean(), &[Observation::Nothing])
+        .unwrap();
+    assert!((info.log_likelihood - expected).abs() < 1e-9 && info.received == 0);
+    let plane = LinearSensor::new(Matrix2::identity(), Matrix2::new(2.0, 0.0, 0.0, 4.0)).unwrap();
+    let two = Network::new(vec![plane], threshold(rate, 2).unwrap(), link).unwrap();
+    let rules = two.rules_under(&belief).unwrap();
+    let (_, info) = two
+        .fuse(&belief, &rules, belief.mean(), &[Observation::Nothing])
+        .unwrap();
+    assert!((info.log_likelihood - expected).abs() < 1e-7);
+    let (after, info) = two
+        .fuse(&belief, &rules, belief.mean(), &[Observation::Erased])
+        .unwrap();
+    assert_eq!((after, info.log_likelihood), (belief, 0.0));
 }

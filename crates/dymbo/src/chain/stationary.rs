@@ -174,7 +174,11 @@ mod tests {
     fn a_filter_that_trusts_noise_walks_wide() {
         for (a, q) in [(0.9, 1.0), (-0.9, 50.0)] {
             let filter = DymboFilter::new(ScalarPlant::new(a, q, 1.0).unwrap());
-            let p = filter.plant().steady_state(filter.information()).unwrap().predicted_variance;
+            let p = filter
+                .plant()
+                .steady_state(filter.information())
+                .unwrap()
+                .predicted_variance;
             let step = std::f64::consts::FRAC_2_PI * p * p / (p + 1.0);
             let expected = (a * a * step + q) / (1.0 - a * a) + step;
             let ours = crossover_mse(&filter, &Link::flipping(0.5).unwrap()).unwrap();
