@@ -232,6 +232,21 @@ mod tests {
     }
 
     /// The Kalman filter is the assumed-density update with a value, at every scale.
+    /// Measurements that say nearly all leave their own covariance, less its share of what was known.
+    #[test]
+    fn fine_measurements_keep_their_digits() {
+        let shape = Matrix2::new(1.0, 0.3, 0.3, 2.0);
+        let prior = Gaussian::new(Vector2::new(1.0, -1.0), Matrix2::new(2.0, 0.3, 0.3, 1.0)).unwrap();
+        for noise in [1e-4, 1e-8, 1e-11] {
+            let sensor = LinearSensor::new(Matrix2::identity(), shape * noise).unwrap();
+            let after = update(&sensor, &prior, &Vector2::new(0.3, 0.2)).unwrap().0;
+            // R - R (P + R)^-1 R, where nothing cancels.
+            let share = (prior.covariance() + shape * noise).try_inverse().unwrap() * shape * noise;
+            let off = after.covariance() / noise - shape * (Matrix2::identity() - share);
+            assert!(off.amax() < 1e-9, "{noise}: {off}");
+        }
+    }
+
     #[test]
     fn it_is_the_assumed_density_update_with_a_value() {
         for scale in [1e-4, 1.0, 1e4] {

@@ -353,6 +353,17 @@ mod tests {
     }
 
     #[test]
+    fn eigenvectors_are_orthonormal_and_put_the_matrix_together() {
+        let a = Matrix3::new(2.0, 0.7, -1.1, 0.7, 1.3, 0.4, -1.1, 0.4, 3.1);
+        for scale in [1e-150, 1.0, 1e150] {
+            let (values, vectors) = super::symmetric_eigen(a * scale);
+            assert!((vectors.transpose() * vectors - Matrix3::identity()).amax() < 1e-14);
+            let again = vectors * Matrix3::from_diagonal(&(values / scale)) * vectors.transpose();
+            assert!((again - a).amax() < 1e-14, "{again}");
+        }
+    }
+
+    #[test]
     fn volumes_are_those_of_the_textbook() {
         let pi = std::f64::consts::PI;
         let volume = |m: f64| m.ln();

@@ -273,3 +273,29 @@ pub(super) fn moments<const M: usize>(
     total.log_mass = sum.value();
     total
 }
+
+#[cfg(test)]
+mod tests {
+    use super::LogSum;
+
+    /// Terms whose exponentials are no numbers, in either order.
+    #[test]
+    fn logarithms_are_summed_whatever_their_size() {
+        for terms in [
+            [1000.0, 999.0, -1000.0],
+            [-1000.0, 999.0, 1000.0],
+            [999.0, 1000.0, f64::NEG_INFINITY],
+        ] {
+            let mut sum = LogSum::default();
+            let shares = terms.map(|term| sum.add(term));
+            assert!((sum.value() - 1000.0 - (-1.0_f64).exp().ln_1p()).abs() < 1e-12);
+            let last = if terms[2] == 1000.0 {
+                1.0 / (1.0 + (-1.0_f64).exp())
+            } else {
+                0.0
+            };
+            assert!((shares[2] - last).abs() < 1e-12 && shares[0] == 1.0);
+        }
+        assert_eq!(LogSum::default().value(), f64::NEG_INFINITY);
+    }
+}
