@@ -106,6 +106,23 @@ impl Axis {
         }
     }
 
+    /// Categories at 0, 1, 2, ...
+    pub fn categories<N: Into<String>>(label: impl Into<String>, names: impl IntoIterator<Item = N>) -> Self {
+        let named: Vec<_> = (0..).map(f64::from).zip(names.into_iter().map(Into::into)).collect();
+        let end = named.len() as f64 - 0.4;
+        Self::linear(label).named(named).between(-0.6, end)
+    }
+
+    /// Categories from the top downwards, at 0, -1, -2, ...
+    pub fn ladder<N: Into<String>>(names: impl IntoIterator<Item = N>) -> Self {
+        let named: Vec<_> = (0..)
+            .map(|i: i32| f64::from(-i))
+            .zip(names.into_iter().map(Into::into))
+            .collect();
+        let end = 0.6 - named.len() as f64;
+        Self::linear("").named(named).between(end, 0.6)
+    }
+
     /// Names places: category axes.
     #[must_use]
     pub fn named(self, names: impl IntoIterator<Item = (f64, String)>) -> Self {
@@ -313,6 +330,12 @@ impl Layer {
             colour: Some(colour),
             ..self
         }
+    }
+
+    /// Fixes colour and marker.
+    #[must_use]
+    pub fn styled(self, colour: usize, with: Marker) -> Self {
+        self.coloured(colour).marked(with)
     }
 
     /// Writes the label at the curve and not in the legend: contours.

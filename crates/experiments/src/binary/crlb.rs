@@ -9,32 +9,20 @@ use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 /// `binary-fig5-6`.
 pub struct PrintedBounds;
 
-/// Parameters of `binary-fig5-6`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Bits, and sensors.
-    #[garde(length(min = 1, max = 4), inner(range(min = 1, max = 5)))]
-    bits: Vec<usize>,
-    /// First signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    from_db: f64,
-    /// Last signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-    to_db: f64,
-    /// Step, dB.
-    #[garde(range(min = 0.01, max = 60.0))]
-    step_db: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            bits: vec![3, 4],
-            from_db: 0.0,
-            to_db: 30.0,
-            step_db: 1.0,
-        }
+parameters! { self #[derive(Validate)]
+    pub struct Parameters {
+        /// Bits, and sensors.
+        #[garde(length(min = 1, max = 4), inner(range(min = 1, max = 5)))]
+        bits: Vec<usize> = vec![3, 4],
+        /// First signal-to-noise ratio, dB.
+        #[garde(range(min = -60.0, max = 60.0))]
+        from_db: f64 = 0.0,
+        /// Last signal-to-noise ratio, dB.
+        #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
+        to_db: f64 = 30.0,
+        /// Step, dB.
+        #[garde(range(min = 0.01, max = 60.0))]
+        step_db: f64 = 1.0 => quick 2.0,
     }
 }
 
@@ -71,72 +59,55 @@ fn meet(a: Kind, b: Kind, bits: usize, name: &str) -> Result<Option<f64>, Error>
     crossing(about - 3.0, about + 3.0, difference).map(Some)
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Values and errors.
-    sets: Vec<Row>,
-    /// Crossings of equation 5.13.
-    crossings: Vec<Crossing>,
-}
+rows! {
+    pub struct Rows {
+        /// Values and errors.
+        sets: Vec<Row>,
+        /// Crossings of equation 5.13.
+        crossings: Vec<Crossing>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Bits B and sensors N.
-    bits: usize,
-    /// Signal-to-noise ratio.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Equation 5.13, all thresholds at zero.
-    #[schemars(extend("unit" = "V^2"))]
-    crlb_fixed: f64,
-    /// Equation 5.13, natural patterns.
-    #[schemars(extend("unit" = "V^2"))]
-    crlb_natural: f64,
-    /// Equation 5.13, Gray patterns.
-    #[schemars(extend("unit" = "V^2"))]
-    crlb_gray: f64,
-    /// Exact error, all thresholds at zero.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_fixed: f64,
-    /// Exact error, natural patterns.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_natural: f64,
-    /// Exact error, Gray patterns.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_gray: f64,
-}
+    struct Row {
+        /// Bits B and sensors N.
+        bits: usize,
+        /// Signal-to-noise ratio.
+        snr_db: f64 ["dB"],
+        /// Equation 5.13, all thresholds at zero.
+        crlb_fixed: f64 ["V^2"],
+        /// Equation 5.13, natural patterns.
+        crlb_natural: f64 ["V^2"],
+        /// Equation 5.13, Gray patterns.
+        crlb_gray: f64 ["V^2"],
+        /// Exact error, all thresholds at zero.
+        mse_fixed: f64 ["V^2"],
+        /// Exact error, natural patterns.
+        mse_natural: f64 ["V^2"],
+        /// Exact error, Gray patterns.
+        mse_gray: f64 ["V^2"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Crossing {
-    /// Bits B and sensors N.
-    bits: usize,
-    /// Where fixed and Gray cross.
-    #[schemars(extend("unit" = "dB"))]
-    fixed_gray_db: Option<f64>,
-    /// Where Gray and natural cross.
-    #[schemars(extend("unit" = "dB"))]
-    gray_natural_db: Option<f64>,
+    struct Crossing {
+        /// Bits B and sensors N.
+        bits: usize,
+        /// Where fixed and Gray cross.
+        fixed_gray_db: Option<f64> ["dB"],
+        /// Where Gray and natural cross.
+        gray_natural_db: Option<f64> ["dB"],
+    }
 }
 
 impl Figure for PrintedBounds {
     type Parameters = Parameters;
     type Tables = Rows;
 
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-6",
-            title: "The printed Cramer-Rao formula for fixed, natural and Gray patterns",
-            caption: "Left: equation 5.13 prefers a fixed threshold at low, Gray patterns at medium and natural patterns at high \
+    const ABOUT: About = About {
+        id: "binary-fig5-6",
+        title: "The printed Cramer-Rao formula for fixed, natural and Gray patterns",
+        caption: "Left: equation 5.13 prefers a fixed threshold at low, Gray patterns at medium and natural patterns at high \
                       signal-to-noise ratio. Right: the exact errors of the same sets. At high ratios Gray patterns are better throughout: the \
                       formula averages information and does not see that natural bits fail together.",
-            source: "Movaghati, thesis, figure 5.6",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.step_db = 2.0;
-    }
+        source: "Movaghati, thesis, figure 5.6",
+    };
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let (mut sets, mut crossings) = (Vec::new(), Vec::new());

@@ -51,21 +51,21 @@ struct Scene {
 impl Scene {
     /// Uniform on `[-1, 1]` over `2^bits` cells.
     fn uniform(bits: usize, snr_db: f64) -> Result<Self, Error> {
-        let source = Source::uniform(1.0).map_err(Error::failed)?;
-        let grid = Grid::uniform(1.0, bits).map_err(Error::failed)?;
+        let source = Source::uniform(1.0)?;
+        let grid = Grid::uniform(1.0, bits)?;
         Self::new(source, grid, snr_db)
     }
 
     /// Gaussian of variance 0.1 over the eight cells with the printed Lloyd-Max edges.
     fn gaussian(snr_db: f64) -> Result<Self, Error> {
         let std = GAUSSIAN_VARIANCE.sqrt();
-        let source = Source::gaussian_with_deviation(std).map_err(Error::failed)?;
-        let grid = Grid::printed_gaussian(std).map_err(Error::failed)?;
+        let source = Source::gaussian_with_deviation(std)?;
+        let grid = Grid::printed_gaussian(std)?;
         Self::new(source, grid, snr_db)
     }
 
     fn new(source: Source, grid: Grid, snr_db: f64) -> Result<Self, Error> {
-        let noise = source.noise_std(snr_db).map_err(Error::failed)?;
+        let noise = source.noise_std(snr_db)?;
         Ok(Self { source, grid, noise })
     }
 
@@ -78,11 +78,7 @@ impl Scene {
     }
 
     fn pattern_bank(&self, patterns: &[Pattern]) -> Result<Bank, Error> {
-        let quantizers = patterns
-            .iter()
-            .map(|p| p.on(&self.grid))
-            .collect::<Result<_, _>>()
-            .map_err(Error::failed)?;
+        let quantizers = patterns.iter().map(|p| p.on(&self.grid)).collect::<Result<_, _>>()?;
         Bank::homogeneous_with_deviation(self.source, quantizers, self.noise).map_err(Error::failed)
     }
 
@@ -114,6 +110,12 @@ impl<const FROM: i32, const TO: i32> Default for Ratios<FROM, TO> {
             to_db: f64::from(TO),
             step_db: 1.0,
         }
+    }
+}
+
+impl<const FROM: i32, const TO: i32> Quick for Ratios<FROM, TO> {
+    fn quicken(&mut self) {
+        self.step_db = 5.0;
     }
 }
 

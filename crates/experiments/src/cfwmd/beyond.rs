@@ -92,26 +92,25 @@ pub(super) struct Scheduled;
 
 const TWO: &str = "2 sensors";
 
-/// Bounds beside the runs.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Bounds {
-    /// Bounds of any filter that receives these messages.
-    bound: Vec<Bound>,
-}
+rows! {
+    /// Bounds beside the runs.
+    #[derive(Debug)]
+    pub struct Bounds {
+        /// Bounds of any filter that receives these messages.
+        bound: Vec<Bound>,
+    }
 
-#[derive(Debug, Serialize, JsonSchema)]
-struct Bound {
-    /// Message budget.
-    #[schemars(extend("unit" = "messages/step"))]
-    l: f64,
-    /// Number of sensors.
-    sensors: u64,
-    /// Time-averaged position bound, innovations weighed by the sensor's own filter (CFwMD).
-    #[schemars(extend("unit" = "m"))]
-    bound_m: f64,
-    /// The same, weighed with the bound's own covariance (CFwMD2, scheduled).
-    #[schemars(extend("unit" = "m"))]
-    bound_centre_m: f64,
+    #[derive(Debug)]
+    struct Bound {
+        /// Message budget.
+        l: f64 ["messages/step"],
+        /// Number of sensors.
+        sensors: u64,
+        /// Time-averaged position bound, innovations weighed by the sensor's own filter (CFwMD).
+        bound_m: f64 ["m"],
+        /// The same, weighed with the bound's own covariance (CFwMD2, scheduled).
+        bound_centre_m: f64 ["m"],
+    }
 }
 
 fn world(sensors: u64) -> String {
@@ -182,7 +181,7 @@ impl Case for Scheduled {
             for scheme in ["CFwMD", "CFwMD2", "scheduled"] {
                 let error = rows.at(&name(scheme), l).map(|r| r.position_rmse.value);
                 let own = bound.map(|b| if scheme == "CFwMD" { b.bound_m } else { b.bound_centre_m });
-                let ratio = error.zip(own).map(|(error, bound)| error / bound);
+                let ratio = over(error, own);
                 let what = format!("{scheme} does not beat its bound at l = {l} (ratio)");
                 claims.at_least(format!("above-bound-{scheme}-l{l}"), what, ratio, 0.995);
             }
@@ -218,9 +217,9 @@ impl Case for Scheduled {
 
 /// Time-averaged position bound: expected Fisher information of each sensor at the bound's own covariance.
 fn bound(setting: &Linear, messages: f64, sensors: u64, own_filter: bool) -> Result<f64, Error> {
-    let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance).map_err(Error::failed)?;
+    let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance)?;
     let noise = setting.noise_variances[0];
-    let eta = fewbits_cfwmd::threshold::threshold(messages / sensors as f64, 1).map_err(Error::failed)?;
+    let eta = fewbits_cfwmd::threshold::threshold(messages / sensors as f64, 1)?;
     let (f, q) = (*dynamics.transition(), *dynamics.noise_covariance());
     let mut bound = *start(setting)?.covariance();
     let mut own = bound;
@@ -236,10 +235,10 @@ fn bound(setting: &Linear, messages: f64, sensors: u64, own_filter: bool) -> Res
         let mut information = 0.0;
         for (mu, weight) in gauss_legendre::<24>().panels(-reach, reach, 8) {
             let density = normal::log_pdf_with(mu, 0.0, p).exp();
-            information += weight * density * fisher_information(mu, half_width, noise).map_err(Error::failed)?;
+            information += weight * density * fisher_information(mu, half_width, noise)?;
         }
         let received = Matrix2::new(sensors as f64 * information, 0.0, 0.0, 0.0);
-        bound = cramer_rao::covariance_step(&dynamics, &bound, &received).map_err(Error::failed)?;
+        bound = cramer_rao::covariance_step(&dynamics, &bound, &received)?;
         total += bound[(0, 0)];
     }
     Ok((total / setting.steps as f64).sqrt())
@@ -258,23 +257,24 @@ const SCHEMES: [(&str, Scheme); 7] = [
     ("RBPF 100", Scheme::RaoBlackwell(100)),
 ];
 
-/// Times beside the runs.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Times {
-    /// Time of a fusion step.
-    #[schemars(extend("volatile" = true))]
-    time: Vec<Time>,
-}
+rows! {
+    /// Times beside the runs.
+    #[derive(Debug)]
+    pub struct Times {
+        /// Time of a fusion step.
+        #[schemars(extend("volatile" = true))]
+        time: Vec<Time>,
+    }
 
-#[derive(Debug, Serialize, JsonSchema)]
-struct Time {
-    /// Filter.
-    scheme: &'static str,
-    /// Time of one fusion step, best of the repetitions.
-    #[schemars(extend("unit" = "us"))]
-    time_us: f64,
-    /// Time over that of the Gaussian belief.
-    relative: f64,
+    #[derive(Debug)]
+    struct Time {
+        /// Filter.
+        scheme: &'static str,
+        /// Time of one fusion step, best of the repetitions.
+        time_us: f64 ["us"],
+        /// Time over that of the Gaussian belief.
+        relative: f64,
+    }
 }
 
 impl Case for Cost {

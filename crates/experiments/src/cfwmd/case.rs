@@ -64,6 +64,12 @@ impl<C: Case> Default for Preset<C> {
     }
 }
 
+impl<C: Case> Quick for Preset<C> {
+    fn quicken(&mut self) {
+        self.0.quicken();
+    }
+}
+
 impl<C: Case> JsonSchema for Preset<C> {
     fn schema_name() -> Cow<'static, str> {
         C::Setting::schema_name()
@@ -98,10 +104,6 @@ impl<C: Case> Figure for Simulated<C> {
         C::ABOUT
     }
 
-    fn quicken(&self, parameters: &mut Preset<C>) {
-        parameters.0.quicken();
-    }
-
     fn cost(&self, parameters: &Preset<C>) -> Cost {
         parameters.0.cost()
     }
@@ -117,9 +119,9 @@ impl<C: Case> Figure for Simulated<C> {
     }
 
     fn claims(&self, Preset(setting): &Preset<C>, rows: &Self::Tables, claims: &mut Claims) {
-        rows.agree(claims, C::REFERENCES);
-        C::claims(rows, claims);
-        claims.so_far().at_defaults().at_full_trials();
+        let mut limited = claims.at_defaults().at_full_trials();
+        rows.agree(&mut limited, C::REFERENCES);
+        C::claims(rows, &mut limited);
         C::always(setting, rows, claims);
     }
 

@@ -19,55 +19,47 @@ const FUSED: [(&str, Scheme); 2] = [("CFwMD", Scheme::State), ("CFwMD2", Scheme:
 /// Figure 7: the sensors and one target.
 pub(super) struct Fig7;
 
-/// Which trial is shown.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Shown {
-    /// Index of the trial whose truth is drawn.
-    #[garde(range(max = 1_000_000))]
-    trial: u64,
-}
-
-impl Default for Shown {
-    fn default() -> Self {
-        Self { trial: 1 }
+parameters! {
+    /// Which trial is shown.
+    #[derive(Debug, Clone)]
+    pub(super) struct Shown {
+        /// Index of the trial whose truth is drawn.
+        #[garde(range(max = 1_000_000))]
+        trial: u64 = 1,
     }
 }
 
-/// The tables of figure 7.
-#[derive(Debug, Serialize, JsonSchema)]
-pub(super) struct Map {
-    /// The target.
-    path: Vec<Place>,
-    /// The sensors.
-    sensors: Vec<Place>,
-}
+rows! {
+    #[derive(Debug)]
+    pub(super) struct Map {
+        /// The target.
+        path: Vec<Place>,
+        /// The sensors.
+        sensors: Vec<Place>,
+    }
 
-#[derive(Debug, Serialize, JsonSchema)]
-struct Place {
-    /// Time step, or index of the sensor.
-    k: usize,
-    /// Position.
-    #[schemars(extend("unit" = "m"))]
-    x: f64,
-    /// Position.
-    #[schemars(extend("unit" = "m"))]
-    y: f64,
+    #[derive(Debug)]
+    struct Place {
+        /// Time step, or index of the sensor.
+        k: usize,
+        /// Position.
+        x: f64 ["m"],
+        /// Position.
+        y: f64 ["m"],
+    }
 }
 
 impl Figure for Fig7 {
     type Parameters = Shown;
     type Tables = Map;
 
-    fn about(&self) -> About {
-        About {
-            id: "cfwmd-fig7",
-            title: "Sensors and target",
-            caption: "Nine sensors of received power on a grid, and one trajectory. The target starts beside a corner sensor and leaves the \
+    const ABOUT: About = About {
+        id: "cfwmd-fig7",
+        title: "Sensors and target",
+        caption: "Nine sensors of received power on a grid, and one trajectory. The target starts beside a corner sensor and leaves the \
                       grid after about ten steps.",
-            source: "CFwMD paper, figure 7",
-        }
-    }
+        source: "CFwMD paper, figure 7",
+    };
 
     fn run(&self, shown: &Shown, context: &Context<'_>) -> Result<Map, Error> {
         let world = World::new(&Field::new(&[2.0]))?;
@@ -81,16 +73,13 @@ impl Figure for Fig7 {
     }
 
     fn claims(&self, _: &Shown, map: &Map, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let reach = |place: Option<&Place>| place.map(|p| p.x.abs().max(p.y.abs()));
         let grid = map.sensors.iter().filter_map(|s| reach(Some(s))).fold(0.0, f64::max);
         let what = "the target starts among the sensors (farthest coordinate, m)";
-        claims
-            .below("starts-inside", what, reach(map.path.first()), grid)
-            .at_defaults();
+        here.below("starts-inside", what, reach(map.path.first()), grid);
         let what = "and ends outside the grid (farthest coordinate, m)";
-        claims
-            .above("ends-outside", what, reach(map.path.last()), grid)
-            .at_defaults();
+        here.above("ends-outside", what, reach(map.path.last()), grid);
     }
 
     fn plot(&self, _: &Shown, map: &Map) -> Plot {
@@ -99,16 +88,8 @@ impl Figure for Fig7 {
             Panel::new("Sensors and target", Axis::linear("x (m)"), Axis::linear("y (m)"))
                 .with(Layer::line("target", places(&map.path)).coloured(0))
                 .with(Layer::points("each step", places(&map.path[1..])).coloured(0))
-                .with(
-                    Layer::points("start", places(&map.path[..1]))
-                        .marked(Marker::Square)
-                        .coloured(2),
-                )
-                .with(
-                    Layer::points("sensors", places(&map.sensors))
-                        .marked(Marker::Triangle)
-                        .coloured(1),
-                ),
+                .with(Layer::points("start", places(&map.path[..1])).styled(2, Marker::Square))
+                .with(Layer::points("sensors", places(&map.sensors)).styled(1, Marker::Triangle)),
         )
     }
 }
@@ -149,16 +130,12 @@ impl Case for Fig8 {
         let what = "CFoMD has the smaller time-averaged position error than random (ratio)";
         claims.below("CFoMD-beats-random", what, rows.ratio("CFoMD", "random", 2.0), 1.0);
         let error = |scheme, k| Some(rows.step(scheme, 2.0, k)?.position_rmse.value);
-        let first = error("all", 1)
-            .zip(error("random", 1))
-            .map(|(all, random)| all / random);
+        let first = over(error("all", 1), error("random", 1));
         let what =
             "in the first step sending everything is worse than random: the truth starts on the prior mean (ratio)";
         claims.above("start-on-the-mean", what, first, 1.0);
         for scheme in ["CFwMD", "all"] {
-            let growth = error(scheme, 20)
-                .zip(error(scheme, 10))
-                .map(|(last, middle)| last / middle);
+            let growth = over(error(scheme, 20), error(scheme, 10));
             let what = format!("the error of {scheme} grows after step 10: the target leaves the grid (ratio)");
             claims.above(format!("leaves-{scheme}"), what, growth, 1.0);
         }
@@ -219,7 +196,7 @@ impl Case for Fig9 {
             rows.beats(claims, ("random", "CFoMD"), ("", l), &[Part::Velocity]);
         }
         let error = |scheme, l| Some(rows.at(scheme, l)?.position_rmse.value);
-        let gap = error("CFoMD", 1.0).zip(error("CFwMD", 1.0)).map(|(a, b)| a - b);
+        let gap = minus(error("CFoMD", 1.0), error("CFwMD", 1.0));
         claims.above("gap-at-small-budgets", "the gap between CFwMD and CFoMD at l = 1 (m)", gap, 0.5);
         for scheme in ["random", "CFoMD", "CFwMD"] {
             let what = format!("at l = 9 {scheme} sends everything (ratio of errors)");

@@ -65,39 +65,38 @@ impl Case for Fig3 {
 /// Ways to use silence without feedback.
 pub(super) struct NoFeedbackFigure;
 
-/// What the printed likelihood says.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Literal {
-    /// The printed likelihood of silence over the law that it assumes.
-    printed_likelihood: Vec<Printed>,
-}
+rows! {
+    /// What the printed likelihood says.
+    #[derive(Debug)]
+    pub struct Literal {
+        /// The printed likelihood of silence over the law that it assumes.
+        printed_likelihood: Vec<Printed>,
+    }
 
-#[derive(Debug, Serialize, JsonSchema)]
-struct Printed {
-    /// Time step.
-    k: usize,
-    /// Position less its mean.
-    #[schemars(extend("unit" = "m"))]
-    offset: f64,
-    /// Probability of silence as printed: averaged over an own estimate that scatters about this position.
-    probability: f64,
+    #[derive(Debug)]
+    struct Printed {
+        /// Time step.
+        k: usize,
+        /// Position less its mean.
+        offset: f64 ["m"],
+        /// Probability of silence as printed: averaged over an own estimate that scatters about this position.
+        probability: f64,
+    }
 }
 
 /// The printed likelihood by quadrature over the sensor's estimate, at positions of all steps.
 fn printed_likelihood(setting: &Linear) -> Result<Vec<Printed>, Error> {
     let noise = setting.noise_variances[0];
     let rate = setting.messages[0] / setting.sensors as f64;
-    let threshold = fewbits_cfwmd::threshold::threshold(rate, 1).map_err(Error::failed)?;
-    let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance).map_err(Error::failed)?;
-    let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), noise).map_err(Error::failed)?;
+    let threshold = fewbits_cfwmd::threshold::threshold(rate, 1)?;
+    let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance)?;
+    let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), noise)?;
     let start = start(setting)?;
     let mut own = OwnRecursion::new(&start);
     let mut rows = Vec::new();
     for k in 1..=setting.steps as usize {
-        let step = own.advance(&dynamics, &sensor, start.mean()).map_err(Error::failed)?;
-        let half_width = CensoringRule::new(&step.innovation_covariance, threshold)
-            .map_err(Error::failed)?
-            .half_width();
+        let step = own.advance(&dynamics, &sensor, start.mean())?;
+        let half_width = CensoringRule::new(&step.innovation_covariance, threshold)?.half_width();
         let spread = step.innovation_covariance[(0, 0)] - noise;
         for offset in [-10.0, -1.0, 0.0, 1.0, 10.0] {
             let reach = 9.0 * spread.sqrt();

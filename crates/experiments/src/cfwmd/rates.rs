@@ -5,28 +5,25 @@ use super::rows::{Ensemble, rate};
 use crate::prelude::*;
 use crate::reference;
 
-/// Rates of one budget in one setting.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Rates {
-    /// Message budget.
-    #[schemars(extend("unit" = "messages/step"))]
-    l: f64,
-    /// How start and noise are read, and the estimator.
-    setting: String,
-    /// Mean number of messages, state feedback (CFwMD).
-    #[schemars(extend("unit" = "messages/step"))]
-    state: Measured,
-    /// Mean number of messages, state and covariance feedback (CFwMD2).
-    #[schemars(extend("unit" = "messages/step"))]
-    covariance: Measured,
-    /// The first as printed.
-    #[schemars(extend("unit" = "messages/step"))]
-    printed_state: Option<f64>,
-    /// The second as printed.
-    #[schemars(extend("unit" = "messages/step"))]
-    printed_covariance: Option<f64>,
-    /// Trials.
-    trials: usize,
+rows! {
+    /// Rates of one budget in one setting.
+    #[derive(Debug)]
+    pub struct Rates {
+        /// Message budget.
+        l: f64 ["messages/step"],
+        /// How start and noise are read, and the estimator.
+        setting: String,
+        /// Mean number of messages, state feedback (CFwMD).
+        state: Measured ["messages/step"],
+        /// Mean number of messages, state and covariance feedback (CFwMD2).
+        covariance: Measured ["messages/step"],
+        /// The first as printed.
+        printed_state: Option<f64> ["messages/step"],
+        /// The second as printed.
+        printed_covariance: Option<f64> ["messages/step"],
+        /// Trials.
+        trials: usize,
+    }
 }
 
 /// Rates of all budgets and worlds. The print does not say which world is its own: it stands beside all of them.

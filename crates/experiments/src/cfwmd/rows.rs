@@ -67,16 +67,17 @@ pub(super) enum Part {
     Velocity,
 }
 
-/// What the rows speak of.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Run {
-    /// What is sent, and what is made of silence.
-    pub(super) scheme: &'static str,
-    /// Where it ran, in figures of several settings.
-    pub(super) world: Option<String>,
-    /// Message budget.
-    #[schemars(extend("unit" = "messages/step"))]
-    pub(super) l: f64,
+rows! {
+    /// What the rows speak of.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct Run {
+        /// What is sent, and what is made of silence.
+        pub(super) scheme: &'static str,
+        /// Where it ran, in figures of several settings.
+        pub(super) world: Option<String>,
+        /// Message budget.
+        pub(super) l: f64 ["messages/step"],
+    }
 }
 
 impl Run {
@@ -102,65 +103,59 @@ impl Run {
     }
 }
 
-/// One step of one run.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Step {
-    #[serde(flatten)]
-    pub(super) run: Run,
-    /// Time step.
-    pub(super) k: usize,
-    /// Root mean squared position error.
-    #[schemars(extend("unit" = "m"))]
-    pub(super) position_rmse: Measured,
-    /// Root mean squared velocity error.
-    #[schemars(extend("unit" = "m/s"))]
-    pub(super) velocity_rmse: Measured,
-    /// Mean number of messages in this step.
-    pub(super) messages: Measured,
-    /// Trials.
-    trials: usize,
-}
+rows! {
+    /// One step of one run.
+    #[derive(Debug, Clone)]
+    pub struct Step {
+        #[serde(flatten)]
+        pub(super) run: Run,
+        /// Time step.
+        pub(super) k: usize,
+        /// Root mean squared position error.
+        pub(super) position_rmse: Measured ["m"],
+        /// Root mean squared velocity error.
+        pub(super) velocity_rmse: Measured ["m/s"],
+        /// Mean number of messages in this step.
+        pub(super) messages: Measured,
+        /// Trials.
+        trials: usize,
+    }
 
-/// One run, averaged over its steps.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Summary {
-    #[serde(flatten)]
-    pub(super) run: Run,
-    /// Root mean squared position error over trials and steps.
-    #[schemars(extend("unit" = "m"))]
-    pub(super) position_rmse: Measured,
-    /// Root mean squared velocity error over trials and steps.
-    #[schemars(extend("unit" = "m/s"))]
-    pub(super) velocity_rmse: Measured,
-    /// Mean number of messages.
-    #[schemars(extend("unit" = "messages/step"))]
-    pub(super) rate: Measured,
-    /// Squared position error over its variance under the belief; 1 if the belief is consistent.
-    pub(super) nees: Option<Measured>,
-    /// Trials.
-    pub(super) trials: usize,
-}
+    /// One run, averaged over its steps.
+    #[derive(Debug, Clone)]
+    pub struct Summary {
+        #[serde(flatten)]
+        pub(super) run: Run,
+        /// Root mean squared position error over trials and steps.
+        pub(super) position_rmse: Measured ["m"],
+        /// Root mean squared velocity error over trials and steps.
+        pub(super) velocity_rmse: Measured ["m/s"],
+        /// Mean number of messages.
+        pub(super) rate: Measured ["messages/step"],
+        /// Squared position error over its variance under the belief; 1 if the belief is consistent.
+        pub(super) nees: Option<Measured>,
+        /// Trials.
+        pub(super) trials: usize,
+    }
 
-/// Two schemes on the same truth, noise and draws.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Paired {
-    /// Scheme.
-    pub(super) first: &'static str,
-    /// Scheme it is compared with.
-    pub(super) second: &'static str,
-    /// Where both ran, in figures of several settings.
-    pub(super) world: Option<String>,
-    /// Message budget.
-    #[schemars(extend("unit" = "messages/step"))]
-    pub(super) l: f64,
-    /// Mean squared position error of the first minus that of the second.
-    #[schemars(extend("unit" = "m^2"))]
-    pub(super) position: Measured,
-    /// The same of the velocity.
-    #[schemars(extend("unit" = "m^2/s^2"))]
-    pub(super) velocity: Measured,
-    /// Trials.
-    trials: u64,
+    /// Two schemes on the same truth, noise and draws.
+    #[derive(Debug, Clone)]
+    pub struct Paired {
+        /// Scheme.
+        pub(super) first: &'static str,
+        /// Scheme it is compared with.
+        pub(super) second: &'static str,
+        /// Where both ran, in figures of several settings.
+        pub(super) world: Option<String>,
+        /// Message budget.
+        pub(super) l: f64 ["messages/step"],
+        /// Mean squared position error of the first minus that of the second.
+        pub(super) position: Measured ["m^2"],
+        /// The same of the velocity.
+        pub(super) velocity: Measured ["m^2/s^2"],
+        /// Trials.
+        trials: u64,
+    }
 }
 
 impl Step {

@@ -60,10 +60,7 @@ fn at_most(messages: f64, sensors: u64) -> garde::Result {
 /// Seconds and bytes of so many trials of ten schemes.
 fn cost(trials: u64, steps: u64, budgets: usize, step_seconds: f64) -> Cost {
     let runs = trials as f64 * steps as f64 * budgets as f64 * 10.0;
-    Cost {
-        seconds: runs * step_seconds,
-        bytes: runs * 32.0,
-    }
+    Cost::new(runs * step_seconds, runs * 32.0)
 }
 
 /// A target on a line among identical linear sensors.

@@ -173,15 +173,11 @@ impl Figure for Chains {
         self.about
     }
 
-    fn quicken(&self, p: &mut Settings) {
-        p.trials = 8;
-    }
-
     fn cost(&self, p: &Settings) -> Cost {
-        Cost {
-            seconds: p.trials as f64 * (self.schemes)().len() as f64 * 0.1,
-            bytes: p.trials as f64 * (self.schemes)().len() as f64 * 2e3,
-        }
+        Cost::new(
+            p.trials as f64 * (self.schemes)().len() as f64 * 0.1,
+            p.trials as f64 * (self.schemes)().len() as f64 * 2e3,
+        )
     }
 
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Rows, Error> {

@@ -10,56 +10,44 @@ use nalgebra::Vector2;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-/// Settings of the comparison.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Random deployments of the searches.
-    #[garde(range(min = 1, max = 100_000))]
-    trials: u64,
-    /// Random deployments in which candidates are ranked.
-    #[garde(range(min = 1, max = 10_000))]
-    ranking_trials: u64,
-    /// Support points of the bounds.
-    #[garde(range(min = 10, max = 2_000))]
-    points: usize,
-    /// Draws of the mutual information.
-    #[garde(range(min = 10, max = 100_000))]
-    draws: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            trials: 200,
-            ranking_trials: 60,
-            points: 200,
-            draws: 200,
-        }
+parameters! {
+    /// Settings of the comparison.
+    #[derive(Debug, Clone)]
+    pub struct Parameters {
+        /// Random deployments of the searches.
+        #[garde(range(min = 1, max = 100_000))]
+        trials: u64 = 200 => quick 8,
+        /// Random deployments in which candidates are ranked.
+        #[garde(range(min = 1, max = 10_000))]
+        ranking_trials: u64 = 60 => quick 2,
+        /// Support points of the bounds.
+        #[garde(range(min = 10, max = 2_000))]
+        points: usize = 200,
+        /// Draws of the mutual information.
+        #[garde(range(min = 10, max = 100_000))]
+        draws: usize = 200,
     }
 }
 
-/// Both tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Searches with the exact belief, by rule.
-    searches: Vec<Summary>,
-    /// How rules rank the neighbours after three nodes, against the mutual information by draws.
-    rankings: Vec<Ranking>,
-}
+rows! {
+    /// Both tables.
+    pub struct Rows {
+        /// Searches with the exact belief, by rule.
+        searches: Vec<Summary>,
+        /// How rules rank the neighbours after three nodes, against the mutual information by draws.
+        rankings: Vec<Ranking>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Ranking {
-    /// Rule.
-    rule: &'static str,
-    /// Mean rank correlation with the exact mutual information.
-    rank_correlation: Measured,
-    /// Information lost by taking the rule's best instead of the best.
-    #[schemars(extend("unit" = "nats"))]
-    lost: Measured,
-    /// Mean of rule minus exact information, for rules that are in nats.
-    #[schemars(extend("unit" = "nats"))]
-    bias: Option<f64>,
+    struct Ranking {
+        /// Rule.
+        rule: &'static str,
+        /// Mean rank correlation with the exact mutual information.
+        rank_correlation: Measured,
+        /// Information lost by taking the rule's best instead of the best.
+        lost: Measured ["nats"],
+        /// Mean of rule minus exact information, for rules that are in nats.
+        bias: Option<f64> ["nats"],
+    }
 }
 
 const RULES: [&str; 7] = [
@@ -101,27 +89,17 @@ impl Figure for Selection {
     type Parameters = Parameters;
     type Tables = Rows;
 
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-selection",
-            title: "Choosing the next node",
-            caption: "Left: mean nodes to the threshold with the exact belief, by mutual information (its Gaussian bound, \
+    const ABOUT: About = About {
+        id: "diffusive-selection",
+        title: "Choosing the next node",
+        caption: "Left: mean nodes to the threshold with the exact belief, by mutual information (its Gaussian bound, \
                       and its pairwise bound) and by Mahalanobis distance. Right: how rules rank the neighbours after three nodes of example B, as rank \
                       correlation with the exact mutual information.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 8;
-        p.ranking_trials = 2;
-    }
+        source: "",
+    };
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: p.trials as f64 * 0.3 + p.ranking_trials as f64 * p.draws as f64 * 0.01,
-            bytes: 1e7,
-        }
+        Cost::new(p.trials as f64 * 0.3 + p.ranking_trials as f64 * p.draws as f64 * 0.01, 1e7)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
@@ -147,6 +125,7 @@ impl Figure for Selection {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let searches = || rows.searches.iter();
         claims.references("nodes_mean", "mean nodes to the threshold", searches(), |s| {
             (s.scheme.to_owned(), s.nodes_mean)
@@ -155,17 +134,13 @@ impl Figure for Selection {
         let find = |setting: &str, rule: &str| searches().find(|s| s.scheme == format!("{setting} {rule}"));
         for (setting, ..) in SETTINGS {
             let reach = |rule| find(setting, rule).map(|s| s.reach.value);
-            let gap = reach("information").zip(reach("mahalanobis")).map(|(a, b)| a - b);
+            let gap = minus(reach("information"), reach("mahalanobis"));
             let what = format!("information reaches the threshold at least as often as Mahalanobis: {setting}");
-            claims
-                .at_least(format!("no-stall/{setting}"), what, gap, 0.0)
-                .at_full_trials();
+            full.at_least(format!("no-stall/{setting}"), what, gap, 0.0);
             let mean = |rule| find(setting, rule).and_then(|s| s.nodes_mean).map(|m| m.value);
             let gap = mean("pairwise").zip(mean("information")).map(|(a, b)| (a - b).abs());
             let what = format!("the better ranking of the pairwise bound saves less than half a node: {setting}");
-            claims
-                .at_most(format!("bound-suffices/{setting}"), what, gap, 0.5)
-                .at_full_trials();
+            full.at_most(format!("bound-suffices/{setting}"), what, gap, 0.5);
         }
         let rank = |rule: &str| {
             rows.rankings
@@ -174,22 +149,14 @@ impl Figure for Selection {
                 .map(|r| r.rank_correlation.value)
         };
         let what = "the pairwise lower bound ranks as the exact information does";
-        claims
-            .at_least("pairwise-ranks", what, rank("pairwise lower"), 0.98)
-            .at_full_trials();
+        full.at_least("pairwise-ranks", what, rank("pairwise lower"), 0.98);
         let lost = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).map(|r| r.lost.value);
         let what = "choosing by the Gaussian bound loses less than 0.15 nat, though it misjudges beliefs of two peaks (errata diffusive-16)";
-        claims
-            .below("gaussian-loses-little", what, lost("gaussian bound"), 0.15)
-            .at_full_trials();
-        let gap = rank("pairwise lower").zip(rank("mahalanobis")).map(|(a, b)| a - b);
-        claims
-            .above("mahalanobis-does-not", "Mahalanobis distance ranks far worse", gap, 0.2)
-            .at_full_trials();
-        let gap = lost("mahalanobis").zip(lost("pairwise lower")).map(|(m, p)| m - p);
-        claims
-            .above("mahalanobis-loses", "and loses more information", gap, 0.0)
-            .at_full_trials();
+        full.below("gaussian-loses-little", what, lost("gaussian bound"), 0.15);
+        let gap = minus(rank("pairwise lower"), rank("mahalanobis"));
+        full.above("mahalanobis-does-not", "Mahalanobis distance ranks far worse", gap, 0.2);
+        let gap = minus(lost("mahalanobis"), lost("pairwise lower"));
+        full.above("mahalanobis-loses", "and loses more information", gap, 0.0);
         let bias = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).and_then(|r| r.bias);
         let what = "the pairwise lower bound is below the information on average (draws leave some noise)";
         claims.at_most("lower", what, bias("pairwise lower"), 0.05);
@@ -263,7 +230,7 @@ fn rank(
         return Ok(None);
     }
     let reference = Reference::new(posterior, p.draws, trial);
-    let clumps = posterior.clumps_with_rate(1.0, p.points).map_err(Error::failed)?;
+    let clumps = posterior.clumps_with_rate(1.0, p.points)?;
     let weights: Vec<f64> = clumps.clumps().iter().map(|c| c.weight).collect();
     let total: f64 = weights.iter().sum();
     let weights: Vec<f64> = weights.iter().map(|w| w / total).collect();
@@ -384,7 +351,7 @@ impl<'a> Reference<'a> {
                 .zip(&draw.noise)
                 .map(|(a, e)| draw.rate * a + sensor.noise() * e + sensor.bias())
                 .collect();
-            let record = sensor.record(place, &samples).map_err(Error::failed)?;
+            let record = sensor.record(place, &samples)?;
             let own = record.sums(&draw.position).log_given_rate(draw.rate);
             let mut ratio = 0.0;
             for (i, weight) in weights.iter().enumerate() {

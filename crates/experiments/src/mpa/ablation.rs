@@ -8,32 +8,23 @@ use fewbits_pf_mpa::{
     DynamicsWeight, IntervalRule, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight, Velocity,
 };
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Particles.
-    #[garde(range(min = 3, max = 1000))]
-    particles: usize,
-    /// Trajectories.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            particles: 40,
-            trials: 200,
-        }
+parameters! {
+    /// Settings.
+    pub struct Parameters {
+        /// Particles.
+        #[garde(range(min = 3, max = 1000))]
+        particles: usize = 40,
+        /// Trajectories.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 200 => quick 4,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Variants.
-    variants: Vec<Row>,
+rows! {
+    pub struct Rows {
+        /// Variants.
+        variants: Vec<Row>,
+    }
 }
 
 /// `mpa-ablation`.
@@ -111,19 +102,13 @@ impl Figure for Ablation {
     type Parameters = Parameters;
     type Tables = Rows;
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-ablation",
-            title: "Which erratum costs what",
-            caption: "Improved message passing with one printed choice put back at a time, 50 and 30 dB, four levels. Full rings, the \
+    const ABOUT: About = About {
+        id: "mpa-ablation",
+        title: "Which erratum costs what",
+        caption: "Improved message passing with one printed choice put back at a time, 50 and 30 dB, four levels. Full rings, the \
                       printed interval and transferred velocities cost most.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = p.trials.min(4);
-    }
+        source: "",
+    };
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let mut rows = Vec::new();
@@ -150,28 +135,14 @@ impl Figure for Ablation {
     }
 
     fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+        let paper = claims.at_defaults().at_full_trials();
         agree(claims, &t.variants, "", true);
         let ratio = |name: &str| Some(mse(&t.variants, "50dB", name)? / mse(&t.variants, "50dB", "improved")?);
-        claims
-            .above("transfer", "E7: transferring velocities costs half as much again", ratio("transfer"), 1.25)
-            .at_defaults()
-            .at_full_trials();
-        claims
-            .above("full-ring", "a full ring loses what its kernel cannot hold", ratio("full ring"), 4.0)
-            .at_defaults()
-            .at_full_trials();
-        claims
-            .above("interval", "E1: the printed interval costs a factor", ratio("printed interval"), 1.8)
-            .at_defaults()
-            .at_full_trials();
-        claims
-            .above("ratios", "E4: ratio weights of the dynamics only add noise", ratio("dynamics ratio"), 1.05)
-            .at_defaults()
-            .at_full_trials();
-        claims
-            .near("radius", "E3: the missing radius costs little here", ratio("uniform ring"), 1.04, 0.12)
-            .at_defaults()
-            .at_full_trials();
+        paper.above("transfer", "E7: transferring velocities costs half as much again", ratio("transfer"), 1.25);
+        paper.above("full-ring", "a full ring loses what its kernel cannot hold", ratio("full ring"), 4.0);
+        paper.above("interval", "E1: the printed interval costs a factor", ratio("printed interval"), 1.8);
+        paper.above("ratios", "E4: ratio weights of the dynamics only add noise", ratio("dynamics ratio"), 1.05);
+        paper.near("radius", "E3: the missing radius costs little here", ratio("uniform ring"), 1.04, 0.12);
     }
 
     fn plot(&self, _: &Parameters, t: &Rows) -> Plot {

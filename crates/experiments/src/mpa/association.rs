@@ -170,71 +170,59 @@ fn cloud_step<R: Rng>(
 /// `mpa-fig3-7`.
 pub struct Fig37;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Variances of the measurements.
-    #[garde(length(min = 1, max = 4), inner(range(min = 1e-8, max = 1.0)))]
-    variance: Vec<f64>,
-    /// Distance of the targets at the start.
-    #[garde(range(min = 0.0, max = 10.0))]
-    apart: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            variance: vec![1e-4, 4e-4],
-            apart: 0.1,
-        }
+parameters! {
+    /// Settings.
+    pub struct Parameters {
+        /// Variances of the measurements.
+        #[garde(length(min = 1, max = 4), inner(range(min = 1e-8, max = 1.0)))]
+        variance: Vec<f64> = vec![1e-4, 4e-4],
+        /// Distance of the targets at the start.
+        #[garde(range(min = 0.0, max = 10.0))]
+        apart: f64 = 0.1,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Step {
-    /// Variance of the measurements.
-    variance: f64,
-    /// Rule.
-    rule: String,
-    /// Step, from 1.
-    k: usize,
-    /// First target.
-    t1: f64,
-    /// Second target.
-    t2: f64,
-    /// First measurement received.
-    za: f64,
-    /// Second measurement received.
-    zb: f64,
-    /// Estimate of the first target.
-    estimate1: f64,
-    /// Estimate of the second.
-    estimate2: f64,
-    /// Probability that the first measurement is of the first target.
-    p0: f64,
-}
+rows! {
+    struct Step {
+        /// Variance of the measurements.
+        variance: f64,
+        /// Rule.
+        rule: String,
+        /// Step, from 1.
+        k: usize,
+        /// First target.
+        t1: f64,
+        /// Second target.
+        t2: f64,
+        /// First measurement received.
+        za: f64,
+        /// Second measurement received.
+        zb: f64,
+        /// Estimate of the first target.
+        estimate1: f64,
+        /// Estimate of the second.
+        estimate2: f64,
+        /// Probability that the first measurement is of the first target.
+        p0: f64,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Steps {
-    /// Tracks.
-    tracks: Vec<Step>,
+    pub struct Steps {
+        /// Tracks.
+        tracks: Vec<Step>,
+    }
 }
 
 impl Figure for Fig37 {
     type Parameters = Parameters;
     type Tables = Steps;
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-fig3-7",
-            title: "Two targets, two measurements in unknown order",
-            caption: "Tracks with the printed rule of thumb and with the exact probability. After a crossing the labels cannot be told \
+    const ABOUT: About = About {
+        id: "mpa-fig3-7",
+        title: "Two targets, two measurements in unknown order",
+        caption: "Tracks with the printed rule of thumb and with the exact probability. After a crossing the labels cannot be told \
                       apart, by any rule.",
-            source: "particle message passing, Figure 3.7",
-        }
-    }
+        source: "particle message passing, Figure 3.7",
+    };
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Steps, Error> {
         let mut tracks = Vec::new();
@@ -263,14 +251,13 @@ impl Figure for Fig37 {
     }
 
     fn claims(&self, _: &Parameters, t: &Steps, claims: &mut Claims) {
+        let here = claims.at_defaults();
         claims.all("probabilities", "rules give probabilities", &t.tracks, |r| (0.0..=1.0).contains(&r.p0));
         let near = |r: &Step| {
             let to = |x: f64| (x - r.t1).abs().min((x - r.t2).abs());
             to(r.estimate1).max(to(r.estimate2)) < 8.0 * r.variance.sqrt()
         };
-        claims
-            .all("follow", "every estimate follows one of the targets", &t.tracks, near)
-            .at_defaults();
+        here.all("follow", "every estimate follows one of the targets", &t.tracks, near);
     }
 
     fn plot(&self, p: &Parameters, t: &Steps) -> Plot {
@@ -296,61 +283,48 @@ impl Figure for Fig37 {
 /// `mpa-table3-da`.
 pub struct Table;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Effort {
-    /// Tracks of each setting.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Effort {
-    fn default() -> Self {
-        Self { trials: 400 }
+parameters! {
+    /// Settings.
+    pub struct Effort {
+        /// Tracks of each setting.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 400 => quick 10,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Variance of the measurements.
-    variance: f64,
-    /// Distance of the targets at the start.
-    apart: f64,
-    /// Rule.
-    method: &'static str,
-    /// Mean squared error, both targets summed, labels counted.
-    labelled: Measured,
-    /// The same with the better labels of each step.
-    unlabelled: Measured,
-    /// Mean distance of the probability from what was.
-    association: Measured,
-}
+rows! {
+    struct Row {
+        /// Variance of the measurements.
+        variance: f64,
+        /// Distance of the targets at the start.
+        apart: f64,
+        /// Rule.
+        method: &'static str,
+        /// Mean squared error, both targets summed, labels counted.
+        labelled: Measured,
+        /// The same with the better labels of each step.
+        unlabelled: Measured,
+        /// Mean distance of the probability from what was.
+        association: Measured,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Rules.
-    rules: Vec<Row>,
+    pub struct Rows {
+        /// Rules.
+        rules: Vec<Row>,
+    }
 }
 
 impl Figure for Table {
     type Parameters = Effort;
     type Tables = Rows;
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-table3-da",
-            title: "Rules of association",
-            caption: "Labelled and unlabelled errors of two random walks, and how far the probabilities are from what was. The exact \
+    const ABOUT: About = About {
+        id: "mpa-table3-da",
+        title: "Rules of association",
+        caption: "Labelled and unlabelled errors of two random walks, and how far the probabilities are from what was. The exact \
                       likelihood is better than the printed rule, most of all inside a particle filter.",
-            source: "particle message passing, Section 3.5",
-        }
-    }
-
-    fn quicken(&self, p: &mut Effort) {
-        p.trials = p.trials.min(10);
-    }
+        source: "particle message passing, Section 3.5",
+    };
 
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Rows, Error> {
         let mut rules = Vec::new();
@@ -394,22 +368,17 @@ impl Figure for Table {
     }
 
     fn claims(&self, _: &Effort, t: &Rows, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let key = |r: &Row| format!("R{}-sep{}-{}", r.variance, r.apart, r.method);
-        claims
-            .references("labelled", "labelled error", &t.rules, |r| (key(r), r.labelled))
-            .at_full_trials();
+        full.references("labelled", "labelled error", &t.rules, |r| (key(r), r.labelled));
         type Of = fn(&Row) -> Measured;
         let two: [(&str, &str, Of); 2] = [
             ("unlabelled", "unlabelled error", |r| r.unlabelled),
             ("association", "error of association", |r| r.association),
         ];
         for (id, what, value) in two {
-            claims
-                .references(id, what, &t.rules, |r| (key(r), value(r)))
-                .at_full_trials();
-            claims
-                .references_at_most(&format!("{id}-most"), what, &t.rules, |r| (key(r), value(r)))
-                .at_full_trials();
+            full.references(id, what, &t.rules, |r| (key(r), value(r)));
+            full.references_at_most(&format!("{id}-most"), what, &t.rules, |r| (key(r), value(r)));
         }
         for (variance, blur) in [(1e-4, 3.0), (4e-4, 2.0)] {
             let of = |method: &str| {
@@ -418,24 +387,13 @@ impl Figure for Table {
                     .find(|r| r.variance == variance && r.apart == 0.1 && r.method == method)
             };
             let errors = ["jpda", "tanh", "pf-tanh"].map(|m| of(m).map(|r| r.association.value));
-            claims
-                .increasing(
-                    format!("order-{variance}"),
-                    "C10: exact < printed rule < printed rule over particles",
-                    errors,
-                )
-                .at_full_trials();
+            let what = "C10: exact < printed rule < printed rule over particles";
+            full.increasing(format!("order-{variance}"), what, errors);
             let ratio = of("pf-tanh")
                 .zip(of("pf-exact"))
                 .map(|(a, b)| a.unlabelled.value / b.unlabelled.value);
-            claims
-                .above(
-                    format!("particles-{variance}"),
-                    "C10: over particles the printed rule blurs the targets",
-                    ratio,
-                    blur,
-                )
-                .at_full_trials();
+            let what = "C10: over particles the printed rule blurs the targets";
+            full.above(format!("particles-{variance}"), what, ratio, blur);
         }
         let genie = |r: &Row| {
             t.rules
@@ -443,11 +401,9 @@ impl Figure for Table {
                 .find(|g| g.variance == r.variance && g.apart == r.apart && g.method == "genie")
         };
         let known = t.rules.iter().filter(|r| r.method != "genie");
-        claims
-            .all("genie", "C10: no rule is below the genie", known, |r| {
-                genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
-            })
-            .at_full_trials();
+        full.all("genie", "C10: no rule is below the genie", known, |r| {
+            genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
+        });
     }
 
     fn plot(&self, _: &Effort, t: &Rows) -> Plot {

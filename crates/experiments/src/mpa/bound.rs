@@ -8,51 +8,43 @@ use fewbits_monte_carlo::{Moments, Trial};
 use fewbits_pf_mpa::{CramerRao, Target, position_information};
 use nalgebra::{Matrix4, Vector2};
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Free trajectories.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { trials: 400 }
+parameters! {
+    /// Settings.
+    pub struct Parameters {
+        /// Free trajectories.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 400 => quick 10,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Ratio of the powers of range and noise.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Levels of the quantizer.
-    levels: usize,
-    /// Bound for levels, mean over the steps.
-    quantized: Measured,
-    /// Bound for the ranges themselves.
-    unquantized: Measured,
-    /// Grid of 25 nodes an axis.
-    grid: Measured,
-    /// Gaussian message passing.
-    message_passing: Measured,
-    /// Extended Kalman filter of the ranges.
-    unquantized_filter: Measured,
-    /// Medians of the three.
-    grid_median: f64,
-    /// Median.
-    message_passing_median: f64,
-    /// Median.
-    unquantized_filter_median: f64,
-}
+rows! {
+    struct Row {
+        /// Ratio of the powers of range and noise.
+        snr_db: f64 ["dB"],
+        /// Levels of the quantizer.
+        levels: usize,
+        /// Bound for levels, mean over the steps.
+        quantized: Measured,
+        /// Bound for the ranges themselves.
+        unquantized: Measured,
+        /// Grid of 25 nodes an axis.
+        grid: Measured,
+        /// Gaussian message passing.
+        message_passing: Measured,
+        /// Extended Kalman filter of the ranges.
+        unquantized_filter: Measured,
+        /// Medians of the three.
+        grid_median: f64,
+        /// Median.
+        message_passing_median: f64,
+        /// Median.
+        unquantized_filter_median: f64,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Bounds and errors.
-    bounds: Vec<Row>,
+    pub struct Rows {
+        /// Bounds and errors.
+        bounds: Vec<Row>,
+    }
 }
 
 /// `mpa-crlb`.
@@ -70,19 +62,13 @@ impl Figure for Bounds {
     type Parameters = Parameters;
     type Tables = Rows;
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-crlb",
-            title: "Bounds for quantized ranges",
-            caption: "Posterior Cramer-Rao bounds over free trajectories, accelerations known, with the references of the grid filter; \
+    const ABOUT: About = About {
+        id: "mpa-crlb",
+        title: "Bounds for quantized ranges",
+        caption: "Posterior Cramer-Rao bounds over free trajectories, accelerations known, with the references of the grid filter; \
                       and what is reached. At 50 dB the bound is far below: information sits at the edges of the cells.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = p.trials.min(10);
-    }
+        source: "",
+    };
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let target = Target::printed()?;
@@ -155,16 +141,11 @@ impl Figure for Bounds {
     }
 
     fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let key = |r: &Row| format!("{}dB-L{}", r.snr_db, r.levels);
-        claims
-            .references("quantized", "bound for levels", &t.bounds, |r| (key(r), r.quantized))
-            .at_full_trials();
-        claims
-            .references("unquantized", "bound for ranges", &t.bounds, |r| (key(r), r.unquantized))
-            .at_full_trials();
-        claims
-            .references("grid-median", "median of the grid", &t.bounds, |r| (key(r), r.grid_median))
-            .at_full_trials();
+        full.references("quantized", "bound for levels", &t.bounds, |r| (key(r), r.quantized));
+        full.references("unquantized", "bound for ranges", &t.bounds, |r| (key(r), r.unquantized));
+        full.references("grid-median", "median of the grid", &t.bounds, |r| (key(r), r.grid_median));
         claims.all("floor", "C7: no tracker of levels is below its bound", &t.bounds, |r| {
             let above = |m: Measured| m.value > r.quantized.value - 3.0 * m.standard_error.unwrap_or(0.0);
             above(r.grid) && above(r.message_passing)
@@ -174,14 +155,10 @@ impl Figure for Bounds {
         });
         for snr in SNRS {
             let of = t.bounds.iter().filter(|r| r.snr_db == snr).map(|r| r.quantized.value);
-            claims
-                .decreasing(format!("levels-{snr}"), "C7: fewer levels, larger bound", of)
-                .at_full_trials();
+            full.decreasing(format!("levels-{snr}"), "C7: fewer levels, larger bound", of);
         }
         let loose = t.bounds.iter().find(|r| r.snr_db == 50.0 && r.levels == 4);
-        claims
-            .above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized.value), 5.0)
-            .at_full_trials();
+        full.above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized.value), 5.0);
     }
 
     fn plot(&self, _: &Parameters, t: &Rows) -> Plot {

@@ -12,64 +12,53 @@ use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};
 /// `mpa-gibbs`.
 pub struct Gibbs;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Draws {
-    /// Draws of the sampler in each case.
-    #[garde(range(min = 2, max = 10_000_000))]
-    trials: u64,
-    /// Sweeps of each draw.
-    #[garde(range(min = 0, max = 1000))]
-    sweeps: usize,
-}
-
-impl Default for Draws {
-    fn default() -> Self {
-        Self {
-            trials: 400_000,
-            sweeps: 5,
-        }
+parameters! {
+    /// Settings.
+    pub struct Draws {
+        /// Draws of the sampler in each case.
+        #[garde(range(min = 2, max = 10_000_000))]
+        trials: u64 = 400_000 => quick 5000,
+        /// Sweeps of each draw.
+        #[garde(range(min = 0, max = 1000))]
+        sweeps: usize = 5,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Mixing {
-    /// Case.
-    case: &'static str,
-    /// Sweeps.
-    sweeps: usize,
-    /// Total variation between the labels' law and the product's, exactly.
-    total_variation: f64,
-    /// Mean of a draw minus that of the product, first axis, exactly: what no number of draws removes.
-    bias: f64,
-}
+rows! {
+    struct Mixing {
+        /// Case.
+        case: &'static str,
+        /// Sweeps.
+        sweeps: usize,
+        /// Total variation between the labels' law and the product's, exactly.
+        total_variation: f64,
+        /// Mean of a draw minus that of the product, first axis, exactly: what no number of draws removes.
+        bias: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Sampled {
-    /// Case.
-    case: &'static str,
-    /// Axis.
-    axis: usize,
-    /// Mean of the product.
-    exact: f64,
-    /// Mean of a draw after the sweeps, exactly.
-    after_sweeps: f64,
-    /// Mean of the draws.
-    mean: Measured,
-    /// Second largest modulus of the label chain's eigenvalues.
-    second_eigenvalue: f64,
-    /// `ln` of the product's mass.
-    log_normaliser: f64,
-}
+    struct Sampled {
+        /// Case.
+        case: &'static str,
+        /// Axis.
+        axis: usize,
+        /// Mean of the product.
+        exact: f64,
+        /// Mean of a draw after the sweeps, exactly.
+        after_sweeps: f64,
+        /// Mean of the draws.
+        mean: Measured,
+        /// Second largest modulus of the label chain's eigenvalues.
+        second_eigenvalue: f64,
+        /// `ln` of the product's mass.
+        log_normaliser: f64,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct GibbsRows {
-    /// How the labels forget their start.
-    mixing: Vec<Mixing>,
-    /// What the sampler draws.
-    sampled: Vec<Sampled>,
+    pub struct GibbsRows {
+        /// How the labels forget their start.
+        mixing: Vec<Mixing>,
+        /// What the sampler draws.
+        sampled: Vec<Sampled>,
+    }
 }
 
 fn mixture<const D: usize>(
@@ -163,19 +152,13 @@ impl Figure for Gibbs {
     type Parameters = Draws;
     type Tables = GibbsRows;
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-gibbs",
-            title: "How fast Gibbs sweeps forget their start",
-            caption: "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
+    const ABOUT: About = About {
+        id: "mpa-gibbs",
+        title: "How fast Gibbs sweeps forget their start",
+        caption: "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
                       separated modes (B), and what the sampler draws after five. In A the chain's own bias after five sweeps is 0.0093.",
-            source: "particle message passing, Section 2.1.4",
-        }
-    }
-
-    fn quicken(&self, p: &mut Draws) {
-        p.trials = p.trials.min(5000);
-    }
+        source: "particle message passing, Section 2.1.4",
+    };
 
     fn run(&self, p: &Draws, context: &Context<'_>) -> Result<GibbsRows, Error> {
         let mut rows = GibbsRows {
@@ -189,34 +172,20 @@ impl Figure for Gibbs {
     }
 
     fn claims(&self, _: &Draws, t: &GibbsRows, claims: &mut Claims) {
+        let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         let key = |r: &Mixing| format!("{}-t{}", r.case, r.sweeps);
         claims.references("tv", "total variation after the sweeps", &t.mixing, |r| (key(r), r.total_variation));
         let axis = |r: &Sampled| format!("{}{}", r.case, r.axis);
         claims.references("mean", "mean of the product", &t.sampled, |r| (axis(r), r.exact));
         claims.references("log-mass", "mass of the product", &t.sampled, |r| (axis(r), r.log_normaliser));
         claims.references("eigenvalue", "second eigenvalue", &t.sampled, |r| (axis(r), r.second_eigenvalue));
-        claims.all_within(
-            "law",
-            "draws have the mean of the chain after these sweeps",
-            &t.sampled,
-            |r| (r.mean, r.after_sweeps),
-            4.0,
-        );
+        let what = "draws have the mean of the chain after these sweeps";
+        claims.all_within("law", what, &t.sampled, |r| (r.mean, r.after_sweeps), 4.0);
         let first = t.sampled.iter().find(|r| r.case == "A");
-        claims
-            .near(
-                "bias-a",
-                "C8: five sweeps leave a bias of 0.0093 in case A, beyond the 0.004 that was asked for",
-                first.map(|r| r.after_sweeps - r.exact),
-                0.009_346,
-                1e-5,
-            )
-            .at_defaults();
+        let what = "C8: five sweeps leave a bias of 0.0093 in case A, beyond the 0.004 that was asked for";
+        here.near("bias-a", what, first.map(|r| r.after_sweeps - r.exact), 0.009_346, 1e-5);
         let plane = t.sampled.iter().filter(|r| r.case == "C");
-        claims
-            .all("bias-c", "C8: in case C it is within 0.004", plane, |r| (r.mean.value - r.exact).abs() < 0.004)
-            .at_defaults()
-            .at_full_trials();
+        paper.all("bias-c", "C8: in case C it is within 0.004", plane, |r| (r.mean.value - r.exact).abs() < 0.004);
         let stuck = t.sampled.iter().find(|r| r.case == "B").map(|r| r.second_eigenvalue);
         claims.above("stuck", "between separated modes a chain does not move", stuck, 0.999_999);
     }
@@ -243,79 +212,74 @@ impl Figure for Gibbs {
 /// `mpa-ring`.
 pub struct Rings;
 
-/// No settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate, Default)]
-#[serde(deny_unknown_fields)]
-pub struct None {}
-
-#[derive(Serialize, JsonSchema)]
-struct Ring {
-    /// Lower end of the cell.
-    lower: f64,
-    /// Upper end.
-    upper: f64,
-    /// Deviation of the noise.
-    deviation: f64,
-    /// Mean radius of uniform bearings, as printed.
-    printed: f64,
-    /// Mean radius of the message.
-    exact: f64,
-    /// Total variation between both.
-    total_variation: f64,
+parameters! {
+    /// No settings.
+    pub struct None {}
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Kernel {
-    /// Points.
-    n: u32,
-    /// Dimensions.
-    dimension: u32,
-    /// Printed factor of the variance.
-    printed: f64,
-    /// Silverman's.
-    silverman: f64,
-    /// Integrated squared error with the printed factor, exactly, for a normal density.
-    printed_error: f64,
-    /// With Silverman's.
-    silverman_error: f64,
-}
+rows! {
+    struct Ring {
+        /// Lower end of the cell.
+        lower: f64,
+        /// Upper end.
+        upper: f64,
+        /// Deviation of the noise.
+        deviation: f64,
+        /// Mean radius of uniform bearings, as printed.
+        printed: f64,
+        /// Mean radius of the message.
+        exact: f64,
+        /// Total variation between both.
+        total_variation: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Weight {
-    /// Components.
-    components: usize,
-    /// Distance between neighbours, in their deviations.
-    spacing: f64,
-    /// Second moment of the printed weights, one draw from each component; equal weights have 1.
-    each: f64,
-    /// With all draws from the first.
-    first: f64,
-}
+    struct Kernel {
+        /// Points.
+        n: u32,
+        /// Dimensions.
+        dimension: u32,
+        /// Printed factor of the variance.
+        printed: f64,
+        /// Silverman's.
+        silverman: f64,
+        /// Integrated squared error with the printed factor, exactly, for a normal density.
+        printed_error: f64,
+        /// With Silverman's.
+        silverman_error: f64,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct RingRows {
-    /// Rings.
-    rings: Vec<Ring>,
-    /// Kernels.
-    kernels: Vec<Kernel>,
-    /// Weights.
-    weights: Vec<Weight>,
+    struct Weight {
+        /// Components.
+        components: usize,
+        /// Distance between neighbours, in their deviations.
+        spacing: f64,
+        /// Second moment of the printed weights, one draw from each component; equal weights have 1.
+        each: f64,
+        /// With all draws from the first.
+        first: f64,
+    }
+
+    pub struct RingRows {
+        /// Rings.
+        rings: Vec<Ring>,
+        /// Kernels.
+        kernels: Vec<Kernel>,
+        /// Weights.
+        weights: Vec<Weight>,
+    }
 }
 
 impl Figure for Rings {
     type Parameters = None;
     type Tables = RingRows;
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-ring",
-            title: "Errata in closed form: radii, kernels, weights",
-            caption: "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
+    const ABOUT: About = About {
+        id: "mpa-ring",
+        title: "Errata in closed form: radii, kernels, weights",
+        caption: "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
                       Silverman's kernel; and the second moment of the printed ratio weights, which equal weights make 1.",
-            source: "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
-        }
-    }
+        source: "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
+    };
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<RingRows, Error> {
         let ring = |(lower, upper, deviation): (f64, f64, f64)| -> Result<Ring, Error> {
@@ -407,46 +371,39 @@ impl Figure for Rings {
 /// `mpa-bits`.
 pub struct Bits;
 
-#[derive(Serialize, JsonSchema)]
-struct BitRow {
-    /// Sensors.
-    sensors: usize,
-    /// Levels.
-    levels: usize,
-    /// Levels of all sensors.
-    #[schemars(extend("unit" = "bit"))]
-    reports: u64,
-    /// Mean and covariance from leader to leader.
-    #[schemars(extend("unit" = "bit"))]
-    handover: u64,
-    /// Published protocol: both.
-    #[schemars(extend("unit" = "bit"))]
-    published: u64,
-    /// The ranges themselves, 32 bits each.
-    #[schemars(extend("unit" = "bit"))]
-    raw: u64,
-}
+rows! {
+    struct BitRow {
+        /// Sensors.
+        sensors: usize,
+        /// Levels.
+        levels: usize,
+        /// Levels of all sensors.
+        reports: u64 ["bit"],
+        /// Mean and covariance from leader to leader.
+        handover: u64 ["bit"],
+        /// Published protocol: both.
+        published: u64 ["bit"],
+        /// The ranges themselves, 32 bits each.
+        raw: u64 ["bit"],
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct BitRows {
-    /// Bits of a step.
-    bits: Vec<BitRow>,
+    pub struct BitRows {
+        /// Bits of a step.
+        bits: Vec<BitRow>,
+    }
 }
 
 impl Figure for Bits {
     type Parameters = None;
     type Tables = BitRows;
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-bits",
-            title: "Bits of a step",
-            caption: "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
+    const ABOUT: About = About {
+        id: "mpa-bits",
+        title: "Bits of a step",
+        caption: "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
                       Where all nodes receive all levels and run the same deterministic tracker, none is needed.",
-            source: "particle message passing, Section 3.3",
-        }
-    }
+        source: "particle message passing, Section 3.3",
+    };
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<BitRows, Error> {
         let mut bits = Vec::new();
@@ -493,35 +450,33 @@ impl Figure for Bits {
 /// `mpa-graphs`.
 pub struct Graphs;
 
-#[derive(Serialize, JsonSchema)]
-struct NodeRow {
-    /// Figure of the thesis.
-    graph: &'static str,
-    /// Node.
-    node: String,
-    /// `variable` or `function`.
-    kind: &'static str,
-    /// Edges.
-    degree: usize,
-}
+rows! {
+    struct NodeRow {
+        /// Figure of the thesis.
+        graph: &'static str,
+        /// Node.
+        node: String,
+        /// `variable` or `function`.
+        kind: &'static str,
+        /// Edges.
+        degree: usize,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct EdgeRow {
-    /// Figure of the thesis.
-    graph: &'static str,
-    /// Function.
-    function: String,
-    /// Variable.
-    variable: String,
-}
+    struct EdgeRow {
+        /// Figure of the thesis.
+        graph: &'static str,
+        /// Function.
+        function: String,
+        /// Variable.
+        variable: String,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct GraphRows {
-    /// Nodes.
-    nodes: Vec<NodeRow>,
-    /// Edges.
-    edges: Vec<EdgeRow>,
+    pub struct GraphRows {
+        /// Nodes.
+        nodes: Vec<NodeRow>,
+        /// Edges.
+        edges: Vec<EdgeRow>,
+    }
 }
 
 fn graphs() -> Result<[(&'static str, FactorGraph); 3], Error> {
@@ -536,14 +491,12 @@ impl Figure for Graphs {
     type Parameters = None;
     type Tables = GraphRows;
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-graphs",
-            title: "The factor graphs",
-            caption: "Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).",
-            source: "particle message passing, Figures 2.1, 3.2, 3.6",
-        }
-    }
+    const ABOUT: About = About {
+        id: "mpa-graphs",
+        title: "The factor graphs",
+        caption: "Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).",
+        source: "particle message passing, Figures 2.1, 3.2, 3.6",
+    };
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<GraphRows, Error> {
         let (mut nodes, mut edges) = (Vec::new(), Vec::new());
@@ -570,13 +523,8 @@ impl Figure for Graphs {
         let edges = t.edges.iter().filter(|e| e.graph == "2.1").count() as f64;
         claims.near("edges", "and eight edges", edges, 8.0, 0.0);
         let position = t.nodes.iter().find(|n| n.graph == "3.2" && n.node == "position");
-        claims.near(
-            "position",
-            "with five sensors, the position has six edges",
-            position.map(|n| n.degree as f64),
-            6.0,
-            0.0,
-        );
+        let what = "with five sensors, the position has six edges";
+        claims.near("position", what, position.map(|n| n.degree as f64), 6.0, 0.0);
     }
 
     fn plot(&self, _: &None, t: &GraphRows) -> Plot {

@@ -9,47 +9,39 @@ use fewbits_pf_mpa::leader::{Handover, elect, nearest};
 use fewbits_pf_mpa::{MessagePassing, Reports, Target, Tracker};
 use nalgebra::Vector2;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Trajectories of 25 steps.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { trials: 160 }
+parameters! {
+    /// Settings.
+    pub struct Parameters {
+        /// Trajectories of 25 steps.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 160 => quick 3,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Ratio of the powers of range and noise.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Particles.
-    particles: usize,
-    /// Share of steps with one claimant.
-    one: Measured,
-    /// With none.
-    none: Measured,
-    /// With several.
-    several: Measured,
-    /// Share of steps in which the true nearest sensor leads.
-    nearest: Measured,
-    /// Mean squared position error of the leader's estimate.
-    mse: Measured,
-    /// Variance of the sensors' estimates about their mean, both axes.
-    spread: Measured,
-}
+rows! {
+    struct Row {
+        /// Ratio of the powers of range and noise.
+        snr_db: f64 ["dB"],
+        /// Particles.
+        particles: usize,
+        /// Share of steps with one claimant.
+        one: Measured,
+        /// With none.
+        none: Measured,
+        /// With several.
+        several: Measured,
+        /// Share of steps in which the true nearest sensor leads.
+        nearest: Measured,
+        /// Mean squared position error of the leader's estimate.
+        mse: Measured,
+        /// Variance of the sensors' estimates about their mean, both axes.
+        spread: Measured,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Elections.
-    elections: Vec<Row>,
+    pub struct Rows {
+        /// Elections.
+        elections: Vec<Row>,
+    }
 }
 
 /// `mpa-leader`.
@@ -61,20 +53,14 @@ impl Figure for Leaders {
     type Parameters = Parameters;
     type Tables = Rows;
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-leader",
-            title: "Elections among copies that drew for themselves",
-            caption: "Five sensors, each with its own message passing and its own seed; the leader's mean and covariance, rounded to \
+    const ABOUT: About = About {
+        id: "mpa-leader",
+        title: "Elections among copies that drew for themselves",
+        caption: "Five sensors, each with its own message passing and its own seed; the leader's mean and covariance, rounded to \
                       32 bits, are what all go on with. In 98 of 100 steps exactly one claims the lead. One shared seed, or a \
                       deterministic tracker, would make it all of them.",
-            source: "particle message passing, Section 3.3",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = p.trials.min(3);
-    }
+        source: "particle message passing, Section 3.3",
+    };
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let (target, sensors) = (Target::printed()?, canonical());
@@ -135,6 +121,7 @@ impl Figure for Leaders {
     }
 
     fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let key = |r: &Row| format!("{}dB-N{}", r.snr_db, r.particles);
         type Field = fn(&Row) -> Measured;
         let fields: [(&str, &str, Field); 5] = [
@@ -145,9 +132,7 @@ impl Figure for Leaders {
             ("spread", "variance between the copies", |r| r.spread),
         ];
         for (quantity, statement, field) in fields {
-            claims
-                .references(quantity, statement, &t.elections, |r| (key(r), field(r)))
-                .at_full_trials();
+            full.references(quantity, statement, &t.elections, |r| (key(r), field(r)));
         }
         claims.all("sum", "every step has one, none or several", &t.elections, |r| {
             (r.one.value + r.none.value + r.several.value - 1.0).abs() < 1e-9

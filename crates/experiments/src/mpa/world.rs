@@ -288,17 +288,19 @@ impl Point {
     }
 }
 
-/// What a method did on many trajectories.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub(super) struct Score {
-    /// Mean squared position error, averaged over trajectories.
-    pub(super) mse: Measured,
-    /// Median over trajectories of their mean squared error.
-    pub(super) median: Measured,
-    /// Share of trajectories with a mean squared error above 4.
-    pub(super) lost: f64,
-    /// Trajectories.
-    pub(super) trajectories: u64,
+rows! {
+    /// What a method did on many trajectories.
+    #[derive(Debug, Clone)]
+    pub(super) struct Score {
+        /// Mean squared position error, averaged over trajectories.
+        pub(super) mse: Measured,
+        /// Median over trajectories of their mean squared error.
+        pub(super) median: Measured,
+        /// Share of trajectories with a mean squared error above 4.
+        pub(super) lost: f64,
+        /// Trajectories.
+        pub(super) trajectories: u64,
+    }
 }
 
 impl Score {

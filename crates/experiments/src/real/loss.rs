@@ -46,28 +46,35 @@ impl Default for Parameters {
     }
 }
 
-/// One interval of refreshes at one rate of loss.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Signal.
-    column: String,
-    /// Probability that a packet is lost.
-    loss: f64,
-    /// Slots from one refresh to the next.
-    refresh: u64,
-    /// Whole bits per sample, counters and refreshes included.
-    #[schemars(extend("unit" = "bit"))]
-    bits: Measured,
-    /// Root mean square error over delta.
-    rmse: Measured,
-    /// Share of the slots whose error exceeds delta.
-    beyond: Measured,
-    /// Share of the slots whose error exceeds delta although the receiver believes to be in step.
-    unnoticed: Measured,
-    /// Slots from the first packet lost to the next refresh received, at the longest, over the interval of refreshes.
-    longest: f64,
-    /// Errors beyond delta while no packet was lost since the last refresh that arrived: never.
-    violations: u64,
+impl Quick for Parameters {
+    fn quicken(&mut self) {
+        self.source.samples = 1000;
+        self.trials = 4;
+    }
+}
+
+rows! {
+    /// One interval of refreshes at one rate of loss.
+    pub struct Row {
+        /// Signal.
+        column: String,
+        /// Probability that a packet is lost.
+        loss: f64,
+        /// Slots from one refresh to the next.
+        refresh: u64,
+        /// Whole bits per sample, counters and refreshes included.
+        bits: Measured ["bit"],
+        /// Root mean square error over delta.
+        rmse: Measured,
+        /// Share of the slots whose error exceeds delta.
+        beyond: Measured,
+        /// Share of the slots whose error exceeds delta although the receiver believes to be in step.
+        unnoticed: Measured,
+        /// Slots from the first packet lost to the next refresh received, at the longest, over the interval of refreshes.
+        longest: f64,
+        /// Errors beyond delta while no packet was lost since the last refresh that arrived: never.
+        violations: u64,
+    }
 }
 
 /// Loss and recovery.
@@ -115,9 +122,7 @@ fn one(point: &Point<'_>, sums: &mut Sums, trial: Trial) -> Result<(), Error> {
     for (slot, x) in (0_u64..).zip(&recording.samples) {
         let report = sensor.encode(*x)?;
         bits += report.map_or(0.0, |r| r.packet.bits() as f64);
-        let observation = link
-            .transmit(&mut rng, report.map(|r| r.packet).as_ref(), &())
-            .map_err(Error::failed)?;
+        let observation = link.transmit(&mut rng, report.map(|r| r.packet).as_ref(), &())?;
         let arrived = observation.received().is_some();
         if report.is_some() && !arrived {
             lost.get_or_insert(slot);
@@ -159,11 +164,6 @@ impl Figure for Loss {
         }
     }
 
-    fn quicken(&self, p: &mut Parameters) {
-        p.source.samples = 1000;
-        p.trials = 4;
-    }
-
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-loss", context)?;
         let mut points = Vec::new();
@@ -198,24 +198,17 @@ impl Figure for Loss {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let what = "no error exceeds delta but between a loss and the next refresh that arrives";
         claims.all("bounded", what, rows, |r| r.violations == 0);
         let what = "without loss no error exceeds delta";
-        claims
-            .all("perfect", what, rows.iter().filter(|r| r.loss == 0.0), |r| r.beyond.value == 0.0)
-            .at_defaults();
+        here.all("perfect", what, rows.iter().filter(|r| r.loss == 0.0), |r| r.beyond.value == 0.0);
         let what = "with frequent refreshes fewer slots are wrong";
         let worst = || rows.iter().filter(|r| r.loss == 0.1);
-        claims
-            .increasing("refresh", what, worst().map(|r| r.beyond))
-            .at_defaults();
-        claims
-            .decreasing("price", "and more bits are spent", worst().map(|r| r.bits))
-            .at_defaults();
+        here.increasing("refresh", what, worst().map(|r| r.beyond));
+        here.decreasing("price", "and more bits are spent", worst().map(|r| r.bits));
         let what = "most wrong slots are known to be so";
-        claims
-            .all("noticed", what, worst(), |r| r.unnoticed.value < 0.5 * r.beyond.value)
-            .at_defaults();
+        here.all("noticed", what, worst(), |r| r.unnoticed.value < 0.5 * r.beyond.value);
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {

@@ -33,25 +33,32 @@ impl Default for Parameters {
     }
 }
 
-/// One moment of one signal.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Signal.
-    column: String,
-    /// Slot.
-    slot: usize,
-    /// Sample.
-    sample: f64,
-    /// Reconstruction.
-    value: f64,
-    /// Weight of the random walks.
-    walk: f64,
-    /// Weight of the velocities that decay by 0.6.
-    damped: f64,
-    /// Weight of the velocities that decay by 0.95.
-    smooth: f64,
-    /// Mean logarithm to base 2 of the driving noise, in steps of two delta.
-    scale: f64,
+impl Quick for Parameters {
+    fn quicken(&mut self) {
+        self.source.samples = 1000;
+    }
+}
+
+rows! {
+    /// One moment of one signal.
+    pub struct Row {
+        /// Signal.
+        column: String,
+        /// Slot.
+        slot: usize,
+        /// Sample.
+        sample: f64,
+        /// Reconstruction.
+        value: f64,
+        /// Weight of the random walks.
+        walk: f64,
+        /// Weight of the velocities that decay by 0.6.
+        damped: f64,
+        /// Weight of the velocities that decay by 0.95.
+        smooth: f64,
+        /// Mean logarithm to base 2 of the driving noise, in steps of two delta.
+        scale: f64,
+    }
 }
 
 /// Models over time.
@@ -95,19 +102,13 @@ impl Figure for Models {
     type Parameters = Parameters;
     type Tables = Vec<Row>;
 
-    fn about(&self) -> About {
-        About {
-            id: "real-models",
-            title: "Real signals: what the bank believed",
-            caption: "Weights of the three families of models, and the mean scale of their noise, over time: a plume raises the scale \
+    const ABOUT: About = About {
+        id: "real-models",
+        title: "Real signals: what the bank believed",
+        caption: "Weights of the three families of models, and the mean scale of their noise, over time: a plume raises the scale \
                       within a few reports, a smooth drift is given to the velocities, a calm to the narrowest walks.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.source.samples = 1000;
-    }
+        source: "our own comparison",
+    };
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-models", context)?;
@@ -119,19 +120,18 @@ impl Figure for Models {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let sums = |r: &Row| (r.walk + r.damped + r.smooth - 1.0).abs() < 1e-9;
         claims.all("weights", "weights sum to one", rows, sums);
         let of = |column: &'static str| rows.iter().filter(move |r| r.column == column && r.slot > 300);
         let velocity = |r: &Row| r.damped + r.smooth;
         let what = "a smooth drift is given to the velocities";
-        claims
-            .above("drift", what, mean(of("drift"), velocity), 0.5)
-            .at_defaults();
+        here.above("drift", what, mean(of("drift"), velocity), 0.5);
         let moving = mean(of("gusts").filter(|r| r.sample > 0.3), |r| r.scale);
         let calm = mean(of("gusts").filter(|r| r.sample == 0.0), |r| r.scale);
         let what = "gusts raise the scale by a factor of at least four over a calm";
-        let gap = moving.zip(calm).map(|(m, c)| m - c);
-        claims.above("gusts", what, gap, 2.0).at_defaults();
+        let gap = minus(moving, calm);
+        here.above("gusts", what, gap, 2.0);
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {

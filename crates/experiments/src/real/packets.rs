@@ -28,26 +28,34 @@ impl Default for Parameters {
     }
 }
 
-/// One scheme at one rate.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Signal.
-    column: String,
-    /// Packets per sample, at most.
-    target: f64,
-    /// adaptive; send-on-delta, which is also DPCM of order 0 without a lattice; dpcm-0, dpcm-1.
-    scheme: &'static str,
-    /// Half-width of the region of silence.
-    delta: f64,
-    /// Root mean square error.
-    rmse: f64,
-    /// Packets per sample.
-    packets: f64,
-    /// Error over that of the better of both orders of DPCM, whose packets hold a lattice point too; smaller errors than the
-    /// negligible one count as that.
-    ratio: Option<f64>,
-    /// A millionth of the signal's range.
-    negligible: f64,
+impl Quick for Parameters {
+    fn quicken(&mut self) {
+        self.source.samples = 800;
+        self.packets = vec![0.1];
+    }
+}
+
+rows! {
+    /// One scheme at one rate.
+    pub struct Row {
+        /// Signal.
+        column: String,
+        /// Packets per sample, at most.
+        target: f64,
+        /// adaptive; send-on-delta, which is also DPCM of order 0 without a lattice; dpcm-0, dpcm-1.
+        scheme: &'static str,
+        /// Half-width of the region of silence.
+        delta: f64,
+        /// Root mean square error.
+        rmse: f64,
+        /// Packets per sample.
+        packets: f64,
+        /// Error over that of the better of both orders of DPCM, whose packets hold a lattice point too; smaller errors than the
+        /// negligible one count as that.
+        ratio: Option<f64>,
+        /// A millionth of the signal's range.
+        negligible: f64,
+    }
 }
 
 /// Error against packets.
@@ -88,22 +96,15 @@ impl Figure for Packets {
     type Parameters = Parameters;
     type Tables = Vec<Row>;
 
-    fn about(&self) -> About {
-        About {
-            id: "real-packets",
-            title: "Real signals: error against packets",
-            caption: "Root mean square error against packets per sample. Where a packet costs the same whatever it holds, codes gain \
+    const ABOUT: About = About {
+        id: "real-packets",
+        title: "Real signals: error against packets",
+        caption: "Root mean square error against packets per sample. Where a packet costs the same whatever it holds, codes gain \
                       nothing: only the prediction counts, and what a packet holds. Send-on-delta sends the sample itself, and is \
                       ahead where signals jump and rest; the bank is ahead where they have a velocity. Errors below a \
                       millionth of the signal's range are drawn there.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.source.samples = 800;
-        p.packets = vec![0.1];
-    }
+        source: "our own comparison",
+    };
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-packets", context)?;
@@ -119,12 +120,11 @@ impl Figure for Packets {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let ratios = || rows.iter().filter_map(|r| r.ratio);
         let what = "at equal packets the error is at most that of the better DPCM, in the geometric mean";
         claims.at_most("mean", what, geometric_mean(ratios()), 1.0);
-        claims
-            .at_most("worst", "and nowhere above 1.35 of it", largest(ratios()), 1.35)
-            .at_defaults();
+        here.at_most("worst", "and nowhere above 1.35 of it", largest(ratios()), 1.35);
         claims.all("rate", "the rate is kept", rows.iter().filter(|r| r.ratio.is_some()), |r| r.packets <= r.target);
     }
 
