@@ -2,6 +2,7 @@
 
 pub(crate) use crate::claim::{minus, over};
 pub(crate) use crate::plot::{Axis, Layer, Marker, Panel, Plot, points};
+pub(crate) use crate::sweep::{first, select};
 pub(crate) use crate::{About, Claims, Comparison, Context, Cost, Error, Figure, Measured, Quick, Tally};
 pub(crate) use garde::Validate;
 pub(crate) use schemars::JsonSchema;

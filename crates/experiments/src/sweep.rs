@@ -116,6 +116,16 @@ impl Context<'_> {
     }
 }
 
+/// The first row of which this holds.
+pub fn first<R>(rows: &[R], is: impl Fn(&R) -> bool) -> Option<&R> {
+    rows.iter().find(|row| is(row))
+}
+
+/// The rows of which this holds.
+pub fn select<R>(rows: &[R], is: impl Fn(&R) -> bool) -> impl Iterator<Item = &R> {
+    rows.iter().filter(move |row| is(row))
+}
+
 /// All trials of all schemes at one point: `K` numbers each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison<const K: usize> {

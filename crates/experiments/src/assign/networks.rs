@@ -172,7 +172,6 @@ fn feasible(sensors: usize, mean: f64, std: f64) -> garde::Result {
     }
 }
 
-/// `assign-fig6-3`.
 pub struct Spread;
 
 parameters! { self #[derive(Validate)]
@@ -235,7 +234,6 @@ impl Figure for Spread {
     }
 }
 
-/// `assign-fig6-4`.
 pub struct Mean;
 
 parameters! { self #[derive(Validate)]

@@ -11,7 +11,6 @@ fn axis_points(step: f64) -> impl Iterator<Item = f64> {
     (0..=count).map(move |i| -1.0 + 2.0 * i as f64 / count as f64)
 }
 
-/// `assign-fig6-1`.
 pub struct Landings;
 
 parameters! {
@@ -113,7 +112,6 @@ impl Figure for Landings {
     }
 }
 
-/// `assign-figC-1`.
 pub struct BitErrors;
 
 parameters! {

@@ -6,7 +6,6 @@ use fewbits_sensor_assignment::{
     quantization_error,
 };
 
-/// `assign-table6-1`.
 pub struct Table;
 
 parameters! {
@@ -128,7 +127,7 @@ impl Figure for Table {
     };
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        tables(&p.variances).map_err(Error::failed)
+        Ok(tables(&p.variances)?)
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
@@ -197,13 +196,7 @@ impl Figure for Table {
         let n = p.variances.len();
         let index: Vec<f64> = (1..=n).map(|i| i as f64).collect();
         // The coarsest bit on top.
-        let line = |bit: usize| {
-            rows.costs
-                .iter()
-                .filter(|c| c.bit == bit)
-                .map(|c| c.gamma.log10())
-                .collect()
-        };
+        let line = |bit: usize| select(&rows.costs, |c| c.bit == bit).map(|c| c.gamma.log10()).collect();
         let field = (1..=n).rev().map(line).collect();
         let names = (1..=n).map(|b| ((n + 1 - b) as f64, format!("bit {b}")));
         let optimal = find(&rows.assignments, "optimal").map_or("", |r| r.sensors.as_str());

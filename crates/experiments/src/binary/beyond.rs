@@ -11,7 +11,6 @@ use fewbits_sensor_assignment::{
 };
 use rayon::prelude::*;
 
-/// `binary-beyond`.
 pub struct Beyond;
 
 parameters! {

@@ -6,7 +6,6 @@ use crate::reference;
 use fewbits_binary_patterns::bounds::printed_crlb;
 use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 
-/// `binary-fig5-6`.
 pub struct PrintedBounds;
 
 parameters! { self #[derive(Validate)]
@@ -36,14 +35,14 @@ enum Kind {
 fn masks(kind: Kind, bits: usize) -> Result<Vec<Mask>, Error> {
     match kind {
         Kind::Fixed => Ok(vec![1 << (bits - 1); bits]),
-        Kind::Natural => natural_basis(bits).map_err(Error::failed),
-        Kind::Gray => gray_basis(bits).map_err(Error::failed),
+        Kind::Natural => Ok(natural_basis(bits)?),
+        Kind::Gray => Ok(gray_basis(bits)?),
     }
 }
 
 /// Equation 5.13.
 fn printed(kind: Kind, bits: usize, snr: f64) -> Result<f64, Error> {
-    printed_crlb(&Scene::uniform(bits, snr)?.bank(&masks(kind, bits)?)?).map_err(Error::failed)
+    Ok(printed_crlb(&Scene::uniform(bits, snr)?.bank(&masks(kind, bits)?)?)?)
 }
 
 fn exact(kind: Kind, bits: usize, snr: f64) -> Result<f64, Error> {
@@ -145,12 +144,7 @@ impl Figure for PrintedBounds {
                 .map(|(name, at)| (format!("{name} {} bits", c.bits), at))
         });
         claims.references("crossing", what, crossings, |crossing| crossing);
-        let natural = |bits: usize| {
-            rows.crossings
-                .iter()
-                .find(|c| c.bits == bits)
-                .and_then(|c| c.gray_natural_db)
-        };
+        let natural = |bits: usize| first(&rows.crossings, |c| c.bits == bits).and_then(|c| c.gray_natural_db);
         let beyond = rows
             .sets
             .iter()

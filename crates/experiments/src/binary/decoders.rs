@@ -7,7 +7,6 @@ use fewbits_binary_patterns::bounds::{
 };
 use fewbits_binary_patterns::{Decoder, gray_basis};
 
-/// `binary-fig5-8`.
 pub struct Decoders;
 
 type Parameters = Ratios<-10, 40>;

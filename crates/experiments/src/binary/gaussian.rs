@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
 
-/// `binary-fig5-9`.
 pub struct GaussianSource;
 
 type Parameters = Ratios<-10, 30>;

@@ -70,21 +70,21 @@ impl Scene {
     }
 
     fn search(&self, sensors: usize) -> Result<LinearSearch, Error> {
-        LinearSearch::with_deviation(self.source, self.grid.clone(), self.noise, sensors).map_err(Error::failed)
+        Ok(LinearSearch::with_deviation(self.source, self.grid.clone(), self.noise, sensors)?)
     }
 
     fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
-        self.search(masks.len())?.bank(masks).map_err(Error::failed)
+        Ok(self.search(masks.len())?.bank(masks)?)
     }
 
     fn pattern_bank(&self, patterns: &[Pattern]) -> Result<Bank, Error> {
         let quantizers = patterns.iter().map(|p| p.on(&self.grid)).collect::<Result<_, _>>()?;
-        Bank::homogeneous_with_deviation(self.source, quantizers, self.noise).map_err(Error::failed)
+        Ok(Bank::homogeneous_with_deviation(self.source, quantizers, self.noise)?)
     }
 
     /// Exact error of the posterior mean.
     fn mmse(&self, masks: &[Mask]) -> Result<f64, Error> {
-        self.bank(masks)?.mmse().map_err(Error::failed)
+        Ok(self.bank(masks)?.mmse()?)
     }
 }
 
@@ -195,7 +195,7 @@ fn mask_text(masks: &[Mask]) -> String {
 
 /// The pattern of a mask.
 fn pattern(mask: Mask, bits: usize) -> Result<Pattern, Error> {
-    linear_pattern(mask, bits).map_err(Error::failed)
+    Ok(linear_pattern(mask, bits)?)
 }
 
 /// A picture of patterns: a row each, dark where the bit is 1, light where it is 0, over the cells of the unit grid.

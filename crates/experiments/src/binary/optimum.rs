@@ -6,7 +6,6 @@ use fewbits_binary_patterns::baselines::Luo;
 use fewbits_binary_patterns::search::{by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis};
 
-/// `binary-fig5-7`.
 pub struct Optimum;
 
 parameters! { self #[derive(Validate)]

@@ -7,7 +7,6 @@ use fewbits_binary_patterns::{
 };
 use rayon::prelude::*;
 
-/// `binary-fig5-2`.
 pub struct Clipping;
 
 parameters! { self #[derive(Validate)]
@@ -107,10 +106,10 @@ impl Figure for Clipping {
                 let mut bits = vec![inner.bits()[count - 1]];
                 bits.extend(inner.bits());
                 bits.push(inner.bits()[0]);
-                Pattern::new(bits).map_err(Error::failed)
+                Ok::<_, Error>(Pattern::new(bits)?)
             };
             let patterns = masks.iter().map(turned).collect::<Result<Vec<_>, _>>()?;
-            wide.pattern_bank(&patterns)?.mmse().map_err(Error::failed)
+            Ok(wide.pattern_bank(&patterns)?.mmse()?)
         };
         let best = all
             .par_iter()
@@ -205,7 +204,6 @@ fn claim_printed(claims: &mut Claims, what: &str, table: &[Bit], printed: &[&str
 }
 
 parameters! {
-    /// Parameters of the pattern pictures.
     pub struct BitsParameters {
         /// Bits of the cell index.
         #[garde(range(min = 1, max = 8))]
@@ -221,7 +219,6 @@ fn numbered(kind: &str, masks: Vec<Mask>) -> impl Iterator<Item = (String, Mask)
         .map(move |(b, mask)| (format!("{kind}{}", b + 1), mask))
 }
 
-/// `binary-fig5-3`.
 pub struct Natural;
 
 impl Figure for Natural {
@@ -254,7 +251,6 @@ impl Figure for Natural {
     }
 }
 
-/// `binary-fig5-4`.
 pub struct Gray;
 
 impl Figure for Gray {
@@ -294,7 +290,6 @@ impl Figure for Gray {
     }
 }
 
-/// `binary-fig5-5`.
 pub struct Extra;
 
 parameters! { self #[derive(Validate)]
@@ -346,7 +341,6 @@ impl Figure for Extra {
     }
 }
 
-/// `binary-figB-1`.
 pub struct Response;
 
 parameters! {

@@ -7,7 +7,6 @@ use fewbits_binary_patterns::search::MaskSet;
 use fewbits_binary_patterns::{Decoder, Mask, count};
 use rayon::prelude::*;
 
-/// `binary-table5-1`.
 pub struct Table;
 
 parameters! {

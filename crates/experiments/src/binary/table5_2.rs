@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_binary_patterns::{Decoder, Pattern, check_separation, count, mask_of};
 use rayon::prelude::*;
 
-/// `binary-table5-2`.
 pub struct Table;
 
 parameters! {

@@ -3,7 +3,7 @@
 use super::case::Case;
 use super::linear::{Scheme, start, time_of_steps};
 use super::pictures::{by_budget, curve};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, Summary, steps};
+use super::rows::{Ensemble, Further, Nothing, Part, Rows, Step, Summary};
 use super::scalar::{BUDGETS, CENSORED};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
@@ -51,10 +51,6 @@ impl Case for Lossy {
             all.extend(setting.at_budgets(context, &format!("loss {loss}"), &schemes)?);
         }
         Ok(all)
-    }
-
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
     }
 
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
@@ -113,6 +109,24 @@ rows! {
     }
 }
 
+impl Further<Linear> for Bounds {
+    fn of(p: &Linear, _: &Context<'_>) -> Result<Self, Error> {
+        let row = |(l, sensors)| {
+            let (bound_m, bound_centre_m) = (bound(p, l, sensors, true)?, bound(p, l, sensors, false)?);
+            Ok(Bound {
+                l,
+                sensors,
+                bound_m,
+                bound_centre_m,
+            })
+        };
+        let own = p.messages.iter().map(|l| (*l, p.sensors));
+        let cases = own.chain([(1.0, 2), (2.0, 2)]).filter(|_| p.noise_variances.len() == 1);
+        let bound = cases.map(row).collect::<Result<_, Error>>()?;
+        Ok(Self { bound })
+    }
+}
+
 fn world(sensors: u64) -> String {
     format!("{sensors} sensors")
 }
@@ -150,21 +164,6 @@ impl Case for Scheduled {
             all.extend(two.run(context, TWO, 1.0, &schemes)?);
         }
         Ok(all)
-    }
-
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Bounds), Error> {
-        let row = |(l, sensors)| {
-            Ok(Bound {
-                l,
-                sensors,
-                bound_m: bound(p, l, sensors, true)?,
-                bound_centre_m: bound(p, l, sensors, false)?,
-            })
-        };
-        let own = p.messages.iter().map(|l| (*l, p.sensors));
-        let cases = own.chain([(1.0, 2), (2.0, 2)]).filter(|_| p.noise_variances.len() == 1);
-        let bound = cases.map(row).collect::<Result<_, Error>>()?;
-        Ok((steps(all), Bounds { bound }))
     }
 
     fn claims(rows: &Rows<Step, Bounds>, claims: &mut Claims) {
@@ -277,6 +276,20 @@ rows! {
     }
 }
 
+impl Further<Linear> for Times {
+    fn of(p: &Linear, context: &Context<'_>) -> Result<Self, Error> {
+        let times = time_of_steps(context, p, p.messages[0], &SCHEMES)?;
+        let base = times[0].1;
+        let row = |(scheme, seconds): (_, f64)| Time {
+            scheme,
+            time_us: seconds * 1e6,
+            relative: seconds / base,
+        };
+        let time = times.into_iter().map(row).collect();
+        Ok(Self { time })
+    }
+}
+
 impl Case for Cost {
     type Setting = Linear;
     type Main = Step;
@@ -298,18 +311,6 @@ impl Case for Cost {
 
     fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         setting.at_budgets(context, "", &SCHEMES)
-    }
-
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, context: &Context<'_>) -> Result<(Vec<Step>, Times), Error> {
-        let times = time_of_steps(context, p, p.messages[0], &SCHEMES)?;
-        let base = times[0].1;
-        let row = |(scheme, seconds): (_, f64)| Time {
-            scheme,
-            time_us: seconds * 1e6,
-            relative: seconds / base,
-        };
-        let time = times.into_iter().map(row).collect();
-        Ok((steps(all), Times { time }))
     }
 
     fn claims(rows: &Rows<Step, Times>, claims: &mut Claims) {

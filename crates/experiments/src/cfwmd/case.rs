@@ -1,6 +1,6 @@
 //! A simulated figure in few words: a setting, the runs, what is claimed of them, a picture.
 
-use super::rows::{Ensemble, Rows};
+use super::rows::{Ensemble, Further, Main, Rows};
 use super::setting::Setting;
 use crate::parameters;
 use crate::prelude::*;
@@ -11,10 +11,8 @@ use std::marker::PhantomData;
 /// What a simulated figure runs and claims.
 pub(super) trait Case: Sync + 'static {
     type Setting: Setting;
-    /// A row of the main table.
-    type Main: Serialize + JsonSchema;
-    /// Further tables.
-    type Further: Serialize + JsonSchema;
+    type Main: Main;
+    type Further: Further<Self::Setting>;
 
     const ABOUT: About;
     /// Schemes that are compared trial by trial, wherever both ran.
@@ -29,13 +27,10 @@ pub(super) trait Case: Sync + 'static {
     /// All runs.
     fn simulate(setting: &Self::Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error>;
 
-    /// The main table, and further ones. `printed`: whether printed numbers may stand beside ours.
-    fn tables(
-        setting: &Self::Setting,
-        ensembles: &[Ensemble],
-        printed: bool,
-        context: &Context<'_>,
-    ) -> Result<(Vec<Self::Main>, Self::Further), Error>;
+    /// Whether the main table shows this run.
+    fn shown(_setting: &Self::Setting, _run: &Ensemble) -> bool {
+        true
+    }
 
     /// Claims about the publication's setting at its full number of trials.
     fn claims(rows: &Rows<Self::Main, Self::Further>, claims: &mut Claims);
@@ -43,7 +38,9 @@ pub(super) trait Case: Sync + 'static {
     /// Claims about any setting and number of trials.
     fn always(_setting: &Self::Setting, _rows: &Rows<Self::Main, Self::Further>, _claims: &mut Claims) {}
 
-    fn plot(setting: &Self::Setting, rows: &Rows<Self::Main, Self::Further>) -> Plot;
+    fn plot(_setting: &Self::Setting, rows: &Rows<Self::Main, Self::Further>) -> Plot {
+        Self::Main::plot(&rows.main)
+    }
 }
 
 /// The figure of a case.
@@ -114,8 +111,9 @@ impl<C: Case> Figure for Simulated<C> {
 
     fn run(&self, Preset(setting): &Preset<C>, context: &Context<'_>) -> Result<Self::Tables, Error> {
         let ensembles = C::simulate(setting, context)?;
-        let (main, further) = C::tables(setting, &ensembles, is_printed::<C>(setting), context)?;
-        Ok(Rows::of(&ensembles, C::PAIRS, main, further))
+        let shown: Vec<_> = ensembles.iter().filter(|e| C::shown(setting, e)).collect();
+        let main = C::Main::of(C::ABOUT.id, &shown, is_printed::<C>(setting));
+        Ok(Rows::of(&ensembles, C::PAIRS, main, C::Further::of(setting, context)?))
     }
 
     fn claims(&self, Preset(setting): &Preset<C>, rows: &Self::Tables, claims: &mut Claims) {

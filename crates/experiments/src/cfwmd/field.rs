@@ -2,9 +2,9 @@
 
 use super::case::Case;
 use super::nonlinear::{Scheme, World};
-use super::pictures::{BOTH, by_budget, by_step};
-use super::rates::{Rates, as_printed, misses, rate_plot, rates};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, Summary, steps, summary};
+use super::pictures::BOTH;
+use super::rates::{Rates, as_printed, misses};
+use super::rows::{Ensemble, Nothing, Part, Rows, Step, Summary};
 use super::setting::{Field, Setting};
 use crate::prelude::*;
 
@@ -16,7 +16,6 @@ const FOUR: [(&str, Scheme); 4] = [
 ];
 const FUSED: [(&str, Scheme); 2] = [("CFwMD", Scheme::State), ("CFwMD2", Scheme::StateAndCovariance)];
 
-/// Figure 7: the sensors and one target.
 pub(super) struct Fig7;
 
 parameters! {
@@ -94,7 +93,6 @@ impl Figure for Fig7 {
     }
 }
 
-/// Figure 8.
 pub(super) struct Fig8;
 
 impl Case for Fig8 {
@@ -119,10 +117,6 @@ impl Case for Fig8 {
         setting.at_budgets(context, "", &FOUR)
     }
 
-    fn tables(_: &Field, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
         for pair in [("all", "CFwMD"), ("CFwMD", "CFoMD")] {
             rows.beats(claims, pair, ("", 2.0), &[Part::Position]);
@@ -143,13 +137,8 @@ impl Case for Fig8 {
         let what = "CFwMD saves 83% of the messages, more than the nominal 78%";
         claims.near("saving", what, saved, 0.831, 0.012);
     }
-
-    fn plot(_: &Field, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
-/// Figure 9.
 pub(super) struct Fig9;
 
 impl Case for Fig9 {
@@ -177,10 +166,6 @@ impl Case for Fig9 {
         Ok(all)
     }
 
-    fn tables(_: &Field, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Summary>, Nothing), Error> {
-        Ok((all.iter().map(summary).collect(), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Summary>, claims: &mut Claims) {
         for l in [1.0, 2.0, 3.0, 4.0, 5.0, 6.0] {
             for other in ["CFoMD", "random"] {
@@ -203,18 +188,8 @@ impl Case for Fig9 {
             claims.near(format!("merge-{scheme}"), what, rows.ratio(scheme, "all", 9.0), 1.0, 0.03);
         }
     }
-
-    fn plot(_: &Field, rows: &Rows<Summary>) -> Plot {
-        let all: Vec<&Summary> = rows.main.iter().collect();
-        let panels = [
-            by_budget(&all, "Position", "time-averaged RMSE (m)", |r| r.position_rmse),
-            by_budget(&all, "Velocity", "time-averaged RMSE (m/s)", |r| r.velocity_rmse),
-        ];
-        Plot::grid(2, panels.into())
-    }
 }
 
-/// Figure 10.
 pub(super) struct Fig10;
 
 const THREE: [f64; 3] = [2.0, 4.0, 6.0];
@@ -251,8 +226,8 @@ impl Case for Fig10 {
         Ok(all)
     }
 
-    fn tables(_: &Field, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all.iter().filter(|e| e.world.is_empty())), Nothing {}))
+    fn shown(_: &Field, run: &Ensemble) -> bool {
+        run.world.is_empty()
     }
 
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
@@ -261,13 +236,8 @@ impl Case for Fig10 {
         }
         rows.beats(claims, ("CFwMD2", "CFwMD"), (MANY, 2.0), &BOTH);
     }
-
-    fn plot(_: &Field, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
-/// Table III.
 pub(super) struct Table3;
 
 const ON_MEAN: &str = "start on the mean";
@@ -306,10 +276,6 @@ impl Case for Table3 {
         Ok(all)
     }
 
-    fn tables(_: &Field, all: &[Ensemble], print: bool, _: &Context<'_>) -> Result<(Vec<Rates>, Nothing), Error> {
-        Ok((rates(Self::ABOUT.id, all, print), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Rates>, claims: &mut Claims) {
         as_printed(claims, &rows.main, ON_MEAN);
         let [state, covariance] = misses(&rows.main, ON_MEAN, 2.0).map_or([None; 2], |both| both.map(Some));
@@ -322,9 +288,5 @@ impl Case for Table3 {
         let drawn = rows.at(&format!("CFwMD, {DRAWN}"), 2.0).map(|r| r.rate.value);
         let what = "a start drawn from the prior gives a rate above the printed 1.598 at l = 2";
         claims.above("drawn-start-rejected", what, drawn, 1.7);
-    }
-
-    fn plot(_: &Field, rows: &Rows<Rates>) -> Plot {
-        rate_plot(&rows.main)
     }
 }

@@ -139,10 +139,6 @@ impl<const M: usize> Track<'_, M> {
     }
 }
 
-fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
-    Error::failed(error)
-}
-
 /// Runs schemes over the trials of a setting at one budget, on common random numbers. Schemes for scalar measurements are left
 /// out where position and velocity are measured.
 pub(super) fn run<const M: usize>(
@@ -228,7 +224,7 @@ where
             )?;
             let rule = |p: &SMatrix<f64, 2, 2>| {
                 let predicted = Gaussian::from_trusted_parts(Vector2::zeros(), *p);
-                network.rule_under(0, &predicted).map_err(failed)
+                Ok::<_, Error>(network.rule_under(0, &predicted)?)
             };
             experiment.scheduled = covariances.iter().map(rule).collect::<Result<_, _>>()?;
         }
@@ -236,7 +232,7 @@ where
     }
 
     fn network(&self, loss: f64) -> Result<Sensors<M>, Error> {
-        Network::new(vec![self.sensor; self.sensors], self.threshold, Link::lossy(loss)?).map_err(failed)
+        Ok(Network::new(vec![self.sensor; self.sensors], self.threshold, Link::lossy(loss)?)?)
     }
 
     fn draw(&self, stream: Stream) -> Result<Draws<M>, Error> {
@@ -485,7 +481,7 @@ const SCHEDULE_RUNS: usize = 500;
 impl Dimension<1> for Measured {
     fn sensor(variances: &[f64]) -> Result<LinearSensor<2, 1>, Error> {
         let variance = variances.first().copied().unwrap_or(0.0);
-        LinearSensor::scalar(Vector2::new(1.0, 0.0), variance).map_err(failed)
+        Ok(LinearSensor::scalar(Vector2::new(1.0, 0.0), variance)?)
     }
 
     fn special(experiment: &Experiment<1>, scheme: Scheme, mut track: Track<'_, 1>) -> Result<(), Error> {
@@ -504,7 +500,7 @@ impl Dimension<2> for Measured {
             return Err(fewbits_numerics::ArgumentError::new("noise_variances", got, "2 variances").into());
         }
         let covariance = SMatrix::<f64, 2, 2>::from_diagonal(&Vector2::from_column_slice(variances));
-        LinearSensor::new(SMatrix::identity(), covariance).map_err(failed)
+        Ok(LinearSensor::new(SMatrix::identity(), covariance)?)
     }
 
     fn special(_: &Experiment<2>, scheme: Scheme, _: Track<'_, 2>) -> Result<(), Error> {

@@ -2,8 +2,8 @@
 
 use super::case::Case;
 use super::linear::{Method, Scheme, start};
-use super::pictures::{BOTH, by_step};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
+use super::pictures::BOTH;
+use super::rows::{Ensemble, Further, Nothing, Part, Rows, Step};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
@@ -12,7 +12,6 @@ use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::Vector2;
 
-/// Figure 3.
 pub(super) struct Fig3;
 
 impl Case for Fig3 {
@@ -43,10 +42,6 @@ impl Case for Fig3 {
         setting.at_budgets(context, "", &schemes)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
         rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], ("", 1.0), &BOTH);
         rows.beats(claims, ("CFwMD", "CFoMD"), ("", 1.0), &BOTH);
@@ -55,10 +50,6 @@ impl Case for Fig3 {
         claims.within("rate-exact", "without feedback the rate is exactly the budget", rate, 1.0, 4.0);
         let gain = rows.ratio("CFwMD", "CFoMD", 1.0).map(|r| 1.0 - r);
         claims.near("gain", "using silence lowers the position RMSE by a tenth", gain, 0.105, 0.025);
-    }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
     }
 }
 
@@ -112,6 +103,13 @@ fn printed_likelihood(setting: &Linear) -> Result<Vec<Printed>, Error> {
     Ok(rows)
 }
 
+impl Further<Linear> for Literal {
+    fn of(p: &Linear, _: &Context<'_>) -> Result<Self, Error> {
+        let printed_likelihood = printed_likelihood(p)?;
+        Ok(Self { printed_likelihood })
+    }
+}
+
 impl Case for NoFeedbackFigure {
     type Setting = Linear;
     type Main = Step;
@@ -151,11 +149,6 @@ impl Case for NoFeedbackFigure {
             ("no history", Scheme::Unconditional),
         ];
         setting.at_budgets(context, "", &schemes)
-    }
-
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Literal), Error> {
-        let printed_likelihood = printed_likelihood(p)?;
-        Ok((steps(all), Literal { printed_likelihood }))
     }
 
     fn claims(rows: &Rows<Step, Literal>, claims: &mut Claims) {

@@ -44,10 +44,6 @@ pub(super) struct Draws {
     coins: Vec<Vec<f64>>,
 }
 
-fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
-    Error::failed(error)
-}
-
 impl World {
     pub(super) fn new(field: &Field) -> Result<Self, Error> {
         let dynamics = constant_velocity_2d(0.5, field.acceleration_variance)?;
@@ -95,10 +91,8 @@ impl World {
     /// Particles from the prior, whose axes are independent.
     fn cloud<R: Rng + ?Sized>(&self, rng: &mut R) -> Result<Particles<4>, Error> {
         let (mean, deviations) = (self.start.mean(), self.start.standard_deviations());
-        Particles::from_draws(self.particles, || {
-            Vector4::from_fn(|d, _| mean[d] + deviations[d] * rng.sample::<f64, _>(StandardNormal))
-        })
-        .map_err(failed)
+        let mut draw = || Vector4::from_fn(|d, _| mean[d] + deviations[d] * rng.sample::<f64, _>(StandardNormal));
+        Ok(Particles::from_draws(self.particles, &mut draw)?)
     }
 
     fn trial(&self, scheme: Scheme, messages: f64, draws: &Draws, stream: Stream) -> Result<Record, Error> {

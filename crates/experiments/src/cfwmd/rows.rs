@@ -1,5 +1,6 @@
 //! What the simulated figures have in common: runs of schemes on common trials, and the rows that come of them.
 
+use super::pictures::{by_budget, by_step};
 use crate::prelude::*;
 use fewbits_monte_carlo::{Moments, Stream, Trial};
 
@@ -180,11 +181,6 @@ fn steps_of(e: &Ensemble) -> impl Iterator<Item = Step> {
     })
 }
 
-/// Every step of these runs.
-pub(super) fn steps<'a>(ensembles: impl IntoIterator<Item = &'a Ensemble>) -> Vec<Step> {
-    ensembles.into_iter().flat_map(steps_of).collect()
-}
-
 /// Mean number of messages a step.
 pub(super) fn rate(e: &Ensemble) -> Measured {
     Measured::mean(&moments(&e.records, |r| mean(&r.sent)))
@@ -226,9 +222,55 @@ fn paired(ensembles: &[Ensemble], pairs: &[(&str, &str)]) -> Vec<Paired> {
     rows
 }
 
+/// A kind of main table.
+pub trait Main: Serialize + JsonSchema + Sized {
+    /// The rows of these runs. `printed`: whether printed numbers may stand beside ours.
+    fn of(figure: &str, runs: &[&Ensemble], printed: bool) -> Vec<Self>;
+
+    /// Their picture.
+    fn plot(rows: &[Self]) -> Plot;
+}
+
+impl Main for Step {
+    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
+        runs.iter().flat_map(|run| steps_of(run)).collect()
+    }
+
+    fn plot(rows: &[Self]) -> Plot {
+        by_step(rows)
+    }
+}
+
+impl Main for Summary {
+    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
+        runs.iter().map(|run| summary(run)).collect()
+    }
+
+    fn plot(rows: &[Self]) -> Plot {
+        let rows: Vec<&Summary> = rows.iter().collect();
+        let panels = [
+            by_budget(&rows, "Position", "time-averaged RMSE (m)", |r| r.position_rmse),
+            by_budget(&rows, "Velocity", "time-averaged RMSE (m/s)", |r| r.velocity_rmse),
+        ];
+        Plot::grid(2, panels.into())
+    }
+}
+
+/// Further tables.
+pub trait Further<S>: Serialize + JsonSchema + Sized {
+    /// Those of a setting.
+    fn of(setting: &S, context: &Context<'_>) -> Result<Self, Error>;
+}
+
 /// No further tables.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Nothing {}
+
+impl<S> Further<S> for Nothing {
+    fn of(_: &S, _: &Context<'_>) -> Result<Self, Error> {
+        Ok(Self {})
+    }
+}
 
 /// All tables of a simulated figure.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -313,9 +355,7 @@ impl<M, X> Rows<M, X> {
 impl<X> Rows<Step, X> {
     /// Errors of a run after its `k`th step.
     pub(super) fn step(&self, scheme: &str, l: f64, k: usize) -> Option<&Step> {
-        self.main
-            .iter()
-            .find(|r| r.run.scheme == scheme && r.run.l == l && r.k == k)
+        first(&self.main, |r| r.run.scheme == scheme && r.run.l == l && r.k == k)
     }
 
     /// Claims that at every step the schemes are in this order, smallest error first, but for two standard errors.

@@ -2,9 +2,9 @@
 
 use super::case::Case;
 use super::linear::Scheme;
-use super::pictures::{BOTH, by_step};
-use super::rates::{Rates, as_printed, misses, rate_plot, rates};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
+use super::pictures::BOTH;
+use super::rates::{Rates, as_printed, misses};
+use super::rows::{Ensemble, Nothing, Part, Rows, Step};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
 use fewbits_cfwmd::rule::Weighing;
@@ -14,7 +14,6 @@ pub(super) const CENSORED: [(&str, Scheme); 2] = [
     ("CFwMD2", Scheme::Gaussian(Weighing::FusionCentre)),
 ];
 
-/// Figure 1: the four schemes.
 pub(super) struct Fig1;
 
 impl Case for Fig1 {
@@ -57,10 +56,6 @@ impl Case for Fig1 {
         setting.at_budgets(context, "", &schemes)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
         rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], ("", 1.0), &BOTH);
         for pair in [
@@ -91,10 +86,6 @@ impl Case for Fig1 {
         let what = "keeping the belief Gaussian by a random trigger costs 11% at equal rate";
         claims.near("trigger-price", what, price, 1.11, 0.03);
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
 /// Position standard deviation of the all-send Kalman filter: the reference recursion in closed loop.
@@ -113,7 +104,6 @@ fn exact_all_send(sensors: u32) -> Vec<f64> {
 /// Budgets of four sensors in figure 2 and table I.
 pub(super) const BUDGETS: [f64; 5] = [1.0, 1.2, 1.5, 2.0, 3.0];
 
-/// Figure 2.
 pub(super) struct Fig2;
 
 impl Case for Fig2 {
@@ -138,10 +128,6 @@ impl Case for Fig2 {
         setting.at_budgets(context, "", &CENSORED)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
         rows.beats(claims, ("CFwMD", "CFwMD2"), ("", 1.0), &[Part::Position]);
         for l in [1.2, 1.5, 2.0] {
@@ -150,16 +136,11 @@ impl Case for Fig2 {
         let gap = rows.ratio("CFwMD", "CFwMD2", 3.0).map(|r| r - 1.0);
         claims.below("little-gain", "at l = 3 covariance feedback gains less than 2%", gap, 0.02);
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
 /// Trials of the particle filters of table I.
 const CLOUD_TRIALS: u64 = 2000;
 
-/// Table I.
 pub(super) struct Table1;
 
 const KNOWN: &str = "known start";
@@ -205,10 +186,6 @@ impl Case for Table1 {
         Ok(all)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], print: bool, _: &Context<'_>) -> Result<(Vec<Rates>, Nothing), Error> {
-        Ok((rates(Self::ABOUT.id, all, print), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Rates>, claims: &mut Claims) {
         as_printed(claims, &rows.main, CLOUDS);
         let known = BUDGETS.iter().filter_map(|l| misses(&rows.main, KNOWN, *l));
@@ -226,9 +203,5 @@ impl Case for Table1 {
         let missed = rows.at(&format!("CFwMD, {DRAWN}"), 2.0).map(|r| r.rate.value);
         let what = "state feedback alone falls short of the budget l = 2 by more than a tenth";
         claims.below("budget-missed", what, missed, 1.8);
-    }
-
-    fn plot(_: &Linear, rows: &Rows<Rates>) -> Plot {
-        rate_plot(&rows.main)
     }
 }

@@ -6,13 +6,10 @@ use serde::de::DeserializeOwned;
 
 /// Parameters of an experiment whose schemes are simulated on common trials.
 pub trait Setting:
-    Clone + Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Send + Sync + 'static
+    Clone + Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Quick + Send + Sync + 'static
 {
     /// What is sent, and what is made of it.
     type Scheme: Copy;
-
-    /// About a second of work.
-    fn quicken(&mut self);
 
     /// Message budgets.
     fn messages(&self) -> &[f64];
@@ -152,13 +149,15 @@ impl Linear {
     }
 }
 
-impl Setting for Linear {
-    type Scheme = super::linear::Scheme;
-
+impl Quick for Linear {
     fn quicken(&mut self) {
         self.trials = 100;
         self.particles = self.particles.map(|_| 100);
     }
+}
+
+impl Setting for Linear {
+    type Scheme = super::linear::Scheme;
 
     fn messages(&self) -> &[f64] {
         &self.messages
@@ -237,13 +236,15 @@ impl Field {
     }
 }
 
-impl Setting for Field {
-    type Scheme = super::nonlinear::Scheme;
-
+impl Quick for Field {
     fn quicken(&mut self) {
         self.trials = 24;
         self.particles = 500;
     }
+}
+
+impl Setting for Field {
+    type Scheme = super::nonlinear::Scheme;
 
     fn messages(&self) -> &[f64] {
         &self.messages

@@ -2,9 +2,9 @@
 
 use super::case::Case;
 use super::linear::{Method, Scheme};
-use super::pictures::{BOTH, by_step};
-use super::rates::{Rates, as_printed, rate_plot, rates};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
+use super::pictures::BOTH;
+use super::rates::{Rates, as_printed};
+use super::rows::{Ensemble, Nothing, Part, Rows, Step};
 use super::scalar::CENSORED;
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
@@ -40,7 +40,6 @@ fn worlds() -> [String; 2] {
     [world(1.0), world(STATED)]
 }
 
-/// Figure 4.
 pub(super) struct Fig4;
 
 impl Case for Fig4 {
@@ -76,10 +75,6 @@ impl Case for Fig4 {
         Ok(all)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
         for world in &worlds() {
             for pair in Self::PAIRS {
@@ -92,13 +87,8 @@ impl Case for Fig4 {
         let what = "1000 particles that weigh silence by quadrature agree with the Gaussian belief";
         claims.near("particles-equal", what, ratio, 1.0, 0.06);
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
-/// Figure 5.
 pub(super) struct Fig5;
 
 impl Case for Fig5 {
@@ -124,9 +114,8 @@ impl Case for Fig5 {
         both(context, setting, &CENSORED, &CENSORED)
     }
 
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        let own = world(p.acceleration_variance);
-        Ok((steps(all.iter().filter(|e| e.world == own)), Nothing {}))
+    fn shown(p: &Linear, run: &Ensemble) -> bool {
+        run.world == world(p.acceleration_variance)
     }
 
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
@@ -139,13 +128,8 @@ impl Case for Fig5 {
             "at the stated acceleration variance CFwMD2 is not better at l = 1 (paired difference in standard errors)";
         claims.above("stated-variance-fails", what, z, -2.0);
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
-/// Figure 6.
 pub(super) struct Fig6;
 
 /// Trials of the particle filter without feedback.
@@ -193,10 +177,8 @@ impl Case for Fig6 {
         Ok(all)
     }
 
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        let own = world(p.acceleration_variance);
-        let shown = all.iter().filter(|e| e.world == own && e.scheme != SAME_TRIALS);
-        Ok((steps(shown), Nothing {}))
+    fn shown(p: &Linear, run: &Ensemble) -> bool {
+        run.world == world(p.acceleration_variance) && run.scheme != SAME_TRIALS
     }
 
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
@@ -208,13 +190,8 @@ impl Case for Fig6 {
             claims.near(id, what, ratio, 1.0, 0.03);
         }
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
-/// Table II.
 pub(super) struct Table2;
 
 const DEVIATIONS: &str = "acceleration variance 4, noise deviations 2 and 4";
@@ -249,18 +226,10 @@ impl Case for Table2 {
         Ok(all)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], print: bool, _: &Context<'_>) -> Result<(Vec<Rates>, Nothing), Error> {
-        Ok((rates(Self::ABOUT.id, all, print), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Rates>, claims: &mut Claims) {
         as_printed(claims, &rows.main, &world(1.0));
         let stated = rows.at(&format!("CFwMD, {}", world(STATED)), 1.0).map(|r| r.rate.value);
         let what = "the stated acceleration variance gives a rate far above the printed .9296 at l = 1";
         claims.above("stated-variance-rejected", what, stated, 0.98);
-    }
-
-    fn plot(_: &Linear, rows: &Rows<Rates>) -> Plot {
-        rate_plot(&rows.main)
     }
 }

@@ -64,7 +64,6 @@ parameters! {
 }
 
 rows! {
-    /// Tables of Figures 5 and 6.
     pub struct Fields {
         /// Densities on a grid.
         field: Vec<Point>,
@@ -97,9 +96,7 @@ rows! {
     }
 }
 
-/// Figure 5: the true belief.
 pub struct True;
-/// Figure 6: the approximated one.
 pub struct Approximated;
 
 fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fields, Error> {

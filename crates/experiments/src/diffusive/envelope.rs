@@ -85,7 +85,7 @@ impl Parameters {
             return Ok(None);
         };
         let likelihood = SourceLikelihood::new(outcome.records, settings.joint()?)?;
-        Area::new(&posterior, &likelihood).map(Some).map_err(Error::failed)
+        Ok(Area::new(&posterior, &likelihood).map(Some)?)
     }
 }
 
@@ -125,10 +125,7 @@ impl Figure for Envelope {
         let known: Vec<&Vec<(f64, f64)>> = all.iter().flatten().collect();
         let coverage = edges.iter().enumerate().filter_map(|(i, (edge, angle))| {
             let truth = radius + source.x * angle.to_radians().cos() + source.y * angle.to_radians().sin();
-            let hits = known
-                .iter()
-                .filter(|bands| (bands[i].0..=bands[i].1).contains(&truth))
-                .count();
+            let hits = select(&known, |bands| (bands[i].0..=bands[i].1).contains(&truth)).count();
             let widths: Vec<f64> = known.iter().map(|bands| bands[i].1 - bands[i].0).collect();
             Some(Coverage {
                 edge,

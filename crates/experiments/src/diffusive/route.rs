@@ -80,7 +80,6 @@ rows! {
     }
 }
 
-/// Figure 1: the flow chart, as the trace of one search.
 pub struct Trace;
 
 impl Figure for Trace {
@@ -145,9 +144,7 @@ impl Figure for Trace {
             .filter_map(|r| Some((r.step as f64, r.log10_determinant?)))
             .collect();
         let mut total = 0.0;
-        let bytes = rows
-            .iter()
-            .filter(|r| r.event == Event::Receive)
+        let bytes = select(&rows, |r| r.event == Event::Receive)
             .map(|r| {
                 total += r.bytes;
                 (r.step as f64, total)
@@ -166,7 +163,6 @@ impl Figure for Trace {
 }
 
 rows! {
-    /// Tables of Figure 2.
     pub struct RouteRows {
         /// The nodes visited.
         route: Vec<RouteRow>,
@@ -207,7 +203,6 @@ rows! {
     }
 }
 
-/// Figure 2: the route over the field.
 pub struct Route;
 
 impl Figure for Route {

@@ -30,7 +30,6 @@ parameters! {
 }
 
 rows! {
-    /// Both tables.
     pub struct Rows {
         /// Searches with the exact belief, by rule.
         searches: Vec<Summary>,
@@ -142,12 +141,7 @@ impl Figure for Selection {
             let what = format!("the better ranking of the pairwise bound saves less than half a node: {setting}");
             full.at_most(format!("bound-suffices/{setting}"), what, gap, 0.5);
         }
-        let rank = |rule: &str| {
-            rows.rankings
-                .iter()
-                .find(|r| r.rule == rule)
-                .map(|r| r.rank_correlation.value)
-        };
+        let rank = |rule: &str| first(&rows.rankings, |r| r.rule == rule).map(|r| r.rank_correlation.value);
         let what = "the pairwise lower bound ranks as the exact information does";
         full.at_least("pairwise-ranks", what, rank("pairwise lower"), 0.98);
         let lost = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).map(|r| r.lost.value);

@@ -4,7 +4,6 @@ use super::common::{Scheme, Settings, Track, fraction, median, quantile};
 use crate::prelude::*;
 
 rows! {
-    /// Both tables.
     pub struct Rows {
         /// Medians and bands over the deployments, node by node; searches that have ended keep their last values.
         pub(super) curves: Vec<Curve>,

@@ -34,7 +34,6 @@ impl Parameters {
 }
 
 rows! {
-    /// Both tables.
     pub struct Rows {
         /// The monomials of every polynomial.
         monomials: Vec<Monomial>,
@@ -86,7 +85,6 @@ fn printed(nu: [usize; 2], w: &Matrix2<f64>) -> Option<Vec<([usize; 2], f64)>> {
 const MISPRINT_40: f64 = 0.057_67;
 const MISPRINT_22: f64 = 5.190_31;
 
-/// Table I.
 pub struct Table1;
 
 impl Figure for Table1 {
@@ -147,12 +145,7 @@ impl Figure for Table1 {
         let here = claims.at_defaults();
         let what = "every polynomial but the first has mean zero";
         claims.all("zero-mean", what, rows.means.iter().filter(|m| m.nu1 + m.nu2 > 0), |m| m.mean.abs() < 1e-10);
-        let misprint = |nu1, nu2| {
-            rows.means
-                .iter()
-                .find(|m| (m.nu1, m.nu2) == (nu1, nu2))
-                .and_then(|m| m.printed)
-        };
+        let misprint = |nu1, nu2| first(&rows.means, |m| (m.nu1, m.nu2) == (nu1, nu2)).and_then(|m| m.printed);
         for (nu, id, reference) in [((4, 0), "he40", MISPRINT_40), ((2, 2), "he22", MISPRINT_22)] {
             let what = "the printed entry has another mean and is a misprint (errata diffusive-3)";
             let value = misprint(nu.0, nu.1).map(f64::abs);

@@ -27,7 +27,6 @@ parameters! {
 }
 
 rows! {
-    /// Both tables.
     pub struct Rows {
         /// Cramer-Rao bounds with more and more unknowns.
         bounds: Vec<Bound>,

@@ -6,7 +6,6 @@ use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain, iterated};
 use rayon::prelude::*;
 
 parameters! {
-    /// Plants and word lengths.
     pub struct Parameters {
         /// Plants, `a:gamma`.
         #[garde(length(min = 1), dive)]

@@ -9,7 +9,6 @@ use fewbits_dymbo::{DymboFilter, ScalarFilter, chain};
 const ID: &str = "dymbo-bsc";
 
 parameters! {
-    /// Plant, crossover probabilities, and the effort of the comparison with the exact posterior.
     pub struct Parameters {
         /// Plant coefficient.
         #[garde(range(min = -0.999_999, max = 0.999_999))]

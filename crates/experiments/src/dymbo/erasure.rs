@@ -10,7 +10,6 @@ use rand::RngExt;
 const ID: &str = "dymbo-erasure";
 
 parameters! {
-    /// Plant, loss probabilities, and the effort.
     pub struct Parameters {
         /// Plant coefficient; the state starts from its stationary law.
         #[garde(range(min = -0.999_999, max = 0.999_999))]

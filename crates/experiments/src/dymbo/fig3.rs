@@ -4,7 +4,6 @@ use super::common::{Plant, log_spaced};
 use crate::prelude::*;
 
 parameters! {
-    /// Coefficients and noise ratios.
     pub struct Parameters {
         /// Plant coefficients.
         #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]

@@ -11,7 +11,6 @@ fn hundredths(i: i32) -> f64 {
 }
 
 parameters! {
-    /// The grid and the contour levels.
     pub struct Parameters {
         /// Plant coefficients.
         #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]

@@ -15,7 +15,6 @@ use std::f64::consts::FRAC_2_PI;
 const ID: &str = "dymbo-fig5";
 
 parameters! {
-    /// The plants, the resolution of the first message, and the effort.
     pub struct Parameters {
         /// Plant coefficient; the state starts from its stationary law.
         #[garde(range(min = -0.999_999, max = 0.999_999))]

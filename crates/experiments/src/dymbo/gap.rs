@@ -11,7 +11,6 @@ use fewbits_monte_carlo::{Moments, Stream};
 const ID: &str = "dymbo-gap";
 
 parameters! {
-    /// Plants, the first message, and the effort.
     pub struct Parameters {
         /// Plants, `a:gamma`.
         #[garde(length(min = 1), dive)]

@@ -7,7 +7,6 @@ use fewbits_dymbo::skew_normal::{distance_from_normal, posterior_density};
 use fewbits_numerics::normal::log_pdf_with;
 
 parameters! {
-    /// Noise deviations, and that of the prior.
     pub struct Parameters {
         /// Measurement noise deviations.
         #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
@@ -47,7 +46,6 @@ rows! {
     }
 }
 
-/// Proposition 1(b).
 pub struct PosteriorShape;
 
 impl Figure for PosteriorShape {

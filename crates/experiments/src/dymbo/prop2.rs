@@ -6,7 +6,6 @@ use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{RoundedSample, ScalarPlant, first_message_mse};
 
 parameters! {
-    /// Noise deviation and resolutions; the plant of the start-up comparison.
     pub struct Parameters {
         /// Measurement noise deviation.
         #[garde(range(min = 1e-6, max = 1e6))]
@@ -56,7 +55,6 @@ rows! {
     }
 }
 
-/// Proposition 2.
 pub struct FirstMessage;
 
 impl Figure for FirstMessage {

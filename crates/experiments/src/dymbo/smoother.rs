@@ -11,7 +11,6 @@ use fewbits_monte_carlo::Moments;
 const ID: &str = "dymbo-smoother";
 
 parameters! {
-    /// Plants, lags, and the effort.
     pub struct Parameters {
         /// Plants, `a:gamma`.
         #[garde(length(min = 1), dive)]

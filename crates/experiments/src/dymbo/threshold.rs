@@ -11,7 +11,6 @@ use nalgebra::{Matrix1, Vector1};
 const ID: &str = "dymbo-threshold";
 
 parameters! {
-    /// Plants, the length of runs, and the unstable plant.
     pub struct Parameters {
         /// Plants, `a:gamma`; the state starts from its stationary law.
         #[garde(length(min = 1), custom(stationary), dive)]

@@ -13,7 +13,6 @@ use std::f64::consts::FRAC_1_SQRT_2;
 const ID: &str = "dymbo-vector";
 
 parameters! {
-    /// The system and the effort.
     pub struct Parameters {
         /// Transition matrix, row by row; stable.
         #[garde(length(equal = 4), inner(range(min = -10.0, max = 10.0)), custom(stable))]
@@ -49,11 +48,11 @@ const BURN: usize = 15;
 impl Parameters {
     fn dynamics(&self) -> Result<LinearGaussian<2, 2>, Error> {
         let noise = Matrix2::identity() * self.process_variance;
-        LinearGaussian::with_covariance(Matrix2::from_row_slice(&self.transition), noise).map_err(Error::failed)
+        Ok(LinearGaussian::with_covariance(Matrix2::from_row_slice(&self.transition), noise)?)
     }
 
     fn sensor(&self, direction: [f64; 2]) -> Result<ScalarSensor<2>, Error> {
-        ScalarSensor::scalar(Vector2::from(direction), self.measurement_variance).map_err(Error::failed)
+        Ok(ScalarSensor::scalar(Vector2::from(direction), self.measurement_variance)?)
     }
 
     fn one(&self) -> Result<Filter<1>, Error> {

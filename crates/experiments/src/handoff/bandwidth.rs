@@ -10,7 +10,6 @@ use fewbits_handoff::{Components, HandoffFilter, Reducer, Whole};
 use fewbits_monte_carlo::Moments;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Worlds.
         #[garde(range(min = 2, max = 10_000))]
@@ -19,7 +18,6 @@ parameters! {
 }
 
 rows! {
-    /// One filter.
     pub struct Row {
         /// Filter.
         filter: &'static str,
@@ -111,9 +109,7 @@ fn setups() -> Vec<Setup> {
 pub struct Widths;
 
 fn kl(rows: &[Row], filter: &str, factor: f64, shrunk: bool) -> Option<f64> {
-    rows.iter()
-        .find(|r| r.filter == filter && r.factor == factor && r.shrunk == shrunk)
-        .map(|r| r.kl.value)
+    first(&rows, |r| r.filter == filter && r.factor == factor && r.shrunk == shrunk).map(|r| r.kl.value)
 }
 
 impl Figure for Widths {

@@ -3,7 +3,6 @@
 use crate::prelude::*;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Hand-overs.
         #[garde(range(min = 1, max = 12))]
@@ -27,7 +26,6 @@ rows! {
     }
 }
 
-/// Figure 1.
 pub struct Fig1;
 
 impl Figure for Fig1 {

@@ -4,7 +4,6 @@ use crate::prelude::*;
 use fewbits_densities::divergence::kl_centred_normals;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Ratios of successive standard deviations; 0.96 is printed, 0.97 is meant.
         #[garde(length(min = 1), inner(range(min = 0.5, max = 2.0)))]
@@ -16,7 +15,6 @@ parameters! {
 }
 
 rows! {
-    /// One time of one sequence.
     pub struct Row {
         /// Ratio of successive standard deviations.
         ratio: f64,
@@ -33,7 +31,6 @@ rows! {
     }
 }
 
-/// Figure 2.
 pub struct Fig2;
 
 fn at(rows: &[Row], ratio: f64, t: u32) -> Option<&Row> {
@@ -94,10 +91,7 @@ impl Figure for Fig2 {
         let ends = [(0.9691, false), (0.9692, true), (0.9717, true), (0.9719, false)];
         claims.all("window", what, ends, |(ratio, holds)| both(ratio) == Some(holds));
         for ratio in p.ratio.iter().filter(|r| **r < 1.0) {
-            let gaps = rows
-                .iter()
-                .filter(|r| r.ratio == *ratio && r.t > 0)
-                .map(|r| r.kl_total / r.sum_of_steps);
+            let gaps = select(&rows, |r| r.ratio == *ratio && r.t > 0).map(|r| r.kl_total / r.sum_of_steps);
             let what = "the ratio of the whole to the sum of its parts grows with time";
             claims.increasing(format!("gap-r{ratio}"), what, gaps);
         }

@@ -7,7 +7,6 @@ use fewbits_densities::{Component, Mixture};
 use nalgebra::{Matrix1, Vector1};
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Mass of the small lobe.
         #[garde(range(min = 1e-6, max = 0.5))]
@@ -57,7 +56,6 @@ impl Rows {
     }
 }
 
-/// Figure 3.
 pub struct Fig3;
 
 impl Figure for Fig3 {

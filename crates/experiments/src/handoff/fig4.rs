@@ -4,7 +4,6 @@ use super::world::{STAND_OFF, STEP, World};
 use crate::prelude::*;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Sensors in the field.
         #[garde(range(min = 5, max = 10_000))]
@@ -52,7 +51,6 @@ rows! {
     }
 }
 
-/// Figure 4.
 pub struct Fig4;
 
 impl Figure for Fig4 {

@@ -7,7 +7,6 @@ use fewbits_densities::{Reduction, ellipse};
 use fewbits_monte_carlo::Moments;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Times shown.
         #[garde(length(min = 1, max = 3), inner(range(min = 1, max = 10)))]
@@ -61,7 +60,6 @@ rows! {
     }
 }
 
-/// Figure 5.
 pub struct Fig5;
 
 impl Figure for Fig5 {
@@ -138,12 +136,8 @@ impl Figure for Fig5 {
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let panel = |t: &usize| {
-            let cloud = points(
-                rows.particles
-                    .iter()
-                    .filter(|r| r.t == *t && r.weight > 0.1 / PARTICLES as f64),
-                |r| (r.x, r.y),
-            );
+            let cloud =
+                points(select(&rows.particles, |r| r.t == *t && r.weight > 0.1 / PARTICLES as f64), |r| (r.x, r.y));
             let outlines = (0..p.components).map(|k| {
                 let outline = points(rows.ellipses.iter().filter(|r| r.t == *t && r.component == k), |r| (r.x, r.y));
                 Layer::line("", outline).coloured(1)

@@ -8,7 +8,6 @@ use fewbits_monte_carlo::{Moments, Trial};
 use std::f64::consts::LN_10;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Worlds.
         #[garde(range(min = 2, max = 100_000))]

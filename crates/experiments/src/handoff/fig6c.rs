@@ -13,7 +13,6 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Components sent.
         #[garde(range(min = 1, max = 100))]
@@ -28,7 +27,6 @@ parameters! {
 }
 
 rows! {
-    /// One time of one method.
     pub struct Row {
         /// Time.
         t: usize,
@@ -180,15 +178,11 @@ fn trial(p: &Parameters, it: Trial) -> Result<Vec<Moment>, Error> {
     Ok(run)
 }
 
-/// Figure 6(c).
 pub struct Fig6c;
 
 impl Rows {
     fn at(&self, t: usize, method: &str) -> Option<Measured> {
-        self.error
-            .iter()
-            .find(|r| r.t == t && r.method == method)
-            .map(|r| r.kl_increase)
+        first(&self.error, |r| r.t == t && r.method == method).map(|r| r.kl_increase)
     }
 }
 

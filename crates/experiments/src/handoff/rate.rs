@@ -9,7 +9,6 @@ use fewbits_monte_carlo::Moments;
 use nalgebra::Vector2;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Components.
         #[garde(length(min = 1), inner(range(min = 1, max = 60)))]
@@ -24,7 +23,6 @@ parameters! {
 }
 
 rows! {
-    /// One kind of message.
     pub struct Row {
         /// What is sent: coded, f32 (mixture parameters as floats), coded-kd (a cut by KL, coded), particles (f32, resampled).
         message: &'static str,
@@ -43,8 +41,7 @@ rows! {
 pub struct Rate;
 
 fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
-    rows.iter()
-        .find(|r| r.message == message && r.size == size && r.resolution == resolution)
+    first(&rows, |r| r.message == message && r.size == size && r.resolution == resolution)
 }
 
 impl Figure for Rate {

@@ -9,7 +9,6 @@ use fewbits_monte_carlo::Moments;
 use std::time::Instant;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Components.
         #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
@@ -29,7 +28,6 @@ rows! {
         cost: Vec<Time>,
     }
 
-    /// One method.
     struct Row {
         /// Method.
         method: &'static str,
@@ -119,10 +117,7 @@ pub struct Reductions;
 
 impl Rows {
     fn kl(&self, method: &str, components: usize) -> Option<f64> {
-        self.errors
-            .iter()
-            .find(|r| r.method == method && r.components == components)
-            .map(|r| r.kl.value)
+        first(&self.errors, |r| r.method == method && r.components == components).map(|r| r.kl.value)
     }
 }
 

@@ -6,7 +6,6 @@ use fewbits_quantizer_design::design::{self, Discovery};
 use fewbits_quantizer_design::{Channel, Criterion, Newton, Quantizer, SensorGroup, System, bounds};
 
 parameters! {
-    /// Settings of the searches.
     pub struct Parameters {
         /// Random starts among contiguous quantizers.
         #[garde(range(min = 1, max = 10_000))]
@@ -480,11 +479,7 @@ impl Figure for Beyond {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let of = |cells: &'static str| {
-            rows.searches
-                .iter()
-                .filter(move |s| s.criterion == "mse" && s.cells == cells)
-        };
+        let of = |cells: &'static str| select(&rows.searches, move |s| s.criterion == "mse" && s.cells == cells);
         let title = |s: &Search| {
             let words = [
                 ("noise", "noise "),

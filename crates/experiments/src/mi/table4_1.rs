@@ -7,7 +7,6 @@ use crate::reference;
 use fewbits_quantizer_design::{Newton, System, bounds, design};
 
 parameters! {
-    /// Settings of Table 4.1.
     pub struct Parameters {
         /// Noise standard deviation of both sensors, in prior standard deviations.
         #[garde(range(min = 1e-3, max = 1e3))]

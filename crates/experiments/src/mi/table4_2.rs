@@ -7,7 +7,6 @@ use crate::reference;
 use fewbits_quantizer_design::{Newton, System, bounds, design};
 
 parameters! {
-    /// Settings of Table 4.2.
     pub struct Parameters {
         /// Noise variances of the two sensors, in prior variances.
         #[garde(length(min = 2, max = 2), inner(range(min = 1e-6, max = 1e6)))]

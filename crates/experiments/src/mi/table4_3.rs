@@ -6,7 +6,6 @@ use crate::reference;
 use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design};
 
 parameters! {
-    /// Settings of Table 4.3.
     pub struct Parameters {
         /// Number of sensors; the greedy chain enumerates `4^sensors` outcomes.
         #[garde(range(min = 2, max = 10))]
@@ -220,13 +219,7 @@ impl Figure for Table43 {
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let flat = |name: &str| {
-            points(
-                rows.bounds
-                    .iter()
-                    .filter(|b| b.bound == name)
-                    .flat_map(|b| [(0.8, b.mse), (2.0, b.mse)]),
-                |p| p,
-            )
+            points(select(&rows.bounds, |b| b.bound == name).flat_map(|b| [(0.8, b.mse), (2.0, b.mse)]), |p| p)
         };
         let marks = |value: fn(&Design) -> Option<f64>| {
             points(&rows.designs, |d| (d.t.unwrap_or(f64::NAN), d.t.and_then(|_| value(d))))

@@ -11,7 +11,6 @@ use fewbits_quantizer_design::{Channel, Criterion, JointTable, Newton, Noise, Pr
 const PE: Criterion = Criterion::BayesError;
 
 parameters! {
-    /// Settings of Table 4.4.
     pub struct Parameters {
         /// The signals to detect, in noise standard deviations.
         #[garde(length(min = 1, max = 20), inner(range(min = 0.1, max = 16.0)))]

@@ -9,7 +9,6 @@ use fewbits_pf_mpa::{
 };
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Particles.
         #[garde(range(min = 3, max = 1000))]
@@ -27,7 +26,6 @@ rows! {
     }
 }
 
-/// `mpa-ablation`.
 pub struct Ablation;
 
 /// The variants by name.

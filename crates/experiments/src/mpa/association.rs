@@ -167,11 +167,9 @@ fn cloud_step<R: Rng>(
     Ok((means, straight.iter().sum::<f64>() / PAIRS as f64))
 }
 
-/// `mpa-fig3-7`.
 pub struct Fig37;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Variances of the measurements.
         #[garde(length(min = 1, max = 4), inner(range(min = 1e-8, max = 1.0)))]
@@ -262,11 +260,7 @@ impl Figure for Fig37 {
 
     fn plot(&self, p: &Parameters, t: &Steps) -> Plot {
         let panel = |variance: &f64| {
-            let of = |rule: &'static str| {
-                t.tracks
-                    .iter()
-                    .filter(move |r| r.variance == *variance && r.rule == rule)
-            };
+            let of = |rule: &'static str| select(&t.tracks, move |r| r.variance == *variance && r.rule == rule);
             let k = |r: &Step| r.k as f64;
             Panel::new(format!("R = {variance}"), Axis::linear("step"), Axis::linear("position"))
                 .with(Layer::line("target 1", points(of("jpda"), |r| (k(r), r.t1))).coloured(0))
@@ -280,7 +274,6 @@ impl Figure for Fig37 {
     }
 }
 
-/// `mpa-table3-da`.
 pub struct Table;
 
 parameters! {
@@ -381,11 +374,7 @@ impl Figure for Table {
             full.references_at_most(&format!("{id}-most"), what, &t.rules, |r| (key(r), value(r)));
         }
         for (variance, blur) in [(1e-4, 3.0), (4e-4, 2.0)] {
-            let of = |method: &str| {
-                t.rules
-                    .iter()
-                    .find(|r| r.variance == variance && r.apart == 0.1 && r.method == method)
-            };
+            let of = |method: &str| first(&t.rules, |r| r.variance == variance && r.apart == 0.1 && r.method == method);
             let errors = ["jpda", "tanh", "pf-tanh"].map(|m| of(m).map(|r| r.association.value));
             let what = "C10: exact < printed rule < printed rule over particles";
             full.increasing(format!("order-{variance}"), what, errors);
@@ -395,11 +384,8 @@ impl Figure for Table {
             let what = "C10: over particles the printed rule blurs the targets";
             full.above(format!("particles-{variance}"), what, ratio, blur);
         }
-        let genie = |r: &Row| {
-            t.rules
-                .iter()
-                .find(|g| g.variance == r.variance && g.apart == r.apart && g.method == "genie")
-        };
+        let genie =
+            |r: &Row| first(&t.rules, |g| g.variance == r.variance && g.apart == r.apart && g.method == "genie");
         let known = t.rules.iter().filter(|r| r.method != "genie");
         full.all("genie", "C10: no rule is below the genie", known, |r| {
             genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)

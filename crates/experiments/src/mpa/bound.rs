@@ -9,7 +9,6 @@ use fewbits_pf_mpa::{CramerRao, Target, position_information};
 use nalgebra::{Matrix4, Vector2};
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Free trajectories.
         #[garde(range(min = 2, max = 100_000))]
@@ -47,7 +46,6 @@ rows! {
     }
 }
 
-/// `mpa-crlb`.
 pub struct Bounds;
 
 const LEVELS: [usize; 3] = [2, 4, 16];

@@ -7,7 +7,6 @@ use crate::prelude::*;
 use fewbits_pf_mpa::Encoder;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Trajectories.
         #[garde(range(min = 2, max = 100_000))]
@@ -24,7 +23,6 @@ rows! {
     }
 }
 
-/// `mpa-encoder`.
 pub struct Encoders;
 
 const LEVELS: [usize; 4] = [2, 4, 8, 16];

@@ -9,7 +9,6 @@ use fewbits_pf_mpa::leader::StepBits;
 use fewbits_pf_mpa::{LabelChain, RingBias, kernel_error, ratio_second_moments};
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};
 
-/// `mpa-gibbs`.
 pub struct Gibbs;
 
 parameters! {
@@ -191,11 +190,7 @@ impl Figure for Gibbs {
     }
 
     fn plot(&self, _: &Draws, t: &GibbsRows) -> Plot {
-        let of = |case: &'static str| {
-            t.mixing
-                .iter()
-                .filter(move |r| r.case == case && r.total_variation > 1e-12)
-        };
+        let of = |case: &'static str| select(&t.mixing, move |r| r.case == case && r.total_variation > 1e-12);
         let panel = Panel::new("Labels", Axis::linear("sweeps"), Axis::log("total variation"))
             .with_all(["A", "C"].map(|c| Layer::line(c, points(of(c), |r| (r.sweeps as f64, r.total_variation)))));
         let bias = |case: &'static str| {
@@ -209,11 +204,9 @@ impl Figure for Gibbs {
     }
 }
 
-/// `mpa-ring`.
 pub struct Rings;
 
 parameters! {
-    /// No settings.
     pub struct None {}
 }
 
@@ -368,7 +361,6 @@ impl Figure for Rings {
     }
 }
 
-/// `mpa-bits`.
 pub struct Bits;
 
 rows! {
@@ -447,7 +439,6 @@ impl Figure for Bits {
     }
 }
 
-/// `mpa-graphs`.
 pub struct Graphs;
 
 rows! {

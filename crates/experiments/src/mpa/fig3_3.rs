@@ -6,7 +6,6 @@ use crate::prelude::*;
 use fewbits_pf_mpa::Target;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Which trajectory of those that all figures share.
         #[garde(range(min = 0, max = 10_000))]
@@ -50,7 +49,6 @@ rows! {
     }
 }
 
-/// `mpa-fig3-3`.
 pub struct Fig33;
 
 impl Figure for Fig33 {

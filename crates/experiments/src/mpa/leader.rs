@@ -10,7 +10,6 @@ use fewbits_pf_mpa::{MessagePassing, Reports, Target, Tracker};
 use nalgebra::Vector2;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Trajectories of 25 steps.
         #[garde(range(min = 2, max = 100_000))]
@@ -44,7 +43,6 @@ rows! {
     }
 }
 
-/// `mpa-leader`.
 pub struct Leaders;
 
 const SETTINGS: [(f64, usize); 3] = [(50.0, 40), (50.0, 10), (30.0, 40)];

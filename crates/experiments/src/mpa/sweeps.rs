@@ -9,7 +9,6 @@ use nalgebra::Vector2;
 /// The speed of the canonical scenario.
 pub(super) const SPEED: f64 = 3.0;
 
-/// `mpa-table3-mse`.
 pub struct Mse;
 
 rows! {
@@ -147,7 +146,6 @@ impl Figure for Mse {
 }
 
 rows! {
-    /// Rows of one table.
     pub struct Sweep {
         /// Trackers.
         trackers: Vec<Row>,
@@ -163,7 +161,6 @@ fn families(rows: &[Row], shown: &[&str], x: impl Fn(&Row) -> f64) -> Vec<Layer>
     shown.iter().enumerate().map(line).collect()
 }
 
-/// `mpa-fig3-4`.
 pub struct Fig34;
 
 const SIZES: [usize; 7] = [3, 5, 10, 20, 40, 100, 500];
@@ -236,7 +233,6 @@ impl Figure for Fig34 {
     }
 }
 
-/// `mpa-fig3-5`.
 pub struct Fig35;
 
 const LEVELS: [usize; 7] = [2, 4, 8, 16, 32, 64, 256];
@@ -320,7 +316,6 @@ impl Figure for Fig35 {
     }
 }
 
-/// `mpa-table3-low`.
 pub struct Low;
 
 impl Figure for Low {

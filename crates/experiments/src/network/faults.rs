@@ -14,7 +14,6 @@ const SENSORS: usize = 4;
 const WARM_UP: usize = 20;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Probabilities that a frame is lost.
         #[garde(length(min = 1), inner(range(min = 0.0, max = 0.8)))]
@@ -38,7 +37,6 @@ parameters! {
 }
 
 rows! {
-    /// One fault at one level.
     pub struct Row {
         /// loss, flips, delay or deaths.
         fault: &'static str,
@@ -201,8 +199,7 @@ impl Figure for Faulty {
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         let at = |fault: &str, level: f64, feedback: &str| {
-            rows.iter()
-                .find(|r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
+            first(&rows, |r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
         };
         let gap = |feedback| {
             at("loss", 0.0, feedback)
@@ -225,9 +222,7 @@ impl Figure for Faulty {
         here.near("recovery-echoed", what, clean.map(|c| c.0), 2.0, 0.0);
         let restart = at("loss", 0.0, "told").map(|r| r.disagreements.value);
         here.near("told", "without faults on air nobody disagrees with a centre that tells", restart, 0.0, 0.0);
-        let lossy = rows
-            .iter()
-            .filter(|r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
+        let lossy = select(&rows, |r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
         claims.all("noted", "replicas that miss frames are seen to disagree", lossy, |r| r.disagreements.value > 0.0);
     }
 

@@ -6,7 +6,6 @@ use crate::prelude::*;
 use fewbits_network::Radio;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Lengths of a slot, s.
         #[garde(length(min = 1), inner(range(min = 0.01, max = 1e4)))]
@@ -24,7 +23,6 @@ parameters! {
 }
 
 rows! {
-    /// One scheme at one rate of slots.
     pub struct Row {
         /// The scheme.
         scheme: &'static str,
@@ -102,12 +100,11 @@ impl Figure for Lifetime {
         let here = claims.at_defaults();
         claims.all("idle", "no node outlives one that is silent", rows, |r| r.days <= r.idle_days);
         let at = |scheme: &str, setting: &str, period: f64, baseline: f64| {
-            rows.iter()
-                .find(|r| {
-                    (r.scheme, r.setting.as_str(), r.period, r.baseline) == (scheme, setting, period, baseline)
-                        && r.feedback != "told"
-                })
-                .map(|r| r.days)
+            first(&rows, |r| {
+                (r.scheme, r.setting.as_str(), r.period, r.baseline) == (scheme, setting, period, baseline)
+                    && r.feedback != "told"
+            })
+            .map(|r| r.days)
         };
         let ratio = |period, baseline| {
             at("CFwMD", "n=0.25", period, baseline)

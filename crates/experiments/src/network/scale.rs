@@ -8,7 +8,6 @@ use fewbits_network::{
 use fewbits_topology::Deployment;
 
 parameters! {
-    /// Settings.
     pub struct Parameters {
         /// Nodes, on average ten in range of each.
         #[garde(length(min = 1), inner(range(min = 2, max = 10_000_000)))]
@@ -20,7 +19,6 @@ parameters! {
 }
 
 rows! {
-    /// One size.
     pub struct Row {
         /// Nodes.
         nodes: u64,

@@ -230,7 +230,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
         if shared {
             return Ok(Censors::told(network, format, self.dynamics.clone(), self.start));
         }
-        Censors::own(network, format, self.dynamics.clone(), self.start, slots).map_err(Error::failed)
+        Ok(Censors::own(network, format, self.dynamics.clone(), self.start, slots)?)
     }
 
     fn handed(&self, components: usize, resolution: f64, stream: Stream, slots: usize) -> Result<Bill, Error> {

@@ -54,7 +54,6 @@ impl Quick for Parameters {
 }
 
 rows! {
-    /// One interval of refreshes at one rate of loss.
     pub struct Row {
         /// Signal.
         column: String,

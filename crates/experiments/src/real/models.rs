@@ -40,7 +40,6 @@ impl Quick for Parameters {
 }
 
 rows! {
-    /// One moment of one signal.
     pub struct Row {
         /// Signal.
         column: String,

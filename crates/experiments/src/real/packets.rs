@@ -36,7 +36,6 @@ impl Quick for Parameters {
 }
 
 rows! {
-    /// One scheme at one rate.
     pub struct Row {
         /// Signal.
         column: String,
