@@ -287,6 +287,12 @@ impl Layer {
         Self::points(label, points).with_errors(errors)
     }
 
+    /// A line through markers with error bars, in one colour.
+    pub fn curve(label: impl Into<String>, colour: usize, marks: Vec<(f64, Measured)>) -> [Self; 2] {
+        let line = Self::line(label, points(&marks, |(x, y)| (*x, y.value)));
+        [line, Self::measured("", marks, |mark| mark)].map(|layer| layer.coloured(colour))
+    }
+
     /// Vertical bars.
     pub fn bars(label: impl Into<String>, points: Vec<(f64, f64)>, width: f64) -> Self {
         Self::new(label, Shape::Bars { points, width })
@@ -388,6 +394,26 @@ impl Panel {
             layers: Vec::new(),
             legend: true,
         }
+    }
+
+    /// An empty panel of two linear axes.
+    pub fn linear(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self::new(title, Axis::linear(x), Axis::linear(y))
+    }
+
+    /// An empty panel, its vertical axis logarithmic.
+    pub fn semilog(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self::new(title, Axis::linear(x), Axis::log(y))
+    }
+
+    /// An empty panel, its horizontal axis logarithmic.
+    pub fn log_x(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self::new(title, Axis::log(x), Axis::linear(y))
+    }
+
+    /// An empty panel, both axes logarithmic.
+    pub fn loglog(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self::new(title, Axis::log(x), Axis::log(y))
     }
 
     /// Adds a layer.

@@ -1,7 +1,6 @@
 //! `assign-fig6-3` and `assign-fig6-4`: random networks of given mean and spread of their noise variances.
 
 use crate::prelude::*;
-use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_sensor_assignment::{
     CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
     variances_with_moments,
@@ -145,14 +144,15 @@ fn centre(rows: &[Row]) -> impl Iterator<Item = &Row> {
 fn picture(rows: &[Row], label: &str) -> Plot {
     let panel = |(decoder, title): (&'static str, &str)| {
         let curve = |text: &str, colour, value: fn(&Row) -> Measured| {
-            let own = || rows.iter().filter(|r| r.decoder == decoder);
-            let line = Layer::line("", points(own(), |r| (r.at, value(r)))).coloured(colour);
-            [
-                line,
-                Layer::measured(text, own(), |r| (r.at, value(r))).coloured(colour),
-            ]
+            Layer::curve(
+                text,
+                colour,
+                select(rows, |r| r.decoder == decoder)
+                    .map(|r| (r.at, value(r)))
+                    .collect(),
+            )
         };
-        Panel::new(title, Axis::linear(label), Axis::linear("mean squared error / V²"))
+        Panel::linear(title, label, "mean squared error / V²")
             .with_all(curve("mean of all", 0, |r| r.avg))
             .with_all(curve("assignment II", 1, |r| r.ii))
             .with_all(curve("linear assignment", 2, |r| r.alg))
@@ -165,11 +165,7 @@ fn picture(rows: &[Row], label: &str) -> Plot {
 /// Refuses moments that no network of positive variances has.
 fn feasible(sensors: usize, mean: f64, std: f64) -> garde::Result {
     let most = mean * (sensors as f64 - 1.0).sqrt();
-    if std < most {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("at a mean of {mean} the deviation must be below {most}")))
-    }
+    accept(std < most, || format!("at a mean of {mean} the deviation must be below {most}"))
 }
 
 pub struct Spread;

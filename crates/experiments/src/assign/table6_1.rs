@@ -203,7 +203,6 @@ impl Figure for Table {
         let chosen = optimal.split(' ').filter_map(|s| s.parse::<f64>().ok()).enumerate();
         let chosen = chosen.map(|(bit, sensor)| (sensor, (n - bit) as f64)).collect();
         let three = &rows.assignments[..3.min(rows.assignments.len())];
-        let places = three.iter().enumerate().map(|(i, r)| (i as f64, r.assign.to_owned()));
         let errors = |value: fn(&Row) -> f64, shift: f64| {
             three
                 .iter()
@@ -220,7 +219,7 @@ impl Figure for Table {
         .with(Layer::points("optimal assignment", chosen).styled(1, Marker::Cross));
         let exact = Panel::new(
             "Error of the assignments",
-            Axis::linear("assignment").named(places).between(-0.6, 2.6),
+            Axis::categories("assignment", three.iter().map(|r| r.assign)),
             Axis::log("mean squared error / V²").between(2e-3, 0.1),
         )
         .with(Layer::points("equation 6.6", errors(|r| r.approx, -0.1)).coloured(7))

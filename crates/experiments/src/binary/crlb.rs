@@ -1,6 +1,6 @@
 //! `binary-fig5-6`: equation 5.13 for three sets of patterns, and why it misleads.
 
-use super::{Scene, crossing, each, not_below, sweep};
+use super::{Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
 use crate::reference;
 use fewbits_binary_patterns::bounds::printed_crlb;
@@ -8,21 +8,10 @@ use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 
 pub struct PrintedBounds;
 
-parameters! { self #[derive(Validate)]
-    pub struct Parameters {
-        /// Bits, and sensors.
-        #[garde(length(min = 1, max = 4), inner(range(min = 1, max = 5)))]
-        bits: Vec<usize> = vec![3, 4],
-        /// First signal-to-noise ratio, dB.
-        #[garde(range(min = -60.0, max = 60.0))]
-        from_db: f64 = 0.0,
-        /// Last signal-to-noise ratio, dB.
-        #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-        to_db: f64 = 30.0,
-        /// Step, dB.
-        #[garde(range(min = 0.01, max = 60.0))]
-        step_db: f64 = 1.0 => quick 2.0,
-    }
+swept! { 0.0 to 30.0, step => quick 2.0,
+    /// Bits, and sensors.
+    #[garde(length(min = 1, max = 4), inner(range(min = 1, max = 5)))]
+    bits: Vec<usize> = vec![3, 4],
 }
 
 #[derive(Clone, Copy)]

@@ -1,6 +1,6 @@
 //! `binary-fig5-8`: decoders and bounds for three Gray bits.
 
-use super::{Ratios, Scene, each, sweep};
+use super::{Scene, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
@@ -9,7 +9,7 @@ use fewbits_binary_patterns::{Decoder, gray_basis};
 
 pub struct Decoders;
 
-type Parameters = Ratios<-10, 40>;
+swept! { -10.0 to 40.0, step => quick 5.0, }
 
 rows! {
     pub struct Rows {

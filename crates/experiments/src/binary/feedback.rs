@@ -1,6 +1,6 @@
 //! `binary-fig5-10`: ten sensors, with and without feedback.
 
-use super::{Scene, descent_from, each, mask_text, not_below, sweep};
+use super::{Scene, descent_from, each, mask_text, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::baselines::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
 use fewbits_binary_patterns::bounds::ConditionalMean;
@@ -8,30 +8,19 @@ use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Feedback;
 
-parameters! { self #[derive(Validate)]
-    pub struct Parameters {
-        /// Number of sensors.
-        #[garde(range(min = 3, max = 14))]
-        sensors: usize = 10,
-        /// Most bits of the cell index that are tried.
-        #[garde(range(min = 3, max = 8))]
-        most_bits: usize = 7 => quick 5,
-        /// First signal-to-noise ratio, dB.
-        #[garde(range(min = -60.0, max = 60.0))]
-        from_db: f64 = 0.0,
-        /// Last signal-to-noise ratio, dB.
-        #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-        to_db: f64 = 40.0 => quick 30.0,
-        /// Step, dB.
-        #[garde(range(min = 0.01, max = 60.0))]
-        step_db: f64 = 1.0 => quick 10.0,
-        /// First step of AQ-VS in units of V. The thesis gives no rule.
-        #[garde(range(min = 1e-6, max = 10.0))]
-        vs_step: f64 = 0.5,
-        /// Factor of AQ-VS.
-        #[garde(range(min = 1.0, max = 10.0))]
-        vs_factor: f64 = 1.5,
-    }
+swept! { 0.0 to 40.0 => quick 30.0, step => quick 10.0,
+    /// Number of sensors.
+    #[garde(range(min = 3, max = 14))]
+    sensors: usize = 10,
+    /// Most bits of the cell index that are tried.
+    #[garde(range(min = 3, max = 8))]
+    most_bits: usize = 7 => quick 5,
+    /// First step of AQ-VS in units of V. The thesis gives no rule.
+    #[garde(range(min = 1e-6, max = 10.0))]
+    vs_step: f64 = 0.5,
+    /// Factor of AQ-VS.
+    #[garde(range(min = 1.0, max = 10.0))]
+    vs_factor: f64 = 1.5,
 }
 
 /// Finer cells than this share of the noise are not tried: they never win.

@@ -1,13 +1,13 @@
 //! `binary-fig5-9`: a Gaussian source, three sensors of three bits.
 
-use super::{Ratios, Scene, crossing, each, mask_text, sweep};
+use super::{Scene, crossing, each, mask_text, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
 
 pub struct GaussianSource;
 
-type Parameters = Ratios<-10, 30>;
+swept! { -10.0 to 30.0, step => quick 5.0, }
 
 const SENSORS: usize = 3;
 const GRAY: [Mask; 3] = [3, 4, 6];
@@ -131,10 +131,10 @@ impl Figure for GaussianSource {
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let curve = |value: fn(&Row) -> f64| points(&rows.errors, |r| (r.snr_db, value(r)));
         Plot::of(
-            Panel::new(
+            Panel::semilog(
                 "Three sensors, Gaussian source of variance 0.1",
-                Axis::linear("signal-to-noise ratio / dB"),
-                Axis::log("mean squared error"),
+                "signal-to-noise ratio / dB",
+                "mean squared error",
             )
             .with(Layer::line("best basis", curve(|r| r.mse_opt)).coloured(0))
             .with(Layer::line("any three masks", curve(|r| r.mse_unconstrained)).coloured(1))

@@ -88,44 +88,30 @@ impl Scene {
     }
 }
 
-/// Signal-to-noise ratios from `FROM` to `TO` in steps of 1 dB by default.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Ratios<const FROM: i32, const TO: i32> {
-    /// First signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    from_db: f64,
-    /// Last signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-    to_db: f64,
-    /// Step, dB.
-    #[garde(range(min = 0.01, max = 60.0))]
-    step_db: f64,
-}
-
-impl<const FROM: i32, const TO: i32> Default for Ratios<FROM, TO> {
-    fn default() -> Self {
-        Self {
-            from_db: f64::from(FROM),
-            to_db: f64::from(TO),
-            step_db: 1.0,
+/// Parameters of a sweep over signal-to-noise ratios, in steps of 1 dB by default, behind the figure's own.
+macro_rules! swept {
+    ($from:literal to $to:literal $(=> quick $last:literal)?, step => quick $step:literal, $($own:tt)*) => {
+        parameters! { self #[derive(Validate)]
+            pub struct Parameters {
+                $($own)*
+                /// First signal-to-noise ratio, dB.
+                #[garde(range(min = -60.0, max = 60.0))]
+                from_db: f64 = $from,
+                /// Last signal-to-noise ratio, dB.
+                #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| super::not_below(self.from_db, *to)))]
+                to_db: f64 = $to $(=> quick $last)?,
+                /// Step, dB.
+                #[garde(range(min = 0.01, max = 60.0))]
+                step_db: f64 = 1.0 => quick $step,
+            }
         }
-    }
+    };
 }
-
-impl<const FROM: i32, const TO: i32> Quick for Ratios<FROM, TO> {
-    fn quicken(&mut self) {
-        self.step_db = 5.0;
-    }
-}
+use swept;
 
 /// Refuses the end of a sweep below its beginning.
 fn not_below(from: f64, to: f64) -> garde::Result {
-    if to >= from {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("lower than from_db, {from}")))
-    }
+    accept(to >= from, || format!("lower than from_db, {from}"))
 }
 
 /// `from, from + step, ..., to`.

@@ -30,11 +30,7 @@ parameters! { self #[derive(Validate)]
 
 /// Refuses fewer sensors than bits: no set of full rank.
 fn enough(sensors: usize, bits: usize) -> garde::Result {
-    if sensors >= bits {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("fewer sensors than the {bits} bits")))
-    }
+    accept(sensors >= bits, || format!("fewer sensors than the {bits} bits"))
 }
 
 rows! {

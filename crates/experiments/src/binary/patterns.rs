@@ -25,11 +25,7 @@ parameters! { self #[derive(Validate)]
 
 /// Refuses a mask of more digits than there are bits.
 fn fits(mask: Mask, bits: usize) -> garde::Result {
-    if u64::from(mask) < 1 << bits {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("not below 2^{bits}")))
-    }
+    accept(u64::from(mask) < 1 << bits, || format!("not below 2^{bits}"))
 }
 
 rows! {
@@ -142,7 +138,7 @@ impl Figure for Clipping {
 
     fn plot(&self, _: &ClippingParameters, tables: &Clipped) -> Plot {
         let curve = |cell: fn(&Cell) -> usize| points(&tables.cells, |c| (c.y, cell(c) as f64));
-        let panel = Panel::new("Cell of a measurement", Axis::linear("measurement y / V"), Axis::linear("cell"));
+        let panel = Panel::linear("Cell of a measurement", "measurement y / V", "cell");
         Plot::of(
             panel
                 .with(Layer::dashed("sides as printed", curve(|c| c.cell_swapped)).coloured(1))

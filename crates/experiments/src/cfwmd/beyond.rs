@@ -2,7 +2,7 @@
 
 use super::case::Case;
 use super::linear::{Scheme, start, time_of_steps};
-use super::pictures::{by_budget, curve};
+use super::pictures::by_budget;
 use super::rows::{Ensemble, Further, Nothing, Part, Rows, Step, Summary};
 use super::scalar::{BUDGETS, CENSORED};
 use super::setting::{Linear, Setting};
@@ -68,16 +68,12 @@ impl Case for Lossy {
 
     fn plot(setting: &Linear, rows: &Rows<Step>) -> Plot {
         let l = setting.messages[0];
-        let mut panel = Panel::new(
-            "Position error over a lossy link",
-            Axis::linear("loss probability"),
-            Axis::linear("time-averaged RMSE (m)"),
-        );
+        let mut panel = Panel::linear("Position error over a lossy link", "loss probability", "time-averaged RMSE (m)");
         for (colour, scheme) in [IGNORED, MODELLED].into_iter().enumerate() {
             let at = |loss: &f64| Some((*loss, rows.at(&format!("{scheme}, loss {loss}"), l)?.position_rmse));
             let clean = rows.at(NO_LOSS, l).map(|r| (0.0, r.position_rmse));
             let lossy = setting.losses.iter().flatten().filter_map(at);
-            panel = panel.with_all(curve(scheme, colour, clean.into_iter().chain(lossy).collect()));
+            panel = panel.with_all(Layer::curve(scheme, colour, clean.into_iter().chain(lossy).collect()));
         }
         Plot::of(panel)
     }

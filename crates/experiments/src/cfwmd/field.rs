@@ -84,7 +84,7 @@ impl Figure for Fig7 {
     fn plot(&self, _: &Shown, map: &Map) -> Plot {
         let places = |places: &[Place]| points(places, |p| (p.x, p.y));
         Plot::of(
-            Panel::new("Sensors and target", Axis::linear("x (m)"), Axis::linear("y (m)"))
+            Panel::linear("Sensors and target", "x (m)", "y (m)")
                 .with(Layer::line("target", places(&map.path)).coloured(0))
                 .with(Layer::points("each step", places(&map.path[1..])).coloured(0))
                 .with(Layer::points("start", places(&map.path[..1])).styled(2, Marker::Square))

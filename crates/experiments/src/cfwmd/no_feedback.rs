@@ -174,23 +174,12 @@ impl Case for NoFeedbackFigure {
     }
 
     fn plot(_: &Linear, rows: &Rows<Step, Literal>) -> Plot {
-        let place = |i: usize| i as f64 + 1.0;
-        let names = rows
-            .summary
-            .iter()
-            .enumerate()
-            .map(|(i, r)| (place(i), r.run.scheme.to_owned()));
+        let schemes = Axis::categories("", rows.summary.iter().map(|r| r.run.scheme));
         let all = rows.summary.iter().enumerate();
         Plot::of(
-            Panel::new(
-                "Position error without feedback",
-                Axis::linear("")
-                    .between(0.5, rows.summary.len() as f64 + 0.5)
-                    .named(names),
-                Axis::linear("time-averaged RMSE (m)"),
-            )
-            .with(Layer::measured("", all, |(i, r)| (place(i), r.position_rmse)))
-            .without_legend(),
+            Panel::new("Position error without feedback", schemes, Axis::linear("time-averaged RMSE (m)"))
+                .with(Layer::measured("", all, |(i, r)| (i as f64, r.position_rmse)))
+                .without_legend(),
         )
     }
 }

@@ -1,6 +1,5 @@
 //! Tables of rates: printed ones beside ours.
 
-use super::pictures::{curve, distinct};
 use super::rows::{Ensemble, Main, rate};
 use crate::prelude::*;
 use crate::reference;
@@ -67,7 +66,7 @@ impl Main for Rates {
             let first = rows.iter().filter(|r| Some(&r.setting) == worlds.first());
             let layers = worlds.iter().enumerate().flat_map(|(colour, world)| {
                 let own = rows.iter().filter(|r| r.setting == *world);
-                curve(world, colour, own.map(|r| (r.l, excess(r))).collect())
+                Layer::curve(world.as_str(), colour, own.map(|r| (r.l, excess(r))).collect())
             });
             let axis = Axis::linear("message budget l (messages/step)");
             Panel::new(title, axis, Axis::linear("rate minus budget (messages/step)"))

@@ -2,7 +2,6 @@
 
 use super::pictures::{by_budget, by_step};
 use crate::prelude::*;
-use fewbits_monte_carlo::{Moments, Stream, Trial};
 
 /// One trial of one scheme, one entry a step.
 #[derive(Debug, Clone, Default)]

@@ -47,11 +47,7 @@ pub trait Setting:
 
 /// Refuses a budget of more messages than sensors.
 fn at_most(messages: f64, sensors: u64) -> garde::Result {
-    if messages <= sensors as f64 {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("more messages than the {sensors} sensors send")))
-    }
+    accept(messages <= sensors as f64, || format!("more messages than the {sensors} sensors send"))
 }
 
 /// Seconds and bytes of so many trials of ten schemes.

@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_core::Density;
 use fewbits_densities::{Clumps, MixtureFit};
 use fewbits_diffusive::{Form, Outcome, PositionBelief, Posterior, RateModel, Travelling, project};
-use fewbits_monte_carlo::Trial;
 use nalgebra::Vector2;
 
 /// Only the position is approximated here.

@@ -71,11 +71,8 @@ impl Figure for Bytes {
     }
 
     fn plot(&self, _: &Settings, rows: &Vec<Summary>) -> Plot {
-        let mut panel = Panel::new(
-            "Cost and accuracy",
-            Axis::log("bytes of all messages (median)"),
-            Axis::log("error at the end (m, median)"),
-        );
+        let mut panel =
+            Panel::loglog("Cost and accuracy", "bytes of all messages (median)", "error at the end (m, median)");
         let markers = [
             Marker::Circle,
             Marker::Square,

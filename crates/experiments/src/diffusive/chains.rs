@@ -236,8 +236,7 @@ impl Figure for Chains {
                 ],
             );
         }
-        let mut errors =
-            Panel::new("Error", Axis::linear("nodes"), Axis::log("distance to the source (m)")).without_legend();
+        let mut errors = Panel::semilog("Error", "nodes", "distance to the source (m)").without_legend();
         for (i, scheme) in schemes.iter().enumerate() {
             if i == 0 {
                 let band = of(scheme).map(|c| (c.step as f64, c.err_q10, c.err_q90)).collect();

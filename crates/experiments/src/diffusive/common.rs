@@ -4,7 +4,6 @@ use crate::prelude::*;
 use fewbits_diffusive::message::Wire;
 use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Rule, Search, SearchBox, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
-use fewbits_monte_carlo::{Stream, Trial};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Vector2, Vector3};
 

@@ -77,7 +77,7 @@ rows! {
 pub struct Envelope;
 
 impl Parameters {
-    fn area(&self, trial: fewbits_monte_carlo::Trial) -> Result<Option<Area>, Error> {
+    fn area(&self, trial: Trial) -> Result<Option<Area>, Error> {
         let settings = Settings::default();
         let endless = super::common::Example { threshold: 1e-300, ..B };
         let outcome = Scheme::new("exact", endless).up_to(self.nodes).run(&settings, trial)?;
@@ -216,14 +216,11 @@ impl Figure for Envelope {
         .with(Layer::dashed("true edge", circle.collect()).coloured(3));
         let of = |f: fn(&Band) -> f64| rows.band.iter().map(|b| (b.direction_deg, f(b))).collect::<Vec<_>>();
         let limits = rows.band.iter().map(|b| (b.direction_deg, b.r05, b.r95)).collect();
-        let band = Panel::new(
-            format!("Reach from the alarm node after {} s", p.time),
-            Axis::linear("direction (deg)"),
-            Axis::linear("reach (m)"),
-        )
-        .with(Layer::band("90 % band", limits).coloured(0))
-        .with(Layer::line("median", of(|b| b.r50)).coloured(0))
-        .with(Layer::dashed("truth", of(|b| b.truth)).coloured(3));
+        let band =
+            Panel::linear(format!("Reach from the alarm node after {} s", p.time), "direction (deg)", "reach (m)")
+                .with(Layer::band("90 % band", limits).coloured(0))
+                .with(Layer::line("median", of(|b| b.r50)).coloured(0))
+                .with(Layer::dashed("truth", of(|b| b.truth)).coloured(3));
         Plot::grid(2, vec![map, band])
     }
 }

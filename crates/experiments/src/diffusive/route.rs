@@ -4,7 +4,6 @@ use super::common::{A, ALARM, Network, Scheme, Settings};
 use crate::prelude::*;
 use fewbits_densities::ellipse;
 use fewbits_diffusive::{Form, Outcome, Rule};
-use fewbits_monte_carlo::Trial;
 
 parameters! {
     /// Which deployment is shown.
@@ -150,8 +149,8 @@ impl Figure for Trace {
                 (r.step as f64, total)
             })
             .collect();
-        let determinant = Panel::new("Test", Axis::linear("nodes"), Axis::linear("log10 det of the covariance (m^4)"));
-        let sent = Panel::new("Messages", Axis::linear("nodes"), Axis::linear("bytes so far"));
+        let determinant = Panel::linear("Test", "nodes", "log10 det of the covariance (m^4)");
+        let sent = Panel::linear("Messages", "nodes", "bytes so far");
         Plot::grid(
             2,
             vec![

@@ -5,7 +5,6 @@ use super::summary::{Summary, summaries};
 use crate::prelude::*;
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{Posterior, Rule, Selector, SourceSensor};
-use fewbits_monte_carlo::Moments;
 use nalgebra::Vector2;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -159,12 +158,10 @@ impl Figure for Selection {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let names = SETTINGS.iter().enumerate().map(|(i, s)| (i as f64, s.0.to_owned()));
+        let names = SETTINGS.iter().map(|s| s.0.to_owned());
         let mut nodes = Panel::new(
             "Nodes to the threshold",
-            Axis::linear("example and range (m)")
-                .named(names)
-                .between(-0.5, SETTINGS.len() as f64 - 0.5),
+            Axis::categories("example and range (m)", names),
             Axis::linear("mean nodes").between(0.0, 11.0),
         );
         for (c, (rule, _)) in SEARCH_RULES.into_iter().enumerate() {
@@ -175,7 +172,7 @@ impl Figure for Selection {
         // Rules downwards, best at the top, so that their names have room.
         let mut sorted: Vec<&Ranking> = rows.rankings.iter().collect();
         sorted.sort_by(|a, b| a.rank_correlation.value.total_cmp(&b.rank_correlation.value));
-        let names = sorted.iter().enumerate().map(|(i, r)| (i as f64, r.rule.to_owned()));
+        let names = sorted.iter().map(|r| r.rule.to_owned());
         let bars = sorted.iter().enumerate();
         let bars = bars.map(|(i, r)| (0.0, r.rank_correlation.value.max(0.0), i as f64 - 0.3, i as f64 + 0.3));
         let errors = sorted.iter().enumerate().filter_map(|(i, r)| {
@@ -186,7 +183,7 @@ impl Figure for Selection {
         let ranks = Panel::new(
             "Ranking",
             Axis::linear("rank correlation with exact information").between(0.0, 1.05),
-            Axis::linear("").named(names).between(-0.7, sorted.len() as f64 - 0.3),
+            Axis::categories("", names),
         )
         .with(Layer::boxes("mean over deployments", bars.collect()).coloured(0))
         .with_all(errors.enumerate().map(|(i, line)| {
@@ -198,11 +195,7 @@ impl Figure for Selection {
 }
 
 /// Of every rule: rank correlation, information lost, bias; none if the search had no candidates.
-fn rank(
-    p: &Parameters,
-    settings: &Settings,
-    trial: fewbits_monte_carlo::Trial,
-) -> Result<Option<Vec<[f64; 3]>>, Error> {
+fn rank(p: &Parameters, settings: &Settings, trial: Trial) -> Result<Option<Vec<[f64; 3]>>, Error> {
     let endless = Example { threshold: 1e-300, ..B };
     let scheme = Scheme::new("exact", endless).up_to(3);
     let outcome = scheme.run(settings, trial)?;
@@ -306,7 +299,7 @@ struct Draw {
 }
 
 impl<'a> Reference<'a> {
-    fn new(posterior: &'a Posterior, draws: usize, trial: fewbits_monte_carlo::Trial) -> Self {
+    fn new(posterior: &'a Posterior, draws: usize, trial: Trial) -> Self {
         let mut rng = trial.stream.named("information").rng();
         let [x, y] = posterior.cells.columns();
         let mut cumulative: Vec<f64> = posterior.cells.weights().to_vec();

@@ -163,21 +163,11 @@ impl Figure for Table1 {
                 .filter_map(|(i, m)| Some((i as f64, value(m)?)))
                 .collect()
         };
-        let names = rows
-            .means
-            .iter()
-            .enumerate()
-            .map(|(i, m)| (i as f64, format!("{}{}", m.nu1, m.nu2)));
+        let index = Axis::categories("index nu", rows.means.iter().map(|m| format!("{}{}", m.nu1, m.nu2)));
         Plot::of(
-            Panel::new(
-                "Mean under the Gaussian",
-                Axis::linear("index nu")
-                    .named(names)
-                    .between(-0.7, rows.means.len() as f64 - 0.3),
-                Axis::linear("mean"),
-            )
-            .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))
-            .with(Layer::points("by the recursion", bars(|m| Some(m.mean))).coloured(0)),
+            Panel::new("Mean under the Gaussian", index, Axis::linear("mean"))
+                .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))
+                .with(Layer::points("by the recursion", bars(|m| Some(m.mean))).coloured(0)),
         )
     }
 }

@@ -6,7 +6,6 @@ use fewbits_core::{Belief, Gaussian};
 use fewbits_densities::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information_of};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLikelihood};
-use fewbits_monte_carlo::Moments;
 use nalgebra::{Matrix2, Vector2};
 use rand::RngExt;
 
@@ -208,35 +207,20 @@ impl Figure for Unknowns {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let names = rows
-            .bounds
-            .iter()
-            .enumerate()
-            .map(|(i, b)| (i as f64, b.unknown.to_owned()));
-        let bound = Panel::new(
-            "Bound of x",
-            Axis::linear("unknown besides the position").named(names),
-            Axis::linear("standard deviation (m)"),
-        )
-        .with(Layer::bars(
+        let bars = rows.bounds.iter().enumerate().map(|(i, b)| (i as f64, b.sd_x));
+        let unknown = Axis::categories("unknown besides the position", rows.bounds.iter().map(|b| b.unknown));
+        let bound = Panel::new("Bound of x", unknown, Axis::linear("standard deviation (m)")).with(Layer::bars(
             "",
-            rows.bounds
-                .iter()
-                .enumerate()
-                .map(|(i, b)| (i as f64, b.sd_x))
-                .collect(),
+            bars.collect(),
             0.6,
         ));
-        let mut bias =
-            Panel::new("Noise-free samples", Axis::linear("nodes"), Axis::log("median distance to the source (m)"));
+        let mut bias = Panel::semilog("Noise-free samples", "nodes", "median distance to the source (m)");
         for (c, model) in ["sample-wise", "node-wise", "joint"].into_iter().enumerate() {
-            let of = || rows.models.iter().filter(|m| m.model == model);
+            let of = || select(&rows.models, |m| m.model == model);
+            let width = points(of(), |m| (m.nodes as f64, m.width.value));
             bias = bias
-                .with(Layer::points(model, of().map(|m| (m.nodes as f64, m.bias.value)).collect()).coloured(c))
-                .with(
-                    Layer::dashed(format!("{model}: width"), of().map(|m| (m.nodes as f64, m.width.value)).collect())
-                        .coloured(c),
-                );
+                .with(Layer::points(model, points(of(), |m| (m.nodes as f64, m.bias.value))).coloured(c))
+                .with(Layer::dashed(format!("{model}: width"), width).coloured(c));
         }
         Plot::grid(2, vec![bound, bias])
     }

@@ -4,7 +4,6 @@ use super::common::{Plant, each};
 use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing, Sign};
 use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant, steady};
-use fewbits_monte_carlo::{Moments, Stream};
 use rand::RngExt;
 
 const ID: &str = "dymbo-erasure";

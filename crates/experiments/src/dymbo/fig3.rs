@@ -88,8 +88,8 @@ impl Figure for KalmanVariance {
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
-        let (x, y) = (Axis::log("gamma = process / measurement variance"), Axis::log("filtered variance / sigma^2"));
-        let mut panel = Panel::new("Steady variance", x, y);
+        let mut panel =
+            Panel::loglog("Steady variance", "gamma = process / measurement variance", "filtered variance / sigma^2");
         for (i, (a, curve)) in p.a.iter().zip(rows.chunks(p.gamma.len())).enumerate() {
             let kalman = points(curve, |r| (r.plant.gamma, r.kf_reduction));
             let sign_bit = points(curve, |r| (r.plant.gamma, r.dymbo_reduction));

@@ -8,7 +8,6 @@ use fewbits_dymbo::{
     DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance, first_message_value,
 };
 use fewbits_filters::kalman;
-use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::Vector1;
 use std::f64::consts::FRAC_2_PI;
 
@@ -303,7 +302,7 @@ impl Figure for Convergence {
             let line = |of: fn(&Point) -> f64| points(path, |r| (r.n as f64, of(r)));
             let title = format!("One run, gamma = {}", path[0].plant.gamma);
             panels.push(
-                Panel::new(title, Axis::linear("step n"), Axis::linear("state / sigma"))
+                Panel::linear(title, "step n", "state / sigma")
                     .with(Layer::line("state", line(|r| r.theta)).coloured(4))
                     .with(Layer::dashed("Kalman", line(|r| r.kf)).coloured(0))
                     .with(Layer::line("sign bit", line(|r| r.dymbo)).coloured(1)),

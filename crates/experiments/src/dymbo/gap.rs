@@ -6,7 +6,6 @@ use fewbits_core::Link;
 use fewbits_dymbo::chain::{self, MessageLaw};
 use fewbits_dymbo::gap::{Twin, exact_filter};
 use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, innovation_gain, tree};
-use fewbits_monte_carlo::{Moments, Stream};
 
 const ID: &str = "dymbo-gap";
 
@@ -209,14 +208,7 @@ impl Figure for GapToExact {
             let shares = points(curve, |r| (r.n as f64, r.excess / r.mmse));
             left = left.with(Layer::line(curve[0].plant.title(), shares).coloured(i));
         }
-        let names = p
-            .plants
-            .iter()
-            .enumerate()
-            .map(|(i, p)| (i as f64, format!("{}, {}", p.a, p.gamma)));
-        let x = Axis::linear("plant a, gamma")
-            .named(names)
-            .between(-0.5, p.plants.len() as f64 - 0.5);
+        let x = Axis::categories("plant a, gamma", p.plants.iter().map(|p| format!("{}, {}", p.a, p.gamma)));
         let mut right = Panel::new("Steady state", x, y);
         for (bits, label, marker) in [
             (1, "one bit a sample", Marker::Circle),
@@ -224,7 +216,7 @@ impl Figure for GapToExact {
         ] {
             let those = rows.steady.iter().filter(|r| r.bits == bits).enumerate();
             let shares = Layer::measured(label, those, |(i, r)| (i as f64, r.excess.scaled(1.0 / r.mmse)));
-            right = right.with(shares.coloured(bits + 3).marked(marker));
+            right = right.with(shares.styled(bits + 3, marker));
         }
         Plot::grid(2, vec![left, right])
     }

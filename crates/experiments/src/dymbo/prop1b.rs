@@ -109,7 +109,7 @@ impl Figure for PosteriorShape {
             .with(Layer::points("exact", points(&rows.distances, |r| (r.sigma, r.distance))).coloured(0));
         let curve = |of: fn(&Density) -> f64| points(&rows.densities, |r| (r.theta, of(r)));
         let title = "Densities at the smallest noise";
-        let densities = Panel::new(title, Axis::linear("state"), Axis::linear("density"))
+        let densities = Panel::linear(title, "state", "density")
             .with(Layer::dashed("prior", curve(|r| r.prior)).coloured(2))
             .with(Layer::line("exact posterior", curve(|r| r.exact)).coloured(0))
             .with(Layer::dashed("normal, same moments", curve(|r| r.normal)).coloured(1));

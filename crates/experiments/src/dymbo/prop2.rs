@@ -123,12 +123,11 @@ impl Figure for FirstMessage {
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let curve = |of: fn(&Row) -> f64| points(&rows.messages, |r| (r.tau, of(r)));
-        let left = Panel::new("First message", Axis::log("resolution tau"), Axis::log("mean squared error"))
+        let left = Panel::loglog("First message", "resolution tau", "mean squared error")
             .with(Layer::points("exact, worst state", curve(|r| r.exact_sup)).coloured(0))
             .with(Layer::line("sigma^2 + tau^2/12", curve(|r| r.tight)).coloured(0))
             .with(Layer::dashed("printed bound", curve(|r| r.printed_bound)).coloured(1));
-        let (x, y) = (Axis::linear("step n"), Axis::linear("exact error / computed variance"));
-        let mut right = Panel::new("Consistency after the start", x, y);
+        let mut right = Panel::linear("Consistency after the start", "step n", "exact error / computed variance");
         for (i, &gamma) in p.gamma.iter().enumerate() {
             let of = |start: &str| {
                 let those = rows.starts.iter().filter(|r| r.gamma == gamma && r.start == start);

@@ -6,7 +6,6 @@ use crate::prelude::*;
 use fewbits_dymbo::gap::{Twin, exact_filter};
 use fewbits_dymbo::{DymboFilter, ScalarFilter};
 use fewbits_filters::scalar_fixed_lag_variance;
-use fewbits_monte_carlo::Moments;
 
 const ID: &str = "dymbo-smoother";
 

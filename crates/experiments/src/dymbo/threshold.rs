@@ -5,7 +5,7 @@ use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Scheme, Sensing, Sign};
 use fewbits_dymbo::{DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant};
 use fewbits_filters::assumed_density;
-use fewbits_monte_carlo::{Estimate, Moments, Stream};
+use fewbits_monte_carlo::Estimate;
 use nalgebra::{Matrix1, Vector1};
 
 const ID: &str = "dymbo-threshold";
@@ -37,10 +37,8 @@ parameters! {
 }
 
 fn stationary(plants: &[Plant], (): &()) -> garde::Result {
-    if plants.iter().all(|plant| plant.a.abs() < 1.0) {
-        return Ok(());
-    }
-    Err(garde::Error::new("a must be above -1 and below 1"))
+    let stable = plants.iter().all(|plant| plant.a.abs() < 1.0);
+    accept(stable, || "a must be above -1 and below 1".to_owned())
 }
 
 rows! {
@@ -226,10 +224,8 @@ impl Figure for ThresholdPlace {
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let names = p.plants.iter().enumerate().map(|(i, plant)| (i as f64, plant.title()));
-        let x = Axis::linear("plant")
-            .named(names)
-            .between(-0.6, p.plants.len() as f64 - 0.4);
+        let names = p.plants.iter().map(|plant| plant.title());
+        let x = Axis::categories("plant", names);
         let mut panel = Panel::new("Place of the threshold", x, Axis::log("mean squared error / sigma^2"));
         for (i, (rule, label)) in RULES.into_iter().enumerate() {
             let (those, shift) = (rows.rules.iter().filter(|r| r.rule == rule).enumerate(), 0.2 * (i as f64 - 1.0));

@@ -6,7 +6,6 @@ use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing, Sign}
 use fewbits_dymbo::SignFilter;
 use fewbits_filters::{PlaneFilter, SteadyState, steady_state};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
-use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix2, SMatrix, Vector2};
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -37,9 +36,7 @@ fn stable(transition: &[f64], (): &()) -> garde::Result {
     let stable = LinearGaussian::with_covariance(matrix, Matrix2::identity())
         .and_then(|dynamics| dynamics.stationary_covariance())
         .is_ok();
-    stable
-        .then_some(())
-        .ok_or_else(|| garde::Error::new("not a stable matrix"))
+    accept(stable, || "not a stable matrix".to_owned())
 }
 
 /// Steps before the exact posterior has forgotten that it started normal.
@@ -263,8 +260,8 @@ impl Figure for VectorState {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let names = rows.iter().enumerate().map(|(i, r)| (i as f64, r.scheme.to_owned()));
-        let x = Axis::linear("").named(names).between(-0.6, 2.6);
+        let names = rows.iter().map(|r| r.scheme.to_owned());
+        let x = Axis::categories("", names);
         let marks = |of: fn(&Row) -> f64, shift: f64| {
             rows.iter()
                 .enumerate()

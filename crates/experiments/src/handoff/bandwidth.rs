@@ -7,7 +7,6 @@ use crate::prelude::*;
 use fewbits_densities::tree::{At, Axis as SplitAxis};
 use fewbits_densities::{Bandwidth, Criterion, Reduction, Split};
 use fewbits_handoff::{Components, HandoffFilter, Reducer, Whole};
-use fewbits_monte_carlo::Moments;
 
 parameters! {
     pub struct Parameters {
@@ -131,7 +130,7 @@ impl Figure for Widths {
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let setups = setups();
         let law = StepLaw::new();
-        let one = |it: fewbits_monte_carlo::Trial| -> Result<Vec<f64>, Error> {
+        let one = |it: Trial| -> Result<Vec<f64>, Error> {
             let world = world(it.stream)?;
             let mut exact = Vec::new();
             let mut lattice = Lattice::prior();
@@ -218,14 +217,16 @@ impl Figure for Widths {
             |r: &Row| format!("{}, c = {}{}", super::title(r.filter), r.factor, if r.shrunk { ", shrunk" } else { "" });
         let mut sorted: Vec<&Row> = rows.iter().collect();
         sorted.sort_by(|a, b| b.kl.value.total_cmp(&a.kl.value));
-        let names: Vec<(f64, String)> = sorted.iter().enumerate().map(|(i, r)| (i as f64, label(r))).collect();
-        let places: Vec<(f64, Measured)> = sorted.iter().enumerate().map(|(i, r)| (i as f64, r.kl)).collect();
         // Values run to the right, filters downwards.
-        let bars = places.iter().map(|(i, m)| (0.0, m.value, i - 0.35, i + 0.35)).collect();
+        let bars = (0..)
+            .map(f64::from)
+            .zip(&sorted)
+            .map(|(i, r)| (0.0, r.kl.value, i - 0.35, i + 0.35))
+            .collect();
         let panel = Panel::new(
             "Error of what is handed on",
             Axis::linear("KL from the exact belief / nat"),
-            Axis::linear("").named(names).between(-0.7, rows.len() as f64 - 0.3),
+            Axis::categories("", sorted.iter().map(|r| label(r))),
         )
         .with(Layer::boxes("", bars))
         .without_legend();

@@ -100,7 +100,7 @@ impl Figure for Fig2 {
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
         let panel = |ratio: &f64| {
             let of = || rows.iter().filter(|r| r.ratio == *ratio && r.t > 0);
-            Panel::new(format!("ratio {ratio}"), Axis::linear("time t"), Axis::log("KL / nat"))
+            Panel::semilog(format!("ratio {ratio}"), "time t", "KL / nat")
                 .with(Layer::line("from the first density", points(of(), |r| (r.t.into(), r.kl_total))))
                 .with(Layer::dashed("to the first density", points(of(), |r| (r.t.into(), r.kl_total_reverse))))
                 .with(Layer::points("sum of the steps", points(of(), |r| (r.t.into(), r.sum_of_steps))))

@@ -121,15 +121,15 @@ impl Figure for Fig3 {
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let density = Panel::new("Two densities", Axis::linear("state x"), Axis::linear("density"))
+        let density = Panel::linear("Two densities", "state x", "density")
             .with(Layer::line("p0", points(&rows.densities, |d| (d.x, d.p0))))
             .with(Layer::line("p1", points(&rows.densities, |d| (d.x, d.p1))))
             .with(Layer::dashed("threshold", vec![(p.threshold, 0.0), (p.threshold, 7.0)]));
-        let names = rows.l1.iter().enumerate().map(|(i, d)| (i as f64, d.when.to_owned()));
+        let names = rows.l1.iter().map(|d| d.when.to_owned());
         let bars = rows.l1.iter().enumerate().map(|(i, d)| (i as f64, d.l1)).collect();
         let distance = Panel::new(
             "Error before and after the bit",
-            Axis::linear("").named(names).between(-0.6, 3.6),
+            Axis::categories("", names),
             Axis::linear("L1").between(0.0, 2.1),
         )
         .with(Layer::bars("", bars, 0.6));

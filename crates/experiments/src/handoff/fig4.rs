@@ -119,7 +119,7 @@ impl Figure for Fig4 {
             .iter()
             .filter_map(|s| Some((s.leader_x?, s.leader_y? + 0.35, s.t.to_string())))
             .collect();
-        let panel = Panel::new("One world", Axis::linear("x / r0"), Axis::linear("y / r0"))
+        let panel = Panel::linear("One world", "x / r0", "y / r0")
             .with(Layer::points("sensors", points(&rows.sensors, |s| (s.x, s.y))).styled(3, Marker::Cross))
             .with_all(links)
             .with(Layer::line("target", track.clone()).coloured(0))

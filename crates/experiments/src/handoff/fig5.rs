@@ -4,7 +4,6 @@ use super::filters::{PARTICLES, STEPS, Smoothing, Truth, posteriors, prior, sing
 use super::world::World;
 use crate::prelude::*;
 use fewbits_densities::{Reduction, ellipse};
-use fewbits_monte_carlo::Moments;
 
 parameters! {
     pub struct Parameters {
@@ -142,7 +141,7 @@ impl Figure for Fig5 {
                 let outline = points(rows.ellipses.iter().filter(|r| r.t == *t && r.component == k), |r| (r.x, r.y));
                 Layer::line("", outline).coloured(1)
             });
-            Panel::new(format!("time {t}"), Axis::linear("x / r0"), Axis::linear("y / r0"))
+            Panel::linear(format!("time {t}"), "x / r0", "y / r0")
                 .with(Layer::points("particles", cloud).coloured(0))
                 .with_all(outlines)
                 .without_legend()

@@ -4,7 +4,6 @@ use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, paper_cut,
 use super::world::Walk;
 use crate::prelude::*;
 use fewbits_handoff::{Accounting, Amplification, StepError};
-use fewbits_monte_carlo::{Moments, Trial};
 use std::f64::consts::LN_10;
 
 parameters! {

@@ -8,7 +8,6 @@ use crate::prelude::*;
 use fewbits_core::Columns;
 use fewbits_densities::{KernelEstimate, Mixture, Particles};
 use fewbits_handoff::{HandoffFilter, StepError, Whole};
-use fewbits_monte_carlo::{Moments, Stream, Trial};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
@@ -301,7 +300,7 @@ impl Figure for Fig6c {
             Layer::line("", of.map(|r| (r.t as f64, r.kl_increase.value)).collect()).coloured(i)
         });
         let sums = points(&rows.bounds, |b| (b.t as f64, b.kl_sum.value));
-        let panel = Panel::new("Five components", Axis::linear("hand-overs t"), Axis::linear("KL increase / nat"))
+        let panel = Panel::linear("Five components", "hand-overs t", "KL increase / nat")
             .with_all(lines)
             .with_all(layers)
             .with(Layer::dashed("KL bound, not amplified", sums).coloured(6));

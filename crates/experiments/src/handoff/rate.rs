@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_core::Message;
 use fewbits_densities::wire::{CodedMixture, WireFormat};
 use fewbits_densities::{Bandwidth, Criterion, KernelEstimate, Mixture, Reduction};
-use fewbits_monte_carlo::Moments;
 use nalgebra::Vector2;
 
 parameters! {
@@ -72,7 +71,7 @@ impl Figure for Rate {
             let bits = message.to_bits(format)?.bits();
             Ok([bits as f64, truth.kl(message.mixture())])
         };
-        let one = |it: fewbits_monte_carlo::Trial| -> Result<Vec<[f64; 2]>, Error> {
+        let one = |it: Trial| -> Result<Vec<[f64; 2]>, Error> {
             let mut sums: Vec<[f64; 2]> = Vec::new();
             let estimates = posteriors(it.stream, &[2, 5, 8])?;
             for estimate in &estimates {
@@ -163,7 +162,7 @@ impl Figure for Rate {
             .iter()
             .enumerate()
             .map(|(i, m)| Layer::line(format!("coded, {m} components"), of("coded", *m)).coloured(i));
-        let panel = Panel::new("One belief", Axis::log("message / bit"), Axis::log("KL / nat"))
+        let panel = Panel::loglog("One belief", "message / bit", "KL / nat")
             .with_all(layers)
             .with(Layer::dashed("mixture as floats", all("f32")).coloured(5))
             .with(Layer::points("particles as floats", all("particles")).coloured(6));

@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_densities::merge::{MergeCost, merge};
 use fewbits_densities::tree::{At, Axis as SplitAxis};
 use fewbits_densities::{Criterion, KernelEstimate, Mixture, Reduction, Split};
-use fewbits_monte_carlo::Moments;
 use std::time::Instant;
 
 parameters! {
@@ -143,7 +142,7 @@ impl Figure for Reductions {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let methods = methods();
-        let one = |it: fewbits_monte_carlo::Trial| -> Result<Vec<(f64, f64)>, Error> {
+        let one = |it: Trial| -> Result<Vec<(f64, f64)>, Error> {
             let mut all = vec![(0.0, 0.0); methods.len() * p.components.len()];
             let estimates = posteriors(it.stream, &[2, 5, 8])?;
             for estimate in &estimates {
@@ -210,8 +209,7 @@ impl Figure for Reductions {
             let of = rows.errors.iter().filter(|r| r.method == method);
             Layer::measured(super::title(method), of, |r| (r.components as f64, r.kl)).coloured(i)
         });
-        let panel =
-            Panel::new("KL of the reduced mixture", Axis::log("components M"), Axis::log("KL / nat")).with_all(layers);
+        let panel = Panel::loglog("KL of the reduced mixture", "components M", "KL / nat").with_all(layers);
         Plot::of(panel)
     }
 }

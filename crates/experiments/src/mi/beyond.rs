@@ -490,10 +490,7 @@ impl Figure for Beyond {
                 .iter()
                 .fold(s.case.to_owned(), |text, (code, word)| text.replace(code, word))
         };
-        let names = of("any").enumerate().map(|(i, s)| (-(i as f64), title(s)));
-        let y = Axis::linear("")
-            .named(names)
-            .between(0.6 - of("any").count() as f64, 0.6);
+        let y = Axis::ladder(of("any").map(title));
         let place = |value: fn(&Search) -> Option<f64>, cells| {
             of(cells)
                 .enumerate()

@@ -315,9 +315,7 @@ impl<S: Setting> Figure for Iterations<S> {
                     Layer::points(label, curve).coloured(i),
                 ]
             });
-            Panel::new(title, Axis::linear("iteration"), Axis::linear(axis))
-                .with_all(curves)
-                .with(divider)
+            Panel::linear(title, "iteration", axis).with_all(curves).with(divider)
         };
         let label = |crossover: f64, name: &str| {
             if several {

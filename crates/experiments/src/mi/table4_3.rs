@@ -224,10 +224,10 @@ impl Figure for Table43 {
         let marks = |value: fn(&Design) -> Option<f64>| {
             points(&rows.designs, |d| (d.t.unwrap_or(f64::NAN), d.t.and_then(|_| value(d))))
         };
-        let error = Panel::new(
+        let error = Panel::linear(
             "One quantizer for all sensors",
-            Axis::linear("outer breakpoint t / prior deviations"),
-            Axis::linear("mean squared error / prior variances"),
+            "outer breakpoint t / prior deviations",
+            "mean squared error / prior variances",
         )
         .with(Layer::line("identical quantizers", points(&rows.curve, |p| (p.t, p.mse))))
         .with(Layer::points("designs", marks(|d| Some(d.mse))))
@@ -235,10 +235,10 @@ impl Figure for Table43 {
         .with(Layer::dashed("bound for any codes", flat("ceo")))
         .with(Layer::dashed("unquantized", flat("unquantized")));
         let chain = points(rows.chain.iter().filter(|s| s.criterion == "mi"), |s| (s.stage as f64, s.t));
-        let stages = Panel::new(
+        let stages = Panel::linear(
             "Greedy chain for information",
-            Axis::linear("sensor, in order of design"),
-            Axis::linear("outer breakpoint t / prior deviations"),
+            "sensor, in order of design",
+            "outer breakpoint t / prior deviations",
         )
         .with(Layer::line("", chain.clone()).coloured(0))
         .with(Layer::points("", chain).coloured(0))

@@ -247,10 +247,10 @@ impl Figure for Table44 {
                 ("j-divergence", "J-divergence"),
                 ("pe", "least error"),
             ];
-            Panel::new(
+            Panel::semilog(
                 format!("Signal of {signal} noise deviations"),
-                Axis::linear("offset t / noise deviations"),
-                Axis::log("error probability"),
+                "offset t / noise deviations",
+                "error probability",
             )
             .with(Layer::line("identical quantizers", curve).coloured(6))
             .with_all(

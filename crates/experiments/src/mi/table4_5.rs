@@ -137,7 +137,7 @@ impl Figure for Table45 {
                 ]
             });
             let print = select(&rows, |r| r.labelling == "natural" && r.design == "printed");
-            Panel::new(title, Axis::linear("crossover probability"), Axis::linear(axis))
+            Panel::linear(title, "crossover probability", axis)
                 .with_all(lines)
                 .with(Layer::points("printed", points(print, |r| (r.crossover, printed(r)))).styled(6, Marker::Cross))
         };

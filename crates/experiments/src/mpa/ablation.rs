@@ -19,12 +19,7 @@ parameters! {
     }
 }
 
-rows! {
-    pub struct Rows {
-        /// Variants.
-        variants: Vec<Row>,
-    }
-}
+rows! {}
 
 pub struct Ablation;
 
@@ -98,7 +93,7 @@ fn variants(n: usize) -> Result<Vec<(&'static str, MessagePassing, IntervalRule)
 
 impl Figure for Ablation {
     type Parameters = Parameters;
-    type Tables = Rows;
+    type Tables = Vec<Row>;
 
     const ABOUT: About = About {
         id: "mpa-ablation",
@@ -108,7 +103,7 @@ impl Figure for Ablation {
         source: "",
     };
 
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
         for snr in [50.0, 30.0] {
             for (name, messages, interval) in variants(p.particles)? {
@@ -129,13 +124,13 @@ impl Figure for Ablation {
                 });
             }
         }
-        Ok(Rows { variants: rows })
+        Ok(rows)
     }
 
-    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+    fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let paper = claims.at_defaults().at_full_trials();
-        agree(claims, &t.variants, "", true);
-        let ratio = |name: &str| Some(mse(&t.variants, "50dB", name)? / mse(&t.variants, "50dB", "improved")?);
+        agree(claims, t, "", true);
+        let ratio = |name: &str| Some(mse(t, "50dB", name)? / mse(t, "50dB", "improved")?);
         paper.above("transfer", "E7: transferring velocities costs half as much again", ratio("transfer"), 1.25);
         paper.above("full-ring", "a full ring loses what its kernel cannot hold", ratio("full ring"), 4.0);
         paper.above("interval", "E1: the printed interval costs a factor", ratio("printed interval"), 1.8);
@@ -143,8 +138,8 @@ impl Figure for Ablation {
         paper.near("radius", "E3: the missing radius costs little here", ratio("uniform ring"), 1.04, 0.12);
     }
 
-    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
-        let panel = |snr: f64| ladder(&format!("{snr} dB"), t.variants.iter().filter(|r| r.snr_db == snr));
+    fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
+        let panel = |snr: f64| ladder(&format!("{snr} dB"), t.iter().filter(|r| r.snr_db == snr));
         Plot::grid(2, vec![panel(50.0), panel(30.0)])
     }
 }

@@ -3,7 +3,6 @@
 use crate::prelude::*;
 use fewbits_core::Gaussian;
 use fewbits_filters::Resampling;
-use fewbits_monte_carlo::{Moments, Stream, Trial};
 use fewbits_numerics::kernels::log_sum_exp;
 use fewbits_numerics::normal;
 use fewbits_pf_mpa::association::{Hypotheses, PRINTED_GAIN, PairTracker, Rule, separation, sigmoid, tanh_rule};
@@ -181,7 +180,7 @@ parameters! {
 }
 
 rows! {
-    struct Step {
+    pub struct Step {
         /// Variance of the measurements.
         variance: f64,
         /// Rule.
@@ -203,16 +202,11 @@ rows! {
         /// Probability that the first measurement is of the first target.
         p0: f64,
     }
-
-    pub struct Steps {
-        /// Tracks.
-        tracks: Vec<Step>,
-    }
 }
 
 impl Figure for Fig37 {
     type Parameters = Parameters;
-    type Tables = Steps;
+    type Tables = Vec<Step>;
 
     const ABOUT: About = About {
         id: "mpa-fig3-7",
@@ -222,7 +216,7 @@ impl Figure for Fig37 {
         source: "particle message passing, Figure 3.7",
     };
 
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Steps, Error> {
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Step>, Error> {
         let mut tracks = Vec::new();
         for variance in &p.variance {
             let stream = context.stream("mpa-fig3-7");
@@ -245,24 +239,24 @@ impl Figure for Fig37 {
                 }
             }
         }
-        Ok(Steps { tracks })
+        Ok(tracks)
     }
 
-    fn claims(&self, _: &Parameters, t: &Steps, claims: &mut Claims) {
+    fn claims(&self, _: &Parameters, t: &Vec<Step>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        claims.all("probabilities", "rules give probabilities", &t.tracks, |r| (0.0..=1.0).contains(&r.p0));
+        claims.all("probabilities", "rules give probabilities", t, |r| (0.0..=1.0).contains(&r.p0));
         let near = |r: &Step| {
             let to = |x: f64| (x - r.t1).abs().min((x - r.t2).abs());
             to(r.estimate1).max(to(r.estimate2)) < 8.0 * r.variance.sqrt()
         };
-        here.all("follow", "every estimate follows one of the targets", &t.tracks, near);
+        here.all("follow", "every estimate follows one of the targets", t, near);
     }
 
-    fn plot(&self, p: &Parameters, t: &Steps) -> Plot {
+    fn plot(&self, p: &Parameters, t: &Vec<Step>) -> Plot {
         let panel = |variance: &f64| {
-            let of = |rule: &'static str| select(&t.tracks, move |r| r.variance == *variance && r.rule == rule);
+            let of = |rule: &'static str| select(t, move |r| r.variance == *variance && r.rule == rule);
             let k = |r: &Step| r.k as f64;
-            Panel::new(format!("R = {variance}"), Axis::linear("step"), Axis::linear("position"))
+            Panel::linear(format!("R = {variance}"), "step", "position")
                 .with(Layer::line("target 1", points(of("jpda"), |r| (k(r), r.t1))).coloured(0))
                 .with(Layer::line("target 2", points(of("jpda"), |r| (k(r), r.t2))).coloured(1))
                 .with(Layer::points("printed, 1", points(of("tanh"), |r| (k(r), r.estimate1))).coloured(2))
@@ -286,7 +280,7 @@ parameters! {
 }
 
 rows! {
-    struct Row {
+    pub struct Row {
         /// Variance of the measurements.
         variance: f64,
         /// Distance of the targets at the start.
@@ -300,16 +294,11 @@ rows! {
         /// Mean distance of the probability from what was.
         association: Measured,
     }
-
-    pub struct Rows {
-        /// Rules.
-        rules: Vec<Row>,
-    }
 }
 
 impl Figure for Table {
     type Parameters = Effort;
-    type Tables = Rows;
+    type Tables = Vec<Row>;
 
     const ABOUT: About = About {
         id: "mpa-table3-da",
@@ -319,7 +308,7 @@ impl Figure for Table {
         source: "particle message passing, Section 3.5",
     };
 
-    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Rows, Error> {
+    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rules = Vec::new();
         for variance in [1e-4, 4e-4] {
             for apart in [0.1, 0.3] {
@@ -357,24 +346,24 @@ impl Figure for Table {
                 }
             }
         }
-        Ok(Rows { rules })
+        Ok(rules)
     }
 
-    fn claims(&self, _: &Effort, t: &Rows, claims: &mut Claims) {
+    fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         let key = |r: &Row| format!("R{}-sep{}-{}", r.variance, r.apart, r.method);
-        full.references("labelled", "labelled error", &t.rules, |r| (key(r), r.labelled));
+        full.references("labelled", "labelled error", t, |r| (key(r), r.labelled));
         type Of = fn(&Row) -> Measured;
         let two: [(&str, &str, Of); 2] = [
             ("unlabelled", "unlabelled error", |r| r.unlabelled),
             ("association", "error of association", |r| r.association),
         ];
         for (id, what, value) in two {
-            full.references(id, what, &t.rules, |r| (key(r), value(r)));
-            full.references_at_most(&format!("{id}-most"), what, &t.rules, |r| (key(r), value(r)));
+            full.references(id, what, t, |r| (key(r), value(r)));
+            full.references_at_most(&format!("{id}-most"), what, t, |r| (key(r), value(r)));
         }
         for (variance, blur) in [(1e-4, 3.0), (4e-4, 2.0)] {
-            let of = |method: &str| first(&t.rules, |r| r.variance == variance && r.apart == 0.1 && r.method == method);
+            let of = |method: &str| first(t, |r| r.variance == variance && r.apart == 0.1 && r.method == method);
             let errors = ["jpda", "tanh", "pf-tanh"].map(|m| of(m).map(|r| r.association.value));
             let what = "C10: exact < printed rule < printed rule over particles";
             full.increasing(format!("order-{variance}"), what, errors);
@@ -384,24 +373,19 @@ impl Figure for Table {
             let what = "C10: over particles the printed rule blurs the targets";
             full.above(format!("particles-{variance}"), what, ratio, blur);
         }
-        let genie =
-            |r: &Row| first(&t.rules, |g| g.variance == r.variance && g.apart == r.apart && g.method == "genie");
-        let known = t.rules.iter().filter(|r| r.method != "genie");
+        let genie = |r: &Row| first(t, |g| g.variance == r.variance && g.apart == r.apart && g.method == "genie");
+        let known = t.iter().filter(|r| r.method != "genie");
         full.all("genie", "C10: no rule is below the genie", known, |r| {
             genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
         });
     }
 
-    fn plot(&self, _: &Effort, t: &Rows) -> Plot {
+    fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
         let panel = |variance: f64| {
-            let here: Vec<&Row> = t
-                .rules
-                .iter()
-                .filter(|r| r.variance == variance && r.apart == 0.1)
-                .collect();
-            let names = here.iter().enumerate().map(|(i, r)| (i as f64, r.method.to_owned()));
+            let here: Vec<&Row> = t.iter().filter(|r| r.variance == variance && r.apart == 0.1).collect();
+            let names = here.iter().map(|r| r.method.to_owned());
             let numbered: Vec<(usize, &Row)> = here.iter().copied().enumerate().collect();
-            Panel::new(format!("R = {variance}"), Axis::linear("").named(names), Axis::log("mean squared error"))
+            Panel::new(format!("R = {variance}"), Axis::categories("", names), Axis::log("mean squared error"))
                 .with(Layer::measured("labelled", numbered.clone(), |(i, r)| (i as f64, r.labelled)))
                 .with(Layer::measured("unlabelled", numbered, |(i, r)| (i as f64, r.unlabelled)))
         };

@@ -4,7 +4,6 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, Score, World, prior};
 use crate::prelude::*;
 use fewbits_core::Gaussian;
-use fewbits_monte_carlo::{Moments, Trial};
 use fewbits_pf_mpa::{CramerRao, Target, position_information};
 use nalgebra::{Matrix4, Vector2};
 
@@ -17,7 +16,7 @@ parameters! {
 }
 
 rows! {
-    struct Row {
+    pub struct Row {
         /// Ratio of the powers of range and noise.
         snr_db: f64 ["dB"],
         /// Levels of the quantizer.
@@ -39,11 +38,6 @@ rows! {
         /// Median.
         unquantized_filter_median: f64,
     }
-
-    pub struct Rows {
-        /// Bounds and errors.
-        bounds: Vec<Row>,
-    }
 }
 
 pub struct Bounds;
@@ -58,7 +52,7 @@ type Sums = Vec<[Matrix4<f64>; 2]>;
 
 impl Figure for Bounds {
     type Parameters = Parameters;
-    type Tables = Rows;
+    type Tables = Vec<Row>;
 
     const ABOUT: About = About {
         id: "mpa-crlb",
@@ -68,7 +62,7 @@ impl Figure for Bounds {
         source: "",
     };
 
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let target = Target::printed()?;
         let mut bounds = Vec::new();
         for snr_db in SNRS {
@@ -135,35 +129,33 @@ impl Figure for Bounds {
                 });
             }
         }
-        Ok(Rows { bounds })
+        Ok(bounds)
     }
 
-    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+    fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         let key = |r: &Row| format!("{}dB-L{}", r.snr_db, r.levels);
-        full.references("quantized", "bound for levels", &t.bounds, |r| (key(r), r.quantized));
-        full.references("unquantized", "bound for ranges", &t.bounds, |r| (key(r), r.unquantized));
-        full.references("grid-median", "median of the grid", &t.bounds, |r| (key(r), r.grid_median));
-        claims.all("floor", "C7: no tracker of levels is below its bound", &t.bounds, |r| {
+        full.references("quantized", "bound for levels", t, |r| (key(r), r.quantized));
+        full.references("unquantized", "bound for ranges", t, |r| (key(r), r.unquantized));
+        full.references("grid-median", "median of the grid", t, |r| (key(r), r.grid_median));
+        claims.all("floor", "C7: no tracker of levels is below its bound", t, |r| {
             let above = |m: Measured| m.value > r.quantized.value - 3.0 * m.standard_error.unwrap_or(0.0);
             above(r.grid) && above(r.message_passing)
         });
-        claims.all("order", "levels never tell more than ranges", &t.bounds, |r| {
-            r.quantized.value > r.unquantized.value
-        });
+        claims.all("order", "levels never tell more than ranges", t, |r| r.quantized.value > r.unquantized.value);
         for snr in SNRS {
-            let of = t.bounds.iter().filter(|r| r.snr_db == snr).map(|r| r.quantized.value);
+            let of = t.iter().filter(|r| r.snr_db == snr).map(|r| r.quantized.value);
             full.decreasing(format!("levels-{snr}"), "C7: fewer levels, larger bound", of);
         }
-        let loose = t.bounds.iter().find(|r| r.snr_db == 50.0 && r.levels == 4);
+        let loose = t.iter().find(|r| r.snr_db == 50.0 && r.levels == 4);
         full.above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized.value), 5.0);
     }
 
-    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
+    fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
         let panel = |levels: usize| {
-            let here: Vec<&Row> = t.bounds.iter().filter(|r| r.levels == levels).collect();
+            let here: Vec<&Row> = t.iter().filter(|r| r.levels == levels).collect();
             let snr = |r: &&Row| r.snr_db;
-            Panel::new(format!("{levels} levels"), Axis::linear("SNR / dB"), Axis::log("mean squared error"))
+            Panel::semilog(format!("{levels} levels"), "SNR / dB", "mean squared error")
                 .with(Layer::line("bound", points(&here, |r| (snr(r), r.quantized.value))).coloured(0))
                 .with(Layer::points("grid, median", points(&here, |r| (snr(r), r.grid_median))).coloured(1))
                 .with(Layer::measured("grid, mean", &here, |r| (snr(r), r.grid)).coloured(2))

@@ -120,7 +120,7 @@ impl Figure for Encoders {
             });
             let reference = t.encoders.iter().find(|r| r.snr_db == snr && r.method == "EKF-U");
             let level = reference.map_or(Vec::new(), |r| vec![(1.0, r.score.mse.value), (4.0, r.score.mse.value)]);
-            Panel::new(format!("{snr} dB"), Axis::linear("bits"), Axis::log("mean squared error"))
+            Panel::semilog(format!("{snr} dB"), "bits", "mean squared error")
                 .with_all(lines)
                 .with(Layer::dashed("unquantized EKF", level))
         };

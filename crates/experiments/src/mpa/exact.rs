@@ -3,7 +3,6 @@
 use crate::prelude::*;
 use fewbits_core::NumberFormat;
 use fewbits_densities::{Component, Mixture, product};
-use fewbits_monte_carlo::Moments;
 use fewbits_pf_mpa::graph::{self, FactorGraph};
 use fewbits_pf_mpa::leader::StepBits;
 use fewbits_pf_mpa::{LabelChain, RingBias, kernel_error, ratio_second_moments};
@@ -191,15 +190,15 @@ impl Figure for Gibbs {
 
     fn plot(&self, _: &Draws, t: &GibbsRows) -> Plot {
         let of = |case: &'static str| select(&t.mixing, move |r| r.case == case && r.total_variation > 1e-12);
-        let panel = Panel::new("Labels", Axis::linear("sweeps"), Axis::log("total variation"))
+        let panel = Panel::semilog("Labels", "sweeps", "total variation")
             .with_all(["A", "C"].map(|c| Layer::line(c, points(of(c), |r| (r.sweeps as f64, r.total_variation)))));
         let bias = |case: &'static str| {
             points(t.mixing.iter().filter(move |r| r.case == case && r.bias != 0.0), |r| {
                 (r.sweeps as f64, r.bias.abs())
             })
         };
-        let second = Panel::new("Mean of a draw", Axis::linear("sweeps"), Axis::log("bias"))
-            .with_all(["A", "C"].map(|c| Layer::line(c, bias(c))));
+        let second =
+            Panel::semilog("Mean of a draw", "sweeps", "bias").with_all(["A", "C"].map(|c| Layer::line(c, bias(c))));
         Plot::grid(2, vec![panel, second])
     }
 }
@@ -342,19 +341,15 @@ impl Figure for Rings {
     fn plot(&self, _: &None, t: &RingRows) -> Plot {
         let swept = || t.rings.iter().filter(|r| r.deviation == 0.01);
         let middle = |r: &Ring| 0.5 * (r.lower + r.upper);
-        let first = Panel::new(
-            "Cell of width 1.5",
-            Axis::linear("middle of the cell"),
-            Axis::linear("mean radius minus middle"),
-        )
-        .with(Layer::line("message", points(swept(), |r| (middle(r), r.exact - middle(r)))))
-        .with(Layer::line("printed ring", points(swept(), |r| (middle(r), r.printed - middle(r)))));
+        let first = Panel::linear("Cell of width 1.5", "middle of the cell", "mean radius minus middle")
+            .with(Layer::line("message", points(swept(), |r| (middle(r), r.exact - middle(r)))))
+            .with(Layer::line("printed ring", points(swept(), |r| (middle(r), r.printed - middle(r)))));
         let plane = || {
             let mut all: Vec<&Kernel> = t.kernels.iter().filter(|k| k.dimension == 2).collect();
             all.sort_by_key(|k| k.n);
             all
         };
-        let second = Panel::new("Kernels, two dimensions", Axis::log("points"), Axis::log("integrated squared error"))
+        let second = Panel::loglog("Kernels, two dimensions", "points", "integrated squared error")
             .with(Layer::line("Silverman", points(plane(), |r| (f64::from(r.n), r.silverman_error))))
             .with(Layer::line("printed", points(plane(), |r| (f64::from(r.n), r.printed_error))));
         Plot::grid(2, vec![first, second])
@@ -364,7 +359,7 @@ impl Figure for Rings {
 pub struct Bits;
 
 rows! {
-    struct BitRow {
+    pub struct BitRow {
         /// Sensors.
         sensors: usize,
         /// Levels.
@@ -378,16 +373,11 @@ rows! {
         /// The ranges themselves, 32 bits each.
         raw: u64 ["bit"],
     }
-
-    pub struct BitRows {
-        /// Bits of a step.
-        bits: Vec<BitRow>,
-    }
 }
 
 impl Figure for Bits {
     type Parameters = None;
-    type Tables = BitRows;
+    type Tables = Vec<BitRow>;
 
     const ABOUT: About = About {
         id: "mpa-bits",
@@ -397,7 +387,7 @@ impl Figure for Bits {
         source: "particle message passing, Section 3.3",
     };
 
-    fn run(&self, _: &None, _: &Context<'_>) -> Result<BitRows, Error> {
+    fn run(&self, _: &None, _: &Context<'_>) -> Result<Vec<BitRow>, Error> {
         let mut bits = Vec::new();
         for sensors in [3, 5, 10, 20] {
             for levels in [2, 4, 16, 256] {
@@ -412,25 +402,25 @@ impl Figure for Bits {
                 });
             }
         }
-        Ok(BitRows { bits })
+        Ok(bits)
     }
 
-    fn claims(&self, _: &None, t: &BitRows, claims: &mut Claims) {
+    fn claims(&self, _: &None, t: &Vec<BitRow>, claims: &mut Claims) {
         let key = |r: &BitRow| format!("S{}-L{}", r.sensors, r.levels);
-        claims.references("reports", "bits of the levels", &t.bits, |r| (key(r), r.reports as f64));
-        claims.references("handover", "bits of a hand-over", &t.bits, |r| (key(r), r.handover as f64));
-        claims.references("raw", "bits of plain ranges", &t.bits, |r| (key(r), r.raw as f64));
-        let five = t.bits.iter().filter(|r| r.sensors == 5);
+        claims.references("reports", "bits of the levels", t, |r| (key(r), r.reports as f64));
+        claims.references("handover", "bits of a hand-over", t, |r| (key(r), r.handover as f64));
+        claims.references("raw", "bits of plain ranges", t, |r| (key(r), r.raw as f64));
+        let five = t.iter().filter(|r| r.sensors == 5);
         claims.all("dear", "with five sensors the published protocol costs more than plain ranges", five, |r| {
             r.published > r.raw
         });
     }
 
-    fn plot(&self, _: &None, t: &BitRows) -> Plot {
-        let of = |levels: usize| t.bits.iter().filter(move |r| r.levels == levels);
+    fn plot(&self, _: &None, t: &Vec<BitRow>) -> Plot {
+        let of = |levels: usize| t.iter().filter(move |r| r.levels == levels);
         let sensors = |r: &BitRow| r.sensors as f64;
         Plot::of(
-            Panel::new("Bits of a step", Axis::log("sensors"), Axis::log("bits"))
+            Panel::loglog("Bits of a step", "sensors", "bits")
                 .with(Layer::line("levels alone, L = 4", points(of(4), |r| (sensors(r), r.reports as f64))))
                 .with(Layer::line("with hand-over, L = 4", points(of(4), |r| (sensors(r), r.published as f64))))
                 .with(Layer::line("with hand-over, L = 256", points(of(256), |r| (sensors(r), r.published as f64))))

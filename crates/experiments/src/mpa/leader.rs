@@ -4,7 +4,6 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
 use fewbits_core::{Gaussian, NumberFormat};
-use fewbits_monte_carlo::{Moments, Trial};
 use fewbits_pf_mpa::leader::{Handover, elect, nearest};
 use fewbits_pf_mpa::{MessagePassing, Reports, Target, Tracker};
 use nalgebra::Vector2;
@@ -18,7 +17,7 @@ parameters! {
 }
 
 rows! {
-    struct Row {
+    pub struct Row {
         /// Ratio of the powers of range and noise.
         snr_db: f64 ["dB"],
         /// Particles.
@@ -36,11 +35,6 @@ rows! {
         /// Variance of the sensors' estimates about their mean, both axes.
         spread: Measured,
     }
-
-    pub struct Rows {
-        /// Elections.
-        elections: Vec<Row>,
-    }
 }
 
 pub struct Leaders;
@@ -49,7 +43,7 @@ const SETTINGS: [(f64, usize); 3] = [(50.0, 40), (50.0, 10), (30.0, 40)];
 
 impl Figure for Leaders {
     type Parameters = Parameters;
-    type Tables = Rows;
+    type Tables = Vec<Row>;
 
     const ABOUT: About = About {
         id: "mpa-leader",
@@ -60,7 +54,7 @@ impl Figure for Leaders {
         source: "particle message passing, Section 3.3",
     };
 
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (target, sensors) = (Target::printed()?, canonical());
         let row = |(snr_db, particles): (f64, usize)| -> Result<Row, Error> {
             let network = Point::published(snr_db, 4, SPEED)?.network()?;
@@ -113,12 +107,10 @@ impl Figure for Leaders {
                 spread,
             })
         };
-        Ok(Rows {
-            elections: SETTINGS.into_iter().map(row).collect::<Result<_, _>>()?,
-        })
+        SETTINGS.into_iter().map(row).collect()
     }
 
-    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+    fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         let key = |r: &Row| format!("{}dB-N{}", r.snr_db, r.particles);
         type Field = fn(&Row) -> Measured;
@@ -130,38 +122,28 @@ impl Figure for Leaders {
             ("spread", "variance between the copies", |r| r.spread),
         ];
         for (quantity, statement, field) in fields {
-            full.references(quantity, statement, &t.elections, |r| (key(r), field(r)));
+            full.references(quantity, statement, t, |r| (key(r), field(r)));
         }
-        claims.all("sum", "every step has one, none or several", &t.elections, |r| {
+        claims.all("sum", "every step has one, none or several", t, |r| {
             (r.one.value + r.none.value + r.several.value - 1.0).abs() < 1e-9
         });
     }
 
-    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
-        let names = t
-            .elections
-            .iter()
-            .enumerate()
-            .map(|(i, r)| (i as f64, format!("{} dB, N = {}", r.snr_db, r.particles)));
-        let rows: Vec<(usize, &Row)> = t.elections.iter().enumerate().collect();
+    fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
+        let names = t.iter().map(|r| format!("{} dB, N = {}", r.snr_db, r.particles));
+        let rows: Vec<(usize, &Row)> = t.iter().enumerate().collect();
         let others = points(&rows, |(i, r)| (*i as f64, r.none.value + r.several.value));
         Plot::of(
-            Panel::new(
-                "Elections",
-                Axis::linear("")
-                    .named(names)
-                    .between(-0.5, t.elections.len() as f64 - 0.5),
-                Axis::linear("share of steps"),
-            )
-            .with(Layer::measured("none claims", rows.clone(), |(i, r)| (i as f64, r.none)))
-            .with(Layer::points("none or several claim", others))
-            .with(Layer::measured("another than the nearest leads", rows, |(i, r)| {
-                let share = Measured {
-                    value: 1.0 - r.nearest.value,
-                    ..r.nearest
-                };
-                (i as f64, share)
-            })),
+            Panel::new("Elections", Axis::categories("", names), Axis::linear("share of steps"))
+                .with(Layer::measured("none claims", rows.clone(), |(i, r)| (i as f64, r.none)))
+                .with(Layer::points("none or several claim", others))
+                .with(Layer::measured("another than the nearest leads", rows, |(i, r)| {
+                    let share = Measured {
+                        value: 1.0 - r.nearest.value,
+                        ..r.nearest
+                    };
+                    (i as f64, share)
+                })),
         )
     }
 }

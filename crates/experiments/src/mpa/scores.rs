@@ -33,7 +33,7 @@ impl Effort {
 rows! {
     /// One tracker at one point.
     #[derive(Debug, Clone)]
-    pub(super) struct Row {
+    pub struct Row {
         /// Which setting.
         pub(super) point: String,
         /// Ratio of the powers of range and noise.
@@ -114,8 +114,7 @@ pub(super) fn mse(rows: &[Row], point: &str, method: &str) -> Option<f64> {
 pub(super) fn ladder<'a>(title: &str, rows: impl IntoIterator<Item = &'a Row>) -> Panel {
     let rows: Vec<&Row> = rows.into_iter().collect();
     let numbered = || rows.iter().enumerate().map(|(i, r)| (-(i as f64), *r));
-    let names = numbered().map(|(at, r)| (at, r.method.clone()));
-    let y = Axis::linear("").named(names).between(0.6 - rows.len() as f64, 0.6);
+    let y = Axis::ladder(rows.iter().map(|r| r.method.as_str()));
     Panel::new(title, Axis::log("mean squared error"), y)
         .with(Layer::points("mean", points(numbered(), |(at, r)| (r.score.mse.value, at))))
         .with(Layer::points("median", points(numbered(), |(at, r)| (r.score.median.value, at))))

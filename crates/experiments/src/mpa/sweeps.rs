@@ -145,12 +145,7 @@ impl Figure for Mse {
     }
 }
 
-rows! {
-    pub struct Sweep {
-        /// Trackers.
-        trackers: Vec<Row>,
-    }
-}
+rows! {}
 
 /// Lines of the families over a coordinate of the rows.
 fn families(rows: &[Row], shown: &[&str], x: impl Fn(&Row) -> f64) -> Vec<Layer> {
@@ -167,7 +162,7 @@ const SIZES: [usize; 7] = [3, 5, 10, 20, 40, 100, 500];
 
 impl Figure for Fig34 {
     type Parameters = Effort;
-    type Tables = Sweep;
+    type Tables = Vec<Row>;
 
     const ABOUT: About = About {
         id: "mpa-fig3-4",
@@ -177,7 +172,7 @@ impl Figure for Fig34 {
         source: "particle message passing, Figure 3.4",
     };
 
-    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Sweep, Error> {
+    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut methods = gaussian();
         methods.extend([9, 15, 31].map(Method::Grid));
         for n in SIZES {
@@ -189,16 +184,14 @@ impl Figure for Fig34 {
             }
         }
         let point = Point::published(40.0, 4, SPEED)?;
-        Ok(Sweep {
-            trackers: rows(context, "40dB-L4", &point, &p.of(&methods))?,
-        })
+        rows(context, "40dB-L4", &point, &p.of(&methods))
     }
 
-    fn claims(&self, _: &Effort, t: &Sweep, claims: &mut Claims) {
+    fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, &t.trackers, "", true);
-        loses_no_more(claims, &t.trackers);
-        let value = |method: String| mse(&t.trackers, "40dB-L4", &method);
+        agree(claims, t, "", true);
+        loses_no_more(claims, t);
+        let value = |method: String| mse(t, "40dB-L4", &method);
         let improved = [10, 20, 40, 100].map(|n| value(format!("improved-{n}")));
         full.decreasing("improved", "C3: improved message passing gains from particles up to 100", improved);
         full.above("few", "C3: with three particles it loses the target", value("improved-3".into()), 4.0);
@@ -210,7 +203,7 @@ impl Figure for Fig34 {
         full.above("gap", "C3: the gap to unquantized ranges never closes with four levels", gap, 10.0);
     }
 
-    fn plot(&self, _: &Effort, t: &Sweep) -> Plot {
+    fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
         let shown = [
             "guided",
             "improved",
@@ -221,12 +214,12 @@ impl Figure for Fig34 {
         ];
         let size = |r: &Row| r.size.unwrap_or(1) as f64;
         let level = |method: &str| {
-            let value = mse(&t.trackers, "40dB-L4", method);
+            let value = mse(t, "40dB-L4", method);
             value.map(|v| vec![(3.0, v), (500.0, v)]).unwrap_or_default()
         };
         Plot::of(
-            Panel::new("40 dB, four levels", Axis::log("particles"), Axis::log("mean squared error"))
-                .with_all(families(&t.trackers, &shown, size))
+            Panel::loglog("40 dB, four levels", "particles", "mean squared error")
+                .with_all(families(t, &shown, size))
                 .with(Layer::dashed("grid of 15", level("grid-15")))
                 .with(Layer::dashed("unquantized EKF", level("EKF-U"))),
         )
@@ -250,7 +243,7 @@ parameters! {
 
 impl Figure for Fig35 {
     type Parameters = LevelEffort;
-    type Tables = Sweep;
+    type Tables = Vec<Row>;
 
     const ABOUT: About = About {
         id: "mpa-fig3-5",
@@ -260,7 +253,7 @@ impl Figure for Fig35 {
         source: "particle message passing, Figure 3.5",
     };
 
-    fn run(&self, p: &LevelEffort, context: &Context<'_>) -> Result<Sweep, Error> {
+    fn run(&self, p: &LevelEffort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut methods = gaussian();
         methods.extend([9, 15, 31].map(Method::Grid));
         methods.push(Method::Guided(40));
@@ -274,20 +267,20 @@ impl Figure for Fig35 {
             let point = Point::published(50.0, levels, SPEED)?;
             trackers.extend(rows(context, &format!("50dB-L{levels}"), &point, &effort.of(&methods))?);
         }
-        Ok(Sweep { trackers })
+        Ok(trackers)
     }
 
-    fn claims(&self, _: &LevelEffort, t: &Sweep, claims: &mut Claims) {
+    fn claims(&self, _: &LevelEffort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, &t.trackers, "", true);
+        agree(claims, t, "", true);
         for (method, what) in [
             ("improved-40", "improved message passing"),
             ("GMPA", "Gaussian message passing"),
         ] {
-            let values = LEVELS.map(|l| mse(&t.trackers, &format!("50dB-L{l}"), method));
+            let values = LEVELS.map(|l| mse(t, &format!("50dB-L{l}"), method));
             full.decreasing(format!("levels-{method}"), format!("C4: more levels, less error: {what}"), values);
         }
-        let of = |levels: usize, method: &str| find(&t.trackers, &format!("50dB-L{levels}"), method);
+        let of = |levels: usize, method: &str| find(t, &format!("50dB-L{levels}"), method);
         let slope = |method: &str| {
             let ratio = of(4, method)?.score.mse.value / of(64, method)?.score.mse.value;
             Some(ratio.powf(0.25))
@@ -302,14 +295,14 @@ impl Figure for Fig35 {
         full.increasing("eight-bits", what, [median(256, "EKF-U"), median(256, "improved-40")]);
     }
 
-    fn plot(&self, _: &LevelEffort, t: &Sweep) -> Plot {
+    fn plot(&self, _: &LevelEffort, t: &Vec<Row>) -> Plot {
         let shown = ["EKF-Q", "GMPA", "GMPA-transfer", "improved", "guided"];
         let bits = |r: &Row| (r.levels as f64).log2();
-        let grid: Vec<&Row> = t.trackers.iter().filter(|r| r.method == "grid-15").collect();
-        let unquantized: Vec<&Row> = t.trackers.iter().filter(|r| r.method == "EKF-U").collect();
+        let grid: Vec<&Row> = t.iter().filter(|r| r.method == "grid-15").collect();
+        let unquantized: Vec<&Row> = t.iter().filter(|r| r.method == "EKF-U").collect();
         Plot::of(
-            Panel::new("50 dB, forty particles", Axis::linear("bits"), Axis::log("mean squared error"))
-                .with_all(families(&t.trackers, &shown, bits))
+            Panel::semilog("50 dB, forty particles", "bits", "mean squared error")
+                .with_all(families(t, &shown, bits))
                 .with(Layer::measured("grid of 15", grid, |r| (bits(r), r.score.mse)))
                 .with(Layer::dashed("unquantized EKF", points(unquantized, |r| (bits(r), r.score.mse.value)))),
         )
@@ -320,7 +313,7 @@ pub struct Low;
 
 impl Figure for Low {
     type Parameters = Effort;
-    type Tables = Sweep;
+    type Tables = Vec<Row>;
 
     const ABOUT: About = About {
         id: "mpa-table3-low",
@@ -330,7 +323,7 @@ impl Figure for Low {
         source: "particle message passing, Section 3.4",
     };
 
-    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Sweep, Error> {
+    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut trackers = Vec::new();
         for snr in [30.0, 20.0] {
             let mut methods = gaussian();
@@ -348,14 +341,14 @@ impl Figure for Low {
                 trackers.extend(rows(context, &format!("{snr}dB-L{levels}"), &point, &p.of(&cheap))?);
             }
         }
-        Ok(Sweep { trackers })
+        Ok(trackers)
     }
 
-    fn claims(&self, _: &Effort, t: &Sweep, claims: &mut Claims) {
+    fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        agree(claims, &t.trackers, "", true);
-        loses_no_more(claims, &t.trackers);
-        let gmpa = |snr: u32, levels: usize| mse(&t.trackers, &format!("{snr}dB-L{levels}"), "GMPA");
+        agree(claims, t, "", true);
+        loses_no_more(claims, t);
+        let gmpa = |snr: u32, levels: usize| mse(t, &format!("{snr}dB-L{levels}"), "GMPA");
         full.decreasing("30dB", "C5: at 30 dB more levels help", [4, 8, 16, 64].map(|l| gmpa(30, l)));
         let saturated = [16, 64].map(|l| Some(gmpa(20, l)? / gmpa(20, 8)?));
         full.all("20dB", "C5: at 20 dB nothing is gained beyond eight levels", saturated, |r| {
@@ -363,18 +356,19 @@ impl Figure for Low {
         });
     }
 
-    fn plot(&self, _: &Effort, t: &Sweep) -> Plot {
-        let panel =
-            |snr: f64| {
-                let here: Vec<Row> = t
-                    .trackers
-                    .iter()
-                    .filter(|r| r.snr_db == snr && r.size != Some(500))
-                    .cloned()
-                    .collect();
-                Panel::new(format!("{snr} dB"), Axis::log("levels"), Axis::log("mean squared error"))
-                    .with_all(families(&here, &["EKF-U", "EKF-Q", "GMPA", "GMPA-transfer"], |r| r.levels as f64))
-            };
+    fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
+        let panel = |snr: f64| {
+            let here: Vec<Row> = t
+                .iter()
+                .filter(|r| r.snr_db == snr && r.size != Some(500))
+                .cloned()
+                .collect();
+            Panel::loglog(format!("{snr} dB"), "levels", "mean squared error").with_all(families(
+                &here,
+                &["EKF-U", "EKF-Q", "GMPA", "GMPA-transfer"],
+                |r| r.levels as f64,
+            ))
+        };
         Plot::grid(2, vec![panel(30.0), panel(20.0)])
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::prelude::*;
 use fewbits_core::{Belief, Gaussian};
-use fewbits_monte_carlo::{Moments, Stream, Trial};
 use fewbits_pf_mpa::{
     Bootstrap, DynamicsWeight, Encoder, GridFilter, GuidedGaussian, IntervalRule, KernelRule, Linearised,
     MessagePassing, Network, QuantizedRange, RangeNoise, RaoBlackwellGuided, Reports, Ring, RingWeight, StepInfo,

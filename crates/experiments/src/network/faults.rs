@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Sensing};
 use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
 use fewbits_models::{Ar1, LinearSensor};
-use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_network::estimators::Counted;
 use fewbits_network::{Channel, Fault, Loss, Mishap, Seconds, SensorId, Setup, Star};
 use nalgebra::Vector1;

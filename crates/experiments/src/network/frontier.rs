@@ -109,9 +109,7 @@ impl Figure for Frontier {
         let (scalar, plane) = (worlds::scalar()?, worlds::plane()?);
         let (of_scalar, of_plane) = (schemes::scalar_schemes(), schemes::plane_schemes());
         let one =
-            |name: &str,
-             schemes: &[Scheme],
-             run: &(dyn Fn(Scheme, fewbits_monte_carlo::Stream) -> Result<worlds::Bill, Error> + Sync)| {
+            |name: &str, schemes: &[Scheme], run: &(dyn Fn(Scheme, Stream) -> Result<worlds::Bill, Error> + Sync)| {
                 let all = context.compare(
                     "network-frontier",
                     p.trials,
@@ -194,16 +192,11 @@ impl Figure for Frontier {
             ("bits on air / (bit/slot)", |r| r.air.value, |r| r.best_by_air),
             ("radio energy / (mJ/slot)", |r| 1e3 * r.energy.value, |r| r.best_by_energy),
         ];
-        let mut families: Vec<&'static str> = Vec::new();
-        for row in rows {
-            if !families.contains(&row.scheme) {
-                families.push(row.scheme);
-            }
-        }
+        let families = distinct(rows, |r| r.scheme);
         let mut panels = Vec::new();
         for (i, (label, of, best)) in axes.iter().enumerate() {
             for world in ["scalar", "plane"] {
-                let mut panel = Panel::new(world, Axis::log(*label), Axis::log("RMSE"));
+                let mut panel = Panel::loglog(world, *label, "RMSE");
                 if i != 2 {
                     panel = panel.without_legend();
                 }

@@ -121,19 +121,14 @@ impl Figure for Lifetime {
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
-        let mut families: Vec<&'static str> = Vec::new();
-        for row in rows {
-            if !families.contains(&row.scheme) {
-                families.push(row.scheme);
-            }
-        }
+        let families = distinct(rows, |r| r.scheme);
         let mut panels = Vec::new();
         for baseline in &p.baseline {
             for period in &p.period {
                 let here = || rows.iter().filter(|r| r.baseline == *baseline && r.period == *period);
                 let title = format!("{} ms a slot, {baseline} mW", period * 1e3);
                 let last = panels.len() + 1 == p.baseline.len() * p.period.len();
-                let mut panel = Panel::new(title, Axis::linear("days"), Axis::log("RMSE"));
+                let mut panel = Panel::semilog(title, "days", "RMSE");
                 if !last {
                     panel = panel.without_legend();
                 }

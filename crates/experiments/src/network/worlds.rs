@@ -15,7 +15,6 @@ use fewbits_dymbo::{CountFusion, InnovationWord, MultibitFilter, ParallelFilter,
 use fewbits_filters::{AssumedDensity, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
-use fewbits_monte_carlo::Stream;
 use fewbits_network::estimators::{Bits, Censors, Counted, Followers, Leaders, LookUp, Patterns, Reporting, SendAll};
 use fewbits_network::{Clock, Field, Ledger, Radio, Replicable, Seconds, SensorId, Setup, Star, Walk};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};

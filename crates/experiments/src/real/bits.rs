@@ -7,30 +7,14 @@ use crate::prelude::*;
 use fewbits_adaptive::{Replay, Silence};
 use rayon::prelude::*;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-pub struct Parameters {
-    #[serde(flatten)]
-    #[garde(dive)]
-    source: Source,
-    /// Bits per sample, at most.
-    #[garde(length(min = 1, max = 20), inner(range(min = 0.02, max = 12.0)))]
-    rate: Vec<f64>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            source: Source::default(),
-            rate: vec![0.25, 0.5, 1.0, 2.0],
-        }
-    }
-}
-
-impl Quick for Parameters {
-    fn quicken(&mut self) {
-        self.source.samples = 800;
-        self.rate = vec![0.5, 2.0];
+parameters! {
+    pub struct Parameters {
+        #[serde(flatten)]
+        #[garde(dive)]
+        source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
+        /// Bits per sample, at most.
+        #[garde(length(min = 1, max = 20), inner(range(min = 0.02, max = 12.0)))]
+        rate: Vec<f64> = vec![0.25, 0.5, 1.0, 2.0] => quick vec![0.5, 2.0],
     }
 }
 
@@ -227,8 +211,7 @@ impl Figure for Bits {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let mut columns: Vec<&str> = rows.comparison.iter().map(|p| p.column.as_str()).collect();
-        columns.dedup();
+        let columns = distinct(&rows.comparison, |p| p.column.clone());
         let schemes = [
             "adaptive",
             "dpcm-0",
@@ -238,14 +221,14 @@ impl Figure for Bits {
             "jayant",
             "words",
         ];
-        let panel = |column: &&str| {
-            let pair = rows.comparison.iter().find(|p| p.column == **column);
+        let panel = |column: &String| {
+            let pair = rows.comparison.iter().find(|p| p.column == *column);
             let negligible = pair.map_or(0.0, |p| p.negligible);
             let curve = |(colour, scheme): (usize, &&'static str)| {
                 let chosen = rows
                     .schemes
                     .iter()
-                    .filter(|r| r.column == **column && r.scheme == *scheme);
+                    .filter(|r| r.column == *column && r.scheme == *scheme);
                 let curve = points(chosen, |r| (r.rate, r.rmse.max(negligible)));
                 match *scheme {
                     "adaptive" => Layer::line(*scheme, curve).coloured(colour),
@@ -253,8 +236,7 @@ impl Figure for Bits {
                     _ => Layer::points(*scheme, curve).coloured(colour),
                 }
             };
-            Panel::new(*column, Axis::log("bits per sample"), Axis::log("rms error"))
-                .with_all(schemes.iter().enumerate().map(curve))
+            Panel::loglog(column, "bits per sample", "rms error").with_all(schemes.iter().enumerate().map(curve))
         };
         Plot::grid(3, columns.iter().map(panel).collect())
     }

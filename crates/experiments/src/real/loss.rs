@@ -5,51 +5,34 @@ use super::tracking::best_for;
 use crate::prelude::*;
 use fewbits_adaptive::{Config, Receiver, Replay, Sensor};
 use fewbits_core::Link;
-use fewbits_monte_carlo::{Moments, Trial};
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-pub struct Parameters {
-    #[serde(flatten)]
-    #[garde(dive)]
-    source: Source,
-    /// Bits per sample over a perfect link, which choose delta.
-    #[garde(range(min = 0.02, max = 12.0))]
-    rate: f64,
-    /// Probabilities that a packet is lost.
-    #[garde(length(min = 1, max = 9), inner(range(min = 0.0, max = 0.5)))]
-    loss: Vec<f64>,
-    /// Slots from one refresh to the next.
-    #[garde(length(min = 1, max = 9), inner(range(min = 2, max = 100_000)))]
-    refresh: Vec<u64>,
-    /// Bits of the packets' counter.
-    #[garde(range(min = 1, max = 16))]
-    sequence_bits: u32,
-    /// Sequences of losses.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            source: Source {
-                columns: vec!["bursts".into()],
-                ..Source::default()
-            },
-            rate: 0.5,
-            loss: vec![0.0, 0.01, 0.1],
-            refresh: vec![25, 100, 400],
-            sequence_bits: 4,
-            trials: 20,
-        }
+fn shown() -> Source {
+    Source {
+        columns: vec!["bursts".into()],
+        ..Source::default()
     }
 }
 
-impl Quick for Parameters {
-    fn quicken(&mut self) {
-        self.source.samples = 1000;
-        self.trials = 4;
+parameters! {
+    pub struct Parameters {
+        #[serde(flatten)]
+        #[garde(dive)]
+        source: Source = shown() => quick Source { samples: 1000, ..shown() },
+        /// Bits per sample over a perfect link, which choose delta.
+        #[garde(range(min = 0.02, max = 12.0))]
+        rate: f64 = 0.5,
+        /// Probabilities that a packet is lost.
+        #[garde(length(min = 1, max = 9), inner(range(min = 0.0, max = 0.5)))]
+        loss: Vec<f64> = vec![0.0, 0.01, 0.1],
+        /// Slots from one refresh to the next.
+        #[garde(length(min = 1, max = 9), inner(range(min = 2, max = 100_000)))]
+        refresh: Vec<u64> = vec![25, 100, 400],
+        /// Bits of the packets' counter.
+        #[garde(range(min = 1, max = 16))]
+        sequence_bits: u32 = 4,
+        /// Sequences of losses.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 20 => quick 4,
     }
 }
 
@@ -153,15 +136,13 @@ impl Figure for Loss {
     type Parameters = Parameters;
     type Tables = Vec<Row>;
 
-    fn about(&self) -> About {
-        About {
-            id: "real-loss",
-            title: "Real signals: loss and recovery",
-            caption: "A lost packet leaves the receiver out of step until the next refresh that arrives. Frequent refreshes cost bits \
-                      and shorten that time; the counter of the packets tells the receiver in which slots it must not trust itself.",
-            source: "our own comparison",
-        }
-    }
+    const ABOUT: About = About {
+        id: "real-loss",
+        title: "Real signals: loss and recovery",
+        caption: "A lost packet leaves the receiver out of step until the next refresh that arrives. Frequent refreshes cost bits \
+                  and shorten that time; the counter of the packets tells the receiver in which slots it must not trust itself.",
+        source: "our own comparison",
+    };
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-loss", context)?;

@@ -5,37 +5,25 @@ use super::tracking::best_for;
 use crate::prelude::*;
 use fewbits_adaptive::{Replay, SCALES, Sensor};
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-pub struct Parameters {
-    #[serde(flatten)]
-    #[garde(dive)]
-    source: Source,
-    /// Bits per sample, at most.
-    #[garde(range(min = 0.02, max = 12.0))]
-    rate: f64,
-    /// Slots from one row to the next.
-    #[garde(range(min = 1, max = 10_000))]
-    every: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            source: Source {
-                columns: vec!["bursts".into(), "drift".into(), "gusts".into()],
-                samples: 1500,
-                ..Source::default()
-            },
-            rate: 0.5,
-            every: 10,
-        }
+fn shown() -> Source {
+    Source {
+        columns: vec!["bursts".into(), "drift".into(), "gusts".into()],
+        samples: 1500,
+        ..Source::default()
     }
 }
 
-impl Quick for Parameters {
-    fn quicken(&mut self) {
-        self.source.samples = 1000;
+parameters! {
+    pub struct Parameters {
+        #[serde(flatten)]
+        #[garde(dive)]
+        source: Source = shown() => quick Source { samples: 1000, ..shown() },
+        /// Bits per sample, at most.
+        #[garde(range(min = 0.02, max = 12.0))]
+        rate: f64 = 0.5,
+        /// Slots from one row to the next.
+        #[garde(range(min = 1, max = 10_000))]
+        every: usize = 10,
     }
 }
 
@@ -134,8 +122,7 @@ impl Figure for Models {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let mut columns: Vec<&str> = rows.iter().map(|r| r.column.as_str()).collect();
-        columns.dedup();
+        let columns = distinct(&rows, |r| r.column.clone());
         let panels = columns.iter().flat_map(|column| {
             let of = |y: fn(&Row) -> f64| {
                 let chosen = rows.iter().filter(|r| r.column == *column);
@@ -152,11 +139,11 @@ impl Figure for Models {
                     .with(Layer::line("velocity 0.95", of(|r| r.smooth))),
             ]
         });
-        let scale = |column: &&str| {
-            let chosen = rows.iter().filter(|r| r.column == **column);
-            Layer::line(*column, points(chosen, |r| (r.slot as f64, r.scale)))
+        let scale = |column: &String| {
+            let chosen = rows.iter().filter(|r| r.column == *column);
+            Layer::line(column, points(chosen, |r| (r.slot as f64, r.scale)))
         };
-        let scales = Panel::new("scale of the models", Axis::linear("slot"), Axis::linear("log2 of the noise, steps"))
+        let scales = Panel::linear("scale of the models", "slot", "log2 of the noise, steps")
             .with_all(columns.iter().map(scale));
         Plot::grid(2, panels.chain([scales]).collect())
     }

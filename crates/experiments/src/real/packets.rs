@@ -8,30 +8,14 @@ use crate::prelude::*;
 use fewbits_adaptive::Replay;
 use rayon::prelude::*;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-pub struct Parameters {
-    #[serde(flatten)]
-    #[garde(dive)]
-    source: Source,
-    /// Packets per sample, at most.
-    #[garde(length(min = 1, max = 20), inner(range(min = 0.005, max = 1.0)))]
-    packets: Vec<f64>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            source: Source::default(),
-            packets: vec![0.03, 0.1, 0.3],
-        }
-    }
-}
-
-impl Quick for Parameters {
-    fn quicken(&mut self) {
-        self.source.samples = 800;
-        self.packets = vec![0.1];
+parameters! {
+    pub struct Parameters {
+        #[serde(flatten)]
+        #[garde(dive)]
+        source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
+        /// Packets per sample, at most.
+        #[garde(length(min = 1, max = 20), inner(range(min = 0.005, max = 1.0)))]
+        packets: Vec<f64> = vec![0.03, 0.1, 0.3] => quick vec![0.1],
     }
 }
 
@@ -128,11 +112,10 @@ impl Figure for Packets {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let mut columns: Vec<&str> = rows.iter().map(|r| r.column.as_str()).collect();
-        columns.dedup();
-        let panel = |column: &&str| {
+        let columns = distinct(&rows, |r| r.column.clone());
+        let panel = |column: &String| {
             let curve = |(colour, scheme): (usize, &&'static str)| {
-                let chosen = rows.iter().filter(|r| r.column == **column && r.scheme == *scheme);
+                let chosen = rows.iter().filter(|r| r.column == *column && r.scheme == *scheme);
                 let curve = points(chosen, |r| (r.target, r.rmse.max(r.negligible)));
                 let layer = if colour == 0 {
                     Layer::line(*scheme, curve)
@@ -142,8 +125,7 @@ impl Figure for Packets {
                 layer.coloured(colour)
             };
             let schemes = ["adaptive", "dpcm-0", "dpcm-1", "send-on-delta"];
-            Panel::new(*column, Axis::log("packets per sample"), Axis::log("rms error"))
-                .with_all(schemes.iter().enumerate().map(curve))
+            Panel::loglog(column, "packets per sample", "rms error").with_all(schemes.iter().enumerate().map(curve))
         };
         Plot::grid(3, columns.iter().map(panel).collect())
     }
