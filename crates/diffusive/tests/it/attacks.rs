@@ -1,6 +1,6 @@
 //! Arguments that make no sense, and data that do not fit.
 
-use super::{field, joint, sensor};
+use super::{RULES, field, joint, sensor};
 use fewbits_core::Gaussian;
 use fewbits_densities::hermite::{hermite, multi_indices};
 use fewbits_densities::laplace::Peak;
@@ -240,13 +240,7 @@ fn coincident_nodes_and_a_source_on_a_node() {
     let field_of = Deployment::given(positions).unwrap();
     let graph = Graph::within(field_of.positions(), 10.0).unwrap();
     let sensor = sensor(1.0, false);
-    for rule in [
-        Rule::MutualInformation,
-        Rule::PairwiseInformation,
-        Rule::CramerRao,
-        Rule::Mahalanobis,
-        Rule::Covariance,
-    ] {
+    for rule in RULES {
         let mut search = Search::new(&place, 50.0, field(1.0), joint(), 1e-5).unwrap();
         search.rule = rule;
         let mut rng = fewbits_monte_carlo::Stream::new(7).rng();
