@@ -88,13 +88,9 @@ impl Figure for Divergences {
     type Parameters = KlParameters;
     type Tables = Vec<KlRow>;
 
-    const ABOUT: About = About {
-        id: "diffusive-kl",
-        title: "What a number buys",
-        caption: "Kullback-Leibler divergence of the exact belief (example B, rate integrated out) from what would travel, against \
-                      the numbers in a message, after one to four nodes.",
-        source: "",
-    };
+    const ABOUT: About = About::of("diffusive-kl", "What a number buys", "");
+    const CAPTION: &str = "Kullback-Leibler divergence of the exact belief (example B, rate integrated out) from what would travel, against \
+        the numbers in a message, after one to four nodes.";
 
     fn cost(&self, p: &KlParameters) -> Cost {
         Cost::new(p.trials as f64 * p.nodes.len() as f64 * 0.1, 1e6)

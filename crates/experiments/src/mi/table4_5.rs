@@ -59,14 +59,10 @@ impl Figure for Table45 {
     type Parameters = Parameters;
     type Tables = Vec<Row>;
 
-    const ABOUT: About = About {
-        id: "mi-table4-5",
-        title: "Words over a binary symmetric channel",
-        caption: "Two sensors of four levels whose two-bit words cross a binary symmetric channel. With natural words the \
-                      breakpoints shrink as the channel gets worse, as printed; with Gray words they hardly move. At a crossover \
-                      of 0.05 information prefers Gray words and squared error natural ones.",
-        source: "thesis, Table 4.5",
-    };
+    const ABOUT: About = About::of("mi-table4-5", "Words over a binary symmetric channel", "thesis, Table 4.5");
+    const CAPTION: &str = "Two sensors of four levels whose two-bit words cross a binary symmetric channel. With natural words the \
+        breakpoints shrink as the channel gets worse, as printed; with Gray words they hardly move. At a crossover \
+        of 0.05 information prefers Gray words and squared error natural ones.";
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
@@ -195,14 +191,11 @@ impl Figure for Mismatch {
     type Parameters = Parameters;
     type Tables = Mismatches;
 
-    const ABOUT: About = About {
-        id: "mi-table4-5-mismatch",
-        title: "Designed for one channel, used on another",
-        caption: "Squared error when the joint information design for one crossover meets another (the decoder knows the true \
-                      one). Designing for a clean channel costs 2.6 % at a crossover of 0.05 with natural words and nothing with \
-                      Gray words.",
-        source: "thesis, Table 4.5 and text",
-    };
+    const ABOUT: About =
+        About::of("mi-table4-5-mismatch", "Designed for one channel, used on another", "thesis, Table 4.5 and text");
+    const CAPTION: &str = "Squared error when the joint information design for one crossover meets another (the decoder knows the true \
+        one). Designing for a clean channel costs 2.6 % at a crossover of 0.05 with natural words and nothing with \
+        Gray words.";
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Mismatches, Error> {
         let (mut rows, mut printed) = (Vec::new(), Vec::new());

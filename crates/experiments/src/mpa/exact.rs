@@ -150,13 +150,10 @@ impl Figure for Gibbs {
     type Parameters = Draws;
     type Tables = GibbsRows;
 
-    const ABOUT: About = About {
-        id: "mpa-gibbs",
-        title: "How fast Gibbs sweeps forget their start",
-        caption: "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
-                      separated modes (B), and what the sampler draws after five. In A the chain's own bias after five sweeps is 0.0093.",
-        source: "particle message passing, Section 2.1.4",
-    };
+    const ABOUT: About =
+        About::of("mpa-gibbs", "How fast Gibbs sweeps forget their start", "particle message passing, Section 2.1.4");
+    const CAPTION: &str = "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
+        separated modes (B), and what the sampler draws after five. In A the chain's own bias after five sweeps is 0.0093.";
 
     fn run(&self, p: &Draws, context: &Context<'_>) -> Result<GibbsRows, Error> {
         let mut rows = GibbsRows {
@@ -265,13 +262,13 @@ impl Figure for Rings {
     type Parameters = None;
     type Tables = RingRows;
 
-    const ABOUT: About = About {
-        id: "mpa-ring",
-        title: "Errata in closed form: radii, kernels, weights",
-        caption: "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
-                      Silverman's kernel; and the second moment of the printed ratio weights, which equal weights make 1.",
-        source: "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
-    };
+    const ABOUT: About = About::of(
+        "mpa-ring",
+        "Errata in closed form: radii, kernels, weights",
+        "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
+    );
+    const CAPTION: &str = "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
+        Silverman's kernel; and the second moment of the printed ratio weights, which equal weights make 1.";
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<RingRows, Error> {
         let ring = |(lower, upper, deviation): (f64, f64, f64)| -> Result<Ring, Error> {
@@ -379,13 +376,9 @@ impl Figure for Bits {
     type Parameters = None;
     type Tables = Vec<BitRow>;
 
-    const ABOUT: About = About {
-        id: "mpa-bits",
-        title: "Bits of a step",
-        caption: "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
-                      Where all nodes receive all levels and run the same deterministic tracker, none is needed.",
-        source: "particle message passing, Section 3.3",
-    };
+    const ABOUT: About = About::of("mpa-bits", "Bits of a step", "particle message passing, Section 3.3");
+    const CAPTION: &str = "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
+        Where all nodes receive all levels and run the same deterministic tracker, none is needed.";
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<Vec<BitRow>, Error> {
         let mut bits = Vec::new();
@@ -472,12 +465,9 @@ impl Figure for Graphs {
     type Parameters = None;
     type Tables = GraphRows;
 
-    const ABOUT: About = About {
-        id: "mpa-graphs",
-        title: "The factor graphs",
-        caption: "Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).",
-        source: "particle message passing, Figures 2.1, 3.2, 3.6",
-    };
+    const ABOUT: About =
+        About::of("mpa-graphs", "The factor graphs", "particle message passing, Figures 2.1, 3.2, 3.6")
+            .showing("Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).");
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<GraphRows, Error> {
         let (mut nodes, mut edges) = (Vec::new(), Vec::new());

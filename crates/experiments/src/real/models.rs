@@ -89,13 +89,9 @@ impl Figure for Models {
     type Parameters = Parameters;
     type Tables = Vec<Row>;
 
-    const ABOUT: About = About {
-        id: "real-models",
-        title: "Real signals: what the bank believed",
-        caption: "Weights of the three families of models, and the mean scale of their noise, over time: a plume raises the scale \
-                      within a few reports, a smooth drift is given to the velocities, a calm to the narrowest walks.",
-        source: "our own comparison",
-    };
+    const ABOUT: About = About::of("real-models", "Real signals: what the bank believed", "our own comparison");
+    const CAPTION: &str = "Weights of the three families of models, and the mean scale of their noise, over time: a plume raises the scale \
+        within a few reports, a smooth drift is given to the velocities, a calm to the narrowest walks.";
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-models", context)?;
