@@ -154,12 +154,9 @@ pub trait Figure: Sync {
     /// What stands above the figure, unless [`Figure::about`] says so of each value of the type.
     const ABOUT: About = About::of("", "", "");
 
-    /// What it shows and what to look for.
-    const CAPTION: &'static str = "";
-
     /// What stands above the figure.
     fn about(&self) -> About {
-        Self::ABOUT.showing(Self::CAPTION)
+        Self::ABOUT
     }
 
     /// Parameters without effect under these values: setting one is refused.

@@ -108,17 +108,10 @@ fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
 }
 
 impl Figure for Feedback {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About::of(
-        "binary-fig5-10",
-        "Ten sensors against schemes with thresholds and with feedback",
-        "Movaghati, thesis, figure 5.10",
-    );
-    const CAPTION: &str = "Linear patterns of the best resolution beat the relaxed multi-threshold bound from 5 dB on, and the adaptive variable-step \
-        scheme (AQ-VS) from 20 dB on. The adaptive maximum-likelihood scheme (AQ-ML), which needs feedback, is better \
-        than they are at every ratio from 5 to 40 dB: the thesis's claim is not reproduced.";
+    figure!(Parameters => Vec<Row>, "binary-fig5-10", "Ten sensors against schemes with thresholds and with feedback", "Movaghati, thesis, figure 5.10",
+        "Linear patterns of the best resolution beat the relaxed multi-threshold bound from 5 dB on, and the adaptive variable-step \
+         scheme (AQ-VS) from 20 dB on. The adaptive maximum-likelihood scheme (AQ-ML), which needs feedback, is better \
+         than they are at every ratio from 5 to 40 dB: the thesis's claim is not reproduced.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);

@@ -49,12 +49,9 @@ rows! {
 }
 
 impl Figure for Fig7 {
-    type Parameters = Shown;
-    type Tables = Map;
-
-    const ABOUT: About = About::of("cfwmd-fig7", "Sensors and target", "CFwMD paper, figure 7");
-    const CAPTION: &str = "Nine sensors of received power on a grid, and one trajectory. The target starts beside a corner sensor and leaves the \
-        grid after about ten steps.";
+    figure!(Shown => Map, "cfwmd-fig7", "Sensors and target", "CFwMD paper, figure 7",
+        "Nine sensors of received power on a grid, and one trajectory. The target starts beside a corner sensor and leaves the \
+         grid after about ten steps.");
 
     fn run(&self, shown: &Shown, context: &Context<'_>) -> Result<Map, Error> {
         let world = World::new(&Field::new(&[2.0]))?;

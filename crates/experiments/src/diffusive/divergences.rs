@@ -85,12 +85,9 @@ const TWO_PHASES: &str = "lpg-2x5 printed";
 pub struct Divergences;
 
 impl Figure for Divergences {
-    type Parameters = KlParameters;
-    type Tables = Vec<KlRow>;
-
-    const ABOUT: About = About::of("diffusive-kl", "What a number buys", "");
-    const CAPTION: &str = "Kullback-Leibler divergence of the exact belief (example B, rate integrated out) from what would travel, against \
-        the numbers in a message, after one to four nodes.";
+    figure!(KlParameters => Vec<KlRow>, "diffusive-kl", "What a number buys", "",
+        "Kullback-Leibler divergence of the exact belief (example B, rate integrated out) from what would travel, against \
+         the numbers in a message, after one to four nodes.");
 
     fn cost(&self, p: &KlParameters) -> Cost {
         Cost::new(p.trials as f64 * p.nodes.len() as f64 * 0.1, 1e6)

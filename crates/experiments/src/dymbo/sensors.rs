@@ -49,13 +49,10 @@ const LONGEST: usize = 10;
 pub struct SeveralSensors;
 
 impl Figure for SeveralSensors {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About::of("dymbo-sensors", "Several one-bit sensors a slot", "");
-    const CAPTION: &str = "Steady error with K one-bit sensors: one after the other against the refreshed threshold, or all at once, \
-        fused linearly or through the count table; below, K unquantized sensors. Two one-bit sensors in turn are \
-        worth one unquantized sensor, but for 0.14 %. Bits sent at once share the prediction error and saturate.";
+    figure!(Parameters => Vec<Row>, "dymbo-sensors", "Several one-bit sensors a slot", "",
+        "Steady error with K one-bit sensors: one after the other against the refreshed threshold, or all at once, \
+         fused linearly or through the count table; below, K unquantized sensors. Two one-bit sensors in turn are \
+         worth one unquantized sensor, but for 0.14 %. Bits sent at once share the prediction error and saturate.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let plants = each(p.a, &p.gamma);

@@ -112,12 +112,9 @@ fn kl(rows: &[Row], filter: &str, factor: f64, shrunk: bool) -> Option<f64> {
 }
 
 impl Figure for Widths {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About::of("handoff-bandwidth", "Smoothing costs more than reduction", "our own comparison");
-    const CAPTION: &str = "KL from the exact belief, computed on a lattice, to what each filter hands on, averaged over ten steps. Halving \
-        the bandwidth or shrinking the particles removes a third of the error at no bits.";
+    figure!(Parameters => Vec<Row>, "handoff-bandwidth", "Smoothing costs more than reduction", "our own comparison",
+        "KL from the exact belief, computed on a lattice, to what each filter hands on, averaged over ten steps. Halving \
+         the bandwidth or shrinking the particles removes a third of the error at no bits.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(2.0 * p.trials as f64, 1e6 * p.trials as f64)

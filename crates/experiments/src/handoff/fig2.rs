@@ -38,16 +38,9 @@ fn at(rows: &[Row], ratio: f64, t: u32) -> Option<&Row> {
 }
 
 impl Figure for Fig2 {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About::of(
-        "handoff-fig2",
-        "Small losses add up to more than their sum",
-        "compressed particle filter, Section 4, Figure 2",
-    );
-    const CAPTION: &str = "A Gaussian that is narrowed a little at every step. Each step loses under 0.001 nat at ratio 0.97, ten steps \
-        lose over 0.1: the error grows with the square of time, not in proportion.";
+    figure!(Parameters => Vec<Row>, "handoff-fig2", "Small losses add up to more than their sum", "compressed particle filter, Section 4, Figure 2",
+        "A Gaussian that is narrowed a little at every step. Each step loses under 0.001 nat at ratio 0.97, ten steps \
+         lose over 0.1: the error grows with the square of time, not in proportion.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();

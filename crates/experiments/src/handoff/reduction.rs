@@ -121,12 +121,9 @@ impl Rows {
 }
 
 impl Figure for Reductions {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About::of("handoff-reduction", "What a reduction loses", "our own comparison");
-    const CAPTION: &str = "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
-        2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.";
+    figure!(Parameters => Rows, "handoff-reduction", "What a reduction loses", "our own comparison",
+        "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
+         2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.");
 
     fn measures_time(&self) -> bool {
         true

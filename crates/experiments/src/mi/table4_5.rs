@@ -56,13 +56,10 @@ rows! {
 pub struct Table45;
 
 impl Figure for Table45 {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About::of("mi-table4-5", "Words over a binary symmetric channel", "thesis, Table 4.5");
-    const CAPTION: &str = "Two sensors of four levels whose two-bit words cross a binary symmetric channel. With natural words the \
-        breakpoints shrink as the channel gets worse, as printed; with Gray words they hardly move. At a crossover \
-        of 0.05 information prefers Gray words and squared error natural ones.";
+    figure!(Parameters => Vec<Row>, "mi-table4-5", "Words over a binary symmetric channel", "thesis, Table 4.5",
+        "Two sensors of four levels whose two-bit words cross a binary symmetric channel. With natural words the \
+         breakpoints shrink as the channel gets worse, as printed; with Gray words they hardly move. At a crossover \
+         of 0.05 information prefers Gray words and squared error natural ones.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
@@ -188,14 +185,10 @@ rows! {
 pub struct Mismatch;
 
 impl Figure for Mismatch {
-    type Parameters = Parameters;
-    type Tables = Mismatches;
-
-    const ABOUT: About =
-        About::of("mi-table4-5-mismatch", "Designed for one channel, used on another", "thesis, Table 4.5 and text");
-    const CAPTION: &str = "Squared error when the joint information design for one crossover meets another (the decoder knows the true \
-        one). Designing for a clean channel costs 2.6 % at a crossover of 0.05 with natural words and nothing with \
-        Gray words.";
+    figure!(Parameters => Mismatches, "mi-table4-5-mismatch", "Designed for one channel, used on another", "thesis, Table 4.5 and text",
+        "Squared error when the joint information design for one crossover meets another (the decoder knows the true \
+         one). Designing for a clean channel costs 2.6 % at a crossover of 0.05 with natural words and nothing with \
+         Gray words.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Mismatches, Error> {
         let (mut rows, mut printed) = (Vec::new(), Vec::new());

@@ -147,13 +147,9 @@ fn case<const D: usize>(
 }
 
 impl Figure for Gibbs {
-    type Parameters = Draws;
-    type Tables = GibbsRows;
-
-    const ABOUT: About =
-        About::of("mpa-gibbs", "How fast Gibbs sweeps forget their start", "particle message passing, Section 2.1.4");
-    const CAPTION: &str = "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
-        separated modes (B), and what the sampler draws after five. In A the chain's own bias after five sweeps is 0.0093.";
+    figure!(Draws => GibbsRows, "mpa-gibbs", "How fast Gibbs sweeps forget their start", "particle message passing, Section 2.1.4",
+        "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
+         separated modes (B), and what the sampler draws after five. In A the chain's own bias after five sweeps is 0.0093.");
 
     fn run(&self, p: &Draws, context: &Context<'_>) -> Result<GibbsRows, Error> {
         let mut rows = GibbsRows {
@@ -259,16 +255,9 @@ rows! {
 }
 
 impl Figure for Rings {
-    type Parameters = None;
-    type Tables = RingRows;
-
-    const ABOUT: About = About::of(
-        "mpa-ring",
-        "Errata in closed form: radii, kernels, weights",
-        "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
-    );
-    const CAPTION: &str = "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
-        Silverman's kernel; and the second moment of the printed ratio weights, which equal weights make 1.";
+    figure!(None => RingRows, "mpa-ring", "Errata in closed form: radii, kernels, weights", "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
+        "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
+         Silverman's kernel; and the second moment of the printed ratio weights, which equal weights make 1.");
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<RingRows, Error> {
         let ring = |(lower, upper, deviation): (f64, f64, f64)| -> Result<Ring, Error> {
@@ -373,12 +362,9 @@ rows! {
 }
 
 impl Figure for Bits {
-    type Parameters = None;
-    type Tables = Vec<BitRow>;
-
-    const ABOUT: About = About::of("mpa-bits", "Bits of a step", "particle message passing, Section 3.3");
-    const CAPTION: &str = "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
-        Where all nodes receive all levels and run the same deterministic tracker, none is needed.";
+    figure!(None => Vec<BitRow>, "mpa-bits", "Bits of a step", "particle message passing, Section 3.3",
+        "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
+         Where all nodes receive all levels and run the same deterministic tracker, none is needed.");
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<Vec<BitRow>, Error> {
         let mut bits = Vec::new();
@@ -462,12 +448,8 @@ fn graphs() -> Result<[(&'static str, FactorGraph); 3], Error> {
 }
 
 impl Figure for Graphs {
-    type Parameters = None;
-    type Tables = GraphRows;
-
-    const ABOUT: About =
-        About::of("mpa-graphs", "The factor graphs", "particle message passing, Figures 2.1, 3.2, 3.6")
-            .showing("Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).");
+    figure!(None => GraphRows, "mpa-graphs", "The factor graphs", "particle message passing, Figures 2.1, 3.2, 3.6",
+        "Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).");
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<GraphRows, Error> {
         let (mut nodes, mut edges) = (Vec::new(), Vec::new());

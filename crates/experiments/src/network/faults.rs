@@ -143,13 +143,10 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
 }
 
 impl Figure for Faulty {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About::of("network-faults", "What faults cost", "our own comparison");
-    const CAPTION: &str = "Four one-bit sensors of the scalar world under lost frames, inverted bits, random delays and dying sensors. Told the \
-        prediction in full, a sensor loses only the slot whose question is lost; following by echo, it must first be given the \
-        belief again, which takes two slots and grows with the loss. Right: slots until a restarted sensor answers.";
+    figure!(Parameters => Vec<Row>, "network-faults", "What faults cost", "our own comparison",
+        "Four one-bit sensors of the scalar world under lost frames, inverted bits, random delays and dying sensors. Told the \
+         prediction in full, a sensor loses only the slot whose question is lost; following by echo, it must first be given the \
+         belief again, which takes two slots and grows with the loss. Right: slots until a restarted sensor answers.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let levels = [

@@ -88,14 +88,11 @@ fn rows_of(world: &'static str, schemes: &[Scheme], runs: &Comparison<5>, floor:
 }
 
 impl Figure for Frontier {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About::of("network-frontier", "One frontier for all schemes", "our own comparison");
-    const CAPTION: &str = "Root mean squared error of every scheme against its payload, against all bits on air, and against the energy of \
-        all radios (CC2420 at 0 dBm), on the same scalar and plane worlds with four sensors. The line joins what nothing else \
-        beats in both. By payload one bit a sensor is a bargain; on air a frame's overhead of 200 bits buries the difference \
-        between one bit and 32, so that few frames win, and sensors that are silent while they are predicted (adaptive) win most.";
+    figure!(Parameters => Vec<Row>, "network-frontier", "One frontier for all schemes", "our own comparison",
+        "Root mean squared error of every scheme against its payload, against all bits on air, and against the energy of \
+         all radios (CC2420 at 0 dBm), on the same scalar and plane worlds with four sensors. The line joins what nothing else \
+         beats in both. By payload one bit a sensor is a bargain; on air a frame's overhead of 200 bits buries the difference \
+         between one bit and 32, so that few frames win, and sensors that are silent while they are predicted (adaptive) win most.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(2e-2 * (p.trials * p.slots as u64) as f64, 1e8)

@@ -51,13 +51,10 @@ pub struct Lifetime;
 const DAY: f64 = 86_400.0;
 
 impl Figure for Lifetime {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About::of("network-lifetime", "Days on two AA cells", "our own comparison");
-    const CAPTION: &str = "Life of the busiest sensor (CC2420, two AA cells) against the error of the scheme it runs, in the scalar world. At a \
-        slot a second the node's own 6 mW decide and no scheme matters; at fifty slots a second, or once the processor sleeps, \
-        the scheme decides.";
+    figure!(Parameters => Vec<Row>, "network-lifetime", "Days on two AA cells", "our own comparison",
+        "Life of the busiest sensor (CC2420, two AA cells) against the error of the scheme it runs, in the scalar world. At a \
+         slot a second the node's own 6 mW decide and no scheme matters; at fifty slots a second, or once the processor sleeps, \
+         the scheme decides.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (world, schemes) = (worlds::scalar()?, schemes::scalar_schemes());

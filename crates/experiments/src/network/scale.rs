@@ -128,12 +128,9 @@ fn measure(context: &Context<'_>, nodes: u64, slots: u64) -> Result<(Row, Time),
 }
 
 impl Figure for Scale {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About::of("network-scale", "A million nodes", "our own measurement");
-    const CAPTION: &str = "Memory of the simulated network and time of an event against the number of nodes, each of which sends a bit \
-        towards a root in every slot. Memory is linear; an event costs a little more where the queue leaves the cache.";
+    figure!(Parameters => Rows, "network-scale", "A million nodes", "our own measurement",
+        "Memory of the simulated network and time of an event against the number of nodes, each of which sends a bit \
+         towards a root in every slot. Memory is linear; an event costs a little more where the queue leaves the cache.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         let nodes: u64 = p.nodes.iter().sum();
