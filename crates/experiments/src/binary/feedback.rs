@@ -125,7 +125,7 @@ impl Figure for Feedback {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let from = |low: f64| select(&rows, move |r| (low - 1e-9..=40.0 + 1e-9).contains(&r.snr_db));
+        let from = |low: f64| select(rows, move |r| (low - 1e-9..=40.0 + 1e-9).contains(&r.snr_db));
         let what = "patterns of the best resolution are below the relaxed multi-threshold bound from 5 to 40 dB";
         claims.all("ribeiro", what, from(5.0), |r| r.lbqp_best < r.ribeiro_relaxed);
         let what = "and below AQ-VS (step V/2, factor 1.5) from 20 dB on";

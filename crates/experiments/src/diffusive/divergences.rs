@@ -141,7 +141,7 @@ impl Figure for Divergences {
     fn claims(&self, _: &KlParameters, rows: &Vec<KlRow>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         let find =
-            |nodes: usize, rep: &str| first(&rows, |r| r.nodes == nodes && r.rep == rep).map(|r| r.kl_median.value);
+            |nodes: usize, rep: &str| first(rows, |r| r.nodes == nodes && r.rep == rep).map(|r| r.kl_median.value);
         let key = |r: &KlRow| format!("{} {}", r.nodes, r.rep);
         full.references("kl_median", "median divergence", rows, |r| (key(r), r.kl_median));
         let what = "no mean divergence is negative, but for what sums over cells leave (0.01 nats)";

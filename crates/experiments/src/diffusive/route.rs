@@ -136,7 +136,7 @@ impl Figure for Trace {
             .filter_map(|r| Some((r.step as f64, r.log10_determinant?)))
             .collect();
         let mut total = 0.0;
-        let bytes = select(&rows, |r| r.event == Event::Receive)
+        let bytes = select(rows, |r| r.event == Event::Receive)
             .map(|r| {
                 total += r.bytes;
                 (r.step as f64, total)

@@ -95,7 +95,7 @@ impl Figure for SeveralSensors {
             let what = format!("{what}, at a, gamma, sensors");
             claims.references(quantity, &what, rows, |r| (format!("{} {}", r.plant, r.sensors), of(r)));
         }
-        let at = |k: usize| first(&rows, |r| r.plant == Plant { a: 0.9, gamma: 0.5 } && r.sensors == k);
+        let at = |k: usize| first(rows, |r| r.plant == Plant { a: 0.9, gamma: 0.5 } && r.sensors == k);
         let two = at(2).zip(at(1));
         let what = "gamma = 0.5: by computed variance two one-bit sensors in turn beat one unquantized sensor";
         let ratio = two.map(|(two, one)| two.sequential / one.kalman);

@@ -108,7 +108,7 @@ fn setups() -> Vec<Setup> {
 pub struct Widths;
 
 fn kl(rows: &[Row], filter: &str, factor: f64, shrunk: bool) -> Option<f64> {
-    first(&rows, |r| r.filter == filter && r.factor == factor && r.shrunk == shrunk).map(|r| r.kl.value)
+    first(rows, |r| r.filter == filter && r.factor == factor && r.shrunk == shrunk).map(|r| r.kl.value)
 }
 
 impl Figure for Widths {

@@ -84,7 +84,7 @@ impl Figure for Fig2 {
         let ends = [(0.9691, false), (0.9692, true), (0.9717, true), (0.9719, false)];
         claims.all("window", what, ends, |(ratio, holds)| both(ratio) == Some(holds));
         for ratio in p.ratio.iter().filter(|r| **r < 1.0) {
-            let gaps = select(&rows, |r| r.ratio == *ratio && r.t > 0).map(|r| r.kl_total / r.sum_of_steps);
+            let gaps = select(rows, |r| r.ratio == *ratio && r.t > 0).map(|r| r.kl_total / r.sum_of_steps);
             let what = "the ratio of the whole to the sum of its parts grows with time";
             claims.increasing(format!("gap-r{ratio}"), what, gaps);
         }

@@ -40,7 +40,7 @@ rows! {
 pub struct Rate;
 
 fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
-    first(&rows, |r| r.message == message && r.size == size && r.resolution == resolution)
+    first(rows, |r| r.message == message && r.size == size && r.resolution == resolution)
 }
 
 impl Figure for Rate {

@@ -97,7 +97,7 @@ impl Figure for Table45 {
         claims.references("outer2", "outer breakpoint", rows, |r| (key(r), r.pair.outer2));
         claims.references("printed", "printed error, natural words, three digits", rows, |r| (key(r), r.pair.mse));
         let at = |crossover: f64, labelling: &str, design: &str| {
-            first(&rows, |r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design)).map(|r| &r.pair)
+            first(rows, |r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design)).map(|r| &r.pair)
         };
         let what = "the printed breakpoint exceeds the joint optimum of natural words by 0.5 to 1.1 %";
         here.all("excess", what, PRINTED, |(crossover, outer)| {
@@ -115,21 +115,21 @@ impl Figure for Table45 {
         let third = at(0.05, "third", "mse-joint").zip(at(0.05, "gray", "mse-joint"));
         let what = "the third assignment is much worse";
         here.above("third-worst", what, third.map(|(a, b)| a.mse - b.mse), 0.04);
-        let natural = select(&rows, |r| r.labelling == "natural" && r.design == "mi-joint");
+        let natural = select(rows, |r| r.labelling == "natural" && r.design == "mi-joint");
         here.increasing("worse", "errors grow with the crossover", natural.map(|r| r.pair.mse));
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         let panel = |title: &str, axis: &str, value: fn(&Row) -> f64, printed: fn(&Row) -> Option<f64>| {
             let lines = LABELLINGS.iter().enumerate().flat_map(|(i, (labelling, title, _))| {
-                let own = select(&rows, |r| r.labelling == *labelling && r.design == "mi-joint");
+                let own = select(rows, |r| r.labelling == *labelling && r.design == "mi-joint");
                 let line = points(own, |r| (r.crossover, value(r)));
                 [
                     Layer::line(*title, line.clone()).coloured(i),
                     Layer::points("", line).coloured(i),
                 ]
             });
-            let print = select(&rows, |r| r.labelling == "natural" && r.design == "printed");
+            let print = select(rows, |r| r.labelling == "natural" && r.design == "printed");
             Panel::linear(title, "crossover probability", axis)
                 .with_all(lines)
                 .with(Layer::points("printed", points(print, |r| (r.crossover, printed(r)))).styled(6, Marker::Cross))
@@ -231,7 +231,7 @@ impl Figure for Mismatch {
         claims.references("printed", what, natural, |r| (format!("{} 0 0.05", r.labelling), r.mse));
         for (labelling, matched) in [("natural", &[0.0, 0.01, 0.05][..]), ("gray", &[0.0, 0.05])] {
             let least_is_matched = |truth: &f64| {
-                let met = || select(&rows, |r| r.labelling == labelling && r.true_crossover == *truth);
+                let met = || select(rows, |r| r.labelling == labelling && r.true_crossover == *truth);
                 met()
                     .min_by(|a, b| a.mse.total_cmp(&b.mse))
                     .is_some_and(|best| best.designed_for == *truth)

@@ -191,7 +191,7 @@ impl Figure for Faulty {
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         let at = |fault: &str, level: f64, feedback: &str| {
-            first(&rows, |r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
+            first(rows, |r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
         };
         let gap = |feedback| {
             at("loss", 0.0, feedback)
@@ -214,7 +214,7 @@ impl Figure for Faulty {
         here.near("recovery-echoed", what, clean.map(|c| c.0), 2.0, 0.0);
         let restart = at("loss", 0.0, "told").map(|r| r.disagreements.value);
         here.near("told", "without faults on air nobody disagrees with a centre that tells", restart, 0.0, 0.0);
-        let lossy = select(&rows, |r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
+        let lossy = select(rows, |r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
         claims.all("noted", "replicas that miss frames are seen to disagree", lossy, |r| r.disagreements.value > 0.0);
     }
 

@@ -134,11 +134,11 @@ impl Figure for Frontier {
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         let find = |world: &str, scheme: &str, setting: &str, feedback: &str| {
-            first(&rows, |r| (r.world, r.scheme, r.setting.as_str(), r.feedback) == (world, scheme, setting, feedback))
+            first(rows, |r| (r.world, r.scheme, r.setting.as_str(), r.feedback) == (world, scheme, setting, feedback))
         };
         let ratio = |a: Option<&Row>, b: Option<&Row>, of: fn(&Row) -> f64| a.zip(b).map(|(a, b)| of(a) / of(b));
         let slack = |r: &&Row| r.floor - 4.0 * r.rmse.standard_error.unwrap_or(0.0);
-        let loud = || select(&rows, |r| !["CFwMD", "CFwMD2", "adaptive"].contains(&r.scheme));
+        let loud = || select(rows, |r| !["CFwMD", "CFwMD2", "adaptive"].contains(&r.scheme));
         claims.all("floor", "no scheme that pays for every symbol beats the floor", loud(), |r| {
             r.rmse.value >= slack(&r)
         });

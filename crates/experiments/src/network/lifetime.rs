@@ -93,7 +93,7 @@ impl Figure for Lifetime {
         let here = claims.at_defaults();
         claims.all("idle", "no node outlives one that is silent", rows, |r| r.days <= r.idle_days);
         let at = |scheme: &str, setting: &str, period: f64, baseline: f64| {
-            first(&rows, |r| {
+            first(rows, |r| {
                 (r.scheme, r.setting.as_str(), r.period, r.baseline) == (scheme, setting, period, baseline)
                     && r.feedback != "told"
             })

@@ -115,7 +115,7 @@ impl Figure for Models {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let columns = distinct(&rows, |r| r.column.clone());
+        let columns = distinct(rows, |r| r.column.clone());
         let panels = columns.iter().flat_map(|column| {
             let of = |y: fn(&Row) -> f64| {
                 let chosen = rows.iter().filter(|r| r.column == *column);

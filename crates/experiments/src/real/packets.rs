@@ -105,7 +105,7 @@ impl Figure for Packets {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let columns = distinct(&rows, |r| r.column.clone());
+        let columns = distinct(rows, |r| r.column.clone());
         let panel = |column: &String| {
             let curve = |(colour, scheme): (usize, &&'static str)| {
                 let chosen = rows.iter().filter(|r| r.column == *column && r.scheme == *scheme);
