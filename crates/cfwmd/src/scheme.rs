@@ -176,29 +176,11 @@ impl<const D: usize> Message for Prediction<D> {
     type Format = NumberFormat;
 
     fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
-        self.0.mean().iter().try_for_each(|x| format.write(*x, writer))?;
-        (0..D).try_for_each(|i| (0..=i).try_for_each(|j| format.write(self.0.covariance()[(i, j)], writer)))
+        self.0.encode(format, writer)
     }
 
     fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
-        let mut mean = SVector::<f64, D>::zeros();
-        for x in mean.iter_mut() {
-            *x = format.read(reader)?;
-        }
-        let mut covariance = SMatrix::<f64, D, D>::zeros();
-        for i in 0..D {
-            for j in 0..=i {
-                covariance[(i, j)] = format.read(reader)?;
-                covariance[(j, i)] = covariance[(i, j)];
-            }
-        }
-        Gaussian::new(mean, covariance)
-            .map(Self)
-            .map_err(|error| CodecError::Invalid {
-                what: "covariance",
-                value: error.value,
-                expected: "a positive semidefinite matrix",
-            })
+        Gaussian::decode(format, reader).map(Self)
     }
 }
 

@@ -2,11 +2,12 @@
 
 use crate::bits::{BitReader, BitWriter, CodecError};
 use crate::cell::Cell;
+use crate::gaussian::Gaussian;
 use crate::message::Message;
 use fewbits_numerics::error::{ArgumentError, finite, within};
 #[cfg(feature = "serde")]
 use fewbits_numerics::stored;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -194,6 +195,32 @@ impl<const M: usize> Message for SVector<f64, M> {
             *value = format.read(reader)?;
         }
         Ok(vector)
+    }
+}
+
+/// The mean, and the lower triangle of the covariance row by row: `D + D (D + 1)/2` numbers.
+impl<const D: usize> Message for Gaussian<D> {
+    type Format = NumberFormat;
+
+    fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
+        self.mean().encode(format, writer)?;
+        (0..D).try_for_each(|i| (0..=i).try_for_each(|j| format.write(self.covariance()[(i, j)], writer)))
+    }
+
+    fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        let mean = SVector::decode(format, reader)?;
+        let mut covariance = SMatrix::<f64, D, D>::zeros();
+        for i in 0..D {
+            for j in 0..=i {
+                covariance[(i, j)] = format.read(reader)?;
+                covariance[(j, i)] = covariance[(i, j)];
+            }
+        }
+        Self::new(mean, covariance).map_err(|error| CodecError::Invalid {
+            what: "covariance",
+            value: error.value,
+            expected: "a positive semidefinite matrix",
+        })
     }
 }
 

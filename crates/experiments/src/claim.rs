@@ -11,7 +11,9 @@ use crate::measured::Measured;
 use crate::reference;
 use crate::table::Value;
 use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
 use std::fmt;
+use std::rc::Rc;
 
 /// Whether a claim held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,20 +82,6 @@ pub struct Claim {
     pub(crate) absent: bool,
 }
 
-impl Claim {
-    /// The claim is made for the figure's own parameters only; skipped after `--set`.
-    pub fn at_defaults(&mut self) -> &mut Self {
-        self.at_defaults = true;
-        self
-    }
-
-    /// The claim can only be decided at the full trial count; skipped with fewer trials.
-    pub fn at_full_trials(&mut self) -> &mut Self {
-        self.full_effort = true;
-        self
-    }
-}
-
 /// A text, owned or not.
 pub trait Text: Into<String> {}
 impl<T: Into<String>> Text for T {}
@@ -102,39 +90,24 @@ impl<T: Into<String>> Text for T {}
 pub trait Maybe<T = f64>: Into<Option<T>> {}
 impl<T, V: Into<Option<T>>> Maybe<T> for V {}
 
-/// Claims that were made together.
-pub struct Group<'a>(&'a mut [Claim]);
-
-impl Group<'_> {
-    /// They are undecided with fewer trials than the paper's: what they compare is no plain average of trials.
-    pub fn at_full_trials(self) -> Self {
-        self.0.iter_mut().for_each(|claim| claim.full_effort = true);
-        self
-    }
-
-    /// They speak of the figure's own parameters only.
-    pub fn at_defaults(self) -> Self {
-        self.0.iter_mut().for_each(|claim| claim.at_defaults = true);
-        self
-    }
-}
-
 macro_rules! comparisons {
     ($($name:ident $operator:tt),*) => {$(
         #[doc = concat!("`value ", stringify!($operator), " bound`.")]
-        pub fn $name(&mut self, id: impl Text, statement: impl Text, value: impl Maybe, bound: f64) -> &mut Claim {
+        pub fn $name(&self, id: impl Text, statement: impl Text, value: impl Maybe, bound: f64) {
             let condition = Expected::of(format_args!(concat!(stringify!($operator), " {}"), bound));
-            self.decide(id, statement, value.into(), condition, |v| v $operator bound)
+            self.decide(id, statement, value.into(), condition, |v| v $operator bound);
         }
     )*};
 }
 
-/// The claims of one figure as they are made. Every method adds one claim (or one for each reference) and returns it, so that
-/// it can be limited: `claims.near(...).at_defaults()`.
+/// The claims of one figure as they are made. Every method adds one claim (or one for each reference); those made through
+/// [`Claims::at_defaults`] or [`Claims::at_full_trials`] are limited.
 #[derive(Debug, Clone)]
 pub struct Claims {
     figure: &'static str,
-    made: Vec<Claim>,
+    made: Rc<RefCell<Vec<Claim>>>,
+    at_defaults: bool,
+    full_effort: bool,
 }
 
 impl Claims {
@@ -142,107 +115,113 @@ impl Claims {
     pub fn about(figure: &'static str) -> Self {
         Self {
             figure,
-            made: Vec::new(),
+            made: Rc::default(),
+            at_defaults: false,
+            full_effort: false,
         }
     }
 
-    /// All claims made so far.
-    pub fn so_far(&mut self) -> Group<'_> {
-        Group(&mut self.made)
+    /// What is claimed through this is made for the figure's own parameters only; skipped after `--set`.
+    pub fn at_defaults(&self) -> Self {
+        Self {
+            at_defaults: true,
+            ..self.clone()
+        }
+    }
+
+    /// What is claimed through this can only be decided at the full trial count, skipped with fewer trials: what it compares is
+    /// no plain average of trials.
+    pub fn at_full_trials(&self) -> Self {
+        Self {
+            full_effort: true,
+            ..self.clone()
+        }
     }
 
     fn decide(
-        &mut self,
+        &self,
         id: impl Text,
         statement: impl Text,
         value: Option<f64>,
         expected: Expected,
         holds: impl FnOnce(f64) -> bool,
-    ) -> &mut Claim {
+    ) {
         let verdict = match value {
             Some(value) if value.is_finite() && holds(value) => Verdict::Pass,
             _ => Verdict::Fail,
         };
-        self.made.push(Claim {
+        self.made.borrow_mut().push(Claim {
             id: id.into(),
             statement: statement.into(),
             verdict,
             value: value.unwrap_or(f64::NAN),
             expected,
             tolerance: None,
-            at_defaults: false,
-            full_effort: false,
+            at_defaults: self.at_defaults,
+            full_effort: self.full_effort,
             absent: value.is_none(),
         });
-        let last = self.made.len() - 1;
-        &mut self.made[last]
     }
 
     /// Every row satisfies `holds`; the value is the number of rows that do not. No rows: nothing was shown.
     pub fn all<R>(
-        &mut self,
+        &self,
         id: impl Text,
         statement: impl Text,
         rows: impl IntoIterator<Item = R>,
         holds: impl Fn(R) -> bool,
-    ) -> &mut Claim {
+    ) {
         let (mut rows, mut broken) = (rows.into_iter().peekable(), 0.0);
         let any = rows.peek().is_some();
         for row in rows {
             broken += f64::from(u8::from(!holds(row)));
         }
-        self.decide(id, statement, any.then_some(broken), Expected::none_broken(), |v| v == 0.0)
+        self.decide(id, statement, any.then_some(broken), Expected::none_broken(), |v| v == 0.0);
     }
 
     /// `|value - expected| <= tolerance`.
-    pub fn near(
-        &mut self,
-        id: impl Text,
-        statement: impl Text,
-        value: impl Maybe,
-        expected: f64,
-        tolerance: f64,
-    ) -> &mut Claim {
+    pub fn near(&self, id: impl Text, statement: impl Text, value: impl Maybe, expected: f64, tolerance: f64) {
         let number = Expected::Number(expected);
-        let claim = self.decide(id, statement, value.into(), number, |v| (v - expected).abs() <= tolerance);
-        claim.tolerance = Some(tolerance);
-        claim
+        self.decide(id, statement, value.into(), number, |v| (v - expected).abs() <= tolerance);
+        if let Some(claim) = self.made.borrow_mut().last_mut() {
+            claim.tolerance = Some(tolerance);
+        }
     }
 
     comparisons! { at_most <=, at_least >=, below <, above > }
 
     /// Each value is strictly smaller than the next; the value is the number of neighbours that are not. At least two values.
     pub fn increasing<V: Into<Option<f64>>>(
-        &mut self,
+        &self,
         id: impl Text,
         statement: impl Text,
         values: impl IntoIterator<Item = V>,
-    ) -> &mut Claim {
+    ) {
         let values: Option<Vec<f64>> = values.into_iter().map(Into::into).collect();
         let values = values.filter(|v| v.len() > 1);
         let broken = values.map(|v| v.windows(2).filter(|pair| !increases(pair[0], pair[1])).count() as f64);
-        self.decide(id, statement, broken, Expected::none_broken(), |v| v == 0.0)
+        self.decide(id, statement, broken, Expected::none_broken(), |v| v == 0.0);
     }
 
     /// Each value is strictly larger than the next.
     pub fn decreasing<V: Into<Option<f64>>>(
-        &mut self,
+        &self,
         id: impl Text,
         statement: impl Text,
         values: impl IntoIterator<Item = V>,
-    ) -> &mut Claim {
-        self.increasing(id, statement, values.into_iter().map(|v| v.into().map(|v: f64| -v)))
+    ) {
+        self.increasing(id, statement, values.into_iter().map(|v| v.into().map(|v: f64| -v)));
     }
 
     /// The estimate is within `errors` of its standard errors of `expected`; the value is its deviation in standard errors.
     pub fn within(
-        &mut self,
+        &self,
         id: impl Text,
         statement: impl Text,
         estimate: impl Maybe<Measured>,
         expected: f64,
         errors: f64,
-    ) -> &mut Claim {
+    ) {
         let z = estimate.into().and_then(|e| e.z_score(expected));
         self.decide(
             id,
@@ -250,19 +229,19 @@ impl Claims {
             z,
             Expected::of(format_args!("{} within {errors} standard errors", Value::Number(expected))),
             |z| z.abs() <= errors,
-        )
+        );
     }
 
     /// Every row's estimate is within `errors` of its standard errors of the row's expectation; the value is the largest
     /// deviation in standard errors.
     pub fn all_within<R>(
-        &mut self,
+        &self,
         id: impl Text,
         statement: impl Text,
         rows: impl IntoIterator<Item = R>,
         pair: impl Fn(R) -> (Measured, f64),
         errors: f64,
-    ) -> &mut Claim {
+    ) {
         let scores = rows
             .into_iter()
             .map(pair)
@@ -270,68 +249,56 @@ impl Claims {
         let scores: Option<Vec<f64>> = scores.map(|z| z.map(f64::abs)).collect();
         // NaN must survive: `f64::max` would drop it.
         let worst = scores.and_then(|z| z.into_iter().reduce(|a, b| if a.is_nan() || a >= b { a } else { b }));
-        self.decide(id, statement, worst, Expected::of(format_args!("<= {errors} standard errors")), |z| z <= errors)
+        self.decide(id, statement, worst, Expected::of(format_args!("<= {errors} standard errors")), |z| z <= errors);
     }
 
     /// The (paired) difference is negative by at least `errors` of its standard errors: the first is smaller than the second.
-    pub fn less(
-        &mut self,
-        id: impl Text,
-        statement: impl Text,
-        difference: impl Maybe<Measured>,
-        errors: f64,
-    ) -> &mut Claim {
+    pub fn less(&self, id: impl Text, statement: impl Text, difference: impl Maybe<Measured>, errors: f64) {
         let z = difference.into().and_then(|d| d.z_score(0.0));
-        self.decide(id, statement, z, Expected::of(format_args!("< -{errors} standard errors")), |z| z < -errors)
+        self.decide(id, statement, z, Expected::of(format_args!("< -{errors} standard errors")), |z| z < -errors);
     }
 
     /// One claim for each reference `<figure>/<quantity>/<key>`: the row of that key has that value, within the reference's
     /// tolerance or, where it has a standard error, within four combined standard errors. A reference whose row is absent
     /// fails. References hold at the paper's setting only.
     pub fn references<R, V: Cell>(
-        &mut self,
+        &self,
         quantity: &str,
         statement: &str,
         rows: impl IntoIterator<Item = R>,
         key_and_value: impl Fn(R) -> (String, V),
-    ) -> Group<'_> {
+    ) {
         let rows = rows.into_iter().map(key_and_value).collect();
-        self.against_references(quantity, statement, rows, false)
+        self.against_references(quantity, statement, rows, false);
     }
 
     /// The same where less is better and the other program is not known to be the best: no row is above its reference by more
     /// than the tolerance and four combined standard errors.
     pub fn references_at_most<R, V: Cell>(
-        &mut self,
+        &self,
         quantity: &str,
         statement: &str,
         rows: impl IntoIterator<Item = R>,
         key_and_value: impl Fn(R) -> (String, V),
-    ) -> Group<'_> {
+    ) {
         let rows = rows.into_iter().map(key_and_value).collect();
-        self.against_references(quantity, statement, rows, true)
+        self.against_references(quantity, statement, rows, true);
     }
 
-    fn against_references<V: Cell>(
-        &mut self,
-        quantity: &str,
-        statement: &str,
-        rows: Vec<(String, V)>,
-        one_sided: bool,
-    ) -> Group<'_> {
-        let first = self.made.len();
+    fn against_references<V: Cell>(&self, quantity: &str, statement: &str, rows: Vec<(String, V)>, one_sided: bool) {
         let known = match reference::group(self.figure, quantity) {
             Ok(known) if !known.is_empty() => known,
             Ok(_) => {
                 let empty = "there are references of that name";
                 self.at_least(format!("{quantity}-references"), empty, 0.0, 1.0);
-                return Group(&mut self.made[first..]);
+                return;
             }
             Err(error) => {
                 self.decide(format!("{quantity}-references"), error, None, Expected::of("to be read"), |_| false);
-                return Group(&mut self.made[first..]);
+                return;
             }
         };
+        let here = self.at_defaults();
         for (key, known) in known {
             let found = rows.iter().find(|(name, _)| name == key);
             let found = found.and_then(|(_, value)| value.measured());
@@ -342,19 +309,17 @@ impl Claims {
             let number = found.map(|found| found.value);
             if one_sided {
                 let statement = format!("{statement}: no more than the reference {}", known.value);
-                self.at_most(id, statement, number, known.value + tolerance)
-                    .at_defaults();
+                here.at_most(id, statement, number, known.value + tolerance);
             } else {
-                self.near(id, statement, number, known.value, tolerance).at_defaults();
+                here.near(id, statement, number, known.value, tolerance);
             }
         }
-        Group(&mut self.made[first..])
     }
 
     /// The claims with the verdicts of a run: undecided ones are skipped.
     pub(crate) fn judged(self, defaults: bool, full_effort: bool) -> Vec<Claim> {
         let undecided = |c: &Claim| ((c.at_defaults || c.absent) && !defaults) || (c.full_effort && !full_effort);
-        let mut judged = self.made;
+        let mut judged = self.made.take();
         let open = judged.iter_mut().filter(|claim| undecided(claim));
         open.for_each(|claim| claim.verdict = Verdict::Skipped);
         judged
@@ -387,6 +352,16 @@ impl Cell for Measured {
     }
 }
 
+/// The first number over the second, where both are there.
+pub fn over(first: impl Cell, second: impl Cell) -> Option<f64> {
+    Some(first.measured()?.value / second.measured()?.value)
+}
+
+/// The first number minus the second, where both are there.
+pub fn minus(first: impl Cell, second: impl Cell) -> Option<f64> {
+    Some(first.measured()?.value - second.measured()?.value)
+}
+
 impl<T: Cell> Cell for Option<T> {
     fn measured(&self) -> Option<Measured> {
         self.as_ref()?.measured()
@@ -397,9 +372,9 @@ impl<T: Cell> Cell for Option<T> {
 mod tests {
     use super::*;
 
-    fn verdict(make: impl FnOnce(&mut Claims)) -> Verdict {
-        let mut claims = Claims::about("demo-fig1");
-        make(&mut claims);
+    fn verdict(make: impl FnOnce(&Claims)) -> Verdict {
+        let claims = Claims::about("demo-fig1");
+        make(&claims);
         let judged = claims.judged(true, true);
         assert!(!judged.is_empty());
         if judged.iter().all(|c| c.verdict == Verdict::Pass) {
@@ -408,8 +383,6 @@ mod tests {
             Verdict::Fail
         }
     }
-
-    fn done(_: &mut Claim) {}
 
     fn measured(value: f64, error: f64) -> Measured {
         Measured {
@@ -421,30 +394,24 @@ mod tests {
     /// Every kind: an example that holds, one that does not, and one about nothing.
     #[test]
     fn every_kind_can_hold_and_can_fail() {
-        type Make = fn(&mut Claims, usize);
+        type Make = fn(&Claims, usize);
         const NONE: Option<f64> = None;
         let kinds: [(&str, Make); 11] = [
-            ("all", |c, i| done(c.all("x", "", [vec![1, 2], vec![1, -2], vec![]][i].iter(), |v| *v > 0))),
-            ("near", |c, i| done(c.near("x", "", [Some(1.05), Some(1.2), NONE][i], 1.0, 0.1))),
-            ("at_most", |c, i| done(c.at_most("x", "", [Some(1.0), Some(1.1), NONE][i], 1.0))),
-            ("at_least", |c, i| done(c.at_least("x", "", [Some(1.0), Some(0.9), NONE][i], 1.0))),
-            ("below", |c, i| done(c.below("x", "", [Some(0.9), Some(1.0), NONE][i], 1.0))),
-            ("above", |c, i| done(c.above("x", "", [Some(1.1), Some(1.0), NONE][i], 1.0))),
-            ("increasing", |c, i| {
-                done(c.increasing("x", "", [vec![1.0, 2.0], vec![1.0, 1.0], vec![1.0]][i].clone()))
-            }),
-            ("decreasing", |c, i| {
-                done(c.decreasing("x", "", [vec![2.0, 1.0], vec![1.0, 1.0], vec![]][i].clone()))
-            }),
+            ("all", |c, i| c.all("x", "", [vec![1, 2], vec![1, -2], vec![]][i].iter(), |v| *v > 0)),
+            ("near", |c, i| c.near("x", "", [Some(1.05), Some(1.2), NONE][i], 1.0, 0.1)),
+            ("at_most", |c, i| c.at_most("x", "", [Some(1.0), Some(1.1), NONE][i], 1.0)),
+            ("at_least", |c, i| c.at_least("x", "", [Some(1.0), Some(0.9), NONE][i], 1.0)),
+            ("below", |c, i| c.below("x", "", [Some(0.9), Some(1.0), NONE][i], 1.0)),
+            ("above", |c, i| c.above("x", "", [Some(1.1), Some(1.0), NONE][i], 1.0)),
+            ("increasing", |c, i| c.increasing("x", "", [vec![1.0, 2.0], vec![1.0, 1.0], vec![1.0]][i].clone())),
+            ("decreasing", |c, i| c.decreasing("x", "", [vec![2.0, 1.0], vec![1.0, 1.0], vec![]][i].clone())),
             ("within", |c, i| {
-                done(c.within("x", "", [Some(measured(1.3, 0.1)), Some(measured(1.5, 0.1)), None][i], 1.0, 4.0))
+                c.within("x", "", [Some(measured(1.3, 0.1)), Some(measured(1.5, 0.1)), None][i], 1.0, 4.0)
             }),
-            ("less", |c, i| {
-                done(c.less("x", "", [Some(measured(-0.4, 0.1)), Some(measured(-0.2, 0.1)), None][i], 3.0))
-            }),
+            ("less", |c, i| c.less("x", "", [Some(measured(-0.4, 0.1)), Some(measured(-0.2, 0.1)), None][i], 3.0)),
             ("all_within", |c, i| {
                 let rows = [vec![1.3], vec![1.0, 1.5], vec![]];
-                done(c.all_within("x", "", &rows[i], |r| (measured(*r, 0.1), 1.0), 4.0))
+                c.all_within("x", "", &rows[i], |r| (measured(*r, 0.1), 1.0), 4.0)
             }),
         ];
         for (kind, make) in kinds {
@@ -457,26 +424,26 @@ mod tests {
     #[test]
     fn what_is_not_finite_fails_every_kind() {
         let nan = f64::NAN;
-        assert_eq!(verdict(|c| done(c.near("x", "", nan, 0.0, 1.0))), Verdict::Fail);
-        assert_eq!(verdict(|c| done(c.at_most("x", "", f64::NEG_INFINITY, 1.0))), Verdict::Fail);
-        assert_eq!(verdict(|c| done(c.increasing("x", "", [0.0, nan, 1.0]))), Verdict::Fail);
-        assert_eq!(verdict(|c| done(c.within("x", "", measured(nan, 1.0), 0.0, 4.0))), Verdict::Fail);
+        assert_eq!(verdict(|c| c.near("x", "", nan, 0.0, 1.0)), Verdict::Fail);
+        assert_eq!(verdict(|c| c.at_most("x", "", f64::NEG_INFINITY, 1.0)), Verdict::Fail);
+        assert_eq!(verdict(|c| c.increasing("x", "", [0.0, nan, 1.0])), Verdict::Fail);
+        assert_eq!(verdict(|c| c.within("x", "", measured(nan, 1.0), 0.0, 4.0)), Verdict::Fail);
         let rows = [measured(nan, 1.0), measured(0.0, 1.0)];
-        assert_eq!(verdict(|c| done(c.all_within("x", "", rows, |r| (r, 0.0), 4.0))), Verdict::Fail);
+        assert_eq!(verdict(|c| c.all_within("x", "", rows, |r| (r, 0.0), 4.0)), Verdict::Fail);
         // A single trial has no standard error and shows nothing.
         let single = Measured {
             value: 1.0,
             standard_error: None,
         };
-        assert_eq!(verdict(|c| done(c.within("x", "", single, 0.9, 4.0))), Verdict::Fail);
+        assert_eq!(verdict(|c| c.within("x", "", single, 0.9, 4.0)), Verdict::Fail);
     }
 
     #[test]
     fn undecided_claims_are_skipped() {
         let of = |defaults, full| {
-            let mut claims = Claims::about("demo-fig1");
-            claims.near("a", "", 0.0, 1.0, 0.1).at_defaults();
-            claims.near("b", "", 0.0, 1.0, 0.1).at_full_trials();
+            let claims = Claims::about("demo-fig1");
+            claims.at_defaults().near("a", "", 0.0, 1.0, 0.1);
+            claims.at_full_trials().near("b", "", 0.0, 1.0, 0.1);
             claims.near("c", "", None, 1.0, 0.1);
             claims
                 .judged(defaults, full)
@@ -493,7 +460,7 @@ mod tests {
     #[test]
     fn references_are_found_by_key_and_fail_where_the_row_is_absent_or_off() {
         let judge = |rows: Vec<(&str, f64)>| {
-            let mut claims = Claims::about("mi-table4-3");
+            let claims = Claims::about("mi-table4-3");
             claims.references("mse", "squared error", rows, |(key, value)| (key.to_owned(), value));
             let of = |c: Claim| (c.id == "mse/lloyd-x").then_some(c.verdict);
             claims.judged(true, true).into_iter().find_map(of).unwrap()
@@ -502,7 +469,7 @@ mod tests {
         assert_eq!(judge(vec![("lloyd-x", 0.130_487)]), Verdict::Fail);
         assert_eq!(judge(vec![("other", 0.130_486_15)]), Verdict::Fail);
         let one_sided = |value: f64| {
-            let mut claims = Claims::about("mi-table4-3");
+            let claims = Claims::about("mi-table4-3");
             claims.references_at_most("mse", "squared error", [value], |value| ("lloyd-x".to_owned(), Some(value)));
             let of = |c: Claim| (c.id == "mse/lloyd-x").then_some(c.verdict);
             claims.judged(true, true).into_iter().find_map(of).unwrap()
@@ -512,7 +479,7 @@ mod tests {
         assert_eq!(
             verdict(|c| {
                 let of = |v: f64| (String::new(), v);
-                c.references("nothing", "", [1.0], of).at_full_trials();
+                c.at_full_trials().references("nothing", "", [1.0], of);
             }),
             Verdict::Fail
         );

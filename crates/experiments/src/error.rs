@@ -92,6 +92,7 @@ macro_rules! wrapped {
     };
 }
 wrapped!(
+    fewbits_adaptive,
     fewbits_binary_patterns,
     fewbits_core,
     fewbits_densities,
@@ -103,23 +104,22 @@ wrapped!(
     fewbits_sensor_assignment
 );
 
-impl From<fewbits_adaptive::Error> for Error {
-    fn from(error: fewbits_adaptive::Error) -> Self {
-        match error {
-            fewbits_adaptive::Error::Argument(argument) => Self::Argument(argument),
-            other => Self::failed(other),
-        }
-    }
+/// The error of a crate below, whatever it is.
+macro_rules! failed {
+    ($($error:ty),+ $(,)?) => {
+        $(impl From<$error> for Error {
+            fn from(error: $error) -> Self {
+                Self::failed(error)
+            }
+        })+
+    };
 }
-
-impl From<fewbits_dymbo::Error> for Error {
-    fn from(error: fewbits_dymbo::Error) -> Self {
-        Self::failed(error)
-    }
-}
-
-impl From<fewbits_filters::Error> for Error {
-    fn from(error: fewbits_filters::Error) -> Self {
-        Self::failed(error)
-    }
-}
+failed!(
+    fewbits_cfwmd::Error,
+    fewbits_core::CodecError,
+    fewbits_diffusive::Error,
+    fewbits_dymbo::Error,
+    fewbits_filters::Error,
+    fewbits_network::Error,
+    fewbits_topology::Error
+);

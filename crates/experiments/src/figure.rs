@@ -26,6 +26,24 @@ pub struct About {
     pub source: &'static str,
 }
 
+impl About {
+    /// A figure's id, its title, and where in the publications it comes from.
+    pub const fn of(id: &'static str, title: &'static str, source: &'static str) -> Self {
+        Self {
+            id,
+            title,
+            caption: "",
+            source,
+        }
+    }
+
+    /// With this caption.
+    #[must_use]
+    pub const fn showing(self, caption: &'static str) -> Self {
+        Self { caption, ..self }
+    }
+}
+
 /// Reads a text file of the user's by its name.
 pub type ReadFile<'a> = dyn Fn(&str) -> std::io::Result<String> + Sync + 'a;
 
@@ -103,6 +121,11 @@ pub struct Cost {
 }
 
 impl Cost {
+    /// So many seconds on one core and bytes at the peak.
+    pub fn new(seconds: f64, bytes: f64) -> Self {
+        Self { seconds, bytes }
+    }
+
     /// More is refused: a day on one core, 2 GB.
     const LIMIT: Self = Self {
         seconds: 86_400.0,
@@ -110,23 +133,31 @@ impl Cost {
     };
 }
 
+/// Parameters that `--quick` lowers.
+pub trait Quick {
+    /// Reduces effort: the whole figure should then take about a second. The default changes nothing.
+    fn quicken(&mut self) {}
+}
+
 /// A figure or table of a publication, or one of our own: parameters in, rows out, and the claims they must meet.
 ///
 /// A parameter named `trials` or ending in `_trials` is effort: lowering it leaves the meaning of the figure and skips the
 /// claims that need the full count.
 pub trait Figure: Sync {
-    /// A flat struct whose `Default` is the paper's setting, and whose fields have documentation and ranges (`garde`). Derive
-    /// `Serialize, Deserialize, JsonSchema, Validate` and `#[serde(deny_unknown_fields)]`.
-    type Parameters: Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Default;
+    /// A flat struct whose `Default` is the paper's setting, and whose fields have documentation and ranges (`garde`):
+    /// [`parameters!`](crate::parameters!) writes it.
+    type Parameters: Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Default + Quick;
 
     /// `Vec<Row>`, or a struct of such lists (the first is the main table): see [`Tables::of`].
     type Tables: Serialize + JsonSchema;
 
-    /// What stands above the figure.
-    fn about(&self) -> About;
+    /// What stands above the figure, unless [`Figure::about`] says so of each value of the type.
+    const ABOUT: About = About::of("", "", "");
 
-    /// Reduces effort for `--quick`: the whole figure should then take about a second. The default changes nothing.
-    fn quicken(&self, _parameters: &mut Self::Parameters) {}
+    /// What stands above the figure.
+    fn about(&self) -> About {
+        Self::ABOUT
+    }
 
     /// Parameters without effect under these values: setting one is refused.
     fn idle(&self, _parameters: &Self::Parameters) -> Vec<&'static str> {
@@ -240,7 +271,7 @@ impl<F: Figure> AnyFigure for F {
         let figure = Figure::about(self).id;
         let mut start = F::Parameters::default();
         if quick {
-            self.quicken(&mut start);
+            start.quicken();
         }
         let mut settings = Settings::new(figure, parameters::map(&start), AnyFigure::parameters(self));
         for (name, text) in overrides {

@@ -11,6 +11,9 @@
 //!
 //! Not here: printing, files, the command line, drawing.
 
+#[macro_use]
+mod fields;
+
 pub mod assign;
 pub mod binary;
 pub mod cfwmd;
@@ -35,7 +38,7 @@ mod table;
 
 pub use claim::{Claim, Claims, Expected, Verdict};
 pub use error::Error;
-pub use figure::{About, AnyFigure, Context, Cost, Figure, Outcome};
+pub use figure::{About, AnyFigure, Context, Cost, Figure, Outcome, Quick};
 pub use measured::Measured;
 pub use schema::{Fields, Parameter, plain};
 pub use sweep::{Comparison, Tally};

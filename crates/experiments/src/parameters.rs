@@ -12,6 +12,11 @@ pub(crate) fn is_effort(name: &str) -> bool {
     name == "trials" || name.ends_with("_trials")
 }
 
+/// Refuses a parameter for this reason where the condition does not hold.
+pub(crate) fn accept(holds: bool, reason: impl FnOnce() -> String) -> garde::Result {
+    holds.then_some(()).ok_or_else(|| garde::Error::new(reason()))
+}
+
 /// Whether these parameters are the defaults (but for effort), and whether effort is not below the defaults.
 pub(crate) fn meaning(map: &Map<String, Json>, defaults: &Map<String, Json>) -> (bool, bool) {
     let (effort, setting): (Vec<_>, Vec<_>) = map.iter().partition(|(name, _)| is_effort(name));

@@ -106,6 +106,23 @@ impl Axis {
         }
     }
 
+    /// Categories at 0, 1, 2, ...
+    pub fn categories<N: Into<String>>(label: impl Into<String>, names: impl IntoIterator<Item = N>) -> Self {
+        let named: Vec<_> = (0..).map(f64::from).zip(names.into_iter().map(Into::into)).collect();
+        let end = named.len() as f64 - 0.4;
+        Self::linear(label).named(named).between(-0.6, end)
+    }
+
+    /// Categories from the top downwards, at 0, -1, -2, ...
+    pub fn ladder<N: Into<String>>(names: impl IntoIterator<Item = N>) -> Self {
+        let named: Vec<_> = (0..)
+            .map(|i: i32| f64::from(-i))
+            .zip(names.into_iter().map(Into::into))
+            .collect();
+        let end = 0.6 - named.len() as f64;
+        Self::linear("").named(named).between(end, 0.6)
+    }
+
     /// Names places: category axes.
     #[must_use]
     pub fn named(self, names: impl IntoIterator<Item = (f64, String)>) -> Self {
@@ -270,6 +287,12 @@ impl Layer {
         Self::points(label, points).with_errors(errors)
     }
 
+    /// A line through markers with error bars, in one colour.
+    pub fn curve(label: impl Into<String>, colour: usize, marks: Vec<(f64, Measured)>) -> [Self; 2] {
+        let line = Self::line(label, points(&marks, |(x, y)| (*x, y.value)));
+        [line, Self::measured("", marks, |mark| mark)].map(|layer| layer.coloured(colour))
+    }
+
     /// Vertical bars.
     pub fn bars(label: impl Into<String>, points: Vec<(f64, f64)>, width: f64) -> Self {
         Self::new(label, Shape::Bars { points, width })
@@ -313,6 +336,12 @@ impl Layer {
             colour: Some(colour),
             ..self
         }
+    }
+
+    /// Fixes colour and marker.
+    #[must_use]
+    pub fn styled(self, colour: usize, with: Marker) -> Self {
+        self.coloured(colour).marked(with)
     }
 
     /// Writes the label at the curve and not in the legend: contours.
@@ -365,6 +394,26 @@ impl Panel {
             layers: Vec::new(),
             legend: true,
         }
+    }
+
+    /// An empty panel of two linear axes.
+    pub fn linear(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self::new(title, Axis::linear(x), Axis::linear(y))
+    }
+
+    /// An empty panel, its vertical axis logarithmic.
+    pub fn semilog(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self::new(title, Axis::linear(x), Axis::log(y))
+    }
+
+    /// An empty panel, its horizontal axis logarithmic.
+    pub fn log_x(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self::new(title, Axis::log(x), Axis::linear(y))
+    }
+
+    /// An empty panel, both axes logarithmic.
+    pub fn loglog(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
+        Self::new(title, Axis::log(x), Axis::log(y))
     }
 
     /// Adds a layer.

@@ -116,6 +116,27 @@ impl Context<'_> {
     }
 }
 
+/// The first row of which this holds.
+pub fn first<R>(rows: &[R], is: impl Fn(&R) -> bool) -> Option<&R> {
+    rows.iter().find(|row| is(row))
+}
+
+/// The rows of which this holds.
+pub fn select<R>(rows: &[R], is: impl Fn(&R) -> bool) -> impl Iterator<Item = &R> {
+    rows.iter().filter(move |row| is(row))
+}
+
+/// Distinct entries in order of appearance.
+pub fn distinct<R, K: PartialEq>(rows: &[R], key: impl Fn(&R) -> K) -> Vec<K> {
+    let mut seen = Vec::new();
+    for key in rows.iter().map(key) {
+        if !seen.contains(&key) {
+            seen.push(key);
+        }
+    }
+    seen
+}
+
 /// All trials of all schemes at one point: `K` numbers each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison<const K: usize> {

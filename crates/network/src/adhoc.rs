@@ -2,7 +2,7 @@
 
 use crate::clock::Clock;
 use crate::error::Error;
-use crate::estimator::Replicable;
+use crate::estimator::{Replicable, check_measurements};
 use crate::exchange::{Arrived, own, predict, settle};
 use crate::field::Field;
 use crate::frame::{Frame, Kind, digest, stored};
@@ -11,7 +11,6 @@ use crate::simulator::{Context, Protocol, Setup, Simulator};
 use crate::units::SensorId;
 use fewbits_core::{BitString, Message};
 use fewbits_monte_carlo::Stream;
-use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
 const ANCHOR: SensorId = SensorId(0);
@@ -96,15 +95,8 @@ impl<E: Replicable> AdHoc<E> {
         beacon: u32,
         stream: Stream,
     ) -> Result<Self, Error> {
-        let sensors = estimator.sensors();
         fewbits_numerics::error::at_least_one("beacon", beacon as usize)?;
-        if let Some(slot) = measurements.iter().find(|slot| slot.len() != sensors) {
-            let expected = format!("{sensors} in every slot, one per sensor");
-            return Err(ArgumentError::new("measurements", slot.len(), expected).into());
-        }
-        if measurements.len() >= 1 << 29 {
-            return Err(ArgumentError::new("measurements", measurements.len(), "fewer than 2^29 slots").into());
-        }
+        check_measurements(estimator.sensors(), &measurements)?;
         Ok(Self {
             estimator,
             measurements,

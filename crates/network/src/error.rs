@@ -1,68 +1,63 @@
 //! Errors of this crate.
 
 use fewbits_core::CodecError;
-use fewbits_numerics::ArgumentError;
-use thiserror::Error;
 
-/// What the simulated network refuses.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// An argument outside its range.
-    #[error(transparent)]
-    Argument(#[from] ArgumentError),
-    /// A node that does not exist.
-    #[error("node {node} does not exist: the network has {nodes} nodes")]
-    UnknownNode {
-        /// Its index.
-        node: usize,
-        /// Number of nodes.
-        nodes: usize,
-    },
-    /// A node that sends to itself.
-    #[error("node {node} sends to itself: expected another node")]
-    SelfLink {
-        /// Its index.
-        node: usize,
-    },
-    /// Two nodes that are not in range of each other.
-    #[error("node {to} is out of range of node {from}")]
-    OutOfRange {
-        /// The sender.
-        from: usize,
-        /// The receiver.
-        to: usize,
-    },
-    /// A network that a protocol needs in one piece.
-    #[error("the network is disconnected: {reached} of {nodes} nodes are reached from node {root}")]
-    Disconnected {
-        /// Where the search began.
-        root: usize,
-        /// Nodes that it reached.
-        reached: usize,
-        /// Number of nodes.
-        nodes: usize,
-    },
-    /// A message that does not fit its format.
-    #[error("message does not fit its format: {0}")]
-    Codec(#[from] CodecError),
-    /// An estimator or scheme failed.
-    #[error("estimator: {0}")]
-    Estimator(String),
-    /// What was observed has probability zero under the belief.
-    #[error("the observation is impossible under the belief")]
-    Impossible,
-    /// A stored log or snapshot that cannot be read or written.
-    #[error("stored run: {0}")]
-    Stored(String),
-    /// A replayed run that left its log.
-    #[error("the run left its log at transmission {transmission}: {difference}")]
-    LeftLog {
-        /// Number of the transmission.
-        transmission: usize,
-        /// What differs.
-        difference: &'static str,
-    },
+fewbits_numerics::errors! {
+    /// What the simulated network refuses.
+    pub enum Error {
+        /// A node that does not exist.
+        #[error("node {node} does not exist: the network has {nodes} nodes")]
+        UnknownNode {
+            /// Its index.
+            node: usize,
+            /// Number of nodes.
+            nodes: usize,
+        },
+        /// A node that sends to itself.
+        #[error("node {node} sends to itself: expected another node")]
+        SelfLink {
+            /// Its index.
+            node: usize,
+        },
+        /// Two nodes that are not in range of each other.
+        #[error("node {to} is out of range of node {from}")]
+        OutOfRange {
+            /// The sender.
+            from: usize,
+            /// The receiver.
+            to: usize,
+        },
+        /// A network that a protocol needs in one piece.
+        #[error("the network is disconnected: {reached} of {nodes} nodes are reached from node {root}")]
+        Disconnected {
+            /// Where the search began.
+            root: usize,
+            /// Nodes that it reached.
+            reached: usize,
+            /// Number of nodes.
+            nodes: usize,
+        },
+        /// A message that does not fit its format.
+        #[error("message does not fit its format: {0}")]
+        Codec(#[from] CodecError),
+        /// An estimator or scheme failed.
+        #[error("estimator: {0}")]
+        Estimator(String),
+        /// What was observed has probability zero under the belief.
+        #[error("the observation is impossible under the belief")]
+        Impossible,
+        /// A stored log or snapshot that cannot be read or written.
+        #[error("stored run: {0}")]
+        Stored(String),
+        /// A replayed run that left its log.
+        #[error("the run left its log at transmission {transmission}: {difference}")]
+        LeftLog {
+            /// Number of the transmission.
+            transmission: usize,
+            /// What differs.
+            difference: &'static str,
+        },
+    }
 }
 
 impl From<fewbits_topology::Error> for Error {

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use fewbits_core::{BitReader, BitString, BitWriter, CodecError, Gaussian, Message, NumberFormat, Observation};
-use nalgebra::{SMatrix, SVector};
+use fewbits_numerics::error::refuse;
 use rand_pcg::Pcg64Dxsm;
 
 /// Sensors that report, and a receiver that estimates: slot by slot.
@@ -99,14 +99,23 @@ pub trait Replicable: Estimator {
     fn belief_of(&self, bits: &BitString) -> Result<Self::Belief, Error>;
 }
 
+/// One measurement for each sensor in every slot, and slots that a frame can number.
+pub(crate) fn check_measurements<M>(sensors: usize, measurements: &[Vec<M>]) -> Result<(), Error> {
+    if let Some(slot) = measurements.iter().find(|slot| slot.len() != sensors) {
+        return refuse("measurements", slot.len(), format!("{sensors} in every slot, one per sensor"));
+    }
+    if measurements.len() >= 1 << 29 {
+        return refuse("measurements", measurements.len(), "fewer than 2^29 slots");
+    }
+    Ok(())
+}
+
 /// A belief that is sent whole: `D` means and `D (D + 1)/2` covariances in double precision.
 ///
 /// # Errors
 /// If a number is not finite.
 pub fn gaussian_bits<const D: usize>(belief: &Gaussian<D>, writer: &mut BitWriter) -> Result<(), CodecError> {
-    let format = NumberFormat::Double;
-    belief.mean().iter().try_for_each(|x| format.write(*x, writer))?;
-    (0..D).try_for_each(|i| (0..=i).try_for_each(|j| format.write(belief.covariance()[(i, j)], writer)))
+    belief.encode(&NumberFormat::Double, writer)
 }
 
 /// Reads what [`gaussian_bits`] wrote.
@@ -114,23 +123,7 @@ pub fn gaussian_bits<const D: usize>(belief: &Gaussian<D>, writer: &mut BitWrite
 /// # Errors
 /// If bits are missing, a number is not finite, or the covariance is none.
 pub fn gaussian_of<const D: usize>(reader: &mut BitReader<'_>) -> Result<Gaussian<D>, CodecError> {
-    let format = NumberFormat::Double;
-    let mut mean = SVector::<f64, D>::zeros();
-    for x in mean.iter_mut() {
-        *x = format.read(reader)?;
-    }
-    let mut covariance = SMatrix::<f64, D, D>::zeros();
-    for i in 0..D {
-        for j in 0..=i {
-            covariance[(i, j)] = format.read(reader)?;
-            covariance[(j, i)] = covariance[(i, j)];
-        }
-    }
-    Gaussian::new(mean, covariance).map_err(|error| CodecError::Invalid {
-        what: "covariance",
-        value: error.value,
-        expected: "a positive semidefinite matrix",
-    })
+    Gaussian::decode(&NumberFormat::Double, reader)
 }
 
 /// [`Replicable`] for an estimator whose belief is a Gaussian.

@@ -2,7 +2,7 @@
 
 use crate::clock::Clock;
 use crate::error::Error;
-use crate::estimator::{Estimator, Replicable};
+use crate::estimator::{Estimator, Replicable, check_measurements};
 use crate::exchange::{Arrived, echo_bits, echo_of, from_prior, own, predict, settle};
 use crate::field::Field;
 use crate::frame::{Frame, Kind, digest};
@@ -11,7 +11,6 @@ use crate::simulator::{Context, Protocol, Setup, Simulator};
 use crate::units::SensorId;
 use fewbits_core::{BitString, Message};
 use fewbits_monte_carlo::Stream;
-use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
 const CENTRE: SensorId = SensorId(0);
@@ -147,14 +146,7 @@ impl<E: Estimator> Star<E> {
         clock: Clock,
         stream: Stream,
     ) -> Result<Self, Error> {
-        let sensors = estimator.sensors();
-        if let Some(slot) = measurements.iter().find(|slot| slot.len() != sensors) {
-            let expected = format!("{sensors} in every slot, one per sensor");
-            return Err(ArgumentError::new("measurements", slot.len(), expected).into());
-        }
-        if measurements.len() >= 1 << 29 {
-            return Err(ArgumentError::new("measurements", measurements.len(), "fewer than 2^29 slots").into());
-        }
+        check_measurements(estimator.sensors(), &measurements)?;
         Ok(Self {
             estimator,
             measurements,

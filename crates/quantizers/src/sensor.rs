@@ -109,8 +109,7 @@ impl Scheme<1> for QuantizingSensor {
         };
         let word = |symbol: usize| self.labelling.word(symbol).map(u64::from);
         let Some(received) = word(symbol.0) else {
-            return Err(refuse::<()>("symbol", symbol.0, format!("a number below {}", self.labelling.symbols()))
-                .map_or_else(Into::into, |()| fewbits_core::Error::Impossible));
+            return refuse("symbol", symbol.0, format!("a number below {}", self.labelling.symbols()));
         };
         let given_level = |level: usize| {
             let sent = word(level).unwrap_or(received);

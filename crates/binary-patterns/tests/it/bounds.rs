@@ -230,16 +230,7 @@ fn free_breakpoints_beat_the_grid() {
 fn the_posterior_mean_is_biased_at_the_ends() {
     let source = Source::uniform(1.0).unwrap();
     let grid = Grid::uniform(1.0, 3).unwrap();
-    let quantizers: Vec<_> = ["00001111", "00111100", "01100110"]
-        .iter()
-        .map(|p| {
-            p.parse::<fewbits_binary_patterns::Pattern>()
-                .unwrap()
-                .on(&grid)
-                .unwrap()
-        })
-        .collect();
-    let bank = Bank::homogeneous_with_deviation(source, quantizers, source.noise_std(18.2).unwrap()).unwrap();
+    let bank = gray(source, &grid, 18.2);
     let table = bank.table(Decoder::Mmse).unwrap();
     let (bias, _) = table.conditional_error(1.0).unwrap();
     assert!((bias + 0.135).abs() < 5e-4, "{bias}");
@@ -261,16 +252,7 @@ fn vanishing_noise_is_resolved() {
     let grid = Grid::uniform(1.0, 3).unwrap();
     let floor = grid.noiseless_mse(&source);
     for snr in [80.0, 140.0] {
-        let quantizers: Vec<_> = ["00001111", "00111100", "01100110"]
-            .iter()
-            .map(|p| {
-                p.parse::<fewbits_binary_patterns::Pattern>()
-                    .unwrap()
-                    .on(&grid)
-                    .unwrap()
-            })
-            .collect();
-        let bank = Bank::homogeneous_with_deviation(source, quantizers, source.noise_std(snr).unwrap()).unwrap();
+        let bank = gray(source, &grid, snr);
         let mmse = bank.mmse().unwrap();
         assert!((mmse / floor - 1.0).abs() < 2e-4, "{mmse} at {snr} dB");
         assert!(optimal_weight_van_trees(&bank).unwrap() <= mmse * (1.0 + 1e-9));
@@ -278,4 +260,11 @@ fn vanishing_noise_is_resolved() {
             assert!((bank.mse(decoder).unwrap() / floor - 1.0).abs() < 2e-4);
         }
     }
+}
+
+/// Three Gray patterns on a grid.
+fn gray(source: Source, grid: &Grid, snr: f64) -> Bank {
+    let on = |p: &str| p.parse::<fewbits_binary_patterns::Pattern>().unwrap().on(grid).unwrap();
+    let quantizers = ["00001111", "00111100", "01100110"].map(on).to_vec();
+    Bank::homogeneous_with_deviation(source, quantizers, source.noise_std(snr).unwrap()).unwrap()
 }

@@ -1,5 +1,6 @@
 //! Every entry of the fixture file, computed by independent programs, against the library.
 
+use crate::entry::{Entry, check};
 use fewbits_binary_patterns::baselines::{
     AdaptiveErrors, AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound,
 };
@@ -10,17 +11,8 @@ use fewbits_binary_patterns::search::{LinearSearch, MaskSet, by_information, fre
 use fewbits_binary_patterns::{
     Bank, Decoder, Grid, Mask, Pattern, PatternSensor, Source, count, gray_basis, linear_pattern, natural_basis,
 };
-use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
-
-#[derive(Deserialize)]
-struct Entry {
-    id: String,
-    inputs: Value,
-    value: Value,
-    tolerance: Value,
-}
 
 fn entries() -> Vec<Entry> {
     serde_json::from_str(include_str!("../fixtures/binary_quantization.json")).unwrap()
@@ -63,25 +55,6 @@ fn masks_of(value: &Value) -> Vec<Mask> {
 /// The number after the last `snr`.
 fn snr_of(id: &str) -> f64 {
     id.rsplit_once("snr").unwrap().1.parse().unwrap()
-}
-
-/// Meets the entry's tolerance or says by how much it is missed.
-fn check(entry: &Entry, ours: f64) -> Result<(), String> {
-    let expected = entry.value.as_f64().unwrap();
-    let tolerance = match &entry.tolerance {
-        Value::Number(n) => n.as_f64().unwrap(),
-        Value::String(text) => match text.split_once(' ').unwrap() {
-            ("rel", share) => share.parse::<f64>().unwrap() * expected.abs(),
-            ("abs", size) => size.parse().unwrap(),
-            _ => return Err(format!("{}: unknown tolerance {text}", entry.id)),
-        },
-        other => return Err(format!("{}: unknown tolerance {other}", entry.id)),
-    };
-    if (ours - expected).abs() <= tolerance {
-        Ok(())
-    } else {
-        Err(format!("{}: {ours:.12e} instead of {expected:.12e} +- {tolerance:.1e}", entry.id))
-    }
 }
 
 /// Walks the entries of one family (a prefix of the ids) and reports all failures at once.

@@ -1,14 +1,13 @@
 //! Arguments that make no sense, and data that do not fit.
 
-use super::{field, joint, sensor};
+use super::{RULES, field, joint, sensor};
 use fewbits_core::Gaussian;
 use fewbits_densities::hermite::{hermite, multi_indices};
 use fewbits_densities::laplace::Peak;
 use fewbits_densities::{CellOptions, Cells, Clumps, Component, Lpg, MixtureFit};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{
-    Form, Posterior, Prior, RateModel, RateRange, RateSums, Rule, Search, SearchBox, SourceLikelihood, SourceSensor,
-    Status,
+    Form, Posterior, Prior, RateModel, RateRange, RateSums, Search, SearchBox, SourceLikelihood, SourceSensor, Status,
 };
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_topology::{Deployment, Graph};
@@ -240,13 +239,7 @@ fn coincident_nodes_and_a_source_on_a_node() {
     let field_of = Deployment::given(positions).unwrap();
     let graph = Graph::within(field_of.positions(), 10.0).unwrap();
     let sensor = sensor(1.0, false);
-    for rule in [
-        Rule::MutualInformation,
-        Rule::PairwiseInformation,
-        Rule::CramerRao,
-        Rule::Mahalanobis,
-        Rule::Covariance,
-    ] {
+    for rule in RULES {
         let mut search = Search::new(&place, 50.0, field(1.0), joint(), 1e-5).unwrap();
         search.rule = rule;
         let mut rng = fewbits_monte_carlo::Stream::new(7).rng();

@@ -1,5 +1,6 @@
 //! Reference values, computed by an independent program.
 
+use crate::diffusion_entries::{beginning_with, number};
 use fewbits_core::{Belief, Gaussian, Likelihood};
 use fewbits_densities::CellOptions;
 use fewbits_densities::hermite::{gaussian_moment, hermite, multi_indices};
@@ -13,19 +14,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use serde_json::Value;
 
 fn entries(prefix: &str) -> Vec<Value> {
-    let all: Vec<Value> = serde_json::from_str(include_str!("../fixtures/diffusive.json")).unwrap();
-    let chosen: Vec<Value> = all
-        .into_iter()
-        .filter(|e| e["id"].as_str().unwrap().starts_with(prefix))
-        .collect();
-    assert!(!chosen.is_empty(), "no fixture begins with {prefix}");
-    chosen
-}
-
-fn number(e: &Value, name: &str) -> f64 {
-    e["inputs"][name]
-        .as_f64()
-        .unwrap_or_else(|| panic!("{name} of {}", e["id"]))
+    beginning_with(prefix, include_str!("../fixtures/diffusive.json"))
 }
 
 fn list(value: &Value) -> Vec<f64> {

@@ -8,14 +8,25 @@
 )]
 
 mod attacks;
+#[path = "../../../models/tests/it/diffusion_entries.rs"]
+mod diffusion_entries;
 mod fixtures;
 mod laws;
 mod messages;
 mod searches;
 
-use fewbits_diffusive::{RateModel, RateRange, SearchBox, SourceSensor};
+use fewbits_diffusive::{RateModel, RateRange, Rule, SearchBox, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
 use nalgebra::Vector3;
+
+/// The rules that searches choose by.
+const RULES: [Rule; 5] = [
+    Rule::MutualInformation,
+    Rule::PairwiseInformation,
+    Rule::CramerRao,
+    Rule::Mahalanobis,
+    Rule::Covariance,
+];
 
 /// Example B of the paper, in other units of length if asked for.
 fn sensor(unit: f64, windy: bool) -> SourceSensor {

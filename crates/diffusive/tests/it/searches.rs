@@ -1,6 +1,6 @@
 //! Whole searches.
 
-use super::{field, joint, sensor};
+use super::{RULES, field, joint, sensor};
 use fewbits_diffusive::message::{SampleCode, Wire};
 use fewbits_diffusive::{Envelope, Form, Outcome, RateModel, Rule, Search, Selector, SourceLikelihood, Status};
 use fewbits_monte_carlo::Stream;
@@ -176,13 +176,7 @@ fn selectors_score_candidates() {
         );
         assert!(lower < exact + 0.1 && exact < upper + 0.1, "{lower} {exact} {upper}");
     }
-    for rule in [
-        Rule::MutualInformation,
-        Rule::PairwiseInformation,
-        Rule::CramerRao,
-        Rule::Mahalanobis,
-        Rule::Covariance,
-    ] {
+    for rule in RULES {
         let selector = Selector::new(rule, &posterior, &estimate, &joint()).unwrap();
         assert_eq!(selector.best(&sensor(1.0, false), &[]), None);
         for x in [-1e6, 0.0, 44.0, 62.0, 1e6] {

@@ -1,7 +1,6 @@
 //! `assign-fig6-3` and `assign-fig6-4`: random networks of given mean and spread of their noise variances.
 
 use crate::prelude::*;
-use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_sensor_assignment::{
     CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, by_precision, exchange, pair_costs,
     variances_with_moments,
@@ -25,7 +24,7 @@ fn draw(stream: Stream, sensors: usize, mean: f64, std: f64) -> Result<Vec<f64>,
     let mut rng = stream.rng();
     for _ in 0..MAX_DRAWS {
         let direction: Vec<f64> = (0..sensors).map(|_| StandardNormal.sample(&mut rng)).collect();
-        if let Some(variances) = variances_with_moments(mean, std, SMALLEST, &direction).map_err(Error::failed)? {
+        if let Some(variances) = variances_with_moments(mean, std, SMALLEST, &direction)? {
             return Ok(variances);
         }
     }
@@ -54,33 +53,28 @@ fn evaluate(variances: &[f64]) -> Result<[[f64; 6]; 2], fewbits_sensor_assignmen
     Ok(errors)
 }
 
-/// Averages over networks, one row for each decoder.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// What is varied: standard deviation (`assign-fig6-3`) or mean (`assign-fig6-4`) of the noise variances.
-    #[schemars(extend("unit" = "V^2"))]
-    at: f64,
-    /// Decoder.
-    decoder: &'static str,
-    /// Networks averaged.
-    trials: u64,
-    /// Squared error of the linear assignment.
-    #[schemars(extend("unit" = "V^2"))]
-    alg: Measured,
-    /// Least over all assignments.
-    #[schemars(extend("unit" = "V^2"))]
-    min: Measured,
-    /// Most precise sensor to the coarsest bit.
-    #[schemars(extend("unit" = "V^2"))]
-    ii: Measured,
-    /// Mean over all assignments.
-    #[schemars(extend("unit" = "V^2"))]
-    avg: Measured,
-    /// Linear assignment improved by exchanges.
-    #[schemars(extend("unit" = "V^2"))]
-    swap: Measured,
-    /// Mean of alg/min - 1.
-    excess: Measured,
+rows! {
+    /// Averages over networks, one row for each decoder.
+    pub struct Row {
+        /// What is varied: standard deviation (`assign-fig6-3`) or mean (`assign-fig6-4`) of the noise variances.
+        at: f64 ["V^2"],
+        /// Decoder.
+        decoder: &'static str,
+        /// Networks averaged.
+        trials: u64,
+        /// Squared error of the linear assignment.
+        alg: Measured ["V^2"],
+        /// Least over all assignments.
+        min: Measured ["V^2"],
+        /// Most precise sensor to the coarsest bit.
+        ii: Measured ["V^2"],
+        /// Mean over all assignments.
+        avg: Measured ["V^2"],
+        /// Linear assignment improved by exchanges.
+        swap: Measured ["V^2"],
+        /// Mean of alg/min - 1.
+        excess: Measured,
+    }
 }
 
 const DECODERS: [(&str, &str); 2] = [("centre", "Cell's centre"), ("posterior mean", "Posterior mean")];
@@ -105,7 +99,7 @@ fn rows(context: &Context<'_>, sensors: usize, trials: u64, points: &[(f64, f64,
                 } else {
                     draw(trial.stream, sensors, mean, std)?
                 };
-                let errors = evaluate(&variances).map_err(Error::failed)?;
+                let errors = evaluate(&variances)?;
                 sums.iter_mut()
                     .flatten()
                     .zip(errors.into_iter().flatten())
@@ -150,14 +144,15 @@ fn centre(rows: &[Row]) -> impl Iterator<Item = &Row> {
 fn picture(rows: &[Row], label: &str) -> Plot {
     let panel = |(decoder, title): (&'static str, &str)| {
         let curve = |text: &str, colour, value: fn(&Row) -> Measured| {
-            let own = || rows.iter().filter(|r| r.decoder == decoder);
-            let line = Layer::line("", points(own(), |r| (r.at, value(r)))).coloured(colour);
-            [
-                line,
-                Layer::measured(text, own(), |r| (r.at, value(r))).coloured(colour),
-            ]
+            Layer::curve(
+                text,
+                colour,
+                select(rows, |r| r.decoder == decoder)
+                    .map(|r| (r.at, value(r)))
+                    .collect(),
+            )
         };
-        Panel::new(title, Axis::linear(label), Axis::linear("mean squared error / V²"))
+        Panel::linear(title, label, "mean squared error / V²")
             .with_all(curve("mean of all", 0, |r| r.avg))
             .with_all(curve("assignment II", 1, |r| r.ii))
             .with_all(curve("linear assignment", 2, |r| r.alg))
@@ -170,64 +165,33 @@ fn picture(rows: &[Row], label: &str) -> Plot {
 /// Refuses moments that no network of positive variances has.
 fn feasible(sensors: usize, mean: f64, std: f64) -> garde::Result {
     let most = mean * (sensors as f64 - 1.0).sqrt();
-    if std < most {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("at a mean of {mean} the deviation must be below {most}")))
-    }
+    accept(std < most, || format!("at a mean of {mean} the deviation must be below {most}"))
 }
 
-/// `assign-fig6-3`.
 pub struct Spread;
 
-/// Parameters of `assign-fig6-3`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct SpreadParameters {
-    /// Number of sensors; all their assignments are enumerated.
-    #[garde(range(min = 2, max = 7))]
-    sensors: usize,
-    /// Mean of the noise variances, V^2.
-    #[garde(range(min = 1e-4, max = 10.0))]
-    mean: f64,
-    /// Their population standard deviations, V^2.
-    #[garde(length(min = 1, max = 100), inner(range(min = 0.0, max = 10.0)), inner(custom(|sd: &f64, _: &()| feasible(self.sensors, self.mean, *sd))))]
-    sds: Vec<f64>,
-    /// Networks at each point.
-    #[garde(range(min = 2, max = 10_000_000))]
-    trials: u64,
-}
-
-impl Default for SpreadParameters {
-    fn default() -> Self {
-        let sds = vec![0.0, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03];
-        Self {
-            sensors: 4,
-            mean: 0.03,
-            sds,
-            trials: 1000,
-        }
+parameters! { self #[derive(Validate)]
+    pub struct SpreadParameters {
+        /// Number of sensors; all their assignments are enumerated.
+        #[garde(range(min = 2, max = 7))]
+        sensors: usize = 4,
+        /// Mean of the noise variances, V^2.
+        #[garde(range(min = 1e-4, max = 10.0))]
+        mean: f64 = 0.03,
+        /// Their population standard deviations, V^2.
+        #[garde(length(min = 1, max = 100), inner(range(min = 0.0, max = 10.0)), inner(custom(|sd: &f64, _: &()| feasible(self.sensors, self.mean, *sd))))]
+        sds: Vec<f64> = vec![0.0, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03],
+        /// Networks at each point.
+        #[garde(range(min = 2, max = 10_000_000))]
+        trials: u64 = 1000 => quick 100,
     }
 }
 
 impl Figure for Spread {
-    type Parameters = SpreadParameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "assign-fig6-3",
-            title: "Error against the spread of the noise variances",
-            caption: "Random networks of four sensors with mean noise variance 0.03. The more the sensors differ, the more a good assignment \
-                      gains; an arbitrary one gains nearly nothing. For the posterior mean the linear assignment is not quite right, and a few \
-                      exchanges of two sensors mend it.",
-            source: "Movaghati, thesis, figure 6.3",
-        }
-    }
-
-    fn quicken(&self, p: &mut SpreadParameters) {
-        p.trials = 100;
-    }
+    figure!(SpreadParameters => Vec<Row>, "assign-fig6-3", "Error against the spread of the noise variances", "Movaghati, thesis, figure 6.3",
+        "Random networks of four sensors with mean noise variance 0.03. The more the sensors differ, the more a good assignment \
+         gains; an arbitrary one gains nearly nothing. For the posterior mean the linear assignment is not quite right, and a few \
+         exchanges of two sensors mend it.");
 
     fn run(&self, p: &SpreadParameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let points: Vec<_> = p.sds.iter().map(|&sd| (sd, p.mean, sd)).collect();
@@ -235,29 +199,23 @@ impl Figure for Spread {
     }
 
     fn claims(&self, _: &SpreadParameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         claim_orders(rows, claims);
         let what = "the linear assignment beats assignment II as soon as sensors differ, centre decoder";
         let differ = centre(rows).filter(|r| r.at > 0.0);
-        claims
-            .all("better-than-ii", what, differ, |r| r.alg.value < r.ii.value)
-            .at_defaults();
+        here.all("better-than-ii", what, differ, |r| r.alg.value < r.ii.value);
         let what = "its error falls with the spread";
-        claims
-            .decreasing("decreasing", what, centre(rows).map(|r| r.alg))
-            .at_defaults();
+        here.decreasing("decreasing", what, centre(rows).map(|r| r.alg));
         let ends = centre(rows).next().zip(centre(rows).last());
         let what = "the mean over all assignments falls by 6.6 % only";
         let fall = ends.map(|(first, last)| 1.0 - last.avg.value / first.avg.value);
-        claims.near("average", what, fall, 0.066, 0.004).at_defaults();
+        here.near("average", what, fall, 0.066, 0.004);
         let what = "the gap between mean and linear assignment grows to 0.020";
         let gap = ends.map(|(_, last)| last.avg.value - last.alg.value);
-        claims
-            .near("gap", what, gap, 0.020, 1.5e-3)
-            .at_defaults()
-            .at_full_trials();
+        paper.near("gap", what, gap, 0.020, 1.5e-3);
         let what = "for the posterior mean the linear assignment is up to 15 % above the minimum";
         let excess = rows.iter().map(|r| r.excess.value).fold(0.0, f64::max);
-        claims.at_most("excess-mmse", what, excess, 0.15).at_defaults();
+        here.at_most("excess-mmse", what, excess, 0.15);
     }
 
     fn plot(&self, _: &SpreadParameters, rows: &Vec<Row>) -> Plot {
@@ -265,57 +223,30 @@ impl Figure for Spread {
     }
 }
 
-/// `assign-fig6-4`.
 pub struct Mean;
 
-/// Parameters of `assign-fig6-4`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct MeanParameters {
-    /// Number of sensors; all their assignments are enumerated.
-    #[garde(range(min = 2, max = 7))]
-    sensors: usize,
-    /// Means of the noise variances, V^2.
-    #[garde(length(min = 1, max = 100), inner(range(min = 1e-4, max = 10.0)), inner(custom(|mean: &f64, _: &()| feasible(self.sensors, *mean, self.sd))))]
-    means: Vec<f64>,
-    /// Their population standard deviation, V^2.
-    #[garde(range(min = 0.0, max = 10.0))]
-    sd: f64,
-    /// Networks at each point.
-    #[garde(range(min = 2, max = 10_000_000))]
-    trials: u64,
-}
-
-impl Default for MeanParameters {
-    fn default() -> Self {
-        let means = vec![0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1];
-        Self {
-            sensors: 4,
-            means,
-            sd: 0.015,
-            trials: 1000,
-        }
+parameters! { self #[derive(Validate)]
+    pub struct MeanParameters {
+        /// Number of sensors; all their assignments are enumerated.
+        #[garde(range(min = 2, max = 7))]
+        sensors: usize = 4,
+        /// Means of the noise variances, V^2.
+        #[garde(length(min = 1, max = 100), inner(range(min = 1e-4, max = 10.0)), inner(custom(|mean: &f64, _: &()| feasible(self.sensors, *mean, self.sd))))]
+        means: Vec<f64> = vec![0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1],
+        /// Their population standard deviation, V^2.
+        #[garde(range(min = 0.0, max = 10.0))]
+        sd: f64 = 0.015,
+        /// Networks at each point.
+        #[garde(range(min = 2, max = 10_000_000))]
+        trials: u64 = 1000 => quick 100,
     }
 }
 
 impl Figure for Mean {
-    type Parameters = MeanParameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "assign-fig6-4",
-            title: "Error against the mean of the noise variances",
-            caption: "Random networks of four sensors whose noise variances have standard deviation 0.015. As the noise grows the cost \
-                      approximation, which counts single wrong bits only, loses its edge: at a mean of 0.1 giving the best sensor the \
-                      coarsest bit is slightly better.",
-            source: "Movaghati, thesis, figure 6.4",
-        }
-    }
-
-    fn quicken(&self, p: &mut MeanParameters) {
-        p.trials = 100;
-    }
+    figure!(MeanParameters => Vec<Row>, "assign-fig6-4", "Error against the mean of the noise variances", "Movaghati, thesis, figure 6.4",
+        "Random networks of four sensors whose noise variances have standard deviation 0.015. As the noise grows the cost \
+         approximation, which counts single wrong bits only, loses its edge: at a mean of 0.1 giving the best sensor the \
+         coarsest bit is slightly better.");
 
     fn run(&self, p: &MeanParameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let points: Vec<_> = p.means.iter().map(|&mean| (mean, mean, p.sd)).collect();
@@ -323,30 +254,19 @@ impl Figure for Mean {
     }
 
     fn claims(&self, _: &MeanParameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         claim_orders(rows, claims);
         let what = "the error of the linear assignment grows with the mean";
-        claims
-            .increasing("increasing", what, centre(rows).map(|r| r.alg))
-            .at_defaults();
+        here.increasing("increasing", what, centre(rows).map(|r| r.alg));
         let what = "it beats assignment II up to a mean of 0.08, centre decoder";
         let quiet = centre(rows).filter(|r| r.at <= 0.08);
-        claims
-            .all("better-than-ii", what, quiet, |r| r.alg.value < r.ii.value)
-            .at_defaults()
-            .at_full_trials();
+        paper.all("better-than-ii", what, quiet, |r| r.alg.value < r.ii.value);
         let last = centre(rows).find(|r| r.at == 0.1);
         let what = "and loses to it at 0.1 (erratum assign-3)";
         let loss = last.map(|r| r.ii.value - r.alg.value);
-        claims
-            .below("ii-at-last", what, loss, 0.0)
-            .at_defaults()
-            .at_full_trials();
-        claims
-            .near("ii-value", "assignment II at 0.1", last.map(|r| r.ii.value), 0.1112, 4e-4)
-            .at_defaults();
-        claims
-            .near("alg-value", "linear assignment at 0.1", last.map(|r| r.alg.value), 0.1119, 4e-4)
-            .at_defaults();
+        paper.below("ii-at-last", what, loss, 0.0);
+        here.near("ii-value", "assignment II at 0.1", last.map(|r| r.ii.value), 0.1112, 4e-4);
+        here.near("alg-value", "linear assignment at 0.1", last.map(|r| r.alg.value), 0.1119, 4e-4);
     }
 
     fn plot(&self, _: &MeanParameters, rows: &Vec<Row>) -> Plot {

@@ -11,41 +11,29 @@ fn axis_points(step: f64) -> impl Iterator<Item = f64> {
     (0..=count).map(move |i| -1.0 + 2.0 * i as f64 / count as f64)
 }
 
-/// `assign-fig6-1`.
 pub struct Landings;
 
-/// Parameters of `assign-fig6-1`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct LandingParameters {
-    /// Step of the horizontal axis in units of V.
-    #[garde(range(min = 1e-5, max = 1.0))]
-    step: f64,
-}
-
-impl Default for LandingParameters {
-    fn default() -> Self {
-        Self { step: 0.002 }
+parameters! {
+    pub struct LandingParameters {
+        /// Step of the horizontal axis in units of V.
+        #[garde(range(min = 1e-5, max = 1.0))]
+        step: f64 = 0.002,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Landing {
-    /// Source.
-    #[schemars(extend("unit" = "V"))]
-    x: f64,
-    /// Estimate with bit 1, the coarsest, wrong.
-    #[schemars(extend("unit" = "V"))]
-    f1: f64,
-    /// Estimate with bit 2 wrong.
-    #[schemars(extend("unit" = "V"))]
-    f2: f64,
-    /// Estimate with bit 3 wrong.
-    #[schemars(extend("unit" = "V"))]
-    f3: f64,
-    /// Estimate with bit 4 wrong.
-    #[schemars(extend("unit" = "V"))]
-    f4: f64,
+rows! {
+    pub struct Landing {
+        /// Source.
+        x: f64 ["V"],
+        /// Estimate with bit 1, the coarsest, wrong.
+        f1: f64 ["V"],
+        /// Estimate with bit 2 wrong.
+        f2: f64 ["V"],
+        /// Estimate with bit 3 wrong.
+        f3: f64 ["V"],
+        /// Estimate with bit 4 wrong.
+        f4: f64 ["V"],
+    }
 }
 
 impl Landing {
@@ -65,28 +53,19 @@ impl Landing {
     }
 }
 
-/// The tables of `assign-fig6-1`.
-#[derive(Serialize, JsonSchema)]
-pub struct Landed {
-    /// Estimates along the axis.
-    curve: Vec<Landing>,
-    /// Estimates at the centres of the cells.
-    centres: Vec<Landing>,
+rows! {
+    pub struct Landed {
+        /// Estimates along the axis.
+        curve: Vec<Landing>,
+        /// Estimates at the centres of the cells.
+        centres: Vec<Landing>,
+    }
 }
 
 impl Figure for Landings {
-    type Parameters = LandingParameters;
-    type Tables = Landed;
-
-    fn about(&self) -> About {
-        About {
-            id: "assign-fig6-1",
-            title: "Where a wrong bit lands",
-            caption: "The estimate f_b(x) of the centre decoder when bit b of a four-bit Gray code is wrong and the others are right. A wrong \
-                      coarse bit mirrors the estimate across the whole range, a wrong fine bit only within a small block.",
-            source: "Movaghati, thesis, figure 6.1",
-        }
-    }
+    figure!(LandingParameters => Landed, "assign-fig6-1", "Where a wrong bit lands", "Movaghati, thesis, figure 6.1",
+        "The estimate f_b(x) of the centre decoder when bit b of a four-bit Gray code is wrong and the others are right. A wrong \
+         coarse bit mirrors the estimate across the whole range, a wrong fine bit only within a small block.");
 
     fn run(&self, p: &LandingParameters, _: &Context<'_>) -> Result<Landed, Error> {
         let centres = (0..16).map(|c| (2.0 * f64::from(c) + 1.0) / 16.0 - 1.0);
@@ -97,6 +76,7 @@ impl Figure for Landings {
     }
 
     fn claims(&self, _: &LandingParameters, tables: &Landed, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let centre = |x: f64| tables.centres.iter().find(|l| (l.x - x).abs() < 1e-14);
         claims.all("involution", "flipping a bit twice returns to the centre", &tables.centres, |l| {
             let back = |bit: usize| {
@@ -105,14 +85,12 @@ impl Figure for Landings {
             (0..BITS).all(back)
         });
         let what = "every curve takes exactly the sixteen centres as values";
-        claims
-            .all("staircase", what, 0..BITS, |bit| {
-                let mut values: Vec<f64> = tables.curve.iter().map(|l| l.estimates()[bit]).collect();
-                values.sort_by(f64::total_cmp);
-                values.dedup();
-                values.len() == 16 && values.iter().all(|v| centre(*v).is_some())
-            })
-            .at_defaults();
+        here.all("staircase", what, 0..BITS, |bit| {
+            let mut values: Vec<f64> = tables.curve.iter().map(|l| l.estimates()[bit]).collect();
+            values.sort_by(f64::total_cmp);
+            values.dedup();
+            values.len() == 16 && values.iter().all(|v| centre(*v).is_some())
+        });
     }
 
     fn plot(&self, _: &LandingParameters, tables: &Landed) -> Plot {
@@ -127,43 +105,32 @@ impl Figure for Landings {
     }
 }
 
-/// `assign-figC-1`.
 pub struct BitErrors;
 
-/// Parameters of `assign-figC-1`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct ErrorParameters {
-    /// Noise variance in units of V^2.
-    #[garde(range(min = 1e-9, max = 1e3))]
-    variance: f64,
-    /// Step of the horizontal axis in units of V.
-    #[garde(range(min = 1e-5, max = 1.0))]
-    step: f64,
-}
-
-impl Default for ErrorParameters {
-    fn default() -> Self {
-        Self {
-            variance: 0.03,
-            step: 0.002,
-        }
+parameters! {
+    pub struct ErrorParameters {
+        /// Noise variance in units of V^2.
+        #[garde(range(min = 1e-9, max = 1e3))]
+        variance: f64 = 0.03,
+        /// Step of the horizontal axis in units of V.
+        #[garde(range(min = 1e-5, max = 1.0))]
+        step: f64 = 0.002,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Wrong {
-    /// Source.
-    #[schemars(extend("unit" = "V"))]
-    x: f64,
-    /// Probability that bit 1, the coarsest, is wrong.
-    pa1: f64,
-    /// Probability that bit 2 is wrong.
-    pa2: f64,
-    /// Probability that bit 3 is wrong.
-    pa3: f64,
-    /// Probability that bit 4 is wrong.
-    pa4: f64,
+rows! {
+    pub struct Wrong {
+        /// Source.
+        x: f64 ["V"],
+        /// Probability that bit 1, the coarsest, is wrong.
+        pa1: f64,
+        /// Probability that bit 2 is wrong.
+        pa2: f64,
+        /// Probability that bit 3 is wrong.
+        pa3: f64,
+        /// Probability that bit 4 is wrong.
+        pa4: f64,
+    }
 }
 
 impl Wrong {
@@ -173,22 +140,13 @@ impl Wrong {
 }
 
 impl Figure for BitErrors {
-    type Parameters = ErrorParameters;
-    type Tables = Vec<Wrong>;
-
-    fn about(&self) -> About {
-        About {
-            id: "assign-figC-1",
-            title: "Probability that a bit is wrong",
-            caption: "For each bit of a four-bit Gray code, the probability that noise turns it: one half at the bit's own edges, \
-                      except where noise reaches across further ones, and for the finest bit hardly less between them. The thesis \
-                      calls the variance sigma.",
-            source: "Movaghati, thesis, figure C.1",
-        }
-    }
+    figure!(ErrorParameters => Vec<Wrong>, "assign-figC-1", "Probability that a bit is wrong", "Movaghati, thesis, figure C.1",
+        "For each bit of a four-bit Gray code, the probability that noise turns it: one half at the bit's own edges, \
+         except where noise reaches across further ones, and for the finest bit hardly less between them. The thesis \
+         calls the variance sigma.");
 
     fn run(&self, p: &ErrorParameters, _: &Context<'_>) -> Result<Vec<Wrong>, Error> {
-        let sensors = CodedSensors::with_variances(1.0, &[p.variance; BITS]).map_err(Error::failed)?;
+        let sensors = CodedSensors::with_variances(1.0, &[p.variance; BITS])?;
         let at = |x: f64| {
             let wrong = |bit: usize| bit_error(&sensors.quantizers()[bit], x, p.variance.sqrt()).map_err(Error::failed);
             Ok(Wrong {
@@ -203,18 +161,15 @@ impl Figure for BitErrors {
     }
 
     fn claims(&self, _: &ErrorParameters, rows: &Vec<Wrong>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let near = |x: f64| rows.iter().find(|r| (r.x - x).abs() < 1e-9).map(|r| r.pa1);
-        claims
-            .near("half", "the sign bit is a coin at zero", near(0.0), 0.5, 1e-12)
-            .at_defaults();
+        here.near("half", "the sign bit is a coin at zero", near(0.0), 0.5, 1e-12);
         claims
             .references("pa1", "the sign bit is wrong with this probability, x =", [0.2], |x| (x.to_string(), near(x)));
         let what = "all values are probabilities";
         claims.all("probabilities", what, rows, |r| r.probabilities().iter().all(|p| (0.0..=1.0).contains(p)));
         let mean = |bit: usize| rows.iter().map(|r| r.probabilities()[bit]).sum::<f64>() / rows.len() as f64;
-        claims
-            .increasing("order", "finer bits are wrong more often on average", (0..BITS).map(mean))
-            .at_defaults();
+        here.increasing("order", "finer bits are wrong more often on average", (0..BITS).map(mean));
     }
 
     fn plot(&self, p: &ErrorParameters, rows: &Vec<Wrong>) -> Plot {

@@ -6,69 +6,51 @@ use fewbits_sensor_assignment::{
     quantization_error,
 };
 
-/// `assign-table6-1`.
 pub struct Table;
 
-/// Parameters of `assign-table6-1`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Noise variances of the sensors, in units of V^2; all their assignments are enumerated.
-    #[garde(length(min = 1, max = 8), inner(range(min = 1e-9, max = 1e3)))]
-    variances: Vec<f64>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            variances: vec![0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001],
-        }
+parameters! {
+    pub struct Parameters {
+        /// Noise variances of the sensors, in units of V^2; all their assignments are enumerated.
+        #[garde(length(min = 1, max = 8), inner(range(min = 1e-9, max = 1e3)))]
+        variances: Vec<f64> = vec![0.04, 0.03, 0.02, 0.01, 0.008, 0.006, 0.005, 0.001],
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Assignments.
-    assignments: Vec<Row>,
-    /// Costs of the linear assignment problem, with the dual variables that prove its optimum.
-    costs: Vec<Cost>,
-    /// The same with the variances read as standard deviations.
-    as_deviations: Vec<Row>,
-}
+rows! {
+    pub struct Rows {
+        /// Assignments.
+        assignments: Vec<Row>,
+        /// Costs of the linear assignment problem, with the dual variables that prove its optimum.
+        costs: Vec<Cost>,
+        /// The same with the variances read as standard deviations.
+        as_deviations: Vec<Row>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Assignment.
-    assign: &'static str,
-    /// Sensor of each bit, coarsest first, counted from 1.
-    sensors: String,
-    /// Equation 6.6.
-    #[schemars(extend("unit" = "V^2"))]
-    approx: f64,
-    /// Exact error of the cell's centre.
-    #[schemars(extend("unit" = "V^2"))]
-    center: f64,
-    /// Exact error of the posterior mean.
-    #[schemars(extend("unit" = "V^2"))]
-    mmse: f64,
-}
+    struct Row {
+        /// Assignment.
+        assign: &'static str,
+        /// Sensor of each bit, coarsest first, counted from 1.
+        sensors: String,
+        /// Equation 6.6.
+        approx: f64 ["V^2"],
+        /// Exact error of the cell's centre.
+        center: f64 ["V^2"],
+        /// Exact error of the posterior mean.
+        mmse: f64 ["V^2"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Cost {
-    /// Bit, coarsest first, from 1.
-    bit: usize,
-    /// Sensor, from 1.
-    sensor: usize,
-    /// Cost of giving the bit to the sensor.
-    #[schemars(extend("unit" = "V^2"))]
-    gamma: f64,
-    /// Dual variable of the bit.
-    #[schemars(extend("unit" = "V^2"))]
-    dual_bit: f64,
-    /// Dual variable of the sensor.
-    #[schemars(extend("unit" = "V^2"))]
-    dual_sensor: f64,
+    struct Cost {
+        /// Bit, coarsest first, from 1.
+        bit: usize,
+        /// Sensor, from 1.
+        sensor: usize,
+        /// Cost of giving the bit to the sensor.
+        gamma: f64 ["V^2"],
+        /// Dual variable of the bit.
+        dual_bit: f64 ["V^2"],
+        /// Dual variable of the sensor.
+        dual_sensor: f64 ["V^2"],
+    }
 }
 
 type Failure = fewbits_sensor_assignment::Error;
@@ -132,25 +114,17 @@ fn find<'a>(rows: &'a [Row], name: &str) -> Option<&'a Row> {
 }
 
 impl Figure for Table {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "assign-table6-1",
-            title: "Three assignments of eight Gray bits to eight sensors",
-            caption: "The optimum of the linear assignment problem gives middling sensors the coarse bits and keeps the noisy ones for the fine \
-                      bits, which are lost anyway; it is the exact optimum of the centre decoder among all 40 320. The row of the thesis headed \
-                      sigma holds variances. The posterior mean of the same bits has a fifth less error.",
-            source: "Movaghati, thesis, table 6.1",
-        }
-    }
+    figure!(Parameters => Rows, "assign-table6-1", "Three assignments of eight Gray bits to eight sensors", "Movaghati, thesis, table 6.1",
+        "The optimum of the linear assignment problem gives middling sensors the coarse bits and keeps the noisy ones for the fine \
+         bits, which are lost anyway; it is the exact optimum of the centre decoder among all 40 320. The row of the thesis headed \
+         sigma holds variances. The posterior mean of the same bits has a fifth less error.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        tables(&p.variances).map_err(Error::failed)
+        Ok(tables(&p.variances)?)
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let all = || rows.assignments.iter();
         let key = |r: &Row| r.assign.to_owned();
         claims.references("approx", "approximate error, assignment", all(), |r| (key(r), r.approx));
@@ -179,15 +153,11 @@ impl Figure for Table {
                 "5 6 7 8 4 1 2 3",
             ),
         ] {
-            claims
-                .all(id, what, find(&rows.assignments, name), |r| r.sensors == expected)
-                .at_defaults();
+            here.all(id, what, find(&rows.assignments, name), |r| r.sensors == expected);
         }
         let pair = find(&rows.assignments, "optimal").zip(find(&rows.assignments, "best, posterior mean"));
         let gain = pair.map(|(linear, best)| linear.mmse / best.mmse - 1.0);
-        claims
-            .near("exact-mmse-error", "by 7e-6 only", gain, 7e-6, 0.05 * 7e-6)
-            .at_defaults();
+        here.near("exact-mmse-error", "by 7e-6 only", gain, 7e-6, 0.05 * 7e-6);
         let bits = rows
             .costs
             .iter()
@@ -209,32 +179,23 @@ impl Figure for Table {
         claims.all("dual-feasible", what, &rows.costs, |c| c.dual_bit + c.dual_sensor <= c.gamma + 1e-12);
         let what = "read as standard deviations the error of assignment I would be 2e-4 (erratum assign-1)";
         let other = find(&rows.as_deviations, "I").map(|r| r.center);
-        claims.near("deviations", what, other, 2.0e-4, 1e-5).at_defaults();
+        here.near("deviations", what, other, 2.0e-4, 1e-5);
         let what = "and another assignment optimal";
         let other = find(&rows.as_deviations, "optimal");
-        claims
-            .all("deviations-optimum", what, other, |r| r.sensors != "5 6 7 8 4 3 2 1")
-            .at_defaults();
+        here.all("deviations-optimum", what, other, |r| r.sensors != "5 6 7 8 4 3 2 1");
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let n = p.variances.len();
         let index: Vec<f64> = (1..=n).map(|i| i as f64).collect();
         // The coarsest bit on top.
-        let line = |bit: usize| {
-            rows.costs
-                .iter()
-                .filter(|c| c.bit == bit)
-                .map(|c| c.gamma.log10())
-                .collect()
-        };
+        let line = |bit: usize| select(&rows.costs, |c| c.bit == bit).map(|c| c.gamma.log10()).collect();
         let field = (1..=n).rev().map(line).collect();
         let names = (1..=n).map(|b| ((n + 1 - b) as f64, format!("bit {b}")));
         let optimal = find(&rows.assignments, "optimal").map_or("", |r| r.sensors.as_str());
         let chosen = optimal.split(' ').filter_map(|s| s.parse::<f64>().ok()).enumerate();
         let chosen = chosen.map(|(bit, sensor)| (sensor, (n - bit) as f64)).collect();
         let three = &rows.assignments[..3.min(rows.assignments.len())];
-        let places = three.iter().enumerate().map(|(i, r)| (i as f64, r.assign.to_owned()));
         let errors = |value: fn(&Row) -> f64, shift: f64| {
             three
                 .iter()
@@ -248,14 +209,10 @@ impl Figure for Table {
             Axis::linear("").named(names),
         )
         .with(Layer::heat("lg(cost / V²)", index.clone(), index, field))
-        .with(
-            Layer::points("optimal assignment", chosen)
-                .marked(Marker::Cross)
-                .coloured(1),
-        );
+        .with(Layer::points("optimal assignment", chosen).styled(1, Marker::Cross));
         let exact = Panel::new(
             "Error of the assignments",
-            Axis::linear("assignment").named(places).between(-0.6, 2.6),
+            Axis::categories("assignment", three.iter().map(|r| r.assign)),
             Axis::log("mean squared error / V²").between(2e-3, 0.1),
         )
         .with(Layer::points("equation 6.6", errors(|r| r.approx, -0.1)).coloured(7))

@@ -11,68 +11,53 @@ use fewbits_sensor_assignment::{
 };
 use rayon::prelude::*;
 
-/// `binary-beyond`.
 pub struct Beyond;
 
-/// Parameters of `binary-beyond`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Include the designs with free thresholds and the larger searches, which take most of the time.
-    #[garde(skip)]
-    thorough: bool,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { thorough: true }
+parameters! {
+    pub struct Parameters {
+        /// Include the designs with free thresholds and the larger searches, which take most of the time.
+        #[garde(skip)]
+        thorough: bool = true => quick false,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Errors before and after each change.
-    changes: Vec<Change>,
-    /// The designs behind the errors after, where there is one.
-    designs: Vec<Design>,
-}
+rows! {
+    pub struct Rows {
+        /// Errors before and after each change.
+        changes: Vec<Change>,
+        /// The designs behind the errors after, where there is one.
+        designs: Vec<Design>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Change {
-    /// Name of the comparison.
-    id: String,
-    /// What is changed.
-    idea: &'static str,
-    /// Where.
-    case: String,
-    /// Error before.
-    #[schemars(extend("unit" = "V^2"))]
-    before: f64,
-    /// Error after.
-    #[schemars(extend("unit" = "V^2"))]
-    after: f64,
-    /// Relative change.
-    #[schemars(extend("unit" = "%"))]
-    change_percent: f64,
-}
+    struct Change {
+        /// Name of the comparison.
+        id: String,
+        /// What is changed.
+        idea: &'static str,
+        /// Where.
+        case: String,
+        /// Error before.
+        before: f64 ["V^2"],
+        /// Error after.
+        after: f64 ["V^2"],
+        /// Relative change.
+        change_percent: f64 ["%"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Design {
-    /// Name of the comparison.
-    id: String,
-    /// Where the search began that found it.
-    start: &'static str,
-    /// Sensor, from 1.
-    sensor: usize,
-    /// Standard deviation of its noise.
-    #[schemars(extend("unit" = "V"))]
-    noise_std: f64,
-    /// Its mask, where it is a linear pattern on a grid.
-    mask: Option<Mask>,
-    /// Thresholds at which its bit changes, from 0 below all of them.
-    #[schemars(extend("unit" = "V"))]
-    thresholds: String,
+    struct Design {
+        /// Name of the comparison.
+        id: String,
+        /// Where the search began that found it.
+        start: &'static str,
+        /// Sensor, from 1.
+        sensor: usize,
+        /// Standard deviation of its noise.
+        noise_std: f64 ["V"],
+        /// Its mask, where it is a linear pattern on a grid.
+        mask: Option<Mask>,
+        /// Thresholds at which its bit changes, from 0 below all of them.
+        thresholds: String ["V"],
+    }
 }
 
 type Outcome = (Change, Vec<Design>);
@@ -330,23 +315,10 @@ fn jobs(thorough: bool) -> Result<Vec<Job>, Error> {
 }
 
 impl Figure for Beyond {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-beyond",
-            title: "Beyond the thesis",
-            caption: "Exact errors before and after each change: no rank constraint, finer grids, any pattern, thresholds off the grid, joint \
-                      choice of patterns for unequal sensors, the posterior mean instead of the cell's centre, better adaptive \
-                      thresholds. The table `designs` has masks and thresholds, and where the search for them began.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.thorough = false;
-    }
+    figure!(Parameters => Rows, "binary-beyond", "Beyond the thesis", "",
+        "Exact errors before and after each change: no rank constraint, finer grids, any pattern, thresholds off the grid, joint \
+         choice of patterns for unequal sensors, the posterior mean instead of the cell's centre, better adaptive \
+         thresholds. The table `designs` has masks and thresholds, and where the search for them began.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let found = jobs(p.thorough)?
@@ -361,6 +333,7 @@ impl Figure for Beyond {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         claims.all("improvements", "every change lowers the error", &rows.changes, |r| r.after < r.before);
         let key = |r: &Change| r.id.clone();
         claims.references("after", "error after the change", &rows.changes, |r| (key(r), r.after));
@@ -370,9 +343,7 @@ impl Figure for Beyond {
         let known = |r: &Change| crate::reference::value(&format!("binary-beyond/best-known/{}", r.id));
         let what = "no search ends above the best design known from elsewhere, but for 0.1 %";
         let searched = rows.changes.iter().filter_map(|r| Some((r.after, known(r)?)));
-        claims
-            .all("best-known", what, searched, |(after, known)| after <= 1.001 * known)
-            .at_defaults();
+        here.all("best-known", what, searched, |(after, known)| after <= 1.001 * known);
         for (what, ids, least) in [
             ("posterior-mean thresholds", ["posterior-mean-5", "posterior-mean-15", "posterior-mean-30"], 12.0),
             ("smaller steps", ["small-steps-5", "small-steps-10", "small-steps-20"], 6.0),
@@ -383,7 +354,7 @@ impl Figure for Beyond {
         }
         for id in ["least-variance-5", "least-variance-20", "free-n3-25"] {
             let gain = at(id).map(|r| -r.change_percent);
-            claims.at_most(id, "gains less than 1 %", gain, 1.0).at_defaults();
+            here.at_most(id, "gains less than 1 %", gain, 1.0);
         }
         let of = |id: &str| rows.designs.iter().filter(move |d| d.id == id).collect::<Vec<_>>();
         for id in ["free-n8-18.2", "free-n8-10", "free-gaussian"] {
@@ -395,7 +366,7 @@ impl Figure for Beyond {
             let what = format!(
                 "free thresholds change the error of the best linear patterns by {percent:.1} %: {thresholds} thresholds, from {start}"
             );
-            claims.below(format!("{id}-start"), what, change, 0.0).at_defaults();
+            here.below(format!("{id}-start"), what, change, 0.0);
         }
     }
 

@@ -1,41 +1,17 @@
 //! `binary-fig5-6`: equation 5.13 for three sets of patterns, and why it misleads.
 
-use super::{Scene, crossing, each, not_below, sweep};
+use super::{Scene, crossing, each, sweep, swept};
 use crate::prelude::*;
 use crate::reference;
 use fewbits_binary_patterns::bounds::printed_crlb;
 use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 
-/// `binary-fig5-6`.
 pub struct PrintedBounds;
 
-/// Parameters of `binary-fig5-6`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
+swept! { 0.0 to 30.0, step => quick 2.0,
     /// Bits, and sensors.
     #[garde(length(min = 1, max = 4), inner(range(min = 1, max = 5)))]
-    bits: Vec<usize>,
-    /// First signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    from_db: f64,
-    /// Last signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-    to_db: f64,
-    /// Step, dB.
-    #[garde(range(min = 0.01, max = 60.0))]
-    step_db: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            bits: vec![3, 4],
-            from_db: 0.0,
-            to_db: 30.0,
-            step_db: 1.0,
-        }
-    }
+    bits: Vec<usize> = vec![3, 4],
 }
 
 #[derive(Clone, Copy)]
@@ -48,14 +24,14 @@ enum Kind {
 fn masks(kind: Kind, bits: usize) -> Result<Vec<Mask>, Error> {
     match kind {
         Kind::Fixed => Ok(vec![1 << (bits - 1); bits]),
-        Kind::Natural => natural_basis(bits).map_err(Error::failed),
-        Kind::Gray => gray_basis(bits).map_err(Error::failed),
+        Kind::Natural => Ok(natural_basis(bits)?),
+        Kind::Gray => Ok(gray_basis(bits)?),
     }
 }
 
 /// Equation 5.13.
 fn printed(kind: Kind, bits: usize, snr: f64) -> Result<f64, Error> {
-    printed_crlb(&Scene::uniform(bits, snr)?.bank(&masks(kind, bits)?)?).map_err(Error::failed)
+    Ok(printed_crlb(&Scene::uniform(bits, snr)?.bank(&masks(kind, bits)?)?)?)
 }
 
 fn exact(kind: Kind, bits: usize, snr: f64) -> Result<f64, Error> {
@@ -71,72 +47,48 @@ fn meet(a: Kind, b: Kind, bits: usize, name: &str) -> Result<Option<f64>, Error>
     crossing(about - 3.0, about + 3.0, difference).map(Some)
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Values and errors.
-    sets: Vec<Row>,
-    /// Crossings of equation 5.13.
-    crossings: Vec<Crossing>,
-}
+rows! {
+    pub struct Rows {
+        /// Values and errors.
+        sets: Vec<Row>,
+        /// Crossings of equation 5.13.
+        crossings: Vec<Crossing>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Bits B and sensors N.
-    bits: usize,
-    /// Signal-to-noise ratio.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Equation 5.13, all thresholds at zero.
-    #[schemars(extend("unit" = "V^2"))]
-    crlb_fixed: f64,
-    /// Equation 5.13, natural patterns.
-    #[schemars(extend("unit" = "V^2"))]
-    crlb_natural: f64,
-    /// Equation 5.13, Gray patterns.
-    #[schemars(extend("unit" = "V^2"))]
-    crlb_gray: f64,
-    /// Exact error, all thresholds at zero.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_fixed: f64,
-    /// Exact error, natural patterns.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_natural: f64,
-    /// Exact error, Gray patterns.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_gray: f64,
-}
+    struct Row {
+        /// Bits B and sensors N.
+        bits: usize,
+        /// Signal-to-noise ratio.
+        snr_db: f64 ["dB"],
+        /// Equation 5.13, all thresholds at zero.
+        crlb_fixed: f64 ["V^2"],
+        /// Equation 5.13, natural patterns.
+        crlb_natural: f64 ["V^2"],
+        /// Equation 5.13, Gray patterns.
+        crlb_gray: f64 ["V^2"],
+        /// Exact error, all thresholds at zero.
+        mse_fixed: f64 ["V^2"],
+        /// Exact error, natural patterns.
+        mse_natural: f64 ["V^2"],
+        /// Exact error, Gray patterns.
+        mse_gray: f64 ["V^2"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Crossing {
-    /// Bits B and sensors N.
-    bits: usize,
-    /// Where fixed and Gray cross.
-    #[schemars(extend("unit" = "dB"))]
-    fixed_gray_db: Option<f64>,
-    /// Where Gray and natural cross.
-    #[schemars(extend("unit" = "dB"))]
-    gray_natural_db: Option<f64>,
+    struct Crossing {
+        /// Bits B and sensors N.
+        bits: usize,
+        /// Where fixed and Gray cross.
+        fixed_gray_db: Option<f64> ["dB"],
+        /// Where Gray and natural cross.
+        gray_natural_db: Option<f64> ["dB"],
+    }
 }
 
 impl Figure for PrintedBounds {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-6",
-            title: "The printed Cramer-Rao formula for fixed, natural and Gray patterns",
-            caption: "Left: equation 5.13 prefers a fixed threshold at low, Gray patterns at medium and natural patterns at high \
-                      signal-to-noise ratio. Right: the exact errors of the same sets. At high ratios Gray patterns are better throughout: the \
-                      formula averages information and does not see that natural bits fail together.",
-            source: "Movaghati, thesis, figure 5.6",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.step_db = 2.0;
-    }
+    figure!(Parameters => Rows, "binary-fig5-6", "The printed Cramer-Rao formula for fixed, natural and Gray patterns", "Movaghati, thesis, figure 5.6",
+        "Left: equation 5.13 prefers a fixed threshold at low, Gray patterns at medium and natural patterns at high \
+         signal-to-noise ratio. Right: the exact errors of the same sets. At high ratios Gray patterns are better throughout: the \
+         formula averages information and does not see that natural bits fail together.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let (mut sets, mut crossings) = (Vec::new(), Vec::new());
@@ -174,12 +126,7 @@ impl Figure for PrintedBounds {
                 .map(|(name, at)| (format!("{name} {} bits", c.bits), at))
         });
         claims.references("crossing", what, crossings, |crossing| crossing);
-        let natural = |bits: usize| {
-            rows.crossings
-                .iter()
-                .find(|c| c.bits == bits)
-                .and_then(|c| c.gray_natural_db)
-        };
+        let natural = |bits: usize| first(&rows.crossings, |c| c.bits == bits).and_then(|c| c.gray_natural_db);
         let beyond = rows
             .sets
             .iter()

@@ -1,24 +1,23 @@
 //! `binary-fig5-8`: decoders and bounds for three Gray bits.
 
-use super::{Ratios, Scene, each, sweep};
+use super::{Scene, each, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::bounds::{
     centralised_bound, network_rate_distortion, optimal_weight_van_trees, printed_crlb, remote_distortion,
 };
 use fewbits_binary_patterns::{Decoder, gray_basis};
 
-/// `binary-fig5-8`.
 pub struct Decoders;
 
-type Parameters = Ratios<-10, 40>;
+swept! { -10.0 to 40.0, step => quick 5.0, }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Errors and bounds.
-    curves: Vec<Row>,
-    /// How close the van Trees bound is, uniform source.
-    tightness: Vec<Tightness>,
+rows! {
+    pub struct Rows {
+        /// Errors and bounds.
+        curves: Vec<Row>,
+        /// How close the van Trees bound is, uniform source.
+        tightness: Vec<Tightness>,
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -30,61 +29,46 @@ enum Kind {
     Gaussian,
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Uniform on [-1, 1], or Gaussian of variance 0.1.
-    source: Kind,
-    /// Signal-to-noise ratio.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Posterior mean.
-    #[schemars(extend("unit" = "V^2"))]
-    mmse: f64,
-    /// Continuous maximum a posteriori.
-    #[schemars(extend("unit" = "V^2"))]
-    cmap: f64,
-    /// Discrete maximum a posteriori.
-    #[schemars(extend("unit" = "V^2"))]
-    dmap: f64,
-    /// Discrete maximum a posteriori as printed.
-    #[schemars(extend("unit" = "V^2"))]
-    dmap_print: f64,
-    /// Discrete maximum a posteriori, exact cells.
-    #[schemars(extend("unit" = "V^2"))]
-    dmap_exact: f64,
-    /// Equation 5.13.
-    #[schemars(extend("unit" = "V^2"))]
-    crlb: f64,
-    /// Van Trees bound with optimal weight.
-    #[schemars(extend("unit" = "V^2"))]
-    vt: f64,
-    /// Rate-distortion bound as printed.
-    #[schemars(extend("unit" = "V^2"))]
-    rd_print: f64,
-    /// Rate-distortion bound of N bits.
-    #[schemars(extend("unit" = "V^2"))]
-    rd_per_n: f64,
-    /// Exact centralised bound.
-    #[schemars(extend("unit" = "V^2"))]
-    central: f64,
-}
+rows! {
+    struct Row {
+        /// Uniform on [-1, 1], or Gaussian of variance 0.1.
+        source: Kind,
+        /// Signal-to-noise ratio.
+        snr_db: f64 ["dB"],
+        /// Posterior mean.
+        mmse: f64 ["V^2"],
+        /// Continuous maximum a posteriori.
+        cmap: f64 ["V^2"],
+        /// Discrete maximum a posteriori.
+        dmap: f64 ["V^2"],
+        /// Discrete maximum a posteriori as printed.
+        dmap_print: f64 ["V^2"],
+        /// Discrete maximum a posteriori, exact cells.
+        dmap_exact: f64 ["V^2"],
+        /// Equation 5.13.
+        crlb: f64 ["V^2"],
+        /// Van Trees bound with optimal weight.
+        vt: f64 ["V^2"],
+        /// Rate-distortion bound as printed.
+        rd_print: f64 ["V^2"],
+        /// Rate-distortion bound of N bits.
+        rd_per_n: f64 ["V^2"],
+        /// Exact centralised bound.
+        central: f64 ["V^2"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Tightness {
-    /// Signal-to-noise ratio.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Optimal-weight bound, uniform source.
-    #[schemars(extend("unit" = "V^2"))]
-    van_trees: f64,
-    /// Exact error.
-    #[schemars(extend("unit" = "V^2"))]
-    mmse: f64,
-    /// Equation 5.13.
-    #[schemars(extend("unit" = "V^2"))]
-    crlb: f64,
-    /// Bound over error.
-    ratio: f64,
+    struct Tightness {
+        /// Signal-to-noise ratio.
+        snr_db: f64 ["dB"],
+        /// Optimal-weight bound, uniform source.
+        van_trees: f64 ["V^2"],
+        /// Exact error.
+        mmse: f64 ["V^2"],
+        /// Equation 5.13.
+        crlb: f64 ["V^2"],
+        /// Bound over error.
+        ratio: f64,
+    }
 }
 
 fn row(source: Kind, snr_db: f64) -> Result<Row, Error> {
@@ -122,24 +106,11 @@ fn tightness(snr_db: f64) -> Result<Tightness, Error> {
 }
 
 impl Figure for Decoders {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-8",
-            title: "Decoders and bounds, three Gray bits",
-            caption: "The caption of the thesis says Gaussian, the text uniform: both are here. The posterior mean is best everywhere. The \
-                      continuous maximum a posteriori (MAP) decoder is worse than the discrete one for a uniform source, and better only \
-                      up to 13 dB for a Gaussian one. Equation 5.13 is no bound for a uniform source; the optimal-weight van Trees \
-                      bound is one, and tight.",
-            source: "Movaghati, thesis, figure 5.8",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.step_db = 5.0;
-    }
+    figure!(Parameters => Rows, "binary-fig5-8", "Decoders and bounds, three Gray bits", "Movaghati, thesis, figure 5.8",
+        "The caption of the thesis says Gaussian, the text uniform: both are here. The posterior mean is best everywhere. The \
+         continuous maximum a posteriori (MAP) decoder is worse than the discrete one for a uniform source, and better only \
+         up to 13 dB for a Gaussian one. Equation 5.13 is no bound for a uniform source; the optimal-weight van Trees \
+         bound is one, and tight.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
@@ -154,6 +125,7 @@ impl Figure for Decoders {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let of = |kind: Kind| rows.curves.iter().filter(move |r| r.source == kind);
         let at_most = 1.0 + 1e-9;
         let what = "the posterior mean is no worse than any other decoder";
@@ -176,12 +148,10 @@ impl Figure for Decoders {
         let what = "for a uniform source the continuous MAP decoder is worse than the discrete one throughout (erratum binary-15)";
         claims.all("uniform-cmap", what, of(Kind::Uniform), |r| r.cmap > r.dmap);
         let what = "for a Gaussian source continuous MAP beats discrete MAP up to 13 dB and loses from 14 dB on";
-        claims
-            .all("gaussian-cmap", what, of(Kind::Gaussian), |r| match r.snr_db {
-                snr if snr <= 13.0 => r.cmap < r.dmap,
-                snr => snr < 14.0 || r.cmap > r.dmap,
-            })
-            .at_defaults();
+        here.all("gaussian-cmap", what, of(Kind::Gaussian), |r| match r.snr_db {
+            snr if snr <= 13.0 => r.cmap < r.dmap,
+            snr => snr < 14.0 || r.cmap > r.dmap,
+        });
         let what = "for a Gaussian source equation 5.13 is a bound";
         claims.all("gaussian-crlb", what, of(Kind::Gaussian), |r| r.crlb <= r.mmse * at_most);
         let key = |r: &Row| format!("{} dB", r.snr_db);

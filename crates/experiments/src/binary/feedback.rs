@@ -1,53 +1,26 @@
 //! `binary-fig5-10`: ten sensors, with and without feedback.
 
-use super::{Scene, descent_from, each, mask_text, not_below, sweep};
+use super::{Scene, descent_from, each, mask_text, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::baselines::{AdaptiveRule, Luo, adaptive, fixed_threshold, multi_threshold_bound};
 use fewbits_binary_patterns::bounds::ConditionalMean;
 use fewbits_binary_patterns::{Mask, gray_basis};
 
-/// `binary-fig5-10`.
 pub struct Feedback;
 
-/// Parameters of `binary-fig5-10`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
+swept! { 0.0 to 40.0 => quick 30.0, step => quick 10.0,
     /// Number of sensors.
     #[garde(range(min = 3, max = 14))]
-    sensors: usize,
+    sensors: usize = 10,
     /// Most bits of the cell index that are tried.
     #[garde(range(min = 3, max = 8))]
-    most_bits: usize,
-    /// First signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    from_db: f64,
-    /// Last signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-    to_db: f64,
-    /// Step, dB.
-    #[garde(range(min = 0.01, max = 60.0))]
-    step_db: f64,
+    most_bits: usize = 7 => quick 5,
     /// First step of AQ-VS in units of V. The thesis gives no rule.
     #[garde(range(min = 1e-6, max = 10.0))]
-    vs_step: f64,
+    vs_step: f64 = 0.5,
     /// Factor of AQ-VS.
     #[garde(range(min = 1.0, max = 10.0))]
-    vs_factor: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            sensors: 10,
-            most_bits: 7,
-            from_db: 0.0,
-            to_db: 40.0,
-            step_db: 1.0,
-            vs_step: 0.5,
-            vs_factor: 1.5,
-        }
-    }
+    vs_factor: f64 = 1.5,
 }
 
 /// Finer cells than this share of the noise are not tried: they never win.
@@ -62,47 +35,37 @@ pub(super) fn descend(bits: usize, sensors: usize, snr: f64, extra: usize) -> Re
     descent_from(&Scene::uniform(bits, snr)?, bits, sensors, &[cycle(gray), cycle(reversed)], extra)
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Signal-to-noise ratio.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Best linear patterns of three bits, exhaustive.
-    #[schemars(extend("unit" = "V^2"))]
-    lbqp_b3: f64,
-    /// Their masks.
-    masks_b3: String,
-    /// Best linear patterns of any number of bits, by descent beyond three.
-    #[schemars(extend("unit" = "V^2"))]
-    lbqp_best: f64,
-    /// That number of bits.
-    bits: usize,
-    /// Their masks.
-    masks: String,
-    /// All thresholds at zero, posterior mean.
-    #[schemars(extend("unit" = "V^2"))]
-    fixed: f64,
-    /// Luo's allocation, linear fusion.
-    #[schemars(extend("unit" = "V^2"))]
-    luo_soft: Option<f64>,
-    /// Relaxed multi-threshold bound.
-    #[schemars(extend("unit" = "V^2"))]
-    ribeiro_relaxed: f64,
-    /// Adaptive variable step, bounded maximum likelihood.
-    #[schemars(extend("unit" = "V^2"))]
-    aqvs_mle: f64,
-    /// Adaptive maximum likelihood, bounded maximum likelihood.
-    #[schemars(extend("unit" = "V^2"))]
-    aqml_mle: f64,
-    /// Adaptive maximum likelihood, posterior mean.
-    #[schemars(extend("unit" = "V^2"))]
-    aqml_mmse: f64,
-    /// Adaptive posterior mean.
-    #[schemars(extend("unit" = "V^2"))]
-    aq_posterior_mean: f64,
-    /// All measurements without quantization.
-    #[schemars(extend("unit" = "V^2"))]
-    clairvoyant: f64,
+rows! {
+    pub struct Row {
+        /// Signal-to-noise ratio.
+        snr_db: f64 ["dB"],
+        /// Best linear patterns of three bits, exhaustive.
+        lbqp_b3: f64 ["V^2"],
+        /// Their masks.
+        masks_b3: String,
+        /// Best linear patterns of any number of bits, by descent beyond three.
+        lbqp_best: f64 ["V^2"],
+        /// That number of bits.
+        bits: usize,
+        /// Their masks.
+        masks: String,
+        /// All thresholds at zero, posterior mean.
+        fixed: f64 ["V^2"],
+        /// Luo's allocation, linear fusion.
+        luo_soft: Option<f64> ["V^2"],
+        /// Relaxed multi-threshold bound.
+        ribeiro_relaxed: f64 ["V^2"],
+        /// Adaptive variable step, bounded maximum likelihood.
+        aqvs_mle: f64 ["V^2"],
+        /// Adaptive maximum likelihood, bounded maximum likelihood.
+        aqml_mle: f64 ["V^2"],
+        /// Adaptive maximum likelihood, posterior mean.
+        aqml_mmse: f64 ["V^2"],
+        /// Adaptive posterior mean.
+        aq_posterior_mean: f64 ["V^2"],
+        /// All measurements without quantization.
+        clairvoyant: f64 ["V^2"],
+    }
 }
 
 fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
@@ -145,25 +108,10 @@ fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
 }
 
 impl Figure for Feedback {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-10",
-            title: "Ten sensors against schemes with thresholds and with feedback",
-            caption: "Linear patterns of the best resolution beat the relaxed multi-threshold bound from 5 dB on, and the adaptive variable-step \
-                      scheme (AQ-VS) from 20 dB on. The adaptive maximum-likelihood scheme (AQ-ML), which needs feedback, is better \
-                      than they are at every ratio from 5 to 40 dB: the thesis's claim is not reproduced.",
-            source: "Movaghati, thesis, figure 5.10",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.step_db = 10.0;
-        p.most_bits = 5;
-        p.to_db = 30.0;
-    }
+    figure!(Parameters => Vec<Row>, "binary-fig5-10", "Ten sensors against schemes with thresholds and with feedback", "Movaghati, thesis, figure 5.10",
+        "Linear patterns of the best resolution beat the relaxed multi-threshold bound from 5 dB on, and the adaptive variable-step \
+         scheme (AQ-VS) from 20 dB on. The adaptive maximum-likelihood scheme (AQ-ML), which needs feedback, is better \
+         than they are at every ratio from 5 to 40 dB: the thesis's claim is not reproduced.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
@@ -176,16 +124,12 @@ impl Figure for Feedback {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
-        let from = |low: f64| {
-            rows.iter()
-                .filter(move |r| (low - 1e-9..=40.0 + 1e-9).contains(&r.snr_db))
-        };
+        let here = claims.at_defaults();
+        let from = |low: f64| select(rows, move |r| (low - 1e-9..=40.0 + 1e-9).contains(&r.snr_db));
         let what = "patterns of the best resolution are below the relaxed multi-threshold bound from 5 to 40 dB";
         claims.all("ribeiro", what, from(5.0), |r| r.lbqp_best < r.ribeiro_relaxed);
         let what = "and below AQ-VS (step V/2, factor 1.5) from 20 dB on";
-        claims
-            .all("aq-vs", what, from(20.0), |r| r.lbqp_best < r.aqvs_mle)
-            .at_defaults();
+        here.all("aq-vs", what, from(20.0), |r| r.lbqp_best < r.aqvs_mle);
         let what = "AQ-ML, which has feedback, beats them from 5 to 40 dB (erratum binary-21)";
         claims.all("aq-ml", what, from(5.0), |r| r.aqml_mle < r.lbqp_best);
         let what = "posterior-mean thresholds beat AQ-ML's estimate from 5 dB on";

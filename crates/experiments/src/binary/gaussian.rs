@@ -1,89 +1,71 @@
 //! `binary-fig5-9`: a Gaussian source, three sensors of three bits.
 
-use super::{Ratios, Scene, crossing, each, mask_text, sweep};
+use super::{Scene, crossing, each, mask_text, sweep, swept};
 use crate::prelude::*;
 use fewbits_binary_patterns::Mask;
 use fewbits_binary_patterns::bounds::{network_rate_distortion, optimal_weight_van_trees, remote_distortion};
 
-/// `binary-fig5-9`.
 pub struct GaussianSource;
 
-type Parameters = Ratios<-10, 30>;
+swept! { -10.0 to 30.0, step => quick 5.0, }
 
 const SENSORS: usize = 3;
 const GRAY: [Mask; 3] = [3, 4, 6];
 const OTHER: [Mask; 3] = [4, 6, 7];
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Errors and bounds; the variance of the source is 0.1.
-    errors: Vec<Row>,
-    /// Where two bases have the same error.
-    crossings: Vec<Crossing>,
-}
+rows! {
+    pub struct Rows {
+        /// Errors and bounds; the variance of the source is 0.1.
+        errors: Vec<Row>,
+        /// Where two bases have the same error.
+        crossings: Vec<Crossing>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Signal-to-noise ratio.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Least error over the 28 bases.
-    mse_opt: f64,
-    /// The best basis.
-    masks: String,
-    /// Error of the Gray basis.
-    mse_gray: f64,
-    /// Error of the natural basis.
-    mse_natural: f64,
-    /// Equation 5.12 as printed, R = 3.
-    dr_print: f64,
-    /// The same with the noise of the average.
-    dr_per_n: f64,
-    /// Optimal-weight van Trees bound of the best basis.
-    vt: f64,
-    /// Least error over all triples of masks.
-    mse_unconstrained: f64,
-    /// The best triple.
-    masks_unconstrained: String,
-    /// Error of three sign bits.
-    mse_signs: f64,
-}
+    struct Row {
+        /// Signal-to-noise ratio.
+        snr_db: f64 ["dB"],
+        /// Least error over the 28 bases.
+        mse_opt: f64,
+        /// The best basis.
+        masks: String,
+        /// Error of the Gray basis.
+        mse_gray: f64,
+        /// Error of the natural basis.
+        mse_natural: f64,
+        /// Equation 5.12 as printed, R = 3.
+        dr_print: f64,
+        /// The same with the noise of the average.
+        dr_per_n: f64,
+        /// Optimal-weight van Trees bound of the best basis.
+        vt: f64,
+        /// Least error over all triples of masks.
+        mse_unconstrained: f64,
+        /// The best triple.
+        masks_unconstrained: String,
+        /// Error of three sign bits.
+        mse_signs: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Crossing {
-    /// Two bases.
-    pair: &'static str,
-    /// Where their errors are equal.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
+    struct Crossing {
+        /// Two bases.
+        pair: &'static str,
+        /// Where their errors are equal.
+        snr_db: f64 ["dB"],
+    }
 }
 
 impl Figure for GaussianSource {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-9",
-            title: "Gaussian source, three sensors of three bits",
-            caption: "The best basis against Gray and natural patterns, the printed distortion-rate function of one observation and the \
-                      correct one of three. The printed one is no bound: three identical sign bits fall below it at low ratios.",
-            source: "Movaghati, thesis, figure 5.9",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.step_db = 5.0;
-    }
+    figure!(Parameters => Rows, "binary-fig5-9", "Gaussian source, three sensors of three bits", "Movaghati, thesis, figure 5.9",
+        "The best basis against Gray and natural patterns, the printed distortion-rate function of one observation and the \
+         correct one of three. The printed one is no bound: three identical sign bits fall below it at low ratios.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
         let errors = each(&ratios, |snr_db| {
             let scene = Scene::gaussian(snr_db)?;
             let search = scene.search(SENSORS)?;
-            let best = search.best().map_err(Error::failed)?;
-            let any = search.any_rank().best().map_err(Error::failed)?;
+            let best = search.best()?;
+            let any = search.any_rank().best()?;
             let printed = remote_distortion(&scene.source, scene.noise).and_then(|d| d.at(3.0));
             Ok(Row {
                 snr_db,
@@ -91,9 +73,9 @@ impl Figure for GaussianSource {
                 masks: mask_text(&best.masks),
                 mse_gray: scene.mmse(&GRAY)?,
                 mse_natural: scene.mmse(&[4, 2, 1])?,
-                dr_print: printed.map_err(Error::failed)?,
-                dr_per_n: network_rate_distortion(&scene.source, scene.noise, SENSORS).map_err(Error::failed)?,
-                vt: optimal_weight_van_trees(&scene.bank(&best.masks)?).map_err(Error::failed)?,
+                dr_print: printed?,
+                dr_per_n: network_rate_distortion(&scene.source, scene.noise, SENSORS)?,
+                vt: optimal_weight_van_trees(&scene.bank(&best.masks)?)?,
                 mse_unconstrained: any.mse,
                 masks_unconstrained: mask_text(&any.masks),
                 mse_signs: scene.mmse(&[4, 4, 4])?,
@@ -117,6 +99,7 @@ impl Figure for GaussianSource {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let errors = &rows.errors;
         let what = "the corrected distortion-rate function bounds every set";
         claims.all("bound", what, errors, |r| r.dr_per_n <= r.mse_unconstrained * (1.0 + 1e-9));
@@ -124,9 +107,7 @@ impl Figure for GaussianSource {
         claims.all("van-trees", what, errors, |r| r.vt <= r.mse_opt * (1.0 + 1e-9));
         let violated = errors.iter().filter(|r| r.mse_signs < r.dr_print).count();
         let what = "three sign bits fall below the printed function somewhere (erratum binary-6)";
-        claims
-            .at_least("printed-violated", what, violated as f64, 1.0)
-            .at_defaults();
+        here.at_least("printed-violated", what, violated as f64, 1.0);
         let what = "between them {4,6,7} is best (erratum binary-13)";
         claims.references("crossing", what, &rows.crossings, |c| (c.pair.to_owned(), c.snr_db));
         let from = rows.crossings.last().map_or(f64::NAN, |c| c.snr_db);
@@ -143,10 +124,10 @@ impl Figure for GaussianSource {
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let curve = |value: fn(&Row) -> f64| points(&rows.errors, |r| (r.snr_db, value(r)));
         Plot::of(
-            Panel::new(
+            Panel::semilog(
                 "Three sensors, Gaussian source of variance 0.1",
-                Axis::linear("signal-to-noise ratio / dB"),
-                Axis::log("mean squared error"),
+                "signal-to-noise ratio / dB",
+                "mean squared error",
             )
             .with(Layer::line("best basis", curve(|r| r.mse_opt)).coloured(0))
             .with(Layer::line("any three masks", curve(|r| r.mse_unconstrained)).coloured(1))

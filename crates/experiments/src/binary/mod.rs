@@ -51,79 +51,67 @@ struct Scene {
 impl Scene {
     /// Uniform on `[-1, 1]` over `2^bits` cells.
     fn uniform(bits: usize, snr_db: f64) -> Result<Self, Error> {
-        let source = Source::uniform(1.0).map_err(Error::failed)?;
-        let grid = Grid::uniform(1.0, bits).map_err(Error::failed)?;
+        let source = Source::uniform(1.0)?;
+        let grid = Grid::uniform(1.0, bits)?;
         Self::new(source, grid, snr_db)
     }
 
     /// Gaussian of variance 0.1 over the eight cells with the printed Lloyd-Max edges.
     fn gaussian(snr_db: f64) -> Result<Self, Error> {
         let std = GAUSSIAN_VARIANCE.sqrt();
-        let source = Source::gaussian_with_deviation(std).map_err(Error::failed)?;
-        let grid = Grid::printed_gaussian(std).map_err(Error::failed)?;
+        let source = Source::gaussian_with_deviation(std)?;
+        let grid = Grid::printed_gaussian(std)?;
         Self::new(source, grid, snr_db)
     }
 
     fn new(source: Source, grid: Grid, snr_db: f64) -> Result<Self, Error> {
-        let noise = source.noise_std(snr_db).map_err(Error::failed)?;
+        let noise = source.noise_std(snr_db)?;
         Ok(Self { source, grid, noise })
     }
 
     fn search(&self, sensors: usize) -> Result<LinearSearch, Error> {
-        LinearSearch::with_deviation(self.source, self.grid.clone(), self.noise, sensors).map_err(Error::failed)
+        Ok(LinearSearch::with_deviation(self.source, self.grid.clone(), self.noise, sensors)?)
     }
 
     fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
-        self.search(masks.len())?.bank(masks).map_err(Error::failed)
+        Ok(self.search(masks.len())?.bank(masks)?)
     }
 
     fn pattern_bank(&self, patterns: &[Pattern]) -> Result<Bank, Error> {
-        let quantizers = patterns
-            .iter()
-            .map(|p| p.on(&self.grid))
-            .collect::<Result<_, _>>()
-            .map_err(Error::failed)?;
-        Bank::homogeneous_with_deviation(self.source, quantizers, self.noise).map_err(Error::failed)
+        let quantizers = patterns.iter().map(|p| p.on(&self.grid)).collect::<Result<_, _>>()?;
+        Ok(Bank::homogeneous_with_deviation(self.source, quantizers, self.noise)?)
     }
 
     /// Exact error of the posterior mean.
     fn mmse(&self, masks: &[Mask]) -> Result<f64, Error> {
-        self.bank(masks)?.mmse().map_err(Error::failed)
+        Ok(self.bank(masks)?.mmse()?)
     }
 }
 
-/// Signal-to-noise ratios from `FROM` to `TO` in steps of 1 dB by default.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Ratios<const FROM: i32, const TO: i32> {
-    /// First signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    from_db: f64,
-    /// Last signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-    to_db: f64,
-    /// Step, dB.
-    #[garde(range(min = 0.01, max = 60.0))]
-    step_db: f64,
-}
-
-impl<const FROM: i32, const TO: i32> Default for Ratios<FROM, TO> {
-    fn default() -> Self {
-        Self {
-            from_db: f64::from(FROM),
-            to_db: f64::from(TO),
-            step_db: 1.0,
+/// Parameters of a sweep over signal-to-noise ratios, in steps of 1 dB by default, behind the figure's own.
+macro_rules! swept {
+    ($from:literal to $to:literal $(=> quick $last:literal)?, step => quick $step:literal, $($own:tt)*) => {
+        parameters! { self #[derive(Validate)]
+            pub struct Parameters {
+                $($own)*
+                /// First signal-to-noise ratio, dB.
+                #[garde(range(min = -60.0, max = 60.0))]
+                from_db: f64 = $from,
+                /// Last signal-to-noise ratio, dB.
+                #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| super::not_below(self.from_db, *to)))]
+                to_db: f64 = $to $(=> quick $last)?,
+                /// Step, dB.
+                #[garde(range(min = 0.01, max = 60.0))]
+                step_db: f64 = 1.0 => quick $step,
+            }
         }
-    }
+    };
 }
+use swept;
 
 /// Refuses the end of a sweep below its beginning.
 fn not_below(from: f64, to: f64) -> garde::Result {
-    if to >= from {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("lower than from_db, {from}")))
-    }
+    accept(to >= from, || format!("lower than from_db, {from}"))
 }
 
 /// `from, from + step, ..., to`.
@@ -193,7 +181,7 @@ fn mask_text(masks: &[Mask]) -> String {
 
 /// The pattern of a mask.
 fn pattern(mask: Mask, bits: usize) -> Result<Pattern, Error> {
-    linear_pattern(mask, bits).map_err(Error::failed)
+    Ok(linear_pattern(mask, bits)?)
 }
 
 /// A picture of patterns: a row each, dark where the bit is 1, light where it is 0, over the cells of the unit grid.

@@ -6,116 +6,85 @@ use fewbits_binary_patterns::baselines::Luo;
 use fewbits_binary_patterns::search::{by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis};
 
-/// `binary-fig5-7`.
 pub struct Optimum;
 
-/// Parameters of `binary-fig5-7`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Bits of the cell index.
-    #[garde(range(min = 2, max = 4))]
-    bits: usize,
-    /// Numbers of sensors, each at least the number of bits.
-    #[garde(length(min = 1, max = 6), inner(range(min = 2, max = 10)), inner(custom(|n: &usize, _: &()| enough(*n, self.bits))))]
-    sensors: Vec<usize>,
-    /// First signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    from_db: f64,
-    /// Last signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-    to_db: f64,
-    /// Step, dB.
-    #[garde(range(min = 0.01, max = 60.0))]
-    step_db: f64,
+parameters! { self #[derive(Validate)]
+    pub struct Parameters {
+        /// Bits of the cell index.
+        #[garde(range(min = 2, max = 4))]
+        bits: usize = 3,
+        /// Numbers of sensors, each at least the number of bits.
+        #[garde(length(min = 1, max = 6), inner(range(min = 2, max = 10)), inner(custom(|n: &usize, _: &()| enough(*n, self.bits))))]
+        sensors: Vec<usize> = vec![3, 5, 8],
+        /// First signal-to-noise ratio, dB.
+        #[garde(range(min = -60.0, max = 60.0))]
+        from_db: f64 = 0.0,
+        /// Last signal-to-noise ratio, dB.
+        #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
+        to_db: f64 = 30.0,
+        /// Step, dB.
+        #[garde(range(min = 0.01, max = 60.0))]
+        step_db: f64 = 1.0 => quick 5.0,
+    }
 }
 
 /// Refuses fewer sensors than bits: no set of full rank.
 fn enough(sensors: usize, bits: usize) -> garde::Result {
-    if sensors >= bits {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("fewer sensors than the {bits} bits")))
+    accept(sensors >= bits, || format!("fewer sensors than the {bits} bits"))
+}
+
+rows! {
+    pub struct Rows {
+        /// Errors of searches and shortcuts.
+        errors: Vec<Row>,
+        /// Single quantities.
+        special: Vec<Special>,
+        /// Sixteen sensors at 18.2 dB.
+        tiling: Vec<Tiling>,
     }
-}
 
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            bits: 3,
-            sensors: vec![3, 5, 8],
-            from_db: 0.0,
-            to_db: 30.0,
-            step_db: 1.0,
-        }
+    struct Row {
+        /// Signal-to-noise ratio.
+        snr_db: f64 ["dB"],
+        /// Number of sensors N.
+        sensors: usize,
+        /// Least error over sets of full rank.
+        mse_opt: f64 ["V^2"],
+        /// The best set.
+        masks: String,
+        /// Least error over all sets.
+        mse_unconstrained: f64 ["V^2"],
+        /// The best of all sets.
+        masks_unconstrained: String,
+        /// Least error with the Gray basis forced (strategy 1).
+        mse_strategy1: f64 ["V^2"],
+        /// Gray basis filled up by equation 5.13.
+        mse_strategy13: f64 ["V^2"],
+        /// All masks by equation 5.13.
+        mse_strategy3: f64 ["V^2"],
+        /// Luo's bits, linear fusion; few sensors leave a bit without any.
+        luo_soft: Option<f64> ["V^2"],
+        /// Luo's bits, posterior mean.
+        luo_mmse: Option<f64> ["V^2"],
+        /// Luo's bits, majority.
+        luo_majority: Option<f64> ["V^2"],
     }
-}
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Errors of searches and shortcuts.
-    errors: Vec<Row>,
-    /// Single quantities.
-    special: Vec<Special>,
-    /// Sixteen sensors at 18.2 dB.
-    tiling: Vec<Tiling>,
-}
+    struct Special {
+        /// What.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Signal-to-noise ratio.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Number of sensors N.
-    sensors: usize,
-    /// Least error over sets of full rank.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_opt: f64,
-    /// The best set.
-    masks: String,
-    /// Least error over all sets.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_unconstrained: f64,
-    /// The best of all sets.
-    masks_unconstrained: String,
-    /// Least error with the Gray basis forced (strategy 1).
-    #[schemars(extend("unit" = "V^2"))]
-    mse_strategy1: f64,
-    /// Gray basis filled up by equation 5.13.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_strategy13: f64,
-    /// All masks by equation 5.13.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_strategy3: f64,
-    /// Luo's bits, linear fusion; few sensors leave a bit without any.
-    #[schemars(extend("unit" = "V^2"))]
-    luo_soft: Option<f64>,
-    /// Luo's bits, posterior mean.
-    #[schemars(extend("unit" = "V^2"))]
-    luo_mmse: Option<f64>,
-    /// Luo's bits, majority.
-    #[schemars(extend("unit" = "V^2"))]
-    luo_majority: Option<f64>,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Special {
-    /// What.
-    quantity: &'static str,
-    /// Its value.
-    value: f64,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Tiling {
-    /// How sixteen masks were found.
-    design: &'static str,
-    /// Exact error.
-    #[schemars(extend("unit" = "V^2"))]
-    mse: f64,
-    /// The masks.
-    masks: String,
+    struct Tiling {
+        /// How sixteen masks were found.
+        design: &'static str,
+        /// Exact error.
+        mse: f64 ["V^2"],
+        /// The masks.
+        masks: String,
+    }
 }
 
 fn row(bits: usize, sensors: usize, snr_db: f64) -> Result<Row, Error> {
@@ -165,23 +134,10 @@ fn tiling() -> Result<Vec<Tiling>, Error> {
 }
 
 impl Figure for Optimum {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-7",
-            title: "Best linear patterns, three bits",
-            caption: "Exact optimum over all sets of linear patterns, without the rank constraint, with the Gray basis forced (strategy 1), \
-                      filled up by the printed Cramer-Rao formula (strategies 1 and 3), and Luo's allocation. With more sensors than bits the \
-                      error is not monotone: some noise helps, as dither does.",
-            source: "Movaghati, thesis, figure 5.7",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.step_db = 5.0;
-    }
+    figure!(Parameters => Rows, "binary-fig5-7", "Best linear patterns, three bits", "Movaghati, thesis, figure 5.7",
+        "Exact optimum over all sets of linear patterns, without the rank constraint, with the Gray basis forced (strategy 1), \
+         filled up by the printed Cramer-Rao formula (strategies 1 and 3), and Luo's allocation. With more sensors than bits the \
+         error is not monotone: some noise helps, as dither does.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
@@ -204,6 +160,7 @@ impl Figure for Optimum {
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let all = &rows.errors;
         let of = |sensors: usize| all.iter().filter(move |r| r.sensors == sensors);
         let what = "dropping the rank constraint never hurts, forcing the Gray basis never helps";
@@ -211,22 +168,20 @@ impl Figure for Optimum {
             r.mse_unconstrained <= r.mse_opt * (1.0 + 1e-9) && r.mse_strategy1 >= r.mse_opt * (1.0 - 1e-9)
         });
         let what = "from 5 dB on eight optimal sensors beat Luo's under every fusion rule";
-        claims
-            .all("luo", what, of(8).filter(|r| r.snr_db >= 5.0), |r| {
-                [r.luo_soft, r.luo_mmse, r.luo_majority]
-                    .iter()
-                    .all(|luo| luo.is_some_and(|luo| r.mse_opt < luo))
-            })
-            .at_defaults();
+        here.all("luo", what, of(8).filter(|r| r.snr_db >= 5.0), |r| {
+            [r.luo_soft, r.luo_mmse, r.luo_majority]
+                .iter()
+                .all(|luo| luo.is_some_and(|luo| r.mse_opt < luo))
+        });
         let least = of(8).min_by(|a, b| a.mse_opt.total_cmp(&b.mse_opt)).map(|r| r.snr_db);
         let what = "the error of eight sensors is least near 22 dB and rises beyond (erratum binary-18)";
-        claims.near("dither", what, least, 22.0, 1.0).at_defaults();
+        here.near("dither", what, least, 22.0, 1.0);
         let what = "filling the Gray basis by equation 5.13 is poor: ratio to the optimum";
         let ratio = |r: &Row| (format!("{} sensors, {} dB", r.sensors, r.snr_db), r.mse_strategy13 / r.mse_opt);
         claims.references("strategy-3", what, all, ratio);
         let what = "without the basis, equation 5.13 repeats one pattern; the worst ratio to the optimum";
         let worst = of(8).map(|r| r.mse_strategy3 / r.mse_opt).reduce(f64::max);
-        claims.above("strategy-3-alone", what, worst, 20.0).at_defaults();
+        here.above("strategy-3-alone", what, worst, 20.0);
         if p.bits == 3 {
             for (sensors, lossless) in [(5, 9.0), (8, 7.5)] {
                 let loss = |from: f64| {
@@ -246,9 +201,7 @@ impl Figure for Optimum {
             _ => "3 4 6",
         };
         let what = "N = B: natural up to 1 dB, {4,6,1} at 2 and 3, {4,5,6} at 4 to 8, Gray above (erratum binary-13)";
-        claims
-            .all("regimes", what, of(3), |r| r.masks == expected(r.snr_db))
-            .at_defaults();
+        here.all("regimes", what, of(3), |r| r.masks == expected(r.snr_db));
         let what = "Gray is optimal only above 8.0212 dB; with little noise the errors tend to the square of a cell's width over 12";
         claims.references("special", what, &rows.special, |r| (r.quantity.to_owned(), r.value));
         let limit = rows

@@ -7,92 +7,63 @@ use fewbits_binary_patterns::{
 };
 use rayon::prelude::*;
 
-/// `binary-fig5-2`.
 pub struct Clipping;
 
-/// Parameters of `binary-fig5-2`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct ClippingParameters {
-    /// Bits of the cell index.
-    #[garde(range(min = 1, max = 4))]
-    bits: usize,
-    /// Signal-to-noise ratio at which both readings are compared, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    snr_db: f64,
-    /// Masks of the sensors that are compared, below 2^bits.
-    #[garde(length(min = 1, max = 10), inner(range(min = 1, max = 15)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
-    masks: Vec<Mask>,
+parameters! { self #[derive(Validate)]
+    pub struct ClippingParameters {
+        /// Bits of the cell index.
+        #[garde(range(min = 1, max = 4))]
+        bits: usize = 3,
+        /// Signal-to-noise ratio at which both readings are compared, dB.
+        #[garde(range(min = -60.0, max = 60.0))]
+        snr_db: f64 = 18.2,
+        /// Masks of the sensors that are compared, below 2^bits.
+        #[garde(length(min = 1, max = 10), inner(range(min = 1, max = 15)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
+        masks: Vec<Mask> = vec![4, 6, 3, 3, 3, 3, 2, 2],
+    }
 }
 
 /// Refuses a mask of more digits than there are bits.
 fn fits(mask: Mask, bits: usize) -> garde::Result {
-    if u64::from(mask) < 1 << bits {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("not below 2^{bits}")))
+    accept(u64::from(mask) < 1 << bits, || format!("not below 2^{bits}"))
+}
+
+rows! {
+    pub struct Clipped {
+        /// Cells along the axis.
+        cells: Vec<Cell>,
+        /// What the rule costs.
+        errors: Vec<Rule>,
     }
-}
 
-impl Default for ClippingParameters {
-    fn default() -> Self {
-        Self {
-            bits: 3,
-            snr_db: 18.2,
-            masks: vec![4, 6, 3, 3, 3, 3, 2, 2],
-        }
+    struct Cell {
+        /// Measurement.
+        y: f64 ["V"],
+        /// Cell of the measurement, from 1.
+        cell: usize,
+        /// The same with the printed sides of the clipping rule.
+        cell_swapped: usize,
     }
-}
 
-/// The tables of `binary-fig5-2`.
-#[derive(Serialize, JsonSchema)]
-pub struct Clipped {
-    /// Cells along the axis.
-    cells: Vec<Cell>,
-    /// What the rule costs.
-    errors: Vec<Rule>,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Cell {
-    /// Measurement.
-    #[schemars(extend("unit" = "V"))]
-    y: f64,
-    /// Cell of the measurement, from 1.
-    cell: usize,
-    /// The same with the printed sides of the clipping rule.
-    cell_swapped: usize,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Rule {
-    /// Clipping rule.
-    rule: &'static str,
-    /// Exact error of the posterior mean.
-    #[schemars(extend("unit" = "V^2"))]
-    mse: f64,
+    struct Rule {
+        /// Clipping rule.
+        rule: &'static str,
+        /// Exact error of the posterior mean.
+        mse: f64 ["V^2"],
+    }
 }
 
 impl Figure for Clipping {
-    type Parameters = ClippingParameters;
-    type Tables = Clipped;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-2",
-            title: "Cells of the measurement axis and the clipping rule",
-            caption: "The axis is cut into 2^B cells; measurements beyond [-V, V] fall into the nearest outer cell. The thesis prints \
-                      the two sides of this rule swapped (dashed); taken literally that ruins the best eight patterns.",
-            source: "Movaghati, thesis, section 5.2",
-        }
-    }
+    figure!(ClippingParameters => Clipped, "binary-fig5-2", "Cells of the measurement axis and the clipping rule", "Movaghati, thesis, section 5.2",
+        "The axis is cut into 2^B cells; measurements beyond [-V, V] fall into the nearest outer cell. The thesis prints \
+         the two sides of this rule swapped (dashed); taken literally that ruins the best eight patterns.");
 
     fn run(&self, p: &ClippingParameters, _: &Context<'_>) -> Result<Clipped, Error> {
-        let grid = Grid::uniform(1.0, p.bits).map_err(Error::failed)?;
+        let grid = Grid::uniform(1.0, p.bits)?;
         let count = grid.cells();
         let place = |i: i32| {
             let y = f64::from(i) / 100.0;
-            let cell = grid.locate(y).map_err(Error::failed)?;
+            let cell = grid.locate(y)?;
             let swapped = match y {
                 y if y < -1.0 => count - 1,
                 y if y > 1.0 => 0,
@@ -106,7 +77,7 @@ impl Figure for Clipping {
         };
         let cells = (-150..=150).map(place).collect::<Result<_, Error>>()?;
         let scene = Scene::uniform(p.bits, p.snr_db)?;
-        let all = scene.search(p.masks.len())?.ranking().map_err(Error::failed)?;
+        let all = scene.search(p.masks.len())?.ranking()?;
         let own = scene.mmse(&p.masks)?;
         // The swapped rule is a pattern over a grid with two more cells, which carry the opposite end's bit.
         let edges = [-1.0]
@@ -115,7 +86,7 @@ impl Figure for Clipping {
             .chain([1.0])
             .collect();
         let wide = Scene {
-            grid: Grid::from_breakpoints(edges).map_err(Error::failed)?,
+            grid: Grid::from_breakpoints(edges)?,
             ..scene
         };
         let swapped = |masks: &[Mask]| -> Result<f64, Error> {
@@ -124,10 +95,10 @@ impl Figure for Clipping {
                 let mut bits = vec![inner.bits()[count - 1]];
                 bits.extend(inner.bits());
                 bits.push(inner.bits()[0]);
-                Pattern::new(bits).map_err(Error::failed)
+                Ok::<_, Error>(Pattern::new(bits)?)
             };
             let patterns = masks.iter().map(turned).collect::<Result<Vec<_>, _>>()?;
-            wide.pattern_bank(&patterns)?.mmse().map_err(Error::failed)
+            Ok(wide.pattern_bank(&patterns)?.mmse()?)
         };
         let best = all
             .par_iter()
@@ -160,7 +131,7 @@ impl Figure for Clipping {
 
     fn plot(&self, _: &ClippingParameters, tables: &Clipped) -> Plot {
         let curve = |cell: fn(&Cell) -> usize| points(&tables.cells, |c| (c.y, cell(c) as f64));
-        let panel = Panel::new("Cell of a measurement", Axis::linear("measurement y / V"), Axis::linear("cell"));
+        let panel = Panel::linear("Cell of a measurement", "measurement y / V", "cell");
         Plot::of(
             panel
                 .with(Layer::dashed("sides as printed", curve(|c| c.cell_swapped)).coloured(1))
@@ -169,17 +140,18 @@ impl Figure for Clipping {
     }
 }
 
-/// A bit of a pattern.
-#[derive(Serialize, JsonSchema)]
-pub struct Bit {
-    /// Name.
-    pattern: String,
-    /// Which natural patterns are XORed, the first the most significant digit.
-    mask: Mask,
-    /// Cell, from 1.
-    l: usize,
-    /// Bit sent from the cell.
-    bit: u32,
+rows! {
+    /// A bit of a pattern.
+    pub struct Bit {
+        /// Name.
+        pattern: String,
+        /// Which natural patterns are XORed, the first the most significant digit.
+        mask: Mask,
+        /// Cell, from 1.
+        l: usize,
+        /// Bit sent from the cell.
+        bit: u32,
+    }
 }
 
 fn bits_of(rows: impl IntoIterator<Item = (String, Mask)>, bits: usize) -> Result<Vec<Bit>, Error> {
@@ -213,26 +185,18 @@ fn bits_plot(title: &str, table: &[Bit]) -> Plot {
 
 /// Claims that the patterns are the printed ones.
 fn claim_printed(claims: &mut Claims, what: &str, table: &[Bit], printed: &[&str]) {
+    let here = claims.at_defaults();
     let ours = strings(table);
-    claims
-        .all("bits", what, printed.iter().enumerate(), |(i, bits)| {
-            ours.get(i).is_some_and(|(_, own)| own == bits)
-        })
-        .at_defaults();
+    here.all("bits", what, printed.iter().enumerate(), |(i, bits)| {
+        ours.get(i).is_some_and(|(_, own)| own == bits)
+    });
 }
 
-/// Parameters of the pattern pictures.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct BitsParameters {
-    /// Bits of the cell index.
-    #[garde(range(min = 1, max = 8))]
-    bits: usize,
-}
-
-impl Default for BitsParameters {
-    fn default() -> Self {
-        Self { bits: 4 }
+parameters! {
+    pub struct BitsParameters {
+        /// Bits of the cell index.
+        #[garde(range(min = 1, max = 8))]
+        bits: usize = 4,
     }
 }
 
@@ -244,24 +208,14 @@ fn numbered(kind: &str, masks: Vec<Mask>) -> impl Iterator<Item = (String, Mask)
         .map(move |(b, mask)| (format!("{kind}{}", b + 1), mask))
 }
 
-/// `binary-fig5-3`.
 pub struct Natural;
 
 impl Figure for Natural {
-    type Parameters = BitsParameters;
-    type Tables = Vec<Bit>;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-3",
-            title: "Natural patterns",
-            caption: "The binary digits of the cell's index, most significant first. The finest of them changes at every edge.",
-            source: "Movaghati, thesis, figure 5.3",
-        }
-    }
+    figure!(BitsParameters => Vec<Bit>, "binary-fig5-3", "Natural patterns", "Movaghati, thesis, figure 5.3",
+        "The binary digits of the cell's index, most significant first. The finest of them changes at every edge.");
 
     fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
-        bits_of(numbered("N", natural_basis(p.bits).map_err(Error::failed)?), p.bits)
+        bits_of(numbered("N", natural_basis(p.bits)?), p.bits)
     }
 
     fn claims(&self, _: &BitsParameters, table: &Vec<Bit>, claims: &mut Claims) {
@@ -279,25 +233,15 @@ impl Figure for Natural {
     }
 }
 
-/// `binary-fig5-4`.
 pub struct Gray;
 
 impl Figure for Gray {
-    type Parameters = BitsParameters;
-    type Tables = Vec<Bit>;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-4",
-            title: "Gray patterns",
-            caption: "XORs of neighbouring natural patterns. Every edge belongs to exactly one pattern, so that a measurement near an edge \
-                      endangers one bit only.",
-            source: "Movaghati, thesis, figure 5.4",
-        }
-    }
+    figure!(BitsParameters => Vec<Bit>, "binary-fig5-4", "Gray patterns", "Movaghati, thesis, figure 5.4",
+        "XORs of neighbouring natural patterns. Every edge belongs to exactly one pattern, so that a measurement near an edge \
+         endangers one bit only.");
 
     fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
-        bits_of(numbered("G", gray_basis(p.bits).map_err(Error::failed)?), p.bits)
+        bits_of(numbered("G", gray_basis(p.bits)?), p.bits)
     }
 
     fn claims(&self, p: &BitsParameters, table: &Vec<Bit>, claims: &mut Claims) {
@@ -321,43 +265,23 @@ impl Figure for Gray {
     }
 }
 
-/// `binary-fig5-5`.
 pub struct Extra;
 
-/// Parameters of `binary-fig5-5`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct ExtraParameters {
-    /// Bits of the cell index.
-    #[garde(range(min = 1, max = 8))]
-    bits: usize,
-    /// Masks beyond the Gray basis, below 2^bits.
-    #[garde(length(min = 1, max = 20), inner(range(min = 1, max = 255)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
-    extra: Vec<Mask>,
-}
-
-impl Default for ExtraParameters {
-    fn default() -> Self {
-        Self {
-            bits: 4,
-            extra: vec![14, 5, 11],
-        }
+parameters! { self #[derive(Validate)]
+    pub struct ExtraParameters {
+        /// Bits of the cell index.
+        #[garde(range(min = 1, max = 8))]
+        bits: usize = 4,
+        /// Masks beyond the Gray basis, below 2^bits.
+        #[garde(length(min = 1, max = 20), inner(range(min = 1, max = 255)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
+        extra: Vec<Mask> = vec![14, 5, 11],
     }
 }
 
 impl Figure for Extra {
-    type Parameters = ExtraParameters;
-    type Tables = Vec<Bit>;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-fig5-5",
-            title: "Further linear patterns",
-            caption: "With more sensors than bits, further XORs of the natural patterns join the Gray basis: columns 5 to 7 of the \
-                      thesis's generator matrix (5.6).",
-            source: "Movaghati, thesis, figure 5.5 and equation 5.6",
-        }
-    }
+    figure!(ExtraParameters => Vec<Bit>, "binary-fig5-5", "Further linear patterns", "Movaghati, thesis, figure 5.5 and equation 5.6",
+        "With more sensors than bits, further XORs of the natural patterns join the Gray basis: columns 5 to 7 of the \
+         thesis's generator matrix (5.6).");
 
     fn run(&self, p: &ExtraParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
         bits_of(p.extra.iter().map(|&mask| (format!("mask {mask}"), mask)), p.bits)
@@ -385,65 +309,44 @@ impl Figure for Extra {
     }
 }
 
-/// `binary-figB-1`.
 pub struct Response;
 
-/// Parameters of `binary-figB-1`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct ResponseParameters {
-    /// Where the bit changes, in units of V, increasing.
-    #[garde(length(min = 1, max = 100), inner(range(min = -10.0, max = 10.0)))]
-    thresholds: Vec<f64>,
-    /// Noise standard deviation, in units of V.
-    #[garde(range(min = 1e-6, max = 1e3))]
-    noise_std: f64,
-}
-
-impl Default for ResponseParameters {
-    fn default() -> Self {
-        Self {
-            thresholds: vec![-0.6, -0.2, 0.1, 0.7],
-            noise_std: 0.1,
-        }
+parameters! {
+    pub struct ResponseParameters {
+        /// Where the bit changes, in units of V, increasing.
+        #[garde(length(min = 1, max = 100), inner(range(min = -10.0, max = 10.0)))]
+        thresholds: Vec<f64> = vec![-0.6, -0.2, 0.1, 0.7],
+        /// Noise standard deviation, in units of V.
+        #[garde(range(min = 1e-6, max = 1e3))]
+        noise_std: f64 = 0.1,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Answer {
-    /// Source.
-    #[schemars(extend("unit" = "V"))]
-    x: f64,
-    /// Bit without noise.
-    bit: u32,
-    /// Probability of a 1.
-    p1: f64,
-    /// Fisher information about x in the bit.
-    #[schemars(extend("unit" = "1/V^2"))]
-    information: f64,
+rows! {
+    pub struct Answer {
+        /// Source.
+        x: f64 ["V"],
+        /// Bit without noise.
+        bit: u32,
+        /// Probability of a 1.
+        p1: f64,
+        /// Fisher information about x in the bit.
+        information: f64 ["1/V^2"],
+    }
 }
 
 impl Figure for Response {
-    type Parameters = ResponseParameters;
-    type Tables = Vec<Answer>;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-figB-1",
-            title: "Probability of a 1 under a pattern with four edges",
-            caption: "Noise rounds the pattern off; a run of cells narrower than about two standard deviations never reaches certainty. The \
-                      derivative of this curve over its standard deviation is the information in the bit.",
-            source: "Movaghati, thesis, figure B.1",
-        }
-    }
+    figure!(ResponseParameters => Vec<Answer>, "binary-figB-1", "Probability of a 1 under a pattern with four edges", "Movaghati, thesis, figure B.1",
+        "Noise rounds the pattern off; a run of cells narrower than about two standard deviations never reaches certainty. The \
+         derivative of this curve over its standard deviation is the information in the bit.");
 
     fn run(&self, p: &ResponseParameters, _: &Context<'_>) -> Result<Vec<Answer>, Error> {
-        let quantizer = BinaryQuantizer::new(p.thresholds.clone()).map_err(Error::failed)?;
+        let quantizer = BinaryQuantizer::new(p.thresholds.clone())?;
         let at = |i: i32| {
             let x = -1.0 + f64::from(i) / 400.0;
             Ok(Answer {
                 x,
-                bit: u32::from(quantizer.encode(x).map_err(Error::failed)?),
+                bit: u32::from(quantizer.encode(x)?),
                 p1: quantizer.probabilities(x, p.noise_std)[1],
                 information: quantizer.fisher_information(x, p.noise_std),
             })
@@ -452,13 +355,12 @@ impl Figure for Response {
     }
 
     fn claims(&self, p: &ResponseParameters, rows: &Vec<Answer>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let what = "at an edge far from the others both bits are equally likely";
-        claims
-            .all("half", what, &p.thresholds, |t| {
-                let nearest = rows.iter().min_by(|a, b| (a.x - *t).abs().total_cmp(&(b.x - *t).abs()));
-                nearest.is_some_and(|r| (r.p1 - 0.5).abs() <= 2e-3)
-            })
-            .at_defaults();
+        here.all("half", what, &p.thresholds, |t| {
+            let nearest = rows.iter().min_by(|a, b| (a.x - *t).abs().total_cmp(&(b.x - *t).abs()));
+            nearest.is_some_and(|r| (r.p1 - 0.5).abs() <= 2e-3)
+        });
         claims.all("probabilities", "all values are probabilities", rows, |r| (0.0..=1.0).contains(&r.p1));
     }
 

@@ -7,109 +7,79 @@ use fewbits_binary_patterns::search::MaskSet;
 use fewbits_binary_patterns::{Decoder, Mask, count};
 use rayon::prelude::*;
 
-/// `binary-table5-1`.
 pub struct Table;
 
-/// Parameters of `binary-table5-1`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    snr_db: f64,
-    /// The printed masks, below 8.
-    #[garde(length(min = 3, max = 10), inner(range(min = 1, max = 7)))]
-    printed: Vec<Mask>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            snr_db: 18.2,
-            printed: vec![4, 6, 3, 3, 3, 2, 1, 5],
-        }
+parameters! {
+    pub struct Parameters {
+        /// Signal-to-noise ratio, dB.
+        #[garde(range(min = -60.0, max = 60.0))]
+        snr_db: f64 = 18.2,
+        /// The printed masks, below 8.
+        #[garde(length(min = 3, max = 10), inner(range(min = 1, max = 7)))]
+        printed: Vec<Mask> = vec![4, 6, 3, 3, 3, 2, 1, 5],
     }
 }
 
 const BITS: usize = 3;
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The printed and the best sets.
-    sets: Vec<Set>,
-    /// Sizes of the search space.
-    search_spaces: Vec<Space>,
-    /// All sets with both errors, in the order of the posterior mean's.
-    listed: Vec<Listed>,
-}
+rows! {
+    pub struct Rows {
+        /// The printed and the best sets.
+        sets: Vec<Set>,
+        /// Sizes of the search space.
+        search_spaces: Vec<Space>,
+        /// All sets with both errors, in the order of the posterior mean's.
+        listed: Vec<Listed>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Set {
-    /// Which set.
-    set: &'static str,
-    /// Its masks.
-    masks: String,
-    /// Exact error of the posterior mean.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_mmse: f64,
-    /// Exact error of the discrete maximum a posteriori decoder.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_dmap: f64,
-    /// The same with exact cell probabilities.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_exact_dmap: f64,
-    /// Equation 5.13.
-    #[schemars(extend("unit" = "V^2"))]
-    crlb: f64,
-    /// Optimal-weight van Trees bound.
-    #[schemars(extend("unit" = "V^2"))]
-    van_trees: f64,
-    /// Place among all sets under the posterior mean, from 0; none for a set that is not of full rank.
-    rank: Option<usize>,
-    /// Place under the discrete decoder, from 0.
-    rank_dmap: Option<usize>,
-}
+    struct Set {
+        /// Which set.
+        set: &'static str,
+        /// Its masks.
+        masks: String,
+        /// Exact error of the posterior mean.
+        mse_mmse: f64 ["V^2"],
+        /// Exact error of the discrete maximum a posteriori decoder.
+        mse_dmap: f64 ["V^2"],
+        /// The same with exact cell probabilities.
+        mse_exact_dmap: f64 ["V^2"],
+        /// Equation 5.13.
+        crlb: f64 ["V^2"],
+        /// Optimal-weight van Trees bound.
+        van_trees: f64 ["V^2"],
+        /// Place among all sets under the posterior mean, from 0; none for a set that is not of full rank.
+        rank: Option<usize>,
+        /// Place under the discrete decoder, from 0.
+        rank_dmap: Option<usize>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Space {
-    /// Bits B.
-    bits: usize,
-    /// Sensors N.
-    sensors: usize,
-    /// Sets by equation 5.7.
-    printed: f64,
-    /// Multisets of full rank.
-    exact: f64,
-    /// Sets that hold the Gray basis (strategy 1).
-    with_gray: f64,
-}
+    struct Space {
+        /// Bits B.
+        bits: usize,
+        /// Sensors N.
+        sensors: usize,
+        /// Sets by equation 5.7.
+        printed: f64,
+        /// Multisets of full rank.
+        exact: f64,
+        /// Sets that hold the Gray basis (strategy 1).
+        with_gray: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Listed {
-    /// Masks.
-    masks: String,
-    /// Error of the posterior mean.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_mmse: f64,
-    /// Error of the discrete decoder.
-    #[schemars(extend("unit" = "V^2"))]
-    mse_dmap: Option<f64>,
+    struct Listed {
+        /// Masks.
+        masks: String,
+        /// Error of the posterior mean.
+        mse_mmse: f64 ["V^2"],
+        /// Error of the discrete decoder.
+        mse_dmap: Option<f64> ["V^2"],
+    }
 }
 
 impl Figure for Table {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-table5-1",
-            title: "Printed and optimal patterns of eight sensors",
-            caption: "The printed set is 25 places from the best of 2702 under the posterior mean it is said to be optimal for, and 11 % worse. \
-                      It fits a search under the discrete maximum a posteriori decoder, where it is fourth.",
-            source: "Movaghati, thesis, table 5.1",
-        }
-    }
+    figure!(Parameters => Rows, "binary-table5-1", "Printed and optimal patterns of eight sensors", "Movaghati, thesis, table 5.1",
+        "The printed set is 25 places from the best of 2702 under the posterior mean it is said to be optimal for, and 11 % worse. \
+         It fits a search under the discrete maximum a posteriori decoder, where it is fourth.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let scene = Scene::uniform(BITS, p.snr_db)?;
@@ -172,6 +142,7 @@ impl Figure for Table {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let at = |set: &str| rows.sets.iter().find(|r| r.set == set);
         let (best, decoded) = (at("best, posterior mean"), at("best, discrete MAP"));
         let name = |r: &Set| r.set.to_owned();
@@ -181,17 +152,11 @@ impl Figure for Table {
         claims.references("rank", what, &rows.sets, |r| (name(r), r.rank.map(|rank| rank as f64)));
         let what = "place under the discrete decoder: the table fits a search with that decoder";
         claims.references("rank-dmap", what, &rows.sets, |r| (name(r), r.rank_dmap.map(|rank| rank as f64)));
-        claims
-            .near("sets", "there are 2702 sets", rows.listed.len() as f64, 2702.0, 0.0)
-            .at_defaults();
+        here.near("sets", "there are 2702 sets", rows.listed.len() as f64, 2702.0, 0.0);
         let what = "the best set is {4,6,3,3,3,3,2,2}";
-        claims
-            .all("best-masks", what, best, |r| r.masks == "2 2 3 3 3 3 4 6")
-            .at_defaults();
+        here.all("best-masks", what, best, |r| r.masks == "2 2 3 3 3 3 4 6");
         let what = "the best under the discrete decoder is {1,2,3,3,3,3,4,6}";
-        claims
-            .all("dmap-masks", what, decoded, |r| r.masks == "1 2 3 3 3 3 4 6")
-            .at_defaults();
+        here.all("dmap-masks", what, decoded, |r| r.masks == "1 2 3 3 3 3 4 6");
         let what = "the van Trees bound is below every error";
         claims.all("bound", what, &rows.sets, |r| r.van_trees <= r.mse_mmse);
         let what = "equation 5.7 counts multisets once per basis, 1.5 to 18 times too often (erratum binary-2)";

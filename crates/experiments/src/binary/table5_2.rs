@@ -5,19 +5,17 @@ use crate::prelude::*;
 use fewbits_binary_patterns::{Decoder, Pattern, check_separation, count, mask_of};
 use rayon::prelude::*;
 
-/// `binary-table5-2`.
 pub struct Table;
 
-/// Parameters of `binary-table5-2`.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Signal-to-noise ratio, dB.
-    #[garde(range(min = -60.0, max = 60.0))]
-    snr_db: f64,
-    /// The printed patterns, eight bits each.
-    #[garde(length(min = 3, max = 3), inner(custom(|text: &String, _: &()| eight_bits(text))))]
-    printed: Vec<String>,
+parameters! {
+    pub struct Parameters {
+        /// Signal-to-noise ratio, dB.
+        #[garde(range(min = -60.0, max = 60.0))]
+        snr_db: f64 = 5.2,
+        /// The printed patterns, eight bits each.
+        #[garde(length(min = 3, max = 3), inner(custom(|text: &String, _: &()| eight_bits(text))))]
+        printed: Vec<String> = ["01100110", "10001110", "01011010"].map(String::from).to_vec(),
+    }
 }
 
 /// Refuses what is no pattern of eight cells.
@@ -29,67 +27,54 @@ fn eight_bits(text: &str) -> garde::Result {
     }
 }
 
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            snr_db: 5.2,
-            printed: ["01100110", "10001110", "01011010"].map(String::from).to_vec(),
-        }
-    }
-}
-
 const CELLS: usize = 8;
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The printed and other sets.
-    sets: Vec<Set>,
-    /// Errors of the printed triple over those of Gray.
-    over_gray: Vec<OverGray>,
-    /// How many sets there are.
-    sizes: Vec<Size>,
-}
+rows! {
+    pub struct Rows {
+        /// The printed and other sets.
+        sets: Vec<Set>,
+        /// Errors of the printed triple over those of Gray.
+        over_gray: Vec<OverGray>,
+        /// How many sets there are.
+        sizes: Vec<Size>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Set {
-    /// Which set.
-    set: &'static str,
-    /// Its patterns.
-    patterns: String,
-    /// Patterns that are XORs of natural ones.
-    linear: usize,
-    /// Exact error of the posterior mean; the variance of the source is 0.1.
-    mse_mmse: f64,
-    /// Exact error of the discrete maximum a posteriori decoder.
-    mse_dmap: f64,
-    /// Place among the labelings of eight cells, from 0.
-    rank: Option<usize>,
-}
+    struct Set {
+        /// Which set.
+        set: &'static str,
+        /// Its patterns.
+        patterns: String,
+        /// Patterns that are XORs of natural ones.
+        linear: usize,
+        /// Exact error of the posterior mean; the variance of the source is 0.1.
+        mse_mmse: f64,
+        /// Exact error of the discrete maximum a posteriori decoder.
+        mse_dmap: f64,
+        /// Place among the labelings of eight cells, from 0.
+        rank: Option<usize>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct OverGray {
-    /// Signal-to-noise ratio.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Posterior mean.
-    mmse: f64,
-    /// Discrete maximum a posteriori decoder.
-    dmap: f64,
-    /// Equation 5.10 as printed.
-    dmap_print: f64,
-    /// Discrete decoder with exact cell probabilities.
-    dmap_exact: f64,
-    /// Continuous maximum a posteriori decoder.
-    cmap: f64,
-}
+    struct OverGray {
+        /// Signal-to-noise ratio.
+        snr_db: f64 ["dB"],
+        /// Posterior mean.
+        mmse: f64,
+        /// Discrete maximum a posteriori decoder.
+        dmap: f64,
+        /// Equation 5.10 as printed.
+        dmap_print: f64,
+        /// Discrete decoder with exact cell probabilities.
+        dmap_exact: f64,
+        /// Continuous maximum a posteriori decoder.
+        cmap: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Size {
-    /// What is counted.
-    what: &'static str,
-    /// How many.
-    count: f64,
+    struct Size {
+        /// What is counted.
+        what: &'static str,
+        /// How many.
+        count: f64,
+    }
 }
 
 /// All labelings of the cells by three bits, up to the order and the complements of the bits: triples of balanced patterns
@@ -135,18 +120,9 @@ fn over_gray(snr_db: f64, printed: &[Pattern]) -> Result<OverGray, Error> {
 }
 
 impl Figure for Table {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "binary-table5-2",
-            title: "Printed and best patterns, Gaussian source",
-            caption: "The printed triple has nearly the error of knowing nothing, and its second pattern is not linear: a misprint. The best \
-                      basis is half a per cent better than Gray at this ratio; without the rank constraint a quarter is gained.",
-            source: "Movaghati, thesis, table 5.2",
-        }
-    }
+    figure!(Parameters => Rows, "binary-table5-2", "Printed and best patterns, Gaussian source", "Movaghati, thesis, table 5.2",
+        "The printed triple has nearly the error of knowing nothing, and its second pattern is not linear: a misprint. The best \
+         basis is half a per cent better than Gray at this ratio; without the rank constraint a quarter is gained.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let scene = Scene::gaussian(p.snr_db)?;
@@ -188,29 +164,24 @@ impl Figure for Table {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let at = |set: &str| rows.sets.iter().find(|r| r.set == set);
         let what = "exact error, of a variance of 0.1; without the rank constraint a quarter less than Gray";
         claims.references("mmse", what, &rows.sets, |r| (r.set.to_owned(), r.mse_mmse));
         let linear = at("printed").map(|r| r.linear as f64);
         let what = "one of the printed patterns is not linear (erratum binary-12)";
-        claims.near("not-linear", what, linear, 2.0, 0.0).at_defaults();
+        here.near("not-linear", what, linear, 2.0, 0.0);
         let rank = at("printed").and_then(|r| Some(r.rank? as f64));
-        claims
-            .near("rank", "708 of the 840 labelings are better", rank, 708.0, 0.0)
-            .at_defaults();
+        here.near("rank", "708 of the 840 labelings are better", rank, 708.0, 0.0);
         claims.references("count", "number of sets", &rows.sizes, |r| (r.what.to_owned(), r.count));
         let what = "from 5 to 52 dB, under five decoders, Gray is better: nothing makes the print optimal";
         let ratios = rows
             .over_gray
             .iter()
             .flat_map(|r| [r.mmse, r.dmap, r.dmap_print, r.dmap_exact, r.cmap]);
-        claims
-            .all("never-best", what, ratios, |ratio| ratio > 1.0)
-            .at_defaults();
+        here.all("never-best", what, ratios, |ratio| ratio > 1.0);
         let what = "the best basis is 00001111, 00111100, 01101001";
-        claims
-            .all("best-patterns", what, at("best basis"), |r| r.patterns == "00001111 00111100 01101001")
-            .at_defaults();
+        here.all("best-patterns", what, at("best basis"), |r| r.patterns == "00001111 00111100 01101001");
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {

@@ -2,8 +2,8 @@
 
 use super::case::Case;
 use super::linear::{Scheme, start, time_of_steps};
-use super::pictures::{by_budget, curve};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, Summary, steps};
+use super::pictures::by_budget;
+use super::rows::{Ensemble, Further, Nothing, Part, Rows, Step, Summary};
 use super::scalar::{BUDGETS, CENSORED};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
@@ -27,13 +27,9 @@ impl Case for Lossy {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-lossy",
-        title: "Censored or lost?",
-        caption: "Nothing arrived: the sensor was silent, or its message was lost. A fusion centre that takes loss for silence believes too \
-                  much; one that weighs both loses far less.",
-        source: "",
-    };
+    const ABOUT: About = About::of("cfwmd-lossy", "Censored or lost?", "");
+    const CAPTION: &str = "Nothing arrived: the sensor was silent, or its message was lost. A fusion centre that takes loss for silence believes too \
+        much; one that weighs both loses far less.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[(MODELLED, IGNORED)];
 
     fn setting() -> Linear {
@@ -53,10 +49,6 @@ impl Case for Lossy {
         Ok(all)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
         for loss in ["loss 0.1", "loss 0.3"] {
             rows.beats(claims, (MODELLED, IGNORED), (loss, 1.0), &[Part::Position]);
@@ -72,16 +64,12 @@ impl Case for Lossy {
 
     fn plot(setting: &Linear, rows: &Rows<Step>) -> Plot {
         let l = setting.messages[0];
-        let mut panel = Panel::new(
-            "Position error over a lossy link",
-            Axis::linear("loss probability"),
-            Axis::linear("time-averaged RMSE (m)"),
-        );
+        let mut panel = Panel::linear("Position error over a lossy link", "loss probability", "time-averaged RMSE (m)");
         for (colour, scheme) in [IGNORED, MODELLED].into_iter().enumerate() {
             let at = |loss: &f64| Some((*loss, rows.at(&format!("{scheme}, loss {loss}"), l)?.position_rmse));
             let clean = rows.at(NO_LOSS, l).map(|r| (0.0, r.position_rmse));
             let lossy = setting.losses.iter().flatten().filter_map(at);
-            panel = panel.with_all(curve(scheme, colour, clean.into_iter().chain(lossy).collect()));
+            panel = panel.with_all(Layer::curve(scheme, colour, clean.into_iter().chain(lossy).collect()));
         }
         Plot::of(panel)
     }
@@ -92,26 +80,43 @@ pub(super) struct Scheduled;
 
 const TWO: &str = "2 sensors";
 
-/// Bounds beside the runs.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Bounds {
-    /// Bounds of any filter that receives these messages.
-    bound: Vec<Bound>,
+rows! {
+    /// Bounds beside the runs.
+    #[derive(Debug)]
+    pub struct Bounds {
+        /// Bounds of any filter that receives these messages.
+        bound: Vec<Bound>,
+    }
+
+    #[derive(Debug)]
+    struct Bound {
+        /// Message budget.
+        l: f64 ["messages/step"],
+        /// Number of sensors.
+        sensors: u64,
+        /// Time-averaged position bound, innovations weighed by the sensor's own filter (CFwMD).
+        bound_m: f64 ["m"],
+        /// The same, weighed with the bound's own covariance (CFwMD2, scheduled).
+        bound_centre_m: f64 ["m"],
+    }
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
-struct Bound {
-    /// Message budget.
-    #[schemars(extend("unit" = "messages/step"))]
-    l: f64,
-    /// Number of sensors.
-    sensors: u64,
-    /// Time-averaged position bound, innovations weighed by the sensor's own filter (CFwMD).
-    #[schemars(extend("unit" = "m"))]
-    bound_m: f64,
-    /// The same, weighed with the bound's own covariance (CFwMD2, scheduled).
-    #[schemars(extend("unit" = "m"))]
-    bound_centre_m: f64,
+impl Further<Linear> for Bounds {
+    fn of(p: &Linear, _: &Context<'_>) -> Result<Self, Error> {
+        let row = |(l, sensors)| {
+            let (bound_m, bound_centre_m) = (bound(p, l, sensors, true)?, bound(p, l, sensors, false)?);
+            Ok(Bound {
+                l,
+                sensors,
+                bound_m,
+                bound_centre_m,
+            })
+        };
+        let own = p.messages.iter().map(|l| (*l, p.sensors));
+        let cases = own.chain([(1.0, 2), (2.0, 2)]).filter(|_| p.noise_variances.len() == 1);
+        let bound = cases.map(row).collect::<Result<_, Error>>()?;
+        Ok(Self { bound })
+    }
 }
 
 fn world(sensors: u64) -> String {
@@ -123,13 +128,9 @@ impl Case for Scheduled {
     type Main = Step;
     type Further = Bounds;
 
-    const ABOUT: About = About {
-        id: "cfwmd-scheduled",
-        title: "The rate of covariance feedback without the feedback",
-        caption: "A schedule of innovation variances, simulated once before deployment, meets the message budget and the error of covariance \
-                  feedback (CFwMD2) without sending a covariance. Thin: optimistic bounds for any filter that receives these messages.",
-        source: "",
-    };
+    const ABOUT: About = About::of("cfwmd-scheduled", "The rate of covariance feedback without the feedback", "");
+    const CAPTION: &str = "A schedule of innovation variances, simulated once before deployment, meets the message budget and the error of covariance \
+        feedback (CFwMD2) without sending a covariance. Thin: optimistic bounds for any filter that receives these messages.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("scheduled", "CFwMD2"), ("scheduled", "CFwMD")];
 
     fn setting() -> Linear {
@@ -153,21 +154,6 @@ impl Case for Scheduled {
         Ok(all)
     }
 
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Bounds), Error> {
-        let row = |(l, sensors)| {
-            Ok(Bound {
-                l,
-                sensors,
-                bound_m: bound(p, l, sensors, true)?,
-                bound_centre_m: bound(p, l, sensors, false)?,
-            })
-        };
-        let own = p.messages.iter().map(|l| (*l, p.sensors));
-        let cases = own.chain([(1.0, 2), (2.0, 2)]).filter(|_| p.noise_variances.len() == 1);
-        let bound = cases.map(row).collect::<Result<_, Error>>()?;
-        Ok((steps(all), Bounds { bound }))
-    }
-
     fn claims(rows: &Rows<Step, Bounds>, claims: &mut Claims) {
         let name = |scheme: &str| format!("{scheme}, 4 sensors");
         let bounds = &rows.further.bound;
@@ -182,7 +168,7 @@ impl Case for Scheduled {
             for scheme in ["CFwMD", "CFwMD2", "scheduled"] {
                 let error = rows.at(&name(scheme), l).map(|r| r.position_rmse.value);
                 let own = bound.map(|b| if scheme == "CFwMD" { b.bound_m } else { b.bound_centre_m });
-                let ratio = error.zip(own).map(|(error, bound)| error / bound);
+                let ratio = over(error, own);
                 let what = format!("{scheme} does not beat its bound at l = {l} (ratio)");
                 claims.at_least(format!("above-bound-{scheme}-l{l}"), what, ratio, 0.995);
             }
@@ -218,9 +204,9 @@ impl Case for Scheduled {
 
 /// Time-averaged position bound: expected Fisher information of each sensor at the bound's own covariance.
 fn bound(setting: &Linear, messages: f64, sensors: u64, own_filter: bool) -> Result<f64, Error> {
-    let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance).map_err(Error::failed)?;
+    let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance)?;
     let noise = setting.noise_variances[0];
-    let eta = fewbits_cfwmd::threshold::threshold(messages / sensors as f64, 1).map_err(Error::failed)?;
+    let eta = fewbits_cfwmd::threshold::threshold(messages / sensors as f64, 1)?;
     let (f, q) = (*dynamics.transition(), *dynamics.noise_covariance());
     let mut bound = *start(setting)?.covariance();
     let mut own = bound;
@@ -236,10 +222,10 @@ fn bound(setting: &Linear, messages: f64, sensors: u64, own_filter: bool) -> Res
         let mut information = 0.0;
         for (mu, weight) in gauss_legendre::<24>().panels(-reach, reach, 8) {
             let density = normal::log_pdf_with(mu, 0.0, p).exp();
-            information += weight * density * fisher_information(mu, half_width, noise).map_err(Error::failed)?;
+            information += weight * density * fisher_information(mu, half_width, noise)?;
         }
         let received = Matrix2::new(sensors as f64 * information, 0.0, 0.0, 0.0);
-        bound = cramer_rao::covariance_step(&dynamics, &bound, &received).map_err(Error::failed)?;
+        bound = cramer_rao::covariance_step(&dynamics, &bound, &received)?;
         total += bound[(0, 0)];
     }
     Ok((total / setting.steps as f64).sqrt())
@@ -258,23 +244,38 @@ const SCHEMES: [(&str, Scheme); 7] = [
     ("RBPF 100", Scheme::RaoBlackwell(100)),
 ];
 
-/// Times beside the runs.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Times {
-    /// Time of a fusion step.
-    #[schemars(extend("volatile" = true))]
-    time: Vec<Time>,
+rows! {
+    /// Times beside the runs.
+    #[derive(Debug)]
+    pub struct Times {
+        /// Time of a fusion step.
+        #[schemars(extend("volatile" = true))]
+        time: Vec<Time>,
+    }
+
+    #[derive(Debug)]
+    struct Time {
+        /// Filter.
+        scheme: &'static str,
+        /// Time of one fusion step, best of the repetitions.
+        time_us: f64 ["us"],
+        /// Time over that of the Gaussian belief.
+        relative: f64,
+    }
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
-struct Time {
-    /// Filter.
-    scheme: &'static str,
-    /// Time of one fusion step, best of the repetitions.
-    #[schemars(extend("unit" = "us"))]
-    time_us: f64,
-    /// Time over that of the Gaussian belief.
-    relative: f64,
+impl Further<Linear> for Times {
+    fn of(p: &Linear, context: &Context<'_>) -> Result<Self, Error> {
+        let times = time_of_steps(context, p, p.messages[0], &SCHEMES)?;
+        let base = times[0].1;
+        let row = |(scheme, seconds): (_, f64)| Time {
+            scheme,
+            time_us: seconds * 1e6,
+            relative: seconds / base,
+        };
+        let time = times.into_iter().map(row).collect();
+        Ok(Self { time })
+    }
 }
 
 impl Case for Cost {
@@ -282,13 +283,9 @@ impl Case for Cost {
     type Main = Step;
     type Further = Times;
 
-    const ABOUT: About = About {
-        id: "cfwmd-cost",
-        title: "Error against cost",
-        caption: "The Gaussian belief with exact moments (ADF) is as accurate as a thousand particles (PF) at a small fraction of the time; \
-                  thirty Rao-Blackwellised particles (RBPF) are on a par. Times are per step of fusion, draws of the experiment excluded.",
-        source: "",
-    };
+    const ABOUT: About = About::of("cfwmd-cost", "Error against cost", "");
+    const CAPTION: &str = "The Gaussian belief with exact moments (ADF) is as accurate as a thousand particles (PF) at a small fraction of the time; \
+        thirty Rao-Blackwellised particles (RBPF) are on a par. Times are per step of fusion, draws of the experiment excluded.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("PF 1000", "ADF"), ("RBPF 30", "ADF"), ("ADF", "PF 100")];
     const MEASURES_TIME: bool = true;
 
@@ -298,18 +295,6 @@ impl Case for Cost {
 
     fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
         setting.at_budgets(context, "", &SCHEMES)
-    }
-
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, context: &Context<'_>) -> Result<(Vec<Step>, Times), Error> {
-        let times = time_of_steps(context, p, p.messages[0], &SCHEMES)?;
-        let base = times[0].1;
-        let row = |(scheme, seconds): (_, f64)| Time {
-            scheme,
-            time_us: seconds * 1e6,
-            relative: seconds / base,
-        };
-        let time = times.into_iter().map(row).collect();
-        Ok((steps(all), Times { time }))
     }
 
     fn claims(rows: &Rows<Step, Times>, claims: &mut Claims) {

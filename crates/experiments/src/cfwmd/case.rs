@@ -1,6 +1,6 @@
 //! A simulated figure in few words: a setting, the runs, what is claimed of them, a picture.
 
-use super::rows::{Ensemble, Rows};
+use super::rows::{Ensemble, Further, Main, Rows};
 use super::setting::Setting;
 use crate::parameters;
 use crate::prelude::*;
@@ -11,12 +11,11 @@ use std::marker::PhantomData;
 /// What a simulated figure runs and claims.
 pub(super) trait Case: Sync + 'static {
     type Setting: Setting;
-    /// A row of the main table.
-    type Main: Serialize + JsonSchema;
-    /// Further tables.
-    type Further: Serialize + JsonSchema;
+    type Main: Main;
+    type Further: Further<Self::Setting>;
 
     const ABOUT: About;
+    const CAPTION: &'static str;
     /// Schemes that are compared trial by trial, wherever both ran.
     const PAIRS: &'static [(&'static str, &'static str)];
     /// Quantities with independent references.
@@ -29,13 +28,10 @@ pub(super) trait Case: Sync + 'static {
     /// All runs.
     fn simulate(setting: &Self::Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error>;
 
-    /// The main table, and further ones. `printed`: whether printed numbers may stand beside ours.
-    fn tables(
-        setting: &Self::Setting,
-        ensembles: &[Ensemble],
-        printed: bool,
-        context: &Context<'_>,
-    ) -> Result<(Vec<Self::Main>, Self::Further), Error>;
+    /// Whether the main table shows this run.
+    fn shown(_setting: &Self::Setting, _run: &Ensemble) -> bool {
+        true
+    }
 
     /// Claims about the publication's setting at its full number of trials.
     fn claims(rows: &Rows<Self::Main, Self::Further>, claims: &mut Claims);
@@ -43,7 +39,9 @@ pub(super) trait Case: Sync + 'static {
     /// Claims about any setting and number of trials.
     fn always(_setting: &Self::Setting, _rows: &Rows<Self::Main, Self::Further>, _claims: &mut Claims) {}
 
-    fn plot(setting: &Self::Setting, rows: &Rows<Self::Main, Self::Further>) -> Plot;
+    fn plot(_setting: &Self::Setting, rows: &Rows<Self::Main, Self::Further>) -> Plot {
+        Self::Main::plot(&rows.main)
+    }
 }
 
 /// The figure of a case.
@@ -61,6 +59,12 @@ pub(super) struct Preset<C: Case>(C::Setting);
 impl<C: Case> Default for Preset<C> {
     fn default() -> Self {
         Self(C::setting())
+    }
+}
+
+impl<C: Case> Quick for Preset<C> {
+    fn quicken(&mut self) {
+        self.0.quicken();
     }
 }
 
@@ -95,11 +99,7 @@ impl<C: Case> Figure for Simulated<C> {
     type Tables = Rows<C::Main, C::Further>;
 
     fn about(&self) -> About {
-        C::ABOUT
-    }
-
-    fn quicken(&self, parameters: &mut Preset<C>) {
-        parameters.0.quicken();
+        C::ABOUT.showing(C::CAPTION)
     }
 
     fn cost(&self, parameters: &Preset<C>) -> Cost {
@@ -112,14 +112,15 @@ impl<C: Case> Figure for Simulated<C> {
 
     fn run(&self, Preset(setting): &Preset<C>, context: &Context<'_>) -> Result<Self::Tables, Error> {
         let ensembles = C::simulate(setting, context)?;
-        let (main, further) = C::tables(setting, &ensembles, is_printed::<C>(setting), context)?;
-        Ok(Rows::of(&ensembles, C::PAIRS, main, further))
+        let shown: Vec<_> = ensembles.iter().filter(|e| C::shown(setting, e)).collect();
+        let main = C::Main::of(C::ABOUT.id, &shown, is_printed::<C>(setting));
+        Ok(Rows::of(&ensembles, C::PAIRS, main, C::Further::of(setting, context)?))
     }
 
     fn claims(&self, Preset(setting): &Preset<C>, rows: &Self::Tables, claims: &mut Claims) {
-        rows.agree(claims, C::REFERENCES);
-        C::claims(rows, claims);
-        claims.so_far().at_defaults().at_full_trials();
+        let mut limited = claims.at_defaults().at_full_trials();
+        rows.agree(&mut limited, C::REFERENCES);
+        C::claims(rows, &mut limited);
         C::always(setting, rows, claims);
     }
 

@@ -139,10 +139,6 @@ impl<const M: usize> Track<'_, M> {
     }
 }
 
-fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
-    Error::failed(error)
-}
-
 /// Runs schemes over the trials of a setting at one budget, on common random numbers. Schemes for scalar measurements are left
 /// out where position and velocity are measured.
 pub(super) fn run<const M: usize>(
@@ -183,19 +179,19 @@ where
         messages: f64,
         schemes: &[(&'static str, Scheme)],
     ) -> Result<Self, Error> {
-        let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance).map_err(failed)?;
+        let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance)?;
         let sensor = Measured::sensor(&setting.noise_variances)?;
         let sensors = setting.sensors as usize;
-        let budget = Budget::new(messages, sensors).map_err(failed)?;
-        let threshold = budget.threshold(M).map_err(failed)?;
+        let budget = Budget::new(messages, sensors)?;
+        let threshold = budget.threshold(M)?;
         let start = start(setting)?;
         let steps = setting.steps as usize;
         let mut recursion = OwnRecursion::new(&start);
         let (mut own, mut open_loop) = (Vec::new(), Vec::new());
         let mut prior = start;
         for _ in 0..steps {
-            let step = recursion.advance(&dynamics, &sensor, start.mean()).map_err(failed)?;
-            let rule = CensoringRule::new(&step.innovation_covariance, threshold).map_err(failed)?;
+            let step = recursion.advance(&dynamics, &sensor, start.mean())?;
+            let rule = CensoringRule::new(&step.innovation_covariance, threshold)?;
             own.push((step, rule));
             prior = kalman::predict(&dynamics, &prior);
             open_loop.push(*prior.covariance());
@@ -218,12 +214,17 @@ where
         if schemes.iter().any(|(_, s)| s.needs_schedule()) {
             let network = experiment.network(0.0)?;
             let mut rng = context.stream("cfwmd-schedule").rng();
-            let covariances =
-                expected_covariances(&mut rng, &network, &experiment.dynamics, &experiment.start, steps, SCHEDULE_RUNS)
-                    .map_err(failed)?;
+            let covariances = expected_covariances(
+                &mut rng,
+                &network,
+                &experiment.dynamics,
+                &experiment.start,
+                steps,
+                SCHEDULE_RUNS,
+            )?;
             let rule = |p: &SMatrix<f64, 2, 2>| {
                 let predicted = Gaussian::from_trusted_parts(Vector2::zeros(), *p);
-                network.rule_under(0, &predicted).map_err(failed)
+                Ok::<_, Error>(network.rule_under(0, &predicted)?)
             };
             experiment.scheduled = covariances.iter().map(rule).collect::<Result<_, _>>()?;
         }
@@ -231,7 +232,7 @@ where
     }
 
     fn network(&self, loss: f64) -> Result<Sensors<M>, Error> {
-        Network::new(vec![self.sensor; self.sensors], self.threshold, Link::lossy(loss)?).map_err(failed)
+        Ok(Network::new(vec![self.sensor; self.sensors], self.threshold, Link::lossy(loss)?)?)
     }
 
     fn draw(&self, stream: Stream) -> Result<Draws<M>, Error> {
@@ -242,8 +243,7 @@ where
         let mut state = self.start.sample(&mut rng);
         let mut halves = (0..self.sensors)
             .map(|_| LocalSensor::new(self.sensor, self.threshold, NumberFormat::Double, &self.start))
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(failed)?;
+            .collect::<Result<Vec<_>, _>>()?;
         let mut draws = Draws {
             truth: Vec::new(),
             measurements: Vec::new(),
@@ -259,9 +259,7 @@ where
             if self.local {
                 let reports = halves.iter_mut().zip(&measurements);
                 let reports = reports.map(|(half, z)| half.step(&mut noise, &self.dynamics, z).map(Observation::from));
-                draws
-                    .no_feedback
-                    .push(reports.collect::<Result<_, _>>().map_err(failed)?);
+                draws.no_feedback.push(reports.collect::<Result<_, _>>()?);
             }
             draws.truth.push(state);
             draws.measurements.push(measurements);
@@ -291,9 +289,7 @@ where
             Scheme::Lossy { loss, modelled } => {
                 self.gaussian(&mut track, Weighing::OwnFilter, loss, if modelled { loss } else { 0.0 })?;
             }
-            Scheme::NoFeedback(method) => self
-                .no_feedback(&mut track, method, &self.network(0.0)?)
-                .map_err(failed)?,
+            Scheme::NoFeedback(method) => self.no_feedback(&mut track, method, &self.network(0.0)?)?,
             Scheme::Particles(count, weighing) => self.particles(&mut track, count, weighing)?,
             special => Measured::special(self, special, track)?,
         }
@@ -346,7 +342,7 @@ where
             let mut sent = 0;
             for (i, z) in track.draws.measurements[k].iter().enumerate() {
                 if sends(k, i, z, &prediction) {
-                    belief = kalman::update(&self.sensor, &belief, z).map_err(failed)?.0;
+                    belief = kalman::update(&self.sensor, &belief, z)?.0;
                     sent += 1;
                 }
             }
@@ -364,7 +360,7 @@ where
     ) -> Result<Vec<CensoringRule<M>>, Error> {
         let rule = match weighing {
             Weighing::OwnFilter => self.own[k].1.clone(),
-            Weighing::FusionCentre => network.rule_under(0, predicted).map_err(failed)?,
+            Weighing::FusionCentre => network.rule_under(0, predicted)?,
             Weighing::Scheduled => self.scheduled[k].clone(),
         };
         Ok(vec![rule; self.sensors])
@@ -404,10 +400,7 @@ where
             let predicted = kalman::predict(&self.dynamics, &belief);
             let rules = self.rules(k, weighing, &network, &predicted)?;
             let (observations, sent) = self.observe(k, track.draws, &rules, predicted.mean(), loss);
-            belief = network
-                .fuse(&predicted, &rules, predicted.mean(), &observations)
-                .map_err(failed)?
-                .0;
+            belief = network.fuse(&predicted, &rules, predicted.mean(), &observations)?.0;
             track.note(k, &belief, sent);
         }
         Ok(())
@@ -419,19 +412,17 @@ where
         let mut rng = track.stream.named("particles").fast_rng();
         let root = semidefinite_factor("initial covariance", self.start.covariance())?;
         let mut draw = || self.start.mean() + root * Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
-        let mut cloud = Particles::from_draws(count, &mut draw).map_err(failed)?;
+        let mut cloud = Particles::from_draws(count, &mut draw)?;
         let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Always);
         let mut workspace = Workspace::default();
         for k in 0..self.steps {
-            filter
-                .predict(&mut rng, &self.dynamics, &mut cloud, &mut workspace)
-                .map_err(failed)?;
+            filter.predict(&mut rng, &self.dynamics, &mut cloud, &mut workspace)?;
             let broadcast = cloud.mean();
             let predicted = Gaussian::from_trusted_parts(broadcast, cloud.covariance_about(&broadcast));
             let rules = self.rules(k, weighing, &network, &predicted)?;
             let (observations, sent) = self.observe(k, track.draws, &rules, &broadcast, 0.0);
-            let likelihood = network.likelihood(&rules, &broadcast, &observations).map_err(failed)?;
-            filter.update(&mut cloud, &likelihood).map_err(failed)?;
+            let likelihood = network.likelihood(&rules, &broadcast, &observations)?;
+            filter.update(&mut cloud, &likelihood)?;
             let mean = cloud.mean();
             let belief = Gaussian::from_trusted_parts(mean, cloud.covariance_about(&mean));
             track.note(k, &belief, sent);
@@ -490,7 +481,7 @@ const SCHEDULE_RUNS: usize = 500;
 impl Dimension<1> for Measured {
     fn sensor(variances: &[f64]) -> Result<LinearSensor<2, 1>, Error> {
         let variance = variances.first().copied().unwrap_or(0.0);
-        LinearSensor::scalar(Vector2::new(1.0, 0.0), variance).map_err(failed)
+        Ok(LinearSensor::scalar(Vector2::new(1.0, 0.0), variance)?)
     }
 
     fn special(experiment: &Experiment<1>, scheme: Scheme, mut track: Track<'_, 1>) -> Result<(), Error> {
@@ -509,7 +500,7 @@ impl Dimension<2> for Measured {
             return Err(fewbits_numerics::ArgumentError::new("noise_variances", got, "2 variances").into());
         }
         let covariance = SMatrix::<f64, 2, 2>::from_diagonal(&Vector2::from_column_slice(variances));
-        LinearSensor::new(SMatrix::identity(), covariance).map_err(failed)
+        Ok(LinearSensor::new(SMatrix::identity(), covariance)?)
     }
 
     fn special(_: &Experiment<2>, scheme: Scheme, _: Track<'_, 2>) -> Result<(), Error> {

@@ -2,8 +2,8 @@
 
 use super::case::Case;
 use super::linear::{Method, Scheme, start};
-use super::pictures::{BOTH, by_step};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
+use super::pictures::BOTH;
+use super::rows::{Ensemble, Further, Nothing, Part, Rows, Step};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
@@ -12,7 +12,6 @@ use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::Vector2;
 
-/// Figure 3.
 pub(super) struct Fig3;
 
 impl Case for Fig3 {
@@ -20,13 +19,9 @@ impl Case for Fig3 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig3",
-        title: "Scalar measurements, no feedback",
-        caption: "The order of the published figure, obtained with the correct filter: a joint Gaussian belief over the state and the sensors' \
-                  own estimates. With the printed likelihood CFwMD would coincide with CFoMD.",
-        source: "CFwMD paper, figure 3",
-    };
+    const ABOUT: About = About::of("cfwmd-fig3", "Scalar measurements, no feedback", "CFwMD paper, figure 3");
+    const CAPTION: &str = "The order of the published figure, obtained with the correct filter: a joint Gaussian belief over the state and the sensors' \
+        own estimates. With the printed likelihood CFwMD would coincide with CFoMD.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("CFoMD", "random")];
 
     fn setting() -> Linear {
@@ -43,10 +38,6 @@ impl Case for Fig3 {
         setting.at_budgets(context, "", &schemes)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
         rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], ("", 1.0), &BOTH);
         rows.beats(claims, ("CFwMD", "CFoMD"), ("", 1.0), &BOTH);
@@ -56,48 +47,43 @@ impl Case for Fig3 {
         let gain = rows.ratio("CFwMD", "CFoMD", 1.0).map(|r| 1.0 - r);
         claims.near("gain", "using silence lowers the position RMSE by a tenth", gain, 0.105, 0.025);
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
 /// Ways to use silence without feedback.
 pub(super) struct NoFeedbackFigure;
 
-/// What the printed likelihood says.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Literal {
-    /// The printed likelihood of silence over the law that it assumes.
-    printed_likelihood: Vec<Printed>,
-}
+rows! {
+    /// What the printed likelihood says.
+    #[derive(Debug)]
+    pub struct Literal {
+        /// The printed likelihood of silence over the law that it assumes.
+        printed_likelihood: Vec<Printed>,
+    }
 
-#[derive(Debug, Serialize, JsonSchema)]
-struct Printed {
-    /// Time step.
-    k: usize,
-    /// Position less its mean.
-    #[schemars(extend("unit" = "m"))]
-    offset: f64,
-    /// Probability of silence as printed: averaged over an own estimate that scatters about this position.
-    probability: f64,
+    #[derive(Debug)]
+    struct Printed {
+        /// Time step.
+        k: usize,
+        /// Position less its mean.
+        offset: f64 ["m"],
+        /// Probability of silence as printed: averaged over an own estimate that scatters about this position.
+        probability: f64,
+    }
 }
 
 /// The printed likelihood by quadrature over the sensor's estimate, at positions of all steps.
 fn printed_likelihood(setting: &Linear) -> Result<Vec<Printed>, Error> {
     let noise = setting.noise_variances[0];
     let rate = setting.messages[0] / setting.sensors as f64;
-    let threshold = fewbits_cfwmd::threshold::threshold(rate, 1).map_err(Error::failed)?;
-    let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance).map_err(Error::failed)?;
-    let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), noise).map_err(Error::failed)?;
+    let threshold = fewbits_cfwmd::threshold::threshold(rate, 1)?;
+    let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance)?;
+    let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), noise)?;
     let start = start(setting)?;
     let mut own = OwnRecursion::new(&start);
     let mut rows = Vec::new();
     for k in 1..=setting.steps as usize {
-        let step = own.advance(&dynamics, &sensor, start.mean()).map_err(Error::failed)?;
-        let half_width = CensoringRule::new(&step.innovation_covariance, threshold)
-            .map_err(Error::failed)?
-            .half_width();
+        let step = own.advance(&dynamics, &sensor, start.mean())?;
+        let half_width = CensoringRule::new(&step.innovation_covariance, threshold)?.half_width();
         let spread = step.innovation_covariance[(0, 0)] - noise;
         for offset in [-10.0, -1.0, 0.0, 1.0, 10.0] {
             let reach = 9.0 * spread.sqrt();
@@ -113,20 +99,24 @@ fn printed_likelihood(setting: &Linear) -> Result<Vec<Printed>, Error> {
     Ok(rows)
 }
 
+impl Further<Linear> for Literal {
+    fn of(p: &Linear, _: &Context<'_>) -> Result<Self, Error> {
+        let printed_likelihood = printed_likelihood(p)?;
+        Ok(Self { printed_likelihood })
+    }
+}
+
 impl Case for NoFeedbackFigure {
     type Setting = Linear;
     type Main = Step;
     type Further = Literal;
 
-    const ABOUT: About = About {
-        id: "cfwmd-nofeedback",
-        title: "What silence is worth without feedback, and what the printed likelihood is",
-        caption: "Exact filter (measurements imputed), joint Gaussian belief, a heuristic that scatters the sensors' estimates about the fusion \
-                  centre's, the filter that ignores silence, and the paper's law of the sensors' estimates with its mean corrected, \
-                  which does harm because it forgets the data. The likelihood as printed is one number whatever the state, and so \
-                  leaves the filter that ignores silence.",
-        source: "",
-    };
+    const ABOUT: About =
+        About::of("cfwmd-nofeedback", "What silence is worth without feedback, and what the printed likelihood is", "");
+    const CAPTION: &str = "Exact filter (measurements imputed), joint Gaussian belief, a heuristic that scatters the sensors' estimates about the fusion \
+        centre's, the filter that ignores silence, and the paper's law of the sensors' estimates with its mean corrected, \
+        which does harm because it forgets the data. The likelihood as printed is one number whatever the state, and so \
+        leaves the filter that ignores silence.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[
         ("exact", "joint Gaussian"),
         ("joint Gaussian", "ignored"),
@@ -154,11 +144,6 @@ impl Case for NoFeedbackFigure {
         setting.at_budgets(context, "", &schemes)
     }
 
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Literal), Error> {
-        let printed_likelihood = printed_likelihood(p)?;
-        Ok((steps(all), Literal { printed_likelihood }))
-    }
-
     fn claims(rows: &Rows<Step, Literal>, claims: &mut Claims) {
         for pair in [
             ("exact", "ignored"),
@@ -182,23 +167,12 @@ impl Case for NoFeedbackFigure {
     }
 
     fn plot(_: &Linear, rows: &Rows<Step, Literal>) -> Plot {
-        let place = |i: usize| i as f64 + 1.0;
-        let names = rows
-            .summary
-            .iter()
-            .enumerate()
-            .map(|(i, r)| (place(i), r.run.scheme.to_owned()));
+        let schemes = Axis::categories("", rows.summary.iter().map(|r| r.run.scheme));
         let all = rows.summary.iter().enumerate();
         Plot::of(
-            Panel::new(
-                "Position error without feedback",
-                Axis::linear("")
-                    .between(0.5, rows.summary.len() as f64 + 0.5)
-                    .named(names),
-                Axis::linear("time-averaged RMSE (m)"),
-            )
-            .with(Layer::measured("", all, |(i, r)| (place(i), r.position_rmse)))
-            .without_legend(),
+            Panel::new("Position error without feedback", schemes, Axis::linear("time-averaged RMSE (m)"))
+                .with(Layer::measured("", all, |(i, r)| (i as f64, r.position_rmse)))
+                .without_legend(),
         )
     }
 }

@@ -44,18 +44,13 @@ pub(super) struct Draws {
     coins: Vec<Vec<f64>>,
 }
 
-fn failed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
-    Error::failed(error)
-}
-
 impl World {
     pub(super) fn new(field: &Field) -> Result<Self, Error> {
-        let dynamics = constant_velocity_2d(0.5, field.acceleration_variance).map_err(failed)?;
+        let dynamics = constant_velocity_2d(0.5, field.acceleration_variance)?;
         let sensors = (0..9)
             .map(|i| Vector2::new(f64::from(i % 3) - 1.0, f64::from(i / 3) - 1.0) * field.spacing_m)
             .map(|place| ReceivedPower::new(place, [0, 2], 1000.0, 1.0, 2.0, field.noise_variance))
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(failed)?;
+            .collect::<Result<Vec<_>, _>>()?;
         let (mean, variances) =
             (Vector4::from_column_slice(&field.start), Vector4::from_column_slice(&field.start_variances));
         Ok(Self {
@@ -96,21 +91,19 @@ impl World {
     /// Particles from the prior, whose axes are independent.
     fn cloud<R: Rng + ?Sized>(&self, rng: &mut R) -> Result<Particles<4>, Error> {
         let (mean, deviations) = (self.start.mean(), self.start.standard_deviations());
-        Particles::from_draws(self.particles, || {
-            Vector4::from_fn(|d, _| mean[d] + deviations[d] * rng.sample::<f64, _>(StandardNormal))
-        })
-        .map_err(failed)
+        let mut draw = || Vector4::from_fn(|d, _| mean[d] + deviations[d] * rng.sample::<f64, _>(StandardNormal));
+        Ok(Particles::from_draws(self.particles, &mut draw)?)
     }
 
     fn trial(&self, scheme: Scheme, messages: f64, draws: &Draws, stream: Stream) -> Result<Record, Error> {
-        let budget = Budget::new(messages, self.sensors.len()).map_err(failed)?;
-        let threshold = budget.threshold(1).map_err(failed)?;
+        let budget = Budget::new(messages, self.sensors.len())?;
+        let threshold = budget.threshold(1)?;
         let mut rng = stream.fast_rng();
         let mut cloud = self.cloud(&mut rng)?;
         let filter = ParticleFilter::new(Resampling::Systematic, Schedule::Always);
         let mut workspace = Workspace::default();
-        let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT).map_err(failed)?;
-        let always = CensoringRule::scalar(1.0, 0.0).map_err(failed)?;
+        let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT)?;
+        let always = CensoringRule::scalar(1.0, 0.0)?;
         let mut own = vec![OwnRecursion::new(&self.start); self.sensors.len()];
         // What the fusion centre fed back last: its estimate and, for the second variant, its covariance.
         let mut fed_back = self.start;
@@ -122,14 +115,10 @@ impl World {
                 let z = Vector1::new(draws.measurements[k][i]);
                 let rule = match scheme {
                     Scheme::All | Scheme::Random => always.clone(),
-                    Scheme::StateAndCovariance => {
-                        CensoringRule::under(&self.dynamics, sensor, &fed_back, threshold).map_err(failed)?
-                    }
+                    Scheme::StateAndCovariance => CensoringRule::under(&self.dynamics, sensor, &fed_back, threshold)?,
                     Scheme::Ignored | Scheme::State => {
-                        let step = own[i]
-                            .advance(&self.dynamics, sensor, fed_back.mean())
-                            .map_err(failed)?;
-                        CensoringRule::new(&step.innovation_covariance, threshold).map_err(failed)?
+                        let step = own[i].advance(&self.dynamics, sensor, fed_back.mean())?;
+                        CensoringRule::new(&step.innovation_covariance, threshold)?
                     }
                 };
                 let sends = match scheme {
@@ -145,10 +134,8 @@ impl World {
                 rules.push(rule);
             }
             let sent = observations.iter().filter(|o| o.received().is_some()).count();
-            let likelihood = network.likelihood(&rules, &expected, &observations).map_err(failed)?;
-            filter
-                .step_in_place(&mut rng, &self.dynamics, &mut cloud, &likelihood, &mut workspace)
-                .map_err(failed)?;
+            let likelihood = network.likelihood(&rules, &expected, &observations)?;
+            filter.step_in_place(&mut rng, &self.dynamics, &mut cloud, &likelihood, &mut workspace)?;
             let mean = cloud.mean();
             let covariance = match scheme {
                 Scheme::StateAndCovariance => cloud.covariance_about(&mean),

@@ -19,24 +19,6 @@ fn colour_of(scheme: &str, otherwise: usize) -> usize {
     }
 }
 
-/// A curve with its marks and error bars.
-pub(super) fn curve(label: &str, colour: usize, marks: Vec<(f64, Measured)>) -> [Layer; 2] {
-    let line = Layer::line(label, points(&marks, |(x, y)| (*x, y.value)));
-    [line, Layer::measured("", marks, |mark| mark)].map(|layer| layer.coloured(colour))
-}
-
-/// Distinct entries in order of appearance.
-pub(super) fn distinct<R, K: PartialEq>(rows: &[R], key: impl Fn(&R) -> K) -> Vec<K> {
-    let mut seen = Vec::new();
-    for row in rows {
-        let key = key(row);
-        if !seen.contains(&key) {
-            seen.push(key);
-        }
-    }
-    seen
-}
-
 /// Position and velocity error against time, side by side; a row of panels for each world and budget, a curve for each scheme.
 pub(super) fn by_step(steps: &[Step]) -> Plot {
     let places = distinct(steps, |r| (r.run.world.clone(), r.run.l));
@@ -53,11 +35,10 @@ pub(super) fn by_step(steps: &[Step]) -> Plot {
             let layers = schemes.iter().enumerate().flat_map(|(order, scheme)| {
                 let rows = steps.iter().filter(own).filter(|r| r.run.scheme == *scheme);
                 let marks: Vec<_> = rows.map(|r| (r.k as f64, r.rmse(part))).collect();
-                (!marks.is_empty()).then(|| curve(scheme, colour_of(scheme, order), marks))
+                (!marks.is_empty()).then(|| Layer::curve(*scheme, colour_of(scheme, order), marks))
             });
             panels.push(
-                Panel::new(format!("{title}, l = {l}{world_name}"), Axis::linear("time step k"), Axis::linear(axis))
-                    .with_all(layers.flatten()),
+                Panel::linear(format!("{title}, l = {l}{world_name}"), "time step k", axis).with_all(layers.flatten()),
             );
         }
     }
@@ -70,7 +51,7 @@ pub(super) fn by_budget(rows: &[&Summary], title: &str, label: &str, of: impl Fn
     let schemes = distinct(rows, |r| r.run.scheme);
     let layers = schemes.iter().enumerate().flat_map(|(order, scheme)| {
         let own = rows.iter().filter(|r| r.run.scheme == *scheme);
-        curve(scheme, colour_of(scheme, order), own.map(|r| (r.run.l, of(r))).collect())
+        Layer::curve(*scheme, colour_of(scheme, order), own.map(|r| (r.run.l, of(r))).collect())
     });
     Panel::new(title, axes.0, axes.1).with_all(layers)
 }

@@ -1,56 +1,80 @@
 //! Tables of rates: printed ones beside ours.
 
-use super::pictures::{curve, distinct};
-use super::rows::{Ensemble, rate};
+use super::rows::{Ensemble, Main, rate};
 use crate::prelude::*;
 use crate::reference;
 
-/// Rates of one budget in one setting.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Rates {
-    /// Message budget.
-    #[schemars(extend("unit" = "messages/step"))]
-    l: f64,
-    /// How start and noise are read, and the estimator.
-    setting: String,
-    /// Mean number of messages, state feedback (CFwMD).
-    #[schemars(extend("unit" = "messages/step"))]
-    state: Measured,
-    /// Mean number of messages, state and covariance feedback (CFwMD2).
-    #[schemars(extend("unit" = "messages/step"))]
-    covariance: Measured,
-    /// The first as printed.
-    #[schemars(extend("unit" = "messages/step"))]
-    printed_state: Option<f64>,
-    /// The second as printed.
-    #[schemars(extend("unit" = "messages/step"))]
-    printed_covariance: Option<f64>,
-    /// Trials.
-    trials: usize,
+rows! {
+    /// Rates of one budget in one setting.
+    #[derive(Debug)]
+    pub struct Rates {
+        /// Message budget.
+        l: f64 ["messages/step"],
+        /// How start and noise are read, and the estimator.
+        setting: String,
+        /// Mean number of messages, state feedback (CFwMD).
+        state: Measured ["messages/step"],
+        /// Mean number of messages, state and covariance feedback (CFwMD2).
+        covariance: Measured ["messages/step"],
+        /// The first as printed.
+        printed_state: Option<f64> ["messages/step"],
+        /// The second as printed.
+        printed_covariance: Option<f64> ["messages/step"],
+        /// Trials.
+        trials: usize,
+    }
 }
 
 /// Rates of all budgets and worlds. The print does not say which world is its own: it stands beside all of them.
-pub(super) fn rates(figure: &str, ensembles: &[Ensemble], printed: bool) -> Vec<Rates> {
-    let (first, second) = (|e: &&Ensemble| e.scheme == "CFwMD", |e: &&Ensemble| e.scheme == "CFwMD2");
-    let row = |a: &Ensemble| {
-        let same = |e: &&Ensemble| e.world == a.world && e.messages == a.messages;
-        let b = ensembles.iter().filter(second).find(same)?;
-        // Those of the second kind are printed too, and not met.
-        let print = |column: &str| {
-            let value = |kind| reference::value(&format!("{figure}/{kind}-{column}/l = {}", a.messages));
-            printed.then(|| value("printed").or_else(|| value("unmet"))).flatten()
+impl Main for Rates {
+    fn of(figure: &str, runs: &[&Ensemble], printed: bool) -> Vec<Self> {
+        let of = |scheme: &'static str| runs.iter().copied().filter(move |e| e.scheme == scheme);
+        let row = |a: &Ensemble| {
+            let same = |e: &&Ensemble| e.world == a.world && e.messages == a.messages;
+            let b = of("CFwMD2").find(same)?;
+            // Those of the second kind are printed too, and not met.
+            let print = |column: &str| {
+                let value = |kind| reference::value(&format!("{figure}/{kind}-{column}/l = {}", a.messages));
+                printed.then(|| value("printed").or_else(|| value("unmet"))).flatten()
+            };
+            Some(Self {
+                l: a.messages,
+                setting: a.world.clone(),
+                state: rate(a),
+                covariance: rate(b),
+                printed_state: print("state"),
+                printed_covariance: print("covariance"),
+                trials: a.records.len(),
+            })
         };
-        Some(Rates {
-            l: a.messages,
-            setting: a.world.clone(),
-            state: rate(a),
-            covariance: rate(b),
-            printed_state: print("state"),
-            printed_covariance: print("covariance"),
-            trials: a.records.len(),
-        })
-    };
-    ensembles.iter().filter(first).filter_map(row).collect()
+        of("CFwMD").filter_map(row).collect()
+    }
+
+    /// Rates of both schemes against the budget, with the printed ones.
+    fn plot(rows: &[Self]) -> Plot {
+        type Columns = (fn(&Rates) -> Measured, fn(&Rates) -> Option<f64>);
+        let columns: [(&str, Columns); 2] = [
+            ("State feedback (CFwMD)", (|r| r.state, |r| r.printed_state)),
+            ("State and covariance feedback (CFwMD2)", (|r| r.covariance, |r| r.printed_covariance)),
+        ];
+        let panel = |(title, (ours, printed)): (&str, Columns)| {
+            let excess = |r: &Rates| Measured {
+                value: ours(r).value - r.l,
+                ..ours(r)
+            };
+            let worlds = distinct(rows, |r| r.setting.clone());
+            let first = rows.iter().filter(|r| Some(&r.setting) == worlds.first());
+            let layers = worlds.iter().enumerate().flat_map(|(colour, world)| {
+                let own = rows.iter().filter(|r| r.setting == *world);
+                Layer::curve(world.as_str(), colour, own.map(|r| (r.l, excess(r))).collect())
+            });
+            let axis = Axis::linear("message budget l (messages/step)");
+            Panel::new(title, axis, Axis::linear("rate minus budget (messages/step)"))
+                .with(Layer::dashed("printed", points(first, |r| (r.l, printed(r).map(|p| p - r.l)))).coloured(7))
+                .with_all(layers)
+        };
+        Plot::grid(2, columns.map(panel).into())
+    }
 }
 
 /// Claims that the printed rates are met in one world.
@@ -75,30 +99,4 @@ pub(super) fn misses(rows: &[Rates], world: &str, l: f64) -> Option<[Measured; 2
         less(row.state, row.printed_state?),
         less(row.covariance, row.printed_covariance?),
     ])
-}
-
-/// Rates of both schemes against the budget, with the printed ones.
-pub(super) fn rate_plot(rows: &[Rates]) -> Plot {
-    type Columns = (fn(&Rates) -> Measured, fn(&Rates) -> Option<f64>);
-    let columns: [(&str, Columns); 2] = [
-        ("State feedback (CFwMD)", (|r| r.state, |r| r.printed_state)),
-        ("State and covariance feedback (CFwMD2)", (|r| r.covariance, |r| r.printed_covariance)),
-    ];
-    let panel = |(title, (ours, printed)): (&str, Columns)| {
-        let excess = |r: &Rates| Measured {
-            value: ours(r).value - r.l,
-            ..ours(r)
-        };
-        let worlds = distinct(rows, |r| r.setting.clone());
-        let first = rows.iter().filter(|r| Some(&r.setting) == worlds.first());
-        let layers = worlds.iter().enumerate().flat_map(|(colour, world)| {
-            let own = rows.iter().filter(|r| r.setting == *world);
-            curve(world, colour, own.map(|r| (r.l, excess(r))).collect())
-        });
-        let axis = Axis::linear("message budget l (messages/step)");
-        Panel::new(title, axis, Axis::linear("rate minus budget (messages/step)"))
-            .with(Layer::dashed("printed", points(first, |r| (r.l, printed(r).map(|p| p - r.l)))).coloured(7))
-            .with_all(layers)
-    };
-    Plot::grid(2, columns.map(panel).into())
 }

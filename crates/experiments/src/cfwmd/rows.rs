@@ -1,7 +1,7 @@
 //! What the simulated figures have in common: runs of schemes on common trials, and the rows that come of them.
 
+use super::pictures::{by_budget, by_step};
 use crate::prelude::*;
-use fewbits_monte_carlo::{Moments, Stream, Trial};
 
 /// One trial of one scheme, one entry a step.
 #[derive(Debug, Clone, Default)]
@@ -67,16 +67,17 @@ pub(super) enum Part {
     Velocity,
 }
 
-/// What the rows speak of.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Run {
-    /// What is sent, and what is made of silence.
-    pub(super) scheme: &'static str,
-    /// Where it ran, in figures of several settings.
-    pub(super) world: Option<String>,
-    /// Message budget.
-    #[schemars(extend("unit" = "messages/step"))]
-    pub(super) l: f64,
+rows! {
+    /// What the rows speak of.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct Run {
+        /// What is sent, and what is made of silence.
+        pub(super) scheme: &'static str,
+        /// Where it ran, in figures of several settings.
+        pub(super) world: Option<String>,
+        /// Message budget.
+        pub(super) l: f64 ["messages/step"],
+    }
 }
 
 impl Run {
@@ -102,65 +103,59 @@ impl Run {
     }
 }
 
-/// One step of one run.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Step {
-    #[serde(flatten)]
-    pub(super) run: Run,
-    /// Time step.
-    pub(super) k: usize,
-    /// Root mean squared position error.
-    #[schemars(extend("unit" = "m"))]
-    pub(super) position_rmse: Measured,
-    /// Root mean squared velocity error.
-    #[schemars(extend("unit" = "m/s"))]
-    pub(super) velocity_rmse: Measured,
-    /// Mean number of messages in this step.
-    pub(super) messages: Measured,
-    /// Trials.
-    trials: usize,
-}
+rows! {
+    /// One step of one run.
+    #[derive(Debug, Clone)]
+    pub struct Step {
+        #[serde(flatten)]
+        pub(super) run: Run,
+        /// Time step.
+        pub(super) k: usize,
+        /// Root mean squared position error.
+        pub(super) position_rmse: Measured ["m"],
+        /// Root mean squared velocity error.
+        pub(super) velocity_rmse: Measured ["m/s"],
+        /// Mean number of messages in this step.
+        pub(super) messages: Measured,
+        /// Trials.
+        trials: usize,
+    }
 
-/// One run, averaged over its steps.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Summary {
-    #[serde(flatten)]
-    pub(super) run: Run,
-    /// Root mean squared position error over trials and steps.
-    #[schemars(extend("unit" = "m"))]
-    pub(super) position_rmse: Measured,
-    /// Root mean squared velocity error over trials and steps.
-    #[schemars(extend("unit" = "m/s"))]
-    pub(super) velocity_rmse: Measured,
-    /// Mean number of messages.
-    #[schemars(extend("unit" = "messages/step"))]
-    pub(super) rate: Measured,
-    /// Squared position error over its variance under the belief; 1 if the belief is consistent.
-    pub(super) nees: Option<Measured>,
-    /// Trials.
-    pub(super) trials: usize,
-}
+    /// One run, averaged over its steps.
+    #[derive(Debug, Clone)]
+    pub struct Summary {
+        #[serde(flatten)]
+        pub(super) run: Run,
+        /// Root mean squared position error over trials and steps.
+        pub(super) position_rmse: Measured ["m"],
+        /// Root mean squared velocity error over trials and steps.
+        pub(super) velocity_rmse: Measured ["m/s"],
+        /// Mean number of messages.
+        pub(super) rate: Measured ["messages/step"],
+        /// Squared position error over its variance under the belief; 1 if the belief is consistent.
+        pub(super) nees: Option<Measured>,
+        /// Trials.
+        pub(super) trials: usize,
+    }
 
-/// Two schemes on the same truth, noise and draws.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Paired {
-    /// Scheme.
-    pub(super) first: &'static str,
-    /// Scheme it is compared with.
-    pub(super) second: &'static str,
-    /// Where both ran, in figures of several settings.
-    pub(super) world: Option<String>,
-    /// Message budget.
-    #[schemars(extend("unit" = "messages/step"))]
-    pub(super) l: f64,
-    /// Mean squared position error of the first minus that of the second.
-    #[schemars(extend("unit" = "m^2"))]
-    pub(super) position: Measured,
-    /// The same of the velocity.
-    #[schemars(extend("unit" = "m^2/s^2"))]
-    pub(super) velocity: Measured,
-    /// Trials.
-    trials: u64,
+    /// Two schemes on the same truth, noise and draws.
+    #[derive(Debug, Clone)]
+    pub struct Paired {
+        /// Scheme.
+        pub(super) first: &'static str,
+        /// Scheme it is compared with.
+        pub(super) second: &'static str,
+        /// Where both ran, in figures of several settings.
+        pub(super) world: Option<String>,
+        /// Message budget.
+        pub(super) l: f64 ["messages/step"],
+        /// Mean squared position error of the first minus that of the second.
+        pub(super) position: Measured ["m^2"],
+        /// The same of the velocity.
+        pub(super) velocity: Measured ["m^2/s^2"],
+        /// Trials.
+        trials: u64,
+    }
 }
 
 impl Step {
@@ -183,11 +178,6 @@ fn steps_of(e: &Ensemble) -> impl Iterator<Item = Step> {
         messages: Measured::mean(&moments(&e.records, |r| r.sent[k])),
         trials: e.records.len(),
     })
-}
-
-/// Every step of these runs.
-pub(super) fn steps<'a>(ensembles: impl IntoIterator<Item = &'a Ensemble>) -> Vec<Step> {
-    ensembles.into_iter().flat_map(steps_of).collect()
 }
 
 /// Mean number of messages a step.
@@ -231,9 +221,55 @@ fn paired(ensembles: &[Ensemble], pairs: &[(&str, &str)]) -> Vec<Paired> {
     rows
 }
 
+/// A kind of main table.
+pub trait Main: Serialize + JsonSchema + Sized {
+    /// The rows of these runs. `printed`: whether printed numbers may stand beside ours.
+    fn of(figure: &str, runs: &[&Ensemble], printed: bool) -> Vec<Self>;
+
+    /// Their picture.
+    fn plot(rows: &[Self]) -> Plot;
+}
+
+impl Main for Step {
+    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
+        runs.iter().flat_map(|run| steps_of(run)).collect()
+    }
+
+    fn plot(rows: &[Self]) -> Plot {
+        by_step(rows)
+    }
+}
+
+impl Main for Summary {
+    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
+        runs.iter().map(|run| summary(run)).collect()
+    }
+
+    fn plot(rows: &[Self]) -> Plot {
+        let rows: Vec<&Summary> = rows.iter().collect();
+        let panels = [
+            by_budget(&rows, "Position", "time-averaged RMSE (m)", |r| r.position_rmse),
+            by_budget(&rows, "Velocity", "time-averaged RMSE (m/s)", |r| r.velocity_rmse),
+        ];
+        Plot::grid(2, panels.into())
+    }
+}
+
+/// Further tables.
+pub trait Further<S>: Serialize + JsonSchema + Sized {
+    /// Those of a setting.
+    fn of(setting: &S, context: &Context<'_>) -> Result<Self, Error>;
+}
+
 /// No further tables.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Nothing {}
+
+impl<S> Further<S> for Nothing {
+    fn of(_: &S, _: &Context<'_>) -> Result<Self, Error> {
+        Ok(Self {})
+    }
+}
 
 /// All tables of a simulated figure.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -318,9 +354,7 @@ impl<M, X> Rows<M, X> {
 impl<X> Rows<Step, X> {
     /// Errors of a run after its `k`th step.
     pub(super) fn step(&self, scheme: &str, l: f64, k: usize) -> Option<&Step> {
-        self.main
-            .iter()
-            .find(|r| r.run.scheme == scheme && r.run.l == l && r.k == k)
+        first(&self.main, |r| r.run.scheme == scheme && r.run.l == l && r.k == k)
     }
 
     /// Claims that at every step the schemes are in this order, smallest error first, but for two standard errors.

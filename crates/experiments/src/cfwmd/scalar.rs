@@ -2,9 +2,9 @@
 
 use super::case::Case;
 use super::linear::Scheme;
-use super::pictures::{BOTH, by_step};
-use super::rates::{Rates, as_printed, misses, rate_plot, rates};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
+use super::pictures::BOTH;
+use super::rates::{Rates, as_printed, misses};
+use super::rows::{Ensemble, Nothing, Part, Rows, Step};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
 use fewbits_cfwmd::rule::Weighing;
@@ -14,7 +14,6 @@ pub(super) const CENSORED: [(&str, Scheme); 2] = [
     ("CFwMD2", Scheme::Gaussian(Weighing::FusionCentre)),
 ];
 
-/// Figure 1: the four schemes.
 pub(super) struct Fig1;
 
 impl Case for Fig1 {
@@ -22,14 +21,10 @@ impl Case for Fig1 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig1",
-        title: "Scalar measurements, state feedback",
-        caption: "Two sensors share one message a step. Silence that the fusion centre takes into account (CFwMD) closes a third of the gap \
-                  to sending everything that it leaves open when ignored (CFoMD). The gap that remains is 22% in position, not as \
-                  small as the paper suggests.",
-        source: "CFwMD paper, figure 1",
-    };
+    const ABOUT: About = About::of("cfwmd-fig1", "Scalar measurements, state feedback", "CFwMD paper, figure 1");
+    const CAPTION: &str = "Two sensors share one message a step. Silence that the fusion centre takes into account (CFwMD) closes a third of the gap \
+        to sending everything that it leaves open when ignored (CFoMD). The gap that remains is 22% in position, not as \
+        small as the paper suggests.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[
         ("all", "CFwMD"),
         ("CFwMD", "CFoMD"),
@@ -55,10 +50,6 @@ impl Case for Fig1 {
             ("trigger, centre's s", Scheme::Trigger(Weighing::FusionCentre)),
         ];
         setting.at_budgets(context, "", &schemes)
-    }
-
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
     }
 
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
@@ -91,10 +82,6 @@ impl Case for Fig1 {
         let what = "keeping the belief Gaussian by a random trigger costs 11% at equal rate";
         claims.near("trigger-price", what, price, 1.11, 0.03);
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
 /// Position standard deviation of the all-send Kalman filter: the reference recursion in closed loop.
@@ -113,7 +100,6 @@ fn exact_all_send(sensors: u32) -> Vec<f64> {
 /// Budgets of four sensors in figure 2 and table I.
 pub(super) const BUDGETS: [f64; 5] = [1.0, 1.2, 1.5, 2.0, 3.0];
 
-/// Figure 2.
 pub(super) struct Fig2;
 
 impl Case for Fig2 {
@@ -121,13 +107,10 @@ impl Case for Fig2 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig2",
-        title: "Scalar measurements, state against covariance feedback",
-        caption: "Four sensors, five budgets. Weighing innovations with the fusion centre's covariance (CFwMD2) meets the budget and is \
-                  better from l = 1.2 on; at l = 1 the paper's CFwMD is, in position, because it sends more than it should.",
-        source: "CFwMD paper, figure 2",
-    };
+    const ABOUT: About =
+        About::of("cfwmd-fig2", "Scalar measurements, state against covariance feedback", "CFwMD paper, figure 2");
+    const CAPTION: &str = "Four sensors, five budgets. Weighing innovations with the fusion centre's covariance (CFwMD2) meets the budget and is \
+        better from l = 1.2 on; at l = 1 the paper's CFwMD is, in position, because it sends more than it should.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFwMD2"), ("CFwMD2", "CFwMD")];
 
     fn setting() -> Linear {
@@ -138,10 +121,6 @@ impl Case for Fig2 {
         setting.at_budgets(context, "", &CENSORED)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
         rows.beats(claims, ("CFwMD", "CFwMD2"), ("", 1.0), &[Part::Position]);
         for l in [1.2, 1.5, 2.0] {
@@ -150,16 +129,11 @@ impl Case for Fig2 {
         let gap = rows.ratio("CFwMD", "CFwMD2", 3.0).map(|r| r - 1.0);
         claims.below("little-gain", "at l = 3 covariance feedback gains less than 2%", gap, 0.02);
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
 /// Trials of the particle filters of table I.
 const CLOUD_TRIALS: u64 = 2000;
 
-/// Table I.
 pub(super) struct Table1;
 
 const KNOWN: &str = "known start";
@@ -171,14 +145,10 @@ impl Case for Table1 {
     type Main = Rates;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-table1",
-        title: "Rates with scalar measurements",
-        caption: "Mean number of messages a step. The initial covariance is not printed; the published numbers fit a start drawn with \
-                  variance 5 and 1000 particles better than a known one. With state feedback alone the budget is missed by up to \
-                  14%. The particle filters run 2000 trials.",
-        source: "CFwMD paper, table I",
-    };
+    const ABOUT: About = About::of("cfwmd-table1", "Rates with scalar measurements", "CFwMD paper, table I");
+    const CAPTION: &str = "Mean number of messages a step. The initial covariance is not printed; the published numbers fit a start drawn with \
+        variance 5 and 1000 particles better than a known one. With state feedback alone the budget is missed by up to \
+        14%. The particle filters run 2000 trials.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
 
     fn setting() -> Linear {
@@ -205,10 +175,6 @@ impl Case for Table1 {
         Ok(all)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], print: bool, _: &Context<'_>) -> Result<(Vec<Rates>, Nothing), Error> {
-        Ok((rates(Self::ABOUT.id, all, print), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Rates>, claims: &mut Claims) {
         as_printed(claims, &rows.main, CLOUDS);
         let known = BUDGETS.iter().filter_map(|l| misses(&rows.main, KNOWN, *l));
@@ -226,9 +192,5 @@ impl Case for Table1 {
         let missed = rows.at(&format!("CFwMD, {DRAWN}"), 2.0).map(|r| r.rate.value);
         let what = "state feedback alone falls short of the budget l = 2 by more than a tenth";
         claims.below("budget-missed", what, missed, 1.8);
-    }
-
-    fn plot(_: &Linear, rows: &Rows<Rates>) -> Plot {
-        rate_plot(&rows.main)
     }
 }

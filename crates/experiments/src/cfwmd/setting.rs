@@ -6,13 +6,10 @@ use serde::de::DeserializeOwned;
 
 /// Parameters of an experiment whose schemes are simulated on common trials.
 pub trait Setting:
-    Clone + Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Send + Sync + 'static
+    Clone + Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Quick + Send + Sync + 'static
 {
     /// What is sent, and what is made of it.
     type Scheme: Copy;
-
-    /// About a second of work.
-    fn quicken(&mut self);
 
     /// Message budgets.
     fn messages(&self) -> &[f64];
@@ -50,20 +47,13 @@ pub trait Setting:
 
 /// Refuses a budget of more messages than sensors.
 fn at_most(messages: f64, sensors: u64) -> garde::Result {
-    if messages <= sensors as f64 {
-        Ok(())
-    } else {
-        Err(garde::Error::new(format!("more messages than the {sensors} sensors send")))
-    }
+    accept(messages <= sensors as f64, || format!("more messages than the {sensors} sensors send"))
 }
 
 /// Seconds and bytes of so many trials of ten schemes.
 fn cost(trials: u64, steps: u64, budgets: usize, step_seconds: f64) -> Cost {
     let runs = trials as f64 * steps as f64 * budgets as f64 * 10.0;
-    Cost {
-        seconds: runs * step_seconds,
-        bytes: runs * 32.0,
-    }
+    Cost::new(runs * step_seconds, runs * 32.0)
 }
 
 /// A target on a line among identical linear sensors.
@@ -155,13 +145,15 @@ impl Linear {
     }
 }
 
-impl Setting for Linear {
-    type Scheme = super::linear::Scheme;
-
+impl Quick for Linear {
     fn quicken(&mut self) {
         self.trials = 100;
         self.particles = self.particles.map(|_| 100);
     }
+}
+
+impl Setting for Linear {
+    type Scheme = super::linear::Scheme;
 
     fn messages(&self) -> &[f64] {
         &self.messages
@@ -240,13 +232,15 @@ impl Field {
     }
 }
 
-impl Setting for Field {
-    type Scheme = super::nonlinear::Scheme;
-
+impl Quick for Field {
     fn quicken(&mut self) {
         self.trials = 24;
         self.particles = 500;
     }
+}
+
+impl Setting for Field {
+    type Scheme = super::nonlinear::Scheme;
 
     fn messages(&self) -> &[f64] {
         &self.messages

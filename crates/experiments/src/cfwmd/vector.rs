@@ -2,9 +2,9 @@
 
 use super::case::Case;
 use super::linear::{Method, Scheme};
-use super::pictures::{BOTH, by_step};
-use super::rates::{Rates, as_printed, rate_plot, rates};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, steps};
+use super::pictures::BOTH;
+use super::rates::{Rates, as_printed};
+use super::rows::{Ensemble, Nothing, Part, Rows, Step};
 use super::scalar::CENSORED;
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
@@ -40,7 +40,6 @@ fn worlds() -> [String; 2] {
     [world(1.0), world(STATED)]
 }
 
-/// Figure 4.
 pub(super) struct Fig4;
 
 impl Case for Fig4 {
@@ -48,14 +47,10 @@ impl Case for Fig4 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig4",
-        title: "Vector measurements, state feedback",
-        caption: "Position and velocity measured by two sensors that share one message a step. The order of the schemes is that of scalar \
-                  measurements, at the acceleration variance that fits the published rates (1) and at the one the text states (4). \
-                  The particle filter runs 150 trials.",
-        source: "CFwMD paper, figure 4",
-    };
+    const ABOUT: About = About::of("cfwmd-fig4", "Vector measurements, state feedback", "CFwMD paper, figure 4");
+    const CAPTION: &str = "Position and velocity measured by two sensors that share one message a step. The order of the schemes is that of scalar \
+        measurements, at the acceleration variance that fits the published rates (1) and at the one the text states (4). \
+        The particle filter runs 150 trials.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("CFoMD", "random")];
 
     fn setting() -> Linear {
@@ -76,10 +71,6 @@ impl Case for Fig4 {
         Ok(all)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        Ok((steps(all), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
         for world in &worlds() {
             for pair in Self::PAIRS {
@@ -92,13 +83,8 @@ impl Case for Fig4 {
         let what = "1000 particles that weigh silence by quadrature agree with the Gaussian belief";
         claims.near("particles-equal", what, ratio, 1.0, 0.06);
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
-/// Figure 5.
 pub(super) struct Fig5;
 
 impl Case for Fig5 {
@@ -106,13 +92,10 @@ impl Case for Fig5 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig5",
-        title: "Vector measurements, state against covariance feedback",
-        caption: "With vector measurements covariance feedback (CFwMD2) is better at each budget; at the acceleration variance that the text \
-                  states it would not be, at one message a step.",
-        source: "CFwMD paper, figure 5",
-    };
+    const ABOUT: About =
+        About::of("cfwmd-fig5", "Vector measurements, state against covariance feedback", "CFwMD paper, figure 5");
+    const CAPTION: &str = "With vector measurements covariance feedback (CFwMD2) is better at each budget; at the acceleration variance that the text \
+        states it would not be, at one message a step.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
     const REFERENCES: &'static [&'static str] = &["position", "velocity"];
 
@@ -124,9 +107,8 @@ impl Case for Fig5 {
         both(context, setting, &CENSORED, &CENSORED)
     }
 
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        let own = world(p.acceleration_variance);
-        Ok((steps(all.iter().filter(|e| e.world == own)), Nothing {}))
+    fn shown(p: &Linear, run: &Ensemble) -> bool {
+        run.world == world(p.acceleration_variance)
     }
 
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
@@ -139,13 +121,8 @@ impl Case for Fig5 {
             "at the stated acceleration variance CFwMD2 is not better at l = 1 (paired difference in standard errors)";
         claims.above("stated-variance-fails", what, z, -2.0);
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
-/// Figure 6.
 pub(super) struct Fig6;
 
 /// Trials of the particle filter without feedback.
@@ -158,14 +135,10 @@ impl Case for Fig6 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig6",
-        title: "Vector measurements, no feedback",
-        caption: "Without feedback the fusion centre does not know what a silent sensor compared with. A joint belief over the state and the \
-                  sensors' own estimates (CFwMD) makes silence informative all the same; the printed likelihood does not. The \
-                  exact filter imputes the withheld measurements by particles, in 500 trials.",
-        source: "CFwMD paper, figure 6",
-    };
+    const ABOUT: About = About::of("cfwmd-fig6", "Vector measurements, no feedback", "CFwMD paper, figure 6");
+    const CAPTION: &str = "Without feedback the fusion centre does not know what a silent sensor compared with. A joint belief over the state and the \
+        sensors' own estimates (CFwMD) makes silence informative all the same; the printed likelihood does not. The \
+        exact filter imputes the withheld measurements by particles, in 500 trials.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("exact", SAME_TRIALS)];
 
     fn setting() -> Linear {
@@ -193,10 +166,8 @@ impl Case for Fig6 {
         Ok(all)
     }
 
-    fn tables(p: &Linear, all: &[Ensemble], _: bool, _: &Context<'_>) -> Result<(Vec<Step>, Nothing), Error> {
-        let own = world(p.acceleration_variance);
-        let shown = all.iter().filter(|e| e.world == own && e.scheme != SAME_TRIALS);
-        Ok((steps(shown), Nothing {}))
+    fn shown(p: &Linear, run: &Ensemble) -> bool {
+        run.world == world(p.acceleration_variance) && run.scheme != SAME_TRIALS
     }
 
     fn claims(rows: &Rows<Step>, claims: &mut Claims) {
@@ -208,13 +179,8 @@ impl Case for Fig6 {
             claims.near(id, what, ratio, 1.0, 0.03);
         }
     }
-
-    fn plot(_: &Linear, rows: &Rows<Step>) -> Plot {
-        by_step(&rows.main)
-    }
 }
 
-/// Table II.
 pub(super) struct Table2;
 
 const DEVIATIONS: &str = "acceleration variance 4, noise deviations 2 and 4";
@@ -224,13 +190,9 @@ impl Case for Table2 {
     type Main = Rates;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-table2",
-        title: "Rates with vector measurements",
-        caption: "The published rates fit an acceleration variance of 1, not the stated 4; next best is 4 with the printed noise [2 4] read \
-                  as standard deviations.",
-        source: "CFwMD paper, table II",
-    };
+    const ABOUT: About = About::of("cfwmd-table2", "Rates with vector measurements", "CFwMD paper, table II");
+    const CAPTION: &str = "The published rates fit an acceleration variance of 1, not the stated 4; next best is 4 with the printed noise [2 4] read \
+        as standard deviations.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
     const REFERENCES: &'static [&'static str] = &["rate"];
 
@@ -249,18 +211,10 @@ impl Case for Table2 {
         Ok(all)
     }
 
-    fn tables(_: &Linear, all: &[Ensemble], print: bool, _: &Context<'_>) -> Result<(Vec<Rates>, Nothing), Error> {
-        Ok((rates(Self::ABOUT.id, all, print), Nothing {}))
-    }
-
     fn claims(rows: &Rows<Rates>, claims: &mut Claims) {
         as_printed(claims, &rows.main, &world(1.0));
         let stated = rows.at(&format!("CFwMD, {}", world(STATED)), 1.0).map(|r| r.rate.value);
         let what = "the stated acceleration variance gives a rate far above the printed .9296 at l = 1";
         claims.above("stated-variance-rejected", what, stated, 0.98);
-    }
-
-    fn plot(_: &Linear, rows: &Rows<Rates>) -> Plot {
-        rate_plot(&rows.main)
     }
 }

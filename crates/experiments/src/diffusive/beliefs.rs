@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_core::Density;
 use fewbits_densities::{Clumps, MixtureFit};
 use fewbits_diffusive::{Form, Outcome, PositionBelief, Posterior, RateModel, Travelling, project};
-use fewbits_monte_carlo::Trial;
 use nalgebra::Vector2;
 
 /// Only the position is approximated here.
@@ -24,7 +23,7 @@ pub(super) fn exact_search(settings: &Settings, trial: Trial, nodes: usize) -> R
 
 /// `KL(exact || form)`, nats.
 pub(super) fn divergence(posterior: &Posterior, form: Form) -> Result<f64, Error> {
-    let Some(Travelling::Position(belief)) = project(posterior, form, &POSITION_ONLY).map_err(Error::failed)? else {
+    let Some(Travelling::Position(belief)) = project(posterior, form, &POSITION_ONLY)? else {
         return Ok(0.0);
     };
     let kl = match &belief {
@@ -38,85 +37,65 @@ pub(super) fn divergence(posterior: &Posterior, form: Form) -> Result<f64, Error
 /// the line between them, 0 if one holds less than a twentieth.
 fn lobes(posterior: &Posterior) -> Result<f64, Error> {
     let cells = &posterior.cells;
-    let clumps = Clumps::new(&cells.columns(), &[&[], &[]], cells.weights(), 200).map_err(Error::failed)?;
-    let options = MixtureFit::new(2)
-        .and_then(|fit| fit.with_least_weight(0.05))
-        .map_err(Error::failed)?;
-    let fit = clumps.fit(&options).map_err(Error::failed)?;
+    let clumps = Clumps::new(&cells.columns(), &[&[], &[]], cells.weights(), 200)?;
+    let options = MixtureFit::new(2).and_then(|fit| fit.with_least_weight(0.05))?;
+    let fit = clumps.fit(&options)?;
     let [a, b] = fit.components() else { return Ok(0.0) };
     let line = a.mean() - b.mean();
     let spread = |c: &fewbits_densities::Component<2>| line.dot(&(c.covariance() * line)) / line.norm_squared();
     Ok(line.norm() / (0.5 * (spread(a) + spread(b))).sqrt())
 }
 
-/// Settings of Figures 5 and 6.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Number of the random deployment; it is moved on to the next whose belief has two lobes.
-    #[garde(range(max = 1_000_000))]
-    deployment: u64,
-    /// Nodes that have sampled.
-    #[garde(range(min = 1, max = 20))]
-    nodes: usize,
-    /// Points of the grid along each axis.
-    #[garde(range(min = 10, max = 400))]
-    grid: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            deployment: 0,
-            nodes: 3,
-            grid: 160,
-        }
+parameters! {
+    /// Settings of Figures 5 and 6.
+    #[derive(Debug, Clone)]
+    pub struct Parameters {
+        /// Number of the random deployment; it is moved on to the next whose belief has two lobes.
+        #[garde(range(max = 1_000_000))]
+        deployment: u64 = 0,
+        /// Nodes that have sampled.
+        #[garde(range(min = 1, max = 20))]
+        nodes: usize = 3,
+        /// Points of the grid along each axis.
+        #[garde(range(min = 10, max = 400))]
+        grid: usize = 160,
     }
 }
 
-/// Tables of Figures 5 and 6.
-#[derive(Serialize, JsonSchema)]
-pub struct Fields {
-    /// Densities on a grid.
-    field: Vec<Point>,
-    /// How far each form is from the exact belief.
-    divergences: Vec<Divergence>,
+rows! {
+    pub struct Fields {
+        /// Densities on a grid.
+        field: Vec<Point>,
+        /// How far each form is from the exact belief.
+        divergences: Vec<Divergence>,
+    }
+
+    struct Point {
+        /// Position.
+        x: f64 ["m"],
+        /// Position.
+        y: f64 ["m"],
+        /// Density of the figure's belief.
+        p: f64 ["m^-2"],
+        /// Density of the exact belief.
+        exact: f64 ["m^-2"],
+    }
+
+    struct Divergence {
+        /// The deployment shown.
+        deployment: u64,
+        /// What the belief is approximated by.
+        form: String,
+        /// Numbers in a message.
+        scalars: usize,
+        /// `KL(exact || form)`.
+        kl: f64 ["nats"],
+        /// Distance of the exact belief's two lobes in standard deviations.
+        lobes: f64,
+    }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Point {
-    /// Position.
-    #[schemars(extend("unit" = "m"))]
-    x: f64,
-    /// Position.
-    #[schemars(extend("unit" = "m"))]
-    y: f64,
-    /// Density of the figure's belief.
-    #[schemars(extend("unit" = "m^-2"))]
-    p: f64,
-    /// Density of the exact belief.
-    #[schemars(extend("unit" = "m^-2"))]
-    exact: f64,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Divergence {
-    /// The deployment shown.
-    deployment: u64,
-    /// What the belief is approximated by.
-    form: String,
-    /// Numbers in a message.
-    scalars: usize,
-    /// `KL(exact || form)`.
-    #[schemars(extend("unit" = "nats"))]
-    kl: f64,
-    /// Distance of the exact belief's two lobes in standard deviations.
-    lobes: f64,
-}
-
-/// Figure 5: the true belief.
 pub struct True;
-/// Figure 6: the approximated one.
 pub struct Approximated;
 
 fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fields, Error> {
@@ -140,7 +119,7 @@ fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fi
     let Some((deployment, posterior, apart)) = shown else {
         return Err(Error::Table("no search gave a belief".to_owned()));
     };
-    let belief = project(&posterior, LPG, &POSITION_ONLY).map_err(Error::failed)?;
+    let belief = project(&posterior, LPG, &POSITION_ONLY)?;
     let (lower, upper) = posterior.cells.bounds();
     let at = |d: usize, i: usize| {
         let (low, high) = (lower[d] - 0.05 * (upper[d] - lower[d]), upper[d] + 0.05 * (upper[d] - lower[d]));
@@ -179,20 +158,17 @@ fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fi
 }
 
 fn field_claims(rows: &Fields, claims: &mut Claims) {
+    let here = claims.at_defaults();
     let kl = |form: &str| rows.divergences.iter().find(|d| d.form == form).map(|d| d.kl);
     let apart = rows.divergences.first().map(|d| d.lobes);
-    claims
-        .above("two-lobes", "the belief after three nodes has two lobes", apart, 4.0)
-        .at_defaults();
+    here.above("two-lobes", "the belief after three nodes has two lobes", apart, 4.0);
     let what = "polynomial Gaussians are within 0.3 nats of it";
-    claims.below("lpg-is-close", what, kl("lpg-2x5"), 0.3).at_defaults();
-    let ratio = kl("gaussian").zip(kl("lpg-2x5")).map(|(g, l)| g / l);
-    claims
-        .above("gaussian-is-not", "one Gaussian is at least five times as far", ratio, 5.0)
-        .at_defaults();
+    here.below("lpg-is-close", what, kl("lpg-2x5"), 0.3);
+    let ratio = over(kl("gaussian"), kl("lpg-2x5"));
+    here.above("gaussian-is-not", "one Gaussian is at least five times as far", ratio, 5.0);
     let what = "two Gaussians show both lobes, too: the paper's claim that a Gaussian sum cannot is overstated (errata diffusive-9)";
-    let ratio = kl("gaussian").zip(kl("gmm-2")).map(|(g, m)| g / m);
-    claims.above("gaussian-sums-can", what, ratio, 2.0).at_defaults();
+    let ratio = over(kl("gaussian"), kl("gmm-2"));
+    here.above("gaussian-sums-can", what, ratio, 2.0);
 }
 
 /// Decades of the density that are shown.
@@ -226,26 +202,13 @@ fn field_panel(title: &str, rows: &Fields, of: fn(&Point) -> f64) -> Panel {
     let ((x0, x1), (y0, y1)) = (ends(&x), ends(&y));
     Panel::new(title, Axis::linear("x (m)").between(x0, x1), Axis::linear("y (m)").between(y0, y1))
         .with(Layer::heat("log10 p/peak", x, y, values))
-        .with(
-            Layer::points("source", vec![B.source.into()])
-                .coloured(3)
-                .marked(Marker::OpenCircle),
-        )
+        .with(Layer::points("source", vec![B.source.into()]).styled(3, Marker::OpenCircle))
 }
 
 impl Figure for True {
-    type Parameters = Parameters;
-    type Tables = Fields;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-fig5",
-            title: "The belief after three nodes",
-            caption: "Exact density of the source's position after three nodes of example B, rate unknown, in the first random \
-                      deployment whose belief has two clear lobes.",
-            source: "Zhao and Nehorai 2007, Fig. 5",
-        }
-    }
+    figure!(Parameters => Fields, "diffusive-fig5", "The belief after three nodes", "Zhao and Nehorai 2007, Fig. 5",
+        "Exact density of the source's position after three nodes of example B, rate unknown, in the first random \
+         deployment whose belief has two clear lobes.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Fields, Error> {
         field(p, context, false)
@@ -261,18 +224,9 @@ impl Figure for True {
 }
 
 impl Figure for Approximated {
-    type Parameters = Parameters;
-    type Tables = Fields;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-fig6",
-            title: "The same belief in polynomial Gaussians",
-            caption: "The belief of diffusive-fig5 as two polynomial Gaussians of degree 5 in square-root (Galerkin) form, 51 \
-                      numbers, beside the exact one: decades below the exact peak.",
-            source: "Zhao and Nehorai 2007, Fig. 6",
-        }
-    }
+    figure!(Parameters => Fields, "diffusive-fig6", "The same belief in polynomial Gaussians", "Zhao and Nehorai 2007, Fig. 6",
+        "The belief of diffusive-fig5 as two polynomial Gaussians of degree 5 in square-root (Galerkin) form, 51 \
+         numbers, beside the exact one: decades below the exact peak.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Fields, Error> {
         field(p, context, true)

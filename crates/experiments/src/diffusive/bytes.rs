@@ -31,29 +31,13 @@ fn schemes() -> Vec<Scheme> {
 pub struct Bytes;
 
 impl Figure for Bytes {
-    type Parameters = Settings;
-    type Tables = Vec<Summary>;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-bytes",
-            title: "Bytes to the threshold",
-            caption: "What all messages of a search cost together (example B, numbers in single precision, messages of raw \
-                      records grow with every node): on a short route the samples themselves, quantised to the noise, are the \
-                      cheapest message and lose nothing.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Settings) {
-        p.trials = 8;
-    }
+    figure!(Settings => Vec<Summary>, "diffusive-bytes", "Bytes to the threshold", "",
+        "What all messages of a search cost together (example B, numbers in single precision, messages of raw \
+         records grow with every node): on a short route the samples themselves, quantised to the noise, are the \
+         cheapest message and lose nothing.");
 
     fn cost(&self, p: &Settings) -> Cost {
-        Cost {
-            seconds: p.trials as f64,
-            bytes: p.trials as f64 * 2e4,
-        }
+        Cost::new(p.trials as f64, p.trials as f64 * 2e4)
     }
 
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Vec<Summary>, Error> {
@@ -63,31 +47,25 @@ impl Figure for Bytes {
     }
 
     fn claims(&self, _: &Settings, rows: &Vec<Summary>, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let nodes = |r: &Summary| (r.scheme.to_owned(), r.nodes_median);
         claims.references("nodes_median", "median nodes to the threshold", rows, nodes);
         claims.references("reach", "share that reaches the threshold", rows, |r| (r.scheme.to_owned(), r.reach));
         let find = |name: &str| rows.iter().find(|r| r.scheme == name);
         let bytes = |name: &str| find(name).and_then(|r| r.bytes_median).map(|m| m.value);
         for other in ["gmm-4", "gaussian-9", "lpg-2x5 known rate"] {
-            let ratio = bytes("raw-9-bit").zip(bytes(other)).map(|(raw, other)| raw / other);
+            let ratio = over(bytes("raw-9-bit"), bytes(other));
             let what = format!("samples of nine bits cost less than a third of {other}");
-            claims
-                .below(format!("raw-is-cheapest/{}", other.replace(' ', "-")), what, ratio, 1.0 / 3.0)
-                .at_full_trials();
+            full.below(format!("raw-is-cheapest/{}", other.replace(' ', "-")), what, ratio, 1.0 / 3.0);
         }
         let nodes = |name: &str| find(name).and_then(|r| r.nodes_median).map(|m| m.value);
-        let more = nodes("raw-9-bit").zip(nodes("raw-64-bit")).map(|(a, b)| a - b);
-        claims
-            .at_most("quantising-is-free", "nine bits a sample need no more nodes than exact samples", more, 0.0)
-            .at_full_trials();
+        let more = minus(nodes("raw-9-bit"), nodes("raw-64-bit"));
+        full.at_most("quantising-is-free", "nine bits a sample need no more nodes than exact samples", more, 0.0);
     }
 
     fn plot(&self, _: &Settings, rows: &Vec<Summary>) -> Plot {
-        let mut panel = Panel::new(
-            "Cost and accuracy",
-            Axis::log("bytes of all messages (median)"),
-            Axis::log("error at the end (m, median)"),
-        );
+        let mut panel =
+            Panel::loglog("Cost and accuracy", "bytes of all messages (median)", "error at the end (m, median)");
         let markers = [
             Marker::Circle,
             Marker::Square,

@@ -4,7 +4,6 @@ use crate::prelude::*;
 use fewbits_diffusive::message::Wire;
 use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Rule, Search, SearchBox, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
-use fewbits_monte_carlo::{Stream, Trial};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::{Vector2, Vector3};
 
@@ -27,36 +26,25 @@ pub(super) const LPG: Form = Form::Lpg {
     degree: 5,
 };
 
-/// Settings of every search.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Settings {
-    /// Random deployments, each searched by every scheme.
-    #[garde(range(min = 1, max = 100_000))]
-    pub(super) trials: u64,
-    /// Deployed nodes.
-    #[garde(range(min = 2, max = 100_000))]
-    pub(super) nodes: usize,
-    /// Standard deviation of the prior about the first node, m.
-    #[garde(range(min = 1.0, max = 1e4))]
-    pub(super) prior_sd: f64,
-    /// Lower end of the rate's prior, kg/s.
-    #[garde(range(min = 0.0, max = 0.99))]
-    pub(super) rate_low: f64,
-    /// Upper end of the rate's prior, kg/s.
-    #[garde(range(min = 1.01, max = 1e3))]
-    pub(super) rate_high: f64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            trials: 200,
-            nodes: 300,
-            prior_sd: 50.0,
-            rate_low: 0.5,
-            rate_high: 1.5,
-        }
+parameters! {
+    /// Settings of every search.
+    #[derive(Debug, Clone)]
+    pub struct Settings {
+        /// Random deployments, each searched by every scheme.
+        #[garde(range(min = 1, max = 100_000))]
+        pub(super) trials: u64 = 200 => quick 8,
+        /// Deployed nodes.
+        #[garde(range(min = 2, max = 100_000))]
+        pub(super) nodes: usize = 300,
+        /// Standard deviation of the prior about the first node, m.
+        #[garde(range(min = 1.0, max = 1e4))]
+        pub(super) prior_sd: f64 = 50.0,
+        /// Lower end of the rate's prior, kg/s.
+        #[garde(range(min = 0.0, max = 0.99))]
+        pub(super) rate_low: f64 = 0.5,
+        /// Upper end of the rate's prior, kg/s.
+        #[garde(range(min = 1.01, max = 1e3))]
+        pub(super) rate_high: f64 = 1.5,
     }
 }
 
@@ -101,9 +89,9 @@ impl Example {
         } else {
             Vector3::zeros()
         };
-        let air = Air::new(DIFFUSIVITY, wind, Ground::Impermeable).map_err(Error::failed)?;
+        let air = Air::new(DIFFUSIVITY, wind, Ground::Impermeable)?;
         let instants = (1..=self.samples).map(|j| 5.0 * j as f64).collect();
-        let sensor = SourceSensor::new(air, instants, self.noise).map_err(Error::failed)?;
+        let sensor = SourceSensor::new(air, instants, self.noise)?;
         sensor.with_bias(BIAS).map_err(Error::failed)
     }
 }
@@ -119,11 +107,11 @@ impl Network {
     /// The network of a trial: uniform on 100 m by 100 m, the node nearest to the alarm moved there.
     pub fn draw(stream: Stream, nodes: usize, range: f64) -> Result<Self, Error> {
         let mut rng = stream.named("deployment").rng();
-        let field = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], nodes).map_err(Error::failed)?;
+        let field = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], nodes)?;
         let alarm = Vector2::from(ALARM);
         let start = field.nearest_to(&alarm);
-        let deployment = field.with_moved(start, alarm).map_err(Error::failed)?;
-        let graph = Graph::within(deployment.positions(), range).map_err(Error::failed)?;
+        let deployment = field.with_moved(start, alarm)?;
+        let graph = Graph::within(deployment.positions(), range)?;
         Ok(Self {
             deployment,
             graph,
@@ -208,8 +196,7 @@ impl Scheme {
             settings.joint()?
         };
         let alarm = Vector2::from(ALARM);
-        let mut search = Search::new(&alarm, settings.prior_sd, search_box(), rate, self.example.threshold)
-            .map_err(Error::failed)?;
+        let mut search = Search::new(&alarm, settings.prior_sd, search_box(), rate, self.example.threshold)?;
         search.form = self.form;
         search.rule = self.rule;
         search.most_nodes = self.most_nodes;

@@ -12,60 +12,47 @@ use nalgebra::Vector2;
 fn two_phases(settings: &Settings, outcome: &Outcome, posterior: &Posterior) -> Result<(f64, f64), Error> {
     let alarm = Vector2::from(ALARM);
     let spread = nalgebra::Matrix2::identity() * settings.prior_sd.powi(2);
-    let prior = Gaussian::new(alarm, spread)
-        .and_then(|g| g.factored())
-        .map_err(Error::failed)?;
-    let likelihood = SourceLikelihood::new(outcome.records.clone(), settings.joint()?).map_err(Error::failed)?;
+    let prior = Gaussian::new(alarm, spread).and_then(|g| g.factored())?;
+    let likelihood = SourceLikelihood::new(outcome.records.clone(), settings.joint()?)?;
     let log_density = |x: &Vector2<f64>| prior.log_pdf(x) + likelihood.log_likelihood(x);
     let fit = TwoPhase::fit(posterior, &log_density, 2, 5)?;
     Ok((fit.divergence_from(&posterior.cells)?, fit.no_answer))
 }
 
-/// Settings of the divergences.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct KlParameters {
-    /// Random deployments.
-    #[garde(range(min = 1, max = 100_000))]
-    trials: u64,
-    /// Nodes that have sampled.
-    #[garde(length(min = 1), inner(range(min = 1, max = 20)))]
-    nodes: Vec<usize>,
-}
-
-impl Default for KlParameters {
-    fn default() -> Self {
-        Self {
-            trials: 200,
-            nodes: vec![1, 2, 3, 4],
-        }
+parameters! {
+    /// Settings of the divergences.
+    #[derive(Debug, Clone)]
+    pub struct KlParameters {
+        /// Random deployments.
+        #[garde(range(min = 1, max = 100_000))]
+        trials: u64 = 200 => quick 8,
+        /// Nodes that have sampled.
+        #[garde(length(min = 1), inner(range(min = 1, max = 20)))]
+        nodes: Vec<usize> = vec![1, 2, 3, 4],
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct KlRow {
-    /// Nodes that have sampled.
-    nodes: usize,
-    /// What the belief is approximated by.
-    rep: &'static str,
-    /// Numbers in a message.
-    scalars: usize,
-    /// Median `KL(exact || rep)`.
-    #[schemars(extend("unit" = "nats"))]
-    kl_median: Measured,
-    /// Its upper decile.
-    #[schemars(extend("unit" = "nats"))]
-    kl_q90: f64,
-    /// Its mean.
-    #[schemars(extend("unit" = "nats"))]
-    kl_mean: f64,
-    /// Its maximum.
-    #[schemars(extend("unit" = "nats"))]
-    kl_max: f64,
-    /// Share of the terms for which the printed recipe has no answer: the curvature at the peak is not definite.
-    no_answer: Option<f64>,
-    /// Deployments.
-    trials: usize,
+rows! {
+    pub struct KlRow {
+        /// Nodes that have sampled.
+        nodes: usize,
+        /// What the belief is approximated by.
+        rep: &'static str,
+        /// Numbers in a message.
+        scalars: usize,
+        /// Median `KL(exact || rep)`.
+        kl_median: Measured ["nats"],
+        /// Its upper decile.
+        kl_q90: f64 ["nats"],
+        /// Its mean.
+        kl_mean: f64 ["nats"],
+        /// Its maximum.
+        kl_max: f64 ["nats"],
+        /// Share of the terms for which the printed recipe has no answer: the curvature at the peak is not definite.
+        no_answer: Option<f64>,
+        /// Deployments.
+        trials: usize,
+    }
 }
 
 const FORMS: [(&str, Form); 8] = [
@@ -98,28 +85,12 @@ const TWO_PHASES: &str = "lpg-2x5 printed";
 pub struct Divergences;
 
 impl Figure for Divergences {
-    type Parameters = KlParameters;
-    type Tables = Vec<KlRow>;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-kl",
-            title: "What a number buys",
-            caption: "Kullback-Leibler divergence of the exact belief (example B, rate integrated out) from what would travel, against \
-                      the numbers in a message, after one to four nodes.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut KlParameters) {
-        p.trials = 8;
-    }
+    figure!(KlParameters => Vec<KlRow>, "diffusive-kl", "What a number buys", "",
+        "Kullback-Leibler divergence of the exact belief (example B, rate integrated out) from what would travel, against \
+         the numbers in a message, after one to four nodes.");
 
     fn cost(&self, p: &KlParameters) -> Cost {
-        Cost {
-            seconds: p.trials as f64 * p.nodes.len() as f64 * 0.1,
-            bytes: 1e6,
-        }
+        Cost::new(p.trials as f64 * p.nodes.len() as f64 * 0.1, 1e6)
     }
 
     fn run(&self, p: &KlParameters, context: &Context<'_>) -> Result<Vec<KlRow>, Error> {
@@ -168,45 +139,35 @@ impl Figure for Divergences {
     }
 
     fn claims(&self, _: &KlParameters, rows: &Vec<KlRow>, claims: &mut Claims) {
-        let find = |nodes: usize, rep: &str| {
-            rows.iter()
-                .find(|r| r.nodes == nodes && r.rep == rep)
-                .map(|r| r.kl_median.value)
-        };
+        let full = claims.at_full_trials();
+        let find =
+            |nodes: usize, rep: &str| first(rows, |r| r.nodes == nodes && r.rep == rep).map(|r| r.kl_median.value);
         let key = |r: &KlRow| format!("{} {}", r.nodes, r.rep);
-        claims
-            .references("kl_median", "median divergence", rows, |r| (key(r), r.kl_median))
-            .at_full_trials();
+        full.references("kl_median", "median divergence", rows, |r| (key(r), r.kl_median));
         let what = "no mean divergence is negative, but for what sums over cells leave (0.01 nats)";
         claims.all("positive", what, rows, |r| r.kl_mean >= -0.01);
         let what = "after the first ring eight Gaussians are closer than two polynomial Gaussians";
-        let gap = find(1, "gmm-8").zip(find(1, "lpg-2x5")).map(|(m, l)| m - l);
-        claims.below("ring", what, gap, 0.0).at_full_trials();
+        let gap = minus(find(1, "gmm-8"), find(1, "lpg-2x5"));
+        full.below("ring", what, gap, 0.0);
         for nodes in [2, 3] {
             let what = "polynomial Gaussians are far closer than one Gaussian";
-            let ratio = find(nodes, "gaussian").zip(find(nodes, "lpg-2x5")).map(|(g, l)| g / l);
-            claims
-                .above(format!("lpg-beats-gaussian/{nodes}"), what, ratio, 5.0)
-                .at_full_trials();
+            let ratio = over(find(nodes, "gaussian"), find(nodes, "lpg-2x5"));
+            full.above(format!("lpg-beats-gaussian/{nodes}"), what, ratio, 5.0);
         }
         let row = |nodes, rep| rows.iter().find(|r: &&KlRow| (r.nodes, r.rep) == (nodes, rep));
         let mean = |nodes, rep| row(nodes, rep).map(|r| r.kl_mean);
-        let ratio = mean(1, TWO_PHASES).zip(mean(1, "lpg-2x5")).map(|(p, g)| p / g);
+        let ratio = over(mean(1, TWO_PHASES), mean(1, "lpg-2x5"));
         let what =
             "on the first ring the printed two-phase fit is on average at least twice as far away as the Galerkin form";
-        claims.at_least("printed-ring", what, ratio, 2.0).at_full_trials();
+        full.at_least("printed-ring", what, ratio, 2.0);
         let what = "and of most terms there is no printed answer: no definite curvature (errata diffusive-14)";
         let share = row(1, TWO_PHASES).and_then(|r| r.no_answer);
-        claims.at_least("printed-no-answer", what, share, 0.5).at_full_trials();
-        let ratio = mean(3, TWO_PHASES)
-            .zip(find(3, TWO_PHASES))
-            .map(|(mean, median)| mean / median);
+        full.at_least("printed-no-answer", what, share, 0.5);
+        let ratio = over(mean(3, TWO_PHASES), find(3, TWO_PHASES));
         let what = "after three nodes the printed fit has a heavy tail: its mean divergence is ten medians or more";
-        claims.above("printed-tail", what, ratio, 10.0).at_full_trials();
+        full.above("printed-tail", what, ratio, 10.0);
         let what = "more components bring a mixture closer";
-        claims
-            .decreasing("more-is-closer", what, ["gaussian", "gmm-2", "gmm-4", "gmm-8"].map(|rep| find(3, rep)))
-            .at_full_trials();
+        full.decreasing("more-is-closer", what, ["gaussian", "gmm-2", "gmm-4", "gmm-8"].map(|rep| find(3, rep)));
     }
 
     fn plot(&self, _: &KlParameters, rows: &Vec<KlRow>) -> Plot {

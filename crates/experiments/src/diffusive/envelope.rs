@@ -6,143 +6,103 @@ use fewbits_diffusive::{Envelope as Area, SourceLikelihood};
 use fewbits_models::diffusion::contour_radius;
 use nalgebra::Vector2;
 
-/// Settings of the envelope.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Random deployments.
-    #[garde(range(min = 1, max = 100_000))]
-    trials: u64,
-    /// Nodes that have sampled.
-    #[garde(range(min = 1, max = 20))]
-    nodes: usize,
-    /// Time of the envelope after the release began, s.
-    #[garde(range(min = 1.0, max = 1e5))]
-    time: f64,
-    /// Threshold of the concentration, kg/m^3.
-    #[garde(range(min = 1e-8, max = 1.0))]
-    threshold: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            trials: 200,
-            nodes: 3,
-            time: 100.0,
-            threshold: 1e-4,
-        }
+parameters! {
+    /// Settings of the envelope.
+    #[derive(Debug, Clone)]
+    pub struct Parameters {
+        /// Random deployments.
+        #[garde(range(min = 1, max = 100_000))]
+        trials: u64 = 200 => quick 8,
+        /// Nodes that have sampled.
+        #[garde(range(min = 1, max = 20))]
+        nodes: usize = 3,
+        /// Time of the envelope after the release began, s.
+        #[garde(range(min = 1.0, max = 1e5))]
+        time: f64 = 100.0,
+        /// Threshold of the concentration, kg/m^3.
+        #[garde(range(min = 1e-8, max = 1.0))]
+        threshold: f64 = 1e-4,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The band of the first deployment, direction by direction, seen from the alarm node.
-    band: Vec<Band>,
-    /// How often the band holds the truth.
-    coverage: Vec<Coverage>,
-    /// Probability that the threshold is exceeded, on a grid, first deployment.
-    exceedance: Vec<Exceedance>,
-}
+rows! {
+    pub struct Rows {
+        /// The band of the first deployment, direction by direction, seen from the alarm node.
+        band: Vec<Band>,
+        /// How often the band holds the truth.
+        coverage: Vec<Coverage>,
+        /// Probability that the threshold is exceeded, on a grid, first deployment.
+        exceedance: Vec<Exceedance>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Band {
-    /// Time.
-    #[schemars(extend("unit" = "s"))]
-    t: f64,
-    /// Threshold.
-    #[schemars(extend("unit" = "kg/m^3"))]
-    c_star: f64,
-    /// Direction from the alarm node.
-    #[schemars(extend("unit" = "deg"))]
-    direction_deg: f64,
-    /// How far the area reaches: 5 per cent quantile.
-    #[schemars(extend("unit" = "m"))]
-    r05: f64,
-    /// Median.
-    #[schemars(extend("unit" = "m"))]
-    r50: f64,
-    /// 95 per cent quantile.
-    #[schemars(extend("unit" = "m"))]
-    r95: f64,
-    /// The truth.
-    #[schemars(extend("unit" = "m"))]
-    truth: f64,
-}
+    struct Band {
+        /// Time.
+        t: f64 ["s"],
+        /// Threshold.
+        c_star: f64 ["kg/m^3"],
+        /// Direction from the alarm node.
+        direction_deg: f64 ["deg"],
+        /// How far the area reaches: 5 per cent quantile.
+        r05: f64 ["m"],
+        /// Median.
+        r50: f64 ["m"],
+        /// 95 per cent quantile.
+        r95: f64 ["m"],
+        /// The truth.
+        truth: f64 ["m"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Coverage {
-    /// Which edge.
-    edge: &'static str,
-    /// Share of the deployments whose 90 per cent band holds the true edge.
-    coverage: Measured,
-    /// Median width of the band.
-    #[schemars(extend("unit" = "m"))]
-    width_median: Measured,
-    /// True radius about the source.
-    #[schemars(extend("unit" = "m"))]
-    radius: f64,
-}
+    struct Coverage {
+        /// Which edge.
+        edge: &'static str,
+        /// Share of the deployments whose 90 per cent band holds the true edge.
+        coverage: Measured,
+        /// Median width of the band.
+        width_median: Measured ["m"],
+        /// True radius about the source.
+        radius: f64 ["m"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Exceedance {
-    /// Place.
-    #[schemars(extend("unit" = "m"))]
-    x: f64,
-    /// Place.
-    #[schemars(extend("unit" = "m"))]
-    y: f64,
-    /// Probability that the concentration exceeds the threshold.
-    p_exceed: f64,
+    struct Exceedance {
+        /// Place.
+        x: f64 ["m"],
+        /// Place.
+        y: f64 ["m"],
+        /// Probability that the concentration exceeds the threshold.
+        p_exceed: f64,
+    }
 }
 
 /// The envelope.
 pub struct Envelope;
 
 impl Parameters {
-    fn area(&self, trial: fewbits_monte_carlo::Trial) -> Result<Option<Area>, Error> {
+    fn area(&self, trial: Trial) -> Result<Option<Area>, Error> {
         let settings = Settings::default();
         let endless = super::common::Example { threshold: 1e-300, ..B };
         let outcome = Scheme::new("exact", endless).up_to(self.nodes).run(&settings, trial)?;
         let Some(posterior) = outcome.posterior else {
             return Ok(None);
         };
-        let likelihood = SourceLikelihood::new(outcome.records, settings.joint()?).map_err(Error::failed)?;
-        Area::new(&posterior, &likelihood).map(Some).map_err(Error::failed)
+        let likelihood = SourceLikelihood::new(outcome.records, settings.joint()?)?;
+        Ok(Area::new(&posterior, &likelihood).map(Some)?)
     }
 }
 
 const GRID: usize = 50;
 
 impl Figure for Envelope {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-envelope",
-            title: "The area above a threshold",
-            caption: "Where the concentration on the ground exceeds 1e-4 kg/m^3 after 100 s, as a belief of three nodes sees it \
-                      (example B, rate unknown): probability of exceedance, and how often the 90 per cent band of the eastern \
-                      edge holds the true edge.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 8;
-    }
+    figure!(Parameters => Rows, "diffusive-envelope", "The area above a threshold", "",
+        "Where the concentration on the ground exceeds 1e-4 kg/m^3 after 100 s, as a belief of three nodes sees it \
+         (example B, rate unknown): probability of exceedance, and how often the 90 per cent band of the eastern \
+         edge holds the true edge.");
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: p.trials as f64 * 0.1,
-            bytes: 1e6,
-        }
+        Cost::new(p.trials as f64 * 0.1, 1e6)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let radius = contour_radius(RATE, p.threshold, p.time, DIFFUSIVITY).map_err(Error::failed)?;
+        let radius = contour_radius(RATE, p.threshold, p.time, DIFFUSIVITY)?;
         let source = B.source();
         let edges = [("east", 0.0), ("north", 90.0_f64)];
         let all = trials(context, "diffusive-chains", p.trials, |trial| {
@@ -152,17 +112,13 @@ impl Figure for Envelope {
             let bands = edges.map(|(_, angle)| Ok((quantile(angle, 0.05)?, quantile(angle, 0.95)?)));
             let bands = bands
                 .into_iter()
-                .collect::<Result<Vec<_>, fewbits_diffusive::Error>>()
-                .map_err(Error::failed)?;
+                .collect::<Result<Vec<_>, fewbits_diffusive::Error>>()?;
             Ok(Some(bands))
         })?;
         let known: Vec<&Vec<(f64, f64)>> = all.iter().flatten().collect();
         let coverage = edges.iter().enumerate().filter_map(|(i, (edge, angle))| {
             let truth = radius + source.x * angle.to_radians().cos() + source.y * angle.to_radians().sin();
-            let hits = known
-                .iter()
-                .filter(|bands| (bands[i].0..=bands[i].1).contains(&truth))
-                .count();
+            let hits = select(&known, |bands| (bands[i].0..=bands[i].1).contains(&truth)).count();
             let widths: Vec<f64> = known.iter().map(|bands| bands[i].1 - bands[i].0).collect();
             Some(Coverage {
                 edge,
@@ -196,7 +152,7 @@ impl Figure for Envelope {
             for j in 0..GRID {
                 for i in 0..GRID {
                     let place = Vector2::new(i as f64 + 0.5, j as f64 + 0.5) * (100.0 / GRID as f64);
-                    let p_exceed = area.exceedance(&place, p.time, p.threshold).map_err(Error::failed)?;
+                    let p_exceed = area.exceedance(&place, p.time, p.threshold)?;
                     exceedance.push(Exceedance {
                         x: place.x,
                         y: place.y,
@@ -213,6 +169,7 @@ impl Figure for Envelope {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         claims.references("coverage", "coverage of the 90 per cent band", rows.coverage.iter(), |c| {
             (c.edge.to_owned(), c.coverage)
         });
@@ -226,9 +183,7 @@ impl Figure for Envelope {
         });
         for c in &rows.coverage {
             let what = format!("nine bands in ten hold the true edge: {}", c.edge);
-            claims
-                .within(format!("calibrated/{}", c.edge), what, c.coverage, 0.9, 4.0)
-                .at_full_trials();
+            full.within(format!("calibrated/{}", c.edge), what, c.coverage, 0.9, 4.0);
         }
     }
 
@@ -254,14 +209,11 @@ impl Figure for Envelope {
         .with(Layer::dashed("true edge", circle.collect()).coloured(3));
         let of = |f: fn(&Band) -> f64| rows.band.iter().map(|b| (b.direction_deg, f(b))).collect::<Vec<_>>();
         let limits = rows.band.iter().map(|b| (b.direction_deg, b.r05, b.r95)).collect();
-        let band = Panel::new(
-            format!("Reach from the alarm node after {} s", p.time),
-            Axis::linear("direction (deg)"),
-            Axis::linear("reach (m)"),
-        )
-        .with(Layer::band("90 % band", limits).coloured(0))
-        .with(Layer::line("median", of(|b| b.r50)).coloured(0))
-        .with(Layer::dashed("truth", of(|b| b.truth)).coloured(3));
+        let band =
+            Panel::linear(format!("Reach from the alarm node after {} s", p.time), "direction (deg)", "reach (m)")
+                .with(Layer::band("90 % band", limits).coloured(0))
+                .with(Layer::line("median", of(|b| b.r50)).coloured(0))
+                .with(Layer::dashed("truth", of(|b| b.truth)).coloured(3));
         Plot::grid(2, vec![map, band])
     }
 }

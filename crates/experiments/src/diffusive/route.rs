@@ -4,30 +4,20 @@ use super::common::{A, ALARM, Network, Scheme, Settings};
 use crate::prelude::*;
 use fewbits_densities::ellipse;
 use fewbits_diffusive::{Form, Outcome, Rule};
-use fewbits_monte_carlo::Trial;
 
-/// Which deployment is shown.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Number of the random deployment.
-    #[garde(range(max = 1_000_000))]
-    deployment: u64,
-    /// Deployed nodes.
-    #[garde(range(min = 2, max = 100_000))]
-    nodes: usize,
-    /// Radio range, m.
-    #[garde(range(min = 1.0, max = 1000.0))]
-    range: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            deployment: 0,
-            nodes: 300,
-            range: 15.0,
-        }
+parameters! {
+    /// Which deployment is shown.
+    #[derive(Debug, Clone)]
+    pub struct Parameters {
+        /// Number of the random deployment.
+        #[garde(range(max = 1_000_000))]
+        deployment: u64 = 0,
+        /// Deployed nodes.
+        #[garde(range(min = 2, max = 100_000))]
+        nodes: usize = 300,
+        /// Radio range, m.
+        #[garde(range(min = 1.0, max = 1000.0))]
+        range: f64 = 15.0,
     }
 }
 
@@ -74,37 +64,27 @@ enum Event {
     Stop,
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct TraceRow {
-    /// Nodes that have sampled, this one included.
-    step: usize,
-    /// The node.
-    node: usize,
-    /// What happens.
-    event: Event,
-    /// Bytes that travel.
-    #[schemars(extend("unit" = "bytes"))]
-    bytes: f64,
-    /// Decimal logarithm of the determinant, where it is tested.
-    log10_determinant: Option<f64>,
+rows! {
+    pub struct TraceRow {
+        /// Nodes that have sampled, this one included.
+        step: usize,
+        /// The node.
+        node: usize,
+        /// What happens.
+        event: Event,
+        /// Bytes that travel.
+        bytes: f64 ["bytes"],
+        /// Decimal logarithm of the determinant, where it is tested.
+        log10_determinant: Option<f64>,
+    }
 }
 
-/// Figure 1: the flow chart, as the trace of one search.
 pub struct Trace;
 
 impl Figure for Trace {
-    type Parameters = Parameters;
-    type Tables = Vec<TraceRow>;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-fig1",
-            title: "One search, event by event",
-            caption: "The paper's flow chart as what happens in one search of example B's kind: receive, sample, update, test, \
-                      select, send. A mixture of four Gaussians over position and rate travels.",
-            source: "Zhao and Nehorai 2007, Fig. 1",
-        }
-    }
+    figure!(Parameters => Vec<TraceRow>, "diffusive-fig1", "One search, event by event", "Zhao and Nehorai 2007, Fig. 1",
+        "The paper's flow chart as what happens in one search of example B's kind: receive, sample, update, test, \
+         select, send. A mixture of four Gaussians over position and rate travels.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<TraceRow>, Error> {
         let scheme = Scheme::new("gmm-4", A)
@@ -141,14 +121,13 @@ impl Figure for Trace {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<TraceRow>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let count = |event| rows.iter().filter(|r| r.event == event).count();
         let balance = count(Event::Send) as f64 - count(Event::Receive) as f64;
         claims.near("delivered", "what is sent is received", balance, 0.0, 0.0);
         claims.near("one-end", "the search ends once", count(Event::Stop) as f64, 1.0, 0.0);
         let last = rows.iter().filter_map(|r| r.log10_determinant).next_back();
-        claims
-            .below("sharp", "the last determinant is below the threshold", last, A.threshold.log10())
-            .at_defaults();
+        here.below("sharp", "the last determinant is below the threshold", last, A.threshold.log10());
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<TraceRow>) -> Plot {
@@ -157,16 +136,14 @@ impl Figure for Trace {
             .filter_map(|r| Some((r.step as f64, r.log10_determinant?)))
             .collect();
         let mut total = 0.0;
-        let bytes = rows
-            .iter()
-            .filter(|r| r.event == Event::Receive)
+        let bytes = select(rows, |r| r.event == Event::Receive)
             .map(|r| {
                 total += r.bytes;
                 (r.step as f64, total)
             })
             .collect();
-        let determinant = Panel::new("Test", Axis::linear("nodes"), Axis::linear("log10 det of the covariance (m^4)"));
-        let sent = Panel::new("Messages", Axis::linear("nodes"), Axis::linear("bytes so far"));
+        let determinant = Panel::linear("Test", "nodes", "log10 det of the covariance (m^4)");
+        let sent = Panel::linear("Messages", "nodes", "bytes so far");
         Plot::grid(
             2,
             vec![
@@ -177,74 +154,53 @@ impl Figure for Trace {
     }
 }
 
-/// Tables of Figure 2.
-#[derive(Serialize, JsonSchema)]
-pub struct RouteRows {
-    /// The nodes visited.
-    route: Vec<RouteRow>,
-    /// All deployed nodes.
-    field: Vec<Place>,
+rows! {
+    pub struct RouteRows {
+        /// The nodes visited.
+        route: Vec<RouteRow>,
+        /// All deployed nodes.
+        field: Vec<Place>,
+    }
+
+    struct RouteRow {
+        /// Number of the random deployment.
+        deployment: u64,
+        /// Nodes that have sampled, this one included.
+        step: usize,
+        /// The node.
+        node: usize,
+        /// Its position.
+        x: f64 ["m"],
+        /// Its position.
+        y: f64 ["m"],
+        /// Hops from the node before.
+        hop: usize,
+        /// Estimate of the source.
+        estimate_x: f64 ["m"],
+        /// Estimate of the source.
+        estimate_y: f64 ["m"],
+        /// Variance of x.
+        variance_x: f64 ["m^2"],
+        /// Covariance of x and y.
+        covariance_xy: f64 ["m^2"],
+        /// Variance of y.
+        variance_y: f64 ["m^2"],
+    }
+
+    struct Place {
+        /// Position.
+        x: f64 ["m"],
+        /// Position.
+        y: f64 ["m"],
+    }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct RouteRow {
-    /// Number of the random deployment.
-    deployment: u64,
-    /// Nodes that have sampled, this one included.
-    step: usize,
-    /// The node.
-    node: usize,
-    /// Its position.
-    #[schemars(extend("unit" = "m"))]
-    x: f64,
-    /// Its position.
-    #[schemars(extend("unit" = "m"))]
-    y: f64,
-    /// Hops from the node before.
-    hop: usize,
-    /// Estimate of the source.
-    #[schemars(extend("unit" = "m"))]
-    estimate_x: f64,
-    /// Estimate of the source.
-    #[schemars(extend("unit" = "m"))]
-    estimate_y: f64,
-    /// Variance of x.
-    #[schemars(extend("unit" = "m^2"))]
-    variance_x: f64,
-    /// Covariance of x and y.
-    #[schemars(extend("unit" = "m^2"))]
-    covariance_xy: f64,
-    /// Variance of y.
-    #[schemars(extend("unit" = "m^2"))]
-    variance_y: f64,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Place {
-    /// Position.
-    #[schemars(extend("unit" = "m"))]
-    x: f64,
-    /// Position.
-    #[schemars(extend("unit" = "m"))]
-    y: f64,
-}
-
-/// Figure 2: the route over the field.
 pub struct Route;
 
 impl Figure for Route {
-    type Parameters = Parameters;
-    type Tables = RouteRows;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-fig2",
-            title: "The route of one search",
-            caption: "Nodes visited in one random deployment, example A, with 90 per cent ellipses of the belief after each \
-                      node. The belief is exact; the next node is the one nearest to the estimate in Mahalanobis distance.",
-            source: "Zhao and Nehorai 2007, Fig. 2",
-        }
-    }
+    figure!(Parameters => RouteRows, "diffusive-fig2", "The route of one search", "Zhao and Nehorai 2007, Fig. 2",
+        "Nodes visited in one random deployment, example A, with 90 per cent ellipses of the belief after each \
+         node. The belief is exact; the next node is the one nearest to the estimate in Mahalanobis distance.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<RouteRows, Error> {
         let outcome = p.search(&Scheme::new("exact", A).at(p.range), context)?;
@@ -273,17 +229,14 @@ impl Figure for Route {
     }
 
     fn claims(&self, p: &Parameters, rows: &RouteRows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let last = rows.route.last().map(|r| (r.x - A.source[0]).hypot(r.y - A.source[1]));
-        claims
-            .at_most("ends-near", "the route ends within 15 m of the source", last, 15.0)
-            .at_defaults();
+        here.at_most("ends-near", "the route ends within 15 m of the source", last, 15.0);
         let error = rows
             .route
             .last()
             .map(|r| (r.estimate_x - A.source[0]).hypot(r.estimate_y - A.source[1]));
-        claims
-            .at_most("estimate", "the estimate is within 0.2 m of the source", error, 0.2)
-            .at_defaults();
+        here.at_most("estimate", "the estimate is within 0.2 m of the source", error, 0.2);
         let first = rows.route.first().map(|r| (r.x - ALARM[0]).hypot(r.y - ALARM[1]));
         claims.near("starts", "the route starts at the alarm node", first, 0.0, 1e-9);
         claims.all("in-range", "no hop is longer than the range", rows.route.windows(2), |pair| {
@@ -308,12 +261,8 @@ impl Figure for Route {
         let route: Vec<_> = rows.route.iter().map(|r| (r.x, r.y)).collect();
         panel = panel
             .with(Layer::line("", route.clone()).coloured(0))
-            .with(Layer::points("visited", route).coloured(0).marked(Marker::Square))
-            .with(
-                Layer::points("source", vec![A.source.into()])
-                    .coloured(3)
-                    .marked(Marker::Triangle),
-            );
+            .with(Layer::points("visited", route).styled(0, Marker::Square))
+            .with(Layer::points("source", vec![A.source.into()]).styled(3, Marker::Triangle));
         Plot::of(panel)
     }
 }

@@ -5,61 +5,47 @@ use super::summary::{Summary, summaries};
 use crate::prelude::*;
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{Posterior, Rule, Selector, SourceSensor};
-use fewbits_monte_carlo::Moments;
 use nalgebra::Vector2;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-/// Settings of the comparison.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Random deployments of the searches.
-    #[garde(range(min = 1, max = 100_000))]
-    trials: u64,
-    /// Random deployments in which candidates are ranked.
-    #[garde(range(min = 1, max = 10_000))]
-    ranking_trials: u64,
-    /// Support points of the bounds.
-    #[garde(range(min = 10, max = 2_000))]
-    points: usize,
-    /// Draws of the mutual information.
-    #[garde(range(min = 10, max = 100_000))]
-    draws: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            trials: 200,
-            ranking_trials: 60,
-            points: 200,
-            draws: 200,
-        }
+parameters! {
+    /// Settings of the comparison.
+    #[derive(Debug, Clone)]
+    pub struct Parameters {
+        /// Random deployments of the searches.
+        #[garde(range(min = 1, max = 100_000))]
+        trials: u64 = 200 => quick 8,
+        /// Random deployments in which candidates are ranked.
+        #[garde(range(min = 1, max = 10_000))]
+        ranking_trials: u64 = 60 => quick 2,
+        /// Support points of the bounds.
+        #[garde(range(min = 10, max = 2_000))]
+        points: usize = 200,
+        /// Draws of the mutual information.
+        #[garde(range(min = 10, max = 100_000))]
+        draws: usize = 200,
     }
 }
 
-/// Both tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Searches with the exact belief, by rule.
-    searches: Vec<Summary>,
-    /// How rules rank the neighbours after three nodes, against the mutual information by draws.
-    rankings: Vec<Ranking>,
-}
+rows! {
+    pub struct Rows {
+        /// Searches with the exact belief, by rule.
+        searches: Vec<Summary>,
+        /// How rules rank the neighbours after three nodes, against the mutual information by draws.
+        rankings: Vec<Ranking>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Ranking {
-    /// Rule.
-    rule: &'static str,
-    /// Mean rank correlation with the exact mutual information.
-    rank_correlation: Measured,
-    /// Information lost by taking the rule's best instead of the best.
-    #[schemars(extend("unit" = "nats"))]
-    lost: Measured,
-    /// Mean of rule minus exact information, for rules that are in nats.
-    #[schemars(extend("unit" = "nats"))]
-    bias: Option<f64>,
+    struct Ranking {
+        /// Rule.
+        rule: &'static str,
+        /// Mean rank correlation with the exact mutual information.
+        rank_correlation: Measured,
+        /// Information lost by taking the rule's best instead of the best.
+        lost: Measured ["nats"],
+        /// Mean of rule minus exact information, for rules that are in nats.
+        bias: Option<f64> ["nats"],
+    }
 }
 
 const RULES: [&str; 7] = [
@@ -98,30 +84,13 @@ fn schemes() -> Vec<Scheme> {
 pub struct Selection;
 
 impl Figure for Selection {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-selection",
-            title: "Choosing the next node",
-            caption: "Left: mean nodes to the threshold with the exact belief, by mutual information (its Gaussian bound, \
-                      and its pairwise bound) and by Mahalanobis distance. Right: how rules rank the neighbours after three nodes of example B, as rank \
-                      correlation with the exact mutual information.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 8;
-        p.ranking_trials = 2;
-    }
+    figure!(Parameters => Rows, "diffusive-selection", "Choosing the next node", "",
+        "Left: mean nodes to the threshold with the exact belief, by mutual information (its Gaussian bound, \
+         and its pairwise bound) and by Mahalanobis distance. Right: how rules rank the neighbours after three nodes of example B, as rank \
+         correlation with the exact mutual information.");
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: p.trials as f64 * 0.3 + p.ranking_trials as f64 * p.draws as f64 * 0.01,
-            bytes: 1e7,
-        }
+        Cost::new(p.trials as f64 * 0.3 + p.ranking_trials as f64 * p.draws as f64 * 0.01, 1e7)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
@@ -147,6 +116,7 @@ impl Figure for Selection {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let searches = || rows.searches.iter();
         claims.references("nodes_mean", "mean nodes to the threshold", searches(), |s| {
             (s.scheme.to_owned(), s.nodes_mean)
@@ -155,41 +125,24 @@ impl Figure for Selection {
         let find = |setting: &str, rule: &str| searches().find(|s| s.scheme == format!("{setting} {rule}"));
         for (setting, ..) in SETTINGS {
             let reach = |rule| find(setting, rule).map(|s| s.reach.value);
-            let gap = reach("information").zip(reach("mahalanobis")).map(|(a, b)| a - b);
+            let gap = minus(reach("information"), reach("mahalanobis"));
             let what = format!("information reaches the threshold at least as often as Mahalanobis: {setting}");
-            claims
-                .at_least(format!("no-stall/{setting}"), what, gap, 0.0)
-                .at_full_trials();
+            full.at_least(format!("no-stall/{setting}"), what, gap, 0.0);
             let mean = |rule| find(setting, rule).and_then(|s| s.nodes_mean).map(|m| m.value);
             let gap = mean("pairwise").zip(mean("information")).map(|(a, b)| (a - b).abs());
             let what = format!("the better ranking of the pairwise bound saves less than half a node: {setting}");
-            claims
-                .at_most(format!("bound-suffices/{setting}"), what, gap, 0.5)
-                .at_full_trials();
+            full.at_most(format!("bound-suffices/{setting}"), what, gap, 0.5);
         }
-        let rank = |rule: &str| {
-            rows.rankings
-                .iter()
-                .find(|r| r.rule == rule)
-                .map(|r| r.rank_correlation.value)
-        };
+        let rank = |rule: &str| first(&rows.rankings, |r| r.rule == rule).map(|r| r.rank_correlation.value);
         let what = "the pairwise lower bound ranks as the exact information does";
-        claims
-            .at_least("pairwise-ranks", what, rank("pairwise lower"), 0.98)
-            .at_full_trials();
+        full.at_least("pairwise-ranks", what, rank("pairwise lower"), 0.98);
         let lost = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).map(|r| r.lost.value);
         let what = "choosing by the Gaussian bound loses less than 0.15 nat, though it misjudges beliefs of two peaks (errata diffusive-16)";
-        claims
-            .below("gaussian-loses-little", what, lost("gaussian bound"), 0.15)
-            .at_full_trials();
-        let gap = rank("pairwise lower").zip(rank("mahalanobis")).map(|(a, b)| a - b);
-        claims
-            .above("mahalanobis-does-not", "Mahalanobis distance ranks far worse", gap, 0.2)
-            .at_full_trials();
-        let gap = lost("mahalanobis").zip(lost("pairwise lower")).map(|(m, p)| m - p);
-        claims
-            .above("mahalanobis-loses", "and loses more information", gap, 0.0)
-            .at_full_trials();
+        full.below("gaussian-loses-little", what, lost("gaussian bound"), 0.15);
+        let gap = minus(rank("pairwise lower"), rank("mahalanobis"));
+        full.above("mahalanobis-does-not", "Mahalanobis distance ranks far worse", gap, 0.2);
+        let gap = minus(lost("mahalanobis"), lost("pairwise lower"));
+        full.above("mahalanobis-loses", "and loses more information", gap, 0.0);
         let bias = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).and_then(|r| r.bias);
         let what = "the pairwise lower bound is below the information on average (draws leave some noise)";
         claims.at_most("lower", what, bias("pairwise lower"), 0.05);
@@ -198,12 +151,10 @@ impl Figure for Selection {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let names = SETTINGS.iter().enumerate().map(|(i, s)| (i as f64, s.0.to_owned()));
+        let names = SETTINGS.iter().map(|s| s.0.to_owned());
         let mut nodes = Panel::new(
             "Nodes to the threshold",
-            Axis::linear("example and range (m)")
-                .named(names)
-                .between(-0.5, SETTINGS.len() as f64 - 0.5),
+            Axis::categories("example and range (m)", names),
             Axis::linear("mean nodes").between(0.0, 11.0),
         );
         for (c, (rule, _)) in SEARCH_RULES.into_iter().enumerate() {
@@ -214,7 +165,7 @@ impl Figure for Selection {
         // Rules downwards, best at the top, so that their names have room.
         let mut sorted: Vec<&Ranking> = rows.rankings.iter().collect();
         sorted.sort_by(|a, b| a.rank_correlation.value.total_cmp(&b.rank_correlation.value));
-        let names = sorted.iter().enumerate().map(|(i, r)| (i as f64, r.rule.to_owned()));
+        let names = sorted.iter().map(|r| r.rule.to_owned());
         let bars = sorted.iter().enumerate();
         let bars = bars.map(|(i, r)| (0.0, r.rank_correlation.value.max(0.0), i as f64 - 0.3, i as f64 + 0.3));
         let errors = sorted.iter().enumerate().filter_map(|(i, r)| {
@@ -225,7 +176,7 @@ impl Figure for Selection {
         let ranks = Panel::new(
             "Ranking",
             Axis::linear("rank correlation with exact information").between(0.0, 1.05),
-            Axis::linear("").named(names).between(-0.7, sorted.len() as f64 - 0.3),
+            Axis::categories("", names),
         )
         .with(Layer::boxes("mean over deployments", bars.collect()).coloured(0))
         .with_all(errors.enumerate().map(|(i, line)| {
@@ -237,11 +188,7 @@ impl Figure for Selection {
 }
 
 /// Of every rule: rank correlation, information lost, bias; none if the search had no candidates.
-fn rank(
-    p: &Parameters,
-    settings: &Settings,
-    trial: fewbits_monte_carlo::Trial,
-) -> Result<Option<Vec<[f64; 3]>>, Error> {
+fn rank(p: &Parameters, settings: &Settings, trial: Trial) -> Result<Option<Vec<[f64; 3]>>, Error> {
     let endless = Example { threshold: 1e-300, ..B };
     let scheme = Scheme::new("exact", endless).up_to(3);
     let outcome = scheme.run(settings, trial)?;
@@ -263,7 +210,7 @@ fn rank(
         return Ok(None);
     }
     let reference = Reference::new(posterior, p.draws, trial);
-    let clumps = posterior.clumps_with_rate(1.0, p.points).map_err(Error::failed)?;
+    let clumps = posterior.clumps_with_rate(1.0, p.points)?;
     let weights: Vec<f64> = clumps.clumps().iter().map(|c| c.weight).collect();
     let total: f64 = weights.iter().sum();
     let weights: Vec<f64> = weights.iter().map(|w| w / total).collect();
@@ -345,7 +292,7 @@ struct Draw {
 }
 
 impl<'a> Reference<'a> {
-    fn new(posterior: &'a Posterior, draws: usize, trial: fewbits_monte_carlo::Trial) -> Self {
+    fn new(posterior: &'a Posterior, draws: usize, trial: Trial) -> Self {
         let mut rng = trial.stream.named("information").rng();
         let [x, y] = posterior.cells.columns();
         let mut cumulative: Vec<f64> = posterior.cells.weights().to_vec();
@@ -384,7 +331,7 @@ impl<'a> Reference<'a> {
                 .zip(&draw.noise)
                 .map(|(a, e)| draw.rate * a + sensor.noise() * e + sensor.bias())
                 .collect();
-            let record = sensor.record(place, &samples).map_err(Error::failed)?;
+            let record = sensor.record(place, &samples)?;
             let own = record.sums(&draw.position).log_given_rate(draw.rate);
             let mut ratio = 0.0;
             for (i, weight) in weights.iter().enumerate() {

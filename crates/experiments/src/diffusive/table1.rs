@@ -4,32 +4,22 @@ use crate::prelude::*;
 use fewbits_densities::hermite::{gaussian_moment, hermite_terms, multi_indices};
 use nalgebra::{Matrix2, Vector2};
 
-/// The covariance at which the table is evaluated.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Variance of the first coordinate.
-    #[garde(range(min = 0.01, max = 100.0))]
-    variance1: f64,
-    /// Variance of the second coordinate.
-    #[garde(range(min = 0.01, max = 100.0))]
-    variance2: f64,
-    /// Correlation.
-    #[garde(range(min = -0.99, max = 0.99))]
-    correlation: f64,
-    /// Highest degree.
-    #[garde(range(min = 1, max = 8))]
-    degree: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            variance1: 2.0,
-            variance2: 0.5,
-            correlation: 0.7,
-            degree: 4,
-        }
+parameters! {
+    /// The covariance at which the table is evaluated.
+    #[derive(Debug, Clone)]
+    pub struct Parameters {
+        /// Variance of the first coordinate.
+        #[garde(range(min = 0.01, max = 100.0))]
+        variance1: f64 = 2.0,
+        /// Variance of the second coordinate.
+        #[garde(range(min = 0.01, max = 100.0))]
+        variance2: f64 = 0.5,
+        /// Correlation.
+        #[garde(range(min = -0.99, max = 0.99))]
+        correlation: f64 = 0.7,
+        /// Highest degree.
+        #[garde(range(min = 1, max = 8))]
+        degree: usize = 4,
     }
 }
 
@@ -43,39 +33,37 @@ impl Parameters {
     }
 }
 
-/// Both tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The monomials of every polynomial.
-    monomials: Vec<Monomial>,
-    /// The mean of every polynomial under the Gaussian, which must be zero.
-    means: Vec<Mean>,
-}
+rows! {
+    pub struct Rows {
+        /// The monomials of every polynomial.
+        monomials: Vec<Monomial>,
+        /// The mean of every polynomial under the Gaussian, which must be zero.
+        means: Vec<Mean>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Monomial {
-    /// First index.
-    nu1: usize,
-    /// Second index.
-    nu2: usize,
-    /// Powers of z1 and z2.
-    monomial: String,
-    /// Its coefficient.
-    coef: f64,
-    /// The coefficient as printed, where the entry is misprinted.
-    printed: Option<f64>,
-}
+    struct Monomial {
+        /// First index.
+        nu1: usize,
+        /// Second index.
+        nu2: usize,
+        /// Powers of z1 and z2.
+        monomial: String,
+        /// Its coefficient.
+        coef: f64,
+        /// The coefficient as printed, where the entry is misprinted.
+        printed: Option<f64>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Mean {
-    /// First index.
-    nu1: usize,
-    /// Second index.
-    nu2: usize,
-    /// Mean of the recursion's polynomial under the Gaussian.
-    mean: f64,
-    /// Mean of the printed polynomial, where it is misprinted.
-    printed: Option<f64>,
+    struct Mean {
+        /// First index.
+        nu1: usize,
+        /// Second index.
+        nu2: usize,
+        /// Mean of the recursion's polynomial under the Gaussian.
+        mean: f64,
+        /// Mean of the printed polynomial, where it is misprinted.
+        printed: Option<f64>,
+    }
 }
 
 /// The misprinted entries as printed: He40 with a constant `3 w11`, He22 with `w11 z1 z2` in place of `w11 z2^2`.
@@ -97,22 +85,12 @@ fn printed(nu: [usize; 2], w: &Matrix2<f64>) -> Option<Vec<([usize; 2], f64)>> {
 const MISPRINT_40: f64 = 0.057_67;
 const MISPRINT_22: f64 = 5.190_31;
 
-/// Table I.
 pub struct Table1;
 
 impl Figure for Table1 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-table1",
-            title: "Hermite polynomials of two variables",
-            caption: "The polynomials He_nu(z; W) by the recursion, with the two misprinted entries of the paper's table beside \
-                      them. Every polynomial but the first has mean zero under the Gaussian; the misprints do not.",
-            source: "Zhao and Nehorai 2007, Table I",
-        }
-    }
+    figure!(Parameters => Rows, "diffusive-table1", "Hermite polynomials of two variables", "Zhao and Nehorai 2007, Table I",
+        "The polynomials He_nu(z; W) by the recursion, with the two misprinted entries of the paper's table beside \
+         them. Every polynomial but the first has mean zero under the Gaussian; the misprints do not.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let w = p.precision()?;
@@ -125,8 +103,8 @@ impl Figure for Table1 {
             parts.sum()
         };
         let (mut monomials, mut means) = (Vec::new(), Vec::new());
-        for nu in multi_indices::<2>(p.degree).map_err(Error::failed)? {
-            let terms = hermite_terms(nu, &w).map_err(Error::failed)?;
+        for nu in multi_indices::<2>(p.degree)? {
+            let terms = hermite_terms(nu, &w)?;
             let misprint = printed(nu, &w);
             let mut powers: Vec<[usize; 2]> = terms.iter().map(|t| t.0).collect();
             powers.extend(
@@ -157,25 +135,17 @@ impl Figure for Table1 {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let what = "every polynomial but the first has mean zero";
         claims.all("zero-mean", what, rows.means.iter().filter(|m| m.nu1 + m.nu2 > 0), |m| m.mean.abs() < 1e-10);
-        let misprint = |nu1, nu2| {
-            rows.means
-                .iter()
-                .find(|m| (m.nu1, m.nu2) == (nu1, nu2))
-                .and_then(|m| m.printed)
-        };
+        let misprint = |nu1, nu2| first(&rows.means, |m| (m.nu1, m.nu2) == (nu1, nu2)).and_then(|m| m.printed);
         for (nu, id, reference) in [((4, 0), "he40", MISPRINT_40), ((2, 2), "he22", MISPRINT_22)] {
             let what = "the printed entry has another mean and is a misprint (errata diffusive-3)";
             let value = misprint(nu.0, nu.1).map(f64::abs);
-            claims
-                .near(format!("misprint/{id}"), what, value, reference, 0.01)
-                .at_defaults();
+            here.near(format!("misprint/{id}"), what, value, reference, 0.01);
         }
         let count = rows.means.len() as f64;
-        claims
-            .near("complete", "fifteen polynomials up to degree four", count, 15.0, 0.0)
-            .at_defaults();
+        here.near("complete", "fifteen polynomials up to degree four", count, 15.0, 0.0);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
@@ -186,21 +156,11 @@ impl Figure for Table1 {
                 .filter_map(|(i, m)| Some((i as f64, value(m)?)))
                 .collect()
         };
-        let names = rows
-            .means
-            .iter()
-            .enumerate()
-            .map(|(i, m)| (i as f64, format!("{}{}", m.nu1, m.nu2)));
+        let index = Axis::categories("index nu", rows.means.iter().map(|m| format!("{}{}", m.nu1, m.nu2)));
         Plot::of(
-            Panel::new(
-                "Mean under the Gaussian",
-                Axis::linear("index nu")
-                    .named(names)
-                    .between(-0.7, rows.means.len() as f64 - 0.3),
-                Axis::linear("mean"),
-            )
-            .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))
-            .with(Layer::points("by the recursion", bars(|m| Some(m.mean))).coloured(0)),
+            Panel::new("Mean under the Gaussian", index, Axis::linear("mean"))
+                .with(Layer::bars("as printed", bars(|m| m.printed), 0.6).coloured(1))
+                .with(Layer::points("by the recursion", bars(|m| Some(m.mean))).coloured(0)),
         )
     }
 }

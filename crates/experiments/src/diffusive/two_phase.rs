@@ -48,12 +48,9 @@ impl TwoPhase {
         peaks: usize,
         degree: usize,
     ) -> Result<Self, Error> {
-        let indices = multi_indices::<2>(degree).map_err(Error::failed)?;
-        let fit = MixtureFit::new(peaks).map_err(Error::failed)?;
-        let mixture = posterior
-            .clumps(200)
-            .and_then(|c| Ok(c.fit(&fit)?))
-            .map_err(Error::failed)?;
+        let indices = multi_indices::<2>(degree)?;
+        let fit = MixtureFit::new(peaks)?;
+        let mixture = posterior.clumps(200).and_then(|c| Ok(c.fit(&fit)?))?;
         let cells = &posterior.cells;
         let scale = log_scale(cells, log_density);
         let density = |x: &Vector2<f64>| (log_density(x) - scale).exp();
@@ -158,7 +155,7 @@ impl Term {
         let z = self.precision * gap;
         let phi = self.height * (-0.5 * gap.dot(&z)).exp();
         let all = indices.iter().map(|nu| hermite(*nu, &z, &self.precision));
-        all.map(|value| Ok(phi * value.map_err(Error::failed)?)).collect()
+        all.map(|value| Ok(phi * value?)).collect()
     }
 
     fn value(&self, indices: &[[usize; 2]], x: &Vector2<f64>) -> Result<f64, Error> {

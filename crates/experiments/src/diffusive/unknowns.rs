@@ -6,70 +6,54 @@ use fewbits_core::{Belief, Gaussian};
 use fewbits_densities::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information_of};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLikelihood};
-use fewbits_monte_carlo::Moments;
 use nalgebra::{Matrix2, Vector2};
 use rand::RngExt;
 
-/// Settings of both tables.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Random layouts about the source for the comparison of rate models.
-    #[garde(range(min = 1, max = 10_000))]
-    trials: u64,
-    /// Nodes of a layout.
-    #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
-    nodes: Vec<usize>,
-    /// Radius of a layout, m.
-    #[garde(range(min = 1.0, max = 1000.0))]
-    radius: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            trials: 200,
-            nodes: vec![6, 20],
-            radius: 25.0,
-        }
+parameters! {
+    /// Settings of both tables.
+    #[derive(Debug, Clone)]
+    pub struct Parameters {
+        /// Random layouts about the source for the comparison of rate models.
+        #[garde(range(min = 1, max = 10_000))]
+        trials: u64 = 200 => quick 4,
+        /// Nodes of a layout.
+        #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
+        nodes: Vec<usize> = vec![6, 20],
+        /// Radius of a layout, m.
+        #[garde(range(min = 1.0, max = 1000.0))]
+        radius: f64 = 25.0,
     }
 }
 
-/// Both tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Cramer-Rao bounds with more and more unknowns.
-    bounds: Vec<Bound>,
-    /// Bias and width of the posterior of noise-free samples, by what is assumed of the rate.
-    models: Vec<Model>,
-}
+rows! {
+    pub struct Rows {
+        /// Cramer-Rao bounds with more and more unknowns.
+        bounds: Vec<Bound>,
+        /// Bias and width of the posterior of noise-free samples, by what is assumed of the rate.
+        models: Vec<Model>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Bound {
-    /// What is unknown besides the position.
-    unknown: &'static str,
-    /// Standard deviation of x at the bound.
-    #[schemars(extend("unit" = "m"))]
-    sd_x: f64,
-    /// Standard deviation of the rate at the bound.
-    #[schemars(extend("unit" = "kg/s"))]
-    sd_rate: Option<f64>,
-}
+    struct Bound {
+        /// What is unknown besides the position.
+        unknown: &'static str,
+        /// Standard deviation of x at the bound.
+        sd_x: f64 ["m"],
+        /// Standard deviation of the rate at the bound.
+        sd_rate: Option<f64> ["kg/s"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Model {
-    /// What is assumed of the rate.
-    model: &'static str,
-    /// Nodes.
-    nodes: usize,
-    /// Distance of posterior mean and source, although the samples are free of noise.
-    #[schemars(extend("unit" = "m"))]
-    bias: Measured,
-    /// Fourth root of the determinant of the covariance.
-    #[schemars(extend("unit" = "m"))]
-    width: Measured,
-    /// Bias in units of the width.
-    bias_in_widths: Measured,
+    struct Model {
+        /// What is assumed of the rate.
+        model: &'static str,
+        /// Nodes.
+        nodes: usize,
+        /// Distance of posterior mean and source, although the samples are free of noise.
+        bias: Measured ["m"],
+        /// Fourth root of the determinant of the covariance.
+        width: Measured ["m"],
+        /// Bias in units of the width.
+        bias_in_widths: Measured,
+    }
 }
 
 impl Model {
@@ -101,29 +85,13 @@ fn models() -> Result<[(&'static str, RateModel); 3], Error> {
 pub struct Unknowns;
 
 impl Figure for Unknowns {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "diffusive-unknowns",
-            title: "What else is unknown",
-            caption: "Left: the Cramer-Rao bound of x for six nodes on the way to the source of example B with more and more unknowns. Right: posterior \
-                      means of noise-free samples by what is assumed of the rate. Redrawing the rate for every sample, as the \
-                      paper's equations (13) and (18) do, pushes the source away and stays wrong however many nodes there are.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 4;
-    }
+    figure!(Parameters => Rows, "diffusive-unknowns", "What else is unknown", "",
+        "Left: the Cramer-Rao bound of x for six nodes on the way to the source of example B with more and more unknowns. Right: posterior \
+         means of noise-free samples by what is assumed of the rate. Redrawing the rate for every sample, as the \
+         paper's equations (13) and (18) do, pushes the source away and stays wrong however many nodes there are.");
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: p.trials as f64 * p.nodes.iter().sum::<usize>() as f64 * 0.02,
-            bytes: 1e6,
-        }
+        Cost::new(p.trials as f64 * p.nodes.iter().sum::<usize>() as f64 * 0.02, 1e6)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
@@ -140,7 +108,7 @@ impl Figure for Unknowns {
             ("+ bias", Some(Unknown::Bias)),
         ] {
             unknowns.extend(next);
-            let information = fisher_information_of(&unknowns, &sensor, &nodes, &source, 1.0).map_err(Error::failed)?;
+            let information = fisher_information_of(&unknowns, &sensor, &nodes, &source, 1.0)?;
             // Rows of very different units: factor with the diagonal scaled to one.
             let scale = information.diagonal().map(|d| d.sqrt().recip());
             let scaled = nalgebra::DMatrix::from_fn(unknowns.len(), unknowns.len(), |i, j| {
@@ -178,10 +146,9 @@ impl Figure for Unknowns {
                 kinds
                     .iter()
                     .map(|(_, model)| {
-                        let likelihood = SourceLikelihood::new(records.clone(), *model).map_err(Error::failed)?;
+                        let likelihood = SourceLikelihood::new(records.clone(), *model)?;
                         let posterior =
-                            Posterior::new(&prior, &likelihood, &search_box(), None, &CellOptions::default())
-                                .map_err(Error::failed)?;
+                            Posterior::new(&prior, &likelihood, &search_box(), None, &CellOptions::default())?;
                         let width = posterior.cells.covariance().determinant().powf(0.25);
                         Ok(((posterior.cells.mean() - source).norm(), width))
                     })
@@ -205,11 +172,9 @@ impl Figure for Unknowns {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims.increasing(
-            "more-unknowns",
-            "every further unknown widens the bound",
-            rows.bounds.iter().map(|b| b.sd_x),
-        );
+        let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
+        let what = "every further unknown widens the bound";
+        claims.increasing("more-unknowns", what, rows.bounds.iter().map(|b| b.sd_x));
         let bound = |unknown: &str| rows.bounds.iter().find(|b| b.unknown == unknown).map(|b| b.sd_x);
         for (unknown, expected) in [
             ("nothing", 0.047_177_569),
@@ -221,63 +186,34 @@ impl Figure for Unknowns {
             let what = format!(
                 "the bound of x by another program (differences, Gauss-Jordan): {unknown} unknown besides the position"
             );
-            claims
-                .near(format!("bound/{unknown}").replace(' ', ""), what, bound(unknown), expected, 1e-5)
-                .at_defaults();
+            here.near(format!("bound/{unknown}").replace(' ', ""), what, bound(unknown), expected, 1e-5);
         }
         let bias = |key: &str| rows.models.iter().find(|m| m.key() == key);
         let what = "a rate for each sample is metres off without any noise (errata diffusive-2)";
-        claims
-            .above("sample-wise-is-biased", what, bias("sample-wise 20").map(|m| m.bias.value), 1.0)
-            .at_defaults()
-            .at_full_trials();
+        paper.above("sample-wise-is-biased", what, bias("sample-wise 20").map(|m| m.bias.value), 1.0);
         let what = "and many widths off: it is inconsistent";
-        claims
-            .above("sample-wise-is-inconsistent", what, bias("sample-wise 20").map(|m| m.bias_in_widths.value), 2.0)
-            .at_defaults()
-            .at_full_trials();
+        paper.above("sample-wise-is-inconsistent", what, bias("sample-wise 20").map(|m| m.bias_in_widths.value), 2.0);
         let what = "one joint rate is right";
-        claims
-            .below("joint-is-right", what, bias("joint 20").map(|m| m.bias.value), 0.01)
-            .at_defaults()
-            .at_full_trials();
+        paper.below("joint-is-right", what, bias("joint 20").map(|m| m.bias.value), 0.01);
         let order = ["sample-wise 20", "node-wise 20", "joint 20"].map(|key| bias(key).map(|m| m.width.value));
-        claims
-            .decreasing("sharper", "what is assumed shared sharpens the posterior", order)
-            .at_defaults()
-            .at_full_trials();
+        paper.decreasing("sharper", "what is assumed shared sharpens the posterior", order);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let names = rows
-            .bounds
-            .iter()
-            .enumerate()
-            .map(|(i, b)| (i as f64, b.unknown.to_owned()));
-        let bound = Panel::new(
-            "Bound of x",
-            Axis::linear("unknown besides the position").named(names),
-            Axis::linear("standard deviation (m)"),
-        )
-        .with(Layer::bars(
+        let bars = rows.bounds.iter().enumerate().map(|(i, b)| (i as f64, b.sd_x));
+        let unknown = Axis::categories("unknown besides the position", rows.bounds.iter().map(|b| b.unknown));
+        let bound = Panel::new("Bound of x", unknown, Axis::linear("standard deviation (m)")).with(Layer::bars(
             "",
-            rows.bounds
-                .iter()
-                .enumerate()
-                .map(|(i, b)| (i as f64, b.sd_x))
-                .collect(),
+            bars.collect(),
             0.6,
         ));
-        let mut bias =
-            Panel::new("Noise-free samples", Axis::linear("nodes"), Axis::log("median distance to the source (m)"));
+        let mut bias = Panel::semilog("Noise-free samples", "nodes", "median distance to the source (m)");
         for (c, model) in ["sample-wise", "node-wise", "joint"].into_iter().enumerate() {
-            let of = || rows.models.iter().filter(|m| m.model == model);
+            let of = || select(&rows.models, |m| m.model == model);
+            let width = points(of(), |m| (m.nodes as f64, m.width.value));
             bias = bias
-                .with(Layer::points(model, of().map(|m| (m.nodes as f64, m.bias.value)).collect()).coloured(c))
-                .with(
-                    Layer::dashed(format!("{model}: width"), of().map(|m| (m.nodes as f64, m.width.value)).collect())
-                        .coloured(c),
-                );
+                .with(Layer::points(model, points(of(), |m| (m.nodes as f64, m.bias.value))).coloured(c))
+                .with(Layer::dashed(format!("{model}: width"), width).coloured(c));
         }
         Plot::grid(2, vec![bound, bias])
     }

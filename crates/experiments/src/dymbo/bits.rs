@@ -5,91 +5,68 @@ use crate::prelude::*;
 use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain, iterated};
 use rayon::prelude::*;
 
-/// Plants and word lengths.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plants, `a:gamma`.
-    #[garde(length(min = 1), dive)]
-    plants: Vec<Plant>,
-    /// Bits a sample.
-    #[garde(length(min = 1), inner(range(min = 1, max = 8)))]
-    bits: Vec<usize>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            plants: plants([(0.9, 0.5), (0.9, 0.05)]),
-            bits: (1..=8).collect(),
-        }
+parameters! {
+    pub struct Parameters {
+        /// Plants, `a:gamma`.
+        #[garde(length(min = 1), dive)]
+        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05)]),
+        /// Bits a sample.
+        #[garde(length(min = 1), inner(range(min = 1, max = 8)))]
+        bits: Vec<usize> = (1..=8).collect(),
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Errors of the filters.
-    words: Vec<Row>,
-    /// Several bits about one sample.
-    successive: Vec<Successive>,
-}
+rows! {
+    pub struct Rows {
+        /// Errors of the filters.
+        words: Vec<Row>,
+        /// Several bits about one sample.
+        successive: Vec<Successive>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Word length.
-    bits: usize,
-    /// Information of a word against the sample.
-    c: f64,
-    /// Predicted steady variance.
-    #[schemars(extend("unit" = "sigma^2"))]
-    riccati: f64,
-    /// Exact steady mean squared error.
-    #[schemars(extend("unit" = "sigma^2"))]
-    exact_mse: f64,
-    /// Exact error over the Kalman filter's.
-    loss: f64,
-    /// Predicted variance over the Kalman filter's.
-    riccati_loss: f64,
-}
+    struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Word length.
+        bits: usize,
+        /// Information of a word against the sample.
+        c: f64,
+        /// Predicted steady variance.
+        riccati: f64 ["sigma^2"],
+        /// Exact steady mean squared error.
+        exact_mse: f64 ["sigma^2"],
+        /// Exact error over the Kalman filter's.
+        loss: f64,
+        /// Predicted variance over the Kalman filter's.
+        riccati_loss: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Successive {
-    /// Bits about the same sample.
-    bits: usize,
-    /// 1 - c of the Lloyd-Max word.
-    batch: f64,
-    /// 1 - c with thresholds at exact means.
-    exact_tree: f64,
-    /// 1 - c promised by assuming normal densities, (1 - 2/pi)^m.
-    claimed: f64,
-    /// 1 - c true of its levels.
-    own_levels: f64,
-    /// 1 - c true of its cells.
-    centroids: f64,
-    /// Words that no sample causes.
-    empty_words: usize,
+    struct Successive {
+        /// Bits about the same sample.
+        bits: usize,
+        /// 1 - c of the Lloyd-Max word.
+        batch: f64,
+        /// 1 - c with thresholds at exact means.
+        exact_tree: f64,
+        /// 1 - c promised by assuming normal densities, (1 - 2/pi)^m.
+        claimed: f64,
+        /// 1 - c true of its levels.
+        own_levels: f64,
+        /// 1 - c true of its cells.
+        centroids: f64,
+        /// Words that no sample causes.
+        empty_words: usize,
+    }
 }
 
 /// Loss against word length.
 pub struct WordLength;
 
 impl Figure for WordLength {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "dymbo-bits",
-            title: "Bits a sample",
-            caption: "Loss against the Kalman filter when each sample sends a word of the innovation's Lloyd-Max quantizer: predicted \
-                      (lines) and exact (points). Two bits leave 15 % and three 4 %. Right: what is lost of one sample, 1 - c, by \
-                      batch words and by successive bits; the usual formula for the latter promises too much.",
-            source: "",
-        }
-    }
+    figure!(Parameters => Rows, "dymbo-bits", "Bits a sample", "",
+        "Loss against the Kalman filter when each sample sends a word of the innovation's Lloyd-Max quantizer: predicted \
+         (lines) and exact (points). Two bits leave 15 % and three 4 %. Right: what is lost of one sample, 1 - c, by \
+         batch words and by successive bits; the usual formula for the latter promises too much.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let cases: Vec<_> = p
@@ -132,13 +109,12 @@ impl Figure for WordLength {
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         for curve in rows.words.chunks(p.bits.len()) {
             let plant = curve[0].plant;
             let what = format!("{}: every bit helps", plant.title());
             let losses = curve.iter().map(|r| r.loss);
-            claims
-                .decreasing(format!("falls-{}-{}", plant.a, plant.gamma), what, losses)
-                .at_defaults();
+            here.decreasing(format!("falls-{}-{}", plant.a, plant.gamma), what, losses);
         }
         let key = |r: &Row| format!("{} {}", r.plant, r.bits);
         let first = rows.words.iter().filter(|r| Some(&r.plant) == p.plants.first());
@@ -147,9 +123,7 @@ impl Figure for WordLength {
         claims.references("mse", "exact error at a, gamma, bits", &rows.words, |r| (key(r), r.exact_mse));
         let longer = rows.words.iter().filter(|r| r.bits > 1);
         let what = "from two bits on the prediction is exact to 0.03 %";
-        claims
-            .all("riccati", what, longer, |r| (r.exact_mse / r.riccati - 1.0).abs() <= 3e-4)
-            .at_defaults();
+        here.all("riccati", what, longer, |r| (r.exact_mse / r.riccati - 1.0).abs() <= 3e-4);
         let rows = &rows.successive;
         type Of = fn(&Successive) -> f64;
         let columns: [(&str, Of); 4] = [
@@ -184,16 +158,8 @@ impl Figure for WordLength {
             .with(Layer::line("Lloyd-Max word", curve(|r| r.batch)).coloured(2))
             .with(Layer::points("successive, exact means", curve(|r| r.exact_tree)).coloured(3))
             .with(Layer::dashed("successive, as claimed", curve(|r| r.claimed)).coloured(4))
-            .with(
-                Layer::points("successive, its own levels", curve(|r| r.own_levels))
-                    .coloured(4)
-                    .marked(Marker::Cross),
-            )
-            .with(
-                Layer::points("successive, centroids", curve(|r| r.centroids))
-                    .coloured(5)
-                    .marked(Marker::Triangle),
-            );
+            .with(Layer::points("successive, its own levels", curve(|r| r.own_levels)).styled(4, Marker::Cross))
+            .with(Layer::points("successive, centroids", curve(|r| r.centroids)).styled(5, Marker::Triangle));
         Plot::grid(2, vec![left, right])
     }
 }

@@ -8,78 +8,50 @@ use fewbits_dymbo::{DymboFilter, ScalarFilter, chain};
 
 const ID: &str = "dymbo-bsc";
 
-/// Plant, crossover probabilities, and the effort of the comparison with the exact posterior.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plant coefficient.
-    #[garde(range(min = -0.999_999, max = 0.999_999))]
-    a: f64,
-    /// Process variances over measurement variance.
-    #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-    gamma: Vec<f64>,
-    /// Probabilities that a bit is inverted.
-    #[garde(length(min = 1), inner(range(min = 0.0, max = 0.499)))]
-    crossover: Vec<f64>,
-    /// Runs of the comparison with the exact posterior.
-    #[garde(range(min = 2, max = 10_000_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            a: 0.9,
-            gamma: vec![0.5, 0.05],
-            crossover: vec![0.0, 0.01, 0.05, 0.1, 0.2, 0.3],
-            trials: 400,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Plant coefficient.
+        #[garde(range(min = -0.999_999, max = 0.999_999))]
+        a: f64 = 0.9,
+        /// Process variances over measurement variance.
+        #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
+        gamma: Vec<f64> = vec![0.5, 0.05],
+        /// Probabilities that a bit is inverted.
+        #[garde(length(min = 1), inner(range(min = 0.0, max = 0.499)))]
+        crossover: Vec<f64> = vec![0.0, 0.01, 0.05, 0.1, 0.2, 0.3],
+        /// Runs of the comparison with the exact posterior.
+        #[garde(range(min = 2, max = 10_000_000))]
+        trials: u64 = 400 => quick 40,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Probability that a bit is inverted.
-    crossover: f64,
-    /// Steady variance computed by the filter that knows.
-    #[schemars(extend("unit" = "sigma^2"))]
-    riccati: f64,
-    /// Its exact mean squared error.
-    #[schemars(extend("unit" = "sigma^2"))]
-    aware_mse: f64,
-    /// Exact mean squared error of the filter that does not know.
-    #[schemars(extend("unit" = "sigma^2"))]
-    naive_mse: f64,
-    /// Runs of the comparison with the exact posterior.
-    trials: u64,
-    /// Mean squared distance of the aware estimate from the exact posterior mean.
-    #[schemars(extend("unit" = "sigma^2"))]
-    excess: Measured,
+rows! {
+    pub struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Probability that a bit is inverted.
+        crossover: f64,
+        /// Steady variance computed by the filter that knows.
+        riccati: f64 ["sigma^2"],
+        /// Its exact mean squared error.
+        aware_mse: f64 ["sigma^2"],
+        /// Exact mean squared error of the filter that does not know.
+        naive_mse: f64 ["sigma^2"],
+        /// Runs of the comparison with the exact posterior.
+        trials: u64,
+        /// Mean squared distance of the aware estimate from the exact posterior mean.
+        excess: Measured ["sigma^2"],
+    }
 }
 
 /// Errors against the crossover.
 pub struct NoisyBits;
 
 impl Figure for NoisyBits {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: ID,
-            title: "Noisy bits",
-            caption: "Exact steady error when the link inverts each bit with a probability, of the filter that knows it (solid; its \
-                      prediction dashed) and of one that does not (points). Below one inverted bit in a hundred, knowing does not \
-                      pay; at three in ten it saves a tenth.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 40;
-    }
+    figure!(Parameters => Vec<Row>, ID, "Noisy bits", "",
+        "Exact steady error when the link inverts each bit with a probability, of the filter that knows it (solid; its \
+         prediction dashed) and of one that does not (points). Below one inverted bit in a hundred, knowing does not \
+         pay; at three in ten it saves a tenth.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
@@ -104,6 +76,7 @@ impl Figure for NoisyBits {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         let key = |r: &Row| format!("{} {}", r.plant, r.crossover);
         let what = "exact error of the filter that knows, at a, gamma, crossover";
         claims.references("aware", what, rows, |r| (key(r), r.aware_mse));
@@ -113,19 +86,14 @@ impl Figure for NoisyBits {
         claims.references("cost", what, rows, |r| (key(r), r.naive_mse / r.aware_mse - 1.0));
         let rare = rows.iter().filter(|r| r.crossover == 0.01);
         let what = "at one inverted bit in a hundred knowing changes less than 0.01 %";
-        claims
-            .all("rare", what, rare, |r| (r.naive_mse / r.aware_mse - 1.0).abs() <= 1e-4)
-            .at_defaults();
+        here.all("rare", what, rare, |r| (r.naive_mse / r.aware_mse - 1.0).abs() <= 1e-4);
         let fast = rows.iter().filter(|r| r.plant.gamma == 0.5);
         let under = fast.map(|r| r.aware_mse / r.riccati - 1.0).fold(0.0, f64::max);
         let what = "gamma = 0.5: the prediction is too low by up to 1.6 %";
-        claims.near("under-predicts", what, under, 0.0155, 0.001).at_defaults();
+        here.near("under-predicts", what, under, 0.0155, 0.001);
         let noisy = rows.iter().filter(|r| r.crossover >= 0.1);
         let what = "from crossover 0.1 on the exact posterior would gain at most 0.012 %";
-        claims
-            .all("gap", what, noisy, |r| r.excess.value <= 1.2e-4 * r.aware_mse)
-            .at_defaults()
-            .at_full_trials();
+        paper.all("gap", what, noisy, |r| r.excess.value <= 1.2e-4 * r.aware_mse);
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {

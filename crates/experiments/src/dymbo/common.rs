@@ -35,7 +35,7 @@ impl Plant {
     /// The belief about a plant that has run for ever.
     pub(super) fn stationary(&self) -> Result<Gaussian<1>, Error> {
         let variance = self.model()?.dynamics().stationary_variance();
-        Ok(Gaussian::scalar(0.0, variance.map_err(Error::failed)?)?)
+        Ok(Gaussian::scalar(0.0, variance?)?)
     }
 
     /// Title of a panel.

@@ -4,65 +4,48 @@ use super::common::{Plant, each};
 use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing, Sign};
 use fewbits_dymbo::{DymboFilter, ScalarFilter, ScalarPlant, steady};
-use fewbits_monte_carlo::{Moments, Stream};
 use rand::RngExt;
 
 const ID: &str = "dymbo-erasure";
 
-/// Plant, loss probabilities, and the effort.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plant coefficient; the state starts from its stationary law.
-    #[garde(range(min = -0.999_999, max = 0.999_999))]
-    a: f64,
-    /// Process variances over measurement variance.
-    #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e3)))]
-    gamma: Vec<f64>,
-    /// Probabilities that a bit is lost.
-    #[garde(length(min = 1), inner(range(min = 0.0, max = 0.999_999)))]
-    loss: Vec<f64>,
-    /// Steps of a run that are measured.
-    #[garde(range(min = 1, max = 10_000))]
-    steps: u64,
-    /// Steps before them.
-    #[garde(range(max = 10_000))]
-    burn: u64,
-    /// Simulated runs.
-    #[garde(range(min = 2, max = 100_000_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            a: 0.9,
-            gamma: vec![0.5, 0.05],
-            loss: vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7],
-            steps: 1000,
-            burn: 100,
-            trials: 2_000,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Plant coefficient; the state starts from its stationary law.
+        #[garde(range(min = -0.999_999, max = 0.999_999))]
+        a: f64 = 0.9,
+        /// Process variances over measurement variance.
+        #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e3)))]
+        gamma: Vec<f64> = vec![0.5, 0.05],
+        /// Probabilities that a bit is lost.
+        #[garde(length(min = 1), inner(range(min = 0.0, max = 0.999_999)))]
+        loss: Vec<f64> = vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7],
+        /// Steps of a run that are measured.
+        #[garde(range(min = 1, max = 10_000))]
+        steps: u64 = 1000,
+        /// Steps before them.
+        #[garde(range(max = 10_000))]
+        burn: u64 = 100,
+        /// Simulated runs.
+        #[garde(range(min = 2, max = 100_000_000))]
+        trials: u64 = 2_000 => quick 100,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Probability that a bit is lost.
-    loss: f64,
-    /// Simulated runs.
-    trials: u64,
-    /// Mean of the computed variance.
-    #[schemars(extend("unit" = "sigma^2"))]
-    mean_variance: Measured,
-    /// Mean squared error.
-    #[schemars(extend("unit" = "sigma^2"))]
-    mse: Measured,
-    /// Upper bound on the mean variance.
-    #[schemars(extend("unit" = "sigma^2"))]
-    bound: f64,
+rows! {
+    pub struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Probability that a bit is lost.
+        loss: f64,
+        /// Simulated runs.
+        trials: u64,
+        /// Mean of the computed variance.
+        mean_variance: Measured ["sigma^2"],
+        /// Mean squared error.
+        mse: Measured ["sigma^2"],
+        /// Upper bound on the mean variance.
+        bound: f64 ["sigma^2"],
+    }
 }
 
 /// Time averages of one run: computed variance and squared error.
@@ -100,22 +83,9 @@ fn one_run(
 pub struct LostBits;
 
 impl Figure for LostBits {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: ID,
-            title: "Lost bits",
-            caption: "Mean computed variance and mean squared error when each bit is lost with a probability that both ends notice \
-                      (points), below the bound that averages the information, (1 - p) 2/pi, in closed form (line).",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 100;
-    }
+    figure!(Parameters => Vec<Row>, ID, "Lost bits", "",
+        "Mean computed variance and mean squared error when each bit is lost with a probability that both ends notice \
+         (points), below the bound that averages the information, (1 - p) 2/pi, in closed form (line).");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut cases = Vec::new();
@@ -144,6 +114,7 @@ impl Figure for LostBits {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let noise = |m: Measured| 4.5 * m.standard_error.unwrap_or(0.0);
         let what = "the mean variance stays below the bound (Jensen), within 4.5 standard errors";
         claims.all("bounded", what, rows, |r| r.mean_variance.value <= r.bound + noise(r.mean_variance) + 1e-12);
@@ -152,15 +123,11 @@ impl Figure for LostBits {
         claims.references("bound", "the bound at a, gamma, loss", rows, |r| (key(r), r.bound));
         let printed = || rows.iter().filter(|r| [0.1, 0.3, 0.5].contains(&r.loss));
         let what = "the bound is tight to 0.35 %";
-        claims
-            .all("tight", what, printed(), |r| r.bound <= 1.0035 * r.mean_variance.value + noise(r.mean_variance))
-            .at_defaults();
+        here.all("tight", what, printed(), |r| r.bound <= 1.0035 * r.mean_variance.value + noise(r.mean_variance));
         let what = "the error is the computed variance within 0.5 %";
-        claims
-            .all("consistent", what, printed(), |r| {
-                (r.mse.value - r.mean_variance.value).abs() <= 0.005 * r.mean_variance.value + noise(r.mse)
-            })
-            .at_defaults();
+        here.all("consistent", what, printed(), |r| {
+            (r.mse.value - r.mean_variance.value).abs() <= 0.005 * r.mean_variance.value + noise(r.mse)
+        });
         for r in rows.iter().filter(|r| r.loss == 0.0) {
             let what = format!("gamma = {}: without loss it is the steady variance", r.plant.gamma);
             let ratio = r

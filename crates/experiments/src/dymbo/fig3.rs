@@ -3,55 +3,35 @@
 use super::common::{Plant, log_spaced};
 use crate::prelude::*;
 
-/// Coefficients and noise ratios.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plant coefficients.
-    #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]
-    a: Vec<f64>,
-    /// Process variances over measurement variance.
-    #[garde(length(min = 1), inner(range(min = 1e-12, max = 1e12)))]
-    gamma: Vec<f64>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            a: vec![0.5, 0.9, 0.99],
-            gamma: log_spaced(-3.0, 1.0, 81),
-        }
+parameters! {
+    pub struct Parameters {
+        /// Plant coefficients.
+        #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]
+        a: Vec<f64> = vec![0.5, 0.9, 0.99],
+        /// Process variances over measurement variance.
+        #[garde(length(min = 1), inner(range(min = 1e-12, max = 1e12)))]
+        gamma: Vec<f64> = log_spaced(-3.0, 1.0, 81),
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Steady filtered variance of the Kalman filter.
-    #[schemars(extend("unit" = "sigma^2"))]
-    kf_reduction: f64,
-    /// Steady filtered variance of the sign-bit filter.
-    #[schemars(extend("unit" = "sigma^2"))]
-    dymbo_reduction: f64,
+rows! {
+    pub struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Steady filtered variance of the Kalman filter.
+        kf_reduction: f64 ["sigma^2"],
+        /// Steady filtered variance of the sign-bit filter.
+        dymbo_reduction: f64 ["sigma^2"],
+    }
 }
 
 pub struct KalmanVariance;
 
 impl Figure for KalmanVariance {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "dymbo-fig3",
-            title: "Steady variance against the noise ratio",
-            caption: "Steady filtered variance over the measurement variance, of the Kalman filter (solid) and of the sign-bit filter \
-                      (dashed). A slow plant (small gamma) is averaged over many samples; a fast one leaves the last sample \
-                      alone, and then one bit falls behind.",
-            source: "Ribeiro and Giannakis, Fig. 3",
-        }
-    }
+    figure!(Parameters => Vec<Row>, "dymbo-fig3", "Steady variance against the noise ratio", "Ribeiro and Giannakis, Fig. 3",
+        "Steady filtered variance over the measurement variance, of the Kalman filter (solid) and of the sign-bit filter \
+         (dashed). A slow plant (small gamma) is averaged over many samples; a fast one leaves the last sample \
+         alone, and then one bit falls behind.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let plants = p.a.iter().flat_map(|a| super::common::each(*a, &p.gamma));
@@ -66,19 +46,16 @@ impl Figure for KalmanVariance {
     }
 
     fn claims(&self, p: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         type Of = fn(&Row) -> f64;
         let schemes: [(&str, Of); 2] = [("kf", |r| r.kf_reduction), ("dymbo", |r| r.dymbo_reduction)];
         for (scheme, of) in schemes {
             let neighbours = rows.windows(2).filter(|w| w[0].plant.a == w[1].plant.a);
             let what = format!("the {scheme} variance increases strictly with gamma");
-            claims
-                .all(format!("{scheme}-rises-with-gamma"), what, neighbours, |w| of(&w[0]) < of(&w[1]))
-                .at_defaults();
+            here.all(format!("{scheme}-rises-with-gamma"), what, neighbours, |w| of(&w[0]) < of(&w[1]));
             let neighbours = rows.iter().zip(rows.iter().skip(p.gamma.len()));
             let what = format!("the {scheme} variance increases strictly with |a|");
-            claims
-                .all(format!("{scheme}-rises-with-a"), what, neighbours, |(low, high)| of(low) < of(high))
-                .at_defaults();
+            here.all(format!("{scheme}-rises-with-a"), what, neighbours, |(low, high)| of(low) < of(high));
         }
         let what = "the Kalman variance stays below that of one measurement";
         claims.all("kf-below-one", what, rows, |r| r.kf_reduction < 1.0);
@@ -104,8 +81,8 @@ impl Figure for KalmanVariance {
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
-        let (x, y) = (Axis::log("gamma = process / measurement variance"), Axis::log("filtered variance / sigma^2"));
-        let mut panel = Panel::new("Steady variance", x, y);
+        let mut panel =
+            Panel::loglog("Steady variance", "gamma = process / measurement variance", "filtered variance / sigma^2");
         for (i, (a, curve)) in p.a.iter().zip(rows.chunks(p.gamma.len())).enumerate() {
             let kalman = points(curve, |r| (r.plant.gamma, r.kf_reduction));
             let sign_bit = points(curve, |r| (r.plant.gamma, r.dymbo_reduction));

@@ -6,65 +6,54 @@ use fewbits_dymbo::{chain, filtered_variance, steady};
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_2_PI, PI};
 
-/// The grid and the contour levels.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plant coefficients.
-    #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]
-    a: Vec<f64>,
-    /// Process variances over measurement variance.
-    #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e3)))]
-    gamma: Vec<f64>,
-    /// Losses of the contours.
-    #[garde(length(min = 1), inner(range(min = 1.000_001, max = 1e6)))]
-    level: Vec<f64>,
-    /// Coefficients at which the exact loss is computed as well.
-    #[garde(inner(range(min = -1.0, max = 1.0)))]
-    exact_a: Vec<f64>,
+fn hundredths(i: i32) -> f64 {
+    f64::from(i) / 100.0
 }
 
-impl Default for Parameters {
-    fn default() -> Self {
-        let hundredths = |i: i32| f64::from(i) / 100.0;
-        Self {
-            a: (0..=100).map(hundredths).collect(),
-            gamma: log_spaced(-3.0, 1.0, 81),
-            level: vec![1.05, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0],
-            exact_a: (0..=19).map(|i| hundredths(5 * i)).chain([0.99, 1.0]).collect(),
-        }
+parameters! {
+    pub struct Parameters {
+        /// Plant coefficients.
+        #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]
+        a: Vec<f64> = (0..=100).map(hundredths).collect(),
+        /// Process variances over measurement variance.
+        #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e3)))]
+        gamma: Vec<f64> = log_spaced(-3.0, 1.0, 81),
+        /// Losses of the contours.
+        #[garde(length(min = 1), inner(range(min = 1.000_001, max = 1e6)))]
+        level: Vec<f64> = vec![1.05, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0],
+        /// Coefficients at which the exact loss is computed as well.
+        #[garde(inner(range(min = -1.0, max = 1.0)))]
+        exact_a: Vec<f64> = (0..=19).map(|i| hundredths(5 * i)).chain([0.99, 1.0]).collect() => quick vec![0.0, 0.5, 0.9, 1.0],
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The plane of plants.
-    plane: Vec<Row>,
-    /// Where the loss reaches each level.
-    contours: Vec<Contour>,
-}
+rows! {
+    pub struct Rows {
+        /// The plane of plants.
+        plane: Vec<Row>,
+        /// Where the loss reaches each level.
+        contours: Vec<Contour>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Steady variance over the Kalman filter's, closed form.
-    loss_riccati: f64,
-    /// The same with the exact mean squared error.
-    loss_true: Option<f64>,
-}
+    struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Steady variance over the Kalman filter's, closed form.
+        loss_riccati: f64,
+        /// The same with the exact mean squared error.
+        loss_true: Option<f64>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Contour {
-    /// Riccati or exact.
-    kind: &'static str,
-    /// Loss.
-    level: f64,
-    /// Plant coefficient.
-    a: f64,
-    /// Noise ratio at which the loss reaches the level.
-    gamma: f64,
+    struct Contour {
+        /// Riccati or exact.
+        kind: &'static str,
+        /// Loss.
+        level: f64,
+        /// Plant coefficient.
+        a: f64,
+        /// Noise ratio at which the loss reaches the level.
+        gamma: f64,
+    }
 }
 
 /// Noise ratios in the picture.
@@ -78,23 +67,10 @@ fn loss(a: f64, gamma: f64) -> Option<f64> {
 pub struct Loss;
 
 impl Figure for Loss {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "dymbo-fig4",
-            title: "Loss against the Kalman filter",
-            caption: "Contours of the steady variance of the sign-bit filter over that of the Kalman filter. One bit costs nearly \
-                      nothing for slow plants. The paper's `below 2 whenever gamma < 1` fails in the corner near |a| = 1; the \
-                      exact loss (dashed) is a little larger than the Riccati prediction.",
-            source: "Ribeiro and Giannakis, Fig. 4",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.exact_a = vec![0.0, 0.5, 0.9, 1.0];
-    }
+    figure!(Parameters => Rows, "dymbo-fig4", "Loss against the Kalman filter", "Ribeiro and Giannakis, Fig. 4",
+        "Contours of the steady variance of the sign-bit filter over that of the Kalman filter. One bit costs nearly \
+         nothing for slow plants. The paper's `below 2 whenever gamma < 1` fails in the corner near |a| = 1; the \
+         exact loss (dashed) is a little larger than the Riccati prediction.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let plants: Vec<Plant> = p.a.iter().flat_map(|a| each(*a, &p.gamma)).collect();
@@ -128,6 +104,7 @@ impl Figure for Loss {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         claims.all("at-least-one", "the loss is never below 1", &rows.plane, |r| r.loss_riccati >= 1.0);
         shapes(claims);
         limits(claims);
@@ -148,13 +125,9 @@ impl Figure for Loss {
         claims.near("exact-double-gamma-1", "exact loss 2 at gamma = 1", root, 0.971111, 1e-6);
         let exact = || rows.plane.iter().filter_map(|r| Some(r.loss_true? / r.loss_riccati));
         let what = "the exact loss is nowhere below the Riccati loss";
-        claims
-            .all("exact-above", what, exact(), |ratio| ratio >= 1.0 - 1e-10)
-            .at_defaults();
+        here.all("exact-above", what, exact(), |ratio| ratio >= 1.0 - 1e-10);
         let what = "the Riccati loss is right to 6 % on the whole grid";
-        claims
-            .all("exact-close", what, exact(), |ratio| ratio <= 1.06)
-            .at_defaults();
+        here.all("exact-close", what, exact(), |ratio| ratio <= 1.06);
         let named = super::common::plants([(0.9, 0.5), (0.9, 1.0), (1.0, 1.0)]);
         let exact = |plant: Plant| plant.model().ok().and_then(|model| chain::true_loss(&model).ok());
         claims.references("exact", "exact loss at a, gamma", named, |plant| (plant.to_string(), exact(plant)));

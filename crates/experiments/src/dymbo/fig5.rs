@@ -8,109 +8,82 @@ use fewbits_dymbo::{
     DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant, filtered_variance, first_message_value,
 };
 use fewbits_filters::kalman;
-use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::Vector1;
 use std::f64::consts::FRAC_2_PI;
 
 const ID: &str = "dymbo-fig5";
 
-/// The plants, the resolution of the first message, and the effort.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plant coefficient; the state starts from its stationary law.
-    #[garde(range(min = -0.999_999, max = 0.999_999))]
-    a: f64,
-    /// Process variances over measurement variance.
-    #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-    gamma: Vec<f64>,
-    /// Resolution of the first message in noise deviations.
-    #[garde(range(min = 1e-3, max = 100.0))]
-    tau: f64,
-    /// Steps after the first message.
-    #[garde(range(min = 1, max = 10_000))]
-    steps: usize,
-    /// Simulated runs.
-    #[garde(range(min = 2, max = 100_000_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            a: 0.9,
-            gamma: vec![0.5, 0.05],
-            tau: 1.0,
-            steps: 50,
-            trials: 100_000,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Plant coefficient; the state starts from its stationary law.
+        #[garde(range(min = -0.999_999, max = 0.999_999))]
+        a: f64 = 0.9,
+        /// Process variances over measurement variance.
+        #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
+        gamma: Vec<f64> = vec![0.5, 0.05],
+        /// Resolution of the first message in noise deviations.
+        #[garde(range(min = 1e-3, max = 100.0))]
+        tau: f64 = 1.0,
+        /// Steps after the first message.
+        #[garde(range(min = 1, max = 10_000))]
+        steps: usize = 50,
+        /// Simulated runs.
+        #[garde(range(min = 2, max = 100_000_000))]
+        trials: u64 = 100_000 => quick 5_000,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Errors and variances.
-    errors: Vec<Row>,
-    /// One run.
-    path: Vec<Point>,
-}
+rows! {
+    pub struct Rows {
+        /// Errors and variances.
+        errors: Vec<Row>,
+        /// One run.
+        path: Vec<Point>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Step.
-    n: usize,
-    /// Simulated runs.
-    trials: u64,
-    /// Variance computed by the Kalman filter, which is exact.
-    #[schemars(extend("unit" = "sigma^2"))]
-    kf_pred: f64,
-    /// Mean squared error of the Kalman filter.
-    #[schemars(extend("unit" = "sigma^2"))]
-    kf_mse: Measured,
-    /// Variance computed by the sign-bit filter.
-    #[schemars(extend("unit" = "sigma^2"))]
-    dymbo_pred: f64,
-    /// Mean squared error of the sign-bit filter.
-    #[schemars(extend("unit" = "sigma^2"))]
-    dymbo_mse: Measured,
-    /// Exact mean squared error, by the error chain.
-    #[schemars(extend("unit" = "sigma^2"))]
-    dymbo_exact: f64,
-    /// Steady variance of the sign-bit filter.
-    #[schemars(extend("unit" = "sigma^2"))]
-    dymbo_minf: f64,
-    /// Steady variance of the Kalman filter.
-    #[schemars(extend("unit" = "sigma^2"))]
-    kf_minf: f64,
-    /// Squared error over computed variance, sign-bit filter.
-    nees: Measured,
-    /// Mean squared error when the stationary prior is used at n = 0.
-    #[schemars(extend("unit" = "sigma^2"))]
-    informed_mse: Measured,
-    /// Its squared error over computed variance.
-    informed_nees: Measured,
-}
+    struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Step.
+        n: usize,
+        /// Simulated runs.
+        trials: u64,
+        /// Variance computed by the Kalman filter, which is exact.
+        kf_pred: f64 ["sigma^2"],
+        /// Mean squared error of the Kalman filter.
+        kf_mse: Measured ["sigma^2"],
+        /// Variance computed by the sign-bit filter.
+        dymbo_pred: f64 ["sigma^2"],
+        /// Mean squared error of the sign-bit filter.
+        dymbo_mse: Measured ["sigma^2"],
+        /// Exact mean squared error, by the error chain.
+        dymbo_exact: f64 ["sigma^2"],
+        /// Steady variance of the sign-bit filter.
+        dymbo_minf: f64 ["sigma^2"],
+        /// Steady variance of the Kalman filter.
+        kf_minf: f64 ["sigma^2"],
+        /// Squared error over computed variance, sign-bit filter.
+        nees: Measured,
+        /// Mean squared error when the stationary prior is used at n = 0.
+        informed_mse: Measured ["sigma^2"],
+        /// Its squared error over computed variance.
+        informed_nees: Measured,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Point {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Step.
-    n: usize,
-    /// State.
-    #[schemars(extend("unit" = "sigma"))]
-    theta: f64,
-    /// Estimate of the Kalman filter.
-    #[schemars(extend("unit" = "sigma"))]
-    kf: f64,
-    /// Estimate of the sign-bit filter.
-    #[schemars(extend("unit" = "sigma"))]
-    dymbo: f64,
-    /// Bit received; none at the first message.
-    bit: Option<f64>,
+    struct Point {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Step.
+        n: usize,
+        /// State.
+        theta: f64 ["sigma"],
+        /// Estimate of the Kalman filter.
+        kf: f64 ["sigma"],
+        /// Estimate of the sign-bit filter.
+        dymbo: f64 ["sigma"],
+        /// Bit received; none at the first message.
+        bit: Option<f64>,
+    }
 }
 
 /// Truth and the three estimates at one step.
@@ -171,24 +144,11 @@ fn simulate(
 pub struct Convergence;
 
 impl Figure for Convergence {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: ID,
-            title: "Convergence after a fine first message",
-            caption: "Mean squared error of the Kalman filter and of the sign-bit filter, simulated (points, one standard error) and \
-                      exact (lines); the third curve starts from first message and stationary prior together. The level differs \
-                      by the loss, the convergence by a step or two (E12); for the slow plant the first message without the \
-                      prior is worse than the prior alone (E13).",
-            source: "Ribeiro and Giannakis, Fig. 5",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 5_000;
-    }
+    figure!(Parameters => Rows, ID, "Convergence after a fine first message", "Ribeiro and Giannakis, Fig. 5",
+        "Mean squared error of the Kalman filter and of the sign-bit filter, simulated (points, one standard error) and \
+         exact (lines); the third curve starts from first message and stationary prior together. The level differs \
+         by the loss, the convergence by a step or two (E12); for the slow plant the first message without the \
+         prior is worse than the prior alone (E13).");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let plants = each(p.a, &p.gamma);
@@ -253,6 +213,7 @@ impl Figure for Convergence {
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let rows = &rows.errors;
         let what = "simulated sign-bit error against the error chain, worst step";
         claims.all_within("dymbo-exact", what, rows, |r| (r.dymbo_mse, r.dymbo_exact), 4.5);
@@ -260,16 +221,12 @@ impl Figure for Convergence {
         claims.all_within("kf-exact", what, rows, |r| (r.kf_mse, r.kf_pred), 4.5);
         let steady = |nees: f64| (0.9995..=1.0030).contains(&nees);
         let what = "exact normalised error within [0.9995, 1.0030] at every step";
-        claims
-            .all("consistent", what, rows, |r| steady(r.dymbo_exact / r.dymbo_pred))
-            .at_defaults();
+        here.all("consistent", what, rows, |r| steady(r.dymbo_exact / r.dymbo_pred));
         let what = "normalised error of the prior-aware start within 4.5 standard errors of the same interval";
-        claims
-            .all("informed-consistent", what, rows, |r| {
-                let slack = 4.5 * r.informed_nees.standard_error.unwrap_or(0.0);
-                (0.9995 - slack..=1.0030 + slack).contains(&r.informed_nees.value)
-            })
-            .at_defaults();
+        here.all("informed-consistent", what, rows, |r| {
+            let slack = 4.5 * r.informed_nees.standard_error.unwrap_or(0.0);
+            (0.9995 - slack..=1.0030 + slack).contains(&r.informed_nees.value)
+        });
         for curve in rows.chunks(p.steps + 1) {
             let gamma = curve[0].plant.gamma;
             let late: Moments = curve
@@ -279,9 +236,7 @@ impl Figure for Convergence {
                 .collect();
             let what =
                 format!("gamma = {gamma}: simulated error over n >= 30 is the predicted steady variance within 2 %");
-            claims
-                .near(format!("steady-{gamma}"), what, late.mean(), 1.0, 0.02)
-                .at_defaults();
+            here.near(format!("steady-{gamma}"), what, late.mean(), 1.0, 0.02);
         }
         let key = |r: &Row| format!("{} {}", r.plant, r.n);
         claims.references("exact", "exact sign-bit error at a, gamma, n", rows, |r| (key(r), r.dymbo_exact));
@@ -313,9 +268,7 @@ impl Figure for Convergence {
         for (id, of, ratio) in ratios {
             let peak = |c: &[Row]| c.iter().map(ratio).fold(0.0, f64::max);
             let what = format!("the ratio of {of} peaks at n = 2");
-            claims
-                .all(format!("peak-at-{id}"), what, curves(), |c| c.get(2).is_some_and(|r| ratio(r) == peak(c)))
-                .at_defaults();
+            here.all(format!("peak-at-{id}"), what, curves(), |c| c.get(2).is_some_and(|r| ratio(r) == peak(c)));
             let what = format!("the ratio of {of} at its peak, a, gamma");
             claims.references(&format!("peak-{id}"), &what, curves(), |c| (c[0].plant.to_string(), peak(c)));
         }
@@ -331,18 +284,10 @@ impl Figure for Convergence {
             panels.push(
                 Panel::new(curve[0].plant.title(), x, y)
                     .with(Layer::line("Kalman, exact", line(|r| r.kf_pred)).coloured(0))
-                    .with(
-                        marks("Kalman, simulated", |r| r.kf_mse)
-                            .coloured(0)
-                            .marked(Marker::Square),
-                    )
+                    .with(marks("Kalman, simulated", |r| r.kf_mse).styled(0, Marker::Square))
                     .with(Layer::line("sign bit, exact", line(|r| r.dymbo_exact)).coloured(1))
                     .with(marks("sign bit, simulated", |r| r.dymbo_mse).coloured(1))
-                    .with(
-                        marks("sign bit with prior, simulated", |r| r.informed_mse)
-                            .coloured(2)
-                            .marked(Marker::Triangle),
-                    )
+                    .with(marks("sign bit with prior, simulated", |r| r.informed_mse).styled(2, Marker::Triangle))
                     .with(Layer::dashed("sign bit, steady", line(|r| r.dymbo_minf)).coloured(3)),
             );
         }
@@ -350,7 +295,7 @@ impl Figure for Convergence {
             let line = |of: fn(&Point) -> f64| points(path, |r| (r.n as f64, of(r)));
             let title = format!("One run, gamma = {}", path[0].plant.gamma);
             panels.push(
-                Panel::new(title, Axis::linear("step n"), Axis::linear("state / sigma"))
+                Panel::linear(title, "step n", "state / sigma")
                     .with(Layer::line("state", line(|r| r.theta)).coloured(4))
                     .with(Layer::dashed("Kalman", line(|r| r.kf)).coloured(0))
                     .with(Layer::line("sign bit", line(|r| r.dymbo)).coloured(1)),

@@ -6,93 +6,69 @@ use fewbits_core::Link;
 use fewbits_dymbo::chain::{self, MessageLaw};
 use fewbits_dymbo::gap::{Twin, exact_filter};
 use fewbits_dymbo::{DymboFilter, MultibitFilter, ScalarFilter, innovation_gain, tree};
-use fewbits_monte_carlo::{Moments, Stream};
 
 const ID: &str = "dymbo-gap";
 
-/// Plants, the first message, and the effort.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plants, `a:gamma`.
-    #[garde(length(min = 1), dive)]
-    plants: Vec<Plant>,
-    /// Resolution of the first message in noise deviations.
-    #[garde(range(min = 0.01, max = 10.0))]
-    tau: f64,
-    /// Bits after the first message whose strings are all followed.
-    #[garde(range(min = 1, max = 14))]
-    depth: usize,
-    /// Runs of the steady comparison.
-    #[garde(range(min = 2, max = 10_000_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            plants: plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0), (1.0, 1.0)]),
-            tau: 1.0,
-            depth: 12,
-            trials: 400,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Plants, `a:gamma`.
+        #[garde(length(min = 1), dive)]
+        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0), (1.0, 1.0)]),
+        /// Resolution of the first message in noise deviations.
+        #[garde(range(min = 0.01, max = 10.0))]
+        tau: f64 = 1.0,
+        /// Bits after the first message whose strings are all followed.
+        #[garde(range(min = 1, max = 14))]
+        depth: usize = 12 => quick 8,
+        /// Runs of the steady comparison.
+        #[garde(range(min = 2, max = 10_000_000))]
+        trials: u64 = 400 => quick 50,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// After a first message, all bit strings.
-    tree: Vec<Row>,
-    /// In the steady state.
-    steady: Vec<Steady>,
-}
+rows! {
+    pub struct Rows {
+        /// After a first message, all bit strings.
+        tree: Vec<Row>,
+        /// In the steady state.
+        steady: Vec<Steady>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Bits after the first message.
-    n: usize,
-    /// Exact minimum mean squared error given the bits.
-    #[schemars(extend("unit" = "sigma^2"))]
-    mmse: f64,
-    /// What the sign-bit filter adds.
-    #[schemars(extend("unit" = "sigma^2"))]
-    excess: f64,
-    /// Variance that it computes.
-    #[schemars(extend("unit" = "sigma^2"))]
-    riccati: f64,
-    /// Its error by the error chain: mmse + excess.
-    #[schemars(extend("unit" = "sigma^2"))]
-    chain_mse: f64,
-}
+    struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Bits after the first message.
+        n: usize,
+        /// Exact minimum mean squared error given the bits.
+        mmse: f64 ["sigma^2"],
+        /// What the sign-bit filter adds.
+        excess: f64 ["sigma^2"],
+        /// Variance that it computes.
+        riccati: f64 ["sigma^2"],
+        /// Its error by the error chain: mmse + excess.
+        chain_mse: f64 ["sigma^2"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Steady {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Bits a sample.
-    bits: usize,
-    /// Exact steady error of the filter.
-    #[schemars(extend("unit" = "sigma^2"))]
-    exact_mse: f64,
-    /// Variance that it computes.
-    #[schemars(extend("unit" = "sigma^2"))]
-    riccati: f64,
-    /// Simulated runs.
-    trials: u64,
-    /// Steady distance from the exact posterior mean, squared.
-    #[schemars(extend("unit" = "sigma^2"))]
-    excess: Measured,
-    /// Minimum error given the bits, `exact_mse - excess`.
-    #[schemars(extend("unit" = "sigma^2"))]
-    mmse: f64,
-    /// Kurtosis of the error; 3 if normal.
-    kurtosis: f64,
-    /// Exact steady error at the best constant gain; one bit only.
-    #[schemars(extend("unit" = "sigma^2"))]
-    tuned_mse: Option<f64>,
+    struct Steady {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Bits a sample.
+        bits: usize,
+        /// Exact steady error of the filter.
+        exact_mse: f64 ["sigma^2"],
+        /// Variance that it computes.
+        riccati: f64 ["sigma^2"],
+        /// Simulated runs.
+        trials: u64,
+        /// Steady distance from the exact posterior mean, squared.
+        excess: Measured ["sigma^2"],
+        /// Minimum error given the bits, `exact_mse - excess`.
+        mmse: f64 ["sigma^2"],
+        /// Kurtosis of the error; 3 if normal.
+        kurtosis: f64,
+        /// Exact steady error at the best constant gain; one bit only.
+        tuned_mse: Option<f64> ["sigma^2"],
+    }
 }
 
 /// Steps before the exact posterior has forgotten that it started normal.
@@ -145,23 +121,10 @@ fn tuned_gain_mse(filter: &DymboFilter) -> Result<f64, Error> {
 pub struct GapToExact;
 
 impl Figure for GapToExact {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: ID,
-            title: "The gap to the exact posterior",
-            caption: "Mean squared distance of the sign-bit filter's estimate from the exact posterior mean given the same bits, as a \
-                      fraction of its error: after a first message over all bit strings (left), and in the steady state (right). \
-                      It stays near a hundredth of a percent: that is all that a better estimator of the present state could gain.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        (p.depth, p.trials) = (8, 50);
-    }
+    figure!(Parameters => Rows, ID, "The gap to the exact posterior", "",
+        "Mean squared distance of the sign-bit filter's estimate from the exact posterior mean given the same bits, as a \
+         fraction of its error: after a first message over all bit strings (left), and in the steady state (right). \
+         It stays near a hundredth of a percent: that is all that a better estimator of the present state could gain.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let (mut rows, mut steady) = (Vec::new(), Vec::new());
@@ -205,6 +168,7 @@ impl Figure for GapToExact {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let what = "minimum error and excess add up to the error chain's, at every step";
         claims.all("adds-up", what, &rows.tree, |r| (r.mmse + r.excess - r.chain_mse).abs() <= 1e-12);
         let what = "minimum error after a first message, at a, gamma, bits";
@@ -216,12 +180,10 @@ impl Figure for GapToExact {
         claims.references("percent", what, of(1), |r| (r.plant.to_string(), r.excess.scaled(100.0 / r.mmse)));
         let what =
             "percent that two-bit words leave to the exact posterior: at most .03 at a = .9, .08 at a = 1, and a tenth";
-        claims
-            .all("two-bits", what, of(2).filter(|r| r.plant.a != 0.99), |r| {
-                let most = if r.plant.a < 1.0 { 0.033 } else { 0.088 };
-                100.0 * r.excess.value / r.mmse <= most
-            })
-            .at_defaults();
+        here.all("two-bits", what, of(2).filter(|r| r.plant.a != 0.99), |r| {
+            let most = if r.plant.a < 1.0 { 0.033 } else { 0.088 };
+            100.0 * r.excess.value / r.mmse <= most
+        });
         let what = "kurtosis of the error, at a, gamma";
         claims.references("kurtosis", what, of(1), |r| (r.plant.to_string(), r.kurtosis));
         let what = "percent that the best constant gain would save, at a, gamma";
@@ -239,14 +201,7 @@ impl Figure for GapToExact {
             let shares = points(curve, |r| (r.n as f64, r.excess / r.mmse));
             left = left.with(Layer::line(curve[0].plant.title(), shares).coloured(i));
         }
-        let names = p
-            .plants
-            .iter()
-            .enumerate()
-            .map(|(i, p)| (i as f64, format!("{}, {}", p.a, p.gamma)));
-        let x = Axis::linear("plant a, gamma")
-            .named(names)
-            .between(-0.5, p.plants.len() as f64 - 0.5);
+        let x = Axis::categories("plant a, gamma", p.plants.iter().map(|p| format!("{}, {}", p.a, p.gamma)));
         let mut right = Panel::new("Steady state", x, y);
         for (bits, label, marker) in [
             (1, "one bit a sample", Marker::Circle),
@@ -254,7 +209,7 @@ impl Figure for GapToExact {
         ] {
             let those = rows.steady.iter().filter(|r| r.bits == bits).enumerate();
             let shares = Layer::measured(label, those, |(i, r)| (i as f64, r.excess.scaled(1.0 / r.mmse)));
-            right = right.with(shares.coloured(bits + 3).marked(marker));
+            right = right.with(shares.styled(bits + 3, marker));
         }
         Plot::grid(2, vec![left, right])
     }

@@ -6,80 +6,53 @@ use fewbits_core::{Gaussian, Link, Sign};
 use fewbits_dymbo::skew_normal::{distance_from_normal, posterior_density};
 use fewbits_numerics::normal::log_pdf_with;
 
-/// Noise deviations, and that of the prior.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Measurement noise deviations.
-    #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
-    sigma: Vec<f64>,
-    /// Prior deviation.
-    #[garde(range(min = 1e-6, max = 1e6))]
-    sigma_theta: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            sigma: vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0],
-            sigma_theta: 1.0,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Measurement noise deviations.
+        #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
+        sigma: Vec<f64> = vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0],
+        /// Prior deviation.
+        #[garde(range(min = 1e-6, max = 1e6))]
+        sigma_theta: f64 = 1.0,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Distance against noise.
-    distances: Vec<Distance>,
-    /// Densities at the smallest noise.
-    densities: Vec<Density>,
+rows! {
+    pub struct Rows {
+        /// Distance against noise.
+        distances: Vec<Distance>,
+        /// Densities at the smallest noise.
+        densities: Vec<Density>,
+    }
+
+    struct Distance {
+        /// Measurement noise deviation.
+        sigma: f64,
+        /// Largest difference of the densities.
+        distance: f64 ["1/unit"],
+        /// Distance times prior deviation times (sigma/prior deviation)^3.
+        cubed: f64,
+    }
+
+    struct Density {
+        /// State.
+        theta: f64 ["unit"],
+        /// Posterior after a +1 at the prior mean.
+        exact: f64 ["1/unit"],
+        /// Normal density of the same moments.
+        normal: f64 ["1/unit"],
+        /// Density before.
+        prior: f64 ["1/unit"],
+    }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Distance {
-    /// Measurement noise deviation.
-    sigma: f64,
-    /// Largest difference of the densities.
-    #[schemars(extend("unit" = "1/unit"))]
-    distance: f64,
-    /// Distance times prior deviation times (sigma/prior deviation)^3.
-    cubed: f64,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Density {
-    /// State.
-    #[schemars(extend("unit" = "unit"))]
-    theta: f64,
-    /// Posterior after a +1 at the prior mean.
-    #[schemars(extend("unit" = "1/unit"))]
-    exact: f64,
-    /// Normal density of the same moments.
-    #[schemars(extend("unit" = "1/unit"))]
-    normal: f64,
-    /// Density before.
-    #[schemars(extend("unit" = "1/unit"))]
-    prior: f64,
-}
-
-/// Proposition 1(b).
 pub struct PosteriorShape;
 
 impl Figure for PosteriorShape {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "dymbo-prop1b",
-            title: "The posterior of one bit is nearly normal",
-            caption: "Largest difference between the exact posterior density after one bit, which is skew-normal, and the normal \
-                      density of the same mean and variance. It falls with the cube of the noise (Proposition 1b, restated: E11). \
-                      Right: both densities at the smallest noise, where they differ most.",
-            source: "Ribeiro and Giannakis, Proposition 1(b)",
-        }
-    }
+    figure!(Parameters => Rows, "dymbo-prop1b", "The posterior of one bit is nearly normal", "Ribeiro and Giannakis, Proposition 1(b)",
+        "Largest difference between the exact posterior density after one bit, which is skew-normal, and the normal \
+         density of the same mean and variance. It falls with the cube of the noise (Proposition 1b, restated: E11). \
+         Right: both densities at the smallest noise, where they differ most.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let prior = Gaussian::scalar(0.0, p.sigma_theta * p.sigma_theta)?;
@@ -93,9 +66,7 @@ impl Figure for PosteriorShape {
             })
         };
         let noise = p.sigma.iter().copied().fold(f64::INFINITY, f64::min).powi(2);
-        let after = InCell::sign(Sign::Above, 0.0, noise, &Link::PERFECT)?
-            .tilted(&prior)
-            .map_err(Error::failed)?;
+        let after = InCell::sign(Sign::Above, 0.0, noise, &Link::PERFECT)?.tilted(&prior)?;
         let density = |i: i32| {
             let theta = p.sigma_theta * f64::from(i) / 50.0;
             Density {
@@ -112,20 +83,15 @@ impl Figure for PosteriorShape {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let rows = &rows.distances;
         let what = "the posterior becomes normal as the noise grows";
-        claims
-            .decreasing("converges", what, rows.iter().map(|r| r.distance))
-            .at_defaults();
+        here.decreasing("converges", what, rows.iter().map(|r| r.distance));
         claims.references("distance", "largest difference at sigma", rows, |r| (r.sigma.to_string(), r.distance));
         let ratio = rows.windows(2).last().map(|w| w[0].distance / w[1].distance);
-        claims
-            .near("cubic", "twice the noise, an eighth of the difference", ratio, 8.0, 0.01)
-            .at_defaults();
+        here.near("cubic", "twice the noise, an eighth of the difference", ratio, 8.0, 0.01);
         let constant = rows.last().map(|r| r.cubed);
-        claims
-            .near("constant", "constant of the cubic law", constant, 0.0200, 5e-5)
-            .at_defaults();
+        here.near("constant", "constant of the cubic law", constant, 0.0200, 5e-5);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
@@ -136,7 +102,7 @@ impl Figure for PosteriorShape {
             .with(Layer::points("exact", points(&rows.distances, |r| (r.sigma, r.distance))).coloured(0));
         let curve = |of: fn(&Density) -> f64| points(&rows.densities, |r| (r.theta, of(r)));
         let title = "Densities at the smallest noise";
-        let densities = Panel::new(title, Axis::linear("state"), Axis::linear("density"))
+        let densities = Panel::linear(title, "state", "density")
             .with(Layer::dashed("prior", curve(|r| r.prior)).coloured(2))
             .with(Layer::line("exact posterior", curve(|r| r.exact)).coloured(0))
             .with(Layer::dashed("normal, same moments", curve(|r| r.normal)).coloured(1));

@@ -5,92 +5,63 @@ use fewbits_core::Gaussian;
 use fewbits_dymbo::chain::first_message_transient;
 use fewbits_dymbo::{RoundedSample, ScalarPlant, first_message_mse};
 
-/// Noise deviation and resolutions; the plant of the start-up comparison.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Measurement noise deviation.
-    #[garde(range(min = 1e-6, max = 1e6))]
-    sigma: f64,
-    /// Resolutions of the first message.
-    #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
-    tau: Vec<f64>,
-    /// Plant coefficient.
-    #[garde(range(min = -1.0, max = 1.0))]
-    a: f64,
-    /// Process variances over measurement variance.
-    #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-    gamma: Vec<f64>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            sigma: 1.0,
-            tau: vec![0.25, 0.5, 1.0, 2.0, 4.0],
-            a: 0.9,
-            gamma: vec![0.5, 0.05],
-        }
+parameters! {
+    pub struct Parameters {
+        /// Measurement noise deviation.
+        #[garde(range(min = 1e-6, max = 1e6))]
+        sigma: f64 = 1.0,
+        /// Resolutions of the first message.
+        #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
+        tau: Vec<f64> = vec![0.25, 0.5, 1.0, 2.0, 4.0],
+        /// Plant coefficient.
+        #[garde(range(min = -1.0, max = 1.0))]
+        a: f64 = 0.9,
+        /// Process variances over measurement variance.
+        #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
+        gamma: Vec<f64> = vec![0.5, 0.05],
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The first message.
-    messages: Vec<Row>,
-    /// The filter after it.
-    starts: Vec<Start>,
+rows! {
+    pub struct Rows {
+        /// The first message.
+        messages: Vec<Row>,
+        /// The filter after it.
+        starts: Vec<Start>,
+    }
+
+    struct Row {
+        /// Resolution of the first message.
+        tau: f64 ["unit"],
+        /// Mean squared error at the worst state.
+        exact_sup: f64 ["unit^2"],
+        /// Variance to start from, sigma^2 + tau^2/12.
+        tight: f64 ["unit^2"],
+        /// The paper's bound, (sigma + tau/2)^2.
+        printed_bound: f64 ["unit^2"],
+    }
+
+    struct Start {
+        /// Process variance over measurement variance.
+        gamma: f64,
+        /// Step.
+        n: usize,
+        /// Initial variance: tight or printed.
+        start: &'static str,
+        /// Exact mean squared error.
+        mse: f64 ["unit^2"],
+        /// Exact error over computed variance.
+        nees: f64,
+    }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Resolution of the first message.
-    #[schemars(extend("unit" = "unit"))]
-    tau: f64,
-    /// Mean squared error at the worst state.
-    #[schemars(extend("unit" = "unit^2"))]
-    exact_sup: f64,
-    /// Variance to start from, sigma^2 + tau^2/12.
-    #[schemars(extend("unit" = "unit^2"))]
-    tight: f64,
-    /// The paper's bound, (sigma + tau/2)^2.
-    #[schemars(extend("unit" = "unit^2"))]
-    printed_bound: f64,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Start {
-    /// Process variance over measurement variance.
-    gamma: f64,
-    /// Step.
-    n: usize,
-    /// Initial variance: tight or printed.
-    start: &'static str,
-    /// Exact mean squared error.
-    #[schemars(extend("unit" = "unit^2"))]
-    mse: f64,
-    /// Exact error over computed variance.
-    nees: f64,
-}
-
-/// Proposition 2.
 pub struct FirstMessage;
 
 impl Figure for FirstMessage {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "dymbo-prop2",
-            title: "The fine first message",
-            caption: "Mean squared error of the first sample rounded to a multiple of tau, at the worst place of the state: exact, \
-                      sigma^2 + tau^2/12, and the paper's bound (sigma + tau/2)^2. The bound is valid but loose; a filter that \
-                      starts from it (right) is over-cautious for several steps (E7).",
-            source: "Ribeiro and Giannakis, Proposition 2",
-        }
-    }
+    figure!(Parameters => Rows, "dymbo-prop2", "The fine first message", "Ribeiro and Giannakis, Proposition 2",
+        "Mean squared error of the first sample rounded to a multiple of tau, at the worst place of the state: exact, \
+         sigma^2 + tau^2/12, and the paper's bound (sigma + tau/2)^2. The bound is valid but loose; a filter that \
+         starts from it (right) is over-cautious for several steps (E7).");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let noise = p.sigma * p.sigma;
@@ -145,12 +116,11 @@ impl Figure for FirstMessage {
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let curve = |of: fn(&Row) -> f64| points(&rows.messages, |r| (r.tau, of(r)));
-        let left = Panel::new("First message", Axis::log("resolution tau"), Axis::log("mean squared error"))
+        let left = Panel::loglog("First message", "resolution tau", "mean squared error")
             .with(Layer::points("exact, worst state", curve(|r| r.exact_sup)).coloured(0))
             .with(Layer::line("sigma^2 + tau^2/12", curve(|r| r.tight)).coloured(0))
             .with(Layer::dashed("printed bound", curve(|r| r.printed_bound)).coloured(1));
-        let (x, y) = (Axis::linear("step n"), Axis::linear("exact error / computed variance"));
-        let mut right = Panel::new("Consistency after the start", x, y);
+        let mut right = Panel::linear("Consistency after the start", "step n", "exact error / computed variance");
         for (i, &gamma) in p.gamma.iter().enumerate() {
             let of = |start: &str| {
                 let those = rows.starts.iter().filter(|r| r.gamma == gamma && r.start == start);

@@ -5,58 +5,41 @@ use crate::prelude::*;
 use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant, chain, steady};
 use rayon::prelude::*;
 
-/// Plant and numbers of sensors.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plant coefficient.
-    #[garde(range(min = -1.0, max = 1.0))]
-    a: f64,
-    /// Process variances over measurement variance.
-    #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-    gamma: Vec<f64>,
-    /// Sensors a slot.
-    #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
-    sensors: Vec<usize>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            a: 0.9,
-            gamma: vec![0.5, 0.05],
-            sensors: vec![1, 2, 3, 4, 5, 7, 10, 14, 20],
-        }
+parameters! {
+    pub struct Parameters {
+        /// Plant coefficient.
+        #[garde(range(min = -1.0, max = 1.0))]
+        a: f64 = 0.9,
+        /// Process variances over measurement variance.
+        #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
+        gamma: Vec<f64> = vec![0.5, 0.05],
+        /// Sensors a slot.
+        #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
+        sensors: Vec<usize> = vec![1, 2, 3, 4, 5, 7, 10, 14, 20],
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Sensors a slot, K.
-    sensors: usize,
-    /// Computed steady variance, one after the other.
-    #[schemars(extend("unit" = "sigma^2"))]
-    sequential: f64,
-    /// Exact error of that; up to ten sensors.
-    #[schemars(extend("unit" = "sigma^2"))]
-    sequential_mse: Option<f64>,
-    /// Computed steady variance, all at once, linear fusion.
-    #[schemars(extend("unit" = "sigma^2"))]
-    parallel: f64,
-    /// Exact error of that.
-    #[schemars(extend("unit" = "sigma^2"))]
-    parallel_mse: f64,
-    /// Computed steady variance, all at once, count table.
-    #[schemars(extend("unit" = "sigma^2"))]
-    table: f64,
-    /// Exact error of that.
-    #[schemars(extend("unit" = "sigma^2"))]
-    table_mse: f64,
-    /// Kalman filter with K unquantized sensors.
-    #[schemars(extend("unit" = "sigma^2"))]
-    kalman: f64,
+rows! {
+    pub struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Sensors a slot, K.
+        sensors: usize,
+        /// Computed steady variance, one after the other.
+        sequential: f64 ["sigma^2"],
+        /// Exact error of that; up to ten sensors.
+        sequential_mse: Option<f64> ["sigma^2"],
+        /// Computed steady variance, all at once, linear fusion.
+        parallel: f64 ["sigma^2"],
+        /// Exact error of that.
+        parallel_mse: f64 ["sigma^2"],
+        /// Computed steady variance, all at once, count table.
+        table: f64 ["sigma^2"],
+        /// Exact error of that.
+        table_mse: f64 ["sigma^2"],
+        /// Kalman filter with K unquantized sensors.
+        kalman: f64 ["sigma^2"],
+    }
 }
 
 /// Most sensors whose bit strings are followed exactly.
@@ -66,19 +49,10 @@ const LONGEST: usize = 10;
 pub struct SeveralSensors;
 
 impl Figure for SeveralSensors {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "dymbo-sensors",
-            title: "Several one-bit sensors a slot",
-            caption: "Steady error with K one-bit sensors: one after the other against the refreshed threshold, or all at once, \
-                      fused linearly or through the count table; below, K unquantized sensors. Two one-bit sensors in turn are \
-                      worth one unquantized sensor, but for 0.14 %. Bits sent at once share the prediction error and saturate.",
-            source: "",
-        }
-    }
+    figure!(Parameters => Vec<Row>, "dymbo-sensors", "Several one-bit sensors a slot", "",
+        "Steady error with K one-bit sensors: one after the other against the refreshed threshold, or all at once, \
+         fused linearly or through the count table; below, K unquantized sensors. Two one-bit sensors in turn are \
+         worth one unquantized sensor, but for 0.14 %. Bits sent at once share the prediction error and saturate.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let plants = each(p.a, &p.gamma);
@@ -109,6 +83,7 @@ impl Figure for SeveralSensors {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         type Of = fn(&Row) -> f64;
         let columns: [(&str, &str, Of); 4] = [
             ("sequential", "computed variance in turn", |r| r.sequential),
@@ -120,20 +95,17 @@ impl Figure for SeveralSensors {
             let what = format!("{what}, at a, gamma, sensors");
             claims.references(quantity, &what, rows, |r| (format!("{} {}", r.plant, r.sensors), of(r)));
         }
-        let at = |k: usize| {
-            rows.iter()
-                .find(|r| r.plant == Plant { a: 0.9, gamma: 0.5 } && r.sensors == k)
-        };
+        let at = |k: usize| first(rows, |r| r.plant == Plant { a: 0.9, gamma: 0.5 } && r.sensors == k);
         let two = at(2).zip(at(1));
         let what = "gamma = 0.5: by computed variance two one-bit sensors in turn beat one unquantized sensor";
         let ratio = two.map(|(two, one)| two.sequential / one.kalman);
-        claims.below("two-beat-one", what, ratio, 1.0).at_defaults();
+        here.below("two-beat-one", what, ratio, 1.0);
         let what = "gamma = 0.5: by exact error they miss it by 0.14 %";
         let ratio = two.and_then(|(two, one)| Some(two.sequential_mse? / one.kalman));
-        claims.near("two-miss-one", what, ratio, 1.00139, 1e-5).at_defaults();
+        here.near("two-miss-one", what, ratio, 1.00139, 1e-5);
         let what = "gamma = 0.5, ten sensors: relative saving of the count table";
         let saved = at(10).map(|r| 1.0 - r.table_mse / r.parallel_mse);
-        claims.near("table-saves", what, saved, 0.026, 1e-3).at_defaults();
+        here.near("table-saves", what, saved, 0.026, 1e-3);
         let what = "in turn is never worse than at once";
         claims.all("turns", what, rows, |r| r.sequential <= r.parallel * (1.0 + 1e-9));
         let what = "the count table is never worse than linear fusion";
@@ -146,17 +118,9 @@ impl Figure for SeveralSensors {
             Panel::new(rows[0].plant.title(), Axis::log("sensors a slot"), Axis::log("steady error / sigma^2"))
                 .with(Layer::line("at once, linear, predicted", curve(|r| Some(r.parallel))).coloured(1))
                 .with(Layer::points("at once, linear, exact", curve(|r| Some(r.parallel_mse))).coloured(1))
-                .with(
-                    Layer::points("at once, table, exact", curve(|r| Some(r.table_mse)))
-                        .coloured(2)
-                        .marked(Marker::Triangle),
-                )
+                .with(Layer::points("at once, table, exact", curve(|r| Some(r.table_mse))).styled(2, Marker::Triangle))
                 .with(Layer::line("in turn, predicted", curve(|r| Some(r.sequential))).coloured(0))
-                .with(
-                    Layer::points("in turn, exact", curve(|r| r.sequential_mse))
-                        .coloured(0)
-                        .marked(Marker::Square),
-                )
+                .with(Layer::points("in turn, exact", curve(|r| r.sequential_mse)).styled(0, Marker::Square))
                 .with(Layer::dashed("unquantized", curve(|r| Some(r.kalman))).coloured(3))
         };
         Plot::grid(2, rows.chunks(p.sensors.len()).map(panel).collect())

@@ -6,32 +6,20 @@ use crate::prelude::*;
 use fewbits_dymbo::gap::{Twin, exact_filter};
 use fewbits_dymbo::{DymboFilter, ScalarFilter};
 use fewbits_filters::scalar_fixed_lag_variance;
-use fewbits_monte_carlo::Moments;
 
 const ID: &str = "dymbo-smoother";
 
-/// Plants, lags, and the effort.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plants, `a:gamma`.
-    #[garde(length(min = 1), dive)]
-    plants: Vec<Plant>,
-    /// Steps between the state and the last bit.
-    #[garde(length(min = 1), inner(range(max = 200)))]
-    lag: Vec<usize>,
-    /// Simulated runs of ten smoothed states.
-    #[garde(range(min = 2, max = 10_000_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            plants: plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0)]),
-            lag: vec![0, 1, 2, 3, 4, 5, 10, 20],
-            trials: 400,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Plants, `a:gamma`.
+        #[garde(length(min = 1), dive)]
+        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0)]),
+        /// Steps between the state and the last bit.
+        #[garde(length(min = 1), inner(range(max = 200)))]
+        lag: Vec<usize> = vec![0, 1, 2, 3, 4, 5, 10, 20],
+        /// Simulated runs of ten smoothed states.
+        #[garde(range(min = 2, max = 10_000_000))]
+        trials: u64 = 400 => quick 20,
     }
 }
 
@@ -40,52 +28,35 @@ const ANCHORS: usize = 10;
 /// Steps between them.
 const STRIDE: usize = 4;
 
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Steps between the state and the last bit.
-    lag: usize,
-    /// Simulated runs of ten smoothed states.
-    trials: u64,
-    /// Steady variance computed by the sign-bit smoother.
-    #[schemars(extend("unit" = "sigma^2"))]
-    predicted: f64,
-    /// Steady variance of the unquantized smoother.
-    #[schemars(extend("unit" = "sigma^2"))]
-    kalman: f64,
-    /// Mean squared error of the sign-bit smoother.
-    #[schemars(extend("unit" = "sigma^2"))]
-    rts_mse: Measured,
-    /// Mean squared error of the exact smoother of the same bits.
-    #[schemars(extend("unit" = "sigma^2"))]
-    exact_mse: Measured,
-    /// Mean squared distance of the two smoothed estimates.
-    #[schemars(extend("unit" = "sigma^2"))]
-    excess: Measured,
+rows! {
+    pub struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Steps between the state and the last bit.
+        lag: usize,
+        /// Simulated runs of ten smoothed states.
+        trials: u64,
+        /// Steady variance computed by the sign-bit smoother.
+        predicted: f64 ["sigma^2"],
+        /// Steady variance of the unquantized smoother.
+        kalman: f64 ["sigma^2"],
+        /// Mean squared error of the sign-bit smoother.
+        rts_mse: Measured ["sigma^2"],
+        /// Mean squared error of the exact smoother of the same bits.
+        exact_mse: Measured ["sigma^2"],
+        /// Mean squared distance of the two smoothed estimates.
+        excess: Measured ["sigma^2"],
+    }
 }
 
 /// Errors against the lag.
 pub struct Smoothing;
 
 impl Figure for Smoothing {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: ID,
-            title: "Fixed-lag smoothing",
-            caption: "Error of the state some steps ago: Rauch-Tung-Striebel smoothing of the sign-bit filter's means and variances \
-                      as if they were normal (points), what it predicts (lines), and the exact smoother of the same bits (crosses). \
-                      At gamma = 0.05 the sign-bit smoother passes the unquantized filter (dashed) from lag 4 on.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 20;
-    }
+    figure!(Parameters => Vec<Row>, ID, "Fixed-lag smoothing", "",
+        "Error of the state some steps ago: Rauch-Tung-Striebel smoothing of the sign-bit filter's means and variances \
+         as if they were normal (points), what it predicts (lines), and the exact smoother of the same bits (crosses). \
+         At gamma = 0.05 the sign-bit smoother passes the unquantized filter (dashed) from lag 4 on.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let longest = p.lag.iter().copied().max().unwrap_or(0);
@@ -125,6 +96,7 @@ impl Figure for Smoothing {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let key = |r: &Row| format!("{} {}", r.plant, r.lag);
         claims.references("rts", "error of the smoother at a, gamma, lag", rows, |r| (key(r), r.rts_mse));
         claims.references("exact", "error of the exact smoother at a, gamma, lag", rows, |r| (key(r), r.exact_mse));
@@ -136,23 +108,19 @@ impl Figure for Smoothing {
                 .zip(at(gamma, 0))
                 .map(|(r, now)| 1.0 - r.rts_mse.value / now.rts_mse.value);
             let what = format!("gamma = {gamma}: a lag of {lag} saves this share of the filter's error");
-            claims
-                .near(format!("saves-{gamma}"), what, saved, saving, 0.01)
-                .at_defaults();
+            here.near(format!("saves-{gamma}"), what, saved, saving, 0.01);
         }
         let slow = rows.iter().filter(|r| r.plant.gamma == 0.5);
         let what = "gamma = 0.5: within 0.14 % of the exact smoother at every lag, less 4.5 standard errors";
-        claims
-            .all("near-exact", what, slow, |r| {
-                r.excess.value - 4.5 * r.excess.standard_error.unwrap_or(0.0) <= 1.45e-3 * r.exact_mse.value
-            })
-            .at_defaults();
+        here.all("near-exact", what, slow, |r| {
+            r.excess.value - 4.5 * r.excess.standard_error.unwrap_or(0.0) <= 1.45e-3 * r.exact_mse.value
+        });
         let difference = at(0.05, 4).zip(at(0.05, 0)).map(|(r, now)| Measured {
             value: r.rts_mse.value - now.kalman,
             ..r.rts_mse
         });
         let what = "gamma = 0.05: from lag 4 the sign-bit smoother beats the unquantized filter";
-        claims.less("beats-analog", what, difference, 4.5).at_defaults();
+        here.less("beats-analog", what, difference, 4.5);
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
@@ -162,11 +130,7 @@ impl Figure for Smoothing {
             Panel::new(rows[0].plant.title(), Axis::linear("lag"), Axis::linear("error / sigma^2"))
                 .with(Layer::line("sign bit, predicted", curve(|r| r.predicted)).coloured(0))
                 .with(Layer::measured("sign bit", rows, |r| (r.lag as f64, r.rts_mse)).coloured(0))
-                .with(
-                    Layer::measured("exact smoother", rows, |r| (r.lag as f64, r.exact_mse))
-                        .coloured(1)
-                        .marked(Marker::Cross),
-                )
+                .with(Layer::measured("exact smoother", rows, |r| (r.lag as f64, r.exact_mse)).styled(1, Marker::Cross))
                 .with(Layer::line("unquantized smoother", curve(|r| r.kalman)).coloured(2))
                 .with(Layer::dashed("unquantized filter", points(rows, |r| (r.lag as f64, filter))).coloured(3))
         };

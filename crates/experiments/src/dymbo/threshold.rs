@@ -5,98 +5,77 @@ use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Observation, Scheme, Sensing, Sign};
 use fewbits_dymbo::{DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant};
 use fewbits_filters::assumed_density;
-use fewbits_monte_carlo::{Estimate, Moments, Stream};
+use fewbits_monte_carlo::Estimate;
 use nalgebra::{Matrix1, Vector1};
 
 const ID: &str = "dymbo-threshold";
 
-/// Plants, the length of runs, and the unstable plant.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Plants, `a:gamma`; the state starts from its stationary law.
-    #[garde(length(min = 1), custom(stationary), dive)]
-    plants: Vec<Plant>,
-    /// Steps of a run that are measured.
-    #[garde(range(min = 1, max = 10_000))]
-    steps: u64,
-    /// Steps before them.
-    #[garde(range(max = 10_000))]
-    burn: u64,
-    /// Simulated runs.
-    #[garde(range(min = 2, max = 100_000_000))]
-    trials: u64,
-    /// Coefficient of the unstable plant.
-    #[garde(range(min = -3.0, max = 3.0))]
-    unstable_a: f64,
-    /// Its process variance over measurement variance.
-    #[garde(range(min = 1e-6, max = 1e3))]
-    unstable_gamma: f64,
-    /// Simulated runs of it.
-    #[garde(range(min = 2, max = 100_000_000))]
-    unstable_trials: u64,
+parameters! {
+    pub struct Parameters {
+        /// Plants, `a:gamma`; the state starts from its stationary law.
+        #[garde(length(min = 1), custom(stationary), dive)]
+        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (-0.9, 0.5)]),
+        /// Steps of a run that are measured.
+        #[garde(range(min = 1, max = 10_000))]
+        steps: u64 = 1000,
+        /// Steps before them.
+        #[garde(range(max = 10_000))]
+        burn: u64 = 100,
+        /// Simulated runs.
+        #[garde(range(min = 2, max = 100_000_000))]
+        trials: u64 = 6_000 => quick 200,
+        /// Coefficient of the unstable plant.
+        #[garde(range(min = -3.0, max = 3.0))]
+        unstable_a: f64 = 1.2,
+        /// Its process variance over measurement variance.
+        #[garde(range(min = 1e-6, max = 1e3))]
+        unstable_gamma: f64 = 0.5,
+        /// Simulated runs of it.
+        #[garde(range(min = 2, max = 100_000_000))]
+        unstable_trials: u64 = 20_000 => quick 2_000,
+    }
 }
 
 fn stationary(plants: &[Plant], (): &()) -> garde::Result {
-    if plants.iter().all(|plant| plant.a.abs() < 1.0) {
-        return Ok(());
+    let stable = plants.iter().all(|plant| plant.a.abs() < 1.0);
+    accept(stable, || "a must be above -1 and below 1".to_owned())
+}
+
+rows! {
+    pub struct Rows {
+        /// Errors of the three rules.
+        rules: Vec<Row>,
+        /// Runs of an unstable plant that escape.
+        unstable: Vec<Unstable>,
     }
-    Err(garde::Error::new("a must be above -1 and below 1"))
-}
 
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            plants: plants([(0.9, 0.5), (0.9, 0.05), (-0.9, 0.5)]),
-            steps: 1000,
-            burn: 100,
-            trials: 6_000,
-            unstable_a: 1.2,
-            unstable_gamma: 0.5,
-            unstable_trials: 20_000,
-        }
+    struct Row {
+        #[serde(flatten)]
+        plant: Plant,
+        /// Place of the threshold.
+        rule: &'static str,
+        /// Simulated runs.
+        trials: u64,
+        /// Mean squared error.
+        mse: Measured ["sigma^2"],
+        /// Relative excess over the prediction rule, same noise.
+        excess: Measured,
+        /// Squared error over computed variance.
+        nees: Measured,
     }
-}
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Errors of the three rules.
-    rules: Vec<Row>,
-    /// Runs of an unstable plant that escape.
-    unstable: Vec<Unstable>,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    #[serde(flatten)]
-    plant: Plant,
-    /// Place of the threshold.
-    rule: &'static str,
-    /// Simulated runs.
-    trials: u64,
-    /// Mean squared error.
-    #[schemars(extend("unit" = "sigma^2"))]
-    mse: Measured,
-    /// Relative excess over the prediction rule, same noise.
-    excess: Measured,
-    /// Squared error over computed variance.
-    nees: Measured,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Unstable {
-    /// Plant coefficient.
-    a: f64,
-    /// Process variance over measurement variance.
-    gamma: f64,
-    /// Simulated runs.
-    trials: u64,
-    /// Fraction of runs whose error exceeds 50 within 500 steps.
-    escaped: Measured,
-    /// Steady variance that the filter computes meanwhile.
-    #[schemars(extend("unit" = "sigma^2"))]
-    riccati: Option<f64>,
+    struct Unstable {
+        /// Plant coefficient.
+        a: f64,
+        /// Process variance over measurement variance.
+        gamma: f64,
+        /// Simulated runs.
+        trials: u64,
+        /// Fraction of runs whose error exceeds 50 within 500 steps.
+        escaped: Measured,
+        /// Steady variance that the filter computes meanwhile.
+        riccati: Option<f64> ["sigma^2"],
+    }
 }
 
 /// The three rules, in the order of the table, and their names in the plot.
@@ -183,24 +162,11 @@ fn escapes(plant: &ScalarPlant, stream: Stream) -> Result<bool, fewbits_dymbo::E
 pub struct ThresholdPlace;
 
 impl Figure for ThresholdPlace {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: ID,
-            title: "Where the threshold belongs",
-            caption: "Steady mean squared error with the threshold at the prediction a theta_hat(n-1), at theta_hat(n-1) as equation \
-                      (14) prints it with the update unchanged, and the same with the exact update (E1). For a > 0 the mistake \
-                      hides within the width of a line; for a < 0 it is a catastrophe. A second table counts the runs of an \
-                      unstable plant that escape although the computed variance stays finite.",
-            source: "Ribeiro and Giannakis, equation (14)",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        (p.trials, p.unstable_trials) = (200, 2_000);
-    }
+    figure!(Parameters => Rows, ID, "Where the threshold belongs", "Ribeiro and Giannakis, equation (14)",
+        "Steady mean squared error with the threshold at the prediction a theta_hat(n-1), at theta_hat(n-1) as equation \
+         (14) prints it with the update unchanged, and the same with the exact update (E1). For a > 0 the mistake \
+         hides within the width of a line; for a < 0 it is a catastrophe. A second table counts the runs of an \
+         unstable plant that escape although the computed variance stays finite.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let mut rules = Vec::new();
@@ -251,10 +217,8 @@ impl Figure for ThresholdPlace {
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let names = p.plants.iter().enumerate().map(|(i, plant)| (i as f64, plant.title()));
-        let x = Axis::linear("plant")
-            .named(names)
-            .between(-0.6, p.plants.len() as f64 - 0.4);
+        let names = p.plants.iter().map(|plant| plant.title());
+        let x = Axis::categories("plant", names);
         let mut panel = Panel::new("Place of the threshold", x, Axis::log("mean squared error / sigma^2"));
         for (i, (rule, label)) in RULES.into_iter().enumerate() {
             let (those, shift) = (rows.rules.iter().filter(|r| r.rule == rule).enumerate(), 0.2 * (i as f64 - 1.0));

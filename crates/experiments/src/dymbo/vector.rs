@@ -6,31 +6,29 @@ use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing, Sign}
 use fewbits_dymbo::SignFilter;
 use fewbits_filters::{PlaneFilter, SteadyState, steady_state};
 use fewbits_models::{LinearGaussian, LinearSensor, ScalarSensor};
-use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix2, SMatrix, Vector2};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 const ID: &str = "dymbo-vector";
 
-/// The system and the effort.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Transition matrix, row by row; stable.
-    #[garde(length(equal = 4), inner(range(min = -10.0, max = 10.0)), custom(stable))]
-    transition: Vec<f64>,
-    /// Variance of the process noise of each coordinate.
-    #[garde(range(min = 1e-6, max = 1e6))]
-    process_variance: f64,
-    /// Variance of the measurement noise.
-    #[garde(range(min = 1e-6, max = 1e6))]
-    measurement_variance: f64,
-    /// Steps of a run that are measured.
-    #[garde(range(min = 1, max = 10_000))]
-    steps: usize,
-    /// Simulated runs.
-    #[garde(range(min = 2, max = 1_000_000))]
-    trials: u64,
+parameters! {
+    pub struct Parameters {
+        /// Transition matrix, row by row; stable.
+        #[garde(length(equal = 4), inner(range(min = -10.0, max = 10.0)), custom(stable))]
+        transition: Vec<f64> = vec![0.95, 0.25, -0.1, 0.9],
+        /// Variance of the process noise of each coordinate.
+        #[garde(range(min = 1e-6, max = 1e6))]
+        process_variance: f64 = 0.3,
+        /// Variance of the measurement noise.
+        #[garde(range(min = 1e-6, max = 1e6))]
+        measurement_variance: f64 = 1.0,
+        /// Steps of a run that are measured.
+        #[garde(range(min = 1, max = 10_000))]
+        steps: usize = 40 => quick 10,
+        /// Simulated runs.
+        #[garde(range(min = 2, max = 1_000_000))]
+        trials: u64 = 60 => quick 4,
+    }
 }
 
 fn stable(transition: &[f64], (): &()) -> garde::Result {
@@ -38,21 +36,7 @@ fn stable(transition: &[f64], (): &()) -> garde::Result {
     let stable = LinearGaussian::with_covariance(matrix, Matrix2::identity())
         .and_then(|dynamics| dynamics.stationary_covariance())
         .is_ok();
-    stable
-        .then_some(())
-        .ok_or_else(|| garde::Error::new("not a stable matrix"))
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            transition: vec![0.95, 0.25, -0.1, 0.9],
-            process_variance: 0.3,
-            measurement_variance: 1.0,
-            steps: 40,
-            trials: 60,
-        }
-    }
+    accept(stable, || "not a stable matrix".to_owned())
 }
 
 /// Steps before the exact posterior has forgotten that it started normal.
@@ -61,11 +45,11 @@ const BURN: usize = 15;
 impl Parameters {
     fn dynamics(&self) -> Result<LinearGaussian<2, 2>, Error> {
         let noise = Matrix2::identity() * self.process_variance;
-        LinearGaussian::with_covariance(Matrix2::from_row_slice(&self.transition), noise).map_err(Error::failed)
+        Ok(LinearGaussian::with_covariance(Matrix2::from_row_slice(&self.transition), noise)?)
     }
 
     fn sensor(&self, direction: [f64; 2]) -> Result<ScalarSensor<2>, Error> {
-        ScalarSensor::scalar(Vector2::from(direction), self.measurement_variance).map_err(Error::failed)
+        Ok(ScalarSensor::scalar(Vector2::from(direction), self.measurement_variance)?)
     }
 
     fn one(&self) -> Result<Filter<1>, Error> {
@@ -106,7 +90,7 @@ fn kalman<const M: usize>(filter: &Filter<M>) -> Result<Matrix2<f64>, Error> {
     let rows = filter.sensors().map(|sensor| sensor.direction());
     let matrix = SMatrix::<f64, M, 2>::from_fn(|i, j| rows[i][j]);
     let noise = SMatrix::<f64, M, M>::from_diagonal_element(filter.sensors()[0].noise_variance());
-    let sensing = LinearSensor::new(matrix, noise).map_err(Error::failed)?;
+    let sensing = LinearSensor::new(matrix, noise)?;
     Ok(steady_state(filter.dynamics(), &sensing)?.filtered_covariance)
 }
 
@@ -171,35 +155,29 @@ fn one_run<const M: usize>(
     Ok(means)
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Number of sensors and when they answer.
-    scheme: &'static str,
-    /// Computed steady variance of the first coordinate.
-    #[schemars(extend("unit" = "unit^2"))]
-    p11: f64,
-    /// Computed steady covariance.
-    #[schemars(extend("unit" = "unit^2"))]
-    p12: f64,
-    /// Computed steady variance of the second coordinate.
-    #[schemars(extend("unit" = "unit^2"))]
-    p22: f64,
-    /// Computed steady trace.
-    #[schemars(extend("unit" = "unit^2"))]
-    trace: f64,
-    /// Steady trace of the Kalman filter of the same sensors, unquantized.
-    #[schemars(extend("unit" = "unit^2"))]
-    kalman_trace: f64,
-    /// Simulated runs.
-    trials: u64,
-    /// Exact minimum given the bits.
-    #[schemars(extend("unit" = "unit^2"))]
-    mmse_trace: Measured,
-    /// Mean squared distance from the exact mean.
-    #[schemars(extend("unit" = "unit^2"))]
-    excess: Measured,
-    /// Normalised error over the dimension.
-    nees: Measured,
+rows! {
+    pub struct Row {
+        /// Number of sensors and when they answer.
+        scheme: &'static str,
+        /// Computed steady variance of the first coordinate.
+        p11: f64 ["unit^2"],
+        /// Computed steady covariance.
+        p12: f64 ["unit^2"],
+        /// Computed steady variance of the second coordinate.
+        p22: f64 ["unit^2"],
+        /// Computed steady trace.
+        trace: f64 ["unit^2"],
+        /// Steady trace of the Kalman filter of the same sensors, unquantized.
+        kalman_trace: f64 ["unit^2"],
+        /// Simulated runs.
+        trials: u64,
+        /// Exact minimum given the bits.
+        mmse_trace: Measured ["unit^2"],
+        /// Mean squared distance from the exact mean.
+        excess: Measured ["unit^2"],
+        /// Normalised error over the dimension.
+        nees: Measured,
+    }
 }
 
 impl Row {
@@ -247,23 +225,10 @@ const SPACING: f64 = 0.75;
 pub struct VectorState;
 
 impl Figure for VectorState {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: ID,
-            title: "A two-dimensional state",
-            caption: "Trace of the error covariance of a rotating two-dimensional state with one sensor or three: computed by the \
-                      sign-bit filter (circles), exact minimum given its bits by a filter on a lattice (crosses), and the Kalman \
-                      filter of the unquantized samples (squares). The sign-bit filter is within 0.06 % of the exact minimum.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        (p.trials, p.steps) = (4, 10);
-    }
+    figure!(Parameters => Vec<Row>, ID, "A two-dimensional state", "",
+        "Trace of the error covariance of a rotating two-dimensional state with one sensor or three: computed by the \
+         sign-bit filter (circles), exact minimum given its bits by a filter on a lattice (crosses), and the Kalman \
+         filter of the unquantized samples (squares). The sign-bit filter is within 0.06 % of the exact minimum.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         Ok(vec![
@@ -288,8 +253,8 @@ impl Figure for VectorState {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let names = rows.iter().enumerate().map(|(i, r)| (i as f64, r.scheme.to_owned()));
-        let x = Axis::linear("").named(names).between(-0.6, 2.6);
+        let names = rows.iter().map(|r| r.scheme.to_owned());
+        let x = Axis::categories("", names);
         let marks = |of: fn(&Row) -> f64, shift: f64| {
             rows.iter()
                 .enumerate()
@@ -302,12 +267,8 @@ impl Figure for VectorState {
         Plot::of(
             Panel::new("Steady error of a two-dimensional state", x, y)
                 .with(Layer::points("sign bits, computed", marks(|r| r.trace, -0.12)).coloured(0))
-                .with(exact.coloured(1).marked(Marker::Cross))
-                .with(
-                    Layer::points("Kalman, unquantized", marks(|r| r.kalman_trace, 0.12))
-                        .coloured(2)
-                        .marked(Marker::Square),
-                ),
+                .with(exact.styled(1, Marker::Cross))
+                .with(Layer::points("Kalman, unquantized", marks(|r| r.kalman_trace, 0.12)).styled(2, Marker::Square)),
         )
     }
 }

@@ -7,35 +7,26 @@ use crate::prelude::*;
 use fewbits_densities::tree::{At, Axis as SplitAxis};
 use fewbits_densities::{Bandwidth, Criterion, Reduction, Split};
 use fewbits_handoff::{Components, HandoffFilter, Reducer, Whole};
-use fewbits_monte_carlo::Moments;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Worlds.
-    #[garde(range(min = 2, max = 10_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { trials: 40 }
+parameters! {
+    pub struct Parameters {
+        /// Worlds.
+        #[garde(range(min = 2, max = 10_000))]
+        trials: u64 = 40 => quick 2,
     }
 }
 
-/// One filter.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Filter.
-    filter: &'static str,
-    /// Multiple of Silverman's bandwidth.
-    factor: f64,
-    /// Whether the centres are shrunk.
-    shrunk: bool,
-    /// KL from the exact belief to the filter's, averaged over the ten times.
-    #[schemars(extend("unit" = "nat"))]
-    kl: Measured,
+rows! {
+    pub struct Row {
+        /// Filter.
+        filter: &'static str,
+        /// Multiple of Silverman's bandwidth.
+        factor: f64,
+        /// Whether the centres are shrunk.
+        shrunk: bool,
+        /// KL from the exact belief to the filter's, averaged over the ten times.
+        kl: Measured ["nat"],
+    }
 }
 
 struct Setup {
@@ -117,40 +108,22 @@ fn setups() -> Vec<Setup> {
 pub struct Widths;
 
 fn kl(rows: &[Row], filter: &str, factor: f64, shrunk: bool) -> Option<f64> {
-    rows.iter()
-        .find(|r| r.filter == filter && r.factor == factor && r.shrunk == shrunk)
-        .map(|r| r.kl.value)
+    first(rows, |r| r.filter == filter && r.factor == factor && r.shrunk == shrunk).map(|r| r.kl.value)
 }
 
 impl Figure for Widths {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "handoff-bandwidth",
-            title: "Smoothing costs more than reduction",
-            caption: "KL from the exact belief, computed on a lattice, to what each filter hands on, averaged over ten steps. Halving \
-                      the bandwidth or shrinking the particles removes a third of the error at no bits.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 2;
-    }
+    figure!(Parameters => Vec<Row>, "handoff-bandwidth", "Smoothing costs more than reduction", "our own comparison",
+        "KL from the exact belief, computed on a lattice, to what each filter hands on, averaged over ten steps. Halving \
+         the bandwidth or shrinking the particles removes a third of the error at no bits.");
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: 2.0 * p.trials as f64,
-            bytes: 1e6 * p.trials as f64,
-        }
+        Cost::new(2.0 * p.trials as f64, 1e6 * p.trials as f64)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let setups = setups();
         let law = StepLaw::new();
-        let one = |it: fewbits_monte_carlo::Trial| -> Result<Vec<f64>, Error> {
+        let one = |it: Trial| -> Result<Vec<f64>, Error> {
             let world = world(it.stream)?;
             let mut exact = Vec::new();
             let mut lattice = Lattice::prior();
@@ -211,37 +184,25 @@ impl Figure for Widths {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let key = |r: &Row| format!("{}-c{}{}", r.filter, r.factor, if r.shrunk { "-shrunk" } else { "" });
         claims.references("kl", "KL from the exact belief", rows, |r| (key(r), r.kl));
-        let ratio = |a: Option<f64>, b: Option<f64>| a.zip(b).map(|(a, b)| a / b);
         let paper = kl(rows, "kl", 1.0, false);
         let what = "shrinking removes a quarter of the error or more at no bits";
-        claims
-            .at_most("shrinkage", what, ratio(kl(rows, "kl", 1.0, true), paper), 0.8)
-            .at_full_trials();
+        full.at_most("shrinkage", what, over(kl(rows, "kl", 1.0, true), paper), 0.8);
         let what = "so does half the bandwidth";
-        claims
-            .at_most("half", what, ratio(kl(rows, "kl", 0.5, false), paper), 0.8)
-            .at_full_trials();
+        full.at_most("half", what, over(kl(rows, "kl", 0.5, false), paper), 0.8);
         let what = "but not where the estimate itself is handed on";
-        claims
-            .at_least("half-kde", what, ratio(kl(rows, "kde", 0.5, false), kl(rows, "kde", 1.0, false)), 1.1)
-            .at_full_trials();
+        full.at_least("half-kde", what, over(kl(rows, "kde", 0.5, false), kl(rows, "kde", 1.0, false)), 1.1);
         let what = "the pipeline with shrinkage has at most 0.7 of the paper's error";
-        claims
-            .at_most("pipeline", what, ratio(kl(rows, "pipeline", 1.0, true), paper), 0.7)
-            .at_full_trials();
+        full.at_most("pipeline", what, over(kl(rows, "pipeline", 1.0, true), paper), 0.7);
         let what = "reduction to five components adds less than a quarter to what smoothing loses";
-        claims
-            .at_most("reduction", what, ratio(paper, kl(rows, "kde", 1.0, false)), 1.25)
-            .at_full_trials();
+        full.at_most("reduction", what, over(paper, kl(rows, "kde", 1.0, false)), 1.25);
         let what = "at the paper's bandwidth one Gaussian is the worst reduction";
         let gauss = kl(rows, "gauss", 1.0, false).unwrap_or(f64::NAN);
-        claims
-            .all("gauss", what, rows.iter().filter(|r| r.filter != "gauss" && r.factor == 1.0), |r| {
-                r.kl.value < gauss
-            })
-            .at_full_trials();
+        full.all("gauss", what, rows.iter().filter(|r| r.filter != "gauss" && r.factor == 1.0), |r| {
+            r.kl.value < gauss
+        });
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
@@ -249,14 +210,16 @@ impl Figure for Widths {
             |r: &Row| format!("{}, c = {}{}", super::title(r.filter), r.factor, if r.shrunk { ", shrunk" } else { "" });
         let mut sorted: Vec<&Row> = rows.iter().collect();
         sorted.sort_by(|a, b| b.kl.value.total_cmp(&a.kl.value));
-        let names: Vec<(f64, String)> = sorted.iter().enumerate().map(|(i, r)| (i as f64, label(r))).collect();
-        let places: Vec<(f64, Measured)> = sorted.iter().enumerate().map(|(i, r)| (i as f64, r.kl)).collect();
         // Values run to the right, filters downwards.
-        let bars = places.iter().map(|(i, m)| (0.0, m.value, i - 0.35, i + 0.35)).collect();
+        let bars = (0..)
+            .map(f64::from)
+            .zip(&sorted)
+            .map(|(i, r)| (0.0, r.kl.value, i - 0.35, i + 0.35))
+            .collect();
         let panel = Panel::new(
             "Error of what is handed on",
             Axis::linear("KL from the exact belief / nat"),
-            Axis::linear("").named(names).between(-0.7, rows.len() as f64 - 0.3),
+            Axis::categories("", sorted.iter().map(|r| label(r))),
         )
         .with(Layer::boxes("", bars))
         .without_legend();

@@ -2,53 +2,37 @@
 
 use crate::prelude::*;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Hand-overs.
-    #[garde(range(min = 1, max = 12))]
-    steps: u32,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { steps: 4 }
+parameters! {
+    pub struct Parameters {
+        /// Hand-overs.
+        #[garde(range(min = 1, max = 12))]
+        steps: u32 = 4,
     }
 }
 
-/// A density `p_t^i`, and how it comes from the one before.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Time.
-    t: u32,
-    /// Hand-overs that were lossy; all after them are exact.
-    lossy: u32,
-    /// Time of the density it comes from; none at the start.
-    from_t: Option<u32>,
-    /// Lossy hand-overs of that density: one less where this hand-over was lossy.
-    from_lossy: Option<u32>,
-    /// Whether a filter that hands on less than it knows has this density.
-    available: bool,
+rows! {
+    /// A density `p_t^i`, and how it comes from the one before.
+    pub struct Row {
+        /// Time.
+        t: u32,
+        /// Hand-overs that were lossy; all after them are exact.
+        lossy: u32,
+        /// Time of the density it comes from; none at the start.
+        from_t: Option<u32>,
+        /// Lossy hand-overs of that density: one less where this hand-over was lossy.
+        from_lossy: Option<u32>,
+        /// Whether a filter that hands on less than it knows has this density.
+        available: bool,
+    }
 }
 
-/// Figure 1.
 pub struct Fig1;
 
 impl Figure for Fig1 {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "handoff-fig1",
-            title: "Exact and lossy hand-overs",
-            caption: "Density p(t, i): the first i hand-overs were lossy, all after them exact. Steps to the right are exact \
-                      (prediction and update), dashed steps lose something. The upper edge is what ought to be known, the \
-                      diagonal what is known; a bound on their distance adds up the distances of neighbours in a column.",
-            source: "compressed particle filter, Section 4, Figure 1 (redrawn: the print is lost)",
-        }
-    }
+    figure!(Parameters => Vec<Row>, "handoff-fig1", "Exact and lossy hand-overs", "compressed particle filter, Section 4, Figure 1 (redrawn: the print is lost)",
+        "Density p(t, i): the first i hand-overs were lossy, all after them exact. Steps to the right are exact \
+         (prediction and update), dashed steps lose something. The upper edge is what ought to be known, the \
+         diagonal what is known; a bound on their distance adds up the distances of neighbours in a column.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let densities = (0..=p.steps).flat_map(|t| (0..=t).map(move |lossy| (t, lossy)));
@@ -105,12 +89,8 @@ impl Figure for Fig1 {
                 .enumerate()
                 .map(|(i, line)| Layer::dashed(name("lossy hand-over", i), line).coloured(1)),
         )
-        .with(
-            Layer::points("with exact steps from i on", of(false))
-                .coloured(0)
-                .marked(Marker::Circle),
-        )
-        .with(Layer::points("available", of(true)).coloured(1).marked(Marker::Square))
+        .with(Layer::points("with exact steps from i on", of(false)).styled(0, Marker::Circle))
+        .with(Layer::points("available", of(true)).styled(1, Marker::Square))
         .with(Layer::texts(labels.collect()));
         Plot::of(panel)
     }

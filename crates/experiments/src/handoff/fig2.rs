@@ -3,49 +3,34 @@
 use crate::prelude::*;
 use fewbits_densities::divergence::kl_centred_normals;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Ratios of successive standard deviations; 0.96 is printed, 0.97 is meant.
-    #[garde(length(min = 1), inner(range(min = 0.5, max = 2.0)))]
-    ratio: Vec<f64>,
-    /// Steps.
-    #[garde(range(min = 2, max = 1000))]
-    steps: u32,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            ratio: vec![0.97, 0.96],
-            steps: 20,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Ratios of successive standard deviations; 0.96 is printed, 0.97 is meant.
+        #[garde(length(min = 1), inner(range(min = 0.5, max = 2.0)))]
+        ratio: Vec<f64> = vec![0.97, 0.96],
+        /// Steps.
+        #[garde(range(min = 2, max = 1000))]
+        steps: u32 = 20,
     }
 }
 
-/// One time of one sequence.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Ratio of successive standard deviations.
-    ratio: f64,
-    /// Time.
-    t: u32,
-    /// KL from one density of the sequence to the next.
-    #[schemars(extend("unit" = "nat"))]
-    kl_step: f64,
-    /// KL from the first density to that of this time.
-    #[schemars(extend("unit" = "nat"))]
-    kl_total: f64,
-    /// KL the other way round.
-    #[schemars(extend("unit" = "nat"))]
-    kl_total_reverse: f64,
-    /// Sum of the steps' KLs.
-    #[schemars(extend("unit" = "nat"))]
-    sum_of_steps: f64,
+rows! {
+    pub struct Row {
+        /// Ratio of successive standard deviations.
+        ratio: f64,
+        /// Time.
+        t: u32,
+        /// KL from one density of the sequence to the next.
+        kl_step: f64 ["nat"],
+        /// KL from the first density to that of this time.
+        kl_total: f64 ["nat"],
+        /// KL the other way round.
+        kl_total_reverse: f64 ["nat"],
+        /// Sum of the steps' KLs.
+        sum_of_steps: f64 ["nat"],
+    }
 }
 
-/// Figure 2.
 pub struct Fig2;
 
 fn at(rows: &[Row], ratio: f64, t: u32) -> Option<&Row> {
@@ -53,18 +38,9 @@ fn at(rows: &[Row], ratio: f64, t: u32) -> Option<&Row> {
 }
 
 impl Figure for Fig2 {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "handoff-fig2",
-            title: "Small losses add up to more than their sum",
-            caption: "A Gaussian that is narrowed a little at every step. Each step loses under 0.001 nat at ratio 0.97, ten steps \
-                      lose over 0.1: the error grows with the square of time, not in proportion.",
-            source: "compressed particle filter, Section 4, Figure 2",
-        }
-    }
+    figure!(Parameters => Vec<Row>, "handoff-fig2", "Small losses add up to more than their sum", "compressed particle filter, Section 4, Figure 2",
+        "A Gaussian that is narrowed a little at every step. Each step loses under 0.001 nat at ratio 0.97, ten steps \
+         lose over 0.1: the error grows with the square of time, not in proportion.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
@@ -86,29 +62,20 @@ impl Figure for Fig2 {
     }
 
     fn claims(&self, p: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let key = |r: &Row| format!("r{}-t{}", r.ratio, r.t);
         claims.references("kl-total", "KL from the first", rows, |r| (key(r), r.kl_total));
         claims.references("kl-reverse", "KL to the first", rows, |r| (key(r), r.kl_total_reverse));
         let what = "at ratio 0.97 a step loses less than 0.001 nat";
-        claims
-            .below("step", what, at(rows, 0.97, 1).map(|r| r.kl_step), 1e-3)
-            .at_defaults();
+        here.below("step", what, at(rows, 0.97, 1).map(|r| r.kl_step), 1e-3);
         let what = "and ten steps more than 0.1 nat";
-        claims
-            .above("ten-steps", what, at(rows, 0.97, 10).map(|r| r.kl_total), 0.1)
-            .at_defaults();
+        here.above("ten-steps", what, at(rows, 0.97, 10).map(|r| r.kl_total), 0.1);
         let what = "while the ten steps' own losses sum to less than 0.01 nat";
-        claims
-            .below("sum", what, at(rows, 0.97, 10).map(|r| r.sum_of_steps), 1e-2)
-            .at_defaults();
+        here.below("sum", what, at(rows, 0.97, 10).map(|r| r.sum_of_steps), 1e-2);
         let what = "at the printed ratio 0.96 a step loses more than the printed 0.001 nat (errata handoff-1)";
-        claims
-            .above("printed-ratio", what, at(rows, 0.96, 1).map(|r| r.kl_step), 1e-3)
-            .at_defaults();
+        here.above("printed-ratio", what, at(rows, 0.96, 1).map(|r| r.kl_step), 1e-3);
         let what = "the other way round even 0.97 stays below 0.1 nat after ten steps";
-        claims
-            .below("reverse", what, at(rows, 0.97, 10).map(|r| r.kl_total_reverse), 0.1)
-            .at_defaults();
+        here.below("reverse", what, at(rows, 0.97, 10).map(|r| r.kl_total_reverse), 0.1);
         let both = |ratio: f64| {
             let (step, total) = (kl_centred_normals(1.0, ratio).ok()?, kl_centred_normals(1.0, ratio.powi(10)).ok()?);
             Some(step < 1e-3 && total > 0.1)
@@ -117,22 +84,16 @@ impl Figure for Fig2 {
         let ends = [(0.9691, false), (0.9692, true), (0.9717, true), (0.9719, false)];
         claims.all("window", what, ends, |(ratio, holds)| both(ratio) == Some(holds));
         for ratio in p.ratio.iter().filter(|r| **r < 1.0) {
-            let gaps = rows
-                .iter()
-                .filter(|r| r.ratio == *ratio && r.t > 0)
-                .map(|r| r.kl_total / r.sum_of_steps);
-            claims.increasing(
-                format!("gap-r{ratio}"),
-                "the ratio of the whole to the sum of its parts grows with time",
-                gaps,
-            );
+            let gaps = select(rows, |r| r.ratio == *ratio && r.t > 0).map(|r| r.kl_total / r.sum_of_steps);
+            let what = "the ratio of the whole to the sum of its parts grows with time";
+            claims.increasing(format!("gap-r{ratio}"), what, gaps);
         }
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
         let panel = |ratio: &f64| {
             let of = || rows.iter().filter(|r| r.ratio == *ratio && r.t > 0);
-            Panel::new(format!("ratio {ratio}"), Axis::linear("time t"), Axis::log("KL / nat"))
+            Panel::semilog(format!("ratio {ratio}"), "time t", "KL / nat")
                 .with(Layer::line("from the first density", points(of(), |r| (r.t.into(), r.kl_total))))
                 .with(Layer::dashed("to the first density", points(of(), |r| (r.t.into(), r.kl_total_reverse))))
                 .with(Layer::points("sum of the steps", points(of(), |r| (r.t.into(), r.sum_of_steps))))

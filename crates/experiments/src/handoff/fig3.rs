@@ -6,62 +6,48 @@ use fewbits_densities::quadrature::QuadratureGrid;
 use fewbits_densities::{Component, Mixture};
 use nalgebra::{Matrix1, Vector1};
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Mass of the small lobe.
-    #[garde(range(min = 1e-6, max = 0.5))]
-    mass: f64,
-    /// Centre of the small lobe of the first density.
-    #[garde(range(min = 0.6, max = 0.9))]
-    lobe: f64,
-    /// Centre of the small lobe of the second.
-    #[garde(range(min = 0.6, max = 0.9))]
-    moved_lobe: f64,
-    /// The measurement tells whether the state is above this.
-    #[garde(range(min = 0.3, max = 0.6))]
-    threshold: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            mass: 0.1,
-            lobe: 0.65,
-            moved_lobe: 0.85,
-            threshold: 0.5,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Mass of the small lobe.
+        #[garde(range(min = 1e-6, max = 0.5))]
+        mass: f64 = 0.1,
+        /// Centre of the small lobe of the first density.
+        #[garde(range(min = 0.6, max = 0.9))]
+        lobe: f64 = 0.65,
+        /// Centre of the small lobe of the second.
+        #[garde(range(min = 0.6, max = 0.9))]
+        moved_lobe: f64 = 0.85,
+        /// The measurement tells whether the state is above this.
+        #[garde(range(min = 0.3, max = 0.6))]
+        threshold: f64 = 0.5,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The two densities.
-    densities: Vec<Density>,
-    /// L1 before and after the measurement.
-    l1: Vec<Distance>,
-}
+rows! {
+    pub struct Rows {
+        /// The two densities.
+        densities: Vec<Density>,
+        /// L1 before and after the measurement.
+        l1: Vec<Distance>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Density {
-    /// State.
-    x: f64,
-    /// First density.
-    p0: f64,
-    /// Second density.
-    p1: f64,
-}
+    struct Density {
+        /// State.
+        x: f64,
+        /// First density.
+        p0: f64,
+        /// Second density.
+        p1: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Distance {
-    /// When: prior, y0, y1 (given the measurement), expected.
-    when: &'static str,
-    /// Probability of the case under the first density.
-    probability: f64,
-    /// L1 of the two densities.
-    l1: f64,
+    struct Distance {
+        /// When: prior, y0, y1 (given the measurement), expected.
+        when: &'static str,
+        /// Probability of the case under the first density.
+        probability: f64,
+        /// L1 of the two densities.
+        l1: f64,
+    }
 }
 
 impl Rows {
@@ -70,22 +56,12 @@ impl Rows {
     }
 }
 
-/// Figure 3.
 pub struct Fig3;
 
 impl Figure for Fig3 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "handoff-fig3",
-            title: "One bit turns a small error into the largest",
-            caption: "Two densities that differ in where a lobe of a tenth of the mass lies: L1 0.2. A bit that points at the lobe \
-                      makes them disjoint, L1 2; it comes with probability 0.1, so the expected error has not grown.",
-            source: "compressed particle filter, Section 4, Figure 3",
-        }
-    }
+    figure!(Parameters => Rows, "handoff-fig3", "One bit turns a small error into the largest", "compressed particle filter, Section 4, Figure 3",
+        "Two densities that differ in where a lobe of a tenth of the mass lies: L1 0.2. A bit that points at the lobe \
+         makes them disjoint, L1 2; it comes with probability 0.1, so the expected error has not grown.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let lobe = |w: f64, m: f64, s: f64| Component::new(w, Vector1::new(m), Matrix1::new(s * s));
@@ -128,28 +104,25 @@ impl Figure for Fig3 {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         claims.references("l1", "L1", &rows.l1, |d| (d.when.to_owned(), d.l1));
         claims.references("probability", "probability", &rows.l1, |d| (d.when.to_owned(), d.probability));
         let gap = rows.l1("expected").zip(rows.l1("prior")).map(|(e, p)| e - 2.0 * p);
         claims.at_most("twice", "the expected L1 is at most twice the prior's", gap, 0.0);
-        claims
-            .below("nothing", "the other answer leaves nothing of it", rows.l1("y0"), 1e-8)
-            .at_defaults();
-        claims
-            .above("largest", "one answer leaves the largest L1 there is, nearly 2", rows.l1("y1"), 1.999)
-            .at_defaults();
+        here.below("nothing", "the other answer leaves nothing of it", rows.l1("y0"), 1e-8);
+        here.above("largest", "one answer leaves the largest L1 there is, nearly 2", rows.l1("y1"), 1.999);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
-        let density = Panel::new("Two densities", Axis::linear("state x"), Axis::linear("density"))
+        let density = Panel::linear("Two densities", "state x", "density")
             .with(Layer::line("p0", points(&rows.densities, |d| (d.x, d.p0))))
             .with(Layer::line("p1", points(&rows.densities, |d| (d.x, d.p1))))
             .with(Layer::dashed("threshold", vec![(p.threshold, 0.0), (p.threshold, 7.0)]));
-        let names = rows.l1.iter().enumerate().map(|(i, d)| (i as f64, d.when.to_owned()));
+        let names = rows.l1.iter().map(|d| d.when.to_owned());
         let bars = rows.l1.iter().enumerate().map(|(i, d)| (i as f64, d.l1)).collect();
         let distance = Panel::new(
             "Error before and after the bit",
-            Axis::linear("").named(names).between(-0.6, 3.6),
+            Axis::categories("", names),
             Axis::linear("L1").between(0.0, 2.1),
         )
         .with(Layer::bars("", bars, 0.6));

@@ -3,86 +3,60 @@
 use super::world::{STAND_OFF, STEP, World};
 use crate::prelude::*;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Sensors in the field.
-    #[garde(range(min = 5, max = 10_000))]
-    sensors: usize,
-    /// Steps.
-    #[garde(range(min = 2, max = 1000))]
-    steps: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { sensors: 25, steps: 10 }
+parameters! {
+    pub struct Parameters {
+        /// Sensors in the field.
+        #[garde(range(min = 5, max = 10_000))]
+        sensors: usize = 25,
+        /// Steps.
+        #[garde(range(min = 2, max = 1000))]
+        steps: usize = 10,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The target and who leads.
-    track: Vec<Step>,
-    /// The sensors.
-    sensors: Vec<Sensor>,
+rows! {
+    pub struct Rows {
+        /// The target and who leads.
+        track: Vec<Step>,
+        /// The sensors.
+        sensors: Vec<Sensor>,
+    }
+
+    struct Step {
+        /// Time.
+        t: usize,
+        /// Position of the target.
+        x: f64 ["r0"],
+        /// Position of the target.
+        y: f64 ["r0"],
+        /// The leader; nobody leads at time 0.
+        leader: Option<usize>,
+        /// Its position.
+        leader_x: Option<f64> ["r0"],
+        /// Its position.
+        leader_y: Option<f64> ["r0"],
+        /// Its distance from the target.
+        distance: Option<f64> ["r0"],
+        /// What it read.
+        reading: Option<f64>,
+    }
+
+    struct Sensor {
+        /// Number.
+        sensor: usize,
+        /// Position.
+        x: f64 ["r0"],
+        /// Position.
+        y: f64 ["r0"],
+    }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Step {
-    /// Time.
-    t: usize,
-    /// Position of the target.
-    #[schemars(extend("unit" = "r0"))]
-    x: f64,
-    /// Position of the target.
-    #[schemars(extend("unit" = "r0"))]
-    y: f64,
-    /// The leader; nobody leads at time 0.
-    leader: Option<usize>,
-    /// Its position.
-    #[schemars(extend("unit" = "r0"))]
-    leader_x: Option<f64>,
-    /// Its position.
-    #[schemars(extend("unit" = "r0"))]
-    leader_y: Option<f64>,
-    /// Its distance from the target.
-    #[schemars(extend("unit" = "r0"))]
-    distance: Option<f64>,
-    /// What it read.
-    reading: Option<f64>,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Sensor {
-    /// Number.
-    sensor: usize,
-    /// Position.
-    #[schemars(extend("unit" = "r0"))]
-    x: f64,
-    /// Position.
-    #[schemars(extend("unit" = "r0"))]
-    y: f64,
-}
-
-/// Figure 4.
 pub struct Fig4;
 
 impl Figure for Fig4 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "handoff-fig4",
-            title: "The field, the target and its leaders",
-            caption: "One world: the target steps to the right, turning up to 45 degrees; at every step the nearest sensor that did \
-                      not just lead, and is not too near, measures and takes over the belief.",
-            source: "compressed particle filter, Section 6, Figure 4",
-        }
-    }
+    figure!(Parameters => Rows, "handoff-fig4", "The field, the target and its leaders", "compressed particle filter, Section 6, Figure 4",
+        "One world: the target steps to the right, turning up to 45 degrees; at every step the nearest sensor that did \
+         not just lead, and is not too near, measures and takes over the belief.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let world = World::draw(&mut context.stream("handoff-fig4").rng(), p.sensors, p.steps, 0.05)?;
@@ -138,20 +112,12 @@ impl Figure for Fig4 {
             .iter()
             .filter_map(|s| Some((s.leader_x?, s.leader_y? + 0.35, s.t.to_string())))
             .collect();
-        let panel = Panel::new("One world", Axis::linear("x / r0"), Axis::linear("y / r0"))
-            .with(
-                Layer::points("sensors", points(&rows.sensors, |s| (s.x, s.y)))
-                    .marked(Marker::Cross)
-                    .coloured(3),
-            )
+        let panel = Panel::linear("One world", "x / r0", "y / r0")
+            .with(Layer::points("sensors", points(&rows.sensors, |s| (s.x, s.y))).styled(3, Marker::Cross))
             .with_all(links)
             .with(Layer::line("target", track.clone()).coloured(0))
             .with(Layer::points("", track).coloured(0))
-            .with(
-                Layer::points("leaders, with their times", leads)
-                    .marked(Marker::Square)
-                    .coloured(1),
-            )
+            .with(Layer::points("leaders, with their times", leads).styled(1, Marker::Square))
             .with(Layer::texts(names));
         Plot::of(panel)
     }

@@ -4,97 +4,67 @@ use super::filters::{PARTICLES, STEPS, Smoothing, Truth, posteriors, prior, sing
 use super::world::World;
 use crate::prelude::*;
 use fewbits_densities::{Reduction, ellipse};
-use fewbits_monte_carlo::Moments;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Times shown.
-    #[garde(length(min = 1, max = 3), inner(range(min = 1, max = 10)))]
-    time: Vec<usize>,
-    /// Components of the mixture that would be sent.
-    #[garde(range(min = 1, max = 60))]
-    components: usize,
-    /// Worlds for the mean distance from a Gaussian.
-    #[garde(range(min = 2, max = 10_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            time: vec![2, 5, 8],
-            components: 5,
-            trials: 20,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Times shown.
+        #[garde(length(min = 1, max = 3), inner(range(min = 1, max = 10)))]
+        time: Vec<usize> = vec![2, 5, 8],
+        /// Components of the mixture that would be sent.
+        #[garde(range(min = 1, max = 60))]
+        components: usize = 5,
+        /// Worlds for the mean distance from a Gaussian.
+        #[garde(range(min = 2, max = 10_000))]
+        trials: u64 = 20,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The particles of one world.
-    particles: Vec<Particle>,
-    /// The components that would be sent: ellipses of half the mass.
-    ellipses: Vec<Outline>,
-    /// How far from Gaussian the beliefs are, over all worlds.
-    gaussian: Vec<Distance>,
+rows! {
+    pub struct Rows {
+        /// The particles of one world.
+        particles: Vec<Particle>,
+        /// The components that would be sent: ellipses of half the mass.
+        ellipses: Vec<Outline>,
+        /// How far from Gaussian the beliefs are, over all worlds.
+        gaussian: Vec<Distance>,
+    }
+
+    struct Particle {
+        /// Time.
+        t: usize,
+        /// Number.
+        i: usize,
+        /// Position.
+        x: f64 ["r0"],
+        /// Position.
+        y: f64 ["r0"],
+        /// Weight.
+        weight: f64,
+    }
+
+    struct Outline {
+        /// Time.
+        t: usize,
+        /// Component.
+        component: usize,
+        /// Point of the outline.
+        x: f64 ["r0"],
+        /// Point of the outline.
+        y: f64 ["r0"],
+    }
+
+    struct Distance {
+        /// KL from the estimate to the Gaussian of its moments.
+        kl: Measured ["nat"],
+    }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Particle {
-    /// Time.
-    t: usize,
-    /// Number.
-    i: usize,
-    /// Position.
-    #[schemars(extend("unit" = "r0"))]
-    x: f64,
-    /// Position.
-    #[schemars(extend("unit" = "r0"))]
-    y: f64,
-    /// Weight.
-    weight: f64,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Outline {
-    /// Time.
-    t: usize,
-    /// Component.
-    component: usize,
-    /// Point of the outline.
-    #[schemars(extend("unit" = "r0"))]
-    x: f64,
-    /// Point of the outline.
-    #[schemars(extend("unit" = "r0"))]
-    y: f64,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct Distance {
-    /// KL from the estimate to the Gaussian of its moments.
-    #[schemars(extend("unit" = "nat"))]
-    kl: Measured,
-}
-
-/// Figure 5.
 pub struct Fig5;
 
 impl Figure for Fig5 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "handoff-fig5",
-            title: "Beliefs along the way",
-            caption: "Particles of an uncompressed filter in the world of Figure 4, and the half-mass ellipses of the five Gaussians \
-                      that would travel. The beliefs are bent and far from Gaussian.",
-            source: "compressed particle filter, Section 6, Figure 5",
-        }
-    }
+    figure!(Parameters => Rows, "handoff-fig5", "Beliefs along the way", "compressed particle filter, Section 6, Figure 5",
+        "Particles of an uncompressed filter in the world of Figure 4, and the half-mass ellipses of the five Gaussians \
+         that would travel. The beliefs are bent and far from Gaussian.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let stream = context.stream("handoff-fig4");
@@ -146,31 +116,25 @@ impl Figure for Fig5 {
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let paper = claims.at_defaults().at_full_trials();
         for t in &p.time {
             let total: f64 = rows.particles.iter().filter(|r| r.t == *t).map(|r| r.weight).sum();
             claims.near(format!("weights-t{t}"), "weights sum to one", total, 1.0, 1e-9);
         }
         let distance = rows.gaussian.first().map(|d| d.kl.value);
         let what = "the beliefs are far from Gaussian: KL 0.12 nat to the Gaussian of their moments";
-        claims
-            .near("gaussian", what, distance, 0.12, 0.03)
-            .at_defaults()
-            .at_full_trials();
+        paper.near("gaussian", what, distance, 0.12, 0.03);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let panel = |t: &usize| {
-            let cloud = points(
-                rows.particles
-                    .iter()
-                    .filter(|r| r.t == *t && r.weight > 0.1 / PARTICLES as f64),
-                |r| (r.x, r.y),
-            );
+            let cloud =
+                points(select(&rows.particles, |r| r.t == *t && r.weight > 0.1 / PARTICLES as f64), |r| (r.x, r.y));
             let outlines = (0..p.components).map(|k| {
                 let outline = points(rows.ellipses.iter().filter(|r| r.t == *t && r.component == k), |r| (r.x, r.y));
                 Layer::line("", outline).coloured(1)
             });
-            Panel::new(format!("time {t}"), Axis::linear("x / r0"), Axis::linear("y / r0"))
+            Panel::linear(format!("time {t}"), "x / r0", "y / r0")
                 .with(Layer::points("particles", cloud).coloured(0))
                 .with_all(outlines)
                 .without_legend()

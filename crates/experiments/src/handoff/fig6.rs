@@ -4,75 +4,65 @@ use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, paper_cut,
 use super::world::Walk;
 use crate::prelude::*;
 use fewbits_handoff::{Accounting, Amplification, StepError};
-use fewbits_monte_carlo::{Moments, Trial};
 use std::f64::consts::LN_10;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Worlds.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { trials: 400 }
+parameters! {
+    pub struct Parameters {
+        /// Worlds.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 400 => quick 4,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Bounds against time.
-    bounds: Vec<Bound>,
-    /// Plug-in errors of a hand-over, averaged over worlds and time.
-    steps: Vec<Step>,
-    /// Bounds in the same worlds with five components, beside ten.
-    five: Vec<Bound>,
-}
+rows! {
+    pub struct Rows {
+        /// Bounds against time.
+        bounds: Vec<Bound>,
+        /// Plug-in errors of a hand-over, averaged over worlds and time.
+        steps: Vec<Step>,
+        /// Bounds in the same worlds with five components, beside ten.
+        five: Vec<Bound>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Bound {
-    /// How estimates are smoothed.
-    smoothing: &'static str,
-    /// Time.
-    t: usize,
-    /// Twice the sum of mean ML errors (ML-optimised): the printed bound of the ML.
-    ml_printed: Measured,
-    /// Twice the sum of mean DR errors: never worse.
-    ml_from_dr: f64,
-    /// Decimal logarithm of the printed KL bound with mean errors (KL-optimised).
-    log10_kl_printed: Measured,
-    /// Of its median over worlds.
-    log10_kl_median: f64,
-    /// Decimal logarithm of the corrected KL bound with mean errors.
-    log10_kl_corrected: f64,
-    /// Decimal logarithm of the printed L1 bound with mean errors (L1-optimised).
-    log10_l1_printed: Measured,
-    /// Mean of `2 tanh(sum DR/2)`, a bound of the L1 for every data sequence (ML-optimised).
-    l1_from_dr: Measured,
-    /// Mean of `phi(2 sum DR)`, a bound of the KL for every data sequence (ML-optimised).
-    kl_from_dr: Measured,
-}
+    struct Bound {
+        /// How estimates are smoothed.
+        smoothing: &'static str,
+        /// Time.
+        t: usize,
+        /// Twice the sum of mean ML errors (ML-optimised): the printed bound of the ML.
+        ml_printed: Measured,
+        /// Twice the sum of mean DR errors: never worse.
+        ml_from_dr: f64,
+        /// Decimal logarithm of the printed KL bound with mean errors (KL-optimised).
+        log10_kl_printed: Measured,
+        /// Of its median over worlds.
+        log10_kl_median: f64,
+        /// Decimal logarithm of the corrected KL bound with mean errors.
+        log10_kl_corrected: f64,
+        /// Decimal logarithm of the printed L1 bound with mean errors (L1-optimised).
+        log10_l1_printed: Measured,
+        /// Mean of `2 tanh(sum DR/2)`, a bound of the L1 for every data sequence (ML-optimised).
+        l1_from_dr: Measured,
+        /// Mean of `phi(2 sum DR)`, a bound of the KL for every data sequence (ML-optimised).
+        kl_from_dr: Measured,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Step {
-    /// How estimates are smoothed.
-    smoothing: &'static str,
-    /// What the reduction keeps small.
-    method: &'static str,
-    /// ML at the centres.
-    ml: Measured,
-    /// KL at the centres.
-    kl: Measured,
-    /// L1 at the centres.
-    l1: Measured,
-    /// DR at the centres.
-    dr: Measured,
-    /// Components sent.
-    size: Measured,
+    struct Step {
+        /// How estimates are smoothed.
+        smoothing: &'static str,
+        /// What the reduction keeps small.
+        method: &'static str,
+        /// ML at the centres.
+        ml: Measured,
+        /// KL at the centres.
+        kl: Measured,
+        /// L1 at the centres.
+        l1: Measured,
+        /// DR at the centres.
+        dr: Measured,
+        /// Components sent.
+        size: Measured,
+    }
 }
 
 /// Figure 6(a) or (b).
@@ -262,15 +252,8 @@ impl Figure for Fig6 {
         }
     }
 
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 4;
-    }
-
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: 0.1 * p.trials as f64,
-            bytes: 5e3 * p.trials as f64,
-        }
+        Cost::new(0.1 * p.trials as f64, 5e3 * p.trials as f64)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
@@ -297,38 +280,19 @@ impl Figure for Fig6 {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let key = |s: &Step| format!("{}-{}", s.smoothing, s.method);
-        claims
-            .references("ml", "mean ML of a hand-over", &rows.steps, |s| (key(s), s.ml))
-            .at_full_trials();
-        claims
-            .references("kl", "mean KL of a hand-over", &rows.steps, |s| (key(s), s.kl))
-            .at_full_trials();
-        claims
-            .references("l1", "mean L1 of a hand-over", &rows.steps, |s| (key(s), s.l1))
-            .at_full_trials();
-        claims
-            .references("dr", "mean DR of a hand-over", &rows.steps, |s| (key(s), s.dr))
-            .at_full_trials();
-        claims
-            .references("size", "components sent", &rows.steps, |s| (key(s), s.size))
-            .at_full_trials();
+        full.references("ml", "mean ML of a hand-over", &rows.steps, |s| (key(s), s.ml));
+        full.references("kl", "mean KL of a hand-over", &rows.steps, |s| (key(s), s.kl));
+        full.references("l1", "mean L1 of a hand-over", &rows.steps, |s| (key(s), s.l1));
+        full.references("dr", "mean DR of a hand-over", &rows.steps, |s| (key(s), s.dr));
+        full.references("size", "components sent", &rows.steps, |s| (key(s), s.size));
         let at = |b: &Bound| format!("{}-t{}", b.smoothing, b.t);
-        claims
-            .references("ml-bound", "printed ML bound", &rows.bounds, |b| (at(b), b.ml_printed))
-            .at_full_trials();
-        claims
-            .references("log10-kl", "logarithm of the printed KL bound", &rows.bounds, |b| (at(b), b.log10_kl_printed))
-            .at_full_trials();
-        claims
-            .references("log10-l1", "logarithm of the printed L1 bound", &rows.bounds, |b| (at(b), b.log10_l1_printed))
-            .at_full_trials();
-        claims
-            .references("l1-from-dr", "L1 bound from DR", &rows.bounds, |b| (at(b), b.l1_from_dr))
-            .at_full_trials();
-        claims
-            .references("kl-from-dr", "KL bound from DR", &rows.bounds, |b| (at(b), b.kl_from_dr))
-            .at_full_trials();
+        full.references("ml-bound", "printed ML bound", &rows.bounds, |b| (at(b), b.ml_printed));
+        full.references("log10-kl", "logarithm of the printed KL bound", &rows.bounds, |b| (at(b), b.log10_kl_printed));
+        full.references("log10-l1", "logarithm of the printed L1 bound", &rows.bounds, |b| (at(b), b.log10_l1_printed));
+        full.references("l1-from-dr", "L1 bound from DR", &rows.bounds, |b| (at(b), b.l1_from_dr));
+        full.references("kl-from-dr", "KL bound from DR", &rows.bounds, |b| (at(b), b.kl_from_dr));
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
             let under = rows.under(smoothing);
             let name = smoothing.name();
@@ -338,9 +302,7 @@ impl Figure for Fig6 {
                 .collect();
             let mean = increments.iter().copied().collect::<Moments>().mean();
             let what = "the ML bound grows by the same amount at every step, within 25 %";
-            claims
-                .all(format!("{name}-linear"), what, &increments, |d| (d / mean - 1.0).abs() < 0.25)
-                .at_full_trials();
+            full.all(format!("{name}-linear"), what, &increments, |d| (d / mean - 1.0).abs() < 0.25);
             let what = "at time 1 the KL bound is the smallest and the ML bound the largest";
             claims.all(format!("{name}-first"), what, under.first(), |b| {
                 b.log10_kl_printed.value < b.log10_l1_printed.value
@@ -354,12 +316,8 @@ impl Figure for Fig6 {
             }
             let slope =
                 |log: fn(&Bound) -> f64| Some((log(under.last()?) - log(under.first()?)) / (under.len() as f64 - 1.0));
-            let gap = slope(|b| b.log10_kl_printed.value)
-                .zip(slope(|b| b.log10_l1_printed.value))
-                .map(|(kl, l1)| kl - l1);
-            claims
-                .below(format!("{name}-slopes"), "the KL bound grows more slowly than the L1 bound", gap, 0.0)
-                .at_full_trials();
+            let gap = minus(slope(|b| b.log10_kl_printed.value), slope(|b| b.log10_l1_printed.value));
+            full.below(format!("{name}-slopes"), "the KL bound grows more slowly than the L1 bound", gap, 0.0);
             let what = "the DR bound of the ML is never above the printed one, and the corrected KL bound never below";
             claims.all(format!("{name}-tight"), what, &under, |b| {
                 b.ml_from_dr <= b.ml_printed.value
@@ -369,27 +327,21 @@ impl Figure for Fig6 {
         }
         if !rows.five.is_empty() {
             let what = "in the same worlds every bound is smaller with ten components than with five, at every time";
-            claims
-                .all("ten-below-five", what, rows.bounds.iter().zip(&rows.five), |(ten, five)| {
-                    ten.ml_printed.value < five.ml_printed.value
-                        && ten.log10_kl_printed.value < five.log10_kl_printed.value
-                        && ten.log10_kl_corrected < five.log10_kl_corrected
-                        && ten.log10_l1_printed.value < five.log10_l1_printed.value
-                        && ten.kl_from_dr.value < five.kl_from_dr.value
-                        && ten.l1_from_dr.value < five.l1_from_dr.value
-                })
-                .at_full_trials();
+            full.all("ten-below-five", what, rows.bounds.iter().zip(&rows.five), |(ten, five)| {
+                ten.ml_printed.value < five.ml_printed.value
+                    && ten.log10_kl_printed.value < five.log10_kl_printed.value
+                    && ten.log10_kl_corrected < five.log10_kl_corrected
+                    && ten.log10_l1_printed.value < five.log10_l1_printed.value
+                    && ten.kl_from_dr.value < five.kl_from_dr.value
+                    && ten.l1_from_dr.value < five.l1_from_dr.value
+            });
         }
         let preset = rows.under(Smoothing::Preset);
         let (kl, l1) = if self.components == 5 { (4.0, 2.0) } else { (7.0, 3.0) };
         let what = "the KL bound is below the ML bound up to this time";
-        claims
-            .near("kl-useful", what, useful(&preset, |b| b.log10_kl_printed.value), kl, 1.0)
-            .at_full_trials();
+        full.near("kl-useful", what, useful(&preset, |b| b.log10_kl_printed.value), kl, 1.0);
         let what = "the L1 bound is below the ML bound up to this time";
-        claims
-            .near("l1-useful", what, useful(&preset, |b| b.log10_l1_printed.value), l1, 1.0)
-            .at_full_trials();
+        full.near("l1-useful", what, useful(&preset, |b| b.log10_l1_printed.value), l1, 1.0);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
@@ -408,11 +360,7 @@ impl Figure for Fig6 {
             .with(Layer::dashed("KL, corrected", of(|b| b.log10_kl_corrected)))
             .with(Layer::line("L1, printed", of(|b| b.log10_l1_printed.value)))
             .with(Layer::measured("KL from DR", &under, |b| (b.t as f64, b.kl_from_dr)))
-            .with(
-                Layer::measured("L1 from DR", &under, |b| (b.t as f64, b.l1_from_dr))
-                    .coloured(6)
-                    .marked(Marker::Triangle),
-            )
+            .with(Layer::measured("L1 from DR", &under, |b| (b.t as f64, b.l1_from_dr)).styled(6, Marker::Triangle))
         };
         Plot::grid(2, vec![panel(Smoothing::Preset), panel(Smoothing::Silverman)])
     }

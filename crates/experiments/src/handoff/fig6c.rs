@@ -8,85 +8,63 @@ use crate::prelude::*;
 use fewbits_core::Columns;
 use fewbits_densities::{KernelEstimate, Mixture, Particles};
 use fewbits_handoff::{HandoffFilter, StepError, Whole};
-use fewbits_monte_carlo::{Moments, Stream, Trial};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Components sent.
-    #[garde(range(min = 1, max = 100))]
-    components: usize,
-    /// Points of the reference at which densities are compared.
-    #[garde(range(min = 2, max = 2000))]
-    points: usize,
-    /// Worlds.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            components: 5,
-            points: 250,
-            trials: 500,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Components sent.
+        #[garde(range(min = 1, max = 100))]
+        components: usize = 5,
+        /// Points of the reference at which densities are compared.
+        #[garde(range(min = 2, max = 2000))]
+        points: usize = 250,
+        /// Worlds.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 500 => quick 4,
     }
 }
 
-/// One time of one method.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Time.
-    t: usize,
-    /// What is handed on: a cut by ml, kl or l1; the estimate (kde_only); particles (raw_pf); one Gaussian (gauss).
-    method: &'static str,
-    /// KL from one reference filter to the method, less that to the other reference filter.
-    #[schemars(extend("unit" = "nat"))]
-    kl_increase: Measured,
-    /// Median over worlds.
-    #[schemars(extend("unit" = "nat"))]
-    median: f64,
-    /// The same before the step's own reduction.
-    #[schemars(extend("unit" = "nat"))]
-    before_reduction: Option<Measured>,
-}
+rows! {
+    pub struct Row {
+        /// Time.
+        t: usize,
+        /// What is handed on: a cut by ml, kl or l1; the estimate (kde_only); particles (raw_pf); one Gaussian (gauss).
+        method: &'static str,
+        /// KL from one reference filter to the method, less that to the other reference filter.
+        kl_increase: Measured ["nat"],
+        /// Median over worlds.
+        median: f64 ["nat"],
+        /// The same before the step's own reduction.
+        before_reduction: Option<Measured> ["nat"],
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// The actual error.
-    error: Vec<Row>,
-    /// Paired differences.
-    difference: Vec<Difference>,
-    /// Bounds in the same worlds.
-    bounds: Vec<Unamplified>,
-}
+    pub struct Rows {
+        /// The actual error.
+        error: Vec<Row>,
+        /// Paired differences.
+        difference: Vec<Difference>,
+        /// Bounds in the same worlds.
+        bounds: Vec<Unamplified>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Unamplified {
-    /// Time.
-    t: usize,
-    /// Sum of the KL errors of all hand-overs (KL-optimised): the printed KL bound if nothing were amplified.
-    #[schemars(extend("unit" = "nat"))]
-    kl_sum: Measured,
-    /// Twice the sum of the ML errors (ML-optimised): the printed ML bound, which bounds the KL as well.
-    #[schemars(extend("unit" = "nat"))]
-    ml_bound: Measured,
-}
+    struct Unamplified {
+        /// Time.
+        t: usize,
+        /// Sum of the KL errors of all hand-overs (KL-optimised): the printed KL bound if nothing were amplified.
+        kl_sum: Measured ["nat"],
+        /// Twice the sum of the ML errors (ML-optimised): the printed ML bound, which bounds the KL as well.
+        ml_bound: Measured ["nat"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Difference {
-    /// Time.
-    t: usize,
-    /// Which.
-    pair: &'static str,
-    /// Difference of their errors, world by world.
-    #[schemars(extend("unit" = "nat"))]
-    kl: Measured,
+    struct Difference {
+        /// Time.
+        t: usize,
+        /// Which.
+        pair: &'static str,
+        /// Difference of their errors, world by world.
+        kl: Measured ["nat"],
+    }
 }
 
 const METHODS: [&str; 6] = ["ml", "kl", "l1", "kde_only", "raw_pf", "gauss"];
@@ -199,41 +177,21 @@ fn trial(p: &Parameters, it: Trial) -> Result<Vec<Moment>, Error> {
     Ok(run)
 }
 
-/// Figure 6(c).
 pub struct Fig6c;
 
 impl Rows {
     fn at(&self, t: usize, method: &str) -> Option<Measured> {
-        self.error
-            .iter()
-            .find(|r| r.t == t && r.method == method)
-            .map(|r| r.kl_increase)
+        first(&self.error, |r| r.t == t && r.method == method).map(|r| r.kl_increase)
     }
 }
 
 impl Figure for Fig6c {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "handoff-fig6c",
-            title: "The actual error",
-            caption: "KL from a reference filter of 2000 particles, less that to an independent copy of it. The three criteria are \
-                      close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.",
-            source: "compressed particle filter, Section 6, Figure 6(c)",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 4;
-    }
+    figure!(Parameters => Rows, "handoff-fig6c", "The actual error", "compressed particle filter, Section 6, Figure 6(c)",
+        "KL from a reference filter of 2000 particles, less that to an independent copy of it. The three criteria are \
+         close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.");
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: 0.2 * p.trials as f64,
-            bytes: 2e3 * p.trials as f64,
-        }
+        Cost::new(0.2 * p.trials as f64, 2e3 * p.trials as f64)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
@@ -281,28 +239,21 @@ impl Figure for Fig6c {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims
-            .references("kl", "actual error", &rows.error, |r| (format!("{}-t{}", r.method, r.t), r.kl_increase))
-            .at_full_trials();
+        let (here, full) = (claims.at_defaults(), claims.at_full_trials());
+        let paper = here.at_full_trials();
+        full.references("kl", "actual error", &rows.error, |r| (format!("{}-t{}", r.method, r.t), r.kl_increase));
         let before = rows.error.iter().filter_map(|r| Some((r, r.before_reduction?)));
-        claims
-            .references("before", "error before the reduction", before, |(r, m)| (format!("{}-t{}", r.method, r.t), m))
-            .at_full_trials();
-        claims
-            .references("difference", "paired difference", &rows.difference, |d| (format!("{}-t{}", d.pair, d.t), d.kl))
-            .at_full_trials();
+        full.references("before", "error before the reduction", before, |(r, m)| (format!("{}-t{}", r.method, r.t), m));
+        full.references("difference", "paired difference", &rows.difference, |d| {
+            (format!("{}-t{}", d.pair, d.t), d.kl)
+        });
         let pair = |pair: &'static str| rows.difference.iter().filter(move |d| d.pair == pair);
         let what = "ML is behind KL at every time";
-        claims
-            .all("ml-behind", what, pair("ml-kl"), |d| d.kl.value > 0.0)
-            .at_full_trials()
-            .at_defaults();
+        paper.all("ml-behind", what, pair("ml-kl"), |d| d.kl.value > 0.0);
         let what = "KL and L1 are the same within 0.015 nat and three standard errors";
-        claims
-            .all("kl-l1", what, pair("kl-l1"), |d| {
-                d.kl.value.abs() < 0.015 + 3.0 * d.kl.standard_error.unwrap_or(0.0)
-            })
-            .at_defaults();
+        here.all("kl-l1", what, pair("kl-l1"), |d| {
+            d.kl.value.abs() < 0.015 + 3.0 * d.kl.standard_error.unwrap_or(0.0)
+        });
         let worst = (1..=STEPS).filter_map(|t| {
             let gauss = rows.at(t, "gauss")?.value;
             Some(
@@ -311,10 +262,7 @@ impl Figure for Fig6c {
                     .all(|m| rows.at(t, m).is_some_and(|v| v.value < gauss)),
             )
         });
-        claims
-            .all("gauss-worst", "one Gaussian is worst at every time", worst, |w| w)
-            .at_full_trials()
-            .at_defaults();
+        paper.all("gauss-worst", "one Gaussian is worst at every time", worst, |w| w);
         let bound = |t: usize| rows.bounds.iter().find(|b| b.t == t);
         for (t, least) in [(2, 1.5), (10, 3.0)] {
             let ratio = bound(t)
@@ -322,28 +270,16 @@ impl Figure for Fig6c {
                 .map(|(b, error)| b.kl_sum.value / error.value);
             let what =
                 format!("even with nothing amplified the KL bound at time {t} is {least} times the error or more");
-            claims
-                .at_least(format!("kl-bound-t{t}"), what, ratio, least)
-                .at_full_trials()
-                .at_defaults();
+            paper.at_least(format!("kl-bound-t{t}"), what, ratio, least);
         }
         let ratio = bound(10)
             .zip(rows.at(10, "ml"))
             .map(|(b, error)| b.ml_bound.value / error.value);
         let what = "at time 10 the ML bound is about two hundred times the error of the ML-optimised cut";
-        claims
-            .near("ml-bound-t10", what, ratio, 200.0, 80.0)
-            .at_full_trials()
-            .at_defaults();
+        paper.near("ml-bound-t10", what, ratio, 200.0, 80.0);
         let what = "smoothing, not reduction, makes most of the error: the estimate alone is above 0.7 of KL";
-        let share = rows
-            .at(10, "kde_only")
-            .zip(rows.at(10, "kl"))
-            .map(|(a, b)| a.value / b.value);
-        claims
-            .above("smoothing", what, share, 0.7)
-            .at_full_trials()
-            .at_defaults();
+        let share = over(rows.at(10, "kde_only"), rows.at(10, "kl"));
+        paper.above("smoothing", what, share, 0.7);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
@@ -357,7 +293,7 @@ impl Figure for Fig6c {
             Layer::line("", of.map(|r| (r.t as f64, r.kl_increase.value)).collect()).coloured(i)
         });
         let sums = points(&rows.bounds, |b| (b.t as f64, b.kl_sum.value));
-        let panel = Panel::new("Five components", Axis::linear("hand-overs t"), Axis::linear("KL increase / nat"))
+        let panel = Panel::linear("Five components", "hand-overs t", "KL increase / nat")
             .with_all(lines)
             .with_all(layers)
             .with(Layer::dashed("KL bound, not amplified", sums).coloured(6));

@@ -5,82 +5,51 @@ use crate::prelude::*;
 use fewbits_core::Message;
 use fewbits_densities::wire::{CodedMixture, WireFormat};
 use fewbits_densities::{Bandwidth, Criterion, KernelEstimate, Mixture, Reduction};
-use fewbits_monte_carlo::Moments;
 use nalgebra::Vector2;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Components.
-    #[garde(length(min = 1), inner(range(min = 1, max = 60)))]
-    components: Vec<usize>,
-    /// Resolutions: quantiser steps in standard deviations.
-    #[garde(length(min = 1), inner(range(min = 0.01, max = 1.0)))]
-    resolution: Vec<f64>,
-    /// Worlds, of three beliefs each.
-    #[garde(range(min = 2, max = 10_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            components: vec![1, 3, 5, 10],
-            resolution: vec![0.5, 0.35, 0.25, 0.15],
-            trials: 12,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Components.
+        #[garde(length(min = 1), inner(range(min = 1, max = 60)))]
+        components: Vec<usize> = vec![1, 3, 5, 10],
+        /// Resolutions: quantiser steps in standard deviations.
+        #[garde(length(min = 1), inner(range(min = 0.01, max = 1.0)))]
+        resolution: Vec<f64> = vec![0.5, 0.35, 0.25, 0.15],
+        /// Worlds, of three beliefs each.
+        #[garde(range(min = 2, max = 10_000))]
+        trials: u64 = 12 => quick 2,
     }
 }
 
-/// One kind of message.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// What is sent: coded, f32 (mixture parameters as floats), coded-kd (a cut by KL, coded), particles (f32, resampled).
-    message: &'static str,
-    /// Components, or particles.
-    size: usize,
-    /// Quantiser step in standard deviations, if coded.
-    resolution: Option<f64>,
-    /// Mean length.
-    #[schemars(extend("unit" = "bit"))]
-    bits: Measured,
-    /// KL from the estimate to what the receiver knows.
-    #[schemars(extend("unit" = "nat"))]
-    kl: Measured,
+rows! {
+    pub struct Row {
+        /// What is sent: coded, f32 (mixture parameters as floats), coded-kd (a cut by KL, coded), particles (f32, resampled).
+        message: &'static str,
+        /// Components, or particles.
+        size: usize,
+        /// Quantiser step in standard deviations, if coded.
+        resolution: Option<f64>,
+        /// Mean length.
+        bits: Measured ["bit"],
+        /// KL from the estimate to what the receiver knows.
+        kl: Measured ["nat"],
+    }
 }
 
 /// Bits against error.
 pub struct Rate;
 
 fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
-    rows.iter()
-        .find(|r| r.message == message && r.size == size && r.resolution == resolution)
+    first(rows, |r| r.message == message && r.size == size && r.resolution == resolution)
 }
 
 impl Figure for Rate {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "handoff-rate",
-            title: "What bits buy",
-            caption: "KL from the estimate to what the receiver decodes against the length of the message. Coded mixtures need a \
-                      seventh of the bits of their parameters as floats, and a hundredth of those of particles.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 2;
-    }
+    figure!(Parameters => Vec<Row>, "handoff-rate", "What bits buy", "our own comparison",
+        "KL from the estimate to what the receiver decodes against the length of the message. Coded mixtures need a \
+         seventh of the bits of their parameters as floats, and a hundredth of those of particles.");
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: p.trials as f64,
-            bytes: 1e6 * p.trials as f64,
-        }
+        Cost::new(p.trials as f64, 1e6 * p.trials as f64)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
@@ -92,10 +61,10 @@ impl Figure for Rate {
             .collect::<Result<_, _>>()?;
         let coded = |mixture: &Mixture<2>, format: &WireFormat<2>, truth: &Truth| -> Result<[f64; 2], Error> {
             let message = CodedMixture::new(mixture, format, 0)?;
-            let bits = message.to_bits(format).map_err(Error::failed)?.bits();
+            let bits = message.to_bits(format)?.bits();
             Ok([bits as f64, truth.kl(message.mixture())])
         };
-        let one = |it: fewbits_monte_carlo::Trial| -> Result<Vec<[f64; 2]>, Error> {
+        let one = |it: Trial| -> Result<Vec<[f64; 2]>, Error> {
             let mut sums: Vec<[f64; 2]> = Vec::new();
             let estimates = posteriors(it.stream, &[2, 5, 8])?;
             for estimate in &estimates {
@@ -150,49 +119,27 @@ impl Figure for Rate {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         let key = |r: &Row| {
             let resolution = r.resolution.map_or(String::new(), |r| format!("-r{r}"));
             format!("{}-{}{resolution}", r.message, r.size)
         };
         claims.references("bits", "length", rows, |r| (key(r), r.bits));
         claims.references("kl", "KL", rows, |r| (key(r), r.kl));
-        let share = find(rows, "coded", 5, Some(0.25))
-            .zip(find(rows, "f32", 5, None))
-            .map(|(c, f)| c.bits.value / f.bits.value);
-        claims
-            .at_most("sixth", "five coded components take at most a sixth of the bits of floats", share, 1.0 / 6.0)
-            .at_defaults();
-        let share = find(rows, "coded", 10, Some(0.15))
-            .zip(find(rows, "particles", 500, None))
-            .map(|(c, f)| c.bits.value / f.bits.value);
-        claims
-            .at_most("hundredth", "ten take at most a hundredth of the bits of 500 particles", share, 0.01)
-            .at_defaults();
-        let gap = find(rows, "coded", 10, Some(0.15))
-            .zip(find(rows, "particles", 100, None))
-            .map(|(c, f)| c.kl.value - f.kl.value);
-        claims
-            .below("particles", "and lose less than 100 particles", gap, 0.0)
-            .at_full_trials()
-            .at_defaults();
+        let bits = |message: &str, size, step| find(rows, message, size, step).map(|r| r.bits);
+        let kl = |message: &str, size, step| find(rows, message, size, step).map(|r| r.kl);
+        let share = over(bits("coded", 5, Some(0.25)), bits("f32", 5, None));
+        here.at_most("sixth", "five coded components take at most a sixth of the bits of floats", share, 1.0 / 6.0);
+        let share = over(bits("coded", 10, Some(0.15)), bits("particles", 500, None));
+        here.at_most("hundredth", "ten take at most a hundredth of the bits of 500 particles", share, 0.01);
+        let gap = minus(kl("coded", 10, Some(0.15)), kl("particles", 100, None));
+        paper.below("particles", "and lose less than 100 particles", gap, 0.0);
         for m in [3, 5, 10] {
-            let by = [0.35, 0.25, 0.15].map(|r| find(rows, "coded", m, Some(r)).map(|r| r.kl.value));
-            claims
-                .decreasing(format!("finer-m{m}"), "finer steps lose less", by)
-                .at_full_trials()
-                .at_defaults();
-            let gap = find(rows, "coded", m, Some(0.15))
-                .zip(find(rows, "coded-kd", m, Some(0.15)))
-                .map(|(a, b)| a.kl.value - b.kl.value);
-            claims
-                .below(
-                    format!("pipeline-m{m}"),
-                    "at the same bits the pipeline loses less than the paper's cut",
-                    gap,
-                    0.0,
-                )
-                .at_full_trials()
-                .at_defaults();
+            let by = [0.35, 0.25, 0.15].map(|r| kl("coded", m, Some(r)).map(|kl| kl.value));
+            paper.decreasing(format!("finer-m{m}"), "finer steps lose less", by);
+            let gap = minus(kl("coded", m, Some(0.15)), kl("coded-kd", m, Some(0.15)));
+            let what = "at the same bits the pipeline loses less than the paper's cut";
+            paper.below(format!("pipeline-m{m}"), what, gap, 0.0);
         }
     }
 
@@ -208,7 +155,7 @@ impl Figure for Rate {
             .iter()
             .enumerate()
             .map(|(i, m)| Layer::line(format!("coded, {m} components"), of("coded", *m)).coloured(i));
-        let panel = Panel::new("One belief", Axis::log("message / bit"), Axis::log("KL / nat"))
+        let panel = Panel::loglog("One belief", "message / bit", "KL / nat")
             .with_all(layers)
             .with(Layer::dashed("mixture as floats", all("f32")).coloured(5))
             .with(Layer::points("particles as floats", all("particles")).coloured(6));

@@ -5,61 +5,45 @@ use crate::prelude::*;
 use fewbits_densities::merge::{MergeCost, merge};
 use fewbits_densities::tree::{At, Axis as SplitAxis};
 use fewbits_densities::{Criterion, KernelEstimate, Mixture, Reduction, Split};
-use fewbits_monte_carlo::Moments;
 use std::time::Instant;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Components.
-    #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
-    components: Vec<usize>,
-    /// Worlds, of three beliefs each.
-    #[garde(range(min = 2, max = 10_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            components: vec![3, 5, 10, 20],
-            trials: 10,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Components.
+        #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
+        components: Vec<usize> = vec![3, 5, 10, 20],
+        /// Worlds, of three beliefs each.
+        #[garde(range(min = 2, max = 10_000))]
+        trials: u64 = 10 => quick 2,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Errors.
-    errors: Vec<Row>,
-    /// What the methods cost.
-    #[schemars(extend("volatile" = true))]
-    cost: Vec<Time>,
-}
+rows! {
+    pub struct Rows {
+        /// Errors.
+        errors: Vec<Row>,
+        /// What the methods cost.
+        #[schemars(extend("volatile" = true))]
+        cost: Vec<Time>,
+    }
 
-/// One method.
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Method.
-    method: &'static str,
-    /// The most components.
-    components: usize,
-    /// KL from the estimate to the mixture, by quadrature.
-    #[schemars(extend("unit" = "nat"))]
-    kl: Measured,
-}
+    struct Row {
+        /// Method.
+        method: &'static str,
+        /// The most components.
+        components: usize,
+        /// KL from the estimate to the mixture, by quadrature.
+        kl: Measured ["nat"],
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Time {
-    /// Method.
-    method: &'static str,
-    /// The most components.
-    components: usize,
-    /// Time of one reduction, the mean of all.
-    #[schemars(extend("unit" = "ms"))]
-    milliseconds: f64,
+    struct Time {
+        /// Method.
+        method: &'static str,
+        /// The most components.
+        components: usize,
+        /// Time of one reduction, the mean of all.
+        milliseconds: f64 ["ms"],
+    }
 }
 
 /// The methods by name.
@@ -132,45 +116,26 @@ pub struct Reductions;
 
 impl Rows {
     fn kl(&self, method: &str, components: usize) -> Option<f64> {
-        self.errors
-            .iter()
-            .find(|r| r.method == method && r.components == components)
-            .map(|r| r.kl.value)
+        first(&self.errors, |r| r.method == method && r.components == components).map(|r| r.kl.value)
     }
 }
 
 impl Figure for Reductions {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "handoff-reduction",
-            title: "What a reduction loses",
-            caption: "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
-                      2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 2;
-    }
+    figure!(Parameters => Rows, "handoff-reduction", "What a reduction loses", "our own comparison",
+        "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
+         2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.");
 
     fn measures_time(&self) -> bool {
         true
     }
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: 2.0 * p.trials as f64,
-            bytes: 1e6 * p.trials as f64,
-        }
+        Cost::new(2.0 * p.trials as f64, 1e6 * p.trials as f64)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let methods = methods();
-        let one = |it: fewbits_monte_carlo::Trial| -> Result<Vec<(f64, f64)>, Error> {
+        let one = |it: Trial| -> Result<Vec<(f64, f64)>, Error> {
             let mut all = vec![(0.0, 0.0); methods.len() * p.components.len()];
             let estimates = posteriors(it.stream, &[2, 5, 8])?;
             for estimate in &estimates {
@@ -213,39 +178,23 @@ impl Figure for Reductions {
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
-        claims
-            .references("kl", "KL", &rows.errors, |r| (format!("{}-m{}", r.method, r.components), r.kl))
-            .at_full_trials();
+        let (full, paper) = (claims.at_full_trials(), claims.at_defaults().at_full_trials());
+        full.references("kl", "KL", &rows.errors, |r| (format!("{}-m{}", r.method, r.components), r.kl));
         for m in p.components.iter().filter(|m| **m >= 3) {
-            let ratio = rows.kl("pipeline 15", *m).zip(rows.kl("kd kl", *m)).map(|(a, b)| a / b);
+            let ratio = over(rows.kl("pipeline 15", *m), rows.kl("kd kl", *m));
             let what = "the recommended pipeline loses at most 0.65 of what the paper's cut does";
-            claims
-                .at_most(format!("pipeline-m{m}"), what, ratio, 0.65)
-                .at_full_trials()
-                .at_defaults();
-            let gap = rows.kl("kd kl", *m).zip(rows.kl("kd ml", *m)).map(|(a, b)| a - b);
-            claims
-                .below(format!("ml-worst-m{m}"), "cuts by ML lose more than cuts by KL", gap, 0.0)
-                .at_full_trials()
-                .at_defaults();
-            let gap = rows
-                .kl("principal kl", *m)
-                .zip(rows.kl("alternating kl", *m))
-                .map(|(a, b)| a - b);
+            paper.at_most(format!("pipeline-m{m}"), what, ratio, 0.65);
+            let gap = minus(rows.kl("kd kl", *m), rows.kl("kd ml", *m));
+            paper.below(format!("ml-worst-m{m}"), "cuts by ML lose more than cuts by KL", gap, 0.0);
+            let gap = minus(rows.kl("principal kl", *m), rows.kl("alternating kl", *m));
             // With three components the difference is below its standard error.
             if *m >= 5 {
                 let what = "alternating axes lose more than principal axes";
-                claims
-                    .below(format!("alternating-m{m}"), what, gap, 0.0)
-                    .at_full_trials()
-                    .at_defaults();
+                paper.below(format!("alternating-m{m}"), what, gap, 0.0);
             }
         }
         let more = p.components.iter().map(|m| rows.kl("pipeline 15", *m));
-        claims
-            .decreasing("more", "more components lose less", more)
-            .at_full_trials()
-            .at_defaults();
+        paper.decreasing("more", "more components lose less", more);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
@@ -253,8 +202,7 @@ impl Figure for Reductions {
             let of = rows.errors.iter().filter(|r| r.method == method);
             Layer::measured(super::title(method), of, |r| (r.components as f64, r.kl)).coloured(i)
         });
-        let panel =
-            Panel::new("KL of the reduced mixture", Axis::log("components M"), Axis::log("KL / nat")).with_all(layers);
+        let panel = Panel::loglog("KL of the reduced mixture", "components M", "KL / nat").with_all(layers);
         Plot::of(panel)
     }
 }

@@ -5,166 +5,145 @@ use crate::prelude::*;
 use fewbits_quantizer_design::design::{self, Discovery};
 use fewbits_quantizer_design::{Channel, Criterion, Newton, Quantizer, SensorGroup, System, bounds};
 
-/// Settings of the searches.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Random starts among contiguous quantizers.
-    #[garde(range(min = 1, max = 10_000))]
-    contiguous_starts: usize,
-    /// Random label sequences among folded quantizers.
-    #[garde(range(min = 1, max = 10_000))]
-    folded_starts: usize,
-    /// Grid cells of a sensor in that search.
-    #[garde(range(min = 16, max = 1000))]
-    grid: usize,
-    /// Crossovers at which words are compared.
-    #[garde(length(min = 1, max = 20), inner(range(min = 0.0, max = 0.45)))]
-    crossovers: Vec<f64>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            contiguous_starts: 20,
-            folded_starts: 60,
-            grid: 160,
-            crossovers: vec![0.001, 0.01, 0.05, 0.1, 0.2],
-        }
+parameters! {
+    pub struct Parameters {
+        /// Random starts among contiguous quantizers.
+        #[garde(range(min = 1, max = 10_000))]
+        contiguous_starts: usize = 20 => quick 8,
+        /// Random label sequences among folded quantizers.
+        #[garde(range(min = 1, max = 10_000))]
+        folded_starts: usize = 60 => quick 24,
+        /// Grid cells of a sensor in that search.
+        #[garde(range(min = 16, max = 1000))]
+        grid: usize = 160,
+        /// Crossovers at which words are compared.
+        #[garde(length(min = 1, max = 20), inner(range(min = 0.0, max = 0.45)))]
+        crossovers: Vec<f64> = vec![0.001, 0.01, 0.05, 0.1, 0.2],
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Best designs found.
-    searches: Vec<Search>,
-    /// Where identical quantizers lose their optimality.
-    symmetry: Vec<Threshold>,
-    /// Words for a binary symmetric channel.
-    words: Vec<Words>,
-    /// Other channels.
-    channels: Vec<Other>,
-    /// Bounds.
-    bounds: Vec<Limit>,
-    /// Iterations of each algorithm.
-    effort: Vec<Effort>,
-    /// Groups of sensors that may differ.
-    grouping: Vec<Grouping>,
-}
+rows! {
+    pub struct Rows {
+        /// Best designs found.
+        searches: Vec<Search>,
+        /// Where identical quantizers lose their optimality.
+        symmetry: Vec<Threshold>,
+        /// Words for a binary symmetric channel.
+        words: Vec<Words>,
+        /// Other channels.
+        channels: Vec<Other>,
+        /// Bounds.
+        bounds: Vec<Limit>,
+        /// Iterations of each algorithm.
+        effort: Vec<Effort>,
+        /// Groups of sensors that may differ.
+        grouping: Vec<Grouping>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Search {
-    /// Noise, correlation and levels.
-    case: &'static str,
-    /// Criterion of the design.
-    criterion: &'static str,
-    /// Contiguous cells, or any.
-    cells: &'static str,
-    /// The criterion: nats, or prior variances.
-    value: f64,
-    /// Mutual information.
-    #[schemars(extend("unit" = "nat"))]
-    mi_nats: f64,
-    /// Squared error.
-    mse: f64,
-    /// Largest eigenvalue of the Hessian.
-    curvature: f64,
-    /// Least squared error of any codes at this rate, independent noise.
-    ceo_bound: Option<f64>,
-    /// Breakpoints of sensor 1.
-    gamma1: String,
-    /// Levels of its cells.
-    labels1: String,
-    /// Breakpoints of sensor 2.
-    gamma2: String,
-    /// Levels of its cells.
-    labels2: String,
-}
+    struct Search {
+        /// Noise, correlation and levels.
+        case: &'static str,
+        /// Criterion of the design.
+        criterion: &'static str,
+        /// Contiguous cells, or any.
+        cells: &'static str,
+        /// The criterion: nats, or prior variances.
+        value: f64,
+        /// Mutual information.
+        mi_nats: f64 ["nat"],
+        /// Squared error.
+        mse: f64,
+        /// Largest eigenvalue of the Hessian.
+        curvature: f64,
+        /// Least squared error of any codes at this rate, independent noise.
+        ceo_bound: Option<f64>,
+        /// Breakpoints of sensor 1.
+        gamma1: String,
+        /// Levels of its cells.
+        labels1: String,
+        /// Breakpoints of sensor 2.
+        gamma2: String,
+        /// Levels of its cells.
+        labels2: String,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Threshold {
-    /// Noise standard deviation (no correlation) or correlation (unit noise).
-    varied: &'static str,
-    /// Criterion.
-    criterion: &'static str,
-    /// Where two sign quantizers stop being a local optimum.
-    threshold: f64,
-}
+    struct Threshold {
+        /// Noise standard deviation (no correlation) or correlation (unit noise).
+        varied: &'static str,
+        /// Criterion.
+        criterion: &'static str,
+        /// Where two sign quantizers stop being a local optimum.
+        threshold: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Words {
-    /// Crossover probability.
-    crossover: f64,
-    /// Criterion of the design.
-    criterion: &'static str,
-    /// Same words at both sensors, or mixed.
-    sensors: &'static str,
-    /// 1 is best.
-    rank: usize,
-    /// Words of the cells, left to right, sensors separated by a bar.
-    words: String,
-    /// The criterion: nats, or prior variances.
-    value: f64,
-    /// Squared error.
-    mse: f64,
-}
+    struct Words {
+        /// Crossover probability.
+        crossover: f64,
+        /// Criterion of the design.
+        criterion: &'static str,
+        /// Same words at both sensors, or mixed.
+        sensors: &'static str,
+        /// 1 is best.
+        rank: usize,
+        /// Words of the cells, left to right, sensors separated by a bar.
+        words: String,
+        /// The criterion: nats, or prior variances.
+        value: f64,
+        /// Squared error.
+        mse: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Other {
-    /// Channel of both sensors.
-    channel: &'static str,
-    /// Outer breakpoint of the joint information design.
-    outer: f64,
-    /// Mutual information.
-    #[schemars(extend("unit" = "nat"))]
-    mi_nats: f64,
-    /// Squared error.
-    mse: f64,
-}
+    struct Other {
+        /// Channel of both sensors.
+        channel: &'static str,
+        /// Outer breakpoint of the joint information design.
+        outer: f64,
+        /// Mutual information.
+        mi_nats: f64 ["nat"],
+        /// Squared error.
+        mse: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Limit {
-    /// Equal sensors in unit noise.
-    sensors: usize,
-    /// Levels of each.
-    levels: usize,
-    /// Crossover probability of the bits.
-    crossover: f64,
-    /// Least squared error of any codes within the channels' capacity.
-    ceo_bound: f64,
-    /// Van Trees bound of the design, clean channels only.
-    van_trees: Option<f64>,
-    /// Squared error of the joint design, natural words.
-    achieved: f64,
-    /// Squared error from samples.
-    unquantized: f64,
-}
+    struct Limit {
+        /// Equal sensors in unit noise.
+        sensors: usize,
+        /// Levels of each.
+        levels: usize,
+        /// Crossover probability of the bits.
+        crossover: f64,
+        /// Least squared error of any codes within the channels' capacity.
+        ceo_bound: f64,
+        /// Van Trees bound of the design, clean channels only.
+        van_trees: Option<f64>,
+        /// Squared error of the joint design, natural words.
+        achieved: f64,
+        /// Squared error from samples.
+        unquantized: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Effort {
-    /// Levels of one sensor in unit noise, from Lloyd-Max of the unknown.
-    levels: usize,
-    /// Iterations of Newton's method to 1e-12.
-    newton: usize,
-    /// Steps of alternating maximisation until within 1e-8 of the same breakpoints.
-    alternating: usize,
-}
+    struct Effort {
+        /// Levels of one sensor in unit noise, from Lloyd-Max of the unknown.
+        levels: usize,
+        /// Iterations of Newton's method to 1e-12.
+        newton: usize,
+        /// Steps of alternating maximisation until within 1e-8 of the same breakpoints.
+        alternating: usize,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Grouping {
-    /// Levels of each of nine sensors in unit noise.
-    levels: usize,
-    /// Sizes of the groups that may differ.
-    groups: String,
-    /// Criterion.
-    criterion: &'static str,
-    /// Its value at the end.
-    value: f64,
-    /// Its value with identical quantizers.
-    identical: f64,
-    /// Largest difference of the same breakpoint between groups.
-    spread: f64,
+    struct Grouping {
+        /// Levels of each of nine sensors in unit noise.
+        levels: usize,
+        /// Sizes of the groups that may differ.
+        groups: String,
+        /// Criterion.
+        criterion: &'static str,
+        /// Its value at the end.
+        value: f64,
+        /// Its value with identical quantizers.
+        identical: f64,
+        /// Largest difference of the same breakpoint between groups.
+        spread: f64,
+    }
 }
 
 /// Case, levels, noise deviation, correlation, criteria.
@@ -426,24 +405,10 @@ fn grouping() -> Result<Vec<Grouping>, Error> {
 pub struct Beyond;
 
 impl Figure for Beyond {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mi-beyond",
-            title: "Beyond the publication",
-            caption: "Levels made of several intervals beat every contiguous design found once noise is shared or small: a quarter \
-                      of the squared error at a noise of 0.3. With them: where identical quantizers lose their optimality, which \
-                      words suit which channel, bounds that no design can beat, and the iterations each algorithm takes.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.contiguous_starts = 8;
-        p.folded_starts = 24;
-    }
+    figure!(Parameters => Rows, "mi-beyond", "Beyond the publication", "",
+        "Levels made of several intervals beat every contiguous design found once noise is shared or small: a quarter \
+         of the squared error at a noise of 0.3. With them: where identical quantizers lose their optimality, which \
+         words suit which channel, bounds that no design can beat, and the iterations each algorithm takes.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         Ok(Rows {
@@ -458,6 +423,7 @@ impl Figure for Beyond {
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let found = || rows.searches.iter();
         let key = |s: &Search| format!("{} {} {}", s.case, s.criterion, s.cells);
         claims.references("value", "the best value known", found(), |s| (key(s), s.value));
@@ -480,11 +446,9 @@ impl Figure for Beyond {
                 "best words for {criterion}: Gray at small crossovers{}, three words above",
                 if criterion == "mse" { ", natural at 0.05" } else { "" }
             );
-            claims
-                .all(format!("words-{criterion}"), what, &p.crossovers, |c| {
-                    best(*c, criterion, "same").is_some_and(|w| w.words == expected(*c, criterion))
-                })
-                .at_defaults();
+            here.all(format!("words-{criterion}"), what, &p.crossovers, |c| {
+                best(*c, criterion, "same").is_some_and(|w| w.words == expected(*c, criterion))
+            });
             let sense = if criterion == "mi" { 1.0 } else { -1.0 };
             let gain = best(0.05, criterion, "mixed").zip(best(0.05, criterion, "same"));
             let what = "different words at the two sensors gain nothing at 0.05";
@@ -508,11 +472,7 @@ impl Figure for Beyond {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let of = |cells: &'static str| {
-            rows.searches
-                .iter()
-                .filter(move |s| s.criterion == "mse" && s.cells == cells)
-        };
+        let of = |cells: &'static str| select(&rows.searches, move |s| s.criterion == "mse" && s.cells == cells);
         let title = |s: &Search| {
             let words = [
                 ("noise", "noise "),
@@ -523,10 +483,7 @@ impl Figure for Beyond {
                 .iter()
                 .fold(s.case.to_owned(), |text, (code, word)| text.replace(code, word))
         };
-        let names = of("any").enumerate().map(|(i, s)| (-(i as f64), title(s)));
-        let y = Axis::linear("")
-            .named(names)
-            .between(0.6 - of("any").count() as f64, 0.6);
+        let y = Axis::ladder(of("any").map(title));
         let place = |value: fn(&Search) -> Option<f64>, cells| {
             of(cells)
                 .enumerate()

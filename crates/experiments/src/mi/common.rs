@@ -57,27 +57,27 @@ pub(super) fn breakpoints(quantizer: &Quantizer) -> String {
         .join(" ")
 }
 
-/// A design of two sensors.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub(super) struct Pair {
-    /// Breakpoints of sensor 1.
-    pub(super) gamma1: String,
-    /// Breakpoints of sensor 2.
-    pub(super) gamma2: String,
-    /// Largest breakpoint of sensor 1.
-    pub(super) outer1: f64,
-    /// Largest breakpoint of sensor 2.
-    pub(super) outer2: f64,
-    /// Mutual information between the unknown and all symbols.
-    #[schemars(extend("unit" = "nat"))]
-    pub(super) mi_nats: f64,
-    /// The same in bits.
-    #[schemars(extend("unit" = "bit"))]
-    pub(super) mi_bits: f64,
-    /// Mean squared error of the posterior mean, in prior variances.
-    pub(super) mse: f64,
-    /// Largest eigenvalue of the criterion's Hessian where it was a joint design.
-    pub(super) curvature: Option<f64>,
+rows! {
+    /// A design of two sensors.
+    #[derive(Debug, Clone)]
+    pub(super) struct Pair {
+        /// Breakpoints of sensor 1.
+        pub(super) gamma1: String,
+        /// Breakpoints of sensor 2.
+        pub(super) gamma2: String,
+        /// Largest breakpoint of sensor 1.
+        pub(super) outer1: f64,
+        /// Largest breakpoint of sensor 2.
+        pub(super) outer2: f64,
+        /// Mutual information between the unknown and all symbols.
+        pub(super) mi_nats: f64 ["nat"],
+        /// The same in bits.
+        pub(super) mi_bits: f64 ["bit"],
+        /// Mean squared error of the posterior mean, in prior variances.
+        pub(super) mse: f64,
+        /// Largest eigenvalue of the criterion's Hessian where it was a joint design.
+        pub(super) curvature: Option<f64>,
+    }
 }
 
 impl Pair {

@@ -8,54 +8,35 @@ use serde::de::DeserializeOwned;
 use std::f64::consts::LN_2;
 use std::marker::PhantomData;
 
-/// Settings of Figures 4.2 and 4.3.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Clean {
-    /// Steps of each stage.
-    #[garde(range(min = 1, max = 1000))]
-    steps: usize,
-    /// Noise standard deviation of both sensors, in prior standard deviations.
-    #[garde(range(min = 1e-2, max = 1e2))]
-    noise_sd: f64,
-}
-
-impl Default for Clean {
-    fn default() -> Self {
-        Self {
-            steps: 15,
-            noise_sd: 1.0,
-        }
+parameters! {
+    /// Settings of Figures 4.2 and 4.3.
+    pub struct Clean {
+        /// Steps of each stage.
+        #[garde(range(min = 1, max = 1000))]
+        steps: usize = 15,
+        /// Noise standard deviation of both sensors, in prior standard deviations.
+        #[garde(range(min = 1e-2, max = 1e2))]
+        noise_sd: f64 = 1.0,
     }
 }
 
-/// Settings of Figures 4.4 and 4.5.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Channels {
-    /// Steps of each stage.
-    #[garde(range(min = 1, max = 1000))]
-    steps: usize,
-    /// Crossover probabilities of the words' bits, natural words, increasing.
-    #[garde(length(min = 1, max = 8), inner(range(min = 0.0, max = 0.06)))]
-    crossovers: Vec<f64>,
-    /// Noise standard deviation of both sensors, in prior standard deviations.
-    #[garde(range(min = 1e-2, max = 1e2))]
-    noise_sd: f64,
-}
-
-impl Default for Channels {
-    fn default() -> Self {
-        Self {
-            steps: 15,
-            crossovers: vec![0.0, 0.001, 0.01, 0.05],
-            noise_sd: 1.0,
-        }
+parameters! {
+    /// Settings of Figures 4.4 and 4.5.
+    pub struct Channels {
+        /// Steps of each stage.
+        #[garde(range(min = 1, max = 1000))]
+        steps: usize = 15,
+        /// Crossover probabilities of the words' bits, natural words, increasing.
+        #[garde(length(min = 1, max = 8), inner(range(min = 0.0, max = 0.06)))]
+        crossovers: Vec<f64> = vec![0.0, 0.001, 0.01, 0.05],
+        /// Noise standard deviation of both sensors, in prior standard deviations.
+        #[garde(range(min = 1e-2, max = 1e2))]
+        noise_sd: f64 = 1.0,
     }
 }
 
 /// Steps, crossovers and noise of either setting.
-pub trait Setting: Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Default {
+pub trait Setting: Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Default + Quick {
     /// Steps, crossovers, noise.
     fn parts(&self) -> (usize, &[f64], f64);
 }
@@ -72,43 +53,38 @@ impl Setting for Channels {
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Sensor by sensor.
-    chain: Vec<Step>,
-    /// One step of each sensor in turn.
-    cyclic: Vec<Step>,
-}
+rows! {
+    pub struct Rows {
+        /// Sensor by sensor.
+        chain: Vec<Step>,
+        /// One step of each sensor in turn.
+        cyclic: Vec<Step>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Step {
-    /// Crossover probability.
-    crossover: f64,
-    /// Steps so far.
-    iteration: usize,
-    /// Sensor being designed.
-    stage: usize,
-    /// Steps in this stage.
-    iter_in_stage: usize,
-    /// Information in sensor 1's symbol.
-    #[schemars(extend("unit" = "nat"))]
-    mi_x_z1_nats: f64,
-    /// Information in both symbols.
-    #[schemars(extend("unit" = "nat"))]
-    mi_x_z1z2_nats: f64,
-    /// Information in sensor 1's symbol.
-    #[schemars(extend("unit" = "bit"))]
-    mi_x_z1_bits: f64,
-    /// Information in both symbols.
-    #[schemars(extend("unit" = "bit"))]
-    mi_x_z1z2_bits: f64,
-    /// Squared error from both symbols, in prior variances.
-    mse: f64,
-    /// Outer breakpoint of sensor 1.
-    gamma1_outer: f64,
-    /// Outer breakpoint of sensor 2.
-    gamma2_outer: f64,
+    struct Step {
+        /// Crossover probability.
+        crossover: f64,
+        /// Steps so far.
+        iteration: usize,
+        /// Sensor being designed.
+        stage: usize,
+        /// Steps in this stage.
+        iter_in_stage: usize,
+        /// Information in sensor 1's symbol.
+        mi_x_z1_nats: f64 ["nat"],
+        /// Information in both symbols.
+        mi_x_z1z2_nats: f64 ["nat"],
+        /// Information in sensor 1's symbol.
+        mi_x_z1_bits: f64 ["bit"],
+        /// Information in both symbols.
+        mi_x_z1z2_bits: f64 ["bit"],
+        /// Squared error from both symbols, in prior variances.
+        mse: f64,
+        /// Outer breakpoint of sensor 1.
+        gamma1_outer: f64,
+        /// Outer breakpoint of sensor 2.
+        gamma2_outer: f64,
+    }
 }
 
 fn first_alone(both: &System) -> Result<System, Error> {
@@ -157,49 +133,33 @@ pub struct Iterations<S> {
 
 /// Figure 4.2.
 pub static FIGURE42: Iterations<Clean> = Iterations {
-    about: About {
-        id: "mi-fig4-2",
-        title: "Information over iterations, clean channel",
-        caption: "Mutual information rises in two steps, one per sensor, to a plateau each.",
-        source: "thesis, Figure 4.2",
-    },
+    about: About::of("mi-fig4-2", "Information over iterations, clean channel", "thesis, Figure 4.2")
+        .showing("Mutual information rises in two steps, one per sensor, to a plateau each."),
     shows: Shows::Information,
     setting: PhantomData,
 };
 
 /// Figure 4.3.
 pub static FIGURE43: Iterations<Clean> = Iterations {
-    about: About {
-        id: "mi-fig4-3",
-        title: "Squared error over iterations, clean channel",
-        caption: "The squared error falls while the information rises, though it is not what is optimised.",
-        source: "thesis, Figure 4.3",
-    },
+    about: About::of("mi-fig4-3", "Squared error over iterations, clean channel", "thesis, Figure 4.3")
+        .showing("The squared error falls while the information rises, though it is not what is optimised."),
     shows: Shows::Error,
     setting: PhantomData,
 };
 
 /// Figure 4.4.
 pub static FIGURE44: Iterations<Channels> = Iterations {
-    about: About {
-        id: "mi-fig4-4",
-        title: "Information over iterations, noisy channels",
-        caption: "Joint information at four crossovers, natural words. It rises for the better channels; at 0.05 the first stage \
-                  lowers it, and the greedy result is below its start.",
-        source: "thesis, Figure 4.4",
-    },
+    about: About::of("mi-fig4-4", "Information over iterations, noisy channels", "thesis, Figure 4.4")
+        .showing("Joint information at four crossovers, natural words. It rises for the better channels; at 0.05 the first stage \
+                  lowers it, and the greedy result is below its start."),
     shows: Shows::Information,
     setting: PhantomData,
 };
 
 /// Figure 4.5.
 pub static FIGURE45: Iterations<Channels> = Iterations {
-    about: About {
-        id: "mi-fig4-5",
-        title: "Squared error over iterations, noisy channels",
-        caption: "Squared error at four crossovers, natural words. It falls at every step, on every channel.",
-        source: "thesis, Figure 4.5",
-    },
+    about: About::of("mi-fig4-5", "Squared error over iterations, noisy channels", "thesis, Figure 4.5")
+        .showing("Squared error at four crossovers, natural words. It falls at every step, on every channel."),
     shows: Shows::Error,
     setting: PhantomData,
 };
@@ -260,6 +220,7 @@ impl<S: Setting> Figure for Iterations<S> {
     }
 
     fn claims(&self, p: &S, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let (steps, crossovers, _) = p.parts();
         let key = |r: &Step| format!("step {}", r.iteration);
         let clean = || rows.chain.iter().filter(|_| crossovers == [0.0]);
@@ -281,9 +242,7 @@ impl<S: Setting> Figure for Iterations<S> {
             }
             Shows::Error => {
                 let what = "the squared error never rises";
-                claims
-                    .all("error-falls", what, neighbours(&rows.chain), |(a, b)| b.mse <= a.mse + ROUNDING)
-                    .at_defaults();
+                here.all("error-falls", what, neighbours(&rows.chain), |(a, b)| b.mse <= a.mse + ROUNDING);
             }
         }
         match self.about.id {
@@ -296,25 +255,19 @@ impl<S: Setting> Figure for Iterations<S> {
             }
             "mi-fig4-4" => {
                 let what = "the smaller the crossover, the higher the information, at every step";
-                claims
-                    .all("ordered", what, pairs(&rows.chain), |(a, b)| a.mi_x_z1z2_nats > b.mi_x_z1z2_nats)
-                    .at_defaults();
+                here.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mi_x_z1z2_nats > b.mi_x_z1z2_nats);
                 let worst: Vec<&Step> = rows.chain.iter().filter(|r| r.crossover == 0.05).collect();
                 let information = |k: usize| worst.get(k).map(|r| r.mi_x_z1z2_nats);
                 let what = "at 0.05 the joint information falls in stage 1, which designs for sensor 1 alone";
-                let fall = information(steps).zip(information(0)).map(|(end, start)| end - start);
-                claims.below("not-monotone", what, fall, 0.0).at_defaults();
+                let fall = minus(information(steps), information(0));
+                here.below("not-monotone", what, fall, 0.0);
                 let what = "what the greedy design gains on the Lloyd-Max start: it loses";
-                let gain = information(2 * steps)
-                    .zip(information(0))
-                    .map(|(end, start)| end - start);
+                let gain = minus(information(2 * steps), information(0));
                 claims.references("greedy-loss", what, [gain], |gain| ("0.05".to_owned(), gain));
             }
             _ => {
                 let what = "the smaller the crossover, the lower the error, at every step";
-                claims
-                    .all("ordered", what, pairs(&rows.chain), |(a, b)| a.mse < b.mse)
-                    .at_defaults();
+                here.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mse < b.mse);
             }
         }
     }
@@ -346,9 +299,7 @@ impl<S: Setting> Figure for Iterations<S> {
                     Layer::points(label, curve).coloured(i),
                 ]
             });
-            Panel::new(title, Axis::linear("iteration"), Axis::linear(axis))
-                .with_all(curves)
-                .with(divider)
+            Panel::linear(title, "iteration", axis).with_all(curves).with(divider)
         };
         let label = |crossover: f64, name: &str| {
             if several {

@@ -6,28 +6,17 @@ use crate::prelude::*;
 use crate::reference;
 use fewbits_quantizer_design::{Newton, System, bounds, design};
 
-/// Settings of Table 4.1.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Noise standard deviation of both sensors, in prior standard deviations.
-    #[garde(range(min = 1e-3, max = 1e3))]
-    noise_sd: f64,
-    /// Noise correlation of the third case.
-    #[garde(range(min = -0.99, max = 0.99))]
-    correlation: f64,
-    /// Random starts of each joint design.
-    #[garde(range(min = 1, max = 10_000))]
-    starts: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            noise_sd: 1.0,
-            correlation: 0.85,
-            starts: 20,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Noise standard deviation of both sensors, in prior standard deviations.
+        #[garde(range(min = 1e-3, max = 1e3))]
+        noise_sd: f64 = 1.0,
+        /// Noise correlation of the third case.
+        #[garde(range(min = -0.99, max = 0.99))]
+        correlation: f64 = 0.85,
+        /// Random starts of each joint design.
+        #[garde(range(min = 1, max = 10_000))]
+        starts: usize = 20,
     }
 }
 
@@ -49,27 +38,26 @@ const CASES: [Case; 3] = [
     ("rho85-L4", "Correlated noise, 4 levels", 4, true, [[&[1.15], &[2.1]], [&[1.13], &[2.08]]]),
 ];
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Designs.
-    designs: Vec<Row>,
-    /// Random starts of the joint designs.
-    searches: Vec<Search>,
-}
+rows! {
+    pub struct Rows {
+        /// Designs.
+        designs: Vec<Row>,
+        /// Random starts of the joint designs.
+        searches: Vec<Search>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Noise correlation and levels.
-    case: &'static str,
-    /// Criterion of the design, or the baseline.
-    method: &'static str,
-    /// How it was reached.
-    design: &'static str,
-    #[serde(flatten)]
-    pair: Pair,
-    /// The publication's squared error.
-    printed_mse: Option<f64>,
+    struct Row {
+        /// Noise correlation and levels.
+        case: &'static str,
+        /// Criterion of the design, or the baseline.
+        method: &'static str,
+        /// How it was reached.
+        design: &'static str,
+        #[serde(flatten)]
+        pair: Pair,
+        /// The publication's squared error.
+        printed_mse: Option<f64>,
+    }
 }
 
 impl Row {
@@ -78,40 +66,32 @@ impl Row {
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Search {
-    /// Noise correlation and levels.
-    case: &'static str,
-    /// Criterion of the design.
-    criterion: &'static str,
-    /// Random starts.
-    starts: usize,
-    /// Starts that reached the best value found.
-    arrived: usize,
-    /// Van Trees bound at the joint design, independent noise only.
-    van_trees: Option<f64>,
-    /// Printed squared error of problem (4.2).
-    printed_primal_mse: Option<f64>,
+rows! {
+    struct Search {
+        /// Noise correlation and levels.
+        case: &'static str,
+        /// Criterion of the design.
+        criterion: &'static str,
+        /// Random starts.
+        starts: usize,
+        /// Starts that reached the best value found.
+        arrived: usize,
+        /// Van Trees bound at the joint design, independent noise only.
+        van_trees: Option<f64>,
+        /// Printed squared error of problem (4.2).
+        printed_primal_mse: Option<f64>,
+    }
 }
 
 /// Table 4.1.
 pub struct Table41;
 
 impl Figure for Table41 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mi-table4-1",
-            title: "Two sensors of equal noise",
-            caption: "Squared error of two-sensor designs for mutual information and for squared error: the greedy chain, the \
-                      joint optimum, Lloyd-Max quantizers of the unknown and of the sample, and the printed breakpoints. With \
-                      independent noise all differences are in the fourth digit. With correlation 0.85 the printed solution is \
-                      a saddle: the best contiguous pair is asymmetric.",
-            source: "thesis, Table 4.1",
-        }
-    }
+    figure!(Parameters => Rows, "mi-table4-1", "Two sensors of equal noise", "thesis, Table 4.1",
+        "Squared error of two-sensor designs for mutual information and for squared error: the greedy chain, the \
+         joint optimum, Lloyd-Max quantizers of the unknown and of the sample, and the printed breakpoints. With \
+         independent noise all differences are in the fourth digit. With correlation 0.85 the printed solution is \
+         a saddle: the best contiguous pair is asymmetric.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let (mut designs, mut searches) = (Vec::new(), Vec::new());
@@ -171,6 +151,7 @@ impl Figure for Table41 {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let designs = || rows.designs.iter();
         let mse = |case: &str, method: &str, design: &str| {
             designs()
@@ -183,27 +164,23 @@ impl Figure for Table41 {
         claims.references("printed", "errors are exact at printed breakpoints", designs(), |r| (r.key(), r.pair.mse));
         let curvature = |design: &'static str| designs().filter(move |r| r.case == "rho85-L4" && r.design == design);
         let what = "the printed (mirror-symmetric) solution at 0.85 is a saddle (errata mi-10)";
-        claims
-            .all("saddle", what, curvature("symmetric"), |r| r.pair.curvature.is_some_and(|c| c > 1e-3))
-            .at_defaults();
+        here.all("saddle", what, curvature("symmetric"), |r| r.pair.curvature.is_some_and(|c| c > 1e-3));
         let what = "the best pair found at 0.85 is a local optimum";
         claims.all("optimum", what, curvature("joint"), |r| r.pair.curvature.is_some_and(|c| c < 0.0));
         let what = "printed errors of (4.2) without correlation lie below the best any contiguous pair reached, so they are not \
                     exact (errata mi-6)";
         let independent = || rows.searches.iter().filter(|s| s.case != "rho85-L4");
-        claims
-            .all("primal-too-low", what, independent(), |s| {
-                s.printed_primal_mse
-                    .zip(mse(s.case, "mse", "joint"))
-                    .is_some_and(|(printed, best)| printed < best)
-            })
-            .at_defaults();
+        here.all("primal-too-low", what, independent(), |s| {
+            s.printed_primal_mse
+                .zip(mse(s.case, "mse", "joint"))
+                .is_some_and(|(printed, best)| printed < best)
+        });
         let first = |case: &str| {
             designs()
                 .find(|r| r.key() == format!("{case} mi greedy"))
                 .map(|r| r.pair.outer1)
         };
-        let difference = first("rho0-L4").zip(first("rho85-L4")).map(|(a, b)| a - b);
+        let difference = minus(first("rho0-L4"), first("rho85-L4"));
         let what =
             "the greedy chain's first sensor does not depend on correlation, unlike the printed one (errata mi-5)";
         claims.near("greedy-first", what, difference, 0.0, 1e-9);
@@ -217,11 +194,9 @@ impl Figure for Table41 {
             .zip(mse("rho85-L4", "mi", "joint"))
             .map(|(a, b)| a / b - 1.0);
         let what = "at 0.85 the greedy chain costs half a percent: not negligible (errata mi-6)";
-        claims.near("rho85-loss", what, lost, 0.00506, 1e-4).at_defaults();
+        here.near("rho85-loss", what, lost, 0.00506, 1e-4);
         let what = "without correlation every random start reaches the same optimum";
-        claims
-            .all("one-optimum", what, independent(), |s| s.arrived == s.starts)
-            .at_defaults();
+        here.all("one-optimum", what, independent(), |s| s.arrived == s.starts);
         let what = "squared error >= exp(-2 I) for every design";
         claims.all("shannon", what, designs(), |r| r.pair.mse >= (-2.0 * r.pair.mi_nats).exp());
         let what = "no pair's error is below the van Trees bound";

@@ -6,79 +6,58 @@ use crate::prelude::*;
 use crate::reference;
 use fewbits_quantizer_design::{Newton, System, bounds, design};
 
-/// Settings of Table 4.2.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Noise variances of the two sensors, in prior variances.
-    #[garde(length(min = 2, max = 2), inner(range(min = 1e-6, max = 1e6)))]
-    noise_variances: Vec<f64>,
-    /// Random starts of each joint design.
-    #[garde(range(min = 1, max = 10_000))]
-    starts: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            noise_variances: vec![1.0, 0.5],
-            starts: 30,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Noise variances of the two sensors, in prior variances.
+        #[garde(length(min = 2, max = 2), inner(range(min = 1e-6, max = 1e6)))]
+        noise_variances: Vec<f64> = vec![1.0, 0.5],
+        /// Random starts of each joint design.
+        #[garde(range(min = 1, max = 10_000))]
+        starts: usize = 30,
     }
 }
 
 /// Levels, and the printed positive breakpoints of both sensors.
 const PRINTED: [(usize, &[f64], &[f64]); 2] = [(4, &[1.38], &[1.135]), (8, &[0.69, 1.45, 2.43], &[0.58, 1.22, 2.05])];
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Designs.
-    designs: Vec<Row>,
-    /// Random starts of the joint information design.
-    searches: Vec<Search>,
-}
+rows! {
+    pub struct Rows {
+        /// Designs.
+        designs: Vec<Row>,
+        /// Random starts of the joint information design.
+        searches: Vec<Search>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Levels of each sensor.
-    levels: usize,
-    /// Criterion and how it was reached.
-    method: &'static str,
-    #[serde(flatten)]
-    design: Pair,
-    /// The publication's squared error.
-    printed_mse: Option<f64>,
-}
+    struct Row {
+        /// Levels of each sensor.
+        levels: usize,
+        /// Criterion and how it was reached.
+        method: &'static str,
+        #[serde(flatten)]
+        design: Pair,
+        /// The publication's squared error.
+        printed_mse: Option<f64>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Search {
-    /// Levels of each sensor.
-    levels: usize,
-    /// Random starts of the joint information design.
-    starts: usize,
-    /// Starts that reached the best value found.
-    arrived: usize,
-    /// Least squared error of any codes at these rates.
-    ceo_bound: f64,
+    struct Search {
+        /// Levels of each sensor.
+        levels: usize,
+        /// Random starts of the joint information design.
+        starts: usize,
+        /// Starts that reached the best value found.
+        arrived: usize,
+        /// Least squared error of any codes at these rates.
+        ceo_bound: f64,
+    }
 }
 
 /// Table 4.2.
 pub struct Table42;
 
 impl Figure for Table42 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mi-table4-2",
-            title: "Two sensors of unequal noise",
-            caption: "Squared error when one sensor has half the other's noise variance. The printed Lloyd-Max baseline is scaled \
-                      to the noise; scaled to the sample, as it should be, it beats the mutual-information design.",
-            source: "thesis, Table 4.2",
-        }
-    }
+    figure!(Parameters => Rows, "mi-table4-2", "Two sensors of unequal noise", "thesis, Table 4.2",
+        "Squared error when one sensor has half the other's noise variance. The printed Lloyd-Max baseline is scaled \
+         to the noise; scaled to the sample, as it should be, it beats the mutual-information design.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let as_printed = p.noise_variances == [1.0, 0.5];
@@ -133,6 +112,7 @@ impl Figure for Table42 {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let designs = || rows.designs.iter();
         let key = |r: &Row| format!("{} levels {}", r.levels, r.method);
         claims.references("mse", "squared error", designs(), |r| (key(r), r.design.mse));
@@ -149,18 +129,12 @@ impl Figure for Table42 {
             let what = "squared-error design < Lloyd-Max of the sample < information design, against the printed claim (errata \
                         mi-7) < the printed baseline, scaled to the noise";
             let order = ["mse-joint", "lloyd-y", "mi-joint", "lloyd-noise"];
-            claims
-                .increasing(format!("L{levels}-order"), what, order.map(mse))
-                .at_defaults();
+            here.increasing(format!("L{levels}-order"), what, order.map(mse));
             let what = "that baseline is worse than Lloyd-Max of the unknown";
-            claims
-                .increasing(format!("L{levels}-baseline"), what, [mse("lloyd-x"), mse("lloyd-noise")])
-                .at_defaults();
+            here.increasing(format!("L{levels}-baseline"), what, [mse("lloyd-x"), mse("lloyd-noise")]);
         }
         let what = "every random start reaches the same joint optimum";
-        claims
-            .all("one-optimum", what, &rows.searches, |s| s.arrived == s.starts)
-            .at_defaults();
+        here.all("one-optimum", what, &rows.searches, |s| s.arrived == s.starts);
         let what = "bound with all subset constraints";
         claims.references("ceo", what, &rows.searches, |s| (format!("{} levels", s.levels), s.ceo_bound));
         let bound = |r: &Row| rows.searches.iter().find(|s| s.levels == r.levels).map(|s| s.ceo_bound);

@@ -5,87 +5,70 @@ use crate::prelude::*;
 use crate::reference;
 use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design};
 
-/// Settings of Table 4.3.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Number of sensors; the greedy chain enumerates `4^sensors` outcomes.
-    #[garde(range(min = 2, max = 10))]
-    sensors: usize,
-    /// Noise standard deviation, in prior standard deviations.
-    #[garde(range(min = 1e-3, max = 1e3))]
-    noise_sd: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            sensors: 9,
-            noise_sd: 1.0,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Number of sensors; the greedy chain enumerates `4^sensors` outcomes.
+        #[garde(range(min = 2, max = 10))]
+        sensors: usize = 9 => quick 6,
+        /// Noise standard deviation, in prior standard deviations.
+        #[garde(range(min = 1e-3, max = 1e3))]
+        noise_sd: f64 = 1.0,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Designs.
-    designs: Vec<Design>,
-    /// The greedy chains, sensor by sensor.
-    chain: Vec<Stage>,
-    /// Identical quantizers against their outer breakpoint.
-    curve: Vec<Point>,
-    /// Least squared errors.
-    bounds: Vec<Bound>,
-}
+rows! {
+    pub struct Rows {
+        /// Designs.
+        designs: Vec<Design>,
+        /// The greedy chains, sensor by sensor.
+        chain: Vec<Stage>,
+        /// Identical quantizers against their outer breakpoint.
+        curve: Vec<Point>,
+        /// Least squared errors.
+        bounds: Vec<Bound>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Design {
-    /// Criterion and how it was reached.
-    method: String,
-    /// Common outer breakpoint; missing where the sensors differ.
-    t: Option<f64>,
-    /// Mutual information.
-    #[schemars(extend("unit" = "nat"))]
-    mi_nats: f64,
-    /// Squared error, in prior variances.
-    mse: f64,
-    /// The publication's value.
-    printed_mse: Option<f64>,
-}
+    struct Design {
+        /// Criterion and how it was reached.
+        method: String,
+        /// Common outer breakpoint; missing where the sensors differ.
+        t: Option<f64>,
+        /// Mutual information.
+        mi_nats: f64 ["nat"],
+        /// Squared error, in prior variances.
+        mse: f64,
+        /// The publication's value.
+        printed_mse: Option<f64>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Stage {
-    /// Criterion of the chain.
-    criterion: &'static str,
-    /// Sensors designed so far.
-    stage: usize,
-    /// Outer breakpoint of the last one.
-    t: f64,
-    /// Mutual information of the sensors so far.
-    #[schemars(extend("unit" = "nat"))]
-    mi_nats: f64,
-    /// Their squared error.
-    mse: f64,
-}
+    struct Stage {
+        /// Criterion of the chain.
+        criterion: &'static str,
+        /// Sensors designed so far.
+        stage: usize,
+        /// Outer breakpoint of the last one.
+        t: f64,
+        /// Mutual information of the sensors so far.
+        mi_nats: f64 ["nat"],
+        /// Their squared error.
+        mse: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Point {
-    /// Common outer breakpoint.
-    t: f64,
-    /// Mutual information.
-    #[schemars(extend("unit" = "nat"))]
-    mi_nats: f64,
-    /// Squared error.
-    mse: f64,
-}
+    struct Point {
+        /// Common outer breakpoint.
+        t: f64,
+        /// Mutual information.
+        mi_nats: f64 ["nat"],
+        /// Squared error.
+        mse: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Bound {
-    /// Which bound.
-    bound: &'static str,
-    /// Least squared error.
-    mse: f64,
+    struct Bound {
+        /// Which bound.
+        bound: &'static str,
+        /// Least squared error.
+        mse: f64,
+    }
 }
 
 impl Rows {
@@ -106,23 +89,10 @@ impl Rows {
 pub struct Table43;
 
 impl Figure for Table43 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mi-table4-3",
-            title: "Nine sensors",
-            caption: "Nine equal sensors of four levels. Identical quantizers need 220 outcomes instead of 262144, so their whole \
-                      error curve is exact; the greedy chain gives nine different quantizers. The printed design stopped 7.5 % \
-                      short of the optimum.",
-            source: "thesis, Table 4.3",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.sensors = 6;
-    }
+    figure!(Parameters => Rows, "mi-table4-3", "Nine sensors", "thesis, Table 4.3",
+        "Nine equal sensors of four levels. Identical quantizers need 220 outcomes instead of 262144, so their whole \
+         error curve is exact; the greedy chain gives nine different quantizers. The printed design stopped 7.5 % \
+         short of the optimum.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let scene = scene(&vec![p.noise_sd; p.sensors], 0.0)?;
@@ -211,6 +181,7 @@ impl Figure for Table43 {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let designs = || rows.designs.iter();
         claims.references("mse", "squared error", designs(), |d| (d.method.clone(), d.mse));
         claims.references("t", "outer breakpoint", designs(), |d| (d.method.clone(), d.t));
@@ -220,24 +191,19 @@ impl Figure for Table43 {
         let what =
             "squared-error design < Lloyd-Max of the sample < joint < greedy < printed < Lloyd-Max of the unknown";
         let order = ["mse-joint", "lloyd-y", "mi-joint", "mi-greedy", "mi-printed", "lloyd-x"];
-        claims
-            .increasing("order", what, order.map(|method| rows.mse(method)))
-            .at_defaults();
+        here.increasing("order", what, order.map(|method| rows.mse(method)));
         let chain: Vec<&Stage> = rows.chain.iter().filter(|s| s.criterion == "mi").collect();
         claims.references("chain", "outer breakpoint of the greedy chain, sensor", &chain, |s| {
             (s.stage.to_string(), s.t)
         });
         let what = "a greedy chain cannot give equal quantizers (errata mi-5)";
         claims.all("chain-differs", what, chain.windows(2), |w| (w[0].t - w[1].t).abs() > 1e-6);
-        let gap = rows
-            .mse("mse-joint")
-            .zip(rows.design("mi-printed").and_then(|d| d.printed_mse))
-            .map(|(a, b)| a - b);
+        let gap = minus(rows.mse("mse-joint"), rows.design("mi-printed").and_then(|d| d.printed_mse));
         let what = "the printed 0.1233 lies below the best of all identical designs (errata mi-8)";
         claims.above("too-low", what, gap, 0.0);
         let short = rows.design("mi-joint").and_then(|d| d.t).map(|t| 1.0 - 1.275 / t);
         let what = "the printed breakpoint is 7.5 % short of the optimum (errata mi-9)";
-        claims.near("unconverged", what, short, 0.0747, 1e-4).at_defaults();
+        here.near("unconverged", what, short, 0.0747, 1e-4);
         let what = "least error of any codes of two bits";
         claims.references("bound", what, &rows.bounds, |b| (b.bound.to_owned(), b.mse));
         let bound = rows.bound("ceo").unwrap_or(f64::INFINITY);
@@ -246,21 +212,15 @@ impl Figure for Table43 {
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let flat = |name: &str| {
-            points(
-                rows.bounds
-                    .iter()
-                    .filter(|b| b.bound == name)
-                    .flat_map(|b| [(0.8, b.mse), (2.0, b.mse)]),
-                |p| p,
-            )
+            points(select(&rows.bounds, |b| b.bound == name).flat_map(|b| [(0.8, b.mse), (2.0, b.mse)]), |p| p)
         };
         let marks = |value: fn(&Design) -> Option<f64>| {
             points(&rows.designs, |d| (d.t.unwrap_or(f64::NAN), d.t.and_then(|_| value(d))))
         };
-        let error = Panel::new(
+        let error = Panel::linear(
             "One quantizer for all sensors",
-            Axis::linear("outer breakpoint t / prior deviations"),
-            Axis::linear("mean squared error / prior variances"),
+            "outer breakpoint t / prior deviations",
+            "mean squared error / prior variances",
         )
         .with(Layer::line("identical quantizers", points(&rows.curve, |p| (p.t, p.mse))))
         .with(Layer::points("designs", marks(|d| Some(d.mse))))
@@ -268,10 +228,10 @@ impl Figure for Table43 {
         .with(Layer::dashed("bound for any codes", flat("ceo")))
         .with(Layer::dashed("unquantized", flat("unquantized")));
         let chain = points(rows.chain.iter().filter(|s| s.criterion == "mi"), |s| (s.stage as f64, s.t));
-        let stages = Panel::new(
+        let stages = Panel::linear(
             "Greedy chain for information",
-            Axis::linear("sensor, in order of design"),
-            Axis::linear("outer breakpoint t / prior deviations"),
+            "sensor, in order of design",
+            "outer breakpoint t / prior deviations",
         )
         .with(Layer::line("", chain.clone()).coloured(0))
         .with(Layer::points("", chain).coloured(0))

@@ -10,96 +10,74 @@ use fewbits_quantizer_design::{Channel, Criterion, JointTable, Newton, Noise, Pr
 
 const PE: Criterion = Criterion::BayesError;
 
-/// Settings of Table 4.4.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// The signals to detect, in noise standard deviations.
-    #[garde(length(min = 1, max = 20), inner(range(min = 0.1, max = 16.0)))]
-    signals: Vec<f64>,
-    /// Number of sensors; the greedy chain enumerates `4^sensors` outcomes.
-    #[garde(range(min = 2, max = 9))]
-    sensors: usize,
-    /// False-alarm probability of the randomised test.
-    #[garde(range(min = 1e-9, max = 0.999))]
-    false_alarm: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            signals: vec![2.0, 4.0],
-            sensors: 5,
-            false_alarm: 0.01,
-        }
+parameters! {
+    pub struct Parameters {
+        /// The signals to detect, in noise standard deviations.
+        #[garde(length(min = 1, max = 20), inner(range(min = 0.1, max = 16.0)))]
+        signals: Vec<f64> = vec![2.0, 4.0],
+        /// Number of sensors; the greedy chain enumerates `4^sensors` outcomes.
+        #[garde(range(min = 2, max = 9))]
+        sensors: usize = 5,
+        /// False-alarm probability of the randomised test.
+        #[garde(range(min = 1e-9, max = 0.999))]
+        false_alarm: f64 = 0.01,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Designs.
-    designs: Vec<Design>,
-    /// Identical quantizers against their offset.
-    curve: Vec<Point>,
-    /// What the designs are compared with.
-    checks: Vec<Check>,
-}
+rows! {
+    pub struct Rows {
+        /// Designs.
+        designs: Vec<Design>,
+        /// Identical quantizers against their offset.
+        curve: Vec<Point>,
+        /// What the designs are compared with.
+        checks: Vec<Check>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Design {
-    /// The value to tell from 0.
-    #[schemars(extend("unit" = "noise sd"))]
-    signal: f64,
-    /// What the quantizer maximises (pe: minimises the error itself).
-    method: &'static str,
-    /// Offset of the outer breakpoints (of the first sensor).
-    #[schemars(extend("unit" = "noise sd"))]
-    t: f64,
-    /// Offsets of all sensors, where they differ.
-    #[schemars(extend("unit" = "noise sd"))]
-    offsets: String,
-    /// Bayes error at equal priors.
-    pe: f64,
-    /// The publication's value.
-    printed_pe: Option<f64>,
-    /// Mutual information.
-    #[schemars(extend("unit" = "nat"))]
-    mi_nats: f64,
-    /// ln 2 minus it, without cancellation.
-    #[schemars(extend("unit" = "nat"))]
-    equivocation_nats: f64,
-    /// Matusita distance of one sensor's symbol.
-    matusita: Option<f64>,
-    /// J-divergence of one sensor's symbol.
-    j_divergence: Option<f64>,
-    /// Bhattacharyya coefficient of one sensor's symbol.
-    bhattacharyya: Option<f64>,
-    /// Detection probability of the randomised Neyman-Pearson test.
-    detection: f64,
-}
+    struct Design {
+        /// The value to tell from 0.
+        signal: f64 ["noise sd"],
+        /// What the quantizer maximises (pe: minimises the error itself).
+        method: &'static str,
+        /// Offset of the outer breakpoints (of the first sensor).
+        t: f64 ["noise sd"],
+        /// Offsets of all sensors, where they differ.
+        offsets: String ["noise sd"],
+        /// Bayes error at equal priors.
+        pe: f64,
+        /// The publication's value.
+        printed_pe: Option<f64>,
+        /// Mutual information.
+        mi_nats: f64 ["nat"],
+        /// ln 2 minus it, without cancellation.
+        equivocation_nats: f64 ["nat"],
+        /// Matusita distance of one sensor's symbol.
+        matusita: Option<f64>,
+        /// J-divergence of one sensor's symbol.
+        j_divergence: Option<f64>,
+        /// Bhattacharyya coefficient of one sensor's symbol.
+        bhattacharyya: Option<f64>,
+        /// Detection probability of the randomised Neyman-Pearson test.
+        detection: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Point {
-    /// The value to tell from 0.
-    #[schemars(extend("unit" = "noise sd"))]
-    signal: f64,
-    /// Common offset.
-    #[schemars(extend("unit" = "noise sd"))]
-    t: f64,
-    /// Bayes error.
-    pe: f64,
-}
+    struct Point {
+        /// The value to tell from 0.
+        signal: f64 ["noise sd"],
+        /// Common offset.
+        t: f64 ["noise sd"],
+        /// Bayes error.
+        pe: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Check {
-    /// The value to tell from 0.
-    #[schemars(extend("unit" = "noise sd"))]
-    signal: f64,
-    /// Error from unquantized samples.
-    unquantized_pe: f64,
-    /// What the best change of one sensor alone would gain on the minimum error, relative.
-    single_change_gain: f64,
+    struct Check {
+        /// The value to tell from 0.
+        signal: f64 ["noise sd"],
+        /// Error from unquantized samples.
+        unquantized_pe: f64,
+        /// What the best change of one sensor alone would gain on the minimum error, relative.
+        single_change_gain: f64,
+    }
 }
 
 fn scene(signal: f64, sensors: usize) -> Result<Scene, Error> {
@@ -142,19 +120,10 @@ impl Design {
 pub struct Table44;
 
 impl Figure for Table44 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mi-table4-4",
-            title: "Detection by five sensors",
-            caption: "Error probability of the optimal decision between 0 and a signal from five sensors of four levels, exact by \
-                      counting. Mutual information and the Matusita distance give almost the least error; the J-divergence is \
-                      far off at the strong signal.",
-            source: "thesis, Table 4.4",
-        }
-    }
+    figure!(Parameters => Rows, "mi-table4-4", "Detection by five sensors", "thesis, Table 4.4",
+        "Error probability of the optimal decision between 0 and a signal from five sensors of four levels, exact by \
+         counting. Mutual information and the Matusita distance give almost the least error; the J-divergence is \
+         far off at the strong signal.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let mut rows = Rows {
@@ -225,6 +194,7 @@ impl Figure for Table44 {
     }
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let designs = || rows.designs.iter();
         claims.references("pe", "error probability", designs(), |d| (d.key(), d.pe));
         claims.references("t", "offset", designs(), |d| (d.key(), d.t));
@@ -242,12 +212,10 @@ impl Figure for Table44 {
         for &signal in &p.signals {
             let what = "least error < Matusita < mutual information < J-divergence (errata mi-11)";
             let order = ["pe", "matusita", "mi-joint", "j-divergence"].map(|method| pe(signal, method));
-            claims.increasing(format!("{signal}-order"), what, order).at_defaults();
+            here.increasing(format!("{signal}-order"), what, order);
             let others = designs().filter(|d| d.signal == signal && d.method != "j-divergence");
             let worst = pe(signal, "j-divergence").unwrap_or(0.0);
-            claims
-                .all(format!("{signal}-j-worst"), "the J-divergence is worst of all", others, |d| d.pe < worst)
-                .at_defaults();
+            here.all(format!("{signal}-j-worst"), "the J-divergence is worst of all", others, |d| d.pe < worst);
         }
         let what = "no change of one sensor improves on the identical minimum (grid of 0.05, dynamic programme)";
         claims.all("person-by-person", what, &rows.checks, |c| c.single_change_gain <= 1e-12);
@@ -255,9 +223,7 @@ impl Figure for Table44 {
         claims.all("unquantized", what, &rows.checks, |c| pe(c.signal, "pe").is_some_and(|pe| pe > c.unquantized_pe));
         let what =
             "the printed 1.0e-5 at the strong signal is below the best that any design found reaches (errata mi-11)";
-        claims
-            .above("too-low", what, pe(4.0, "pe").map(|pe| pe - 1.0e-5), 0.0)
-            .at_defaults();
+        here.above("too-low", what, pe(4.0, "pe").map(|pe| pe - 1.0e-5), 0.0);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
@@ -274,10 +240,10 @@ impl Figure for Table44 {
                 ("j-divergence", "J-divergence"),
                 ("pe", "least error"),
             ];
-            Panel::new(
+            Panel::semilog(
                 format!("Signal of {signal} noise deviations"),
-                Axis::linear("offset t / noise deviations"),
-                Axis::log("error probability"),
+                "offset t / noise deviations",
+                "error probability",
             )
             .with(Layer::line("identical quantizers", curve).coloured(6))
             .with_all(

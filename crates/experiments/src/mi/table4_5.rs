@@ -15,24 +15,14 @@ const LABELLINGS: [(&str, &str, [u32; 4]); 3] = [
 /// Crossovers and printed outer breakpoints.
 const PRINTED: [(f64, f64); 4] = [(0.0, 1.370), (0.001, 1.358), (0.01, 1.260), (0.05, 0.973)];
 
-/// Settings of Table 4.5 and its mismatch matrix.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Crossover probabilities; beyond 0.06 a design of four levels loses a cell (see mi-beyond).
-    #[garde(length(min = 1, max = 100), inner(range(min = 0.0, max = 0.06)))]
-    crossovers: Vec<f64>,
-    /// Noise standard deviation, in prior standard deviations.
-    #[garde(range(min = 1e-2, max = 1e2))]
-    noise_sd: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            crossovers: PRINTED.map(|p| p.0).to_vec(),
-            noise_sd: 1.0,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Crossover probabilities; beyond 0.06 a design of four levels loses a cell (see mi-beyond).
+        #[garde(length(min = 1, max = 100), inner(range(min = 0.0, max = 0.06)))]
+        crossovers: Vec<f64> = PRINTED.map(|p| p.0).to_vec(),
+        /// Noise standard deviation, in prior standard deviations.
+        #[garde(range(min = 1e-2, max = 1e2))]
+        noise_sd: f64 = 1.0,
     }
 }
 
@@ -47,37 +37,29 @@ impl Parameters {
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Crossover probability of each bit.
-    crossover: f64,
-    /// Words of the levels.
-    labelling: &'static str,
-    /// Criterion and how it was reached.
-    design: &'static str,
-    #[serde(flatten)]
-    pair: Pair,
-    /// The publication's squared error.
-    printed_mse: Option<f64>,
+rows! {
+    pub struct Row {
+        /// Crossover probability of each bit.
+        crossover: f64,
+        /// Words of the levels.
+        labelling: &'static str,
+        /// Criterion and how it was reached.
+        design: &'static str,
+        #[serde(flatten)]
+        pair: Pair,
+        /// The publication's squared error.
+        printed_mse: Option<f64>,
+    }
 }
 
 /// Table 4.5.
 pub struct Table45;
 
 impl Figure for Table45 {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "mi-table4-5",
-            title: "Words over a binary symmetric channel",
-            caption: "Two sensors of four levels whose two-bit words cross a binary symmetric channel. With natural words the \
-                      breakpoints shrink as the channel gets worse, as printed; with Gray words they hardly move. At a crossover \
-                      of 0.05 information prefers Gray words and squared error natural ones.",
-            source: "thesis, Table 4.5",
-        }
-    }
+    figure!(Parameters => Vec<Row>, "mi-table4-5", "Words over a binary symmetric channel", "thesis, Table 4.5",
+        "Two sensors of four levels whose two-bit words cross a binary symmetric channel. With natural words the \
+         breakpoints shrink as the channel gets worse, as printed; with Gray words they hardly move. At a crossover \
+         of 0.05 information prefers Gray words and squared error natural ones.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
@@ -109,70 +91,48 @@ impl Figure for Table45 {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let key = |r: &Row| format!("{} {} {}", r.crossover, r.labelling, r.design);
         claims.references("mse", "squared error", rows, |r| (key(r), r.pair.mse));
         claims.references("outer2", "outer breakpoint", rows, |r| (key(r), r.pair.outer2));
         claims.references("printed", "printed error, natural words, three digits", rows, |r| (key(r), r.pair.mse));
         let at = |crossover: f64, labelling: &str, design: &str| {
-            rows.iter()
-                .find(|r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design))
-                .map(|r| &r.pair)
+            first(rows, |r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design)).map(|r| &r.pair)
         };
         let what = "the printed breakpoint exceeds the joint optimum of natural words by 0.5 to 1.1 %";
-        claims
-            .all("excess", what, PRINTED, |(crossover, outer)| {
-                at(crossover, "natural", "mi-joint")
-                    .is_some_and(|d| (0.0045..=0.0115).contains(&(outer / d.outer2 - 1.0)))
-            })
-            .at_defaults();
+        here.all("excess", what, PRINTED, |(crossover, outer)| {
+            at(crossover, "natural", "mi-joint").is_some_and(|d| (0.0045..=0.0115).contains(&(outer / d.outer2 - 1.0)))
+        });
         let what = "Gray words move the breakpoint by 0.4 % only, so the printed table is not Gray's";
         let gray = at(0.05, "gray", "mi-joint").zip(at(0.0, "gray", "mi-joint"));
-        claims
-            .at_most("gray-still", what, gray.map(|(a, b)| (a.outer2 / b.outer2 - 1.0).abs()), 0.0045)
-            .at_defaults();
+        here.at_most("gray-still", what, gray.map(|(a, b)| (a.outer2 / b.outer2 - 1.0).abs()), 0.0045);
         let information = ["natural", "gray"].map(|words| at(0.05, words, "mi-joint").map(|d| d.mi_nats));
-        claims
-            .increasing("mi-prefers-gray", "at 0.05 information prefers Gray words", information)
-            .at_defaults();
+        here.increasing("mi-prefers-gray", "at 0.05 information prefers Gray words", information);
         let what =
             "at 0.05 squared error prefers natural words: the designs are not application-independent (errata mi-12)";
         let error = ["natural", "gray"].map(|words| at(0.05, words, "mse-joint").map(|d| d.mse));
-        claims.increasing("mse-prefers-natural", what, error).at_defaults();
+        here.increasing("mse-prefers-natural", what, error);
         let third = at(0.05, "third", "mse-joint").zip(at(0.05, "gray", "mse-joint"));
         let what = "the third assignment is much worse";
-        claims
-            .above("third-worst", what, third.map(|(a, b)| a.mse - b.mse), 0.04)
-            .at_defaults();
-        let natural = rows
-            .iter()
-            .filter(|r| r.labelling == "natural" && r.design == "mi-joint");
-        claims
-            .increasing("worse", "errors grow with the crossover", natural.map(|r| r.pair.mse))
-            .at_defaults();
+        here.above("third-worst", what, third.map(|(a, b)| a.mse - b.mse), 0.04);
+        let natural = select(rows, |r| r.labelling == "natural" && r.design == "mi-joint");
+        here.increasing("worse", "errors grow with the crossover", natural.map(|r| r.pair.mse));
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         let panel = |title: &str, axis: &str, value: fn(&Row) -> f64, printed: fn(&Row) -> Option<f64>| {
             let lines = LABELLINGS.iter().enumerate().flat_map(|(i, (labelling, title, _))| {
-                let own = rows
-                    .iter()
-                    .filter(|r| r.labelling == *labelling && r.design == "mi-joint");
+                let own = select(rows, |r| r.labelling == *labelling && r.design == "mi-joint");
                 let line = points(own, |r| (r.crossover, value(r)));
                 [
                     Layer::line(*title, line.clone()).coloured(i),
                     Layer::points("", line).coloured(i),
                 ]
             });
-            let print = rows
-                .iter()
-                .filter(|r| r.labelling == "natural" && r.design == "printed");
-            Panel::new(title, Axis::linear("crossover probability"), Axis::linear(axis))
+            let print = select(rows, |r| r.labelling == "natural" && r.design == "printed");
+            Panel::linear(title, "crossover probability", axis)
                 .with_all(lines)
-                .with(
-                    Layer::points("printed", points(print, |r| (r.crossover, printed(r))))
-                        .marked(Marker::Cross)
-                        .coloured(6),
-                )
+                .with(Layer::points("printed", points(print, |r| (r.crossover, printed(r)))).styled(6, Marker::Cross))
         };
         Plot::grid(
             2,
@@ -189,57 +149,46 @@ impl Figure for Table45 {
     }
 }
 
-/// All tables of the mismatch matrix.
-#[derive(Serialize, JsonSchema)]
-pub struct Mismatches {
-    /// Designs for one channel on another.
-    rows: Vec<Met>,
-    /// The printed design for a clean channel at a crossover of 0.05.
-    printed: Vec<AtPrinted>,
-}
+rows! {
+    /// All tables of the mismatch matrix.
+    pub struct Mismatches {
+        /// Designs for one channel on another.
+        rows: Vec<Met>,
+        /// The printed design for a clean channel at a crossover of 0.05.
+        printed: Vec<AtPrinted>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Met {
-    /// Words of the levels.
-    labelling: &'static str,
-    /// Crossover of the design.
-    designed_for: f64,
-    /// Crossover met.
-    true_crossover: f64,
-    /// Squared error.
-    mse: f64,
-    /// Mutual information.
-    #[schemars(extend("unit" = "nat"))]
-    mi_nats: f64,
-    /// The publication's value, printed breakpoints.
-    printed_mse: Option<f64>,
-}
+    struct Met {
+        /// Words of the levels.
+        labelling: &'static str,
+        /// Crossover of the design.
+        designed_for: f64,
+        /// Crossover met.
+        true_crossover: f64,
+        /// Squared error.
+        mse: f64,
+        /// Mutual information.
+        mi_nats: f64 ["nat"],
+        /// The publication's value, printed breakpoints.
+        printed_mse: Option<f64>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct AtPrinted {
-    /// Words of the levels.
-    labelling: &'static str,
-    /// Squared error of the printed design for a clean channel at a crossover of 0.05.
-    mse: f64,
+    struct AtPrinted {
+        /// Words of the levels.
+        labelling: &'static str,
+        /// Squared error of the printed design for a clean channel at a crossover of 0.05.
+        mse: f64,
+    }
 }
 
 /// The mismatch matrix of Table 4.5.
 pub struct Mismatch;
 
 impl Figure for Mismatch {
-    type Parameters = Parameters;
-    type Tables = Mismatches;
-
-    fn about(&self) -> About {
-        About {
-            id: "mi-table4-5-mismatch",
-            title: "Designed for one channel, used on another",
-            caption: "Squared error when the joint information design for one crossover meets another (the decoder knows the true \
-                      one). Designing for a clean channel costs 2.6 % at a crossover of 0.05 with natural words and nothing with \
-                      Gray words.",
-            source: "thesis, Table 4.5 and text",
-        }
-    }
+    figure!(Parameters => Mismatches, "mi-table4-5-mismatch", "Designed for one channel, used on another", "thesis, Table 4.5 and text",
+        "Squared error when the joint information design for one crossover meets another (the decoder knows the true \
+         one). Designing for a clean channel costs 2.6 % at a crossover of 0.05 with natural words and nothing with \
+         Gray words.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Mismatches, Error> {
         let (mut rows, mut printed) = (Vec::new(), Vec::new());
@@ -271,6 +220,7 @@ impl Figure for Mismatch {
     }
 
     fn claims(&self, p: &Parameters, tables: &Mismatches, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let rows = &tables.rows;
         let what = "printed design at 0.05";
         claims.references("at-printed", what, &tables.printed, |r| (r.labelling.to_owned(), r.mse));
@@ -281,10 +231,7 @@ impl Figure for Mismatch {
         claims.references("printed", what, natural, |r| (format!("{} 0 0.05", r.labelling), r.mse));
         for (labelling, matched) in [("natural", &[0.0, 0.01, 0.05][..]), ("gray", &[0.0, 0.05])] {
             let least_is_matched = |truth: &f64| {
-                let met = || {
-                    rows.iter()
-                        .filter(|r| r.labelling == labelling && r.true_crossover == *truth)
-                };
+                let met = || select(rows, |r| r.labelling == labelling && r.true_crossover == *truth);
                 met()
                     .min_by(|a, b| a.mse.total_cmp(&b.mse))
                     .is_some_and(|best| best.designed_for == *truth)
@@ -292,11 +239,9 @@ impl Figure for Mismatch {
             let what = format!(
                 "{labelling} words: the matched design has the least squared error at {matched:?} and nowhere else"
             );
-            claims
-                .all(format!("{labelling}-diagonal"), what, &p.crossovers, |c| {
-                    least_is_matched(c) == matched.contains(c)
-                })
-                .at_defaults();
+            here.all(format!("{labelling}-diagonal"), what, &p.crossovers, |c| {
+                least_is_matched(c) == matched.contains(c)
+            });
         }
     }
 

@@ -8,35 +8,19 @@ use fewbits_pf_mpa::{
     DynamicsWeight, IntervalRule, KernelRule, MessagePassing, ProductSampler, Ring, RingWeight, Velocity,
 };
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Particles.
-    #[garde(range(min = 3, max = 1000))]
-    particles: usize,
-    /// Trajectories.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            particles: 40,
-            trials: 200,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Particles.
+        #[garde(range(min = 3, max = 1000))]
+        particles: usize = 40,
+        /// Trajectories.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 200 => quick 4,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Variants.
-    variants: Vec<Row>,
-}
+rows! {}
 
-/// `mpa-ablation`.
 pub struct Ablation;
 
 /// The variants by name.
@@ -108,24 +92,11 @@ fn variants(n: usize) -> Result<Vec<(&'static str, MessagePassing, IntervalRule)
 }
 
 impl Figure for Ablation {
-    type Parameters = Parameters;
-    type Tables = Rows;
+    figure!(Parameters => Vec<Row>, "mpa-ablation", "Which erratum costs what", "",
+        "Improved message passing with one printed choice put back at a time, 50 and 30 dB, four levels. Full rings, the \
+         printed interval and transferred velocities cost most.");
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-ablation",
-            title: "Which erratum costs what",
-            caption: "Improved message passing with one printed choice put back at a time, 50 and 30 dB, four levels. Full rings, the \
-                      printed interval and transferred velocities cost most.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = p.trials.min(4);
-    }
-
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
         for snr in [50.0, 30.0] {
             for (name, messages, interval) in variants(p.particles)? {
@@ -146,36 +117,22 @@ impl Figure for Ablation {
                 });
             }
         }
-        Ok(Rows { variants: rows })
+        Ok(rows)
     }
 
-    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
-        agree(claims, &t.variants, "", true);
-        let ratio = |name: &str| Some(mse(&t.variants, "50dB", name)? / mse(&t.variants, "50dB", "improved")?);
-        claims
-            .above("transfer", "E7: transferring velocities costs half as much again", ratio("transfer"), 1.25)
-            .at_defaults()
-            .at_full_trials();
-        claims
-            .above("full-ring", "a full ring loses what its kernel cannot hold", ratio("full ring"), 4.0)
-            .at_defaults()
-            .at_full_trials();
-        claims
-            .above("interval", "E1: the printed interval costs a factor", ratio("printed interval"), 1.8)
-            .at_defaults()
-            .at_full_trials();
-        claims
-            .above("ratios", "E4: ratio weights of the dynamics only add noise", ratio("dynamics ratio"), 1.05)
-            .at_defaults()
-            .at_full_trials();
-        claims
-            .near("radius", "E3: the missing radius costs little here", ratio("uniform ring"), 1.04, 0.12)
-            .at_defaults()
-            .at_full_trials();
+    fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
+        let paper = claims.at_defaults().at_full_trials();
+        agree(claims, t, "", true);
+        let ratio = |name: &str| Some(mse(t, "50dB", name)? / mse(t, "50dB", "improved")?);
+        paper.above("transfer", "E7: transferring velocities costs half as much again", ratio("transfer"), 1.25);
+        paper.above("full-ring", "a full ring loses what its kernel cannot hold", ratio("full ring"), 4.0);
+        paper.above("interval", "E1: the printed interval costs a factor", ratio("printed interval"), 1.8);
+        paper.above("ratios", "E4: ratio weights of the dynamics only add noise", ratio("dynamics ratio"), 1.05);
+        paper.near("radius", "E3: the missing radius costs little here", ratio("uniform ring"), 1.04, 0.12);
     }
 
-    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
-        let panel = |snr: f64| ladder(&format!("{snr} dB"), t.variants.iter().filter(|r| r.snr_db == snr));
+    fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
+        let panel = |snr: f64| ladder(&format!("{snr} dB"), t.iter().filter(|r| r.snr_db == snr));
         Plot::grid(2, vec![panel(50.0), panel(30.0)])
     }
 }

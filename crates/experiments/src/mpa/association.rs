@@ -3,7 +3,6 @@
 use crate::prelude::*;
 use fewbits_core::Gaussian;
 use fewbits_filters::Resampling;
-use fewbits_monte_carlo::{Moments, Stream, Trial};
 use fewbits_numerics::kernels::log_sum_exp;
 use fewbits_numerics::normal;
 use fewbits_pf_mpa::association::{Hypotheses, PRINTED_GAIN, PairTracker, Rule, separation, sigmoid, tanh_rule};
@@ -167,76 +166,50 @@ fn cloud_step<R: Rng>(
     Ok((means, straight.iter().sum::<f64>() / PAIRS as f64))
 }
 
-/// `mpa-fig3-7`.
 pub struct Fig37;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Variances of the measurements.
-    #[garde(length(min = 1, max = 4), inner(range(min = 1e-8, max = 1.0)))]
-    variance: Vec<f64>,
-    /// Distance of the targets at the start.
-    #[garde(range(min = 0.0, max = 10.0))]
-    apart: f64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            variance: vec![1e-4, 4e-4],
-            apart: 0.1,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Variances of the measurements.
+        #[garde(length(min = 1, max = 4), inner(range(min = 1e-8, max = 1.0)))]
+        variance: Vec<f64> = vec![1e-4, 4e-4],
+        /// Distance of the targets at the start.
+        #[garde(range(min = 0.0, max = 10.0))]
+        apart: f64 = 0.1,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Step {
-    /// Variance of the measurements.
-    variance: f64,
-    /// Rule.
-    rule: String,
-    /// Step, from 1.
-    k: usize,
-    /// First target.
-    t1: f64,
-    /// Second target.
-    t2: f64,
-    /// First measurement received.
-    za: f64,
-    /// Second measurement received.
-    zb: f64,
-    /// Estimate of the first target.
-    estimate1: f64,
-    /// Estimate of the second.
-    estimate2: f64,
-    /// Probability that the first measurement is of the first target.
-    p0: f64,
-}
-
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Steps {
-    /// Tracks.
-    tracks: Vec<Step>,
+rows! {
+    pub struct Step {
+        /// Variance of the measurements.
+        variance: f64,
+        /// Rule.
+        rule: String,
+        /// Step, from 1.
+        k: usize,
+        /// First target.
+        t1: f64,
+        /// Second target.
+        t2: f64,
+        /// First measurement received.
+        za: f64,
+        /// Second measurement received.
+        zb: f64,
+        /// Estimate of the first target.
+        estimate1: f64,
+        /// Estimate of the second.
+        estimate2: f64,
+        /// Probability that the first measurement is of the first target.
+        p0: f64,
+    }
 }
 
 impl Figure for Fig37 {
-    type Parameters = Parameters;
-    type Tables = Steps;
+    figure!(Parameters => Vec<Step>, "mpa-fig3-7", "Two targets, two measurements in unknown order", "particle message passing, Figure 3.7",
+        "Tracks with the printed rule of thumb and with the exact probability. After a crossing the labels cannot be told \
+         apart, by any rule.");
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-fig3-7",
-            title: "Two targets, two measurements in unknown order",
-            caption: "Tracks with the printed rule of thumb and with the exact probability. After a crossing the labels cannot be told \
-                      apart, by any rule.",
-            source: "particle message passing, Figure 3.7",
-        }
-    }
-
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Steps, Error> {
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Step>, Error> {
         let mut tracks = Vec::new();
         for variance in &p.variance {
             let stream = context.stream("mpa-fig3-7");
@@ -259,29 +232,24 @@ impl Figure for Fig37 {
                 }
             }
         }
-        Ok(Steps { tracks })
+        Ok(tracks)
     }
 
-    fn claims(&self, _: &Parameters, t: &Steps, claims: &mut Claims) {
-        claims.all("probabilities", "rules give probabilities", &t.tracks, |r| (0.0..=1.0).contains(&r.p0));
+    fn claims(&self, _: &Parameters, t: &Vec<Step>, claims: &mut Claims) {
+        let here = claims.at_defaults();
+        claims.all("probabilities", "rules give probabilities", t, |r| (0.0..=1.0).contains(&r.p0));
         let near = |r: &Step| {
             let to = |x: f64| (x - r.t1).abs().min((x - r.t2).abs());
             to(r.estimate1).max(to(r.estimate2)) < 8.0 * r.variance.sqrt()
         };
-        claims
-            .all("follow", "every estimate follows one of the targets", &t.tracks, near)
-            .at_defaults();
+        here.all("follow", "every estimate follows one of the targets", t, near);
     }
 
-    fn plot(&self, p: &Parameters, t: &Steps) -> Plot {
+    fn plot(&self, p: &Parameters, t: &Vec<Step>) -> Plot {
         let panel = |variance: &f64| {
-            let of = |rule: &'static str| {
-                t.tracks
-                    .iter()
-                    .filter(move |r| r.variance == *variance && r.rule == rule)
-            };
+            let of = |rule: &'static str| select(t, move |r| r.variance == *variance && r.rule == rule);
             let k = |r: &Step| r.k as f64;
-            Panel::new(format!("R = {variance}"), Axis::linear("step"), Axis::linear("position"))
+            Panel::linear(format!("R = {variance}"), "step", "position")
                 .with(Layer::line("target 1", points(of("jpda"), |r| (k(r), r.t1))).coloured(0))
                 .with(Layer::line("target 2", points(of("jpda"), |r| (k(r), r.t2))).coloured(1))
                 .with(Layer::points("printed, 1", points(of("tanh"), |r| (k(r), r.estimate1))).coloured(2))
@@ -293,66 +261,40 @@ impl Figure for Fig37 {
     }
 }
 
-/// `mpa-table3-da`.
 pub struct Table;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Effort {
-    /// Tracks of each setting.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Effort {
-    fn default() -> Self {
-        Self { trials: 400 }
+parameters! {
+    /// Settings.
+    pub struct Effort {
+        /// Tracks of each setting.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 400 => quick 10,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Variance of the measurements.
-    variance: f64,
-    /// Distance of the targets at the start.
-    apart: f64,
-    /// Rule.
-    method: &'static str,
-    /// Mean squared error, both targets summed, labels counted.
-    labelled: Measured,
-    /// The same with the better labels of each step.
-    unlabelled: Measured,
-    /// Mean distance of the probability from what was.
-    association: Measured,
-}
-
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Rules.
-    rules: Vec<Row>,
+rows! {
+    pub struct Row {
+        /// Variance of the measurements.
+        variance: f64,
+        /// Distance of the targets at the start.
+        apart: f64,
+        /// Rule.
+        method: &'static str,
+        /// Mean squared error, both targets summed, labels counted.
+        labelled: Measured,
+        /// The same with the better labels of each step.
+        unlabelled: Measured,
+        /// Mean distance of the probability from what was.
+        association: Measured,
+    }
 }
 
 impl Figure for Table {
-    type Parameters = Effort;
-    type Tables = Rows;
+    figure!(Effort => Vec<Row>, "mpa-table3-da", "Rules of association", "particle message passing, Section 3.5",
+        "Labelled and unlabelled errors of two random walks, and how far the probabilities are from what was. The exact \
+         likelihood is better than the printed rule, most of all inside a particle filter.");
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-table3-da",
-            title: "Rules of association",
-            caption: "Labelled and unlabelled errors of two random walks, and how far the probabilities are from what was. The exact \
-                      likelihood is better than the printed rule, most of all inside a particle filter.",
-            source: "particle message passing, Section 3.5",
-        }
-    }
-
-    fn quicken(&self, p: &mut Effort) {
-        p.trials = p.trials.min(10);
-    }
-
-    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Rows, Error> {
+    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rules = Vec::new();
         for variance in [1e-4, 4e-4] {
             for apart in [0.1, 0.3] {
@@ -390,76 +332,46 @@ impl Figure for Table {
                 }
             }
         }
-        Ok(Rows { rules })
+        Ok(rules)
     }
 
-    fn claims(&self, _: &Effort, t: &Rows, claims: &mut Claims) {
+    fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let key = |r: &Row| format!("R{}-sep{}-{}", r.variance, r.apart, r.method);
-        claims
-            .references("labelled", "labelled error", &t.rules, |r| (key(r), r.labelled))
-            .at_full_trials();
+        full.references("labelled", "labelled error", t, |r| (key(r), r.labelled));
         type Of = fn(&Row) -> Measured;
         let two: [(&str, &str, Of); 2] = [
             ("unlabelled", "unlabelled error", |r| r.unlabelled),
             ("association", "error of association", |r| r.association),
         ];
         for (id, what, value) in two {
-            claims
-                .references(id, what, &t.rules, |r| (key(r), value(r)))
-                .at_full_trials();
-            claims
-                .references_at_most(&format!("{id}-most"), what, &t.rules, |r| (key(r), value(r)))
-                .at_full_trials();
+            full.references(id, what, t, |r| (key(r), value(r)));
+            full.references_at_most(&format!("{id}-most"), what, t, |r| (key(r), value(r)));
         }
         for (variance, blur) in [(1e-4, 3.0), (4e-4, 2.0)] {
-            let of = |method: &str| {
-                t.rules
-                    .iter()
-                    .find(|r| r.variance == variance && r.apart == 0.1 && r.method == method)
-            };
+            let of = |method: &str| first(t, |r| r.variance == variance && r.apart == 0.1 && r.method == method);
             let errors = ["jpda", "tanh", "pf-tanh"].map(|m| of(m).map(|r| r.association.value));
-            claims
-                .increasing(
-                    format!("order-{variance}"),
-                    "C10: exact < printed rule < printed rule over particles",
-                    errors,
-                )
-                .at_full_trials();
+            let what = "C10: exact < printed rule < printed rule over particles";
+            full.increasing(format!("order-{variance}"), what, errors);
             let ratio = of("pf-tanh")
                 .zip(of("pf-exact"))
                 .map(|(a, b)| a.unlabelled.value / b.unlabelled.value);
-            claims
-                .above(
-                    format!("particles-{variance}"),
-                    "C10: over particles the printed rule blurs the targets",
-                    ratio,
-                    blur,
-                )
-                .at_full_trials();
+            let what = "C10: over particles the printed rule blurs the targets";
+            full.above(format!("particles-{variance}"), what, ratio, blur);
         }
-        let genie = |r: &Row| {
-            t.rules
-                .iter()
-                .find(|g| g.variance == r.variance && g.apart == r.apart && g.method == "genie")
-        };
-        let known = t.rules.iter().filter(|r| r.method != "genie");
-        claims
-            .all("genie", "C10: no rule is below the genie", known, |r| {
-                genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
-            })
-            .at_full_trials();
+        let genie = |r: &Row| first(t, |g| g.variance == r.variance && g.apart == r.apart && g.method == "genie");
+        let known = t.iter().filter(|r| r.method != "genie");
+        full.all("genie", "C10: no rule is below the genie", known, |r| {
+            genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
+        });
     }
 
-    fn plot(&self, _: &Effort, t: &Rows) -> Plot {
+    fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
         let panel = |variance: f64| {
-            let here: Vec<&Row> = t
-                .rules
-                .iter()
-                .filter(|r| r.variance == variance && r.apart == 0.1)
-                .collect();
-            let names = here.iter().enumerate().map(|(i, r)| (i as f64, r.method.to_owned()));
+            let here: Vec<&Row> = t.iter().filter(|r| r.variance == variance && r.apart == 0.1).collect();
+            let names = here.iter().map(|r| r.method.to_owned());
             let numbered: Vec<(usize, &Row)> = here.iter().copied().enumerate().collect();
-            Panel::new(format!("R = {variance}"), Axis::linear("").named(names), Axis::log("mean squared error"))
+            Panel::new(format!("R = {variance}"), Axis::categories("", names), Axis::log("mean squared error"))
                 .with(Layer::measured("labelled", numbered.clone(), |(i, r)| (i as f64, r.labelled)))
                 .with(Layer::measured("unlabelled", numbered, |(i, r)| (i as f64, r.unlabelled)))
         };

@@ -4,58 +4,42 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, Score, World, prior};
 use crate::prelude::*;
 use fewbits_core::Gaussian;
-use fewbits_monte_carlo::{Moments, Trial};
 use fewbits_pf_mpa::{CramerRao, Target, position_information};
 use nalgebra::{Matrix4, Vector2};
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Free trajectories.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { trials: 400 }
+parameters! {
+    pub struct Parameters {
+        /// Free trajectories.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 400 => quick 10,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Ratio of the powers of range and noise.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Levels of the quantizer.
-    levels: usize,
-    /// Bound for levels, mean over the steps.
-    quantized: Measured,
-    /// Bound for the ranges themselves.
-    unquantized: Measured,
-    /// Grid of 25 nodes an axis.
-    grid: Measured,
-    /// Gaussian message passing.
-    message_passing: Measured,
-    /// Extended Kalman filter of the ranges.
-    unquantized_filter: Measured,
-    /// Medians of the three.
-    grid_median: f64,
-    /// Median.
-    message_passing_median: f64,
-    /// Median.
-    unquantized_filter_median: f64,
+rows! {
+    pub struct Row {
+        /// Ratio of the powers of range and noise.
+        snr_db: f64 ["dB"],
+        /// Levels of the quantizer.
+        levels: usize,
+        /// Bound for levels, mean over the steps.
+        quantized: Measured,
+        /// Bound for the ranges themselves.
+        unquantized: Measured,
+        /// Grid of 25 nodes an axis.
+        grid: Measured,
+        /// Gaussian message passing.
+        message_passing: Measured,
+        /// Extended Kalman filter of the ranges.
+        unquantized_filter: Measured,
+        /// Medians of the three.
+        grid_median: f64,
+        /// Median.
+        message_passing_median: f64,
+        /// Median.
+        unquantized_filter_median: f64,
+    }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Bounds and errors.
-    bounds: Vec<Row>,
-}
-
-/// `mpa-crlb`.
 pub struct Bounds;
 
 const LEVELS: [usize; 3] = [2, 4, 16];
@@ -67,24 +51,11 @@ const SNRS: [f64; 4] = [20.0, 30.0, 40.0, 50.0];
 type Sums = Vec<[Matrix4<f64>; 2]>;
 
 impl Figure for Bounds {
-    type Parameters = Parameters;
-    type Tables = Rows;
+    figure!(Parameters => Vec<Row>, "mpa-crlb", "Bounds for quantized ranges", "",
+        "Posterior Cramer-Rao bounds over free trajectories, accelerations known, with the references of the grid filter; \
+         and what is reached. At 50 dB the bound is far below: information sits at the edges of the cells.");
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-crlb",
-            title: "Bounds for quantized ranges",
-            caption: "Posterior Cramer-Rao bounds over free trajectories, accelerations known, with the references of the grid filter; \
-                      and what is reached. At 50 dB the bound is far below: information sits at the edges of the cells.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = p.trials.min(10);
-    }
-
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let target = Target::printed()?;
         let mut bounds = Vec::new();
         for snr_db in SNRS {
@@ -151,44 +122,33 @@ impl Figure for Bounds {
                 });
             }
         }
-        Ok(Rows { bounds })
+        Ok(bounds)
     }
 
-    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+    fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let key = |r: &Row| format!("{}dB-L{}", r.snr_db, r.levels);
-        claims
-            .references("quantized", "bound for levels", &t.bounds, |r| (key(r), r.quantized))
-            .at_full_trials();
-        claims
-            .references("unquantized", "bound for ranges", &t.bounds, |r| (key(r), r.unquantized))
-            .at_full_trials();
-        claims
-            .references("grid-median", "median of the grid", &t.bounds, |r| (key(r), r.grid_median))
-            .at_full_trials();
-        claims.all("floor", "C7: no tracker of levels is below its bound", &t.bounds, |r| {
+        full.references("quantized", "bound for levels", t, |r| (key(r), r.quantized));
+        full.references("unquantized", "bound for ranges", t, |r| (key(r), r.unquantized));
+        full.references("grid-median", "median of the grid", t, |r| (key(r), r.grid_median));
+        claims.all("floor", "C7: no tracker of levels is below its bound", t, |r| {
             let above = |m: Measured| m.value > r.quantized.value - 3.0 * m.standard_error.unwrap_or(0.0);
             above(r.grid) && above(r.message_passing)
         });
-        claims.all("order", "levels never tell more than ranges", &t.bounds, |r| {
-            r.quantized.value > r.unquantized.value
-        });
+        claims.all("order", "levels never tell more than ranges", t, |r| r.quantized.value > r.unquantized.value);
         for snr in SNRS {
-            let of = t.bounds.iter().filter(|r| r.snr_db == snr).map(|r| r.quantized.value);
-            claims
-                .decreasing(format!("levels-{snr}"), "C7: fewer levels, larger bound", of)
-                .at_full_trials();
+            let of = t.iter().filter(|r| r.snr_db == snr).map(|r| r.quantized.value);
+            full.decreasing(format!("levels-{snr}"), "C7: fewer levels, larger bound", of);
         }
-        let loose = t.bounds.iter().find(|r| r.snr_db == 50.0 && r.levels == 4);
-        claims
-            .above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized.value), 5.0)
-            .at_full_trials();
+        let loose = t.iter().find(|r| r.snr_db == 50.0 && r.levels == 4);
+        full.above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized.value), 5.0);
     }
 
-    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
+    fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
         let panel = |levels: usize| {
-            let here: Vec<&Row> = t.bounds.iter().filter(|r| r.levels == levels).collect();
+            let here: Vec<&Row> = t.iter().filter(|r| r.levels == levels).collect();
             let snr = |r: &&Row| r.snr_db;
-            Panel::new(format!("{levels} levels"), Axis::linear("SNR / dB"), Axis::log("mean squared error"))
+            Panel::semilog(format!("{levels} levels"), "SNR / dB", "mean squared error")
                 .with(Layer::line("bound", points(&here, |r| (snr(r), r.quantized.value))).coloured(0))
                 .with(Layer::points("grid, median", points(&here, |r| (snr(r), r.grid_median))).coloured(1))
                 .with(Layer::measured("grid, mean", &here, |r| (snr(r), r.grid)).coloured(2))

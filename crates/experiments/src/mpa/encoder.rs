@@ -6,54 +6,33 @@ use super::world::{Method, Point};
 use crate::prelude::*;
 use fewbits_pf_mpa::Encoder;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Trajectories.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { trials: 200 }
+parameters! {
+    pub struct Parameters {
+        /// Trajectories.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 200 => quick 6,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Encoders over levels and noise.
-    encoders: Vec<Row>,
-    /// Other loadings of the adaptive encoder.
-    loadings: Vec<Row>,
+rows! {
+    pub struct Rows {
+        /// Encoders over levels and noise.
+        encoders: Vec<Row>,
+        /// Other loadings of the adaptive encoder.
+        loadings: Vec<Row>,
+    }
 }
 
-/// `mpa-encoder`.
 pub struct Encoders;
 
 const LEVELS: [usize; 4] = [2, 4, 8, 16];
 const NAMES: [&str; 3] = ["published", "predicted", "adaptive"];
 
 impl Figure for Encoders {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mpa-encoder",
-            title: "Where the cells should lie",
-            caption: "The grid of 15 and Gaussian message passing with the published encoder, with the predicted range as reference, \
-                      and with cells as wide as the innovation. Without one additional bit the error falls by up to thirty times, and \
-                      four bits reach the filter of unquantized ranges.",
-            source: "",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = p.trials.min(6);
-    }
+    figure!(Parameters => Rows, "mpa-encoder", "Where the cells should lie", "",
+        "The grid of 15 and Gaussian message passing with the published encoder, with the predicted range as reference, \
+         and with cells as wide as the innovation. Without one additional bit the error falls by up to thirty times, and \
+         four bits reach the filter of unquantized ranges.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let methods = [
@@ -101,28 +80,19 @@ impl Figure for Encoders {
     }
 
     fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         agree(claims, &t.encoders, "", true);
         agree(claims, &t.loadings, "loading-", true);
         let grid = |name: &str, point: &str| mse(&t.encoders, &format!("{name} {point}"), "grid-15");
         for (point, factor) in [("50dB-L4", 20.0), ("40dB-L4", 8.0), ("30dB-L4", 2.4)] {
-            let gain = grid("published", point)
-                .zip(grid("adaptive", point))
-                .map(|(a, b)| a / b);
-            claims
-                .at_least(format!("gain-{point}"), "the adaptive encoder divides the error", gain, factor)
-                .at_full_trials();
+            let gain = over(grid("published", point), grid("adaptive", point));
+            full.at_least(format!("gain-{point}"), "the adaptive encoder divides the error", gain, factor);
         }
         for snr in ["50dB", "40dB", "30dB"] {
             let point = format!("{snr}-L16");
             let ratio = grid("adaptive", &point).zip(mse(&t.encoders, &format!("adaptive {point}"), "EKF-U"));
-            claims
-                .at_most(
-                    format!("four-bits-{snr}"),
-                    "with the adaptive encoder four bits are as good as the unquantized extended Kalman filter",
-                    ratio.map(|(a, b)| a / b),
-                    1.15,
-                )
-                .at_full_trials();
+            let what = "with the adaptive encoder four bits are as good as the unquantized extended Kalman filter";
+            full.at_most(format!("four-bits-{snr}"), what, ratio.map(|(a, b)| a / b), 1.15);
         }
         let lost = t
             .encoders
@@ -143,7 +113,7 @@ impl Figure for Encoders {
             });
             let reference = t.encoders.iter().find(|r| r.snr_db == snr && r.method == "EKF-U");
             let level = reference.map_or(Vec::new(), |r| vec![(1.0, r.score.mse.value), (4.0, r.score.mse.value)]);
-            Panel::new(format!("{snr} dB"), Axis::linear("bits"), Axis::log("mean squared error"))
+            Panel::semilog(format!("{snr} dB"), "bits", "mean squared error")
                 .with_all(lines)
                 .with(Layer::dashed("unquantized EKF", level))
         };

@@ -3,73 +3,60 @@
 use crate::prelude::*;
 use fewbits_core::NumberFormat;
 use fewbits_densities::{Component, Mixture, product};
-use fewbits_monte_carlo::Moments;
 use fewbits_pf_mpa::graph::{self, FactorGraph};
 use fewbits_pf_mpa::leader::StepBits;
 use fewbits_pf_mpa::{LabelChain, RingBias, kernel_error, ratio_second_moments};
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};
 
-/// `mpa-gibbs`.
 pub struct Gibbs;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Draws {
-    /// Draws of the sampler in each case.
-    #[garde(range(min = 2, max = 10_000_000))]
-    trials: u64,
-    /// Sweeps of each draw.
-    #[garde(range(min = 0, max = 1000))]
-    sweeps: usize,
-}
-
-impl Default for Draws {
-    fn default() -> Self {
-        Self {
-            trials: 400_000,
-            sweeps: 5,
-        }
+parameters! {
+    /// Settings.
+    pub struct Draws {
+        /// Draws of the sampler in each case.
+        #[garde(range(min = 2, max = 10_000_000))]
+        trials: u64 = 400_000 => quick 5000,
+        /// Sweeps of each draw.
+        #[garde(range(min = 0, max = 1000))]
+        sweeps: usize = 5,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Mixing {
-    /// Case.
-    case: &'static str,
-    /// Sweeps.
-    sweeps: usize,
-    /// Total variation between the labels' law and the product's, exactly.
-    total_variation: f64,
-    /// Mean of a draw minus that of the product, first axis, exactly: what no number of draws removes.
-    bias: f64,
-}
+rows! {
+    struct Mixing {
+        /// Case.
+        case: &'static str,
+        /// Sweeps.
+        sweeps: usize,
+        /// Total variation between the labels' law and the product's, exactly.
+        total_variation: f64,
+        /// Mean of a draw minus that of the product, first axis, exactly: what no number of draws removes.
+        bias: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Sampled {
-    /// Case.
-    case: &'static str,
-    /// Axis.
-    axis: usize,
-    /// Mean of the product.
-    exact: f64,
-    /// Mean of a draw after the sweeps, exactly.
-    after_sweeps: f64,
-    /// Mean of the draws.
-    mean: Measured,
-    /// Second largest modulus of the label chain's eigenvalues.
-    second_eigenvalue: f64,
-    /// `ln` of the product's mass.
-    log_normaliser: f64,
-}
+    struct Sampled {
+        /// Case.
+        case: &'static str,
+        /// Axis.
+        axis: usize,
+        /// Mean of the product.
+        exact: f64,
+        /// Mean of a draw after the sweeps, exactly.
+        after_sweeps: f64,
+        /// Mean of the draws.
+        mean: Measured,
+        /// Second largest modulus of the label chain's eigenvalues.
+        second_eigenvalue: f64,
+        /// `ln` of the product's mass.
+        log_normaliser: f64,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct GibbsRows {
-    /// How the labels forget their start.
-    mixing: Vec<Mixing>,
-    /// What the sampler draws.
-    sampled: Vec<Sampled>,
+    pub struct GibbsRows {
+        /// How the labels forget their start.
+        mixing: Vec<Mixing>,
+        /// What the sampler draws.
+        sampled: Vec<Sampled>,
+    }
 }
 
 fn mixture<const D: usize>(
@@ -160,22 +147,9 @@ fn case<const D: usize>(
 }
 
 impl Figure for Gibbs {
-    type Parameters = Draws;
-    type Tables = GibbsRows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mpa-gibbs",
-            title: "How fast Gibbs sweeps forget their start",
-            caption: "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
-                      separated modes (B), and what the sampler draws after five. In A the chain's own bias after five sweeps is 0.0093.",
-            source: "particle message passing, Section 2.1.4",
-        }
-    }
-
-    fn quicken(&self, p: &mut Draws) {
-        p.trials = p.trials.min(5000);
-    }
+    figure!(Draws => GibbsRows, "mpa-gibbs", "How fast Gibbs sweeps forget their start", "particle message passing, Section 2.1.4",
+        "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
+         separated modes (B), and what the sampler draws after five. In A the chain's own bias after five sweeps is 0.0093.");
 
     fn run(&self, p: &Draws, context: &Context<'_>) -> Result<GibbsRows, Error> {
         let mut rows = GibbsRows {
@@ -189,133 +163,101 @@ impl Figure for Gibbs {
     }
 
     fn claims(&self, _: &Draws, t: &GibbsRows, claims: &mut Claims) {
+        let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         let key = |r: &Mixing| format!("{}-t{}", r.case, r.sweeps);
         claims.references("tv", "total variation after the sweeps", &t.mixing, |r| (key(r), r.total_variation));
         let axis = |r: &Sampled| format!("{}{}", r.case, r.axis);
         claims.references("mean", "mean of the product", &t.sampled, |r| (axis(r), r.exact));
         claims.references("log-mass", "mass of the product", &t.sampled, |r| (axis(r), r.log_normaliser));
         claims.references("eigenvalue", "second eigenvalue", &t.sampled, |r| (axis(r), r.second_eigenvalue));
-        claims.all_within(
-            "law",
-            "draws have the mean of the chain after these sweeps",
-            &t.sampled,
-            |r| (r.mean, r.after_sweeps),
-            4.0,
-        );
+        let what = "draws have the mean of the chain after these sweeps";
+        claims.all_within("law", what, &t.sampled, |r| (r.mean, r.after_sweeps), 4.0);
         let first = t.sampled.iter().find(|r| r.case == "A");
-        claims
-            .near(
-                "bias-a",
-                "C8: five sweeps leave a bias of 0.0093 in case A, beyond the 0.004 that was asked for",
-                first.map(|r| r.after_sweeps - r.exact),
-                0.009_346,
-                1e-5,
-            )
-            .at_defaults();
+        let what = "C8: five sweeps leave a bias of 0.0093 in case A, beyond the 0.004 that was asked for";
+        here.near("bias-a", what, first.map(|r| r.after_sweeps - r.exact), 0.009_346, 1e-5);
         let plane = t.sampled.iter().filter(|r| r.case == "C");
-        claims
-            .all("bias-c", "C8: in case C it is within 0.004", plane, |r| (r.mean.value - r.exact).abs() < 0.004)
-            .at_defaults()
-            .at_full_trials();
+        paper.all("bias-c", "C8: in case C it is within 0.004", plane, |r| (r.mean.value - r.exact).abs() < 0.004);
         let stuck = t.sampled.iter().find(|r| r.case == "B").map(|r| r.second_eigenvalue);
         claims.above("stuck", "between separated modes a chain does not move", stuck, 0.999_999);
     }
 
     fn plot(&self, _: &Draws, t: &GibbsRows) -> Plot {
-        let of = |case: &'static str| {
-            t.mixing
-                .iter()
-                .filter(move |r| r.case == case && r.total_variation > 1e-12)
-        };
-        let panel = Panel::new("Labels", Axis::linear("sweeps"), Axis::log("total variation"))
+        let of = |case: &'static str| select(&t.mixing, move |r| r.case == case && r.total_variation > 1e-12);
+        let panel = Panel::semilog("Labels", "sweeps", "total variation")
             .with_all(["A", "C"].map(|c| Layer::line(c, points(of(c), |r| (r.sweeps as f64, r.total_variation)))));
         let bias = |case: &'static str| {
             points(t.mixing.iter().filter(move |r| r.case == case && r.bias != 0.0), |r| {
                 (r.sweeps as f64, r.bias.abs())
             })
         };
-        let second = Panel::new("Mean of a draw", Axis::linear("sweeps"), Axis::log("bias"))
-            .with_all(["A", "C"].map(|c| Layer::line(c, bias(c))));
+        let second =
+            Panel::semilog("Mean of a draw", "sweeps", "bias").with_all(["A", "C"].map(|c| Layer::line(c, bias(c))));
         Plot::grid(2, vec![panel, second])
     }
 }
 
-/// `mpa-ring`.
 pub struct Rings;
 
-/// No settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate, Default)]
-#[serde(deny_unknown_fields)]
-pub struct None {}
-
-#[derive(Serialize, JsonSchema)]
-struct Ring {
-    /// Lower end of the cell.
-    lower: f64,
-    /// Upper end.
-    upper: f64,
-    /// Deviation of the noise.
-    deviation: f64,
-    /// Mean radius of uniform bearings, as printed.
-    printed: f64,
-    /// Mean radius of the message.
-    exact: f64,
-    /// Total variation between both.
-    total_variation: f64,
+parameters! {
+    pub struct None {}
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Kernel {
-    /// Points.
-    n: u32,
-    /// Dimensions.
-    dimension: u32,
-    /// Printed factor of the variance.
-    printed: f64,
-    /// Silverman's.
-    silverman: f64,
-    /// Integrated squared error with the printed factor, exactly, for a normal density.
-    printed_error: f64,
-    /// With Silverman's.
-    silverman_error: f64,
-}
+rows! {
+    struct Ring {
+        /// Lower end of the cell.
+        lower: f64,
+        /// Upper end.
+        upper: f64,
+        /// Deviation of the noise.
+        deviation: f64,
+        /// Mean radius of uniform bearings, as printed.
+        printed: f64,
+        /// Mean radius of the message.
+        exact: f64,
+        /// Total variation between both.
+        total_variation: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Weight {
-    /// Components.
-    components: usize,
-    /// Distance between neighbours, in their deviations.
-    spacing: f64,
-    /// Second moment of the printed weights, one draw from each component; equal weights have 1.
-    each: f64,
-    /// With all draws from the first.
-    first: f64,
-}
+    struct Kernel {
+        /// Points.
+        n: u32,
+        /// Dimensions.
+        dimension: u32,
+        /// Printed factor of the variance.
+        printed: f64,
+        /// Silverman's.
+        silverman: f64,
+        /// Integrated squared error with the printed factor, exactly, for a normal density.
+        printed_error: f64,
+        /// With Silverman's.
+        silverman_error: f64,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct RingRows {
-    /// Rings.
-    rings: Vec<Ring>,
-    /// Kernels.
-    kernels: Vec<Kernel>,
-    /// Weights.
-    weights: Vec<Weight>,
+    struct Weight {
+        /// Components.
+        components: usize,
+        /// Distance between neighbours, in their deviations.
+        spacing: f64,
+        /// Second moment of the printed weights, one draw from each component; equal weights have 1.
+        each: f64,
+        /// With all draws from the first.
+        first: f64,
+    }
+
+    pub struct RingRows {
+        /// Rings.
+        rings: Vec<Ring>,
+        /// Kernels.
+        kernels: Vec<Kernel>,
+        /// Weights.
+        weights: Vec<Weight>,
+    }
 }
 
 impl Figure for Rings {
-    type Parameters = None;
-    type Tables = RingRows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mpa-ring",
-            title: "Errata in closed form: radii, kernels, weights",
-            caption: "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
-                      Silverman's kernel; and the second moment of the printed ratio weights, which equal weights make 1.",
-            source: "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
-        }
-    }
+    figure!(None => RingRows, "mpa-ring", "Errata in closed form: radii, kernels, weights", "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
+        "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
+         Silverman's kernel; and the second moment of the printed ratio weights, which equal weights make 1.");
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<RingRows, Error> {
         let ring = |(lower, upper, deviation): (f64, f64, f64)| -> Result<Ring, Error> {
@@ -385,70 +327,46 @@ impl Figure for Rings {
     fn plot(&self, _: &None, t: &RingRows) -> Plot {
         let swept = || t.rings.iter().filter(|r| r.deviation == 0.01);
         let middle = |r: &Ring| 0.5 * (r.lower + r.upper);
-        let first = Panel::new(
-            "Cell of width 1.5",
-            Axis::linear("middle of the cell"),
-            Axis::linear("mean radius minus middle"),
-        )
-        .with(Layer::line("message", points(swept(), |r| (middle(r), r.exact - middle(r)))))
-        .with(Layer::line("printed ring", points(swept(), |r| (middle(r), r.printed - middle(r)))));
+        let first = Panel::linear("Cell of width 1.5", "middle of the cell", "mean radius minus middle")
+            .with(Layer::line("message", points(swept(), |r| (middle(r), r.exact - middle(r)))))
+            .with(Layer::line("printed ring", points(swept(), |r| (middle(r), r.printed - middle(r)))));
         let plane = || {
             let mut all: Vec<&Kernel> = t.kernels.iter().filter(|k| k.dimension == 2).collect();
             all.sort_by_key(|k| k.n);
             all
         };
-        let second = Panel::new("Kernels, two dimensions", Axis::log("points"), Axis::log("integrated squared error"))
+        let second = Panel::loglog("Kernels, two dimensions", "points", "integrated squared error")
             .with(Layer::line("Silverman", points(plane(), |r| (f64::from(r.n), r.silverman_error))))
             .with(Layer::line("printed", points(plane(), |r| (f64::from(r.n), r.printed_error))));
         Plot::grid(2, vec![first, second])
     }
 }
 
-/// `mpa-bits`.
 pub struct Bits;
 
-#[derive(Serialize, JsonSchema)]
-struct BitRow {
-    /// Sensors.
-    sensors: usize,
-    /// Levels.
-    levels: usize,
-    /// Levels of all sensors.
-    #[schemars(extend("unit" = "bit"))]
-    reports: u64,
-    /// Mean and covariance from leader to leader.
-    #[schemars(extend("unit" = "bit"))]
-    handover: u64,
-    /// Published protocol: both.
-    #[schemars(extend("unit" = "bit"))]
-    published: u64,
-    /// The ranges themselves, 32 bits each.
-    #[schemars(extend("unit" = "bit"))]
-    raw: u64,
-}
-
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct BitRows {
-    /// Bits of a step.
-    bits: Vec<BitRow>,
+rows! {
+    pub struct BitRow {
+        /// Sensors.
+        sensors: usize,
+        /// Levels.
+        levels: usize,
+        /// Levels of all sensors.
+        reports: u64 ["bit"],
+        /// Mean and covariance from leader to leader.
+        handover: u64 ["bit"],
+        /// Published protocol: both.
+        published: u64 ["bit"],
+        /// The ranges themselves, 32 bits each.
+        raw: u64 ["bit"],
+    }
 }
 
 impl Figure for Bits {
-    type Parameters = None;
-    type Tables = BitRows;
+    figure!(None => Vec<BitRow>, "mpa-bits", "Bits of a step", "particle message passing, Section 3.3",
+        "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
+         Where all nodes receive all levels and run the same deterministic tracker, none is needed.");
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-bits",
-            title: "Bits of a step",
-            caption: "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
-                      Where all nodes receive all levels and run the same deterministic tracker, none is needed.",
-            source: "particle message passing, Section 3.3",
-        }
-    }
-
-    fn run(&self, _: &None, _: &Context<'_>) -> Result<BitRows, Error> {
+    fn run(&self, _: &None, _: &Context<'_>) -> Result<Vec<BitRow>, Error> {
         let mut bits = Vec::new();
         for sensors in [3, 5, 10, 20] {
             for levels in [2, 4, 16, 256] {
@@ -463,25 +381,25 @@ impl Figure for Bits {
                 });
             }
         }
-        Ok(BitRows { bits })
+        Ok(bits)
     }
 
-    fn claims(&self, _: &None, t: &BitRows, claims: &mut Claims) {
+    fn claims(&self, _: &None, t: &Vec<BitRow>, claims: &mut Claims) {
         let key = |r: &BitRow| format!("S{}-L{}", r.sensors, r.levels);
-        claims.references("reports", "bits of the levels", &t.bits, |r| (key(r), r.reports as f64));
-        claims.references("handover", "bits of a hand-over", &t.bits, |r| (key(r), r.handover as f64));
-        claims.references("raw", "bits of plain ranges", &t.bits, |r| (key(r), r.raw as f64));
-        let five = t.bits.iter().filter(|r| r.sensors == 5);
+        claims.references("reports", "bits of the levels", t, |r| (key(r), r.reports as f64));
+        claims.references("handover", "bits of a hand-over", t, |r| (key(r), r.handover as f64));
+        claims.references("raw", "bits of plain ranges", t, |r| (key(r), r.raw as f64));
+        let five = t.iter().filter(|r| r.sensors == 5);
         claims.all("dear", "with five sensors the published protocol costs more than plain ranges", five, |r| {
             r.published > r.raw
         });
     }
 
-    fn plot(&self, _: &None, t: &BitRows) -> Plot {
-        let of = |levels: usize| t.bits.iter().filter(move |r| r.levels == levels);
+    fn plot(&self, _: &None, t: &Vec<BitRow>) -> Plot {
+        let of = |levels: usize| t.iter().filter(move |r| r.levels == levels);
         let sensors = |r: &BitRow| r.sensors as f64;
         Plot::of(
-            Panel::new("Bits of a step", Axis::log("sensors"), Axis::log("bits"))
+            Panel::loglog("Bits of a step", "sensors", "bits")
                 .with(Layer::line("levels alone, L = 4", points(of(4), |r| (sensors(r), r.reports as f64))))
                 .with(Layer::line("with hand-over, L = 4", points(of(4), |r| (sensors(r), r.published as f64))))
                 .with(Layer::line("with hand-over, L = 256", points(of(256), |r| (sensors(r), r.published as f64))))
@@ -490,38 +408,35 @@ impl Figure for Bits {
     }
 }
 
-/// `mpa-graphs`.
 pub struct Graphs;
 
-#[derive(Serialize, JsonSchema)]
-struct NodeRow {
-    /// Figure of the thesis.
-    graph: &'static str,
-    /// Node.
-    node: String,
-    /// `variable` or `function`.
-    kind: &'static str,
-    /// Edges.
-    degree: usize,
-}
+rows! {
+    struct NodeRow {
+        /// Figure of the thesis.
+        graph: &'static str,
+        /// Node.
+        node: String,
+        /// `variable` or `function`.
+        kind: &'static str,
+        /// Edges.
+        degree: usize,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct EdgeRow {
-    /// Figure of the thesis.
-    graph: &'static str,
-    /// Function.
-    function: String,
-    /// Variable.
-    variable: String,
-}
+    struct EdgeRow {
+        /// Figure of the thesis.
+        graph: &'static str,
+        /// Function.
+        function: String,
+        /// Variable.
+        variable: String,
+    }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct GraphRows {
-    /// Nodes.
-    nodes: Vec<NodeRow>,
-    /// Edges.
-    edges: Vec<EdgeRow>,
+    pub struct GraphRows {
+        /// Nodes.
+        nodes: Vec<NodeRow>,
+        /// Edges.
+        edges: Vec<EdgeRow>,
+    }
 }
 
 fn graphs() -> Result<[(&'static str, FactorGraph); 3], Error> {
@@ -533,17 +448,8 @@ fn graphs() -> Result<[(&'static str, FactorGraph); 3], Error> {
 }
 
 impl Figure for Graphs {
-    type Parameters = None;
-    type Tables = GraphRows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mpa-graphs",
-            title: "The factor graphs",
-            caption: "Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).",
-            source: "particle message passing, Figures 2.1, 3.2, 3.6",
-        }
-    }
+    figure!(None => GraphRows, "mpa-graphs", "The factor graphs", "particle message passing, Figures 2.1, 3.2, 3.6",
+        "Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).");
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<GraphRows, Error> {
         let (mut nodes, mut edges) = (Vec::new(), Vec::new());
@@ -570,13 +476,8 @@ impl Figure for Graphs {
         let edges = t.edges.iter().filter(|e| e.graph == "2.1").count() as f64;
         claims.near("edges", "and eight edges", edges, 8.0, 0.0);
         let position = t.nodes.iter().find(|n| n.graph == "3.2" && n.node == "position");
-        claims.near(
-            "position",
-            "with five sensors, the position has six edges",
-            position.map(|n| n.degree as f64),
-            6.0,
-            0.0,
-        );
+        let what = "with five sensors, the position has six edges";
+        claims.near("position", what, position.map(|n| n.degree as f64), 6.0, 0.0);
     }
 
     fn plot(&self, _: &None, t: &GraphRows) -> Plot {

@@ -5,80 +5,56 @@ use super::world::{Field, Method, Point, World, canonical};
 use crate::prelude::*;
 use fewbits_pf_mpa::Target;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Which trajectory of those that all figures share.
-    #[garde(range(min = 0, max = 10_000))]
-    trajectory: u64,
-    /// Particles of message passing.
-    #[garde(range(min = 3, max = 1000))]
-    particles: usize,
-    /// Ratio of the powers of range and noise, in decibels.
-    #[garde(range(min = 0.0, max = 80.0))]
-    snr_db: f64,
-    /// Levels of the quantizer.
-    #[garde(range(min = 2, max = 65_536))]
-    levels: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            trajectory: 0,
-            particles: 40,
-            snr_db: 50.0,
-            levels: 4,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Which trajectory of those that all figures share.
+        #[garde(range(min = 0, max = 10_000))]
+        trajectory: u64 = 0,
+        /// Particles of message passing.
+        #[garde(range(min = 3, max = 1000))]
+        particles: usize = 40,
+        /// Ratio of the powers of range and noise, in decibels.
+        #[garde(range(min = 0.0, max = 80.0))]
+        snr_db: f64 = 50.0,
+        /// Levels of the quantizer.
+        #[garde(range(min = 2, max = 65_536))]
+        levels: usize = 4,
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// True and estimated positions.
-    track: Vec<Row>,
-    /// Mean squared errors of this trajectory.
-    errors: Vec<ErrorRow>,
+rows! {
+    pub struct Rows {
+        /// True and estimated positions.
+        track: Vec<Row>,
+        /// Mean squared errors of this trajectory.
+        errors: Vec<ErrorRow>,
+    }
+
+    struct Row {
+        /// `truth`, or the tracker.
+        method: String,
+        /// Step, from 1.
+        k: usize,
+        /// Position.
+        x: f64,
+        /// Position.
+        y: f64,
+    }
+
+    struct ErrorRow {
+        /// Tracker.
+        method: String,
+        /// Mean squared position error.
+        mse: f64,
+    }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// `truth`, or the tracker.
-    method: String,
-    /// Step, from 1.
-    k: usize,
-    /// Position.
-    x: f64,
-    /// Position.
-    y: f64,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct ErrorRow {
-    /// Tracker.
-    method: String,
-    /// Mean squared position error.
-    mse: f64,
-}
-
-/// `mpa-fig3-3`.
 pub struct Fig33;
 
 impl Figure for Fig33 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "mpa-fig3-3",
-            title: "One trajectory, six trackers",
-            caption: "A manoeuvring target among five sensors that send two bits each per step. The naive filter and message passing \
-                      as published wander off; the grid filter stays on the track.",
-            source: "particle message passing, Figure 3.3",
-        }
-    }
+    figure!(Parameters => Rows, "mpa-fig3-3", "One trajectory, six trackers", "particle message passing, Figure 3.3",
+        "A manoeuvring target among five sensors that send two bits each per step. The naive filter and message passing \
+         as published wander off; the grid filter stays on the track.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let (target, point) = (Target::printed()?, Point::published(p.snr_db, p.levels, SPEED)?);
@@ -120,13 +96,10 @@ impl Figure for Fig33 {
     }
 
     fn claims(&self, p: &Parameters, t: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let of = |method: &str| t.errors.iter().find(|e| e.method == method).map(|e| e.mse);
-        claims
-            .at_most("grid", "the grid filter stays on the track", of("grid-15"), 0.3)
-            .at_defaults();
-        claims
-            .at_most("improved", "so does improved message passing", of(&format!("improved-{}", p.particles)), 0.5)
-            .at_defaults();
+        here.at_most("grid", "the grid filter stays on the track", of("grid-15"), 0.3);
+        here.at_most("improved", "so does improved message passing", of(&format!("improved-{}", p.particles)), 0.5);
     }
 
     fn plot(&self, _: &Parameters, t: &Rows) -> Plot {

@@ -4,79 +4,50 @@ use super::sweeps::SPEED;
 use super::world::{Field, Method, Point, STEPS, World, canonical};
 use crate::prelude::*;
 use fewbits_core::{Gaussian, NumberFormat};
-use fewbits_monte_carlo::{Moments, Trial};
 use fewbits_pf_mpa::leader::{Handover, elect, nearest};
 use fewbits_pf_mpa::{MessagePassing, Reports, Target, Tracker};
 use nalgebra::Vector2;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Trajectories of 25 steps.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { trials: 160 }
+parameters! {
+    pub struct Parameters {
+        /// Trajectories of 25 steps.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 160 => quick 3,
     }
 }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Ratio of the powers of range and noise.
-    #[schemars(extend("unit" = "dB"))]
-    snr_db: f64,
-    /// Particles.
-    particles: usize,
-    /// Share of steps with one claimant.
-    one: Measured,
-    /// With none.
-    none: Measured,
-    /// With several.
-    several: Measured,
-    /// Share of steps in which the true nearest sensor leads.
-    nearest: Measured,
-    /// Mean squared position error of the leader's estimate.
-    mse: Measured,
-    /// Variance of the sensors' estimates about their mean, both axes.
-    spread: Measured,
+rows! {
+    pub struct Row {
+        /// Ratio of the powers of range and noise.
+        snr_db: f64 ["dB"],
+        /// Particles.
+        particles: usize,
+        /// Share of steps with one claimant.
+        one: Measured,
+        /// With none.
+        none: Measured,
+        /// With several.
+        several: Measured,
+        /// Share of steps in which the true nearest sensor leads.
+        nearest: Measured,
+        /// Mean squared position error of the leader's estimate.
+        mse: Measured,
+        /// Variance of the sensors' estimates about their mean, both axes.
+        spread: Measured,
+    }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Elections.
-    elections: Vec<Row>,
-}
-
-/// `mpa-leader`.
 pub struct Leaders;
 
 const SETTINGS: [(f64, usize); 3] = [(50.0, 40), (50.0, 10), (30.0, 40)];
 
 impl Figure for Leaders {
-    type Parameters = Parameters;
-    type Tables = Rows;
+    figure!(Parameters => Vec<Row>, "mpa-leader", "Elections among copies that drew for themselves", "particle message passing, Section 3.3",
+        "Five sensors, each with its own message passing and its own seed; the leader's mean and covariance, rounded to \
+         32 bits, are what all go on with. In 98 of 100 steps exactly one claims the lead. One shared seed, or a \
+         deterministic tracker, would make it all of them.");
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-leader",
-            title: "Elections among copies that drew for themselves",
-            caption: "Five sensors, each with its own message passing and its own seed; the leader's mean and covariance, rounded to \
-                      32 bits, are what all go on with. In 98 of 100 steps exactly one claims the lead. One shared seed, or a \
-                      deterministic tracker, would make it all of them.",
-            source: "particle message passing, Section 3.3",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = p.trials.min(3);
-    }
-
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (target, sensors) = (Target::printed()?, canonical());
         let row = |(snr_db, particles): (f64, usize)| -> Result<Row, Error> {
             let network = Point::published(snr_db, 4, SPEED)?.network()?;
@@ -129,12 +100,11 @@ impl Figure for Leaders {
                 spread,
             })
         };
-        Ok(Rows {
-            elections: SETTINGS.into_iter().map(row).collect::<Result<_, _>>()?,
-        })
+        SETTINGS.into_iter().map(row).collect()
     }
 
-    fn claims(&self, _: &Parameters, t: &Rows, claims: &mut Claims) {
+    fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let key = |r: &Row| format!("{}dB-N{}", r.snr_db, r.particles);
         type Field = fn(&Row) -> Measured;
         let fields: [(&str, &str, Field); 5] = [
@@ -145,40 +115,28 @@ impl Figure for Leaders {
             ("spread", "variance between the copies", |r| r.spread),
         ];
         for (quantity, statement, field) in fields {
-            claims
-                .references(quantity, statement, &t.elections, |r| (key(r), field(r)))
-                .at_full_trials();
+            full.references(quantity, statement, t, |r| (key(r), field(r)));
         }
-        claims.all("sum", "every step has one, none or several", &t.elections, |r| {
+        claims.all("sum", "every step has one, none or several", t, |r| {
             (r.one.value + r.none.value + r.several.value - 1.0).abs() < 1e-9
         });
     }
 
-    fn plot(&self, _: &Parameters, t: &Rows) -> Plot {
-        let names = t
-            .elections
-            .iter()
-            .enumerate()
-            .map(|(i, r)| (i as f64, format!("{} dB, N = {}", r.snr_db, r.particles)));
-        let rows: Vec<(usize, &Row)> = t.elections.iter().enumerate().collect();
+    fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
+        let names = t.iter().map(|r| format!("{} dB, N = {}", r.snr_db, r.particles));
+        let rows: Vec<(usize, &Row)> = t.iter().enumerate().collect();
         let others = points(&rows, |(i, r)| (*i as f64, r.none.value + r.several.value));
         Plot::of(
-            Panel::new(
-                "Elections",
-                Axis::linear("")
-                    .named(names)
-                    .between(-0.5, t.elections.len() as f64 - 0.5),
-                Axis::linear("share of steps"),
-            )
-            .with(Layer::measured("none claims", rows.clone(), |(i, r)| (i as f64, r.none)))
-            .with(Layer::points("none or several claim", others))
-            .with(Layer::measured("another than the nearest leads", rows, |(i, r)| {
-                let share = Measured {
-                    value: 1.0 - r.nearest.value,
-                    ..r.nearest
-                };
-                (i as f64, share)
-            })),
+            Panel::new("Elections", Axis::categories("", names), Axis::linear("share of steps"))
+                .with(Layer::measured("none claims", rows.clone(), |(i, r)| (i as f64, r.none)))
+                .with(Layer::points("none or several claim", others))
+                .with(Layer::measured("another than the nearest leads", rows, |(i, r)| {
+                    let share = Measured {
+                        value: 1.0 - r.nearest.value,
+                        ..r.nearest
+                    };
+                    (i as f64, share)
+                })),
         )
     }
 }

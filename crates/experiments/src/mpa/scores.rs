@@ -4,33 +4,19 @@ use super::world::{Field, Method, Point, Score, compare};
 use crate::prelude::*;
 use fewbits_pf_mpa::Reports;
 
-/// How many trajectories.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Effort {
-    /// Trajectories of every tracker but message passing with particles.
-    #[garde(range(min = 2, max = 100_000))]
-    pub(super) trials: u64,
-    /// Trajectories of message passing with particles, and of the finest grid and largest clouds; the first of the others'.
-    #[garde(range(min = 2, max = 100_000))]
-    pub(super) message_trials: u64,
-}
-
-impl Default for Effort {
-    fn default() -> Self {
-        Self {
-            trials: 200,
-            message_trials: 60,
-        }
+parameters! {
+    /// How many trajectories.
+    pub struct Effort {
+        /// Trajectories of every tracker but message passing with particles.
+        #[garde(range(min = 2, max = 100_000))]
+        pub(super) trials: u64 = 200 => quick 8,
+        /// Trajectories of message passing with particles, and of the finest grid and largest clouds; the first of the others'.
+        #[garde(range(min = 2, max = 100_000))]
+        pub(super) message_trials: u64 = 60 => quick 3,
     }
 }
 
 impl Effort {
-    pub(super) fn quicken(&mut self) {
-        self.trials = self.trials.min(8);
-        self.message_trials = self.message_trials.min(3);
-    }
-
     /// The methods with their counts.
     pub(super) fn of(&self, methods: &[Method]) -> Vec<(Method, u64)> {
         let expensive = |m: &Method| match m {
@@ -44,24 +30,25 @@ impl Effort {
     }
 }
 
-/// One tracker at one point.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub(super) struct Row {
-    /// Which setting.
-    pub(super) point: String,
-    /// Ratio of the powers of range and noise.
-    #[schemars(extend("unit" = "dB"))]
-    pub(super) snr_db: f64,
-    /// Levels of the quantizer.
-    pub(super) levels: usize,
-    /// Tracker and its particles, draws or nodes an axis.
-    pub(super) method: String,
-    /// Kind of tracker.
-    pub(super) family: String,
-    /// Particles, draws, or nodes an axis.
-    pub(super) size: Option<usize>,
-    #[serde(flatten)]
-    pub(super) score: Score,
+rows! {
+    /// One tracker at one point.
+    #[derive(Debug, Clone)]
+    pub struct Row {
+        /// Which setting.
+        pub(super) point: String,
+        /// Ratio of the powers of range and noise.
+        pub(super) snr_db: f64 ["dB"],
+        /// Levels of the quantizer.
+        pub(super) levels: usize,
+        /// Tracker and its particles, draws or nodes an axis.
+        pub(super) method: String,
+        /// Kind of tracker.
+        pub(super) family: String,
+        /// Particles, draws, or nodes an axis.
+        pub(super) size: Option<usize>,
+        #[serde(flatten)]
+        pub(super) score: Score,
+    }
 }
 
 impl Row {
@@ -96,27 +83,21 @@ pub(super) fn rows(
 
 /// The references of means, medians and lost shares that a figure has. Those of heavy-tailed methods have no mean.
 pub(super) fn agree(claims: &mut Claims, rows: &[Row], prefix: &str, heavy_tailed: bool) {
+    let full = claims.at_full_trials();
     let quantity = |what: &str| format!("{prefix}{what}");
-    claims
-        .references(&quantity("mse"), "mean squared position error", rows, |r| (r.key(), r.mse()))
-        .at_full_trials();
+    full.references(&quantity("mse"), "mean squared position error", rows, |r| (r.key(), r.mse()));
     if heavy_tailed {
-        claims
-            .references(&quantity("median"), "median of the squared position error", rows, |r| {
-                (r.key(), r.score.median)
-            })
-            .at_full_trials();
-        claims
-            .references(&quantity("lost"), "share of lost tracks", rows, |r| (r.key(), r.score.lost))
-            .at_full_trials();
+        full.references(&quantity("median"), "median of the squared position error", rows, |r| {
+            (r.key(), r.score.median)
+        });
+        full.references(&quantity("lost"), "share of lost tracks", rows, |r| (r.key(), r.score.lost));
     }
 }
 
 /// The references of shares that ours stay below, of three particles: where the other program loses more tracks.
 pub(super) fn loses_no_more(claims: &mut Claims, rows: &[Row]) {
-    claims
-        .references_at_most("lost-most", "share of lost tracks", rows, |r| (r.key(), r.score.lost))
-        .at_full_trials();
+    let full = claims.at_full_trials();
+    full.references_at_most("lost-most", "share of lost tracks", rows, |r| (r.key(), r.score.lost));
 }
 
 /// The score of a method at a point.
@@ -133,8 +114,7 @@ pub(super) fn mse(rows: &[Row], point: &str, method: &str) -> Option<f64> {
 pub(super) fn ladder<'a>(title: &str, rows: impl IntoIterator<Item = &'a Row>) -> Panel {
     let rows: Vec<&Row> = rows.into_iter().collect();
     let numbered = || rows.iter().enumerate().map(|(i, r)| (-(i as f64), *r));
-    let names = numbered().map(|(at, r)| (at, r.method.clone()));
-    let y = Axis::linear("").named(names).between(0.6 - rows.len() as f64, 0.6);
+    let y = Axis::ladder(rows.iter().map(|r| r.method.as_str()));
     Panel::new(title, Axis::log("mean squared error"), y)
         .with(Layer::points("mean", points(numbered(), |(at, r)| (r.score.mse.value, at))))
         .with(Layer::points("median", points(numbered(), |(at, r)| (r.score.median.value, at))))

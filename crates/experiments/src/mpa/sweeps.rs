@@ -9,39 +9,25 @@ use nalgebra::Vector2;
 /// The speed of the canonical scenario.
 pub(super) const SPEED: f64 = 3.0;
 
-/// `mpa-table3-mse`.
 pub struct Mse;
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Mses {
-    /// Canonical sensors, 50 dB, four levels.
-    trackers: Vec<Row>,
-    /// The published encoder for targets of several speeds.
-    speeds: Vec<Row>,
-    /// Four other layouts of the sensors.
-    layouts: Vec<Row>,
-    /// What many particles reach, at three signal-to-noise ratios.
-    floor: Vec<Row>,
+rows! {
+    pub struct Mses {
+        /// Canonical sensors, 50 dB, four levels.
+        trackers: Vec<Row>,
+        /// The published encoder for targets of several speeds.
+        speeds: Vec<Row>,
+        /// Four other layouts of the sensors.
+        layouts: Vec<Row>,
+        /// What many particles reach, at three signal-to-noise ratios.
+        floor: Vec<Row>,
+    }
 }
 
 impl Figure for Mse {
-    type Parameters = Effort;
-    type Tables = Mses;
-
-    fn about(&self) -> About {
-        About {
-            id: "mpa-table3-mse",
-            title: "Errors of all trackers",
-            caption: "Position error at 50 dB with four levels. The interval likelihood on a small grid is a third below Gaussian \
-                      message passing; particle message passing as published loses the target.",
-            source: "particle message passing, Section 3.4",
-        }
-    }
-
-    fn quicken(&self, p: &mut Effort) {
-        p.quicken();
-    }
+    figure!(Effort => Mses, "mpa-table3-mse", "Errors of all trackers", "particle message passing, Section 3.4",
+        "Position error at 50 dB with four levels. The interval likelihood on a small grid is a third below Gaussian \
+         message passing; particle message passing as published loses the target.");
 
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Mses, Error> {
         let mut methods = gaussian();
@@ -97,71 +83,40 @@ impl Figure for Mse {
     }
 
     fn claims(&self, _: &Effort, t: &Mses, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         agree(claims, &t.trackers, "", true);
         agree(claims, &t.speeds, "speed-", true);
         agree(claims, &t.layouts, "layout-", true);
         agree(claims, &t.floor, "floor-", false);
         let value = |method: &str| mse(&t.trackers, "50dB-L4", method);
         let order = ["grid-15", "guided-40", "GMPA", "GMPA-transfer"].map(value);
-        claims
-            .increasing(
-                "order",
-                "C2: grid < guided draws < Gaussian message passing < the same with transferred velocity",
-                order,
-            )
-            .at_full_trials();
+        let what = "C2: grid < guided draws < Gaussian message passing < the same with transferred velocity";
+        full.increasing("order", what, order);
         let printed = ["improved-40", "GMPA-transfer", "EKF-Q-naive"].map(value);
-        claims
-            .increasing(
-                "printed-order",
-                "C2: the printed order holds with the naive filter, transferred velocity and errata mended",
-                printed,
-            )
-            .at_full_trials();
+        let what = "C2: the printed order holds with the naive filter, transferred velocity and errata mended";
+        full.increasing("printed-order", what, printed);
         let median = |method: &str| find(&t.trackers, "50dB-L4", method).map(|r| r.score.median.value);
-        claims
-            .increasing(
-                "naive",
-                "C2: the naive filter's median, too, is above that with quantization noise",
-                ["EKF-Q", "EKF-Q-naive"].map(median),
-            )
-            .at_full_trials();
+        let what = "C2: the naive filter's median, too, is above that with quantization noise";
+        full.increasing("naive", what, ["EKF-Q", "EKF-Q-naive"].map(median));
         let lost = find(&t.trackers, "50dB-L4", "published-40").map(|r| r.score.lost);
-        claims
-            .at_least("published", "as printed, particle message passing loses the target in most tracks", lost, 0.7)
-            .at_full_trials();
+        full.at_least("published", "as printed, particle message passing loses the target in most tracks", lost, 0.7);
         let grid = (0..4).map(|i| format!("layout{i}"));
         let pairs: Vec<_> = grid
             .map(|l| (mse(&t.layouts, &l, "grid-15"), mse(&t.layouts, &l, "GMPA")))
             .collect();
-        claims
-            .all("layouts-grid", "C2: the grid is below Gaussian message passing in all layouts", pairs, |(a, b)| {
-                a < b && b.is_some()
-            })
-            .at_full_trials();
+        full.all("layouts-grid", "C2: the grid is below Gaussian message passing in all layouts", pairs, |(a, b)| {
+            a < b && b.is_some()
+        });
         let ratios: Vec<_> = (0..4)
             .map(|i| format!("layout{i}"))
             .map(|l| Some(mse(&t.layouts, &l, "improved-40")? / mse(&t.layouts, &l, "GMPA-transfer")?))
             .collect();
-        claims
-            .all(
-                "layouts-improved",
-                "C2: improved message passing is at most 1.15 of Gaussian with transfer, in other layouts",
-                ratios,
-                |r| r.is_some_and(|r| r <= 1.15),
-            )
-            .at_full_trials();
+        let what = "C2: improved message passing is at most 1.15 of Gaussian with transfer, in other layouts";
+        full.all("layouts-improved", what, ratios, |r| r.is_some_and(|r| r <= 1.15));
         let gmpa = |speed: &str| mse(&t.speeds, speed, "GMPA");
-        let growth = gmpa("V4").zip(gmpa("V1.5")).map(|(a, b)| a / b);
-        claims
-            .near(
-                "speed",
-                "C6: the error grows with the square of the speed: a ratio 7.1 of squares gives 5.7",
-                growth,
-                5.7,
-                0.8,
-            )
-            .at_full_trials();
+        let growth = over(gmpa("V4"), gmpa("V1.5"));
+        let what = "C6: the error grows with the square of the speed: a ratio 7.1 of squares gives 5.7";
+        full.near("speed", what, growth, 5.7, 0.8);
     }
 
     fn plot(&self, _: &Effort, t: &Mses) -> Plot {
@@ -183,12 +138,7 @@ impl Figure for Mse {
     }
 }
 
-/// Rows of one table.
-#[derive(Serialize, JsonSchema)]
-pub struct Sweep {
-    /// Trackers.
-    trackers: Vec<Row>,
-}
+rows! {}
 
 /// Lines of the families over a coordinate of the rows.
 fn families(rows: &[Row], shown: &[&str], x: impl Fn(&Row) -> f64) -> Vec<Layer> {
@@ -199,30 +149,16 @@ fn families(rows: &[Row], shown: &[&str], x: impl Fn(&Row) -> f64) -> Vec<Layer>
     shown.iter().enumerate().map(line).collect()
 }
 
-/// `mpa-fig3-4`.
 pub struct Fig34;
 
 const SIZES: [usize; 7] = [3, 5, 10, 20, 40, 100, 500];
 
 impl Figure for Fig34 {
-    type Parameters = Effort;
-    type Tables = Sweep;
+    figure!(Effort => Vec<Row>, "mpa-fig3-4", "Error over the number of particles", "particle message passing, Figure 3.4",
+        "40 dB, four levels. Message passing needs forty particles, guided draws ten; neither closes the gap to the filter \
+         of unquantized ranges.");
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-fig3-4",
-            title: "Error over the number of particles",
-            caption: "40 dB, four levels. Message passing needs forty particles, guided draws ten; neither closes the gap to the filter \
-                      of unquantized ranges.",
-            source: "particle message passing, Figure 3.4",
-        }
-    }
-
-    fn quicken(&self, p: &mut Effort) {
-        p.quicken();
-    }
-
-    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Sweep, Error> {
+    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut methods = gaussian();
         methods.extend([9, 15, 31].map(Method::Grid));
         for n in SIZES {
@@ -234,39 +170,26 @@ impl Figure for Fig34 {
             }
         }
         let point = Point::published(40.0, 4, SPEED)?;
-        Ok(Sweep {
-            trackers: rows(context, "40dB-L4", &point, &p.of(&methods))?,
-        })
+        rows(context, "40dB-L4", &point, &p.of(&methods))
     }
 
-    fn claims(&self, _: &Effort, t: &Sweep, claims: &mut Claims) {
-        agree(claims, &t.trackers, "", true);
-        loses_no_more(claims, &t.trackers);
-        let value = |method: String| mse(&t.trackers, "40dB-L4", &method);
+    fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
+        let full = claims.at_full_trials();
+        agree(claims, t, "", true);
+        loses_no_more(claims, t);
+        let value = |method: String| mse(t, "40dB-L4", &method);
         let improved = [10, 20, 40, 100].map(|n| value(format!("improved-{n}")));
-        claims
-            .decreasing("improved", "C3: improved message passing gains from particles up to 100", improved)
-            .at_full_trials();
-        claims
-            .above("few", "C3: with three particles it loses the target", value("improved-3".into()), 4.0)
-            .at_full_trials();
+        full.decreasing("improved", "C3: improved message passing gains from particles up to 100", improved);
+        full.above("few", "C3: with three particles it loses the target", value("improved-3".into()), 4.0);
         let guided = [3, 10, 40, 500].map(|n| value(format!("guided-{n}")));
-        claims
-            .decreasing("guided", "C3: guided draws gain, too", guided)
-            .at_full_trials();
-        let enough = value("guided-10".into())
-            .zip(value("guided-500".into()))
-            .map(|(a, b)| a / b);
-        claims
-            .at_most("ten", "C3: ten draws are enough for a guided filter: 1.6 of the error of 500", enough, 1.75)
-            .at_full_trials();
-        let gap = value("grid-31".into()).zip(value("EKF-U".into())).map(|(a, b)| a / b);
-        claims
-            .above("gap", "C3: the gap to unquantized ranges never closes with four levels", gap, 10.0)
-            .at_full_trials();
+        full.decreasing("guided", "C3: guided draws gain, too", guided);
+        let enough = over(value("guided-10".into()), value("guided-500".into()));
+        full.at_most("ten", "C3: ten draws are enough for a guided filter: 1.6 of the error of 500", enough, 1.75);
+        let gap = over(value("grid-31".into()), value("EKF-U".into()));
+        full.above("gap", "C3: the gap to unquantized ranges never closes with four levels", gap, 10.0);
     }
 
-    fn plot(&self, _: &Effort, t: &Sweep) -> Plot {
+    fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
         let shown = [
             "guided",
             "improved",
@@ -277,64 +200,39 @@ impl Figure for Fig34 {
         ];
         let size = |r: &Row| r.size.unwrap_or(1) as f64;
         let level = |method: &str| {
-            let value = mse(&t.trackers, "40dB-L4", method);
+            let value = mse(t, "40dB-L4", method);
             value.map(|v| vec![(3.0, v), (500.0, v)]).unwrap_or_default()
         };
         Plot::of(
-            Panel::new("40 dB, four levels", Axis::log("particles"), Axis::log("mean squared error"))
-                .with_all(families(&t.trackers, &shown, size))
+            Panel::loglog("40 dB, four levels", "particles", "mean squared error")
+                .with_all(families(t, &shown, size))
                 .with(Layer::dashed("grid of 15", level("grid-15")))
                 .with(Layer::dashed("unquantized EKF", level("EKF-U"))),
         )
     }
 }
 
-/// `mpa-fig3-5`.
 pub struct Fig35;
 
 const LEVELS: [usize; 7] = [2, 4, 8, 16, 32, 64, 256];
 
-/// How many trajectories of the sweep over levels.
-#[derive(Serialize, serde::Deserialize, JsonSchema, garde::Validate)]
-#[serde(deny_unknown_fields)]
-pub struct LevelEffort {
-    /// Trajectories of every tracker but message passing with particles.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-    /// Trajectories of message passing with particles.
-    #[garde(range(min = 2, max = 100_000))]
-    message_trials: u64,
-}
-
-impl Default for LevelEffort {
-    fn default() -> Self {
-        Self {
-            trials: 100,
-            message_trials: 40,
-        }
+parameters! {
+    pub struct LevelEffort {
+        /// Trajectories of every tracker but message passing with particles.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 100 => quick 8,
+        /// Trajectories of message passing with particles.
+        #[garde(range(min = 2, max = 100_000))]
+        message_trials: u64 = 40 => quick 3,
     }
 }
 
 impl Figure for Fig35 {
-    type Parameters = LevelEffort;
-    type Tables = Sweep;
+    figure!(LevelEffort => Vec<Row>, "mpa-fig3-5", "Error over the number of levels", "particle message passing, Figure 3.5",
+        "50 dB, forty particles, the published encoder. Each bit is worth a factor of about four between two and six bits; \
+         what is left at eight bits is the noise.");
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-fig3-5",
-            title: "Error over the number of levels",
-            caption: "50 dB, forty particles, the published encoder. Each bit is worth a factor of about four between two and six bits; \
-                      what is left at eight bits is the noise.",
-            source: "particle message passing, Figure 3.5",
-        }
-    }
-
-    fn quicken(&self, p: &mut LevelEffort) {
-        p.trials = p.trials.min(8);
-        p.message_trials = p.message_trials.min(3);
-    }
-
-    fn run(&self, p: &LevelEffort, context: &Context<'_>) -> Result<Sweep, Error> {
+    fn run(&self, p: &LevelEffort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut methods = gaussian();
         methods.extend([9, 15, 31].map(Method::Grid));
         methods.push(Method::Guided(40));
@@ -348,80 +246,56 @@ impl Figure for Fig35 {
             let point = Point::published(50.0, levels, SPEED)?;
             trackers.extend(rows(context, &format!("50dB-L{levels}"), &point, &effort.of(&methods))?);
         }
-        Ok(Sweep { trackers })
+        Ok(trackers)
     }
 
-    fn claims(&self, _: &LevelEffort, t: &Sweep, claims: &mut Claims) {
-        agree(claims, &t.trackers, "", true);
+    fn claims(&self, _: &LevelEffort, t: &Vec<Row>, claims: &mut Claims) {
+        let full = claims.at_full_trials();
+        agree(claims, t, "", true);
         for (method, what) in [
             ("improved-40", "improved message passing"),
             ("GMPA", "Gaussian message passing"),
         ] {
-            let values = LEVELS.map(|l| mse(&t.trackers, &format!("50dB-L{l}"), method));
-            claims
-                .decreasing(format!("levels-{method}"), format!("C4: more levels, less error: {what}"), values)
-                .at_full_trials();
+            let values = LEVELS.map(|l| mse(t, &format!("50dB-L{l}"), method));
+            full.decreasing(format!("levels-{method}"), format!("C4: more levels, less error: {what}"), values);
         }
-        let of = |levels: usize, method: &str| find(&t.trackers, &format!("50dB-L{levels}"), method);
+        let of = |levels: usize, method: &str| find(t, &format!("50dB-L{levels}"), method);
         let slope = |method: &str| {
             let ratio = of(4, method)?.score.mse.value / of(64, method)?.score.mse.value;
             Some(ratio.powf(0.25))
         };
-        claims
-            .near("slope", "C4: a bit is worth a factor of about four", slope("GMPA"), 3.4, 0.6)
-            .at_full_trials();
+        full.near("slope", "C4: a bit is worth a factor of about four", slope("GMPA"), 3.4, 0.6);
         let ratio = of(16, "improved-40")
             .zip(of(16, "EKF-U"))
             .map(|(a, b)| a.score.mse.value / b.score.mse.value);
-        claims
-            .above("four-bits", "C4: four bits are not nearly unquantized with the published encoder", ratio, 5.0)
-            .at_full_trials();
+        full.above("four-bits", "C4: four bits are not nearly unquantized with the published encoder", ratio, 5.0);
         let median = |levels: usize, method: &str| of(levels, method).map(|r| r.score.median.value);
-        claims
-            .increasing(
-                "eight-bits",
-                "C4: with eight bits, in the median, still above the unquantized filter",
-                [median(256, "EKF-U"), median(256, "improved-40")],
-            )
-            .at_full_trials();
+        let what = "C4: with eight bits, in the median, still above the unquantized filter";
+        full.increasing("eight-bits", what, [median(256, "EKF-U"), median(256, "improved-40")]);
     }
 
-    fn plot(&self, _: &LevelEffort, t: &Sweep) -> Plot {
+    fn plot(&self, _: &LevelEffort, t: &Vec<Row>) -> Plot {
         let shown = ["EKF-Q", "GMPA", "GMPA-transfer", "improved", "guided"];
         let bits = |r: &Row| (r.levels as f64).log2();
-        let grid: Vec<&Row> = t.trackers.iter().filter(|r| r.method == "grid-15").collect();
-        let unquantized: Vec<&Row> = t.trackers.iter().filter(|r| r.method == "EKF-U").collect();
+        let grid: Vec<&Row> = t.iter().filter(|r| r.method == "grid-15").collect();
+        let unquantized: Vec<&Row> = t.iter().filter(|r| r.method == "EKF-U").collect();
         Plot::of(
-            Panel::new("50 dB, forty particles", Axis::linear("bits"), Axis::log("mean squared error"))
-                .with_all(families(&t.trackers, &shown, bits))
+            Panel::semilog("50 dB, forty particles", "bits", "mean squared error")
+                .with_all(families(t, &shown, bits))
                 .with(Layer::measured("grid of 15", grid, |r| (bits(r), r.score.mse)))
                 .with(Layer::dashed("unquantized EKF", points(unquantized, |r| (bits(r), r.score.mse.value)))),
         )
     }
 }
 
-/// `mpa-table3-low`.
 pub struct Low;
 
 impl Figure for Low {
-    type Parameters = Effort;
-    type Tables = Sweep;
+    figure!(Effort => Vec<Row>, "mpa-table3-low", "Low signal-to-noise ratios", "particle message passing, Section 3.4",
+        "30 and 20 dB. More than four levels still help at 30 dB; at 20 dB eight are enough. The printed numbers for `SNR \
+         = 30` fit 20 dB.");
 
-    fn about(&self) -> About {
-        About {
-            id: "mpa-table3-low",
-            title: "Low signal-to-noise ratios",
-            caption: "30 and 20 dB. More than four levels still help at 30 dB; at 20 dB eight are enough. The printed numbers for `SNR \
-                      = 30` fit 20 dB.",
-            source: "particle message passing, Section 3.4",
-        }
-    }
-
-    fn quicken(&self, p: &mut Effort) {
-        p.quicken();
-    }
-
-    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Sweep, Error> {
+    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut trackers = Vec::new();
         for snr in [30.0, 20.0] {
             let mut methods = gaussian();
@@ -439,36 +313,34 @@ impl Figure for Low {
                 trackers.extend(rows(context, &format!("{snr}dB-L{levels}"), &point, &p.of(&cheap))?);
             }
         }
-        Ok(Sweep { trackers })
+        Ok(trackers)
     }
 
-    fn claims(&self, _: &Effort, t: &Sweep, claims: &mut Claims) {
-        agree(claims, &t.trackers, "", true);
-        loses_no_more(claims, &t.trackers);
-        let gmpa = |snr: u32, levels: usize| mse(&t.trackers, &format!("{snr}dB-L{levels}"), "GMPA");
-        claims
-            .decreasing("30dB", "C5: at 30 dB more levels help", [4, 8, 16, 64].map(|l| gmpa(30, l)))
-            .at_full_trials();
+    fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
+        let full = claims.at_full_trials();
+        agree(claims, t, "", true);
+        loses_no_more(claims, t);
+        let gmpa = |snr: u32, levels: usize| mse(t, &format!("{snr}dB-L{levels}"), "GMPA");
+        full.decreasing("30dB", "C5: at 30 dB more levels help", [4, 8, 16, 64].map(|l| gmpa(30, l)));
         let saturated = [16, 64].map(|l| Some(gmpa(20, l)? / gmpa(20, 8)?));
-        claims
-            .all("20dB", "C5: at 20 dB nothing is gained beyond eight levels", saturated, |r| {
-                r.is_some_and(|r| r > 0.85)
-            })
-            .at_full_trials();
+        full.all("20dB", "C5: at 20 dB nothing is gained beyond eight levels", saturated, |r| {
+            r.is_some_and(|r| r > 0.85)
+        });
     }
 
-    fn plot(&self, _: &Effort, t: &Sweep) -> Plot {
-        let panel =
-            |snr: f64| {
-                let here: Vec<Row> = t
-                    .trackers
-                    .iter()
-                    .filter(|r| r.snr_db == snr && r.size != Some(500))
-                    .cloned()
-                    .collect();
-                Panel::new(format!("{snr} dB"), Axis::log("levels"), Axis::log("mean squared error"))
-                    .with_all(families(&here, &["EKF-U", "EKF-Q", "GMPA", "GMPA-transfer"], |r| r.levels as f64))
-            };
+    fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
+        let panel = |snr: f64| {
+            let here: Vec<Row> = t
+                .iter()
+                .filter(|r| r.snr_db == snr && r.size != Some(500))
+                .cloned()
+                .collect();
+            Panel::loglog(format!("{snr} dB"), "levels", "mean squared error").with_all(families(
+                &here,
+                &["EKF-U", "EKF-Q", "GMPA", "GMPA-transfer"],
+                |r| r.levels as f64,
+            ))
+        };
         Plot::grid(2, vec![panel(30.0), panel(20.0)])
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::prelude::*;
 use fewbits_core::{Belief, Gaussian};
-use fewbits_monte_carlo::{Moments, Stream, Trial};
 use fewbits_pf_mpa::{
     Bootstrap, DynamicsWeight, Encoder, GridFilter, GuidedGaussian, IntervalRule, KernelRule, Linearised,
     MessagePassing, Network, QuantizedRange, RangeNoise, RaoBlackwellGuided, Reports, Ring, RingWeight, StepInfo,
@@ -288,17 +287,19 @@ impl Point {
     }
 }
 
-/// What a method did on many trajectories.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub(super) struct Score {
-    /// Mean squared position error, averaged over trajectories.
-    pub(super) mse: Measured,
-    /// Median over trajectories of their mean squared error.
-    pub(super) median: Measured,
-    /// Share of trajectories with a mean squared error above 4.
-    pub(super) lost: f64,
-    /// Trajectories.
-    pub(super) trajectories: u64,
+rows! {
+    /// What a method did on many trajectories.
+    #[derive(Debug, Clone)]
+    pub(super) struct Score {
+        /// Mean squared position error, averaged over trajectories.
+        pub(super) mse: Measured,
+        /// Median over trajectories of their mean squared error.
+        pub(super) median: Measured,
+        /// Share of trajectories with a mean squared error above 4.
+        pub(super) lost: f64,
+        /// Trajectories.
+        pub(super) trajectories: u64,
+    }
 }
 
 impl Score {

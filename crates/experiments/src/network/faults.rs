@@ -5,7 +5,6 @@ use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Sensing};
 use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
 use fewbits_models::{Ar1, LinearSensor};
-use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_network::estimators::Counted;
 use fewbits_network::{Channel, Fault, Loss, Mishap, Seconds, SensorId, Setup, Star};
 use nalgebra::Vector1;
@@ -13,58 +12,44 @@ use nalgebra::Vector1;
 const SENSORS: usize = 4;
 const WARM_UP: usize = 20;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Probabilities that a frame is lost.
-    #[garde(length(min = 1), inner(range(min = 0.0, max = 0.8)))]
-    loss: Vec<f64>,
-    /// Probabilities that a bit is inverted.
-    #[garde(length(min = 1), inner(range(min = 0.0, max = 0.1)))]
-    crossover: Vec<f64>,
-    /// Mean delays of a frame, in slots.
-    #[garde(length(min = 1), inner(range(min = 0.0, max = 10.0)))]
-    delay: Vec<f64>,
-    /// Sensors of four that die after a quarter of the run.
-    #[garde(length(min = 1), inner(range(min = 0, max = 4)))]
-    deaths: Vec<u32>,
-    /// Slots of a run.
-    #[garde(range(min = 60, max = 100_000))]
-    slots: usize,
-    /// Runs at each point.
-    #[garde(range(min = 2, max = 1_000_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            loss: vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.6],
-            crossover: vec![0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2],
-            delay: vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.8],
-            deaths: vec![0, 1, 2, 3, 4],
-            slots: 200,
-            trials: 40,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Probabilities that a frame is lost.
+        #[garde(length(min = 1), inner(range(min = 0.0, max = 0.8)))]
+        loss: Vec<f64> = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.6],
+        /// Probabilities that a bit is inverted.
+        #[garde(length(min = 1), inner(range(min = 0.0, max = 0.1)))]
+        crossover: Vec<f64> = vec![0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2],
+        /// Mean delays of a frame, in slots.
+        #[garde(length(min = 1), inner(range(min = 0.0, max = 10.0)))]
+        delay: Vec<f64> = vec![0.0, 0.05, 0.1, 0.2, 0.4, 0.8],
+        /// Sensors of four that die after a quarter of the run.
+        #[garde(length(min = 1), inner(range(min = 0, max = 4)))]
+        deaths: Vec<u32> = vec![0, 1, 2, 3, 4],
+        /// Slots of a run.
+        #[garde(range(min = 60, max = 100_000))]
+        slots: usize = 200 => quick 80,
+        /// Runs at each point.
+        #[garde(range(min = 2, max = 1_000_000))]
+        trials: u64 = 40 => quick 2,
     }
 }
 
-/// One fault at one level.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// loss, flips, delay or deaths.
-    fault: &'static str,
-    /// Its level.
-    level: f64,
-    /// told: the centre sends its prediction; echoed: sensors follow by what it received.
-    feedback: &'static str,
-    /// Root mean squared error.
-    rmse: Measured,
-    /// Slots until a sensor that restarts in the middle of the run answers again, at most 50.
-    recovery: Measured,
-    /// Disagreements noted, of 100 slots.
-    disagreements: Measured,
+rows! {
+    pub struct Row {
+        /// loss, flips, delay or deaths.
+        fault: &'static str,
+        /// Its level.
+        level: f64,
+        /// told: the centre sends its prediction; echoed: sensors follow by what it received.
+        feedback: &'static str,
+        /// Root mean squared error.
+        rmse: Measured,
+        /// Slots until a sensor that restarts in the middle of the run answers again, at most 50.
+        recovery: Measured,
+        /// Disagreements noted, of 100 slots.
+        disagreements: Measured,
+    }
 }
 
 /// Faults.
@@ -74,10 +59,6 @@ struct Point {
     fault: &'static str,
     level: f64,
     echoed: bool,
-}
-
-fn failed(error: fewbits_network::Error) -> Error {
-    Error::failed(error)
 }
 
 /// Squared error, slots to recover, disagreements of 100 slots.
@@ -126,7 +107,7 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
     };
     let filter = ParallelFilter::new(ScalarPlant::new(a, q, 1.0)?, SENSORS, CountFusion::Exact)?;
     let filter = filter.with_link(Link::lossy(lost.min(0.99))?);
-    let estimator = Counted::new(filter, start).map_err(failed)?;
+    let estimator = Counted::new(filter, start)?;
     let own = stream.named("filter");
     let star = if point.echoed {
         Star::echoed(estimator, measurements, clock, own)
@@ -138,17 +119,17 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
         faults,
         ..worlds::setup(stream)?
     };
-    let mut network = star.and_then(|star| star.simulate(RADIUS, setup)).map_err(failed)?;
-    network.run_until(clock.end(middle)).map_err(failed)?;
+    let mut network = star.and_then(|star| star.simulate(RADIUS, setup))?;
+    network.run_until(clock.end(middle))?;
     let mut recovery = 0;
     while recovery < 50 && middle + recovery < slots as u32 {
         recovery += 1;
-        network.run_until(clock.end(middle + recovery)).map_err(failed)?;
+        network.run_until(clock.end(middle + recovery))?;
         if network.nodes()[restarted.index()].answered() == Some(middle + recovery) {
             break;
         }
     }
-    network.run_until(clock.end(slots as u32)).map_err(failed)?;
+    network.run_until(clock.end(slots as u32))?;
     let estimates = network.nodes()[0].estimates();
     let squared = truths.iter().zip(estimates).skip(WARM_UP);
     let gap = |(truth, estimate): (&f64, &Vec<f64>)| (truth - estimate.first().copied().unwrap_or(0.0)).powi(2);
@@ -162,24 +143,10 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
 }
 
 impl Figure for Faulty {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "network-faults",
-            title: "What faults cost",
-            caption: "Four one-bit sensors of the scalar world under lost frames, inverted bits, random delays and dying sensors. Told the \
-                      prediction in full, a sensor loses only the slot whose question is lost; following by echo, it must first be given the \
-                      belief again, which takes two slots and grows with the loss. Right: slots until a restarted sensor answers.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 2;
-        p.slots = 80;
-    }
+    figure!(Parameters => Vec<Row>, "network-faults", "What faults cost", "our own comparison",
+        "Four one-bit sensors of the scalar world under lost frames, inverted bits, random delays and dying sensors. Told the \
+         prediction in full, a sensor loses only the slot whose question is lost; following by echo, it must first be given the \
+         belief again, which takes two slots and grows with the loss. Right: slots until a restarted sensor answers.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let levels = [
@@ -222,9 +189,9 @@ impl Figure for Faulty {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         let at = |fault: &str, level: f64, feedback: &str| {
-            rows.iter()
-                .find(|r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
+            first(rows, |r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
         };
         let gap = |feedback| {
             at("loss", 0.0, feedback)
@@ -232,45 +199,22 @@ impl Figure for Faulty {
                 .map(|(none, much)| much.rmse.value - none.rmse.value)
         };
         for feedback in ["told", "echoed"] {
-            claims
-                .above(format!("loss-{feedback}"), "lost frames cost accuracy", gap(feedback), 0.0)
-                .at_defaults();
+            here.above(format!("loss-{feedback}"), "lost frames cost accuracy", gap(feedback), 0.0);
         }
         let worse = at("loss", 0.4, "echoed")
             .zip(at("loss", 0.4, "told"))
             .map(|(e, t)| e.rmse.value / t.rmse.value);
-        claims
-            .above("replicas", "over links that lose much, replicas do worse than questions in full", worse, 1.0)
-            .at_full_trials()
-            .at_defaults();
+        paper.above("replicas", "over links that lose much, replicas do worse than questions in full", worse, 1.0);
         let clean = at("loss", 0.0, "echoed")
             .zip(at("loss", 0.0, "told"))
             .map(|(e, t)| (e.recovery.value, t.recovery.value));
-        claims
-            .near(
-                "recovery-told",
-                "a restarted sensor that is told answers in the next slot",
-                clean.map(|c| c.1),
-                1.0,
-                0.0,
-            )
-            .at_defaults();
-        claims
-            .near(
-                "recovery-echoed",
-                "one that follows by echo answers in the slot after",
-                clean.map(|c| c.0),
-                2.0,
-                0.0,
-            )
-            .at_defaults();
+        let what = "a restarted sensor that is told answers in the next slot";
+        here.near("recovery-told", what, clean.map(|c| c.1), 1.0, 0.0);
+        let what = "one that follows by echo answers in the slot after";
+        here.near("recovery-echoed", what, clean.map(|c| c.0), 2.0, 0.0);
         let restart = at("loss", 0.0, "told").map(|r| r.disagreements.value);
-        claims
-            .near("told", "without faults on air nobody disagrees with a centre that tells", restart, 0.0, 0.0)
-            .at_defaults();
-        let lossy = rows
-            .iter()
-            .filter(|r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
+        here.near("told", "without faults on air nobody disagrees with a centre that tells", restart, 0.0, 0.0);
+        let lossy = select(rows, |r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
         claims.all("noted", "replicas that miss frames are seen to disagree", lossy, |r| r.disagreements.value > 0.0);
     }
 

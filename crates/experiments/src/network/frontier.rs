@@ -4,54 +4,44 @@ use super::schemes::{self, Scheme};
 use super::worlds::{self, COEFFICIENT};
 use crate::prelude::*;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Slots of a run.
-    #[garde(range(min = 40, max = 100_000))]
-    slots: usize,
-    /// Runs of each scheme.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self { slots: 300, trials: 20 }
+parameters! {
+    pub struct Parameters {
+        /// Slots of a run.
+        #[garde(range(min = 40, max = 100_000))]
+        slots: usize = 300 => quick 60,
+        /// Runs of each scheme.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 20 => quick 2,
     }
 }
 
-/// One scheme with one setting in one world.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// scalar: AR(1), a = 0.95, process variance 0.2; plane: constant velocity. Four sensors of unit noise.
-    world: &'static str,
-    /// The scheme.
-    scheme: &'static str,
-    /// Its setting: K sensors, m bits, n messages in a slot, L levels, M components at resolution r, a guaranteed error of delta.
-    setting: String,
-    /// How sensors learn the question: told it in full, following by echo, not at all; or the belief travels.
-    feedback: &'static str,
-    /// Root mean squared error of the state, or of the position.
-    rmse: Measured,
-    /// Payload bits of reports (of beliefs, where these travel) in a slot.
-    #[schemars(extend("unit" = "bit"))]
-    payload: Measured,
-    /// Bits on air in a slot: all frames of all nodes with preambles, headers, checks and feedback.
-    #[schemars(extend("unit" = "bit"))]
-    air: Measured,
-    /// Energy of all radios in a slot.
-    #[schemars(extend("unit" = "J"))]
-    energy: Measured,
-    /// What no scheme can beat with so many payload bits and no information in silence (scalar), or with all measurements (plane).
-    floor: f64,
-    /// Nothing else has a smaller error with at most as many payload bits.
-    best_by_payload: &'static str,
-    /// The same by bits on air.
-    best_by_air: &'static str,
-    /// The same by energy.
-    best_by_energy: &'static str,
+rows! {
+    pub struct Row {
+        /// scalar: AR(1), a = 0.95, process variance 0.2; plane: constant velocity. Four sensors of unit noise.
+        world: &'static str,
+        /// The scheme.
+        scheme: &'static str,
+        /// Its setting: K sensors, m bits, n messages in a slot, L levels, M components at resolution r, a guaranteed error of delta.
+        setting: String,
+        /// How sensors learn the question: told it in full, following by echo, not at all; or the belief travels.
+        feedback: &'static str,
+        /// Root mean squared error of the state, or of the position.
+        rmse: Measured,
+        /// Payload bits of reports (of beliefs, where these travel) in a slot.
+        payload: Measured ["bit"],
+        /// Bits on air in a slot: all frames of all nodes with preambles, headers, checks and feedback.
+        air: Measured ["bit"],
+        /// Energy of all radios in a slot.
+        energy: Measured ["J"],
+        /// What no scheme can beat with so many payload bits and no information in silence (scalar), or with all measurements (plane).
+        floor: f64,
+        /// Nothing else has a smaller error with at most as many payload bits.
+        best_by_payload: &'static str,
+        /// The same by bits on air.
+        best_by_air: &'static str,
+        /// The same by energy.
+        best_by_energy: &'static str,
+    }
 }
 
 /// The comparison.
@@ -98,40 +88,21 @@ fn rows_of(world: &'static str, schemes: &[Scheme], runs: &Comparison<5>, floor:
 }
 
 impl Figure for Frontier {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "network-frontier",
-            title: "One frontier for all schemes",
-            caption: "Root mean squared error of every scheme against its payload, against all bits on air, and against the energy of \
-                      all radios (CC2420 at 0 dBm), on the same scalar and plane worlds with four sensors. The line joins what nothing else \
-                      beats in both. By payload one bit a sensor is a bargain; on air a frame's overhead of 200 bits buries the difference \
-                      between one bit and 32, so that few frames win, and sensors that are silent while they are predicted (adaptive) win most.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 2;
-        p.slots = 60;
-    }
+    figure!(Parameters => Vec<Row>, "network-frontier", "One frontier for all schemes", "our own comparison",
+        "Root mean squared error of every scheme against its payload, against all bits on air, and against the energy of \
+         all radios (CC2420 at 0 dBm), on the same scalar and plane worlds with four sensors. The line joins what nothing else \
+         beats in both. By payload one bit a sensor is a bargain; on air a frame's overhead of 200 bits buries the difference \
+         between one bit and 32, so that few frames win, and sensors that are silent while they are predicted (adaptive) win most.");
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: 2e-2 * (p.trials * p.slots as u64) as f64,
-            bytes: 1e8,
-        }
+        Cost::new(2e-2 * (p.trials * p.slots as u64) as f64, 1e8)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (scalar, plane) = (worlds::scalar()?, worlds::plane()?);
         let (of_scalar, of_plane) = (schemes::scalar_schemes(), schemes::plane_schemes());
         let one =
-            |name: &str,
-             schemes: &[Scheme],
-             run: &(dyn Fn(Scheme, fewbits_monte_carlo::Stream) -> Result<worlds::Bill, Error> + Sync)| {
+            |name: &str, schemes: &[Scheme], run: &(dyn Fn(Scheme, Stream) -> Result<worlds::Bill, Error> + Sync)| {
                 let all = context.compare(
                     "network-frontier",
                     p.trials,
@@ -161,16 +132,13 @@ impl Figure for Frontier {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let full = claims.at_full_trials();
         let find = |world: &str, scheme: &str, setting: &str, feedback: &str| {
-            rows.iter()
-                .find(|r| (r.world, r.scheme, r.setting.as_str(), r.feedback) == (world, scheme, setting, feedback))
+            first(rows, |r| (r.world, r.scheme, r.setting.as_str(), r.feedback) == (world, scheme, setting, feedback))
         };
         let ratio = |a: Option<&Row>, b: Option<&Row>, of: fn(&Row) -> f64| a.zip(b).map(|(a, b)| of(a) / of(b));
         let slack = |r: &&Row| r.floor - 4.0 * r.rmse.standard_error.unwrap_or(0.0);
-        let loud = || {
-            rows.iter()
-                .filter(|r| !["CFwMD", "CFwMD2", "adaptive"].contains(&r.scheme))
-        };
+        let loud = || select(rows, |r| !["CFwMD", "CFwMD2", "adaptive"].contains(&r.scheme));
         claims.all("floor", "no scheme that pays for every symbol beats the floor", loud(), |r| {
             r.rmse.value >= slack(&r)
         });
@@ -178,18 +146,10 @@ impl Figure for Frontier {
         for world in ["scalar", "plane"] {
             let fine = find(world, "all-send", "32 bit", "none");
             let last = |bits: &str| ratio(find(world, "innovation-words", bits, "echoed"), fine, |r| r.rmse.value);
-            claims
-                .at_most(
-                    format!("four-bits-{world}"),
-                    "four bits a sensor come within five per cent of everything",
-                    last("m=4"),
-                    1.05,
-                )
-                .at_full_trials();
+            let what = "four bits a sensor come within five per cent of everything";
+            full.at_most(format!("four-bits-{world}"), what, last("m=4"), 1.05);
             let words = ["m=1", "m=2", "m=3", "m=4"];
-            claims
-                .decreasing(format!("bits-{world}"), "more bits, less error", words.map(last))
-                .at_full_trials();
+            full.decreasing(format!("bits-{world}"), "more bits, less error", words.map(last));
             let told = ratio(
                 find(world, "innovation-words", "m=1", "told"),
                 find(world, "innovation-words", "m=1", "echoed"),
@@ -203,12 +163,8 @@ impl Figure for Frontier {
             );
             claims.near(format!("same-{world}"), "and the estimates are the same", same, 1.0, 1e-12);
             let energy = ratio(find(world, "innovation-words", "m=1", "echoed"), fine, |r| r.energy.value);
-            claims.at_least(
-                format!("frames-{world}"),
-                "one bit a sensor needs more than half of the radio energy of 32: frames cost, not bits",
-                energy,
-                0.5,
-            );
+            let what = "one bit a sensor needs more than half of the radio energy of 32: frames cost, not bits";
+            claims.at_least(format!("frames-{world}"), what, energy, 0.5);
         }
         let silent =
             ratio(find("plane", "CFwMD", "n=1", "echoed"), find("plane", "innovation-words", "m=1", "echoed"), |r| {
@@ -217,9 +173,7 @@ impl Figure for Frontier {
         let quiet =
             |r: &&Row| r.scheme == "adaptive" && ["delta=0.5", "delta=1", "delta=2"].contains(&r.setting.as_str());
         let what = "silence within +-0.5 to 2 of what both ends predict: nothing has less error for less energy";
-        claims
-            .all("adaptive", what, rows.iter().filter(quiet), |r| r.best_by_energy == "yes")
-            .at_full_trials();
+        full.all("adaptive", what, rows.iter().filter(quiet), |r| r.best_by_energy == "yes");
         claims.below("silence", "one message a slot costs less energy than four sensors of one bit", silent, 1.0);
     }
 
@@ -231,16 +185,11 @@ impl Figure for Frontier {
             ("bits on air / (bit/slot)", |r| r.air.value, |r| r.best_by_air),
             ("radio energy / (mJ/slot)", |r| 1e3 * r.energy.value, |r| r.best_by_energy),
         ];
-        let mut families: Vec<&'static str> = Vec::new();
-        for row in rows {
-            if !families.contains(&row.scheme) {
-                families.push(row.scheme);
-            }
-        }
+        let families = distinct(rows, |r| r.scheme);
         let mut panels = Vec::new();
         for (i, (label, of, best)) in axes.iter().enumerate() {
             for world in ["scalar", "plane"] {
-                let mut panel = Panel::new(world, Axis::log(*label), Axis::log("RMSE"));
+                let mut panel = Panel::loglog(world, *label, "RMSE");
                 if i != 2 {
                     panel = panel.without_legend();
                 }

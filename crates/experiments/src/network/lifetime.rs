@@ -5,61 +5,44 @@ use super::worlds;
 use crate::prelude::*;
 use fewbits_network::Radio;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Lengths of a slot, s.
-    #[garde(length(min = 1), inner(range(min = 0.01, max = 1e4)))]
-    period: Vec<f64>,
-    /// Power of the rest of the node, mW; 6 is that of a node whose processor never sleeps.
-    #[garde(length(min = 1), inner(range(min = 0.0, max = 1e3)))]
-    baseline: Vec<f64>,
-    /// Slots of a run.
-    #[garde(range(min = 40, max = 100_000))]
-    slots: usize,
-    /// Runs of each scheme.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            period: vec![0.02, 0.1, 1.0],
-            baseline: vec![6.0, 0.1],
-            slots: 200,
-            trials: 8,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Lengths of a slot, s.
+        #[garde(length(min = 1), inner(range(min = 0.01, max = 1e4)))]
+        period: Vec<f64> = vec![0.02, 0.1, 1.0],
+        /// Power of the rest of the node, mW; 6 is that of a node whose processor never sleeps.
+        #[garde(length(min = 1), inner(range(min = 0.0, max = 1e3)))]
+        baseline: Vec<f64> = vec![6.0, 0.1],
+        /// Slots of a run.
+        #[garde(range(min = 40, max = 100_000))]
+        slots: usize = 200 => quick 60,
+        /// Runs of each scheme.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 8 => quick 2,
     }
 }
 
-/// One scheme at one rate of slots.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// The scheme.
-    scheme: &'static str,
-    /// Its setting.
-    setting: String,
-    /// How sensors learn the question.
-    feedback: &'static str,
-    /// Length of a slot.
-    #[schemars(extend("unit" = "s"))]
-    period: f64,
-    /// Power of the rest of the node.
-    #[schemars(extend("unit" = "mW"))]
-    baseline: f64,
-    /// Root mean squared error.
-    rmse: Measured,
-    /// Energy of the busiest sensor's radio in a slot, beyond what it takes asleep.
-    #[schemars(extend("unit" = "J"))]
-    energy: Measured,
-    /// Days until the batteries of the busiest sensor are empty.
-    #[schemars(extend("unit" = "d"))]
-    days: f64,
-    /// Days of a node that neither sends nor receives.
-    #[schemars(extend("unit" = "d"))]
-    idle_days: f64,
+rows! {
+    pub struct Row {
+        /// The scheme.
+        scheme: &'static str,
+        /// Its setting.
+        setting: String,
+        /// How sensors learn the question.
+        feedback: &'static str,
+        /// Length of a slot.
+        period: f64 ["s"],
+        /// Power of the rest of the node.
+        baseline: f64 ["mW"],
+        /// Root mean squared error.
+        rmse: Measured,
+        /// Energy of the busiest sensor's radio in a slot, beyond what it takes asleep.
+        energy: Measured ["J"],
+        /// Days until the batteries of the busiest sensor are empty.
+        days: f64 ["d"],
+        /// Days of a node that neither sends nor receives.
+        idle_days: f64 ["d"],
+    }
 }
 
 /// Lifetimes.
@@ -68,24 +51,10 @@ pub struct Lifetime;
 const DAY: f64 = 86_400.0;
 
 impl Figure for Lifetime {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "network-lifetime",
-            title: "Days on two AA cells",
-            caption: "Life of the busiest sensor (CC2420, two AA cells) against the error of the scheme it runs, in the scalar world. At a \
-                      slot a second the node's own 6 mW decide and no scheme matters; at fifty slots a second, or once the processor sleeps, \
-                      the scheme decides.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.trials = 2;
-        p.slots = 60;
-    }
+    figure!(Parameters => Vec<Row>, "network-lifetime", "Days on two AA cells", "our own comparison",
+        "Life of the busiest sensor (CC2420, two AA cells) against the error of the scheme it runs, in the scalar world. At a \
+         slot a second the node's own 6 mW decide and no scheme matters; at fifty slots a second, or once the processor sleeps, \
+         the scheme decides.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (world, schemes) = (worlds::scalar()?, schemes::scalar_schemes());
@@ -121,62 +90,38 @@ impl Figure for Lifetime {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         claims.all("idle", "no node outlives one that is silent", rows, |r| r.days <= r.idle_days);
         let at = |scheme: &str, setting: &str, period: f64, baseline: f64| {
-            rows.iter()
-                .find(|r| {
-                    (r.scheme, r.setting.as_str(), r.period, r.baseline) == (scheme, setting, period, baseline)
-                        && r.feedback != "told"
-                })
-                .map(|r| r.days)
+            first(rows, |r| {
+                (r.scheme, r.setting.as_str(), r.period, r.baseline) == (scheme, setting, period, baseline)
+                    && r.feedback != "told"
+            })
+            .map(|r| r.days)
         };
         let ratio = |period, baseline| {
             at("CFwMD", "n=0.25", period, baseline)
                 .zip(at("all-send", "32 bit", period, baseline))
                 .map(|(a, b)| a / b)
         };
-        claims
-            .near(
-                "slow",
-                "at a slot a second and 6 mW the scheme matters by five per cent at most",
-                ratio(1.0, 6.0),
-                1.0,
-                0.05,
-            )
-            .at_defaults();
-        let bits = at("Dymbo", "K=4", 0.02, 0.1)
-            .zip(at("all-send", "32 bit", 0.02, 0.1))
-            .map(|(a, b)| a / b);
-        claims
-            .below(
-                "echo",
-                "a sensor that must listen before it sends one bit dies before one that sends 32 unasked",
-                bits,
-                1.0,
-            )
-            .at_defaults();
-        let table = at("Lloyd-Max-table", "L=2", 0.02, 0.1)
-            .zip(at("all-send", "32 bit", 0.02, 0.1))
-            .map(|(a, b)| a / b);
-        claims
-            .above("table", "one bit unasked outlives 32 bits", table, 1.0)
-            .at_defaults();
+        let what = "at a slot a second and 6 mW the scheme matters by five per cent at most";
+        here.near("slow", what, ratio(1.0, 6.0), 1.0, 0.05);
+        let bits = over(at("Dymbo", "K=4", 0.02, 0.1), at("all-send", "32 bit", 0.02, 0.1));
+        let what = "a sensor that must listen before it sends one bit dies before one that sends 32 unasked";
+        here.below("echo", what, bits, 1.0);
+        let table = over(at("Lloyd-Max-table", "L=2", 0.02, 0.1), at("all-send", "32 bit", 0.02, 0.1));
+        here.above("table", "one bit unasked outlives 32 bits", table, 1.0);
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
-        let mut families: Vec<&'static str> = Vec::new();
-        for row in rows {
-            if !families.contains(&row.scheme) {
-                families.push(row.scheme);
-            }
-        }
+        let families = distinct(rows, |r| r.scheme);
         let mut panels = Vec::new();
         for baseline in &p.baseline {
             for period in &p.period {
                 let here = || rows.iter().filter(|r| r.baseline == *baseline && r.period == *period);
                 let title = format!("{} ms a slot, {baseline} mW", period * 1e3);
                 let last = panels.len() + 1 == p.baseline.len() * p.period.len();
-                let mut panel = Panel::new(title, Axis::linear("days"), Axis::log("RMSE"));
+                let mut panel = Panel::semilog(title, "days", "RMSE");
                 if !last {
                     panel = panel.without_legend();
                 }

@@ -7,68 +7,51 @@ use fewbits_network::{
 };
 use fewbits_topology::Deployment;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-#[serde(deny_unknown_fields)]
-pub struct Parameters {
-    /// Nodes, on average ten in range of each.
-    #[garde(length(min = 1), inner(range(min = 2, max = 10_000_000)))]
-    nodes: Vec<u64>,
-    /// Slots; in each every node sends one bit towards node 0.
-    #[garde(range(min = 1, max = 10_000))]
-    slots: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            nodes: vec![1_000, 10_000, 100_000, 1_000_000],
-            slots: 2,
-        }
+parameters! {
+    pub struct Parameters {
+        /// Nodes, on average ten in range of each.
+        #[garde(length(min = 1), inner(range(min = 2, max = 10_000_000)))]
+        nodes: Vec<u64> = vec![1_000, 10_000, 100_000, 1_000_000] => quick vec![1_000, 10_000],
+        /// Slots; in each every node sends one bit towards node 0.
+        #[garde(range(min = 1, max = 10_000))]
+        slots: u64 = 2,
     }
 }
 
-/// One size.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Nodes.
-    nodes: u64,
-    /// Nodes that reach node 0.
-    connected: u64,
-    /// Events handled.
-    events: u64,
-    /// Bits on air.
-    #[schemars(extend("unit" = "bit"))]
-    air: u64,
-    /// Memory of the network after the run.
-    #[schemars(extend("unit" = "byte"))]
-    bytes: u64,
-    /// The same for each node.
-    #[schemars(extend("unit" = "byte"))]
-    bytes_per_node: f64,
-}
+rows! {
+    pub struct Row {
+        /// Nodes.
+        nodes: u64,
+        /// Nodes that reach node 0.
+        connected: u64,
+        /// Events handled.
+        events: u64,
+        /// Bits on air.
+        air: u64 ["bit"],
+        /// Memory of the network after the run.
+        bytes: u64 ["byte"],
+        /// The same for each node.
+        bytes_per_node: f64 ["byte"],
+    }
 
-/// Times of one size.
-#[derive(Serialize, JsonSchema)]
-pub struct Time {
-    /// Nodes.
-    nodes: u64,
-    /// Time to lay out the network.
-    #[schemars(extend("unit" = "s"))]
-    layout: f64,
-    /// Time of an event.
-    #[schemars(extend("unit" = "us"))]
-    event: f64,
-}
+    /// Times of one size.
+    pub struct Time {
+        /// Nodes.
+        nodes: u64,
+        /// Time to lay out the network.
+        layout: f64 ["s"],
+        /// Time of an event.
+        event: f64 ["us"],
+    }
 
-/// What was counted, and what was timed.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Counts.
-    sizes: Vec<Row>,
-    /// Times on this machine.
-    #[schemars(extend("volatile" = true))]
-    times: Vec<Time>,
+    /// What was counted, and what was timed.
+    pub struct Rows {
+        /// Counts.
+        sizes: Vec<Row>,
+        /// Times on this machine.
+        #[schemars(extend("volatile" = true))]
+        times: Vec<Time>,
+    }
 }
 
 /// The runner's own costs.
@@ -108,14 +91,13 @@ impl Protocol for Collect {
 }
 
 fn measure(context: &Context<'_>, nodes: u64, slots: u64) -> Result<(Row, Time), Error> {
-    let failed = |error: fewbits_network::Error| Error::failed(error);
     let started = std::time::Instant::now();
     let stream = context.stream("network-scale").indexed(nodes);
     // Ten nodes in range on average: 10 / (pi 10^2) to the square metre.
     let side = (nodes as f64 * 10.0 * std::f64::consts::PI).sqrt();
     let deployment = Deployment::uniform(&mut stream.named("field").rng(), [0.0; 2], [side; 2], nodes as usize);
-    let field = Field::new(&deployment.map_err(Error::failed)?, 10.0).map_err(failed)?;
-    let routes = field.graph().hops_from(0).map_err(Error::failed)?;
+    let field = Field::new(&deployment?, 10.0)?;
+    let routes = field.graph().hops_from(0)?;
     let parents = (0..nodes as usize)
         .map(|node| routes.parent(node).map_or(u32::MAX, |parent| parent as u32))
         .collect();
@@ -123,15 +105,15 @@ fn measure(context: &Context<'_>, nodes: u64, slots: u64) -> Result<(Row, Time),
     let layout = started.elapsed().as_secs_f64();
     let protocol = Collect { parents, slots };
     let setup = Setup::new(Radio::cc2420(0.0)?, stream);
-    let mut network = Simulator::new(protocol, vec![0; nodes as usize], field, setup).map_err(failed)?;
+    let mut network = Simulator::new(protocol, vec![0; nodes as usize], field, setup)?;
     for node in connected.iter().skip(1) {
         // Spread over the slot.
         let phase = u64::from(*node).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 38;
-        network.start(SensorId(*node), Instant(phase), 1).map_err(failed)?;
+        network.start(SensorId(*node), Instant(phase), 1)?;
     }
     let started = std::time::Instant::now();
     let end = Instant::default().after(Seconds::new(0.1 * (slots + 2) as f64)?);
-    let events = network.run_until(end).map_err(failed)?;
+    let events = network.run_until(end)?;
     let event = started.elapsed().as_secs_f64() * 1e6 / events.max(1) as f64;
     let bytes = network.memory() as u64;
     let row = Row {
@@ -146,29 +128,13 @@ fn measure(context: &Context<'_>, nodes: u64, slots: u64) -> Result<(Row, Time),
 }
 
 impl Figure for Scale {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "network-scale",
-            title: "A million nodes",
-            caption: "Memory of the simulated network and time of an event against the number of nodes, each of which sends a bit \
-                      towards a root in every slot. Memory is linear; an event costs a little more where the queue leaves the cache.",
-            source: "our own measurement",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.nodes.retain(|nodes| *nodes <= 10_000);
-    }
+    figure!(Parameters => Rows, "network-scale", "A million nodes", "our own measurement",
+        "Memory of the simulated network and time of an event against the number of nodes, each of which sends a bit \
+         towards a root in every slot. Memory is linear; an event costs a little more where the queue leaves the cache.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         let nodes: u64 = p.nodes.iter().sum();
-        Cost {
-            seconds: 1e-5 * (nodes * p.slots) as f64,
-            bytes: 1e3 * p.nodes.iter().max().copied().unwrap_or(0) as f64,
-        }
+        Cost::new(1e-5 * (nodes * p.slots) as f64, 1e3 * p.nodes.iter().max().copied().unwrap_or(0) as f64)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
@@ -187,18 +153,10 @@ impl Figure for Scale {
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let gibibyte = (1_u64 << 30) as f64 / 1e6;
-        claims.all(
-            "memory",
-            "a million nodes fit into 1 GiB: 1073 bytes a node, from 10^4 nodes on",
-            &rows.sizes,
-            |r| r.nodes < 10_000 || r.bytes_per_node <= gibibyte,
-        );
-        claims.all(
-            "events",
-            "every node that reaches the root sends and is received in every slot",
-            &rows.sizes,
-            |r| r.events == 2 * p.slots * (r.connected - 1),
-        );
+        let what = "a million nodes fit into 1 GiB: 1073 bytes a node, from 10^4 nodes on";
+        claims.all("memory", what, &rows.sizes, |r| r.nodes < 10_000 || r.bytes_per_node <= gibibyte);
+        let what = "every node that reaches the root sends and is received in every slot";
+        claims.all("events", what, &rows.sizes, |r| r.events == 2 * p.slots * (r.connected - 1));
         claims.all("air", "each time 201 bits", &rows.sizes, |r| r.air == 201 * p.slots * (r.connected - 1));
     }
 

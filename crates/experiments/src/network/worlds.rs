@@ -15,7 +15,6 @@ use fewbits_dymbo::{CountFusion, InnovationWord, MultibitFilter, ParallelFilter,
 use fewbits_filters::{AssumedDensity, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
-use fewbits_monte_carlo::Stream;
 use fewbits_network::estimators::{Bits, Censors, Counted, Followers, Leaders, LookUp, Patterns, Reporting, SendAll};
 use fewbits_network::{Clock, Field, Ledger, Radio, Replicable, Seconds, SensorId, Setup, Star, Walk};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
@@ -97,11 +96,11 @@ type Measurements = Vec<Vec<Vector1<f64>>>;
 
 /// The scalar world, in its stationary state.
 pub(super) fn scalar() -> Result<World<1, Ar1>, Error> {
-    let dynamics = Ar1::new(COEFFICIENT, PROCESS).map_err(Error::failed)?;
-    let variance = dynamics.stationary_variance().map_err(Error::failed)?;
+    let dynamics = Ar1::new(COEFFICIENT, PROCESS)?;
+    let variance = dynamics.stationary_variance()?;
     Ok(World {
         dynamics,
-        sensors: vec![LinearSensor::direct(1.0).map_err(Error::failed)?; SENSORS],
+        sensors: vec![LinearSensor::direct(1.0)?; SENSORS],
         start: Gaussian::scalar(0.0, variance)?,
         fine: NumberFormat::Single,
         coarse: NumberFormat::fixed(-8.0, 8.0, 8)?,
@@ -115,7 +114,7 @@ pub(super) fn plane() -> Result<World<4, LinearGaussian<4, 2>>, Error> {
     let along = [Vector4::new(1.0, 0.0, 0.0, 0.0), Vector4::new(0.0, 0.0, 1.0, 0.0)];
     let sensor = |i: usize| LinearSensor::scalar(along[i % 2], 1.0).map_err(Error::failed);
     Ok(World {
-        dynamics: constant_velocity_2d(1.0, ACCELERATION).map_err(Error::failed)?,
+        dynamics: constant_velocity_2d(1.0, ACCELERATION)?,
         sensors: (0..SENSORS).map(sensor).collect::<Result<_, _>>()?,
         start: Gaussian::new(Vector4::new(0.0, 1.0, 0.0, -1.0), Matrix4::identity() * 0.5)?,
         fine: NumberFormat::Single,
@@ -146,7 +145,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
             belief = predicted;
             for sensor in &self.sensors {
                 let expected = sensor.mean(belief.mean());
-                belief = kalman::update(sensor, &belief, &expected).map_err(Error::failed)?.0;
+                belief = kalman::update(sensor, &belief, &expected)?.0;
             }
             last = [of(&predicted), of(&belief)];
         }
@@ -201,10 +200,8 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
             Talk::Told => Star::told(e, measurements, clock, own),
             Talk::Echoed => Star::echoed(e, measurements, clock, own),
         };
-        let mut network = star
-            .and_then(|star| star.simulate(RADIUS, setup(stream)?))
-            .map_err(Error::failed)?;
-        network.run_until(clock.end(slots as u32)).map_err(Error::failed)?;
+        let mut network = star.and_then(|star| star.simulate(RADIUS, setup(stream)?))?;
+        network.run_until(clock.end(slots as u32))?;
         let squared = self.squared(&truths, network.nodes()[0].estimates());
         Ok(Bill::of(network.ledger(), 1, squared, slots))
     }
@@ -228,11 +225,11 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
         shared: bool,
         slots: usize,
     ) -> Result<Censors<G, LinearSensor<D, 1>, D, 1>, Error> {
-        let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT).map_err(Error::failed)?;
+        let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT)?;
         if shared {
             return Ok(Censors::told(network, format, self.dynamics.clone(), self.start));
         }
-        Censors::own(network, format, self.dynamics.clone(), self.start, slots).map_err(Error::failed)
+        Ok(Censors::own(network, format, self.dynamics.clone(), self.start, slots)?)
     }
 
     fn handed(&self, components: usize, resolution: f64, stream: Stream, slots: usize) -> Result<Bill, Error> {
@@ -251,7 +248,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
         };
         let leaders: Vec<_> = (0..slots).map(|k| SensorId((k % SENSORS) as u32)).collect();
         let walker = Leaders {
-            filter: HandoffFilter::new(300, reducer).map_err(Error::failed)?,
+            filter: HandoffFilter::new(300, reducer)?,
             dynamics: self.dynamics.clone(),
             start: Mixture::single(&self.start)?,
             readings: readings.collect::<Result<Vec<Vec<_>>, Error>>()?,
@@ -259,13 +256,13 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
         };
         let clock = clock()?;
         let walk = Walk::new(walker, clock, slots as u32, stream.named("filter"));
-        let field = Field::ring(SENSORS, RADIUS).map_err(Error::failed)?;
+        let field = Field::ring(SENSORS, RADIUS)?;
         let run = || -> Result<_, fewbits_network::Error> {
             let mut network = walk.simulate(field, SensorId(0), setup(stream)?)?;
             network.run_until(clock.end(slots as u32))?;
             Ok(network)
         };
-        let network = run().map_err(Error::failed)?;
+        let network = run()?;
         let mut estimates = vec![Vec::new(); slots];
         for (slot, mean) in network.nodes().iter().flat_map(|node| node.estimates()) {
             if let Some(place) = estimates.get_mut(*slot as usize - 1) {
@@ -280,9 +277,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
         Ok(Some(match scheme {
             Scheme::Words { bits, talk } => self.over_star(self.words(bits)?, talk, stream, slots)?,
             Scheme::Censored { messages, shared, talk } => {
-                let threshold = Budget::new(messages, SENSORS)
-                    .and_then(|b| b.threshold(1))
-                    .map_err(Error::failed)?;
+                let threshold = Budget::new(messages, SENSORS).and_then(|b| b.threshold(1))?;
                 self.over_star(self.censors(threshold, self.fine, shared, slots)?, talk, stream, slots)?
             }
             Scheme::AllSend { coarse } => {
@@ -324,7 +319,7 @@ impl World<4, LinearGaussian<4, 2>> {
 
     /// Range sensors of unit noise at [`FAR`] on the axes: to first order each has the coordinate that the world's own sensors have.
     fn ranges(&self, bits: usize, talk: Talk, stream: Stream, slots: usize) -> Result<Bill, Error> {
-        let noise = RangeNoise::constant(1.0).map_err(Error::failed)?;
+        let noise = RangeNoise::constant(1.0)?;
         let places = [[-FAR, 0.0], [0.0, -FAR], [FAR, 0.0], [0.0, FAR]];
         let sensor = |place: [f64; 2]| {
             RangeSensor::new(place.into(), noise)
@@ -332,11 +327,11 @@ impl World<4, LinearGaussian<4, 2>> {
                 .map_err(Error::failed)
         };
         let sensors = places.map(sensor).into_iter().collect::<Result<Vec<_>, _>>()?;
-        let loading = optimal_loading(1 << bits).map_err(Error::failed)?;
+        let loading = optimal_loading(1 << bits)?;
         let ranges = Reporting {
             dynamics: self.dynamics,
             sensors: sensors.clone(),
-            scheme: QuantizedRange::new(1 << bits, noise).map_err(Error::failed)?,
+            scheme: QuantizedRange::new(1 << bits, noise)?,
             link: Link::PERFECT,
             filter: AssumedDensity,
             // In single precision, as it travels.
@@ -388,13 +383,13 @@ impl World<1, Ar1> {
         let (start, deviation) = (self.start, self.start.standard_deviations()[0]);
         let scene = || Scene::gaussian_with_deviations(deviation, &[1.0; SENSORS]).map_err(Error::failed);
         let table = |system: &System| {
-            let look_up = LookUp::new(system, 10_000).map_err(Error::failed)?;
+            let look_up = LookUp::new(system, 10_000)?;
             self.over_star(look_up, Talk::Told, stream, slots)
         };
         match scheme {
             Scheme::SignBits { sensors, talk } => {
                 let filter = ParallelFilter::new(plant, sensors, CountFusion::Exact)?;
-                let counted = Counted::new(filter, start).map_err(Error::failed)?;
+                let counted = Counted::new(filter, start)?;
                 self.over_star(counted, talk, stream, slots)
             }
             Scheme::Word { bits, talk } => {
@@ -402,36 +397,32 @@ impl World<1, Ar1> {
                 self.over_star(Bits { filter, start }, talk, stream, slots)
             }
             Scheme::Information { levels } => {
-                let from = System::lloyd_max(scene()?, levels).map_err(Error::failed)?;
+                let from = System::lloyd_max(scene()?, levels)?;
                 let best = design::joint(&from, Criterion::MutualInformation, &Newton::default());
-                table(&best.map_err(Error::failed)?.system)
+                table(&best?.system)
             }
-            Scheme::LloydMax { levels } => table(&System::lloyd_max(scene()?, levels).map_err(Error::failed)?),
+            Scheme::LloydMax { levels } => table(&System::lloyd_max(scene()?, levels)?),
             Scheme::Patterned => {
                 let edges = [vec![0.0], vec![-1.0, 1.0], vec![0.0], vec![-1.5, 0.0, 1.5]];
                 let sensor = |edges: Vec<f64>| {
                     let cells = BinaryQuantizer::new(edges.iter().map(|e| e * deviation).collect())?;
                     PatternSensor::with_deviation(cells, 1.0)
                 };
-                let sensors: Vec<_> = edges
-                    .into_iter()
-                    .map(sensor)
-                    .collect::<Result<_, _>>()
-                    .map_err(Error::failed)?;
-                let source = Source::gaussian_with_deviation(deviation).map_err(Error::failed)?;
+                let sensors: Vec<_> = edges.into_iter().map(sensor).collect::<Result<_, _>>()?;
+                let source = Source::gaussian_with_deviation(deviation)?;
                 let table = Bank::new(source, sensors.clone()).and_then(|bank| bank.table(Decoder::Mmse));
-                let patterns = Patterns::new(sensors, table.map_err(Error::failed)?, deviation * deviation);
-                self.over_star(patterns.map_err(Error::failed)?, Talk::Told, stream, slots)
+                let patterns = Patterns::new(sensors, table?, deviation * deviation);
+                self.over_star(patterns?, Talk::Told, stream, slots)
             }
             Scheme::Filtered { levels } => {
                 let spread = (deviation * deviation + 1.0).sqrt();
                 let design = lloyd_max::gaussian(levels).and_then(|design| design.affine(0.0, spread));
-                let quantizer = Quantizer::from(&design.map_err(Error::failed)?);
-                let labels = Labelling::gray(levels).map_err(Error::failed)?;
+                let quantizer = Quantizer::from(&design?);
+                let labels = Labelling::gray(levels)?;
                 let reporting = Reporting {
                     dynamics: self.dynamics,
                     sensors: self.sensors.clone(),
-                    scheme: QuantizingSensor::with_variance(quantizer, labels, 1.0).map_err(Error::failed)?,
+                    scheme: QuantizingSensor::with_variance(quantizer, labels, 1.0)?,
                     link: Link::PERFECT,
                     filter: AssumedDensity,
                     broadcast: nothing as fn(&Gaussian<1>),

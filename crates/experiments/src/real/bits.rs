@@ -7,85 +7,69 @@ use crate::prelude::*;
 use fewbits_adaptive::{Replay, Silence};
 use rayon::prelude::*;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-pub struct Parameters {
-    #[serde(flatten)]
-    #[garde(dive)]
-    source: Source,
-    /// Bits per sample, at most.
-    #[garde(length(min = 1, max = 20), inner(range(min = 0.02, max = 12.0)))]
-    rate: Vec<f64>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            source: Source::default(),
-            rate: vec![0.25, 0.5, 1.0, 2.0],
-        }
+parameters! {
+    pub struct Parameters {
+        #[serde(flatten)]
+        #[garde(dive)]
+        source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
+        /// Bits per sample, at most.
+        #[garde(length(min = 1, max = 20), inner(range(min = 0.02, max = 12.0)))]
+        rate: Vec<f64> = vec![0.25, 0.5, 1.0, 2.0] => quick vec![0.5, 2.0],
     }
 }
 
-/// All tables.
-#[derive(Serialize, JsonSchema)]
-pub struct Rows {
-    /// Every scheme at every rate that it can keep to.
-    schemes: Vec<Row>,
-    /// Ours beside the best of the baselines.
-    comparison: Vec<Pair>,
-}
+rows! {
+    pub struct Rows {
+        /// Every scheme at every rate that it can keep to.
+        schemes: Vec<Row>,
+        /// Ours beside the best of the baselines.
+        comparison: Vec<Pair>,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Row {
-    /// Signal.
-    column: String,
-    /// Bits per sample, at most.
-    rate: f64,
-    /// adaptive and words are ours; the others: send-on-delta (12-bit words), modulation (adaptive delta modulation), jayant,
-    /// dpcm-0 and dpcm-1 (deadband, order 0 and 1).
-    scheme: &'static str,
-    /// Half-width of the region of silence.
-    delta: Option<f64>,
-    /// Root mean square error.
-    rmse: f64,
-    /// Bits per sample: ideal code lengths where a code is adaptive.
-    #[schemars(extend("unit" = "bit"))]
-    bits: f64,
-    /// Packets per sample.
-    packets: f64,
-}
+    struct Row {
+        /// Signal.
+        column: String,
+        /// Bits per sample, at most.
+        rate: f64,
+        /// adaptive and words are ours; the others: send-on-delta (12-bit words), modulation (adaptive delta modulation), jayant,
+        /// dpcm-0 and dpcm-1 (deadband, order 0 and 1).
+        scheme: &'static str,
+        /// Half-width of the region of silence.
+        delta: Option<f64>,
+        /// Root mean square error.
+        rmse: f64,
+        /// Bits per sample: ideal code lengths where a code is adaptive.
+        bits: f64 ["bit"],
+        /// Packets per sample.
+        packets: f64,
+    }
 
-#[derive(Serialize, JsonSchema)]
-struct Pair {
-    /// Signal.
-    column: String,
-    /// Bits per sample, at most.
-    rate: f64,
-    /// The best baseline, its order chosen in hindsight.
-    best: &'static str,
-    /// Its root mean square error.
-    best_rmse: f64,
-    /// Ours.
-    rmse: f64,
-    /// Ours over the best; smaller errors than the negligible one count as that.
-    ratio: f64,
-    /// A millionth of the signal's range.
-    negligible: f64,
-    /// Largest error of ours over its delta.
-    worst: f64,
-    /// Ideal bits per sample.
-    #[schemars(extend("unit" = "bit"))]
-    ideal: f64,
-    /// The same reports as one range-coded stream, whole 32-bit words.
-    #[schemars(extend("unit" = "bit"))]
-    stream: f64,
-    /// As packets of whole bits.
-    #[schemars(extend("unit" = "bit"))]
-    packed: f64,
-    /// As one stream that also tells which slots are silent.
-    #[schemars(extend("unit" = "bit"))]
-    with_silence: f64,
+    struct Pair {
+        /// Signal.
+        column: String,
+        /// Bits per sample, at most.
+        rate: f64,
+        /// The best baseline, its order chosen in hindsight.
+        best: &'static str,
+        /// Its root mean square error.
+        best_rmse: f64,
+        /// Ours.
+        rmse: f64,
+        /// Ours over the best; smaller errors than the negligible one count as that.
+        ratio: f64,
+        /// A millionth of the signal's range.
+        negligible: f64,
+        /// Largest error of ours over its delta.
+        worst: f64,
+        /// Ideal bits per sample.
+        ideal: f64 ["bit"],
+        /// The same reports as one range-coded stream, whole 32-bit words.
+        stream: f64 ["bit"],
+        /// As packets of whole bits.
+        packed: f64 ["bit"],
+        /// As one stream that also tells which slots are silent.
+        with_silence: f64 ["bit"],
+    }
 }
 
 /// Errors below this share of the range count as that.
@@ -173,31 +157,14 @@ pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 }
 
 impl Figure for Bits {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    fn about(&self) -> About {
-        About {
-            id: "real-bits",
-            title: "Real signals: error against bits",
-            caption: "Root mean square error against bits per sample on signals with the traits of recordings, or on the columns of \
-                      a file. The adaptive scheme needs no fit and bounds every error; the baselines are what an engineer would \
-                      try first, and deadband DPCM with an adaptive code, whose order is chosen in hindsight. Errors below a \
-                      millionth of the signal's range are drawn there.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.source.samples = 800;
-        p.rate = vec![0.5, 2.0];
-    }
+    figure!(Parameters => Rows, "real-bits", "Real signals: error against bits", "our own comparison",
+        "Root mean square error against bits per sample on signals with the traits of recordings, or on the columns of \
+         a file. The adaptive scheme needs no fit and bounds every error; the baselines are what an engineer would \
+         try first, and deadband DPCM with an adaptive code, whose order is chosen in hindsight. Errors below a \
+         millionth of the signal's range are drawn there.");
 
     fn cost(&self, p: &Parameters) -> Cost {
-        Cost {
-            seconds: 2e-4 * (p.source.samples * p.rate.len()) as f64,
-            bytes: 1e4 * p.source.samples as f64,
-        }
+        Cost::new(2e-4 * (p.source.samples * p.rate.len()) as f64, 1e4 * p.source.samples as f64)
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
@@ -218,6 +185,7 @@ impl Figure for Bits {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let pairs = &rows.comparison;
         claims.at_most("bounded", "no error exceeds delta", largest(pairs.iter().map(|p| p.worst)), 1.0);
         let what = "at equal bits the error is 0.85 of that of the best baseline, in the geometric mean";
@@ -230,16 +198,13 @@ impl Figure for Bits {
         let packets = || pairs.iter().zip(ours());
         claims.all("packets", what, packets(), |(p, r)| p.packed <= p.ideal + r.packets);
         let what = "the stream costs at most one percent and 0.03 bits per sample beyond the ideal length";
-        claims
-            .all("stream", what, pairs, |p| p.stream <= 1.01 * p.ideal + 0.03)
-            .at_defaults();
+        here.all("stream", what, pairs, |p| p.stream <= 1.01 * p.ideal + 0.03);
         let what = "telling the silences costs at most one bit per sample";
         claims.all("silence", what, pairs, |p| p.with_silence <= p.stream + 1.0 + 0.03);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let mut columns: Vec<&str> = rows.comparison.iter().map(|p| p.column.as_str()).collect();
-        columns.dedup();
+        let columns = distinct(&rows.comparison, |p| p.column.clone());
         let schemes = [
             "adaptive",
             "dpcm-0",
@@ -249,14 +214,14 @@ impl Figure for Bits {
             "jayant",
             "words",
         ];
-        let panel = |column: &&str| {
-            let pair = rows.comparison.iter().find(|p| p.column == **column);
+        let panel = |column: &String| {
+            let pair = rows.comparison.iter().find(|p| p.column == *column);
             let negligible = pair.map_or(0.0, |p| p.negligible);
             let curve = |(colour, scheme): (usize, &&'static str)| {
                 let chosen = rows
                     .schemes
                     .iter()
-                    .filter(|r| r.column == **column && r.scheme == *scheme);
+                    .filter(|r| r.column == *column && r.scheme == *scheme);
                 let curve = points(chosen, |r| (r.rate, r.rmse.max(negligible)));
                 match *scheme {
                     "adaptive" => Layer::line(*scheme, curve).coloured(colour),
@@ -264,8 +229,7 @@ impl Figure for Bits {
                     _ => Layer::points(*scheme, curve).coloured(colour),
                 }
             };
-            Panel::new(*column, Axis::log("bits per sample"), Axis::log("rms error"))
-                .with_all(schemes.iter().enumerate().map(curve))
+            Panel::loglog(column, "bits per sample", "rms error").with_all(schemes.iter().enumerate().map(curve))
         };
         Plot::grid(3, columns.iter().map(panel).collect())
     }

@@ -5,69 +5,58 @@ use super::tracking::best_for;
 use crate::prelude::*;
 use fewbits_adaptive::{Config, Receiver, Replay, Sensor};
 use fewbits_core::Link;
-use fewbits_monte_carlo::{Moments, Trial};
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-pub struct Parameters {
-    #[serde(flatten)]
-    #[garde(dive)]
-    source: Source,
-    /// Bits per sample over a perfect link, which choose delta.
-    #[garde(range(min = 0.02, max = 12.0))]
-    rate: f64,
-    /// Probabilities that a packet is lost.
-    #[garde(length(min = 1, max = 9), inner(range(min = 0.0, max = 0.5)))]
-    loss: Vec<f64>,
-    /// Slots from one refresh to the next.
-    #[garde(length(min = 1, max = 9), inner(range(min = 2, max = 100_000)))]
-    refresh: Vec<u64>,
-    /// Bits of the packets' counter.
-    #[garde(range(min = 1, max = 16))]
-    sequence_bits: u32,
-    /// Sequences of losses.
-    #[garde(range(min = 2, max = 100_000))]
-    trials: u64,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            source: Source {
-                columns: vec!["bursts".into()],
-                ..Source::default()
-            },
-            rate: 0.5,
-            loss: vec![0.0, 0.01, 0.1],
-            refresh: vec![25, 100, 400],
-            sequence_bits: 4,
-            trials: 20,
-        }
+fn shown() -> Source {
+    Source {
+        columns: vec!["bursts".into()],
+        ..Source::default()
     }
 }
 
-/// One interval of refreshes at one rate of loss.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Signal.
-    column: String,
-    /// Probability that a packet is lost.
-    loss: f64,
-    /// Slots from one refresh to the next.
-    refresh: u64,
-    /// Whole bits per sample, counters and refreshes included.
-    #[schemars(extend("unit" = "bit"))]
-    bits: Measured,
-    /// Root mean square error over delta.
-    rmse: Measured,
-    /// Share of the slots whose error exceeds delta.
-    beyond: Measured,
-    /// Share of the slots whose error exceeds delta although the receiver believes to be in step.
-    unnoticed: Measured,
-    /// Slots from the first packet lost to the next refresh received, at the longest, over the interval of refreshes.
-    longest: f64,
-    /// Errors beyond delta while no packet was lost since the last refresh that arrived: never.
-    violations: u64,
+parameters! {
+    pub struct Parameters {
+        #[serde(flatten)]
+        #[garde(dive)]
+        source: Source = shown() => quick Source { samples: 1000, ..shown() },
+        /// Bits per sample over a perfect link, which choose delta.
+        #[garde(range(min = 0.02, max = 12.0))]
+        rate: f64 = 0.5,
+        /// Probabilities that a packet is lost.
+        #[garde(length(min = 1, max = 9), inner(range(min = 0.0, max = 0.5)))]
+        loss: Vec<f64> = vec![0.0, 0.01, 0.1],
+        /// Slots from one refresh to the next.
+        #[garde(length(min = 1, max = 9), inner(range(min = 2, max = 100_000)))]
+        refresh: Vec<u64> = vec![25, 100, 400],
+        /// Bits of the packets' counter.
+        #[garde(range(min = 1, max = 16))]
+        sequence_bits: u32 = 4,
+        /// Sequences of losses.
+        #[garde(range(min = 2, max = 100_000))]
+        trials: u64 = 20 => quick 4,
+    }
+}
+
+rows! {
+    pub struct Row {
+        /// Signal.
+        column: String,
+        /// Probability that a packet is lost.
+        loss: f64,
+        /// Slots from one refresh to the next.
+        refresh: u64,
+        /// Whole bits per sample, counters and refreshes included.
+        bits: Measured ["bit"],
+        /// Root mean square error over delta.
+        rmse: Measured,
+        /// Share of the slots whose error exceeds delta.
+        beyond: Measured,
+        /// Share of the slots whose error exceeds delta although the receiver believes to be in step.
+        unnoticed: Measured,
+        /// Slots from the first packet lost to the next refresh received, at the longest, over the interval of refreshes.
+        longest: f64,
+        /// Errors beyond delta while no packet was lost since the last refresh that arrived: never.
+        violations: u64,
+    }
 }
 
 /// Loss and recovery.
@@ -115,9 +104,7 @@ fn one(point: &Point<'_>, sums: &mut Sums, trial: Trial) -> Result<(), Error> {
     for (slot, x) in (0_u64..).zip(&recording.samples) {
         let report = sensor.encode(*x)?;
         bits += report.map_or(0.0, |r| r.packet.bits() as f64);
-        let observation = link
-            .transmit(&mut rng, report.map(|r| r.packet).as_ref(), &())
-            .map_err(Error::failed)?;
+        let observation = link.transmit(&mut rng, report.map(|r| r.packet).as_ref(), &())?;
         let arrived = observation.received().is_some();
         if report.is_some() && !arrived {
             lost.get_or_insert(slot);
@@ -146,23 +133,9 @@ fn one(point: &Point<'_>, sums: &mut Sums, trial: Trial) -> Result<(), Error> {
 }
 
 impl Figure for Loss {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "real-loss",
-            title: "Real signals: loss and recovery",
-            caption: "A lost packet leaves the receiver out of step until the next refresh that arrives. Frequent refreshes cost bits \
-                      and shorten that time; the counter of the packets tells the receiver in which slots it must not trust itself.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.source.samples = 1000;
-        p.trials = 4;
-    }
+    figure!(Parameters => Vec<Row>, "real-loss", "Real signals: loss and recovery", "our own comparison",
+        "A lost packet leaves the receiver out of step until the next refresh that arrives. Frequent refreshes cost bits \
+         and shorten that time; the counter of the packets tells the receiver in which slots it must not trust itself.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-loss", context)?;
@@ -198,24 +171,17 @@ impl Figure for Loss {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let what = "no error exceeds delta but between a loss and the next refresh that arrives";
         claims.all("bounded", what, rows, |r| r.violations == 0);
         let what = "without loss no error exceeds delta";
-        claims
-            .all("perfect", what, rows.iter().filter(|r| r.loss == 0.0), |r| r.beyond.value == 0.0)
-            .at_defaults();
+        here.all("perfect", what, rows.iter().filter(|r| r.loss == 0.0), |r| r.beyond.value == 0.0);
         let what = "with frequent refreshes fewer slots are wrong";
         let worst = || rows.iter().filter(|r| r.loss == 0.1);
-        claims
-            .increasing("refresh", what, worst().map(|r| r.beyond))
-            .at_defaults();
-        claims
-            .decreasing("price", "and more bits are spent", worst().map(|r| r.bits))
-            .at_defaults();
+        here.increasing("refresh", what, worst().map(|r| r.beyond));
+        here.decreasing("price", "and more bits are spent", worst().map(|r| r.bits));
         let what = "most wrong slots are known to be so";
-        claims
-            .all("noticed", what, worst(), |r| r.unnoticed.value < 0.5 * r.beyond.value)
-            .at_defaults();
+        here.all("noticed", what, worst(), |r| r.unnoticed.value < 0.5 * r.beyond.value);
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {

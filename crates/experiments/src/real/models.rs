@@ -5,53 +5,47 @@ use super::tracking::best_for;
 use crate::prelude::*;
 use fewbits_adaptive::{Replay, SCALES, Sensor};
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-pub struct Parameters {
-    #[serde(flatten)]
-    #[garde(dive)]
-    source: Source,
-    /// Bits per sample, at most.
-    #[garde(range(min = 0.02, max = 12.0))]
-    rate: f64,
-    /// Slots from one row to the next.
-    #[garde(range(min = 1, max = 10_000))]
-    every: usize,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            source: Source {
-                columns: vec!["bursts".into(), "drift".into(), "gusts".into()],
-                samples: 1500,
-                ..Source::default()
-            },
-            rate: 0.5,
-            every: 10,
-        }
+fn shown() -> Source {
+    Source {
+        columns: vec!["bursts".into(), "drift".into(), "gusts".into()],
+        samples: 1500,
+        ..Source::default()
     }
 }
 
-/// One moment of one signal.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Signal.
-    column: String,
-    /// Slot.
-    slot: usize,
-    /// Sample.
-    sample: f64,
-    /// Reconstruction.
-    value: f64,
-    /// Weight of the random walks.
-    walk: f64,
-    /// Weight of the velocities that decay by 0.6.
-    damped: f64,
-    /// Weight of the velocities that decay by 0.95.
-    smooth: f64,
-    /// Mean logarithm to base 2 of the driving noise, in steps of two delta.
-    scale: f64,
+parameters! {
+    pub struct Parameters {
+        #[serde(flatten)]
+        #[garde(dive)]
+        source: Source = shown() => quick Source { samples: 1000, ..shown() },
+        /// Bits per sample, at most.
+        #[garde(range(min = 0.02, max = 12.0))]
+        rate: f64 = 0.5,
+        /// Slots from one row to the next.
+        #[garde(range(min = 1, max = 10_000))]
+        every: usize = 10,
+    }
+}
+
+rows! {
+    pub struct Row {
+        /// Signal.
+        column: String,
+        /// Slot.
+        slot: usize,
+        /// Sample.
+        sample: f64,
+        /// Reconstruction.
+        value: f64,
+        /// Weight of the random walks.
+        walk: f64,
+        /// Weight of the velocities that decay by 0.6.
+        damped: f64,
+        /// Weight of the velocities that decay by 0.95.
+        smooth: f64,
+        /// Mean logarithm to base 2 of the driving noise, in steps of two delta.
+        scale: f64,
+    }
 }
 
 /// Models over time.
@@ -92,22 +86,9 @@ fn mean<'a>(rows: impl Iterator<Item = &'a Row>, of: impl Fn(&Row) -> f64) -> Op
 }
 
 impl Figure for Models {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "real-models",
-            title: "Real signals: what the bank believed",
-            caption: "Weights of the three families of models, and the mean scale of their noise, over time: a plume raises the scale \
-                      within a few reports, a smooth drift is given to the velocities, a calm to the narrowest walks.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.source.samples = 1000;
-    }
+    figure!(Parameters => Vec<Row>, "real-models", "Real signals: what the bank believed", "our own comparison",
+        "Weights of the three families of models, and the mean scale of their noise, over time: a plume raises the scale \
+         within a few reports, a smooth drift is given to the velocities, a calm to the narrowest walks.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-models", context)?;
@@ -119,24 +100,22 @@ impl Figure for Models {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let sums = |r: &Row| (r.walk + r.damped + r.smooth - 1.0).abs() < 1e-9;
         claims.all("weights", "weights sum to one", rows, sums);
         let of = |column: &'static str| rows.iter().filter(move |r| r.column == column && r.slot > 300);
         let velocity = |r: &Row| r.damped + r.smooth;
         let what = "a smooth drift is given to the velocities";
-        claims
-            .above("drift", what, mean(of("drift"), velocity), 0.5)
-            .at_defaults();
+        here.above("drift", what, mean(of("drift"), velocity), 0.5);
         let moving = mean(of("gusts").filter(|r| r.sample > 0.3), |r| r.scale);
         let calm = mean(of("gusts").filter(|r| r.sample == 0.0), |r| r.scale);
         let what = "gusts raise the scale by a factor of at least four over a calm";
-        let gap = moving.zip(calm).map(|(m, c)| m - c);
-        claims.above("gusts", what, gap, 2.0).at_defaults();
+        let gap = minus(moving, calm);
+        here.above("gusts", what, gap, 2.0);
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let mut columns: Vec<&str> = rows.iter().map(|r| r.column.as_str()).collect();
-        columns.dedup();
+        let columns = distinct(rows, |r| r.column.clone());
         let panels = columns.iter().flat_map(|column| {
             let of = |y: fn(&Row) -> f64| {
                 let chosen = rows.iter().filter(|r| r.column == *column);
@@ -153,11 +132,11 @@ impl Figure for Models {
                     .with(Layer::line("velocity 0.95", of(|r| r.smooth))),
             ]
         });
-        let scale = |column: &&str| {
-            let chosen = rows.iter().filter(|r| r.column == **column);
-            Layer::line(*column, points(chosen, |r| (r.slot as f64, r.scale)))
+        let scale = |column: &String| {
+            let chosen = rows.iter().filter(|r| r.column == *column);
+            Layer::line(column, points(chosen, |r| (r.slot as f64, r.scale)))
         };
-        let scales = Panel::new("scale of the models", Axis::linear("slot"), Axis::linear("log2 of the noise, steps"))
+        let scales = Panel::linear("scale of the models", "slot", "log2 of the noise, steps")
             .with_all(columns.iter().map(scale));
         Plot::grid(2, panels.chain([scales]).collect())
     }

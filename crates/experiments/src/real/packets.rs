@@ -8,46 +8,37 @@ use crate::prelude::*;
 use fewbits_adaptive::Replay;
 use rayon::prelude::*;
 
-/// Settings.
-#[derive(Serialize, Deserialize, JsonSchema, Validate)]
-pub struct Parameters {
-    #[serde(flatten)]
-    #[garde(dive)]
-    source: Source,
-    /// Packets per sample, at most.
-    #[garde(length(min = 1, max = 20), inner(range(min = 0.005, max = 1.0)))]
-    packets: Vec<f64>,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            source: Source::default(),
-            packets: vec![0.03, 0.1, 0.3],
-        }
+parameters! {
+    pub struct Parameters {
+        #[serde(flatten)]
+        #[garde(dive)]
+        source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
+        /// Packets per sample, at most.
+        #[garde(length(min = 1, max = 20), inner(range(min = 0.005, max = 1.0)))]
+        packets: Vec<f64> = vec![0.03, 0.1, 0.3] => quick vec![0.1],
     }
 }
 
-/// One scheme at one rate.
-#[derive(Serialize, JsonSchema)]
-pub struct Row {
-    /// Signal.
-    column: String,
-    /// Packets per sample, at most.
-    target: f64,
-    /// adaptive; send-on-delta, which is also DPCM of order 0 without a lattice; dpcm-0, dpcm-1.
-    scheme: &'static str,
-    /// Half-width of the region of silence.
-    delta: f64,
-    /// Root mean square error.
-    rmse: f64,
-    /// Packets per sample.
-    packets: f64,
-    /// Error over that of the better of both orders of DPCM, whose packets hold a lattice point too; smaller errors than the
-    /// negligible one count as that.
-    ratio: Option<f64>,
-    /// A millionth of the signal's range.
-    negligible: f64,
+rows! {
+    pub struct Row {
+        /// Signal.
+        column: String,
+        /// Packets per sample, at most.
+        target: f64,
+        /// adaptive; send-on-delta, which is also DPCM of order 0 without a lattice; dpcm-0, dpcm-1.
+        scheme: &'static str,
+        /// Half-width of the region of silence.
+        delta: f64,
+        /// Root mean square error.
+        rmse: f64,
+        /// Packets per sample.
+        packets: f64,
+        /// Error over that of the better of both orders of DPCM, whose packets hold a lattice point too; smaller errors than the
+        /// negligible one count as that.
+        ratio: Option<f64>,
+        /// A millionth of the signal's range.
+        negligible: f64,
+    }
 }
 
 /// Error against packets.
@@ -85,25 +76,11 @@ fn compare(recording: &Recording, target: f64, context: &Context<'_>) -> Result<
 }
 
 impl Figure for Packets {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    fn about(&self) -> About {
-        About {
-            id: "real-packets",
-            title: "Real signals: error against packets",
-            caption: "Root mean square error against packets per sample. Where a packet costs the same whatever it holds, codes gain \
-                      nothing: only the prediction counts, and what a packet holds. Send-on-delta sends the sample itself, and is \
-                      ahead where signals jump and rest; the bank is ahead where they have a velocity. Errors below a \
-                      millionth of the signal's range are drawn there.",
-            source: "our own comparison",
-        }
-    }
-
-    fn quicken(&self, p: &mut Parameters) {
-        p.source.samples = 800;
-        p.packets = vec![0.1];
-    }
+    figure!(Parameters => Vec<Row>, "real-packets", "Real signals: error against packets", "our own comparison",
+        "Root mean square error against packets per sample. Where a packet costs the same whatever it holds, codes gain \
+         nothing: only the prediction counts, and what a packet holds. Send-on-delta sends the sample itself, and is \
+         ahead where signals jump and rest; the bank is ahead where they have a velocity. Errors below a \
+         millionth of the signal's range are drawn there.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-packets", context)?;
@@ -119,21 +96,19 @@ impl Figure for Packets {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
+        let here = claims.at_defaults();
         let ratios = || rows.iter().filter_map(|r| r.ratio);
         let what = "at equal packets the error is at most that of the better DPCM, in the geometric mean";
         claims.at_most("mean", what, geometric_mean(ratios()), 1.0);
-        claims
-            .at_most("worst", "and nowhere above 1.35 of it", largest(ratios()), 1.35)
-            .at_defaults();
+        here.at_most("worst", "and nowhere above 1.35 of it", largest(ratios()), 1.35);
         claims.all("rate", "the rate is kept", rows.iter().filter(|r| r.ratio.is_some()), |r| r.packets <= r.target);
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let mut columns: Vec<&str> = rows.iter().map(|r| r.column.as_str()).collect();
-        columns.dedup();
-        let panel = |column: &&str| {
+        let columns = distinct(rows, |r| r.column.clone());
+        let panel = |column: &String| {
             let curve = |(colour, scheme): (usize, &&'static str)| {
-                let chosen = rows.iter().filter(|r| r.column == **column && r.scheme == *scheme);
+                let chosen = rows.iter().filter(|r| r.column == *column && r.scheme == *scheme);
                 let curve = points(chosen, |r| (r.target, r.rmse.max(r.negligible)));
                 let layer = if colour == 0 {
                     Layer::line(*scheme, curve)
@@ -143,8 +118,7 @@ impl Figure for Packets {
                 layer.coloured(colour)
             };
             let schemes = ["adaptive", "dpcm-0", "dpcm-1", "send-on-delta"];
-            Panel::new(*column, Axis::log("packets per sample"), Axis::log("rms error"))
-                .with_all(schemes.iter().enumerate().map(curve))
+            Panel::loglog(column, "packets per sample", "rms error").with_all(schemes.iter().enumerate().map(curve))
         };
         Plot::grid(3, columns.iter().map(panel).collect())
     }

@@ -1,7 +1,6 @@
 //! Signals: synthetic ones with the traits of recordings, or columns of a user's file.
 
 use crate::prelude::*;
-use fewbits_monte_carlo::Stream;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
@@ -40,31 +39,22 @@ impl Recording {
     }
 }
 
-/// Which signals.
-#[derive(Serialize, Deserialize, JsonSchema, Validate, Clone)]
-pub(super) struct Source {
-    /// A CSV file with a header line and a row a sample; empty for the synthetic set.
-    #[garde(skip)]
-    pub recording: String,
-    /// Columns; empty for all of the synthetic set, or all of the file but the first.
-    #[garde(skip)]
-    pub columns: Vec<String>,
-    /// Columns on a circle of 360.
-    #[garde(skip)]
-    pub circular: Vec<String>,
-    /// Length of the synthetic signals.
-    #[garde(range(min = 50, max = 100_000))]
-    pub samples: usize,
-}
-
-impl Default for Source {
-    fn default() -> Self {
-        Self {
-            recording: String::new(),
-            columns: Vec::new(),
-            circular: vec!["direction".into()],
-            samples: 3800,
-        }
+parameters! {
+    /// Which signals.
+    #[derive(Clone)]
+    pub(super) struct Source {
+        /// A CSV file with a header line and a row a sample; empty for the synthetic set.
+        #[garde(skip)]
+        pub recording: String = String::new(),
+        /// Columns; empty for all of the synthetic set, or all of the file but the first.
+        #[garde(skip)]
+        pub columns: Vec<String> = Vec::new(),
+        /// Columns on a circle of 360.
+        #[garde(skip)]
+        pub circular: Vec<String> = vec!["direction".into()],
+        /// Length of the synthetic signals.
+        #[garde(range(min = 50, max = 100_000))]
+        pub samples: usize = 3800,
     }
 }
 

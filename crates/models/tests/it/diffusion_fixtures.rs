@@ -1,5 +1,6 @@
 //! Reference values of the diffusion physics, computed by an independent program.
 
+use crate::diffusion_entries::{beginning_with, number};
 use fewbits_models::diffusion::{
     Air, Axis, Flux, Ground, Release, SlabWall, TwoMedia, Wall, contour_radius, disk_source, moving_source,
 };
@@ -7,19 +8,7 @@ use nalgebra::{Vector2, Vector3};
 use serde_json::Value;
 
 fn entries(prefix: &str) -> Vec<Value> {
-    let all: Vec<Value> = serde_json::from_str(include_str!("../fixtures/diffusive.json")).unwrap();
-    let chosen: Vec<Value> = all
-        .into_iter()
-        .filter(|e| e["id"].as_str().unwrap().starts_with(prefix))
-        .collect();
-    assert!(!chosen.is_empty(), "no fixture begins with {prefix}");
-    chosen
-}
-
-fn number(entry: &Value, name: &str) -> f64 {
-    entry["inputs"][name]
-        .as_f64()
-        .unwrap_or_else(|| panic!("{name} of {}", entry["id"]))
+    beginning_with(prefix, include_str!("../fixtures/diffusive.json"))
 }
 
 fn vector(entry: &Value, name: &str) -> Vector3<f64> {

@@ -66,32 +66,44 @@ fn moments(values: &[f64], weights: &[f64]) -> (f64, f64) {
     (mean, all().map(|(x, w)| w * (x - mean) * (x - mean)).sum::<f64>() / mass)
 }
 
+/// What estimators of a scalar share where every slot stands alone: nothing is asked, nothing is remembered.
+macro_rules! stands_alone {
+    ($sensors:ident) => {
+        type Belief = Gaussian<1>;
+        type Measurement = Vector1<f64>;
+        type Question = ();
+        type Memory = ();
+
+        fn sensors(&self) -> usize {
+            self.$sensors.len()
+        }
+
+        fn start(&self) -> Gaussian<1> {
+            self.prior
+        }
+
+        fn memory(&self, _: usize) {}
+
+        fn predict(&self, _: &mut Pcg64Dxsm, _: u32, _: &Gaussian<1>) -> Result<Gaussian<1>, Error> {
+            Ok(self.prior)
+        }
+
+        fn question(&self, _: u32, _: &Gaussian<1>, _: usize) -> Result<(), Error> {
+            Ok(())
+        }
+
+        fn question_format(&self, _: usize) {}
+
+        fn mean(&self, belief: &Gaussian<1>) -> Vec<f64> {
+            vec![belief.mean()[0]]
+        }
+    };
+}
+
 impl Estimator for LookUp {
-    type Belief = Gaussian<1>;
-    type Measurement = Vector1<f64>;
-    type Question = ();
     type Report = Symbol;
-    type Memory = ();
 
-    fn sensors(&self) -> usize {
-        self.quantizers.len()
-    }
-
-    fn start(&self) -> Gaussian<1> {
-        self.prior
-    }
-
-    fn memory(&self, _: usize) {}
-
-    fn predict(&self, _: &mut Pcg64Dxsm, _: u32, _: &Gaussian<1>) -> Result<Gaussian<1>, Error> {
-        Ok(self.prior)
-    }
-
-    fn question(&self, _: u32, _: &Gaussian<1>, _: usize) -> Result<(), Error> {
-        Ok(())
-    }
-
-    fn question_format(&self, _: usize) {}
+    stands_alone!(quantizers);
 
     fn report_format(&self, sensor: usize) -> Labelling {
         self.labellings[sensor].clone()
@@ -123,10 +135,6 @@ impl Estimator for LookUp {
         })?;
         Ok(Gaussian::scalar(estimate.mean, estimate.variance)?)
     }
-
-    fn mean(&self, belief: &Gaussian<1>) -> Vec<f64> {
-        vec![belief.mean()[0]]
-    }
 }
 
 gaussian_replica!([] LookUp);
@@ -155,31 +163,9 @@ impl Patterns {
 }
 
 impl Estimator for Patterns {
-    type Belief = Gaussian<1>;
-    type Measurement = Vector1<f64>;
-    type Question = ();
     type Report = Bit;
-    type Memory = ();
 
-    fn sensors(&self) -> usize {
-        self.sensors.len()
-    }
-
-    fn start(&self) -> Gaussian<1> {
-        self.prior
-    }
-
-    fn memory(&self, _: usize) {}
-
-    fn predict(&self, _: &mut Pcg64Dxsm, _: u32, _: &Gaussian<1>) -> Result<Gaussian<1>, Error> {
-        Ok(self.prior)
-    }
-
-    fn question(&self, _: u32, _: &Gaussian<1>, _: usize) -> Result<(), Error> {
-        Ok(())
-    }
-
-    fn question_format(&self, _: usize) {}
+    stands_alone!(sensors);
 
     fn report_format(&self, _: usize) {}
 
@@ -205,10 +191,6 @@ impl Estimator for Patterns {
     ) -> Result<Gaussian<1>, Error> {
         let mean = self.table.decode(observations).map_err(failed)?;
         Ok(Gaussian::scalar(mean, prior.covariance()[0])?)
-    }
-
-    fn mean(&self, belief: &Gaussian<1>) -> Vec<f64> {
-        vec![belief.mean()[0]]
     }
 }
 

@@ -38,6 +38,12 @@ struct Price {
     down: u64,
 }
 
+impl Price {
+    fn of(up: u64, down: u64) -> Self {
+        Self { up, down }
+    }
+}
+
 fn price(ledger: &Ledger) -> Price {
     Price {
         up: ledger.accounts()[1..].iter().map(|account| account.payload.0).sum(),
@@ -111,13 +117,7 @@ fn one_bit_a_sample() {
     let estimator = Bits { filter, start: start() };
     let (estimates, price) = told(estimator.clone(), &measurements);
     assert_eq!(estimates, alone);
-    assert_eq!(
-        price,
-        Price {
-            up: bits,
-            down: 64 * SLOTS as u64
-        }
-    );
+    assert_eq!(price, Price::of(bits, 64 * SLOTS as u64));
     everywhere(&estimator, &measurements, &alone, bits);
 }
 
@@ -138,13 +138,7 @@ fn one_to_eight_bits_a_sample() {
         let estimator = Bits { filter, start: start() };
         let (estimates, price) = told(estimator.clone(), &measurements);
         assert_eq!(estimates, alone);
-        assert_eq!(
-            price,
-            Price {
-                up: sent,
-                down: 128 * SLOTS as u64
-            }
-        );
+        assert_eq!(price, Price::of(sent, 128 * SLOTS as u64));
         everywhere(&estimator, &measurements, &alone, sent);
     }
 }
@@ -165,13 +159,7 @@ fn several_one_bit_sensors() {
         .collect();
     let (estimates, price) = told(counted(Link::PERFECT), &measurements);
     assert_eq!(estimates, alone);
-    assert_eq!(
-        price,
-        Price {
-            up: 3 * SLOTS as u64,
-            down: 64 * SLOTS as u64
-        }
-    );
+    assert_eq!(price, Price::of(3 * SLOTS as u64, 64 * SLOTS as u64));
     everywhere(&counted(Link::PERFECT), &measurements, &alone, 3 * SLOTS as u64);
 }
 
@@ -275,13 +263,7 @@ fn words_in_the_plane() {
     let (estimates, price) = told(estimator.clone(), &measurements);
     assert_eq!(estimates, alone);
     // The two axes are asked different questions: two words of two numbers, one question a sensor.
-    assert_eq!(
-        price,
-        Price {
-            up: 4 * 2 * SLOTS as u64,
-            down: 4 * 128 * SLOTS as u64
-        }
-    );
+    assert_eq!(price, Price::of(4 * 2 * SLOTS as u64, 4 * 128 * SLOTS as u64));
     everywhere(&estimator, &measurements, &alone, 4 * 2 * SLOTS as u64);
 }
 
@@ -322,13 +304,7 @@ fn a_strangers_scheme_with_an_exact_filter() {
     };
     let (estimates, price) = told(estimator, &measurements);
     assert_eq!(estimates, alone);
-    assert_eq!(
-        price,
-        Price {
-            up: 3 * SLOTS as u64,
-            down: 64 * SLOTS as u64
-        }
-    );
+    assert_eq!(price, Price::of(3 * SLOTS as u64, 64 * SLOTS as u64));
 }
 
 #[test]
@@ -347,13 +323,7 @@ fn static_quantizers_with_a_table() {
     let estimator = LookUp::new(&system, 1000).unwrap();
     let (estimates, price) = told(estimator.clone(), &measurements);
     assert_eq!(estimates, alone);
-    assert_eq!(
-        price,
-        Price {
-            up: 3 * 2 * SLOTS as u64,
-            down: 0
-        }
-    );
+    assert_eq!(price, Price::of(3 * 2 * SLOTS as u64, 0));
     everywhere(&estimator, &measurements, &alone, 3 * 2 * SLOTS as u64);
 }
 
@@ -379,13 +349,7 @@ fn binary_patterns_with_a_table() {
     let estimator = Patterns::new(sensors, table, source.variance()).unwrap();
     let (estimates, price) = told(estimator, &measurements);
     assert_eq!(estimates, alone);
-    assert_eq!(
-        price,
-        Price {
-            up: 3 * SLOTS as u64,
-            down: 0
-        }
-    );
+    assert_eq!(price, Price::of(3 * SLOTS as u64, 0));
 }
 
 #[test]
@@ -547,7 +511,7 @@ fn followed_signals() {
     };
     let (estimates, price) = told(followers.clone(), &measurements);
     assert_eq!(estimates, alone);
-    assert_eq!(price, Price { up: sent, down: 0 });
+    assert_eq!(price, Price::of(sent, 0));
     let known = followers.start();
     assert_eq!(followers.belief_of(&followers.belief_bits(&known).unwrap()).unwrap(), known);
     assert!(followers.belief_of(&BitString::default()).is_err());
@@ -616,12 +580,6 @@ fn quantized_ranges_in_the_plane() {
     };
     let (estimates, price) = told(estimator.clone(), &measurements);
     assert_eq!(estimates, alone);
-    assert_eq!(
-        price,
-        Price {
-            up: 3 * 2 * SLOTS as u64,
-            down: 3 * 64 * SLOTS as u64
-        }
-    );
+    assert_eq!(price, Price::of(3 * 2 * SLOTS as u64, 3 * 64 * SLOTS as u64));
     everywhere(&estimator, &measurements, &alone, 3 * 2 * SLOTS as u64);
 }

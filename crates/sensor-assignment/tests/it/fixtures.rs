@@ -1,41 +1,14 @@
 //! Every entry of the fixture file, computed by independent programs, against the library.
 
+use crate::entry::{Entry, check};
 use fewbits_sensor_assignment::{
     CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, all_errors, bit_error, brute_force, by_precision,
     flipped_estimate, pair_costs, quantization_error,
 };
-use serde::Deserialize;
 use serde_json::Value;
-
-#[derive(Deserialize)]
-struct Entry {
-    id: String,
-    inputs: Value,
-    value: Value,
-    tolerance: Value,
-}
 
 fn entries() -> Vec<Entry> {
     serde_json::from_str(include_str!("../fixtures/assignment.json")).unwrap()
-}
-
-/// Meets the entry's tolerance or says by how much it is missed.
-fn check(entry: &Entry, ours: f64) -> Result<(), String> {
-    let expected = entry.value.as_f64().unwrap();
-    let tolerance = match &entry.tolerance {
-        Value::Number(n) => n.as_f64().unwrap(),
-        Value::String(text) => match text.split_once(' ').unwrap() {
-            ("rel", share) => share.parse::<f64>().unwrap() * expected.abs(),
-            ("abs", size) => size.parse().unwrap(),
-            _ => return Err(format!("{}: unknown tolerance {text}", entry.id)),
-        },
-        other => return Err(format!("{}: unknown tolerance {other}", entry.id)),
-    };
-    if (ours - expected).abs() <= tolerance {
-        Ok(())
-    } else {
-        Err(format!("{}: {ours:.12e} instead of {expected:.12e} +- {tolerance:.1e}", entry.id))
-    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Schemes that exist for scalar measurements only.
 
-use super::{Experiment, Track, failed};
+use super::{Experiment, Track};
 use crate::Error;
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::rule::Weighing;
@@ -16,13 +16,11 @@ use nalgebra::{Matrix1, SMatrix, Vector1, Vector2};
 impl Experiment<1> {
     pub(super) fn rao_blackwell(&self, track: &mut Track<'_, 1>, count: usize) -> Result<(), Error> {
         let mut rng = track.stream.named("particles").fast_rng();
-        let mut cloud = GaussianCloud::agreed(&self.start, count).map_err(failed)?;
+        let mut cloud = GaussianCloud::agreed(&self.start, count)?;
         let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.5)));
         let mut workspace = CloudWorkspace::default();
         for k in 0..self.steps {
-            filter
-                .predict(&mut rng, &self.dynamics, &mut cloud, &mut workspace)
-                .map_err(failed)?;
+            filter.predict(&mut rng, &self.dynamics, &mut cloud, &mut workspace)?;
             let broadcast = cloud.means().mean();
             let rules = vec![self.own[k].1.clone(); self.sensors];
             let (observations, sent) = self.observe(k, track.draws, &rules, &broadcast, 0.0);
@@ -37,9 +35,7 @@ impl Experiment<1> {
                     _ => silence.clone(),
                 };
                 let observed = Observed::new(self.sensor, factor);
-                filter
-                    .update(&mut rng, &mut cloud, &observed, &mut workspace)
-                    .map_err(failed)?;
+                filter.update(&mut rng, &mut cloud, &observed, &mut workspace)?;
             }
             track.note(k, &cloud.gaussian(), sent);
         }
@@ -55,7 +51,7 @@ impl Experiment<1> {
                 Weighing::OwnFilter => self.own[k].0.innovation_covariance[(0, 0)],
                 _ => belief.covariance()[(0, 0)] + self.sensor.noise_variance(),
             };
-            let trigger = StochasticTrigger::for_rate(self.budget.rate(), s).map_err(failed)?;
+            let trigger = StochasticTrigger::for_rate(self.budget.rate(), s)?;
             let scheme = Triggered {
                 sensing: self.sensor,
                 trigger,
@@ -66,12 +62,8 @@ impl Experiment<1> {
                 let sends = track.draws.coins[k][i] < trigger.probability(z[0] - prediction[0]);
                 sent += usize::from(sends);
                 let observation = sends.then_some(z[0]).into();
-                let factor = scheme
-                    .factor(&broadcast, &observation, &Link::PERFECT)
-                    .map_err(failed)?;
-                belief = assumed_density::update(&belief, self.sensor.matrix(), &factor)
-                    .map_err(failed)?
-                    .0;
+                let factor = scheme.factor(&broadcast, &observation, &Link::PERFECT)?;
+                belief = assumed_density::update(&belief, self.sensor.matrix(), &factor)?.0;
             }
             track.note(k, &belief, sent);
         }
@@ -103,7 +95,7 @@ impl Experiment<1> {
             for observation in &track.draws.no_feedback[k] {
                 match observation {
                     Observation::Received(z) => {
-                        belief = kalman::update(&self.sensor, &belief, z).map_err(failed)?.0;
+                        belief = kalman::update(&self.sensor, &belief, z)?.0;
                         received += 1;
                     }
                     _ => silent += 1,
@@ -112,9 +104,7 @@ impl Experiment<1> {
             if silent > 0 {
                 let (centre, noise) = (Vector1::new(centre), Matrix1::new(noise));
                 let factor = Censored::silence(rule, &centre, &noise, &Link::PERFECT, silent)?;
-                belief = assumed_density::update(&belief, &direction.transpose(), &factor)
-                    .map_err(failed)?
-                    .0;
+                belief = assumed_density::update(&belief, &direction.transpose(), &factor)?.0;
             }
             track.note(k, &belief, received);
         }
