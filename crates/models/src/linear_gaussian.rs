@@ -139,7 +139,7 @@ impl<const D: usize, const U: usize> LinearGaussian<D, U> {
                 break;
             }
             let left = power.amax();
-            if left == 0.0 || left < f64::MIN_POSITIVE {
+            if left < f64::MIN_POSITIVE {
                 return Ok((sum + sum.transpose()) * 0.5);
             }
             if !left.is_finite() {

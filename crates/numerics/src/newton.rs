@@ -41,6 +41,34 @@ pub fn increasing(mut f: impl FnMut(f64) -> (f64, f64), lower: f64, upper: f64, 
 mod tests {
     use super::increasing;
 
+    /// Quadratic convergence, with the bracket only where Newton's method alone would leave it.
+    #[test]
+    fn few_steps_are_enough() {
+        for (start, most) in [(2.5, 8), (0.2, 9), (4.9, 11)] {
+            let mut calls = 0;
+            let f = |x: f64| {
+                calls += 1;
+                assert!((-0.3..=5.0).contains(&x));
+                (x.exp() - 3.0, x.exp())
+            };
+            assert!((increasing(f, -0.3, 5.0, start, 1e-14) - 3f64.ln()).abs() < 1e-15);
+            assert!(calls <= most, "{calls} from {start}");
+        }
+        // The tolerance is about the step, and what is asked for loosely is found at once.
+        let mut calls = 0;
+        let loose = increasing(
+            |x| {
+                calls += 1;
+                (x - 0.7, 1.0)
+            },
+            -3.0,
+            5.0,
+            0.75,
+            0.1,
+        );
+        assert!(calls == 1 && (loose - 0.7).abs() < 1e-15);
+    }
+
     #[test]
     fn roots_are_found_from_bad_starts_and_at_the_ends() {
         // Newton alone diverges on the arc tangent from here.

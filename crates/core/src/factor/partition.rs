@@ -107,23 +107,11 @@ impl Partition {
     /// `ln p(observation | m)`.
     pub fn log_probability(&self, m: f64) -> f64 {
         let standard = |edge: f64| (edge - m) / self.deviation;
-        let p: f64 = self
-            .parts()
-            .map(|(lower, upper, p)| p * normal::interval(standard(lower), standard(upper)))
-            .sum();
-        if p > LEAST {
-            return p.min(1.0).ln();
-        }
-        // All cells that matter are far away: only logarithms have digits left.
         let logs: Vec<f64> = self
             .parts()
             .map(|(lower, upper, p)| p.ln() + normal::log_interval(standard(lower), standard(upper)))
             .collect();
-        let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if largest == f64::NEG_INFINITY {
-            return largest;
-        }
-        largest + logs.iter().map(|l| (l - largest).exp()).sum::<f64>().ln()
+        kernels::log_sum_exp(&logs).min(0.0)
     }
 }
 

@@ -126,3 +126,19 @@ fn a_link_loses_and_inverts_as_it_says() {
     assert!((words - 1.0).abs() < 1e-15);
     assert_eq!(link.transmit::<Sign, _>(&mut rng, None, &()).unwrap(), Observation::Nothing);
 }
+
+#[test]
+fn an_empty_field_leaves_no_byte_and_a_cleared_writer_begins_again() {
+    let mut writer = BitWriter::with_capacity(20);
+    writer.write(0, 0).unwrap();
+    assert_eq!((writer.bits(), writer.as_bit_string().bytes()), (0, &[][..]));
+    writer.write(0xab, 8).unwrap();
+    writer.write(0, 0).unwrap();
+    writer.write(0x5, 3).unwrap();
+    writer.write(0x1f3, 9).unwrap();
+    assert_eq!(writer.as_bit_string().bytes(), [0xab, 0b1011_1111, 0b0011_0000]);
+    assert_eq!(writer.bits(), 20);
+    writer.clear();
+    writer.write(0x3, 2).unwrap();
+    assert_eq!((writer.bits(), writer.finish().bytes()), (2, &[0xc0][..]));
+}

@@ -239,3 +239,43 @@ fn quadrature_finds_what_nobody_told_it() {
     let exact = below.max(above) + (-(below - above).abs()).exp().ln_1p();
     assert!((tilted.log_evidence - exact).abs() < 1e-10, "{} against {exact}", tilted.log_evidence);
 }
+
+#[test]
+fn what_goes_into_a_factor_comes_out() {
+    let cells = Partition::new(vec![-1.0, 0.3], vec![0.1, 0.7, 0.2], 0.4).unwrap();
+    assert_eq!((cells.edges(), cells.given_cell()), (&[-1.0, 0.3][..], &[0.1, 0.7, 0.2][..]));
+    assert_eq!(cells.noise_variance(), 0.4);
+    assert_eq!((Constant::new(0.3).unwrap().probability(), Constant::ONE.probability()), (0.3, 1.0));
+    let inside = InCell::new(Cell::new(-0.2, 0.9).unwrap(), 0.5, 0.1, 0.7).unwrap();
+    assert_eq!((inside.cell().lower(), inside.cell().upper()), (-0.2, 0.9));
+    assert_eq!((inside.noise_variance(), inside.floor(), inside.share()), (0.5, 0.1, 0.7));
+    let twice = Repeated::new(inside.into(), 2).unwrap();
+    assert_eq!((twice.factor(), twice.count()), (&Scalar::from(inside), 2));
+}
+
+/// A cell that no number can reach is blamed on the floor, where there is one.
+#[test]
+fn a_cell_out_of_reach_is_blamed_on_the_floor() {
+    let far = Gaussian::scalar(1e200, 1.7).unwrap();
+    let kept = silence(1.0, 0.5, 0.3).tilted(&far).unwrap();
+    assert!((kept.log_evidence - 0.3_f64.ln()).abs() < 1e-15);
+    assert_eq!((kept.mean[0], kept.covariance[0]), (1e200, 1.7));
+    assert_eq!(silence(1.0, 0.5, 0.0).tilted(&far), Err(Error::Impossible));
+}
+
+/// Where every cell that matters is far away the logarithm still is that of the nearest one.
+#[test]
+fn a_partition_far_away_is_its_nearest_cell() {
+    let cells = Partition::new(vec![-1.0, 0.3, 1.2], vec![0.1, 0.7, 0.0, 0.0], 0.4).unwrap();
+    for m in [20.0, 45.0, 300.0] {
+        let want = 0.7_f64.ln() + normal::log_interval((-1.0 - m) / 0.4_f64.sqrt(), (0.3 - m) / 0.4_f64.sqrt());
+        assert!((cells.log_probability(m) - want).abs() < 1e-14 * want.abs(), "{m}");
+    }
+    for m in [-2.3, 0.1, 0.9, 2.2] {
+        let p = |lower: f64, upper: f64| normal::interval((lower - m) / 0.4_f64.sqrt(), (upper - m) / 0.4_f64.sqrt());
+        let want = 0.1 * p(f64::NEG_INFINITY, -1.0) + 0.7 * p(-1.0, 0.3);
+        assert!((cells.log_probability(m) - want.ln()).abs() < 1e-14, "{m}");
+    }
+    let sure = Partition::new(vec![-1.0, 0.3], vec![1.0, 0.99, 1.0], 0.4).unwrap();
+    assert_eq!(sure.log_probability(60.0), 0.0);
+}

@@ -410,3 +410,29 @@ fn laws_of_schemes_refuse_what_is_wrong() {
     assert!(total(&biased).is_ok() && honest(&biased).is_err());
     assert!(honest(&coin(0.3, 0.25, 1.0)).is_err());
 }
+
+/// A plane turned and pushed along one coordinate, without a sweep of its own.
+struct Pushed;
+
+impl Dynamics<2> for Pushed {
+    fn mean(&self, state: &Vector2<f64>) -> Vector2<f64> {
+        TURN * state
+    }
+
+    fn propagate<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector2<f64>) -> Vector2<f64> {
+        TURN * state + Vector2::new(0.0, rng.random::<f64>())
+    }
+}
+
+#[test]
+fn a_cloud_is_propagated_state_by_state() {
+    let mut rng = Stream::new(5).named("cloud").rng();
+    let (mut x, mut y) = ([1.3, -0.4, 2.2], [0.7, 0.1, -1.9]);
+    let expected: Vec<Vector2<f64>> = x
+        .iter()
+        .zip(&y)
+        .map(|(x, y)| Pushed.propagate(&mut rng, &Vector2::new(*x, *y)))
+        .collect();
+    Pushed.propagate_columns(&mut Stream::new(5).named("cloud").rng(), [&mut x, &mut y]);
+    assert_eq!((0..3).map(|i| Vector2::new(x[i], y[i])).collect::<Vec<_>>(), expected);
+}

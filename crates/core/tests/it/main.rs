@@ -6,3 +6,4 @@ mod belief;
 mod codec;
 mod factor;
 mod laws;
+mod moments;

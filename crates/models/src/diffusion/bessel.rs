@@ -9,9 +9,14 @@ pub(super) fn jn_derivative(m: i32, x: f64) -> f64 {
     }
 }
 
+/// Here and below an argument counts as zero: one step of the recurrence must not overflow.
+const NEGLIGIBLE: f64 = 1e-40;
+/// Orders above the wanted one at which the downward recurrence begins: right to rounding for orders up to a few hundred.
+const MILLER: u32 = 40;
+
 /// Spherical Bessel function `j_l(x)` for `x >= 0`: upwards where that is stable, downwards (Miller) elsewhere.
 pub(super) fn spherical(l: u32, x: f64) -> f64 {
-    if x == 0.0 {
+    if x < NEGLIGIBLE {
         return if l == 0 { 1.0 } else { 0.0 };
     }
     let zeroth = x.sin() / x;
@@ -27,8 +32,7 @@ pub(super) fn spherical(l: u32, x: f64) -> f64 {
     }
     // j_l(x) < x^l / (2l + 1)!!, below the smallest number long before the recurrence would overflow.
     let (mut above, mut here, mut wanted) = (0.0, 1e-290, 0.0);
-    let start = l + 20 + (40.0 * f64::from(l)).sqrt() as u32;
-    for n in (0..start).rev() {
+    for n in (0..l + MILLER).rev() {
         if n + 1 == l {
             wanted = here;
         }
@@ -107,6 +111,20 @@ mod tests {
     }
 
     #[test]
+    fn zeros_are_found_on_the_steps_and_end_at_the_limit() {
+        assert_eq!(zeros(|x| (x - 2.5) * (x - 20.5), 0.5, 20.0), [2.5]);
+        let found = zeros(|x| (x - 6.1) * (x - 18.9) * (x - 20.2), 0.5, 20.0);
+        assert!(found.len() == 2 && (found[0] - 6.1).abs() < 1e-13 && (found[1] - 18.9).abs() < 1e-13, "{found:?}");
+        let found = zeros(|x| spherical(0, x), 0.5, 100.0);
+        assert_eq!(found.len(), 31);
+        assert!(
+            (1_u32..)
+                .zip(&found)
+                .all(|(n, zero)| (zero - std::f64::consts::PI * f64::from(n)).abs() < 1e-13)
+        );
+    }
+
+    #[test]
     fn spherical_values() {
         // j_2(x) = (3/x^3 - 1/x) sin x - 3/x^2 cos x, and the leading term for small x.
         for x in [0.8_f64, 1.7, 2.5, 9.0] {
@@ -115,8 +133,30 @@ mod tests {
         }
         assert!((spherical(5, 0.01) / (1e-10 / 10_395.0) - 1.0).abs() < 1e-4);
         assert!((spherical(40, 3.0)).abs() < 1e-30 && spherical(40, 3.0) > 0.0);
+        // One term of the power series is left of the smallest arguments, and nothing below.
+        for (l, x) in [(1, 1e-39), (2, 3e-20), (7, 2e-7), (35, 1.3e-6), (50, 1e-4), (60, 1e-3)] {
+            let leading = (1..=l).fold(1.0, |product, n| product * x / f64::from(2 * n + 1));
+            assert!((spherical(l, x) / leading - 1.0).abs() < 1e-7, "j_{l}({x})");
+        }
+        assert_eq!(
+            [
+                spherical(0, 1e-50),
+                spherical(3, 1e-50),
+                spherical(0, 0.0),
+                spherical(1, 0.0)
+            ],
+            [1.0, 0.0, 1.0, 0.0]
+        );
+        // Three neighbours obey the recurrence, on both sides of the order and where the sine vanishes.
+        for x in [0.3, 2.9, 9.424_777_960_769_38, 17.3, 43.982_297_150_257_1, 98.7] {
+            for l in 1..120 {
+                let [below, here, above] = [l - 1, l, l + 1].map(|l| spherical(l, x));
+                let middle = f64::from(2 * l + 1) / x * here;
+                assert!((below + above - middle).abs() < 1e-12 * (below.abs() + middle.abs()), "{l} {x}");
+            }
+        }
         // Sum over l of (2 l + 1) j_l(x)^2 is one.
-        for x in [0.5, 3.0, 17.0] {
+        for x in [0.5, 3.0, 9.424_777_960_769_38, 17.0] {
             let sum: f64 = (0..80).map(|l| f64::from(2 * l + 1) * spherical(l, x).powi(2)).sum();
             assert!((sum - 1.0).abs() < 1e-13);
         }

@@ -4,6 +4,7 @@ use super::air::{Air, Ground};
 use super::space::ImpulseResponse;
 use crate::Error;
 use fewbits_numerics::error::{at_least_one, positive};
+use fewbits_numerics::roots::bracketed;
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
 
@@ -49,24 +50,19 @@ pub fn contour(
         .collect())
 }
 
-/// Distance along a ray at which the concentration falls to the threshold, by bisection of the logarithm of the distance.
+/// Distance along a ray at which the concentration falls to the threshold.
 fn reach(air: &Air, source: &Vector3<f64>, ray: &Vector3<f64>, rate: f64, threshold: f64, age: f64) -> f64 {
-    if age <= 0.0 {
-        return 0.0;
-    }
-    let above = |radius: f64| rate * air.concentration(&(source + ray * radius), source, age) > threshold;
+    let excess = |log_radius: f64| {
+        let field = source + ray * log_radius.exp();
+        (rate * air.concentration(&field, source, age) / threshold).ln()
+    };
     // Without the loss of the second term c < rate / (2 pi kappa R), and with wind no more than that downwind.
-    let mut high = rate / (2.0 * PI * air.diffusivity() * threshold);
-    let mut low = air.closest().max(high * 1e-12);
-    if !above(low) {
-        return 0.0;
+    let high = rate / (2.0 * PI * air.diffusivity() * threshold);
+    let low = air.closest().max(high * 1e-12).ln();
+    if excess(low) > 0.0 {
+        // Where rounding leaves no change of sign the bound itself is reached.
+        bracketed(excess, low, high.ln(), 0.0).map_or(high, f64::exp)
+    } else {
+        0.0
     }
-    for _ in 0..200 {
-        let middle = (low * high).sqrt();
-        if middle <= low || middle >= high || high / low < 1.0 + 4.0 * f64::EPSILON {
-            break;
-        }
-        if above(middle) { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
 }

@@ -18,7 +18,9 @@ fn halve(f: &impl Fn(f64) -> f64, a: f64, b: f64, whole: f64, tolerance: f64, de
     let middle = 0.5 * (a + b);
     let rule = gauss_legendre::<16>();
     let (left, right) = (rule.sum(a, middle, f), rule.sum(middle, b, f));
-    if depth == 0 || (left + right - whole).abs() <= tolerance {
+    let apart = (left + right - whole).abs();
+    // What is not a number stays so.
+    if depth == 0 || apart <= tolerance || apart.is_nan() {
         return left + right;
     }
     halve(f, a, middle, left, tolerance, depth - 1) + halve(f, middle, b, right, tolerance, depth - 1)

@@ -89,3 +89,52 @@ fn bad_layers_are_refused() {
     assert_eq!(layered.green(0.5, 0.5, -1.0, 5).unwrap(), 0.0);
     assert_eq!(layered.green(0.5, 2.0, 1.0, 5).unwrap(), 0.0);
 }
+
+/// Seen from the other end everything is the same: walls, wind and layers change places.
+#[test]
+fn layers_turned_over_are_the_same() {
+    let (lossy, tight) = (Wall::permeable(0.8).unwrap(), Wall::permeable(0.1).unwrap());
+    for flux in [Flux::Total, Flux::Diffusive] {
+        for wind in [0.0, 0.7] {
+            let layers = |pair: [(f64, f64); 2], walls, wind| {
+                Layered::new(&pair, walls, 90).unwrap().with_wind(wind, flux).unwrap()
+            };
+            let up = layers([(1.2, 0.4), (1.8, 1.9)], [lossy, tight], wind);
+            let down = layers([(1.8, 1.9), (1.2, 0.4)], [tight, lossy], -wind);
+            for (field, source) in [(0.03, 0.5), (0.9, 1.4), (2.95, 2.2)] {
+                let one = up.green(field, source, 0.6, 20).unwrap();
+                let other = down.green(3.0 - field, 3.0 - source, 0.6, 20).unwrap();
+                assert!((one / other - 1.0).abs() < 1e-10, "{flux:?} {wind}: {one} {other}");
+            }
+        }
+    }
+}
+
+/// A coarse grid is good to a per cent: against half-spaces with every wall and wind, and free space in three dimensions.
+#[test]
+fn coarse_layers_are_close_already() {
+    for loss in [0.0, 0.8, f64::INFINITY] {
+        for wind in [-0.9, 0.0, 1.2] {
+            for flux in [Flux::Total, Flux::Diffusive] {
+                let wall = Wall::permeable(loss).unwrap();
+                let exact = Axis::half_space(1.3, wall).unwrap().with_wind(wind, flux).unwrap();
+                let numeric = Layered::new(&[(14.0, 1.3)], [wall, CLOSED], 350)
+                    .unwrap()
+                    .with_wind(wind, flux)
+                    .unwrap();
+                for z in [0.01, 0.5, 1.3, 2.9] {
+                    close(numeric.green(z, 0.9, 0.8, 60).unwrap(), exact.green(z, 0.9, 0.8), 1.0, 1e-2);
+                }
+            }
+        }
+    }
+    let open = Space::new([Axis::open(1.3).unwrap(); 3]).unwrap();
+    let deep = Layered::new(&[(16.0, 1.3)], [CLOSED; 2], 240).unwrap();
+    for (distance, z) in [(0.0, 8.1), (1.1, 7.3), (2.3, 9.4)] {
+        let exact = open.green(&Vector3::new(distance, 0.0, z), &Vector3::new(0.0, 0.0, 8.2), 0.9);
+        close(deep.green_3d(distance, (z, 8.2), 0.9, (40, 24)).unwrap(), exact, exact, 2e-2);
+    }
+    assert_eq!(deep.green_3d(1.0, (8.1, 8.2), 0.0, (40, 24)).unwrap(), 0.0);
+    assert!(deep.green_3d(-1.0, (8.1, 8.2), 0.9, (40, 24)).is_err());
+    assert!(deep.green_3d(1.0, (8.1, 8.2), 0.9, (40, 0)).is_err());
+}

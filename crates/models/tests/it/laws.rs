@@ -84,3 +84,24 @@ fn stored_models_come_back_equal_and_checked() {
     assert!(serde_json::from_str::<LinearSensor<1, 1>>(r#"{"matrix":[1.0],"noise_covariance":[0.0]}"#).is_err());
     assert!(serde_json::from_str::<LinearSensor<1, 1>>(r#"{"matrix":[1.0],"noise_covariance":[2.0]}"#).is_ok());
 }
+
+/// The same stream gives the same noise, whatever the type that holds the numbers: runs with common random numbers rely on it.
+#[test]
+fn noise_is_the_draw_times_its_deviation() {
+    let rng = || Pcg64Mcg::seed_from_u64(17);
+    let model = Ar1::new(-0.7, 2.9).unwrap();
+    let vector = LinearGaussian::from(model);
+    for state in [1.3, -0.4] {
+        let (one, other) =
+            (model.propagate(&mut rng(), &[state].into()), vector.propagate(&mut rng(), &[state].into()));
+        assert!((one - other).amax() < 1e-15);
+    }
+    let (mut one, mut other) = ([1.3, -0.4, 2.2], [1.3, -0.4, 2.2]);
+    model.propagate_columns(&mut rng(), [&mut one]);
+    vector.propagate_columns(&mut rng(), [&mut other]);
+    assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-15), "{one:?} {other:?}");
+    let power = ReceivedPower::<4>::new(Vector2::new(1.0, -2.0), [0, 2], 50.0, 0.3, 2.0, 1.7).unwrap();
+    let state = Vector4::new(0.3, 1.0, -0.8, 2.0);
+    let noise = LinearSensor::direct(1.7).unwrap().sample(&mut rng(), &[0.0].into());
+    assert!((power.sample(&mut rng(), &state) - power.mean(&state) - noise).amax() < 1e-14);
+}

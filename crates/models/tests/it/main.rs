@@ -7,8 +7,4 @@
     reason = "a panic is how a test fails"
 )]
 
-mod diffusion_entries;
-mod diffusion_fixtures;
-mod diffusion_laws;
-mod finite_volume;
-mod laws;
+mod diffusion_bodies;

@@ -206,6 +206,66 @@ mod tests {
         assert_eq!([(); 5].map(|()| words.next()), block);
     }
 
+    /// A generator stuck at one word.
+    struct Stuck(u64);
+
+    impl rand::TryRng for Stuck {
+        type Error = std::convert::Infallible;
+
+        fn try_next_u32(&mut self) -> Result<u32, Self::Error> {
+            Ok(self.0 as u32)
+        }
+
+        fn try_next_u64(&mut self) -> Result<u64, Self::Error> {
+            Ok(self.0)
+        }
+
+        fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Self::Error> {
+            bytes.fill(self.0 as u8);
+            Ok(())
+        }
+    }
+
+    /// Whatever the seed, steps are odd and change their bits often enough to mix; good ones stay as they are.
+    #[test]
+    fn steps_mix() {
+        for word in [
+            0,
+            1,
+            0xff,
+            u64::MAX,
+            0xffff_0000_ffff_0000,
+            0x0123_4567_89ab_cdef,
+            0x9e37_79b9_7f4a_7c15,
+        ] {
+            let words = Words::seeded(&mut Stuck(word));
+            assert_eq!((words.step & 1, words.counter), (1, word));
+            assert!((words.step ^ (words.step >> 1)).count_ones() >= 24, "{word:x}");
+        }
+        assert_eq!(Words::seeded(&mut Stuck(0x9e37_79b9_7f4a_7c14)).step, 0x9e37_79b9_7f4a_7c15);
+    }
+
+    #[test]
+    fn single_uniforms_are_inside_and_centred() {
+        // The extreme words, found backwards through the counter: only the top 52 bits count.
+        let mut words = Words {
+            counter: 5,
+            step: 0x9e37_79b9_7f4a_7c15,
+        };
+        let (mut sum, mut square) = (0.0, 0.0);
+        let count = 20_000;
+        for _ in 0..count {
+            let expected = ((words.clone().next() >> 12) as f64 + 0.5) / 4_503_599_627_370_496.0;
+            let u = words.uniform();
+            assert!(u > 0.0 && u < 1.0 && u == expected);
+            sum += u;
+            square += u * u;
+        }
+        let n = f64::from(count);
+        assert!((sum / n - 0.5).abs() < 4.5 / (12.0 * n).sqrt());
+        assert!((square / n - 1.0 / 3.0).abs() < 4.5 * (4.0 / (45.0 * n)).sqrt());
+    }
+
     #[test]
     fn layers_have_equal_areas_and_end_at_zero() {
         let table = ziggurat();

@@ -141,3 +141,56 @@ fn halved(f: &impl Fn(f64) -> f64, from: f64, to: f64, scale: f64, depth: usize)
     }
     halved(f, from, middle, scale, depth - 1) + halved(f, middle, to, scale, depth - 1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn the_fall_of_a_parabola_is_where_it_should_be() {
+        for width in [1e-9, 3e-4, 0.7, 2.9] {
+            for end in [38.6, -37.3] {
+                for peak in [0.0, 0.4] {
+                    let calls = Cell::new(0);
+                    let f = |x: f64| {
+                        calls.set(calls.get() + 1);
+                        1.3 - 0.5 * ((x - peak) / width).powi(2)
+                    };
+                    let (got, want) = ((fall(&f, peak, end, 1.3 - DROP) - peak) / width, 120_f64.sqrt().copysign(end));
+                    assert!((1.0..1.02).contains(&(got / want)), "{width} {end}: {got}");
+                    assert!(calls.get() <= 32, "{}", calls.get());
+                }
+            }
+        }
+        // Nothing has fallen by the end, or all of it only at the end.
+        assert_eq!(fall(&|x: f64| -x, 0.4, 38.6, -DROP), 38.6);
+        let last = fall(&|x: f64| if x < 38.5 { 0.0 } else { -100.0 }, 0.4, 38.6, -DROP);
+        assert!((38.5..38.9).contains(&last), "{last}");
+    }
+
+    #[test]
+    fn the_peak_is_found_inside_and_at_the_ends() {
+        for (at, width) in [(0.37, 1.0), (-11.2, 0.03), (38.9, 1e-6)] {
+            let got = peak(&|x: f64| -((x - at) / width).powi(2), -39.0, 39.0);
+            assert!((got - at).abs() < 1e-3 * width, "{got} for {at}");
+        }
+        assert_eq!(peak(&|x: f64| 3.0 * x, -1.3, 2.7), 2.7);
+        assert_eq!(peak(&|x: f64| -3.0 * x, -1.3, 2.7), -1.3);
+    }
+
+    #[test]
+    fn panels_are_halved_only_where_they_must() {
+        for (width, most) in [(1.0, 180), (0.01, 900)] {
+            let calls = Cell::new(0);
+            let f = |x: f64| {
+                calls.set(calls.get() + 1);
+                (-0.5 * ((x - 0.3) / width).powi(2)).exp()
+            };
+            let whole = (std::f64::consts::TAU).sqrt() * width;
+            let got = halved(&f, 0.3, 9.9, whole, DEEPEST);
+            assert!((got / whole - 0.5).abs() < 1e-13, "{width}: {got}");
+            assert!(calls.get() <= most, "{width}: {}", calls.get());
+        }
+    }
+}
