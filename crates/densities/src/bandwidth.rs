@@ -229,6 +229,85 @@ mod tests {
     }
 
     #[test]
+    fn rules_are_the_published_ones() {
+        let with = |rule| Bandwidth {
+            rule,
+            factor: 1.3,
+            ..Bandwidth::default()
+        };
+        // Silverman's constants: 1.06 in one dimension, 0.97 in three.
+        let silverman = with(Rule::Silverman);
+        assert!(
+            (silverman.width::<1>(200.0).unwrap() / (1.3 * 1.059_223_841_048_812 * 200.0_f64.powf(-0.2)) - 1.0).abs()
+                < 1e-14
+        );
+        assert!(
+            (silverman.width::<3>(200.0).unwrap() / (1.3 * 0.968_625_085_926_997 * 200.0_f64.powf(-1.0 / 7.0)) - 1.0)
+                .abs()
+                < 1e-12
+        );
+        assert!((with(Rule::Scott).width::<3>(128.0).unwrap() - 1.3 * 0.5).abs() < 1e-14);
+        assert!((with(Rule::Power { exponent: 0.25 }).width::<3>(81.0).unwrap() - 1.3 / 3.0).abs() < 1e-14);
+        assert!(with(Rule::Power { exponent: -0.1 }).width::<3>(81.0).is_err() && silverman.width::<1>(0.0).is_err());
+        let p = sample(1.0);
+        let full = Bandwidth {
+            shape: Shape::Full,
+            size: SampleSize::Effective,
+            ..silverman
+        };
+        let width = full.width::<2>(p.effective_sample_size()).unwrap();
+        assert!((full.kernel(&p).unwrap() - p.covariance() * (width * width)).amax() < 1e-15);
+        assert!(
+            (full.kernel_for(&p, 9.0).unwrap() - p.covariance() * (1.3_f64.powi(2) * 9.0_f64.powf(-1.0 / 3.0))).amax()
+                < 1e-14
+        );
+        let diagonal = silverman.kernel(&p).unwrap();
+        assert!(
+            diagonal[(0, 1)] == 0.0
+                && (diagonal[(1, 1)] / p.covariance()[(1, 1)] - 1.69 * 50.0_f64.powf(-1.0 / 3.0)).abs() < 1e-14
+        );
+    }
+
+    #[test]
+    fn floors_are_standard_deviations() {
+        let p = sample(1.0);
+        let raised = |shape, floor| {
+            Bandwidth {
+                shape,
+                floor,
+                ..Bandwidth::default()
+            }
+            .kernel(&p)
+        };
+        let (plain, full) = (raised(Shape::Diagonal, 0.0).unwrap(), raised(Shape::Full, 0.0).unwrap());
+        let (least, most) = (plain[(0, 0)].min(plain[(1, 1)]), plain[(0, 0)].max(plain[(1, 1)]));
+        let between = 0.5 * (least + most);
+        let kernel = raised(Shape::Diagonal, between.sqrt()).unwrap();
+        assert!((kernel.min() - 0.0).abs() < 1e-15 && (kernel[(0, 0)].min(kernel[(1, 1)]) - between).abs() < 1e-15);
+        assert_eq!(kernel[(0, 0)].max(kernel[(1, 1)]), most);
+        assert!((raised(Shape::Full, 0.3).unwrap() - full - SMatrix::identity() * 0.09).amax() < 1e-15);
+        assert!(raised(Shape::Full, -0.3).is_err());
+        // An axis without spread gets a millionth of the others' deviation.
+        let line = Particles::uniform([vec![2.0, 3.0], vec![-1.0, -1.0]]).unwrap();
+        for shape in [Shape::Diagonal, Shape::Full] {
+            let rule = Bandwidth {
+                shape,
+                ..Bandwidth::default()
+            };
+            let kernel = rule.kernel(&line).unwrap();
+            assert!((kernel[(1, 1)] / kernel[(0, 0)] / 1e-12 - 1.0).abs() < 1e-12 && kernel[(0, 1)] == 0.0);
+            // Narrower than its kernel an axis collapses to its mean.
+            let shrunk = rule
+                .shrunk(&line, &SMatrix::from_diagonal(&nalgebra::Vector2::new(0.16, 1.0)))
+                .unwrap();
+            assert!(
+                (shrunk.columns()[0][1] - 2.5 - 0.5 * 0.36_f64.sqrt()).abs() < 1e-15
+                    && shrunk.columns()[1] == [-1.0, -1.0]
+            );
+        }
+    }
+
+    #[test]
     fn rules_agree_where_they_must() {
         let with = |rule| {
             Bandwidth {

@@ -437,8 +437,171 @@ mod tests {
     fn spread_goes_into_the_covariance() {
         let clumps = Clumps::new(&[&[0.0, 1.0]], &[&[2.0, 4.0]], &[1.0, 1.0], 8).unwrap();
         assert_eq!(clumps.covariance()[0], 3.25);
+        let clumps = Clumps::new(&[&[0.0, 1.0]], &[&[2.0, 4.0]], &[1.0, 3.0], 1).unwrap();
+        assert!((clumps.covariance()[0] - 3.0 / 16.0 - 3.5).abs() < 1e-15 && clumps.clumps().len() == 1);
+        assert!(Clumps::<1>::new(&[&[0.0, 1.0]], &[&[1.0]], &[1.0, 1.0], 3).is_err());
+        assert!(Clumps::<1>::new(&[&[0.0, 1.0]], &[&[]], &[1.0, -1.0], 3).is_err());
         assert!(Clumps::<1>::new(&[&[0.0]], &[&[]], &[0.0], 3).is_err());
         assert!(Clumps::<1>::new(&[&[0.0]], &[&[]], &[1.0, 1.0], 3).is_err());
+    }
+
+    /// Two loose pairs and a heavier tight one, in coordinates of very different units, with a point of no weight.
+    #[test]
+    fn what_spreads_most_is_cut_at_its_mean() {
+        let x = [0.0, 4.0, 100.0, 103.0, 50.0, 0.0, 0.0];
+        let y = [3e6, 3e6, 3e6, 3e6, 9e9, -3e6, -3e6];
+        let weights = [1.0, 1.0, 5.0, 5.0, 0.0, 2.0, 3.0];
+        let means = |count| {
+            let clumps = Clumps::new(&[&x, &y], &[&[], &[]], &weights, count).unwrap();
+            let whole = Clumps::new(&[&x, &y], &[&[], &[]], &weights, 1).unwrap();
+            assert!(
+                (clumps.mean() - whole.mean())
+                    .component_div(&SVector::from([1.0, 1e6]))
+                    .amax()
+                    < 1e-12
+            );
+            let gap =
+                (clumps.covariance() - whole.covariance()).component_div(&SMatrix::from([[1.0, 1e6], [1e6, 1e12]]));
+            assert!(gap.amax() < 1e-10);
+            let mut means: Vec<_> = clumps
+                .clumps()
+                .iter()
+                .map(|c| (c.mean.x, c.mean.y, c.weight * 17.0))
+                .collect();
+            means.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            means
+        };
+        let near = |found: Vec<(f64, f64, f64)>, exact: &[(f64, f64, f64)]| {
+            assert_eq!(found.len(), exact.len(), "{found:?}");
+            for (a, b) in found.iter().zip(exact) {
+                assert!((a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-3 && (a.2 - b.2).abs() < 1e-12, "{found:?}");
+            }
+        };
+        let (low, left, right) = ((0.0, -3e6, 5.0), (2.0, 3e6, 2.0), (101.5, 3e6, 10.0));
+        near(means(2), &[(4.0 / 7.0, -9e6 / 7.0, 7.0), right]);
+        near(means(3), &[low, left, right]);
+        near(means(4), &[low, left, (100.0, 3e6, 5.0), (103.0, 3e6, 5.0)]);
+        let all = [
+            low,
+            (0.0, 3e6, 1.0),
+            (4.0, 3e6, 1.0),
+            (100.0, 3e6, 5.0),
+            (103.0, 3e6, 5.0),
+        ];
+        near(means(5), &all);
+        // Equal points stay together.
+        near(means(6), &all);
+    }
+
+    #[test]
+    fn eigenvalues_are_raised_in_the_units_of_the_least_variances() {
+        let turn = SMatrix::<f64, 2, 2>::new(0.8, -0.6, 0.6, 0.8);
+        let unit = SMatrix::<f64, 2, 2>::new(2.0, 0.0, 0.0, 0.25);
+        let of =
+            |a: f64, b: f64| unit * turn * SMatrix::from_diagonal(&SVector::from([a, b])) * turn.transpose() * unit;
+        let least = SVector::from([4.0, 0.0625]);
+        for (a, b) in [(0.3, 2.0), (3.0, 0.2), (0.1, 0.4), (1.5, 2.5)] {
+            assert!((raised(of(a, b), &least) - of(a.max(1.0), b.max(1.0))).amax() < 1e-14, "{a} {b}");
+        }
+        for none in [[0.0, 0.0625], [4.0, 0.0]] {
+            assert_eq!(raised(of(0.3, 0.2), &SVector::from(none)), of(0.3, 0.2));
+        }
+    }
+
+    /// One step of expectation-maximisation as the textbooks have it, and the mean log density before it.
+    fn step(clumps: &[Clump<2>], components: &[Clump<2>]) -> (Vec<Clump<2>>, f64) {
+        let density = |k: &Clump<2>, c: &Clump<2>| {
+            let precision = k.covariance.try_inverse().unwrap();
+            let d = c.mean - k.mean;
+            let square = d.dot(&(precision * d)) + (precision * c.covariance).trace();
+            k.weight * (-0.5 * square).exp() / k.covariance.determinant().sqrt()
+        };
+        let total = |c: &Clump<2>| components.iter().map(|k| density(k, c)).sum::<f64>();
+        let fitted = components.iter().map(|k| {
+            let shares: Vec<f64> = clumps.iter().map(|c| c.weight * density(k, c) / total(c)).collect();
+            let weight: f64 = shares.iter().sum();
+            let mean = shares
+                .iter()
+                .zip(clumps)
+                .map(|(s, c)| c.mean * *s)
+                .sum::<SVector<f64, 2>>()
+                / weight;
+            let spread = |c: &Clump<2>| c.covariance + (c.mean - mean) * (c.mean - mean).transpose();
+            let second: SMatrix<f64, 2, 2> = shares.iter().zip(clumps).map(|(s, c)| spread(c) * *s).sum();
+            Clump {
+                weight,
+                mean,
+                covariance: second / weight,
+            }
+        });
+        (fitted.collect(), clumps.iter().map(|c| c.weight * total(c).ln()).sum())
+    }
+
+    #[test]
+    fn fits_are_expectation_maximisation_until_it_gains_too_little() {
+        // A bent band of points.
+        let at = |i: i32| f64::from(i) * 0.05;
+        let x: Vec<f64> = (0..120).map(|i| at(i) + 0.3 * (7.0 * at(i)).sin()).collect();
+        let y: Vec<f64> = (0..120)
+            .map(|i| 1e3 * ((at(i) - 2.0).powi(2) + (11.3 * at(i)).cos()))
+            .collect();
+        let weights: Vec<f64> = (0..120).map(|i| 1.2 + (1.7 * at(i)).sin()).collect();
+        let clumps = Clumps::new(&[&x, &y], &[&[], &[]], &weights, 40).unwrap();
+        let close = |found: &Mixture<2>, exact: &[Clump<2>]| {
+            assert_eq!(found.len(), exact.len());
+            let unit = SVector::from([1.0, 1e3]);
+            for (a, b) in found.components().iter().zip(exact) {
+                let gap = (a.covariance() - b.covariance).component_div(&(unit * unit.transpose()));
+                let off = (a.mean() - b.mean).component_div(&unit);
+                assert!((a.weight() - b.weight).abs() < 1e-8 && off.amax() < 1e-8 && gap.amax() < 1e-7, "{off} {gap}");
+            }
+        };
+        let options = |iterations, tolerance, least_weight| MixtureFit {
+            components: 3,
+            least_weight,
+            iterations,
+            tolerance,
+        };
+        let mut exact = vec![clumps.start(3)];
+        let mut heights = Vec::new();
+        for k in 0..9 {
+            let (next, height) = step(clumps.clumps(), &exact[k]);
+            close(&clumps.fit(&options(k + 1, -1.0, 0.0)).unwrap(), &next);
+            exact.push(next);
+            heights.push(height);
+        }
+        // It ends after the first step before which the height rose by less than the tolerance.
+        for k in [2, 5, 8] {
+            let gain = heights[k] - heights[k - 1];
+            assert!(gain < heights[k - 1] - heights[k - 2] || k == 2);
+            let tolerance = 1.0001 * gain;
+            let ends = (1..9).find(|k| heights[*k] - heights[*k - 1] <= tolerance).unwrap();
+            close(&clumps.fit(&options(60, tolerance, 0.0)).unwrap(), &exact[ends + 1]);
+        }
+        // What is too light is dropped, one after the other, and the rest fitted on from where it was.
+        let fitted = |least| clumps.fit(&options(9, -1.0, least)).unwrap();
+        let lightest = (0..3)
+            .min_by(|a, b| exact[9][*a].weight.total_cmp(&exact[9][*b].weight))
+            .unwrap();
+        let least = 1.0001 * exact[9][lightest].weight;
+        let mut left = exact[9].clone();
+        left.swap_remove(lightest);
+        for _ in 0..9 {
+            left = step(clumps.clumps(), &left).0;
+        }
+        assert!(left.iter().all(|c| c.weight > least));
+        close(&fitted(least), &left);
+        close(&fitted(0.9999 * exact[9][lightest].weight), &exact[9]);
+        let one = fitted(1.0);
+        assert!(
+            one.len() == 1
+                && (one.mean() - clumps.mean())
+                    .component_div(&SVector::from([1.0, 1e3]))
+                    .amax()
+                    < 1e-12
+        );
+        assert!(MixtureFit::new(0).is_err() && MixtureFit::new(3).unwrap().with_least_weight(1.1).is_err());
+        assert_eq!(MixtureFit::new(3).unwrap().with_least_weight(0.3).unwrap().least_weight, 0.3);
     }
 
     #[test]

@@ -50,7 +50,8 @@ pub fn discrete(p: &[f64], q: &[f64]) -> Result<Divergence, Error> {
     }
     let (mut kl, mut l1) = (0.0, 0.0);
     let (mut top, mut bottom) = (f64::NEG_INFINITY, f64::INFINITY);
-    for (p, q) in p.iter().zip(q).filter(|(p, q)| **p > 0.0 || **q > 0.0) {
+    // Where neither has mass the ratio is NaN, which maximum and minimum pass over.
+    for (p, q) in p.iter().zip(q) {
         let f = log_ratio(*p, *q);
         if *p > 0.0 {
             kl += p * f;
@@ -69,7 +70,7 @@ pub fn discrete(p: &[f64], q: &[f64]) -> Result<Divergence, Error> {
 
 /// `ln(p / q)`, accurate for nearly equal arguments.
 fn log_ratio(p: f64, q: f64) -> f64 {
-    if p > 0.5 * q && p < 2.0 * q {
+    if (p - q).abs() < 0.5 * q {
         ((p - q) / q).ln_1p()
     } else {
         p.ln() - q.ln()
@@ -94,11 +95,7 @@ pub fn l1_from_dr(dr: f64) -> f64 {
 
 /// `KL <= ML tanh(ML / 2)`.
 pub fn kl_from_ml(ml: f64) -> f64 {
-    if ml == f64::INFINITY {
-        ml
-    } else {
-        ml * (0.5 * ml).tanh()
-    }
+    ml * (0.5 * ml).tanh()
 }
 
 /// `ln((e^h - 1)/h) - 1 + h/(e^h - 1)`, without cancellation at either end.
@@ -112,7 +109,7 @@ pub fn phi(h: f64) -> f64 {
     if h < 0.05 {
         // The series about 0; the next term is below 1e-17.
         let s = h * h;
-        return s * (1.0 / 8.0 - s * (1.0 / 576.0 - s * (1.0 / 36_288.0 - s / 2_073_600.0)));
+        return s * (1.0 / 8.0 - s * (1.0 / 576.0 - s * (1.0 / 25_920.0 - s / 1_075_200.0)));
     }
     let decay = (-h).exp();
     let gone = -(-h).exp_m1();
@@ -141,18 +138,15 @@ pub fn kl_chain_corrected(p0: &[f64], p1: &[f64], p2: &[f64]) -> Result<f64, Err
     Ok(first.kl + scaled(most, second.kl) + scaled(0.5 * (most - least), second.l1))
 }
 
-/// `factor x`, where nothing times infinity is nothing.
+/// `factor x`, where infinity times nothing is nothing.
 fn scaled(factor: f64, x: f64) -> f64 {
-    if x == 0.0 || factor == 0.0 { 0.0 } else { factor * x }
+    if x == 0.0 { 0.0 } else { factor * x }
 }
 
 /// Smallest and largest `p/q` over the points that either law gives mass.
 pub fn ratio_range(p: &[f64], q: &[f64]) -> (f64, f64) {
-    let ratios = p
-        .iter()
-        .zip(q)
-        .filter(|(p, q)| **p > 0.0 || **q > 0.0)
-        .map(|(p, q)| p / q);
+    // 0/0 is NaN, which minimum and maximum pass over.
+    let ratios = p.iter().zip(q).map(|(p, q)| p / q);
     ratios.fold((f64::INFINITY, 0.0), |(low, high), r| (r.min(low), r.max(high)))
 }
 
@@ -215,6 +209,16 @@ mod tests {
             assert!((phi(h) - direct(h)).abs() < 2e-13 * h.max(1.0), "{h}");
         }
         assert!((phi(1e-6) / (1e-12 / 8.0) - 1.0).abs() < 1e-12);
+        // With 60 digits.
+        for (h, exact) in [
+            (0.003, 1.1249998593750281e-06),
+            (0.03, 0.00011249859377812439),
+            (0.049, 0.00030011499219889995),
+            (0.8, 0.07929884885810966),
+            (7.0, 4.0595665527344),
+        ] {
+            assert!((phi(h) / exact - 1.0).abs() < 1e-14, "{h} {}", phi(h));
+        }
         assert!((phi(1e5) - (1e5 - 1e5_f64.ln() - 1.0)).abs() < 1e-9);
         for h in [1e-8, 1e-3, 0.7, 5.0, 60.0] {
             assert!(phi(h) <= h * h / 8.0);
@@ -238,11 +242,62 @@ mod tests {
         assert!(discrete(&[0.5, 0.6], &[1.0, 0.0]).is_err() && discrete(&[1.0], &[0.5, 0.5]).is_err());
     }
 
+    /// By `(x - ln(1 + x))/2 = x^2/2 int_0^1 u/(1 + x u) du`, whose integrand has no cancellation.
     #[test]
     fn normals_of_nearly_equal_width_lose_no_digits() {
-        for r in [0.9, 0.999, 1.000_4, 1.2] {
-            let direct = (1.0_f64 / r).ln() + r * r / 2.0 - 0.5;
-            assert!((kl_centred_normals(r, 1.0).unwrap() - direct).abs() < 1e-15, "{r}");
+        let rule = fewbits_numerics::quadrature::Rule::gauss_legendre(20);
+        for (a, b) in [
+            (0.3, 0.7),
+            (1.9, 2.0),
+            (3.999, 4.0),
+            (1.000_3, 1.0),
+            (1.000_6, 1.0),
+            (1.1, 0.9),
+            (5.0, 0.2),
+        ] {
+            let x = (a - b) * (a + b) / (b * b);
+            let direct = 0.5 * x * x * rule.composite(0.0, 1.0, 400, |u| u / (1.0 + x * u));
+            let found: f64 = kl_centred_normals(a, b).unwrap();
+            assert!((found / direct - 1.0).abs() < 1e-11, "{a} {b}: {found} {direct}");
         }
+        assert!(kl_centred_normals(0.0, 1.0).is_err() && kl_centred_normals(1.0, -1.0).is_err());
+    }
+
+    #[test]
+    fn nearly_equal_laws_lose_no_digits_and_very_different_ones_no_range() {
+        let e = 2.0_f64.powi(-30);
+        let d = discrete(&[0.5 + e, 0.5 - e], &[0.5, 0.5]).unwrap();
+        let x = 2.0 * e;
+        assert!((d.kl / (x * x / 2.0) - 1.0).abs() < 1e-6, "{d:?}");
+        assert!((d.ml / (x + x * x / 2.0) - 1.0).abs() < 1e-14 && (d.dr / x - 1.0).abs() < 1e-14 && d.l1 == x);
+        let d = discrete(&[0.1, 0.9], &[1e-310, 1.0]).unwrap();
+        assert!((d.ml - (0.1_f64.ln() - 1e-310_f64.ln())).abs() < 1e-9, "{d:?}");
+        let d = discrete(&[1e-20, 1.0], &[0.9, 0.1]).unwrap();
+        assert!((d.ml - (0.9_f64.ln() - 1e-20_f64.ln())).abs() < 1e-12 && (d.kl - 10.0_f64.ln()).abs() < 1e-12);
+        assert!((d.dr - 0.5 * (10.0_f64.ln() + d.ml)).abs() < 1e-12 && (d.l1 - 1.8).abs() < 1e-12);
+        let d = discrete(&[0.7, 0.3, 0.0, 0.0], &[0.2, 0.5, 0.3, 0.0]).unwrap();
+        assert!((d.kl - (0.7 * 3.5_f64.ln() + 0.3 * 0.6_f64.ln())).abs() < 1e-14 && (d.l1 - 1.0).abs() < 1e-14);
+        assert_eq!((d.ml, d.dr), (f64::INFINITY, f64::INFINITY));
+    }
+
+    #[test]
+    fn ratios_and_chains_where_laws_have_holes() {
+        assert_eq!(ratio_range(&[0.6, 0.4, 0.0, 0.0], &[0.5, 0.25, 0.25, 0.0]), (0.0, 1.6));
+        assert_eq!(ratio_range(&[0.6, 0.4], &[1.0, 0.0]), (0.6, f64::INFINITY));
+        // The second step loses nothing, however large its factor.
+        let (p0, p1) = ([0.5, 0.5], [1.0, 0.0]);
+        assert_eq!(kl_chain_printed(&p0, &p1, &p1).unwrap(), f64::INFINITY);
+        assert_eq!(kl_chain_corrected(&p0, &p1, &p1).unwrap(), f64::INFINITY);
+        let (p0, p1, p2) = ([0.75, 0.25, 0.0], [0.5, 0.3, 0.2], [0.4, 0.4, 0.2]);
+        let kl = |p: &[f64], q: &[f64]| discrete(p, q).unwrap().kl;
+        let chain = kl(&p0, &p1) + 1.5 * kl(&p1, &p2);
+        assert!((kl_chain_printed(&p0, &p1, &p2).unwrap() - chain).abs() < 1e-15);
+        assert!((kl_chain_corrected(&p0, &p1, &p2).unwrap() - chain - 0.75 * 0.2).abs() < 1e-15);
+        assert_eq!(
+            (kl_from_ml(f64::INFINITY), kl_from_dr(-0.3), kl_from_dr(f64::INFINITY)),
+            (f64::INFINITY, 0.0, f64::INFINITY)
+        );
+        let decay = (-1.4_f64).exp();
+        assert!((kl_from_ml(1.4) - 1.4 * (1.0 - decay) / (1.0 + decay)).abs() < 1e-15);
     }
 }

@@ -132,7 +132,7 @@ fn smoothed_rows(values: &[f64], counts: [usize; 2], kernel: &[f64]) -> Vec<f64>
     let mut out = vec![0.0; values.len()];
     for (row, out) in values.chunks(n).zip(out.chunks_mut(n)) {
         for (k, value) in row.iter().enumerate().filter(|(_, v)| **v != 0.0) {
-            let low = k.saturating_sub(kernel.len() - 1);
+            let low = k.saturating_sub(kernel.len());
             let high = (k + kernel.len()).min(n);
             let (left, right) = out[low..high].split_at_mut(k - low);
             left.iter_mut()

@@ -121,13 +121,14 @@ impl<const D: usize> KernelEstimate<D> {
             #[inline(always)]
             || {
                 let point = |p: usize| -> [f64; D] { std::array::from_fn(|d| points[d][p]) };
-                let pairs = out.len() / 2 * 2;
-                for p in (0..pairs).step_by(2) {
-                    let logs = log_kernel_sums(&white, weights, &[point(p), point(p + 1)]);
-                    out[p..p + 2].copy_from_slice(&logs.map(|log| log - offset));
+                let last = out.len().saturating_sub(1);
+                let (pairs, odd) = out.as_chunks_mut::<2>();
+                for (k, logs) in pairs.iter_mut().enumerate() {
+                    let points = [point(2 * k), point(2 * k + 1)];
+                    *logs = log_kernel_sums(&white, weights, &points).map(|log| log - offset);
                 }
-                for p in pairs..out.len() {
-                    out[p] = log_kernel_sums(&white, weights, &[point(p)])[0] - offset;
+                for log in odd {
+                    *log = log_kernel_sums(&white, weights, &[point(last)])[0] - offset;
                 }
             },
         );
@@ -365,15 +366,16 @@ pub(crate) fn add_cross_sums<const D: usize>(
         #[inline(always)]
         || {
             let point = |i: usize| std::array::from_fn(|d| white_i[d][i]);
-            let pairs = weights_i.len() / 2 * 2;
-            for i in (0..pairs).step_by(2) {
-                let weights = [weights_i[i], weights_i[i + 1]];
-                let sums = cross_sums(white_j, weights_j, &[point(i), point(i + 1)], &weights, right);
+            let (pairs, odd) = weights_i.as_chunks::<2>();
+            for (k, weights) in pairs.iter().enumerate() {
+                let (i, j) = (2 * k, 2 * k + 1);
+                let sums = cross_sums(white_j, weights_j, &[point(i), point(j)], weights, right);
                 left[i] += sums[0];
-                left[i + 1] += sums[1];
+                left[j] += sums[1];
             }
-            for i in pairs..weights_i.len() {
-                left[i] += cross_sums(white_j, weights_j, &[point(i)], &[weights_i[i]], right)[0];
+            if let [weight] = odd {
+                let i = weights_i.len() - 1;
+                left[i] += cross_sums(white_j, weights_j, &[point(i)], &[*weight], right)[0];
             }
         },
     );

@@ -50,11 +50,7 @@ impl<const D: usize> Part<D> {
 
     fn joined(&self, other: &Self) -> Self {
         let weight = self.weight + other.weight;
-        let (a, b) = if weight > 0.0 {
-            (self.weight / weight, other.weight / weight)
-        } else {
-            (0.5, 0.5)
-        };
+        let (a, b) = (self.weight / weight, other.weight / weight);
         let gap = other.mean - self.mean;
         let covariance = self.covariance * a + other.covariance * b + gap * gap.transpose() * (a * b);
         Self::new(weight, self.mean + gap * b, covariance)
@@ -247,10 +243,10 @@ mod tests {
                     Part::new(rng.random_range(0.1..1.0), mean, covariance)
                 })
                 .collect();
-            // Not symmetric in its arguments and not monotone under merging, as a price may be.
+            // Not symmetric in its arguments, and as likely to fall as to rise under merging.
             let cost = |a: &Part<2>, b: &Part<2>| {
-                let gap = a.mean - b.mean;
-                gap.dot(&((a.covariance * 0.7 + b.covariance).try_inverse().unwrap() * gap)) * a.weight * b.weight
+                let mixed = a.mean.dot(&Vector2::new(12.9898, 78.233)) + b.mean.dot(&Vector2::new(-37.1, 9.7));
+                (mixed.sin() * 43_758.545_3).fract().abs()
             };
             for components in 1..14 {
                 let (fast, slow) =
@@ -259,6 +255,9 @@ mod tests {
                 let pairs = fast.0.iter().zip(&slow.0);
                 assert!(fast.0.len() == slow.0.len() && pairs.clone().all(|(a, b)| a.mean == b.mean));
             }
+            // What no price can buy stays apart.
+            let (kept, total) = pairwise(parts, 3, |_, _| f64::INFINITY);
+            assert_eq!((kept.len(), total), (14, 0.0));
         }
     }
 }

@@ -51,13 +51,14 @@ pub(crate) fn check_density(density: &[f64], nodes: usize, volume: f64) -> Resul
 pub(crate) fn absorb(density: &mut [f64], logs: &[f64]) -> Result<f64, Error> {
     let reachable = logs.iter().zip(&*density).filter(|(_, p)| **p > 0.0);
     let peak = reachable.map(|(l, _)| *l).fold(f64::NEG_INFINITY, f64::max);
-    let product = |(l, p): (&f64, &f64)| p * (l - peak).exp();
+    // Where the density is zero the likelihood may be anything.
+    let product = |(l, p): (&f64, &f64)| if *p > 0.0 { p * (l - peak).exp() } else { 0.0 };
     let sum = logs.iter().zip(&*density).map(product).sum::<f64>();
     if !(peak.is_finite() && sum > 0.0 && sum.is_finite()) {
         return Err(Error::IMPOSSIBLE);
     }
     for (p, l) in density.iter_mut().zip(logs) {
-        *p *= (l - peak).exp() / sum;
+        *p = product((l, p)) / sum;
     }
     Ok(sum.ln() + peak)
 }

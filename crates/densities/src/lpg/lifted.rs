@@ -128,16 +128,12 @@ impl Lpg<3> {
             let mut coefficients = [0.0; HIGHEST_DEGREE + 1];
             for ([i, j, k], c) in self.indices.iter().zip(&term.coefficients) {
                 let value = c * first[*i] * second[*j];
-                if slice.absolute {
+                coefficients[*k] += match slice.absolute {
+                    false => value,
                     // A coarse cell: near the middle the polynomials are about one.
-                    coefficients[*k] += if reach > 0.5 {
-                        value.abs().max(c.abs())
-                    } else {
-                        value.abs()
-                    };
-                } else {
-                    coefficients[*k] += value;
-                }
+                    true if reach > 0.5 => value.abs().max(c.abs()),
+                    true => value.abs(),
+                };
             }
             slice.terms.push(SliceTerm {
                 height: term.half_log_peak - 0.25 * near * near,
@@ -326,6 +322,112 @@ mod tests {
         }
         belief.slice(&Vector2::new(1e200, 0.0), 0.0, &mut slice);
         assert_eq!(slice.tilted([1.0, 1.0, 1.0], [0.5, 1.5]).log_mass, f64::NEG_INFINITY);
+    }
+
+    /// `exp(-(energy - 2 correlation t + response t^2)/2)` of a measurement `t = place` of the given precision.
+    fn measured(place: f64, precision: f64) -> [f64; 3] {
+        [precision, precision * place, precision * place * place]
+    }
+
+    /// One Gaussian without a polynomial, where everything has a closed form: also a hundred deviations off, where only what is
+    /// scaled by the right peak is a number, and in a range a million times as wide as the mass.
+    #[test]
+    fn of_a_gaussian_slices_are_conditionals() {
+        let gaussian = gaussians()[0];
+        let (m, s) = (*gaussian.mean(), *gaussian.covariance());
+        let (plane, cross) = (s.fixed_view::<2, 2>(0, 0).into_owned(), s.fixed_view::<2, 1>(0, 2).into_owned());
+        let precision = plane.try_inverse().unwrap();
+        let gain = precision * cross;
+        let own = s[(2, 2)] - gain.dot(&cross);
+        let belief = Lpg::new(&[gaussian], 0, &[vec![-1.7]]).unwrap();
+        let mut slice = Slice::default();
+        let log_normal = |square: f64, variance: f64| -0.5 * (square + (std::f64::consts::TAU * variance).ln());
+        for (x, y) in [(1.0, -2.0), (2.9, -0.3), (-3.0, 1.0)] {
+            let place = Vector2::new(x, y);
+            let d = place - m.xy();
+            let (square, centre) = (d.dot(&(precision * d)), m.z + gain.dot(&d));
+            let log_marginal = log_normal(square, std::f64::consts::TAU * plane.determinant());
+            belief.slice(&place, 0.0, &mut slice);
+            let reach = 100.0 * own.sqrt();
+            for (at, accuracy, range) in [
+                (centre + 0.3, 7.0, [-1e5, 1e5]),
+                (centre - reach, 1e4, [-200.0, 200.0]),
+                (centre + reach, 1e4, [-200.0, 200.0]),
+                (centre + 30.0 * reach, 0.9, [-1e6, 1e6]),
+            ] {
+                let got = slice.tilted(measured(at, accuracy), range);
+                let variance = 1.0 / (accuracy + 1.0 / own);
+                let mean = variance * (accuracy * at + centre / own);
+                let gap = at - centre;
+                let log_mass =
+                    log_marginal - 0.5 * (1.0 + own * accuracy).ln() - 0.5 * gap * gap / (own + 1.0 / accuracy);
+                assert!((got.log_mass - log_mass).abs() < 1e-7 * log_mass.abs().max(1.0), "{got:?} {log_mass}");
+                assert!((got.mean - mean).abs() < 1e-7 * mean.abs().max(1.0), "{got:?} {mean}");
+                assert!((got.variance / variance - 1.0).abs() < 1e-6, "{got:?} {variance}");
+            }
+            // Only a tail is inside: `E(-t)` of an exponential beyond an end far from the centre.
+            for (side, range) in [
+                (1.0, [centre + 0.4 * reach, centre + reach]),
+                (-1.0, [centre - reach, centre - 0.4 * reach]),
+            ] {
+                let got = slice.tilted([0.0; 3], range);
+                let log = |t: f64| log_marginal + log_normal((t - centre) * (t - centre) / own, own);
+                let end = centre + side * 0.4 * reach;
+                // Mills' ratio at 40 deviations, to its third term.
+                let mills = own.sqrt() / 40.0 * (1.0 - 1.0 / 1600.0 + 3.0 / 2.56e6);
+                assert!((got.log_mass - log(end) - mills.ln()).abs() < 1e-7, "{got:?}");
+                assert!((got.mean - end - side * own.sqrt() / 40.0 * (1.0 - 2.0 / 1600.0)).abs() < 1e-6, "{got:?}");
+            }
+            // Cells: the centre may move along the third coordinate, and the plane's part is the most within the cell, about.
+            for half in [1e-3, 0.05, 0.4] {
+                belief.slice(&place, half, &mut slice);
+                let got = slice.tilted([0.0; 3], [-60.0, 60.0]);
+                let shift = half * (gain.x.abs() + gain.y.abs());
+                assert!((got.variance / (own + shift * shift) - 1.0).abs() < 1e-7, "{got:?}");
+                let widened = 0.5 * ((own + shift * shift) / own).ln();
+                let most = |reach: f64| {
+                    let grid =
+                        (-10..=10).flat_map(|i| (-10..=10).map(move |j| Vector2::new(f64::from(i), f64::from(j))));
+                    let squares = grid.map(|g| d + g * (0.1 * reach)).map(|d| d.dot(&(precision * d)));
+                    log_normal(squares.fold(f64::INFINITY, f64::min), std::f64::consts::TAU * plane.determinant())
+                };
+                let log = got.log_mass - widened;
+                assert!(
+                    log > most(half) - 1e-7 && log < most(3.0 * half).max(log_marginal + 1e-7) + 3.0 * half,
+                    "{half}"
+                );
+            }
+        }
+    }
+
+    /// Absolute polynomials, as the bound of the whole has them at the same places; a coarse cell takes them for one at least.
+    #[test]
+    fn slices_of_cells_bound_as_the_whole_does() {
+        let (belief, mut slice, mut scratch) = (belief(), Slice::default(), Vec::new());
+        let rule = Rule::gauss_legendre(20);
+        for (x, y) in [(1.0, -2.0), (3.0, 0.5), (-2.0, -3.0)] {
+            belief.slice(&Vector2::new(x, y), 1e-13, &mut slice);
+            let got = slice.tilted([0.0; 3], [-3.0, 4.0]);
+            let mut bound = |t: f64| {
+                belief
+                    .log_density_and_bound(&Vector3::new(x, y, t), 1e-13, &mut scratch)
+                    .1
+                    .exp()
+            };
+            let mass: f64 = rule.panels(-3.0, 4.0, 500).map(|(t, w)| w * bound(t)).sum();
+            // Absolute values have kinks.
+            assert!((got.log_mass - mass.ln()).abs() < 0.01, "{got:?} {}", mass.ln());
+        }
+        let gaussian = gaussians()[1];
+        let odd = Lpg::new(&[gaussian], 1, &[vec![0.0, -1.7, 0.0, 0.0]]).unwrap();
+        let peak = -0.5 * (std::f64::consts::TAU.powi(2) * (1.5 - 0.09)).ln();
+        odd.slice(&gaussian.mean().xy(), 1.0, &mut slice);
+        let coarse = slice.tilted([0.0; 3], [-3.0, 4.0]).log_mass;
+        let shift: f64 = 0.05 / 1.41 * (0.3 + 1.0);
+        let own: f64 = 0.02 - 0.05 * 0.05 / 1.41;
+        assert!((coarse - peak - 0.5 * ((own + shift * shift) / own).ln()).abs() < 1e-7, "{coarse} {peak}");
+        odd.slice(&gaussian.mean().xy(), 1e-3, &mut slice);
+        assert_eq!(slice.tilted([0.0; 3], [-3.0, 4.0]).log_mass, f64::NEG_INFINITY);
     }
 
     /// The marginal over the plane of a tilted Gaussian.

@@ -70,13 +70,6 @@ impl<const D: usize> Lpg<D> {
             all_finite("coefficients", list)?;
             term.coefficients.clone_from(list);
         }
-        let gram = belief.gram()?;
-        let c = belief.stacked();
-        let norm = c.dot(&(&gram * &c)).sqrt();
-        if !(norm > 0.0 && norm.is_finite()) {
-            return Err(Error::IMPOSSIBLE);
-        }
-        belief.scale(norm.recip());
         belief.settle()?;
         Ok(belief)
     }
@@ -140,18 +133,14 @@ impl<const D: usize> Lpg<D> {
             return Err(ArgumentError::new("gaussians", "a dependent set", "Gaussians that differ").into());
         };
         let c = factor.solve(b);
-        let norm = c.dot(&(gram * &c)).sqrt();
-        if !(norm > 0.0 && norm.is_finite()) {
-            return Err(Error::IMPOSSIBLE);
-        }
-        let size = self.indices.len();
-        for (l, term) in self.terms.iter_mut().enumerate() {
-            term.coefficients = c.rows(l * size, size).iter().map(|c| c / norm).collect();
+        for (term, own) in self.terms.iter_mut().zip(c.as_slice().chunks(self.indices.len())) {
+            term.coefficients.copy_from_slice(own);
         }
         self.settle()?;
         Ok(LpgFit {
             belief: self,
-            affinity: b.dot(&c) / norm,
+            // Before it was normalised the projection had the norm of its inner product with what was projected.
+            affinity: b.dot(&c).sqrt(),
         })
     }
 
@@ -220,11 +209,11 @@ impl<const D: usize> Lpg<D> {
                 continue;
             }
             polynomials(&self.indices, self.degree, &u, scratch);
-            let (mut size, mut value) = (0.0, 0.0);
-            for (polynomial, c) in scratch.iter().zip(&term.coefficients) {
-                value += polynomial * c;
-                size += (polynomial * c).abs();
-            }
+            let parts = scratch
+                .iter()
+                .zip(&term.coefficients)
+                .map(|(polynomial, c)| polynomial * c);
+            let (value, size): (f64, f64) = (parts.clone().sum(), parts.map(f64::abs).sum());
             let size: f64 = if reach > 0.5 {
                 size.max(term.coefficients.iter().map(|c| c.abs()).sum())
             } else {
@@ -244,20 +233,6 @@ impl<const D: usize> Lpg<D> {
             f64::NEG_INFINITY
         };
         (density, 2.0 * bound)
-    }
-
-    fn stacked(&self) -> DVector<f64> {
-        DVector::from_iterator(
-            self.terms.len() * self.indices.len(),
-            self.terms.iter().flat_map(|term| term.coefficients.iter().copied()),
-        )
-    }
-
-    fn scale(&mut self, by: f64) {
-        self.terms
-            .iter_mut()
-            .flat_map(|term| &mut term.coefficients)
-            .for_each(|c| *c *= by);
     }
 
     /// Calls `visit(l, m, weight, x, u_l, u_m)` at the nodes of rules that integrate `sqrt(phi_l phi_m)` times polynomials of
@@ -329,7 +304,7 @@ impl<const D: usize> Lpg<D> {
         Ok(gram)
     }
 
-    /// Mean and covariance of the normalised belief.
+    /// Normalises, and finds mean and covariance.
     fn settle(&mut self) -> Result<(), Error> {
         let size = self.indices.len();
         let mut values = vec![0.0; size];
@@ -350,7 +325,10 @@ impl<const D: usize> Lpg<D> {
         if !(mass > 0.0 && mass.is_finite()) {
             return Err(Error::IMPOSSIBLE);
         }
-        self.scale(mass.sqrt().recip());
+        let norm = mass.sqrt();
+        for term in &mut self.terms {
+            term.coefficients.iter_mut().for_each(|c| *c /= norm);
+        }
         let mean = first / mass;
         self.mean = origin + mean;
         self.covariance = second / mass - mean * mean.transpose();
@@ -408,12 +386,13 @@ impl<const D: usize> Belief<D> for Lpg<D> {
             term.gaussian.mean() + term.gaussian.cholesky_factor() * g * WIDER
         };
         let mut values = vec![0.0; self.indices.len()];
+        // Up to a constant, which the bound has too.
         let log_proposal = |x: &SVector<f64, D>| {
-            let parts = self.terms.iter().map(|term| {
-                -0.5 * term.whitened(x).norm_squared() / (WIDER * WIDER) + 2.0 * term.half_log_peak
-                    - D as f64 * WIDER.ln()
-            });
-            parts.fold(f64::NEG_INFINITY, log_add) - (self.terms.len() as f64).ln()
+            let parts = self
+                .terms
+                .iter()
+                .map(|term| 2.0 * term.half_log_peak - 0.5 * term.whitened(x).norm_squared() / (WIDER * WIDER));
+            parts.fold(f64::NEG_INFINITY, log_add)
         };
         let mut bound = f64::NEG_INFINITY;
         for _ in 0..1000 {

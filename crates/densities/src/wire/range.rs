@@ -140,20 +140,17 @@ impl Writer {
                 writer.write(u64::from(rest), 32)?;
             }
         }
-        if length > 0 {
-            writer.write(((point % WHOLE) >> (64 - length)) as u64, length)?;
-        }
-        Ok(())
+        writer.write(((point % WHOLE) >> (64 - length)) as u64, length)
     }
 }
 
-/// Number of symbols of the leading digit and bits below it, for a uniform law of `count` values.
+/// Number of symbols of the leading digit and bits below it, for a uniform law of `count` values, at least one.
 fn digits(count: u64) -> (u32, u32) {
     let mut low = 0;
     while (count - 1) >> low >= 1 << DIGIT {
         low += 1;
     }
-    ((((count.max(1) - 1) >> low) + 1) as u32, low)
+    ((((count - 1) >> low) + 1) as u32, low)
 }
 
 /// Reads integers back.
@@ -217,7 +214,7 @@ impl Reader {
         while left > 0 {
             let width = left.min(DIGIT);
             left -= width;
-            value = value << width | u64::from(self.get(Table::Uniform { count: 1 << width })?);
+            value = (value << width) + u64::from(self.get(Table::Uniform { count: 1 << width })?);
         }
         Ok(value)
     }
@@ -231,7 +228,7 @@ impl Reader {
                 } else {
                     0
                 };
-                let value = head << low | self.uniform(low)?;
+                let value = (head << low) + self.uniform(low)?;
                 if value < count {
                     Ok(value as i64)
                 } else {
@@ -248,7 +245,7 @@ impl Reader {
                     return Ok(self.uniform(32)? as i64 - LARGEST as i64);
                 }
                 let head = centre - i64::from(half) + i64::from(index);
-                Ok(head << low | self.uniform(low)? as i64)
+                Ok((head << low) + self.uniform(low)? as i64)
             }
         }
     }
@@ -260,6 +257,90 @@ mod tests {
     use super::*;
     use rand::RngExt;
     use rand::SeedableRng;
+
+    #[test]
+    fn laws_and_symbols_out_of_range_are_refused_and_the_last_within_are_not() {
+        let write = |law: Law, n: i64| {
+            let mut writer = Writer::new();
+            writer.write(&law, n)?;
+            let mut bits = BitWriter::new();
+            writer.finish(&mut bits)?;
+            let message = bits.finish();
+            let mut reader = Reader::new(&BitReader::new(&message), 1 << 10)?;
+            assert_eq!(reader.read(&law)?, n, "{law:?}");
+            Ok::<usize, CodecError>(message.bits())
+        };
+        let law = |location, scale| Law::Logistic { location, scale };
+        for bad in [
+            law(LARGEST, 1.0),
+            law(-LARGEST, 1.0),
+            law(0.0, LARGEST),
+            law(0.0, 0.0),
+            law(0.0, -1.0),
+            law(0.0, f64::NAN),
+            law(f64::NAN, 1.0),
+            law(f64::INFINITY, 1.0),
+            law(0.0, f64::INFINITY),
+        ] {
+            assert!(write(bad, 0).is_err(), "{bad:?}");
+            let empty = fewbits_core::BitString::default();
+            assert!(Reader::new(&BitReader::new(&empty), 99).unwrap().read(&bad).is_err(), "{bad:?}");
+        }
+        for good in [
+            law(LARGEST - 1.0, 1e-9),
+            law(-3.7, 0.9 * LARGEST),
+            law(0.3, 64.0),
+            law(0.3, 64.1),
+            law(-900.0, 7e5),
+        ] {
+            for n in [0, 7, -8, 123_456, (1 << 31) - 1, -1 << 31] {
+                write(good, n).unwrap();
+            }
+        }
+        assert!(write(law(0.3, 64.0), 1 << 31).is_err() && write(law(0.3, 64.0), -1 - (1 << 31)).is_err());
+        let uniform = |count| Law::Uniform { count };
+        for count in [
+            1,
+            2,
+            3,
+            4095,
+            4096,
+            4097,
+            8193,
+            1 << 24,
+            (1 << 24) + 1,
+            1 << 40,
+            (1 << 50) - 3,
+        ] {
+            for n in [0, count / 3, count - 1] {
+                let bits = write(uniform(count), n as i64).unwrap();
+                assert!((bits as f64) < (count as f64).log2() + 2.01, "{bits} bits for one of {count}");
+            }
+            assert!(write(uniform(count), count as i64).is_err() && write(uniform(count), -1).is_err());
+            // The leading digit is as long as a table allows.
+            let (top, low) = digits(count);
+            assert_eq!((u64::from(top), low), {
+                let low = (0..).find(|low| (count - 1) >> low < 4096).unwrap();
+                (((count - 1) >> low) + 1, low)
+            });
+        }
+        assert_eq!((digits(4096), digits(4097), digits(8193)), ((4096, 0), (2049, 1), (2049, 2)));
+    }
+
+    /// Beyond its end a message is zeros, but no more symbols come from it than it has bits for.
+    #[test]
+    fn nothing_is_read_past_the_end() {
+        let law = Law::Uniform { count: 1024 };
+        for bytes in [0, 1, 3, 8, 9] {
+            let message = fewbits_core::BitString::from_bytes(vec![0; bytes], 8 * bytes).unwrap();
+            let mut reader = Reader::new(&BitReader::new(&message), 1 << 10).unwrap();
+            let read = (0..1000).take_while(|_| reader.read(&law).is_ok()).count();
+            // A symbol of ten bits counts for nine at least.
+            assert_eq!(read, 8 * bytes / 9);
+            let mut few = Reader::new(&BitReader::new(&message), 10).unwrap();
+            assert_eq!((0..1000).take_while(|_| few.read(&law).is_ok()).count(), (8 * bytes).min(10) / 9);
+        }
+    }
 
     #[test]
     fn integers_of_every_size_come_back_and_the_length_is_near_the_information() {

@@ -188,6 +188,58 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    /// The search from the guess takes few steps where the symbols mostly are.
+    #[test]
+    fn guesses_are_near() {
+        let logistic = [(0.0, 0.3), (0.3, 0.5), (-7.6, 2.2), (1e6, 11.0), (0.5, 64.0)];
+        for (location, scale) in logistic {
+            let table = Table::logistic(location, scale);
+            for quantile in (TOTAL / 20..TOTAL - TOTAL / 20).step_by(97) {
+                let (guess, found) = (table.guess(quantile), table.find(quantile).0);
+                assert!(f64::from(guess.abs_diff(found)) <= 1.0 + 0.3 * scale, "{table:?} {quantile}: {guess} {found}");
+            }
+            assert!(table.guess(0) < table.count() && table.guess(TOTAL - 1) < table.count());
+        }
+        for count in [2, 3, 64, 1000, 4096] {
+            let table = Table::Uniform { count };
+            for quantile in (0..TOTAL).step_by(97).chain([TOTAL - 1]) {
+                let (guess, found) = (table.guess(quantile), table.find(quantile).0);
+                assert!(guess < count && guess.abs_diff(found) <= 1, "{table:?} {quantile}: {guess} {found}");
+            }
+        }
+    }
+
+    /// Against the logistic law and the wide one in their textbook form.
+    #[test]
+    fn frequencies_follow_the_law() {
+        for (location, scale) in [(0.0, 0.3), (0.4, 2.5), (-17.3, 30.0), (1e6, 64.0)] {
+            let table = Table::logistic(location, scale);
+            let Table::Logistic { centre, half, .. } = table else {
+                unreachable!()
+            };
+            assert_eq!((centre, half), (location.round() as i64, (10.0 * scale).ceil() as u32 + 4));
+            assert_eq!((table.count(), table.escape()), (2 * half + 2, Some(2 * half + 1)));
+            for index in 1..=2 * half {
+                let (_, frequency) = table.left_cumulative_and_probability(index).unwrap();
+                let cdf = |x: f64| 0.5 + 0.5 * (0.5 * (x - location) / scale).tanh();
+                let wide = |x: f64| 0.5 + 0.5 * (0.0625 * (x - location) / scale).tanh();
+                let at = (centre - i64::from(half) + i64::from(index)) as f64;
+                let share = 0.99 * (cdf(at + 0.5) - cdf(at - 0.5)) + 0.01 * (wide(at + 0.5) - wide(at - 0.5));
+                // The last symbol before the escape has what lies beyond it, too.
+                if index < 2 * half {
+                    let exact = 1.0 + share * f64::from(TOTAL - 32 - (2 * half + 1));
+                    assert!(
+                        (f64::from(frequency.get()) - exact).abs() < 1.01,
+                        "{table:?} {index}: {frequency} {exact}"
+                    );
+                }
+            }
+            assert!(table.left_cumulative_and_probability(table.count()).is_none());
+            assert_eq!(table.left_cumulative_and_probability(2 * half + 1).unwrap().1.get(), 32);
+        }
+        assert_eq!(Table::Uniform { count: 7 }.escape(), None);
+    }
+
     #[test]
     fn frequencies_are_positive_and_complete_and_quantiles_find_their_symbol() {
         let logistic = [(0.0, 0.01), (0.3, 0.5), (-7.6, 2.2), (1e6, 11.0), (0.5, 64.0)];

@@ -100,11 +100,7 @@ pub(super) fn walk<const D: usize>(
     }
     let k = k as usize;
     let choices = format.resolutions.len() as u64;
-    let choice = if choices > 1 {
-        symbols.next(&Law::Uniform { count: choices }, target.map(|(_, r)| r as f64))?
-    } else {
-        0
-    };
+    let choice = symbols.next(&Law::Uniform { count: choices }, target.map(|(_, r)| r as f64))?;
     let r = format
         .resolutions
         .get(choice as usize)

@@ -6,7 +6,7 @@ use fewbits_densities::{
     Component, Grid, HighestDensity, KernelEstimate, Mixture, PointMass, TabulatedEstimate, ellipse,
 };
 use fewbits_monte_carlo::Stream;
-use nalgebra::{Matrix1, SVector, Vector1};
+use nalgebra::{Matrix1, Matrix2, SVector, Vector1, Vector2};
 
 fn obeys_the_laws<const D: usize>(belief: &impl Density<D>, seed: u64) {
     let mut rng = Stream::new(seed).rng();
@@ -80,6 +80,42 @@ fn an_estimate_is_its_mixture() {
     assert!(at_centres.iter().zip(&direct).all(|(a, b)| (a - b).abs() < 1e-12));
 }
 
+/// Sums over kernels run in lanes, blocks and pairs: every remainder, against the plain sum.
+#[test]
+fn estimates_of_every_size_are_plain_sums() {
+    for n in [1, 2, 7, 8, 9, 16, 17, 31, 32, 33, 40, 41, 49, 75, 101] {
+        let x: Vec<f64> = (0..n)
+            .map(|i| (1.3 * f64::from(i)).sin() + 0.02 * f64::from(i))
+            .collect();
+        let y: Vec<f64> = (0..n).map(|i| (0.7 * f64::from(i)).cos() * 2.0).collect();
+        let logs: Vec<f64> = (0..n).map(|i| (2.1 * f64::from(i)).sin()).collect();
+        let total: f64 = logs.iter().map(|l| l.exp()).sum();
+        let kernel = Matrix2::new(0.09, 0.02, 0.02, 0.04);
+        let normal = Gaussian::new(Vector2::zeros(), kernel).unwrap().factored().unwrap();
+        let plain = |a: f64, b: f64| {
+            let terms = (0..n as usize)
+                .map(|i| logs[i].exp() / total * normal.log_pdf(&Vector2::new(a - x[i], b - y[i])).exp());
+            terms.sum::<f64>().ln()
+        };
+        let particles = fewbits_densities::Particles::new([x.clone(), y.clone()], &logs).unwrap();
+        let estimate = KernelEstimate::new(particles, kernel).unwrap();
+        let close = |found: f64, exact: f64| assert!((found - exact).abs() < 1e-11, "{n}: {found} {exact}");
+        let at_centres = estimate.log_pdf_at_centres();
+        assert_eq!((at_centres.len(), estimate.len(), estimate.is_empty()), (n as usize, n as usize, false));
+        at_centres
+            .iter()
+            .enumerate()
+            .for_each(|(i, log)| close(*log, plain(x[i], y[i])));
+        let points = [0.3, -0.8, 1.1, 0.0, 0.6];
+        for count in 0..=5 {
+            let mut out = vec![0.0; count];
+            estimate.log_pdf_columns([&points[..count], &points[..count]], &mut out);
+            out.iter().zip(points).for_each(|(log, p)| close(*log, plain(p, p)));
+        }
+        close(estimate.log_pdf(&Vector2::new(0.4, -0.2)), plain(0.4, -0.2));
+    }
+}
+
 #[test]
 fn densities_stay_numbers_everywhere() {
     let mixture = d1().to_mixture().unwrap();
@@ -114,6 +150,86 @@ fn marginals_and_affine_images_have_the_moments_they_must() {
 }
 
 #[test]
+fn components_give_back_what_they_were_made_of() {
+    let covariance = Matrix2::new(2.0, 0.3, 0.3, 0.7);
+    let c = Component::new(1.7, Vector2::new(0.4, -2.0), covariance).unwrap();
+    assert_eq!((c.weight(), *c.mean(), *c.covariance()), (1.7, Vector2::new(0.4, -2.0), covariance));
+    assert_eq!((c.gaussian().mean(), c.gaussian().covariance()), (c.mean(), c.covariance()));
+    assert!((c.cholesky_factor() * c.cholesky_factor().transpose() - covariance).amax() < 1e-15);
+    assert!((c.log_determinant() - (1.4_f64 - 0.09).ln()).abs() < 1e-14);
+    let x = Vector2::new(1.1, -0.8);
+    let exact = Gaussian::new(*c.mean(), covariance)
+        .unwrap()
+        .factored()
+        .unwrap()
+        .log_pdf(&x);
+    assert!((c.log_pdf(&x) - exact).abs() < 1e-13);
+    let single = Mixture::single(&c.gaussian()).unwrap();
+    assert_eq!((single.len(), single.is_empty(), single.components()[0].weight()), (1, false, 1.0));
+    assert_eq!(single.moment_matched(), c.gaussian());
+}
+
+#[test]
+fn responsibilities_are_shares_of_the_density() {
+    let at = |w, x: f64, s: f64| Component::new(w, Vector1::new(x), Matrix1::new(s * s)).unwrap();
+    let belief = Mixture::new(vec![
+        at(0.2, -1.0, 0.5),
+        at(0.0, 0.1, 1.0),
+        at(0.5, 0.3, 2.0),
+        at(0.3, 1.7, 0.4),
+    ])
+    .unwrap();
+    for x in [-1.3, 0.4, 2.9] {
+        let shares = belief.responsibilities(&Vector1::new(x)).unwrap();
+        let normal = |c: &Component<1>| {
+            let v = c.covariance()[0];
+            c.weight() * (-0.5 * (x - c.mean()[0]).powi(2) / v).exp() / (std::f64::consts::TAU * v).sqrt()
+        };
+        let total: f64 = belief.components().iter().map(normal).sum();
+        let exact = belief.components().iter().map(|c| normal(c) / total);
+        assert!(shares.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-14), "{shares:?}");
+        assert!((belief.log_pdf(&Vector1::new(x)) - total.ln()).abs() < 1e-13);
+    }
+    // Far away only the widest is left; where even logarithms end, none.
+    let far = belief.responsibilities(&Vector1::new(1e4)).unwrap();
+    assert_eq!(far, [0.0, 0.0, 1.0, 0.0]);
+    assert_eq!(belief.responsibilities(&Vector1::new(1e200)), None);
+}
+
+/// Systematic draws take `n w` of each where that is a whole number, whatever the offset, and one more or less elsewhere.
+#[test]
+fn systematic_draws_are_shared_out_to_the_last_one() {
+    let mut rng = Stream::new(14).rng();
+    let (weights, n) = ([0.25, 0.0, 0.5, 0.125, 0.125], 40);
+    let lobe = |k: usize| Component::new(weights[k], Vector1::new(100.0 * k as f64), Matrix1::new(1.0)).unwrap();
+    let mixture = Mixture::new((0..5).map(lobe).collect()).unwrap();
+    let particles =
+        fewbits_densities::Particles::new([(0..5).map(|k| 100.0 * f64::from(k)).collect()], &weights.map(f64::ln))
+            .unwrap();
+    let estimate = KernelEstimate::new(particles, Matrix1::new(1.0)).unwrap();
+    let count = |draws: &fewbits_densities::Particles<1>, k: usize| {
+        let near = |x: &&f64| (**x - 100.0 * k as f64).abs() < 10.0;
+        draws.columns()[0].iter().filter(near).count()
+    };
+    for _ in 0..20 {
+        for draws in [
+            mixture.sample_systematic(&mut rng, n).unwrap(),
+            estimate.sample_systematic(&mut rng, n).unwrap(),
+        ] {
+            assert_eq!([0, 1, 2, 3, 4].map(|k| count(&draws, k)), [10, 0, 20, 5, 5]);
+        }
+        for draws in [
+            mixture.sample_systematic(&mut rng, 13).unwrap(),
+            estimate.sample_systematic(&mut rng, 13).unwrap(),
+        ] {
+            let off = |k: usize| (count(&draws, k) as f64 - 13.0 * weights[k]).abs();
+            assert!(draws.len() == 13 && (0..5).all(|k| off(k) < 1.0));
+        }
+    }
+    assert!(mixture.sample_systematic(&mut rng, 0).is_err() && estimate.sample_systematic(&mut rng, 0).is_err());
+}
+
+#[test]
 fn quantiles_invert_the_distribution_function() {
     let mut rng = Stream::new(10).rng();
     for unit in [1e-4, 1.0, 1e4] {
@@ -134,12 +250,42 @@ fn a_region_of_highest_density_covers_what_it_says() {
     let belief = random_mixture::<2, _>(&mut rng, 4, 1.0);
     let region = HighestDensity::new(&mut rng, &belief, 0.8, 20_000).unwrap();
     let n = 20_000;
+    // Outside is what lies below the threshold.
+    assert_eq!(region.level(), 0.8);
+    for _ in 0..100 {
+        let x = belief.sample(&mut rng);
+        assert_eq!(region.contains(&x), belief.log_pdf(&x) >= region.log_threshold());
+    }
+    assert!(
+        HighestDensity::new(&mut rng, &belief, 1.0, 10).is_err()
+            && HighestDensity::new(&mut rng, &belief, 0.5, 0).is_err()
+    );
     let inside = (0..n).filter(|_| region.contains(&belief.sample(&mut rng))).count();
     assert!((inside as f64 / n as f64 - 0.8).abs() < 4.0 * (2.0 * 0.16 / n as f64).sqrt());
     // Of a Gaussian it is the ellipse of the same probability.
     let gaussian = *d1().to_mixture().unwrap().moment_matched().mean();
     let normal = Gaussian::new(gaussian, d1().covariance()).unwrap();
-    for x in ellipse(&normal, 0.5, 16).unwrap() {
+    let outline = ellipse(&normal, 0.5, 16).unwrap();
+    // Evenly spread in whitened coordinates, once around, anticlockwise.
+    let whitener = nalgebra::Cholesky::new(*normal.covariance())
+        .unwrap()
+        .l()
+        .try_inverse()
+        .unwrap();
+    let angle = |x: [f64; 2]| {
+        (whitener * (SVector::from(x) - normal.mean()))
+            .yx()
+            .iter()
+            .copied()
+            .reduce(f64::atan2)
+            .unwrap()
+    };
+    assert_eq!(outline.len(), 16);
+    for k in 0..16 {
+        let turn = (angle(outline[(k + 1) % 16]) - angle(outline[k])).rem_euclid(std::f64::consts::TAU);
+        assert!((turn - std::f64::consts::TAU / 16.0).abs() < 1e-12, "{turn}");
+    }
+    for x in outline {
         let distance = normal.mahalanobis_squared(&SVector::from(x)).unwrap();
         assert!((distance - 2.0 * 2.0_f64.ln()).abs() < 1e-12);
     }

@@ -91,3 +91,71 @@ fn storage_round_trips_and_checks() {
     assert!(serde_json::from_str::<Particles<3>>(&text).is_err());
     assert!(serde_json::from_str::<Particles<1>>(r#"{"columns":[[1.0]],"weights":[0.5,0.5]}"#).is_err());
 }
+
+#[test]
+fn particles_and_clouds_give_back_what_they_were_made_of() {
+    use fewbits_core::{Belief, Gaussian};
+    use fewbits_densities::GaussianCloud;
+    use nalgebra::{Matrix2, Vector2};
+    let (x, y, logs) = (vec![1.0, 4.0, -2.0], vec![0.5, -1.5, 3.0], [0.2, -0.7, 1.1]);
+    let belief = Particles::new([x.clone(), y.clone()], &logs).unwrap();
+    let mut belief = belief.with_side(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
+    assert_eq!((belief.len(), belief.is_empty(), belief.side_width()), (3, false, 2));
+    assert_eq!(
+        (belief.columns(), belief.point(2), belief.point(3)),
+        ([&x[..], &y[..]], Some(Vector2::new(-2.0, 3.0)), None)
+    );
+    let mut same = Particles::uniform([vec![0.0; 5], vec![0.0; 5]]).unwrap();
+    same.clone_from(&belief);
+    assert_eq!(same, belief);
+    assert_eq!((same.weights(), same.effective_sample_size()), (belief.weights(), belief.effective_sample_size()));
+    {
+        let ([_, y], side) = belief.parts_mut();
+        (y[1], side[3]) = (-2.5, 7.0);
+    }
+    belief.columns_mut()[0][0] = 1.5;
+    assert_eq!((belief.columns()[0][0], belief.columns()[1][1], belief.side()[3]), (1.5, -2.5, 7.0));
+    assert_ne!(same, belief);
+    // About another point the covariance gains the outer product of the gap.
+    let gap = Vector2::new(0.3, -1.1);
+    let about = belief.covariance_about(&(belief.mean() + gap)) - belief.covariance();
+    assert!((about - gap * gap.transpose()).amax() < 1e-13);
+    let shared = Matrix2::new(2.0, 0.5, 0.5, 1.0);
+    let mut cloud = GaussianCloud::new(belief.clone(), shared).unwrap();
+    assert_eq!((cloud.means(), cloud.shared_covariance()), (&belief, &shared));
+    assert_eq!((*cloud.gaussian().mean(), Belief::mean(&cloud)), (belief.mean(), belief.mean()));
+    assert!((Belief::covariance(&cloud) - belief.covariance() - shared).amax() < 1e-14);
+    cloud.set_shared_covariance(shared * 3.0);
+    cloud.means_mut().equalise_weights();
+    assert!((Belief::covariance(&cloud) - cloud.means().covariance() - shared * 3.0).amax() < 1e-14);
+    assert_eq!((cloud.means().weights(), cloud.means().effective_sample_size()), (&[1.0 / 3.0; 3][..], 3.0));
+    assert_eq!(cloud.means().log_weights(), [(1.0_f64 / 3.0).ln(); 3]);
+    let agreed = GaussianCloud::agreed(&Gaussian::new(gap, shared).unwrap(), 4).unwrap();
+    assert!((Belief::mean(&agreed) - gap).amax() < 1e-15 && (Belief::covariance(&agreed) - shared).amax() < 1e-15);
+    assert!(agreed.means().len() == 4 && GaussianCloud::agreed(&Gaussian::new(gap, shared).unwrap(), 0).is_err());
+    assert!(Particles::from_belief(&mut fewbits_monte_carlo::Stream::new(1).rng(), &agreed, 0).is_err());
+}
+
+/// What is stored with weights that are not theirs is refused, down to the effective number.
+#[test]
+fn stored_weights_are_checked_against_each_other() {
+    let stored = |more: &str| {
+        let text = format!(r#"{{"columns":[[1.0,2.0,3.0]],"weights":[0.5,0.25,0.25]{more}}}"#);
+        serde_json::from_str::<Particles<1>>(&text)
+    };
+    let logs = [0.5_f64.ln(), 0.25_f64.ln(), 0.25_f64.ln()]
+        .map(|l| l.to_string())
+        .join(",");
+    let good = stored("").unwrap();
+    assert!((good.effective_sample_size() - 8.0 / 3.0).abs() < 1e-14);
+    assert_eq!(stored(&format!(r#","log_weights":[{logs}]"#)).unwrap(), good);
+    assert!(stored(r#","log_weights":[-0.6931471805599453,-1.3862943611198906]"#).is_err());
+    assert!(stored(r#","log_weights":[-0.6931471805599453,null,-1.3862943611198906]"#).is_err());
+    let effective = |n: f64| stored(&format!(r#","effective_sample_size":{n}"#));
+    assert_eq!(effective(8.0 / 3.0).unwrap().effective_sample_size(), 8.0 / 3.0);
+    assert!(effective(2.6667).is_err() && effective(2.6666).is_err() && effective(3.0).is_err());
+    let zero = r#"{"columns":[[1.0,2.0,3.0]],"weights":[0.5,0.0,0.5],"log_weights":[-0.6931471805599453,null,-0.6931471805599453]}"#;
+    let zero: Particles<1> = serde_json::from_str(zero).unwrap();
+    assert_eq!((zero.log_weights()[1], zero.weights()[1], zero.mean()[0]), (f64::NEG_INFINITY, 0.0, 2.0));
+    assert_eq!(serde_json::from_str::<Particles<1>>(&serde_json::to_string(&zero).unwrap()).unwrap(), zero);
+}

@@ -173,6 +173,31 @@ fn gibbs_and_importance_agree_in_the_plane() {
     assert!((resampled.mean() - truth.belief.mean()).amax() < 4.0 * (0.42_f64 / 2000.0).sqrt());
 }
 
+/// Components of one factor with widths of their own, two factors: the labels' law by enumeration.
+#[test]
+fn gibbs_minds_that_components_differ_in_width() {
+    let own = |parts: &[(f64, f64, f64)]| {
+        let parts = parts
+            .iter()
+            .map(|(w, m, v)| Component::new(*w, Vector1::new(*m), Matrix1::new(*v)).unwrap());
+        Mixture::new(parts.collect()).unwrap()
+    };
+    let a = own(&[(0.5, 0.0, 0.04), (0.2, 0.6, 3.0), (0.3, 1.9, 0.3)]);
+    let b = own(&[(0.3, 1.2, 0.1), (0.7, -0.5, 2.0)]);
+    let truth = exact(&[&a, &b]).unwrap().belief;
+    let mut rng = Stream::new(35).rng();
+    let n = 40_000;
+    let draws = gibbs(&mut rng, &[&a, &b], n, 12).unwrap();
+    for x in [-0.3, 0.05, 0.4, 1.0, 1.5, 2.2] {
+        let below = draws.columns()[0].iter().filter(|s| **s < x).count() as f64 / n as f64;
+        assert!((below - truth.cdf(x)).abs() < 4.0 * (0.25 / n as f64).sqrt(), "{x}: {below} {}", truth.cdf(x));
+    }
+    // Components of no weight are never chosen, not even the last.
+    let zero = own(&[(0.0, -50.0, 1.0), (1.0, 0.3, 0.5), (0.0, 50.0, 1.0)]);
+    let draws = gibbs(&mut rng, &[&zero, &b], 2000, 2).unwrap();
+    assert!(draws.columns()[0].iter().all(|x| x.abs() < 10.0));
+}
+
 #[test]
 fn contradictions_and_bad_arguments_are_errors() {
     let mut rng = Stream::new(34).rng();
