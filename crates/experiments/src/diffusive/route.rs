@@ -149,7 +149,7 @@ impl Figure for Trace {
                 (r.step as f64, total)
             })
             .collect();
-        let determinant = Panel::linear("Test", "nodes", "log10 det of the covariance (m^4)");
+        let determinant = Panel::linear("Test", "nodes", "lg det of the covariance (m^4)");
         let sent = Panel::linear("Messages", "nodes", "bytes so far");
         Plot::grid(
             2,

@@ -56,9 +56,6 @@ rows! {
     }
 }
 
-/// Noise ratios in the picture.
-const SHOWN: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
-
 fn loss(a: f64, gamma: f64) -> Option<f64> {
     steady::loss(&Plant { a, gamma }.model().ok()?).ok()
 }
@@ -142,20 +139,20 @@ impl Figure for Loss {
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let (x, y) = (Axis::log("gamma = process / measurement variance"), Axis::linear("plant coefficient a"));
-        let mut panel = Panel::new(
-            "Loss: steady variance over the Kalman filter's",
-            x.between(*SHOWN.start(), *SHOWN.end()),
-            y.between(0.0, 1.0),
-        );
-        // Contours that leave the picture would pile up at its edge.
+        let mut panel =
+            Panel::new("Loss: steady variance over the Kalman filter's", x.between(1e-3, 10.0), y.between(0.0, 1.0));
         let curve = |kind: &str, level: f64| {
-            let shown = |c: &&Contour| c.kind == kind && c.level == level && SHOWN.contains(&c.gamma);
+            let shown = |c: &&Contour| c.kind == kind && c.level == level;
             points(rows.contours.iter().filter(shown), |c| (c.gamma, c.a))
         };
         for (i, &level) in p.level.iter().enumerate() {
-            panel = panel.with(Layer::line(level.to_string(), curve("riccati", level)).coloured(i));
+            panel = panel.with(
+                Layer::line(level.to_string(), curve("riccati", level))
+                    .coloured(i)
+                    .inline(),
+            );
         }
-        panel = panel.with(Layer::dashed("2, exact", curve("exact", 2.0)).coloured(p.level.len()));
+        panel = panel.with(Layer::dashed("2, by the exact error", curve("exact", 2.0)).coloured(p.level.len()));
         Plot::of(panel)
     }
 }
