@@ -266,8 +266,8 @@ impl Layer {
         )
     }
 
-    /// An unbroken black line: the truth that is estimated.
-    pub fn truth(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+    /// A black line without the dashes that tell schemes apart: the truth that is estimated, edges.
+    pub fn unbroken(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         let stroke = Stroke::Unbroken;
         Self::new(label, Shape::Line { points, stroke }).coloured(6)
     }

@@ -380,12 +380,12 @@ impl Figure for Beyond {
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let all = || (0..).map(|i: i32| f64::from(-i)).zip(&rows.changes);
         let bars = all().map(|(at, r)| (r.change_percent.min(0.0), 0.0, at - 0.35, at + 0.35));
-        let numbers = all().map(|(at, r)| (r.change_percent - 10.0, at, format!("{:.1}", r.change_percent)));
+        let numbers = all().map(|(at, r)| (r.change_percent - 14.0, at, format!("{:.1}", r.change_percent)));
         let names = rows.changes.iter().map(|r| format!("{}: {}", r.idea, r.case));
         Plot::of(
             Panel::new(
                 "Change of the mean squared error",
-                Axis::linear("change / %").between(-115.0, 2.0),
+                Axis::linear("change / %").between(-132.0, 2.0),
                 Axis::ladder(names),
             )
             .with(Layer::boxes("", bars.collect()).coloured(0))

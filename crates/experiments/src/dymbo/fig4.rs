@@ -146,11 +146,12 @@ impl Figure for Loss {
             points(rows.contours.iter().filter(shown), |c| (c.gamma, c.a))
         };
         for (i, &level) in p.level.iter().enumerate() {
-            panel = panel.with(
-                Layer::line(level.to_string(), curve("riccati", level))
-                    .coloured(i)
-                    .inline(),
-            );
+            let mut line = curve("riccati", level);
+            // The table is too coarse for a contour that comes near a = 1 without reaching it.
+            let last = line.last().map_or(1.0, |(_, a)| *a);
+            let near_one = (1..12).map(|k| 1.0 - 0.01 * 0.5_f64.powi(k)).filter(|a| *a > last);
+            line.extend(near_one.filter_map(|a| Some((steady::noise_ratio_at_loss(level, a).ok()??, a))));
+            panel = panel.with(Layer::line(level.to_string(), line).coloured(i).inline());
         }
         panel = panel.with(Layer::dashed("2, by the exact error", curve("exact", 2.0)).coloured(p.level.len()));
         Plot::of(panel)

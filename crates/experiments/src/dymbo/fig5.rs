@@ -303,7 +303,7 @@ impl Figure for Convergence {
             let title = format!("One run, gamma = {}", path[0].plant.gamma);
             panels.push(
                 Panel::linear(title, "step n", "state / sigma")
-                    .with(Layer::truth("state", line(|r| r.theta)))
+                    .with(Layer::unbroken("state", line(|r| r.theta)))
                     .with(Layer::dashed("Kalman", line(|r| r.kf)).coloured(0))
                     .with(Layer::line("sign bit", line(|r| r.dymbo)).coloured(1)),
             );

@@ -155,7 +155,7 @@ impl Figure for Rate {
         let of = |size: usize| select(rows, move |r| r.message == "coded" && r.size == size);
         let all = |message: &'static str| select(rows, move |r| r.message == message);
         let layers = p.components.iter().enumerate().flat_map(|(i, m)| {
-            Layer::curve(format!("coded, {m} components"), i, of(*m).into_iter().map(place).collect())
+            Layer::curve(format!("coded, {m} components"), i, of(*m).map(place).collect())
         });
         let panel = Panel::loglog("One belief", "message / bit", "KL / nat")
             .with_all(layers)

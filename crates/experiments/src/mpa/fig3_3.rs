@@ -121,7 +121,7 @@ impl Figure for Fig33 {
             Axis::linear("x / m").between(0.0, 20.0),
             Axis::linear("y / m").between(0.0, 20.0),
         )
-        .with(Layer::truth("truth", truth))
+        .with(Layer::unbroken("truth", truth))
         .with_all(names.iter().enumerate().map(line))
         .with(Layer::points("sensors", sensors).coloured(8));
         Plot::of(panel)

@@ -213,7 +213,7 @@ impl Figure for Frontier {
                 }
                 let mut frontier = points(here().filter(|r| best(r) == "yes"), |r| (of(r), r.rmse.value));
                 frontier.sort_by(|a, b| a.0.total_cmp(&b.0));
-                panels.push(panel.with(Layer::truth("nothing beats these", frontier)));
+                panels.push(panel.with(Layer::unbroken("nothing beats these", frontier)));
             }
         }
         Plot::grid(2, panels)

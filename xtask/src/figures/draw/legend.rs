@@ -207,6 +207,6 @@ pub(super) fn colour_bar(
         area.draw(&words).map_err(|e| e.to_string())?;
     }
     let style = text(TICK).pos(Pos::new(HPos::Right, VPos::Center));
-    let words = Text::new(label.to_owned(), (width as i32 - 30, top - 60), style);
+    let words = Text::new(label.to_owned(), (width as i32 - 30, top - 76), style);
     area.draw(&words).map_err(|e| e.to_string())
 }

@@ -49,7 +49,7 @@ pub fn to_svg(id: &str, plot: &Plot) -> Result<String, Error> {
     let heights: Vec<(i32, i32)> = rows
         .iter()
         .zip(&legends)
-        .map(|(row, legend)| (panels(row), legend::height(legend) + 60))
+        .map(|(row, legend)| (panels(row), legend::height(legend) + 70))
         .collect();
     let mut svg = String::new();
     {
@@ -65,7 +65,7 @@ pub fn to_svg(id: &str, plot: &Plot) -> Result<String, Error> {
                     let place = root.clone().shrink((left, top), (PANEL_WIDTH, *panels as u32));
                     draw_panel(&root, &place, panel, plot)?;
                 }
-                legend::draw(&root, legend, top + panels)?;
+                legend::draw(&root, legend, top + panels + 24)?;
                 top += panels + below;
             }
             root.present().map_err(why)
@@ -171,7 +171,7 @@ fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> R
     below_names.draw_below(&frame)?;
     left_names.draw_left(&frame)?;
     let (start, _) = area.get_base_pixel();
-    let half = (0.5 * wide(&panel.title, TITLE)).min(0.5 * f64::from(width));
+    let half = (0.5 * wide(&panel.title, TITLE) + 40.0).min(0.5 * f64::from(width));
     let (first, last) = (f64::from(start) + half, f64::from(start + width as i32) - half);
     let middle = (0.5 * (left + right)).clamp(first, last.max(first)) as i32;
     let style = text(TITLE).pos(Pos::new(HPos::Center, VPos::Center));

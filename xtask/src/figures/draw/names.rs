@@ -75,10 +75,17 @@ fn column(frame: &Frame<'_, '_>, lines: &[String], (x, y): (i32, i32), anchor: P
     Ok(())
 }
 
-/// A name cut between words so that lines fit the room if their words do.
+/// A name cut after commas, or between words where that leaves too much, so that lines fit the room if their words do.
 fn lines(name: &str, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in name.split_whitespace() {
+    let parts = || name.split_inclusive(", ").map(str::trim);
+    let fit = parts().all(|part| wide(part, TICK) <= room);
+    let words: Vec<&str> = if fit {
+        parts().collect()
+    } else {
+        name.split_whitespace().collect()
+    };
+    for word in words {
         match lines.last_mut() {
             Some(line) if wide(&format!("{line} {word}"), TICK) <= room => {
                 line.push(' ');
@@ -97,6 +104,7 @@ mod tests {
     #[test]
     fn names_are_cut_between_words() {
         assert_eq!(lines("a = 0.9, γ = 0.5", 400.0), ["a = 0.9,", "γ = 0.5"]);
+        assert_eq!(lines("one two, three", 250.0), ["one", "two,", "three"]);
         assert_eq!(lines("unbreakable", 1.0), ["unbreakable"]);
         assert!(lines("", 100.0).is_empty());
     }
