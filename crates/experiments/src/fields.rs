@@ -82,3 +82,17 @@ macro_rules! rows {
         }
     )*};
 }
+
+/// What stands at the head of a [`Figure`](crate::Figure): its parameters and tables, its id, its title, where in the
+/// publications it comes from, and its caption.
+///
+/// `figure!(Parameters => Vec<Row>, "demo-fig1", "Averages", "the paper, figure 1", "What it shows.");`
+#[macro_export]
+macro_rules! figure {
+    ($parameters:ty => $tables:ty, $id:expr, $title:literal, $source:literal, $caption:literal) => {
+        type Parameters = $parameters;
+        type Tables = $tables;
+
+        const ABOUT: $crate::About = $crate::About::of($id, $title, $source).showing($caption);
+    };
+}

@@ -26,6 +26,24 @@ pub struct About {
     pub source: &'static str,
 }
 
+impl About {
+    /// A figure's id, its title, and where in the publications it comes from.
+    pub const fn of(id: &'static str, title: &'static str, source: &'static str) -> Self {
+        Self {
+            id,
+            title,
+            caption: "",
+            source,
+        }
+    }
+
+    /// With this caption.
+    #[must_use]
+    pub const fn showing(self, caption: &'static str) -> Self {
+        Self { caption, ..self }
+    }
+}
+
 /// Reads a text file of the user's by its name.
 pub type ReadFile<'a> = dyn Fn(&str) -> std::io::Result<String> + Sync + 'a;
 
@@ -134,12 +152,7 @@ pub trait Figure: Sync {
     type Tables: Serialize + JsonSchema;
 
     /// What stands above the figure, unless [`Figure::about`] says so of each value of the type.
-    const ABOUT: About = About {
-        id: "",
-        title: "",
-        caption: "",
-        source: "",
-    };
+    const ABOUT: About = About::of("", "", "");
 
     /// What stands above the figure.
     fn about(&self) -> About {

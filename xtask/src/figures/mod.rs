@@ -379,12 +379,7 @@ mod tests {
 
     impl AnyFigure for Panics {
         fn about(&self) -> About {
-            About {
-                id: "demo-fig1",
-                title: "",
-                caption: "",
-                source: "",
-            }
+            About::of("demo-fig1", "", "")
         }
         fn measures_time(&self) -> bool {
             false

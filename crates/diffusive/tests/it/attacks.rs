@@ -7,8 +7,7 @@ use fewbits_densities::laplace::Peak;
 use fewbits_densities::{CellOptions, Cells, Clumps, Component, Lpg, MixtureFit};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{
-    Form, Posterior, Prior, RateModel, RateRange, RateSums, Rule, Search, SearchBox, SourceLikelihood, SourceSensor,
-    Status,
+    Form, Posterior, Prior, RateModel, RateRange, RateSums, Search, SearchBox, SourceLikelihood, SourceSensor, Status,
 };
 use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_topology::{Deployment, Graph};

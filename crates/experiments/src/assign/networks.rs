@@ -188,17 +188,10 @@ parameters! { self #[derive(Validate)]
 }
 
 impl Figure for Spread {
-    type Parameters = SpreadParameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "assign-fig6-3",
-        title: "Error against the spread of the noise variances",
-        caption: "Random networks of four sensors with mean noise variance 0.03. The more the sensors differ, the more a good assignment \
-                      gains; an arbitrary one gains nearly nothing. For the posterior mean the linear assignment is not quite right, and a few \
-                      exchanges of two sensors mend it.",
-        source: "Movaghati, thesis, figure 6.3",
-    };
+    figure!(SpreadParameters => Vec<Row>, "assign-fig6-3", "Error against the spread of the noise variances", "Movaghati, thesis, figure 6.3",
+        "Random networks of four sensors with mean noise variance 0.03. The more the sensors differ, the more a good assignment \
+         gains; an arbitrary one gains nearly nothing. For the posterior mean the linear assignment is not quite right, and a few \
+         exchanges of two sensors mend it.");
 
     fn run(&self, p: &SpreadParameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let points: Vec<_> = p.sds.iter().map(|&sd| (sd, p.mean, sd)).collect();
@@ -250,17 +243,10 @@ parameters! { self #[derive(Validate)]
 }
 
 impl Figure for Mean {
-    type Parameters = MeanParameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "assign-fig6-4",
-        title: "Error against the mean of the noise variances",
-        caption: "Random networks of four sensors whose noise variances have standard deviation 0.015. As the noise grows the cost \
-                      approximation, which counts single wrong bits only, loses its edge: at a mean of 0.1 giving the best sensor the \
-                      coarsest bit is slightly better.",
-        source: "Movaghati, thesis, figure 6.4",
-    };
+    figure!(MeanParameters => Vec<Row>, "assign-fig6-4", "Error against the mean of the noise variances", "Movaghati, thesis, figure 6.4",
+        "Random networks of four sensors whose noise variances have standard deviation 0.015. As the noise grows the cost \
+         approximation, which counts single wrong bits only, loses its edge: at a mean of 0.1 giving the best sensor the \
+         coarsest bit is slightly better.");
 
     fn run(&self, p: &MeanParameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let points: Vec<_> = p.means.iter().map(|&mean| (mean, mean, p.sd)).collect();

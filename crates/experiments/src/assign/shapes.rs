@@ -63,16 +63,9 @@ rows! {
 }
 
 impl Figure for Landings {
-    type Parameters = LandingParameters;
-    type Tables = Landed;
-
-    const ABOUT: About = About {
-        id: "assign-fig6-1",
-        title: "Where a wrong bit lands",
-        caption: "The estimate f_b(x) of the centre decoder when bit b of a four-bit Gray code is wrong and the others are right. A wrong \
-                      coarse bit mirrors the estimate across the whole range, a wrong fine bit only within a small block.",
-        source: "Movaghati, thesis, figure 6.1",
-    };
+    figure!(LandingParameters => Landed, "assign-fig6-1", "Where a wrong bit lands", "Movaghati, thesis, figure 6.1",
+        "The estimate f_b(x) of the centre decoder when bit b of a four-bit Gray code is wrong and the others are right. A wrong \
+         coarse bit mirrors the estimate across the whole range, a wrong fine bit only within a small block.");
 
     fn run(&self, p: &LandingParameters, _: &Context<'_>) -> Result<Landed, Error> {
         let centres = (0..16).map(|c| (2.0 * f64::from(c) + 1.0) / 16.0 - 1.0);
@@ -147,17 +140,10 @@ impl Wrong {
 }
 
 impl Figure for BitErrors {
-    type Parameters = ErrorParameters;
-    type Tables = Vec<Wrong>;
-
-    const ABOUT: About = About {
-        id: "assign-figC-1",
-        title: "Probability that a bit is wrong",
-        caption: "For each bit of a four-bit Gray code, the probability that noise turns it: one half at the bit's own edges, \
-                      except where noise reaches across further ones, and for the finest bit hardly less between them. The thesis \
-                      calls the variance sigma.",
-        source: "Movaghati, thesis, figure C.1",
-    };
+    figure!(ErrorParameters => Vec<Wrong>, "assign-figC-1", "Probability that a bit is wrong", "Movaghati, thesis, figure C.1",
+        "For each bit of a four-bit Gray code, the probability that noise turns it: one half at the bit's own edges, \
+         except where noise reaches across further ones, and for the finest bit hardly less between them. The thesis \
+         calls the variance sigma.");
 
     fn run(&self, p: &ErrorParameters, _: &Context<'_>) -> Result<Vec<Wrong>, Error> {
         let sensors = CodedSensors::with_variances(1.0, &[p.variance; BITS])?;

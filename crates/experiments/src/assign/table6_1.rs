@@ -114,17 +114,10 @@ fn find<'a>(rows: &'a [Row], name: &str) -> Option<&'a Row> {
 }
 
 impl Figure for Table {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "assign-table6-1",
-        title: "Three assignments of eight Gray bits to eight sensors",
-        caption: "The optimum of the linear assignment problem gives middling sensors the coarse bits and keeps the noisy ones for the fine \
-                      bits, which are lost anyway; it is the exact optimum of the centre decoder among all 40 320. The row of the thesis headed \
-                      sigma holds variances. The posterior mean of the same bits has a fifth less error.",
-        source: "Movaghati, thesis, table 6.1",
-    };
+    figure!(Parameters => Rows, "assign-table6-1", "Three assignments of eight Gray bits to eight sensors", "Movaghati, thesis, table 6.1",
+        "The optimum of the linear assignment problem gives middling sensors the coarse bits and keeps the noisy ones for the fine \
+         bits, which are lost anyway; it is the exact optimum of the centre decoder among all 40 320. The row of the thesis headed \
+         sigma holds variances. The posterior mean of the same bits has a fifth less error.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         Ok(tables(&p.variances)?)

@@ -315,17 +315,10 @@ fn jobs(thorough: bool) -> Result<Vec<Job>, Error> {
 }
 
 impl Figure for Beyond {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "binary-beyond",
-        title: "Beyond the thesis",
-        caption: "Exact errors before and after each change: no rank constraint, finer grids, any pattern, thresholds off the grid, joint \
-                      choice of patterns for unequal sensors, the posterior mean instead of the cell's centre, better adaptive \
-                      thresholds. The table `designs` has masks and thresholds, and where the search for them began.",
-        source: "",
-    };
+    figure!(Parameters => Rows, "binary-beyond", "Beyond the thesis", "",
+        "Exact errors before and after each change: no rank constraint, finer grids, any pattern, thresholds off the grid, joint \
+         choice of patterns for unequal sensors, the posterior mean instead of the cell's centre, better adaptive \
+         thresholds. The table `designs` has masks and thresholds, and where the search for them began.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let found = jobs(p.thorough)?

@@ -85,17 +85,10 @@ rows! {
 }
 
 impl Figure for PrintedBounds {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "binary-fig5-6",
-        title: "The printed Cramer-Rao formula for fixed, natural and Gray patterns",
-        caption: "Left: equation 5.13 prefers a fixed threshold at low, Gray patterns at medium and natural patterns at high \
-                      signal-to-noise ratio. Right: the exact errors of the same sets. At high ratios Gray patterns are better throughout: the \
-                      formula averages information and does not see that natural bits fail together.",
-        source: "Movaghati, thesis, figure 5.6",
-    };
+    figure!(Parameters => Rows, "binary-fig5-6", "The printed Cramer-Rao formula for fixed, natural and Gray patterns", "Movaghati, thesis, figure 5.6",
+        "Left: equation 5.13 prefers a fixed threshold at low, Gray patterns at medium and natural patterns at high \
+         signal-to-noise ratio. Right: the exact errors of the same sets. At high ratios Gray patterns are better throughout: the \
+         formula averages information and does not see that natural bits fail together.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let (mut sets, mut crossings) = (Vec::new(), Vec::new());

@@ -106,18 +106,11 @@ fn tightness(snr_db: f64) -> Result<Tightness, Error> {
 }
 
 impl Figure for Decoders {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "binary-fig5-8",
-        title: "Decoders and bounds, three Gray bits",
-        caption: "The caption of the thesis says Gaussian, the text uniform: both are here. The posterior mean is best everywhere. The \
-                      continuous maximum a posteriori (MAP) decoder is worse than the discrete one for a uniform source, and better only \
-                      up to 13 dB for a Gaussian one. Equation 5.13 is no bound for a uniform source; the optimal-weight van Trees \
-                      bound is one, and tight.",
-        source: "Movaghati, thesis, figure 5.8",
-    };
+    figure!(Parameters => Rows, "binary-fig5-8", "Decoders and bounds, three Gray bits", "Movaghati, thesis, figure 5.8",
+        "The caption of the thesis says Gaussian, the text uniform: both are here. The posterior mean is best everywhere. The \
+         continuous maximum a posteriori (MAP) decoder is worse than the discrete one for a uniform source, and better only \
+         up to 13 dB for a Gaussian one. Equation 5.13 is no bound for a uniform source; the optimal-weight van Trees \
+         bound is one, and tight.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);

@@ -108,17 +108,10 @@ fn row(p: &Parameters, snr_db: f64) -> Result<Row, Error> {
 }
 
 impl Figure for Feedback {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "binary-fig5-10",
-        title: "Ten sensors against schemes with thresholds and with feedback",
-        caption: "Linear patterns of the best resolution beat the relaxed multi-threshold bound from 5 dB on, and the adaptive variable-step \
-                      scheme (AQ-VS) from 20 dB on. The adaptive maximum-likelihood scheme (AQ-ML), which needs feedback, is better \
-                      than they are at every ratio from 5 to 40 dB: the thesis's claim is not reproduced.",
-        source: "Movaghati, thesis, figure 5.10",
-    };
+    figure!(Parameters => Vec<Row>, "binary-fig5-10", "Ten sensors against schemes with thresholds and with feedback", "Movaghati, thesis, figure 5.10",
+        "Linear patterns of the best resolution beat the relaxed multi-threshold bound from 5 dB on, and the adaptive variable-step \
+         scheme (AQ-VS) from 20 dB on. The adaptive maximum-likelihood scheme (AQ-ML), which needs feedback, is better \
+         than they are at every ratio from 5 to 40 dB: the thesis's claim is not reproduced.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);
@@ -132,7 +125,7 @@ impl Figure for Feedback {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let from = |low: f64| select(&rows, move |r| (low - 1e-9..=40.0 + 1e-9).contains(&r.snr_db));
+        let from = |low: f64| select(rows, move |r| (low - 1e-9..=40.0 + 1e-9).contains(&r.snr_db));
         let what = "patterns of the best resolution are below the relaxed multi-threshold bound from 5 to 40 dB";
         claims.all("ribeiro", what, from(5.0), |r| r.lbqp_best < r.ribeiro_relaxed);
         let what = "and below AQ-VS (step V/2, factor 1.5) from 20 dB on";

@@ -55,16 +55,9 @@ rows! {
 }
 
 impl Figure for GaussianSource {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "binary-fig5-9",
-        title: "Gaussian source, three sensors of three bits",
-        caption: "The best basis against Gray and natural patterns, the printed distortion-rate function of one observation and the \
-                      correct one of three. The printed one is no bound: three identical sign bits fall below it at low ratios.",
-        source: "Movaghati, thesis, figure 5.9",
-    };
+    figure!(Parameters => Rows, "binary-fig5-9", "Gaussian source, three sensors of three bits", "Movaghati, thesis, figure 5.9",
+        "The best basis against Gray and natural patterns, the printed distortion-rate function of one observation and the \
+         correct one of three. The printed one is no bound: three identical sign bits fall below it at low ratios.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);

@@ -134,17 +134,10 @@ fn tiling() -> Result<Vec<Tiling>, Error> {
 }
 
 impl Figure for Optimum {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "binary-fig5-7",
-        title: "Best linear patterns, three bits",
-        caption: "Exact optimum over all sets of linear patterns, without the rank constraint, with the Gray basis forced (strategy 1), \
-                      filled up by the printed Cramer-Rao formula (strategies 1 and 3), and Luo's allocation. With more sensors than bits the \
-                      error is not monotone: some noise helps, as dither does.",
-        source: "Movaghati, thesis, figure 5.7",
-    };
+    figure!(Parameters => Rows, "binary-fig5-7", "Best linear patterns, three bits", "Movaghati, thesis, figure 5.7",
+        "Exact optimum over all sets of linear patterns, without the rank constraint, with the Gray basis forced (strategy 1), \
+         filled up by the printed Cramer-Rao formula (strategies 1 and 3), and Luo's allocation. With more sensors than bits the \
+         error is not monotone: some noise helps, as dither does.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let ratios = sweep(p.from_db, p.to_db, p.step_db);

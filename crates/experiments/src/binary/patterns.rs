@@ -54,16 +54,9 @@ rows! {
 }
 
 impl Figure for Clipping {
-    type Parameters = ClippingParameters;
-    type Tables = Clipped;
-
-    const ABOUT: About = About {
-        id: "binary-fig5-2",
-        title: "Cells of the measurement axis and the clipping rule",
-        caption: "The axis is cut into 2^B cells; measurements beyond [-V, V] fall into the nearest outer cell. The thesis prints \
-                      the two sides of this rule swapped (dashed); taken literally that ruins the best eight patterns.",
-        source: "Movaghati, thesis, section 5.2",
-    };
+    figure!(ClippingParameters => Clipped, "binary-fig5-2", "Cells of the measurement axis and the clipping rule", "Movaghati, thesis, section 5.2",
+        "The axis is cut into 2^B cells; measurements beyond [-V, V] fall into the nearest outer cell. The thesis prints \
+         the two sides of this rule swapped (dashed); taken literally that ruins the best eight patterns.");
 
     fn run(&self, p: &ClippingParameters, _: &Context<'_>) -> Result<Clipped, Error> {
         let grid = Grid::uniform(1.0, p.bits)?;
@@ -218,15 +211,8 @@ fn numbered(kind: &str, masks: Vec<Mask>) -> impl Iterator<Item = (String, Mask)
 pub struct Natural;
 
 impl Figure for Natural {
-    type Parameters = BitsParameters;
-    type Tables = Vec<Bit>;
-
-    const ABOUT: About = About {
-        id: "binary-fig5-3",
-        title: "Natural patterns",
-        caption: "The binary digits of the cell's index, most significant first. The finest of them changes at every edge.",
-        source: "Movaghati, thesis, figure 5.3",
-    };
+    figure!(BitsParameters => Vec<Bit>, "binary-fig5-3", "Natural patterns", "Movaghati, thesis, figure 5.3",
+        "The binary digits of the cell's index, most significant first. The finest of them changes at every edge.");
 
     fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
         bits_of(numbered("N", natural_basis(p.bits)?), p.bits)
@@ -250,16 +236,9 @@ impl Figure for Natural {
 pub struct Gray;
 
 impl Figure for Gray {
-    type Parameters = BitsParameters;
-    type Tables = Vec<Bit>;
-
-    const ABOUT: About = About {
-        id: "binary-fig5-4",
-        title: "Gray patterns",
-        caption: "XORs of neighbouring natural patterns. Every edge belongs to exactly one pattern, so that a measurement near an edge \
-                      endangers one bit only.",
-        source: "Movaghati, thesis, figure 5.4",
-    };
+    figure!(BitsParameters => Vec<Bit>, "binary-fig5-4", "Gray patterns", "Movaghati, thesis, figure 5.4",
+        "XORs of neighbouring natural patterns. Every edge belongs to exactly one pattern, so that a measurement near an edge \
+         endangers one bit only.");
 
     fn run(&self, p: &BitsParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
         bits_of(numbered("G", gray_basis(p.bits)?), p.bits)
@@ -300,16 +279,9 @@ parameters! { self #[derive(Validate)]
 }
 
 impl Figure for Extra {
-    type Parameters = ExtraParameters;
-    type Tables = Vec<Bit>;
-
-    const ABOUT: About = About {
-        id: "binary-fig5-5",
-        title: "Further linear patterns",
-        caption: "With more sensors than bits, further XORs of the natural patterns join the Gray basis: columns 5 to 7 of the \
-                      thesis's generator matrix (5.6).",
-        source: "Movaghati, thesis, figure 5.5 and equation 5.6",
-    };
+    figure!(ExtraParameters => Vec<Bit>, "binary-fig5-5", "Further linear patterns", "Movaghati, thesis, figure 5.5 and equation 5.6",
+        "With more sensors than bits, further XORs of the natural patterns join the Gray basis: columns 5 to 7 of the \
+         thesis's generator matrix (5.6).");
 
     fn run(&self, p: &ExtraParameters, _: &Context<'_>) -> Result<Vec<Bit>, Error> {
         bits_of(p.extra.iter().map(|&mask| (format!("mask {mask}"), mask)), p.bits)
@@ -364,16 +336,9 @@ rows! {
 }
 
 impl Figure for Response {
-    type Parameters = ResponseParameters;
-    type Tables = Vec<Answer>;
-
-    const ABOUT: About = About {
-        id: "binary-figB-1",
-        title: "Probability of a 1 under a pattern with four edges",
-        caption: "Noise rounds the pattern off; a run of cells narrower than about two standard deviations never reaches certainty. The \
-                      derivative of this curve over its standard deviation is the information in the bit.",
-        source: "Movaghati, thesis, figure B.1",
-    };
+    figure!(ResponseParameters => Vec<Answer>, "binary-figB-1", "Probability of a 1 under a pattern with four edges", "Movaghati, thesis, figure B.1",
+        "Noise rounds the pattern off; a run of cells narrower than about two standard deviations never reaches certainty. The \
+         derivative of this curve over its standard deviation is the information in the bit.");
 
     fn run(&self, p: &ResponseParameters, _: &Context<'_>) -> Result<Vec<Answer>, Error> {
         let quantizer = BinaryQuantizer::new(p.thresholds.clone())?;

@@ -77,16 +77,9 @@ rows! {
 }
 
 impl Figure for Table {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "binary-table5-1",
-        title: "Printed and optimal patterns of eight sensors",
-        caption: "The printed set is 25 places from the best of 2702 under the posterior mean it is said to be optimal for, and 11 % worse. \
-                      It fits a search under the discrete maximum a posteriori decoder, where it is fourth.",
-        source: "Movaghati, thesis, table 5.1",
-    };
+    figure!(Parameters => Rows, "binary-table5-1", "Printed and optimal patterns of eight sensors", "Movaghati, thesis, table 5.1",
+        "The printed set is 25 places from the best of 2702 under the posterior mean it is said to be optimal for, and 11 % worse. \
+         It fits a search under the discrete maximum a posteriori decoder, where it is fourth.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let scene = Scene::uniform(BITS, p.snr_db)?;

@@ -120,16 +120,9 @@ fn over_gray(snr_db: f64, printed: &[Pattern]) -> Result<OverGray, Error> {
 }
 
 impl Figure for Table {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "binary-table5-2",
-        title: "Printed and best patterns, Gaussian source",
-        caption: "The printed triple has nearly the error of knowing nothing, and its second pattern is not linear: a misprint. The best \
-                      basis is half a per cent better than Gray at this ratio; without the rank constraint a quarter is gained.",
-        source: "Movaghati, thesis, table 5.2",
-    };
+    figure!(Parameters => Rows, "binary-table5-2", "Printed and best patterns, Gaussian source", "Movaghati, thesis, table 5.2",
+        "The printed triple has nearly the error of knowing nothing, and its second pattern is not linear: a misprint. The best \
+         basis is half a per cent better than Gray at this ratio; without the rank constraint a quarter is gained.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let scene = Scene::gaussian(p.snr_db)?;

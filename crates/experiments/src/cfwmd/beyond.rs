@@ -27,13 +27,9 @@ impl Case for Lossy {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-lossy",
-        title: "Censored or lost?",
-        caption: "Nothing arrived: the sensor was silent, or its message was lost. A fusion centre that takes loss for silence believes too \
-                  much; one that weighs both loses far less.",
-        source: "",
-    };
+    const ABOUT: About = About::of("cfwmd-lossy", "Censored or lost?", "");
+    const CAPTION: &str = "Nothing arrived: the sensor was silent, or its message was lost. A fusion centre that takes loss for silence believes too \
+        much; one that weighs both loses far less.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[(MODELLED, IGNORED)];
 
     fn setting() -> Linear {
@@ -132,13 +128,9 @@ impl Case for Scheduled {
     type Main = Step;
     type Further = Bounds;
 
-    const ABOUT: About = About {
-        id: "cfwmd-scheduled",
-        title: "The rate of covariance feedback without the feedback",
-        caption: "A schedule of innovation variances, simulated once before deployment, meets the message budget and the error of covariance \
-                  feedback (CFwMD2) without sending a covariance. Thin: optimistic bounds for any filter that receives these messages.",
-        source: "",
-    };
+    const ABOUT: About = About::of("cfwmd-scheduled", "The rate of covariance feedback without the feedback", "");
+    const CAPTION: &str = "A schedule of innovation variances, simulated once before deployment, meets the message budget and the error of covariance \
+        feedback (CFwMD2) without sending a covariance. Thin: optimistic bounds for any filter that receives these messages.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("scheduled", "CFwMD2"), ("scheduled", "CFwMD")];
 
     fn setting() -> Linear {
@@ -291,13 +283,9 @@ impl Case for Cost {
     type Main = Step;
     type Further = Times;
 
-    const ABOUT: About = About {
-        id: "cfwmd-cost",
-        title: "Error against cost",
-        caption: "The Gaussian belief with exact moments (ADF) is as accurate as a thousand particles (PF) at a small fraction of the time; \
-                  thirty Rao-Blackwellised particles (RBPF) are on a par. Times are per step of fusion, draws of the experiment excluded.",
-        source: "",
-    };
+    const ABOUT: About = About::of("cfwmd-cost", "Error against cost", "");
+    const CAPTION: &str = "The Gaussian belief with exact moments (ADF) is as accurate as a thousand particles (PF) at a small fraction of the time; \
+        thirty Rao-Blackwellised particles (RBPF) are on a par. Times are per step of fusion, draws of the experiment excluded.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("PF 1000", "ADF"), ("RBPF 30", "ADF"), ("ADF", "PF 100")];
     const MEASURES_TIME: bool = true;
 

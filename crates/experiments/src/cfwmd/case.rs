@@ -15,6 +15,7 @@ pub(super) trait Case: Sync + 'static {
     type Further: Further<Self::Setting>;
 
     const ABOUT: About;
+    const CAPTION: &'static str;
     /// Schemes that are compared trial by trial, wherever both ran.
     const PAIRS: &'static [(&'static str, &'static str)];
     /// Quantities with independent references.
@@ -98,7 +99,7 @@ impl<C: Case> Figure for Simulated<C> {
     type Tables = Rows<C::Main, C::Further>;
 
     fn about(&self) -> About {
-        C::ABOUT
+        C::ABOUT.showing(C::CAPTION)
     }
 
     fn cost(&self, parameters: &Preset<C>) -> Cost {

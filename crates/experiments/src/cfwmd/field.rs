@@ -49,16 +49,9 @@ rows! {
 }
 
 impl Figure for Fig7 {
-    type Parameters = Shown;
-    type Tables = Map;
-
-    const ABOUT: About = About {
-        id: "cfwmd-fig7",
-        title: "Sensors and target",
-        caption: "Nine sensors of received power on a grid, and one trajectory. The target starts beside a corner sensor and leaves the \
-                      grid after about ten steps.",
-        source: "CFwMD paper, figure 7",
-    };
+    figure!(Shown => Map, "cfwmd-fig7", "Sensors and target", "CFwMD paper, figure 7",
+        "Nine sensors of received power on a grid, and one trajectory. The target starts beside a corner sensor and leaves the \
+         grid after about ten steps.");
 
     fn run(&self, shown: &Shown, context: &Context<'_>) -> Result<Map, Error> {
         let world = World::new(&Field::new(&[2.0]))?;
@@ -100,13 +93,9 @@ impl Case for Fig8 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig8",
-        title: "Received power, two messages a step",
-        caption: "Time-averaged, the order is that of the linear case. Not at every step: at first the truth sits exactly on the prior mean, so \
-                  that a filter that receives little is right by construction. Errors rise when the target leaves the grid.",
-        source: "CFwMD paper, figure 8",
-    };
+    const ABOUT: About = About::of("cfwmd-fig8", "Received power, two messages a step", "CFwMD paper, figure 8");
+    const CAPTION: &str = "Time-averaged, the order is that of the linear case. Not at every step: at first the truth sits exactly on the prior mean, so \
+        that a filter that receives little is right by construction. Errors rise when the target leaves the grid.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("all", "CFwMD"), ("CFwMD", "CFoMD"), ("CFoMD", "random")];
 
     fn setting() -> Field {
@@ -146,13 +135,9 @@ impl Case for Fig9 {
     type Main = Summary;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig9",
-        title: "Received power against the budget",
-        caption: "Using silence is worth most where little is sent. Censoring with silence ignored beats random selection only up to two \
-                  messages a step; from four on it does not, in velocity clearly, contrary to the paper.",
-        source: "CFwMD paper, figure 9",
-    };
+    const ABOUT: About = About::of("cfwmd-fig9", "Received power against the budget", "CFwMD paper, figure 9");
+    const CAPTION: &str = "Using silence is worth most where little is sent. Censoring with silence ignored beats random selection only up to two \
+        messages a step; from four on it does not, in velocity clearly, contrary to the paper.";
     const PAIRS: &'static [(&'static str, &'static str)] =
         &[("CFwMD", "CFoMD"), ("CFwMD", "random"), ("random", "CFoMD")];
 
@@ -201,14 +186,11 @@ impl Case for Fig10 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig10",
-        title: "Received power, state against covariance feedback",
-        caption: "Feeding the particles' covariance back (CFwMD2) pays at four and six messages per step, more as time goes on. At two it gains \
-                  a twentieth of the squared position error, which 200 trials do not tell from nothing; 12000 with fewer particles \
-                  do (table `summary`).",
-        source: "CFwMD paper, figure 10",
-    };
+    const ABOUT: About =
+        About::of("cfwmd-fig10", "Received power, state against covariance feedback", "CFwMD paper, figure 10");
+    const CAPTION: &str = "Feeding the particles' covariance back (CFwMD2) pays at four and six messages per step, more as time goes on. At two it gains \
+        a twentieth of the squared position error, which 200 trials do not tell from nothing; 12000 with fewer particles \
+        do (table `summary`).";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
 
     fn setting() -> Field {
@@ -248,13 +230,9 @@ impl Case for Table3 {
     type Main = Rates;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-table3",
-        title: "Rates among sensors of received power",
-        caption: "Mean number of messages a step. The grid is not printed; a spacing of 10 m with the truth starting on the prior mean fits \
-                  best, and leaves the rates at l = 2 about 0.1 below the printed ones, unexplained. Drawn starts run 1000 particles.",
-        source: "CFwMD paper, table III",
-    };
+    const ABOUT: About = About::of("cfwmd-table3", "Rates among sensors of received power", "CFwMD paper, table III");
+    const CAPTION: &str = "Mean number of messages a step. The grid is not printed; a spacing of 10 m with the truth starting on the prior mean fits \
+        best, and leaves the rates at l = 2 about 0.1 below the printed ones, unexplained. Drawn starts run 1000 particles.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
     const REFERENCES: &'static [&'static str] = &["rate"];
 

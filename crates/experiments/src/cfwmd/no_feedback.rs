@@ -19,13 +19,9 @@ impl Case for Fig3 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig3",
-        title: "Scalar measurements, no feedback",
-        caption: "The order of the published figure, obtained with the correct filter: a joint Gaussian belief over the state and the sensors' \
-                  own estimates. With the printed likelihood CFwMD would coincide with CFoMD.",
-        source: "CFwMD paper, figure 3",
-    };
+    const ABOUT: About = About::of("cfwmd-fig3", "Scalar measurements, no feedback", "CFwMD paper, figure 3");
+    const CAPTION: &str = "The order of the published figure, obtained with the correct filter: a joint Gaussian belief over the state and the sensors' \
+        own estimates. With the printed likelihood CFwMD would coincide with CFoMD.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("CFoMD", "random")];
 
     fn setting() -> Linear {
@@ -115,15 +111,12 @@ impl Case for NoFeedbackFigure {
     type Main = Step;
     type Further = Literal;
 
-    const ABOUT: About = About {
-        id: "cfwmd-nofeedback",
-        title: "What silence is worth without feedback, and what the printed likelihood is",
-        caption: "Exact filter (measurements imputed), joint Gaussian belief, a heuristic that scatters the sensors' estimates about the fusion \
-                  centre's, the filter that ignores silence, and the paper's law of the sensors' estimates with its mean corrected, \
-                  which does harm because it forgets the data. The likelihood as printed is one number whatever the state, and so \
-                  leaves the filter that ignores silence.",
-        source: "",
-    };
+    const ABOUT: About =
+        About::of("cfwmd-nofeedback", "What silence is worth without feedback, and what the printed likelihood is", "");
+    const CAPTION: &str = "Exact filter (measurements imputed), joint Gaussian belief, a heuristic that scatters the sensors' estimates about the fusion \
+        centre's, the filter that ignores silence, and the paper's law of the sensors' estimates with its mean corrected, \
+        which does harm because it forgets the data. The likelihood as printed is one number whatever the state, and so \
+        leaves the filter that ignores silence.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[
         ("exact", "joint Gaussian"),
         ("joint Gaussian", "ignored"),

@@ -47,14 +47,10 @@ impl Case for Fig4 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig4",
-        title: "Vector measurements, state feedback",
-        caption: "Position and velocity measured by two sensors that share one message a step. The order of the schemes is that of scalar \
-                  measurements, at the acceleration variance that fits the published rates (1) and at the one the text states (4). \
-                  The particle filter runs 150 trials.",
-        source: "CFwMD paper, figure 4",
-    };
+    const ABOUT: About = About::of("cfwmd-fig4", "Vector measurements, state feedback", "CFwMD paper, figure 4");
+    const CAPTION: &str = "Position and velocity measured by two sensors that share one message a step. The order of the schemes is that of scalar \
+        measurements, at the acceleration variance that fits the published rates (1) and at the one the text states (4). \
+        The particle filter runs 150 trials.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("CFoMD", "random")];
 
     fn setting() -> Linear {
@@ -96,13 +92,10 @@ impl Case for Fig5 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig5",
-        title: "Vector measurements, state against covariance feedback",
-        caption: "With vector measurements covariance feedback (CFwMD2) is better at each budget; at the acceleration variance that the text \
-                  states it would not be, at one message a step.",
-        source: "CFwMD paper, figure 5",
-    };
+    const ABOUT: About =
+        About::of("cfwmd-fig5", "Vector measurements, state against covariance feedback", "CFwMD paper, figure 5");
+    const CAPTION: &str = "With vector measurements covariance feedback (CFwMD2) is better at each budget; at the acceleration variance that the text \
+        states it would not be, at one message a step.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
     const REFERENCES: &'static [&'static str] = &["position", "velocity"];
 
@@ -142,14 +135,10 @@ impl Case for Fig6 {
     type Main = Step;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-fig6",
-        title: "Vector measurements, no feedback",
-        caption: "Without feedback the fusion centre does not know what a silent sensor compared with. A joint belief over the state and the \
-                  sensors' own estimates (CFwMD) makes silence informative all the same; the printed likelihood does not. The \
-                  exact filter imputes the withheld measurements by particles, in 500 trials.",
-        source: "CFwMD paper, figure 6",
-    };
+    const ABOUT: About = About::of("cfwmd-fig6", "Vector measurements, no feedback", "CFwMD paper, figure 6");
+    const CAPTION: &str = "Without feedback the fusion centre does not know what a silent sensor compared with. A joint belief over the state and the \
+        sensors' own estimates (CFwMD) makes silence informative all the same; the printed likelihood does not. The \
+        exact filter imputes the withheld measurements by particles, in 500 trials.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("exact", SAME_TRIALS)];
 
     fn setting() -> Linear {
@@ -201,13 +190,9 @@ impl Case for Table2 {
     type Main = Rates;
     type Further = Nothing;
 
-    const ABOUT: About = About {
-        id: "cfwmd-table2",
-        title: "Rates with vector measurements",
-        caption: "The published rates fit an acceleration variance of 1, not the stated 4; next best is 4 with the printed noise [2 4] read \
-                  as standard deviations.",
-        source: "CFwMD paper, table II",
-    };
+    const ABOUT: About = About::of("cfwmd-table2", "Rates with vector measurements", "CFwMD paper, table II");
+    const CAPTION: &str = "The published rates fit an acceleration variance of 1, not the stated 4; next best is 4 with the printed noise [2 4] read \
+        as standard deviations.";
     const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
     const REFERENCES: &'static [&'static str] = &["rate"];
 

@@ -206,16 +206,9 @@ fn field_panel(title: &str, rows: &Fields, of: fn(&Point) -> f64) -> Panel {
 }
 
 impl Figure for True {
-    type Parameters = Parameters;
-    type Tables = Fields;
-
-    const ABOUT: About = About {
-        id: "diffusive-fig5",
-        title: "The belief after three nodes",
-        caption: "Exact density of the source's position after three nodes of example B, rate unknown, in the first random \
-                      deployment whose belief has two clear lobes.",
-        source: "Zhao and Nehorai 2007, Fig. 5",
-    };
+    figure!(Parameters => Fields, "diffusive-fig5", "The belief after three nodes", "Zhao and Nehorai 2007, Fig. 5",
+        "Exact density of the source's position after three nodes of example B, rate unknown, in the first random \
+         deployment whose belief has two clear lobes.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Fields, Error> {
         field(p, context, false)
@@ -231,16 +224,9 @@ impl Figure for True {
 }
 
 impl Figure for Approximated {
-    type Parameters = Parameters;
-    type Tables = Fields;
-
-    const ABOUT: About = About {
-        id: "diffusive-fig6",
-        title: "The same belief in polynomial Gaussians",
-        caption: "The belief of diffusive-fig5 as two polynomial Gaussians of degree 5 in square-root (Galerkin) form, 51 \
-                      numbers, beside the exact one: decades below the exact peak.",
-        source: "Zhao and Nehorai 2007, Fig. 6",
-    };
+    figure!(Parameters => Fields, "diffusive-fig6", "The same belief in polynomial Gaussians", "Zhao and Nehorai 2007, Fig. 6",
+        "The belief of diffusive-fig5 as two polynomial Gaussians of degree 5 in square-root (Galerkin) form, 51 \
+         numbers, beside the exact one: decades below the exact peak.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Fields, Error> {
         field(p, context, true)

@@ -31,17 +31,10 @@ fn schemes() -> Vec<Scheme> {
 pub struct Bytes;
 
 impl Figure for Bytes {
-    type Parameters = Settings;
-    type Tables = Vec<Summary>;
-
-    const ABOUT: About = About {
-        id: "diffusive-bytes",
-        title: "Bytes to the threshold",
-        caption: "What all messages of a search cost together (example B, numbers in single precision, messages of raw \
-                      records grow with every node): on a short route the samples themselves, quantised to the noise, are the \
-                      cheapest message and lose nothing.",
-        source: "",
-    };
+    figure!(Settings => Vec<Summary>, "diffusive-bytes", "Bytes to the threshold", "",
+        "What all messages of a search cost together (example B, numbers in single precision, messages of raw \
+         records grow with every node): on a short route the samples themselves, quantised to the noise, are the \
+         cheapest message and lose nothing.");
 
     fn cost(&self, p: &Settings) -> Cost {
         Cost::new(p.trials as f64, p.trials as f64 * 2e4)

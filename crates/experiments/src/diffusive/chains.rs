@@ -88,79 +88,67 @@ fn windy(example: super::common::Example) -> Vec<Scheme> {
 
 /// Figure 3: error, example A.
 pub static FIG3: Chains = Chains {
-    about: About {
-        id: "diffusive-fig3",
-        title: "Error along the search, two radio ranges",
-        caption: "Median distance of estimate and source after each node (bands: deciles), example A, ranges of 15 and 10 m, \
-                  over random deployments. What the paper calls bias is the root of this distance; both are in the table.",
-        source: "Zhao and Nehorai 2007, Fig. 3",
-    },
+    about: About::of("diffusive-fig3", "Error along the search, two radio ranges", "Zhao and Nehorai 2007, Fig. 3")
+        .showing("Median distance of estimate and source after each node (bands: deciles), example A, ranges of 15 and 10 m, \
+                  over random deployments. What the paper calls bias is the root of this distance; both are in the table."),
     schemes: schemes_a_few,
     claims: chain_claims::fig3,
 };
 
 /// Figure 4: determinant, example A.
 pub static FIG4: Chains = Chains {
-    about: About {
-        id: "diffusive-fig4",
-        title: "Determinant along the search, two radio ranges",
-        caption: "Median log10 determinant of the position's covariance after each node, example A, ranges of 15 and 10 m. The \
+    about: About::of("diffusive-fig4", "Determinant along the search, two radio ranges", "Zhao and Nehorai 2007, Fig. 4")
+        .showing("Median log10 determinant of the position's covariance after each node, example A, ranges of 15 and 10 m. The \
                   threshold is 1e-6. One Gaussian spends about ten nodes near the start, because a ring matched by moments is a \
-                  broad blob; mixtures and the exact belief do not.",
-        source: "Zhao and Nehorai 2007, Fig. 4",
-    },
+                  broad blob; mixtures and the exact belief do not."),
     schemes: schemes_a,
     claims: chain_claims::fig4,
 };
 
 /// Figure 7: error, example B.
 pub static FIG7: Chains = Chains {
-    about: About {
-        id: "diffusive-fig7",
-        title: "Error along the search, Gaussian and polynomial Gaussians",
-        caption: "Median distance of estimate and source after each node, example B: polynomial Gaussians of degree 5 with two \
+    about: About::of(
+        "diffusive-fig7",
+        "Error along the search, Gaussian and polynomial Gaussians",
+        "Zhao and Nehorai 2007, Fig. 7",
+    )
+    .showing(
+        "Median distance of estimate and source after each node, example B: polynomial Gaussians of degree 5 with two \
                   components against one Gaussian, and the exact belief as the referee.",
-        source: "Zhao and Nehorai 2007, Fig. 7",
-    },
+    ),
     schemes: schemes_b_few,
     claims: chain_claims::fig7,
 };
 
 /// Figure 8: determinant, example B.
 pub static FIG8: Chains = Chains {
-    about: About {
-        id: "diffusive-fig8",
-        title: "Nodes to the threshold, by what travels",
-        caption: "Median log10 determinant after each node, example B, threshold 1e-5, for every form of the belief. A \
+    about: About::of("diffusive-fig8", "Nodes to the threshold, by what travels", "Zhao and Nehorai 2007, Fig. 8")
+        .showing(
+            "Median log10 determinant after each node, example B, threshold 1e-5, for every form of the belief. A \
                   determinant alone can mislead: the summary says how many searches end more than a metre off.",
-        source: "Zhao and Nehorai 2007, Fig. 8",
-    },
+        ),
     schemes: schemes_b,
     claims: chain_claims::fig8,
 };
 
 /// Figure 9: wind, sensors and source of example B.
 pub static FIG9: Chains = Chains {
-    about: About {
-        id: "diffusive-fig9",
-        title: "Choosing nodes in wind, source of example B",
-        caption: "Error and determinant along searches in a wind of (-20, -10) m/s, source at (62, 50), by the rule that chooses \
+    about: About::of("diffusive-fig9", "Choosing nodes in wind, source of example B", "Zhao and Nehorai 2007, Figs. 9 and 10")
+        .showing("Error and determinant along searches in a wind of (-20, -10) m/s, source at (62, 50), by the rule that chooses \
                   nodes. A mixture of four Gaussians over position and rate travels. The paper does not print its source: \
-                  diffusive-fig10 has the other one.",
-        source: "Zhao and Nehorai 2007, Figs. 9 and 10",
-    },
+                  diffusive-fig10 has the other one."),
     schemes: || windy(B),
     claims: chain_claims::wind,
 };
 
 /// Figure 10: wind, sensors and source of example A.
 pub static FIG10: Chains = Chains {
-    about: About {
-        id: "diffusive-fig10",
-        title: "Choosing nodes in wind, source of example A",
-        caption: "The same with the source at (73, 38), ten samples a node and threshold 1e-6.",
-        source: "Zhao and Nehorai 2007, Figs. 9 and 10",
-    },
+    about: About::of(
+        "diffusive-fig10",
+        "Choosing nodes in wind, source of example A",
+        "Zhao and Nehorai 2007, Figs. 9 and 10",
+    )
+    .showing("The same with the source at (73, 38), ten samples a node and threshold 1e-6."),
     schemes: || windy(A),
     claims: chain_claims::wind,
 };

@@ -85,16 +85,9 @@ const TWO_PHASES: &str = "lpg-2x5 printed";
 pub struct Divergences;
 
 impl Figure for Divergences {
-    type Parameters = KlParameters;
-    type Tables = Vec<KlRow>;
-
-    const ABOUT: About = About {
-        id: "diffusive-kl",
-        title: "What a number buys",
-        caption: "Kullback-Leibler divergence of the exact belief (example B, rate integrated out) from what would travel, against \
-                      the numbers in a message, after one to four nodes.",
-        source: "",
-    };
+    figure!(KlParameters => Vec<KlRow>, "diffusive-kl", "What a number buys", "",
+        "Kullback-Leibler divergence of the exact belief (example B, rate integrated out) from what would travel, against \
+         the numbers in a message, after one to four nodes.");
 
     fn cost(&self, p: &KlParameters) -> Cost {
         Cost::new(p.trials as f64 * p.nodes.len() as f64 * 0.1, 1e6)
@@ -148,7 +141,7 @@ impl Figure for Divergences {
     fn claims(&self, _: &KlParameters, rows: &Vec<KlRow>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         let find =
-            |nodes: usize, rep: &str| first(&rows, |r| r.nodes == nodes && r.rep == rep).map(|r| r.kl_median.value);
+            |nodes: usize, rep: &str| first(rows, |r| r.nodes == nodes && r.rep == rep).map(|r| r.kl_median.value);
         let key = |r: &KlRow| format!("{} {}", r.nodes, r.rep);
         full.references("kl_median", "median divergence", rows, |r| (key(r), r.kl_median));
         let what = "no mean divergence is negative, but for what sums over cells leave (0.01 nats)";

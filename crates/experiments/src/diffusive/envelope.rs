@@ -92,17 +92,10 @@ impl Parameters {
 const GRID: usize = 50;
 
 impl Figure for Envelope {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "diffusive-envelope",
-        title: "The area above a threshold",
-        caption: "Where the concentration on the ground exceeds 1e-4 kg/m^3 after 100 s, as a belief of three nodes sees it \
-                      (example B, rate unknown): probability of exceedance, and how often the 90 per cent band of the eastern \
-                      edge holds the true edge.",
-        source: "",
-    };
+    figure!(Parameters => Rows, "diffusive-envelope", "The area above a threshold", "",
+        "Where the concentration on the ground exceeds 1e-4 kg/m^3 after 100 s, as a belief of three nodes sees it \
+         (example B, rate unknown): probability of exceedance, and how often the 90 per cent band of the eastern \
+         edge holds the true edge.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(p.trials as f64 * 0.1, 1e6)

@@ -82,16 +82,9 @@ rows! {
 pub struct Trace;
 
 impl Figure for Trace {
-    type Parameters = Parameters;
-    type Tables = Vec<TraceRow>;
-
-    const ABOUT: About = About {
-        id: "diffusive-fig1",
-        title: "One search, event by event",
-        caption: "The paper's flow chart as what happens in one search of example B's kind: receive, sample, update, test, \
-                      select, send. A mixture of four Gaussians over position and rate travels.",
-        source: "Zhao and Nehorai 2007, Fig. 1",
-    };
+    figure!(Parameters => Vec<TraceRow>, "diffusive-fig1", "One search, event by event", "Zhao and Nehorai 2007, Fig. 1",
+        "The paper's flow chart as what happens in one search of example B's kind: receive, sample, update, test, \
+         select, send. A mixture of four Gaussians over position and rate travels.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<TraceRow>, Error> {
         let scheme = Scheme::new("gmm-4", A)
@@ -143,7 +136,7 @@ impl Figure for Trace {
             .filter_map(|r| Some((r.step as f64, r.log10_determinant?)))
             .collect();
         let mut total = 0.0;
-        let bytes = select(&rows, |r| r.event == Event::Receive)
+        let bytes = select(rows, |r| r.event == Event::Receive)
             .map(|r| {
                 total += r.bytes;
                 (r.step as f64, total)
@@ -205,16 +198,9 @@ rows! {
 pub struct Route;
 
 impl Figure for Route {
-    type Parameters = Parameters;
-    type Tables = RouteRows;
-
-    const ABOUT: About = About {
-        id: "diffusive-fig2",
-        title: "The route of one search",
-        caption: "Nodes visited in one random deployment, example A, with 90 per cent ellipses of the belief after each \
-                      node. The belief is exact; the next node is the one nearest to the estimate in Mahalanobis distance.",
-        source: "Zhao and Nehorai 2007, Fig. 2",
-    };
+    figure!(Parameters => RouteRows, "diffusive-fig2", "The route of one search", "Zhao and Nehorai 2007, Fig. 2",
+        "Nodes visited in one random deployment, example A, with 90 per cent ellipses of the belief after each \
+         node. The belief is exact; the next node is the one nearest to the estimate in Mahalanobis distance.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<RouteRows, Error> {
         let outcome = p.search(&Scheme::new("exact", A).at(p.range), context)?;

@@ -84,17 +84,10 @@ fn schemes() -> Vec<Scheme> {
 pub struct Selection;
 
 impl Figure for Selection {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "diffusive-selection",
-        title: "Choosing the next node",
-        caption: "Left: mean nodes to the threshold with the exact belief, by mutual information (its Gaussian bound, \
-                      and its pairwise bound) and by Mahalanobis distance. Right: how rules rank the neighbours after three nodes of example B, as rank \
-                      correlation with the exact mutual information.",
-        source: "",
-    };
+    figure!(Parameters => Rows, "diffusive-selection", "Choosing the next node", "",
+        "Left: mean nodes to the threshold with the exact belief, by mutual information (its Gaussian bound, \
+         and its pairwise bound) and by Mahalanobis distance. Right: how rules rank the neighbours after three nodes of example B, as rank \
+         correlation with the exact mutual information.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(p.trials as f64 * 0.3 + p.ranking_trials as f64 * p.draws as f64 * 0.01, 1e7)

@@ -88,16 +88,9 @@ const MISPRINT_22: f64 = 5.190_31;
 pub struct Table1;
 
 impl Figure for Table1 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "diffusive-table1",
-        title: "Hermite polynomials of two variables",
-        caption: "The polynomials He_nu(z; W) by the recursion, with the two misprinted entries of the paper's table beside \
-                      them. Every polynomial but the first has mean zero under the Gaussian; the misprints do not.",
-        source: "Zhao and Nehorai 2007, Table I",
-    };
+    figure!(Parameters => Rows, "diffusive-table1", "Hermite polynomials of two variables", "Zhao and Nehorai 2007, Table I",
+        "The polynomials He_nu(z; W) by the recursion, with the two misprinted entries of the paper's table beside \
+         them. Every polynomial but the first has mean zero under the Gaussian; the misprints do not.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let w = p.precision()?;

@@ -85,17 +85,10 @@ fn models() -> Result<[(&'static str, RateModel); 3], Error> {
 pub struct Unknowns;
 
 impl Figure for Unknowns {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "diffusive-unknowns",
-        title: "What else is unknown",
-        caption: "Left: the Cramer-Rao bound of x for six nodes on the way to the source of example B with more and more unknowns. Right: posterior \
-                      means of noise-free samples by what is assumed of the rate. Redrawing the rate for every sample, as the \
-                      paper's equations (13) and (18) do, pushes the source away and stays wrong however many nodes there are.",
-        source: "",
-    };
+    figure!(Parameters => Rows, "diffusive-unknowns", "What else is unknown", "",
+        "Left: the Cramer-Rao bound of x for six nodes on the way to the source of example B with more and more unknowns. Right: posterior \
+         means of noise-free samples by what is assumed of the rate. Redrawing the rate for every sample, as the \
+         paper's equations (13) and (18) do, pushes the source away and stays wrong however many nodes there are.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(p.trials as f64 * p.nodes.iter().sum::<usize>() as f64 * 0.02, 1e6)

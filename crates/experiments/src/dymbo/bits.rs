@@ -63,17 +63,10 @@ rows! {
 pub struct WordLength;
 
 impl Figure for WordLength {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "dymbo-bits",
-        title: "Bits a sample",
-        caption: "Loss against the Kalman filter when each sample sends a word of the innovation's Lloyd-Max quantizer: predicted \
-                      (lines) and exact (points). Two bits leave 15 % and three 4 %. Right: what is lost of one sample, 1 - c, by \
-                      batch words and by successive bits; the usual formula for the latter promises too much.",
-        source: "",
-    };
+    figure!(Parameters => Rows, "dymbo-bits", "Bits a sample", "",
+        "Loss against the Kalman filter when each sample sends a word of the innovation's Lloyd-Max quantizer: predicted \
+         (lines) and exact (points). Two bits leave 15 % and three 4 %. Right: what is lost of one sample, 1 - c, by \
+         batch words and by successive bits; the usual formula for the latter promises too much.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let cases: Vec<_> = p

@@ -48,17 +48,10 @@ rows! {
 pub struct NoisyBits;
 
 impl Figure for NoisyBits {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: ID,
-        title: "Noisy bits",
-        caption: "Exact steady error when the link inverts each bit with a probability, of the filter that knows it (solid; its \
-                      prediction dashed) and of one that does not (points). Below one inverted bit in a hundred, knowing does not \
-                      pay; at three in ten it saves a tenth.",
-        source: "",
-    };
+    figure!(Parameters => Vec<Row>, ID, "Noisy bits", "",
+        "Exact steady error when the link inverts each bit with a probability, of the filter that knows it (solid; its \
+         prediction dashed) and of one that does not (points). Below one inverted bit in a hundred, knowing does not \
+         pay; at three in ten it saves a tenth.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();

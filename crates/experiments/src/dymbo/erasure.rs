@@ -83,16 +83,9 @@ fn one_run(
 pub struct LostBits;
 
 impl Figure for LostBits {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: ID,
-        title: "Lost bits",
-        caption: "Mean computed variance and mean squared error when each bit is lost with a probability that both ends notice \
-                      (points), below the bound that averages the information, (1 - p) 2/pi, in closed form (line).",
-        source: "",
-    };
+    figure!(Parameters => Vec<Row>, ID, "Lost bits", "",
+        "Mean computed variance and mean squared error when each bit is lost with a probability that both ends notice \
+         (points), below the bound that averages the information, (1 - p) 2/pi, in closed form (line).");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut cases = Vec::new();

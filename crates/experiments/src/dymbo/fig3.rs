@@ -28,17 +28,10 @@ rows! {
 pub struct KalmanVariance;
 
 impl Figure for KalmanVariance {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "dymbo-fig3",
-        title: "Steady variance against the noise ratio",
-        caption: "Steady filtered variance over the measurement variance, of the Kalman filter (solid) and of the sign-bit filter \
-                      (dashed). A slow plant (small gamma) is averaged over many samples; a fast one leaves the last sample \
-                      alone, and then one bit falls behind.",
-        source: "Ribeiro and Giannakis, Fig. 3",
-    };
+    figure!(Parameters => Vec<Row>, "dymbo-fig3", "Steady variance against the noise ratio", "Ribeiro and Giannakis, Fig. 3",
+        "Steady filtered variance over the measurement variance, of the Kalman filter (solid) and of the sign-bit filter \
+         (dashed). A slow plant (small gamma) is averaged over many samples; a fast one leaves the last sample \
+         alone, and then one bit falls behind.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let plants = p.a.iter().flat_map(|a| super::common::each(*a, &p.gamma));

@@ -64,17 +64,10 @@ fn loss(a: f64, gamma: f64) -> Option<f64> {
 pub struct Loss;
 
 impl Figure for Loss {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "dymbo-fig4",
-        title: "Loss against the Kalman filter",
-        caption: "Contours of the steady variance of the sign-bit filter over that of the Kalman filter. One bit costs nearly \
-                      nothing for slow plants. The paper's `below 2 whenever gamma < 1` fails in the corner near |a| = 1; the \
-                      exact loss (dashed) is a little larger than the Riccati prediction.",
-        source: "Ribeiro and Giannakis, Fig. 4",
-    };
+    figure!(Parameters => Rows, "dymbo-fig4", "Loss against the Kalman filter", "Ribeiro and Giannakis, Fig. 4",
+        "Contours of the steady variance of the sign-bit filter over that of the Kalman filter. One bit costs nearly \
+         nothing for slow plants. The paper's `below 2 whenever gamma < 1` fails in the corner near |a| = 1; the \
+         exact loss (dashed) is a little larger than the Riccati prediction.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let plants: Vec<Plant> = p.a.iter().flat_map(|a| each(*a, &p.gamma)).collect();

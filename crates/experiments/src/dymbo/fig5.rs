@@ -144,18 +144,11 @@ fn simulate(
 pub struct Convergence;
 
 impl Figure for Convergence {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: ID,
-        title: "Convergence after a fine first message",
-        caption: "Mean squared error of the Kalman filter and of the sign-bit filter, simulated (points, one standard error) and \
-                      exact (lines); the third curve starts from first message and stationary prior together. The level differs \
-                      by the loss, the convergence by a step or two (E12); for the slow plant the first message without the \
-                      prior is worse than the prior alone (E13).",
-        source: "Ribeiro and Giannakis, Fig. 5",
-    };
+    figure!(Parameters => Rows, ID, "Convergence after a fine first message", "Ribeiro and Giannakis, Fig. 5",
+        "Mean squared error of the Kalman filter and of the sign-bit filter, simulated (points, one standard error) and \
+         exact (lines); the third curve starts from first message and stationary prior together. The level differs \
+         by the loss, the convergence by a step or two (E12); for the slow plant the first message without the \
+         prior is worse than the prior alone (E13).");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let plants = each(p.a, &p.gamma);

@@ -121,17 +121,10 @@ fn tuned_gain_mse(filter: &DymboFilter) -> Result<f64, Error> {
 pub struct GapToExact;
 
 impl Figure for GapToExact {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: ID,
-        title: "The gap to the exact posterior",
-        caption: "Mean squared distance of the sign-bit filter's estimate from the exact posterior mean given the same bits, as a \
-                      fraction of its error: after a first message over all bit strings (left), and in the steady state (right). \
-                      It stays near a hundredth of a percent: that is all that a better estimator of the present state could gain.",
-        source: "",
-    };
+    figure!(Parameters => Rows, ID, "The gap to the exact posterior", "",
+        "Mean squared distance of the sign-bit filter's estimate from the exact posterior mean given the same bits, as a \
+         fraction of its error: after a first message over all bit strings (left), and in the steady state (right). \
+         It stays near a hundredth of a percent: that is all that a better estimator of the present state could gain.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let (mut rows, mut steady) = (Vec::new(), Vec::new());

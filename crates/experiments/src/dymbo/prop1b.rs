@@ -49,17 +49,10 @@ rows! {
 pub struct PosteriorShape;
 
 impl Figure for PosteriorShape {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "dymbo-prop1b",
-        title: "The posterior of one bit is nearly normal",
-        caption: "Largest difference between the exact posterior density after one bit, which is skew-normal, and the normal \
-                      density of the same mean and variance. It falls with the cube of the noise (Proposition 1b, restated: E11). \
-                      Right: both densities at the smallest noise, where they differ most.",
-        source: "Ribeiro and Giannakis, Proposition 1(b)",
-    };
+    figure!(Parameters => Rows, "dymbo-prop1b", "The posterior of one bit is nearly normal", "Ribeiro and Giannakis, Proposition 1(b)",
+        "Largest difference between the exact posterior density after one bit, which is skew-normal, and the normal \
+         density of the same mean and variance. It falls with the cube of the noise (Proposition 1b, restated: E11). \
+         Right: both densities at the smallest noise, where they differ most.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let prior = Gaussian::scalar(0.0, p.sigma_theta * p.sigma_theta)?;

@@ -58,17 +58,10 @@ rows! {
 pub struct FirstMessage;
 
 impl Figure for FirstMessage {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "dymbo-prop2",
-        title: "The fine first message",
-        caption: "Mean squared error of the first sample rounded to a multiple of tau, at the worst place of the state: exact, \
-                      sigma^2 + tau^2/12, and the paper's bound (sigma + tau/2)^2. The bound is valid but loose; a filter that \
-                      starts from it (right) is over-cautious for several steps (E7).",
-        source: "Ribeiro and Giannakis, Proposition 2",
-    };
+    figure!(Parameters => Rows, "dymbo-prop2", "The fine first message", "Ribeiro and Giannakis, Proposition 2",
+        "Mean squared error of the first sample rounded to a multiple of tau, at the worst place of the state: exact, \
+         sigma^2 + tau^2/12, and the paper's bound (sigma + tau/2)^2. The bound is valid but loose; a filter that \
+         starts from it (right) is over-cautious for several steps (E7).");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let noise = p.sigma * p.sigma;

@@ -49,17 +49,10 @@ const LONGEST: usize = 10;
 pub struct SeveralSensors;
 
 impl Figure for SeveralSensors {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "dymbo-sensors",
-        title: "Several one-bit sensors a slot",
-        caption: "Steady error with K one-bit sensors: one after the other against the refreshed threshold, or all at once, \
-                      fused linearly or through the count table; below, K unquantized sensors. Two one-bit sensors in turn are \
-                      worth one unquantized sensor, but for 0.14 %. Bits sent at once share the prediction error and saturate.",
-        source: "",
-    };
+    figure!(Parameters => Vec<Row>, "dymbo-sensors", "Several one-bit sensors a slot", "",
+        "Steady error with K one-bit sensors: one after the other against the refreshed threshold, or all at once, \
+         fused linearly or through the count table; below, K unquantized sensors. Two one-bit sensors in turn are \
+         worth one unquantized sensor, but for 0.14 %. Bits sent at once share the prediction error and saturate.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let plants = each(p.a, &p.gamma);
@@ -102,7 +95,7 @@ impl Figure for SeveralSensors {
             let what = format!("{what}, at a, gamma, sensors");
             claims.references(quantity, &what, rows, |r| (format!("{} {}", r.plant, r.sensors), of(r)));
         }
-        let at = |k: usize| first(&rows, |r| r.plant == Plant { a: 0.9, gamma: 0.5 } && r.sensors == k);
+        let at = |k: usize| first(rows, |r| r.plant == Plant { a: 0.9, gamma: 0.5 } && r.sensors == k);
         let two = at(2).zip(at(1));
         let what = "gamma = 0.5: by computed variance two one-bit sensors in turn beat one unquantized sensor";
         let ratio = two.map(|(two, one)| two.sequential / one.kalman);

@@ -53,17 +53,10 @@ rows! {
 pub struct Smoothing;
 
 impl Figure for Smoothing {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: ID,
-        title: "Fixed-lag smoothing",
-        caption: "Error of the state some steps ago: Rauch-Tung-Striebel smoothing of the sign-bit filter's means and variances \
-                      as if they were normal (points), what it predicts (lines), and the exact smoother of the same bits (crosses). \
-                      At gamma = 0.05 the sign-bit smoother passes the unquantized filter (dashed) from lag 4 on.",
-        source: "",
-    };
+    figure!(Parameters => Vec<Row>, ID, "Fixed-lag smoothing", "",
+        "Error of the state some steps ago: Rauch-Tung-Striebel smoothing of the sign-bit filter's means and variances \
+         as if they were normal (points), what it predicts (lines), and the exact smoother of the same bits (crosses). \
+         At gamma = 0.05 the sign-bit smoother passes the unquantized filter (dashed) from lag 4 on.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let longest = p.lag.iter().copied().max().unwrap_or(0);

@@ -162,18 +162,11 @@ fn escapes(plant: &ScalarPlant, stream: Stream) -> Result<bool, fewbits_dymbo::E
 pub struct ThresholdPlace;
 
 impl Figure for ThresholdPlace {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: ID,
-        title: "Where the threshold belongs",
-        caption: "Steady mean squared error with the threshold at the prediction a theta_hat(n-1), at theta_hat(n-1) as equation \
-                      (14) prints it with the update unchanged, and the same with the exact update (E1). For a > 0 the mistake \
-                      hides within the width of a line; for a < 0 it is a catastrophe. A second table counts the runs of an \
-                      unstable plant that escape although the computed variance stays finite.",
-        source: "Ribeiro and Giannakis, equation (14)",
-    };
+    figure!(Parameters => Rows, ID, "Where the threshold belongs", "Ribeiro and Giannakis, equation (14)",
+        "Steady mean squared error with the threshold at the prediction a theta_hat(n-1), at theta_hat(n-1) as equation \
+         (14) prints it with the update unchanged, and the same with the exact update (E1). For a > 0 the mistake \
+         hides within the width of a line; for a < 0 it is a catastrophe. A second table counts the runs of an \
+         unstable plant that escape although the computed variance stays finite.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let mut rules = Vec::new();

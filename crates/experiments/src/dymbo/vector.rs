@@ -225,17 +225,10 @@ const SPACING: f64 = 0.75;
 pub struct VectorState;
 
 impl Figure for VectorState {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: ID,
-        title: "A two-dimensional state",
-        caption: "Trace of the error covariance of a rotating two-dimensional state with one sensor or three: computed by the \
-                      sign-bit filter (circles), exact minimum given its bits by a filter on a lattice (crosses), and the Kalman \
-                      filter of the unquantized samples (squares). The sign-bit filter is within 0.06 % of the exact minimum.",
-        source: "",
-    };
+    figure!(Parameters => Vec<Row>, ID, "A two-dimensional state", "",
+        "Trace of the error covariance of a rotating two-dimensional state with one sensor or three: computed by the \
+         sign-bit filter (circles), exact minimum given its bits by a filter on a lattice (crosses), and the Kalman \
+         filter of the unquantized samples (squares). The sign-bit filter is within 0.06 % of the exact minimum.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         Ok(vec![

@@ -108,20 +108,13 @@ fn setups() -> Vec<Setup> {
 pub struct Widths;
 
 fn kl(rows: &[Row], filter: &str, factor: f64, shrunk: bool) -> Option<f64> {
-    first(&rows, |r| r.filter == filter && r.factor == factor && r.shrunk == shrunk).map(|r| r.kl.value)
+    first(rows, |r| r.filter == filter && r.factor == factor && r.shrunk == shrunk).map(|r| r.kl.value)
 }
 
 impl Figure for Widths {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "handoff-bandwidth",
-        title: "Smoothing costs more than reduction",
-        caption: "KL from the exact belief, computed on a lattice, to what each filter hands on, averaged over ten steps. Halving \
-                      the bandwidth or shrinking the particles removes a third of the error at no bits.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Vec<Row>, "handoff-bandwidth", "Smoothing costs more than reduction", "our own comparison",
+        "KL from the exact belief, computed on a lattice, to what each filter hands on, averaged over ten steps. Halving \
+         the bandwidth or shrinking the particles removes a third of the error at no bits.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(2.0 * p.trials as f64, 1e6 * p.trials as f64)

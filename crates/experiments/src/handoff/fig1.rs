@@ -29,17 +29,10 @@ rows! {
 pub struct Fig1;
 
 impl Figure for Fig1 {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "handoff-fig1",
-        title: "Exact and lossy hand-overs",
-        caption: "Density p(t, i): the first i hand-overs were lossy, all after them exact. Steps to the right are exact \
-                      (prediction and update), dashed steps lose something. The upper edge is what ought to be known, the \
-                      diagonal what is known; a bound on their distance adds up the distances of neighbours in a column.",
-        source: "compressed particle filter, Section 4, Figure 1 (redrawn: the print is lost)",
-    };
+    figure!(Parameters => Vec<Row>, "handoff-fig1", "Exact and lossy hand-overs", "compressed particle filter, Section 4, Figure 1 (redrawn: the print is lost)",
+        "Density p(t, i): the first i hand-overs were lossy, all after them exact. Steps to the right are exact \
+         (prediction and update), dashed steps lose something. The upper edge is what ought to be known, the \
+         diagonal what is known; a bound on their distance adds up the distances of neighbours in a column.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let densities = (0..=p.steps).flat_map(|t| (0..=t).map(move |lossy| (t, lossy)));

@@ -38,16 +38,9 @@ fn at(rows: &[Row], ratio: f64, t: u32) -> Option<&Row> {
 }
 
 impl Figure for Fig2 {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "handoff-fig2",
-        title: "Small losses add up to more than their sum",
-        caption: "A Gaussian that is narrowed a little at every step. Each step loses under 0.001 nat at ratio 0.97, ten steps \
-                      lose over 0.1: the error grows with the square of time, not in proportion.",
-        source: "compressed particle filter, Section 4, Figure 2",
-    };
+    figure!(Parameters => Vec<Row>, "handoff-fig2", "Small losses add up to more than their sum", "compressed particle filter, Section 4, Figure 2",
+        "A Gaussian that is narrowed a little at every step. Each step loses under 0.001 nat at ratio 0.97, ten steps \
+         lose over 0.1: the error grows with the square of time, not in proportion.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
@@ -91,7 +84,7 @@ impl Figure for Fig2 {
         let ends = [(0.9691, false), (0.9692, true), (0.9717, true), (0.9719, false)];
         claims.all("window", what, ends, |(ratio, holds)| both(ratio) == Some(holds));
         for ratio in p.ratio.iter().filter(|r| **r < 1.0) {
-            let gaps = select(&rows, |r| r.ratio == *ratio && r.t > 0).map(|r| r.kl_total / r.sum_of_steps);
+            let gaps = select(rows, |r| r.ratio == *ratio && r.t > 0).map(|r| r.kl_total / r.sum_of_steps);
             let what = "the ratio of the whole to the sum of its parts grows with time";
             claims.increasing(format!("gap-r{ratio}"), what, gaps);
         }

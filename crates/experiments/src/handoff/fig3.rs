@@ -59,16 +59,9 @@ impl Rows {
 pub struct Fig3;
 
 impl Figure for Fig3 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "handoff-fig3",
-        title: "One bit turns a small error into the largest",
-        caption: "Two densities that differ in where a lobe of a tenth of the mass lies: L1 0.2. A bit that points at the lobe \
-                      makes them disjoint, L1 2; it comes with probability 0.1, so the expected error has not grown.",
-        source: "compressed particle filter, Section 4, Figure 3",
-    };
+    figure!(Parameters => Rows, "handoff-fig3", "One bit turns a small error into the largest", "compressed particle filter, Section 4, Figure 3",
+        "Two densities that differ in where a lobe of a tenth of the mass lies: L1 0.2. A bit that points at the lobe \
+         makes them disjoint, L1 2; it comes with probability 0.1, so the expected error has not grown.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let lobe = |w: f64, m: f64, s: f64| Component::new(w, Vector1::new(m), Matrix1::new(s * s));

@@ -54,16 +54,9 @@ rows! {
 pub struct Fig4;
 
 impl Figure for Fig4 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "handoff-fig4",
-        title: "The field, the target and its leaders",
-        caption: "One world: the target steps to the right, turning up to 45 degrees; at every step the nearest sensor that did \
-                      not just lead, and is not too near, measures and takes over the belief.",
-        source: "compressed particle filter, Section 6, Figure 4",
-    };
+    figure!(Parameters => Rows, "handoff-fig4", "The field, the target and its leaders", "compressed particle filter, Section 6, Figure 4",
+        "One world: the target steps to the right, turning up to 45 degrees; at every step the nearest sensor that did \
+         not just lead, and is not too near, measures and takes over the belief.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let world = World::draw(&mut context.stream("handoff-fig4").rng(), p.sensors, p.steps, 0.05)?;

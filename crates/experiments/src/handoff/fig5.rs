@@ -62,16 +62,9 @@ rows! {
 pub struct Fig5;
 
 impl Figure for Fig5 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "handoff-fig5",
-        title: "Beliefs along the way",
-        caption: "Particles of an uncompressed filter in the world of Figure 4, and the half-mass ellipses of the five Gaussians \
-                      that would travel. The beliefs are bent and far from Gaussian.",
-        source: "compressed particle filter, Section 6, Figure 5",
-    };
+    figure!(Parameters => Rows, "handoff-fig5", "Beliefs along the way", "compressed particle filter, Section 6, Figure 5",
+        "Particles of an uncompressed filter in the world of Figure 4, and the half-mass ellipses of the five Gaussians \
+         that would travel. The beliefs are bent and far from Gaussian.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let stream = context.stream("handoff-fig4");

@@ -186,16 +186,9 @@ impl Rows {
 }
 
 impl Figure for Fig6c {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "handoff-fig6c",
-        title: "The actual error",
-        caption: "KL from a reference filter of 2000 particles, less that to an independent copy of it. The three criteria are \
-                      close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.",
-        source: "compressed particle filter, Section 6, Figure 6(c)",
-    };
+    figure!(Parameters => Rows, "handoff-fig6c", "The actual error", "compressed particle filter, Section 6, Figure 6(c)",
+        "KL from a reference filter of 2000 particles, less that to an independent copy of it. The three criteria are \
+         close, ML a little behind; all are far below their bounds, and a single Gaussian is far behind.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(0.2 * p.trials as f64, 2e3 * p.trials as f64)

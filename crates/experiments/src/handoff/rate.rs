@@ -40,20 +40,13 @@ rows! {
 pub struct Rate;
 
 fn find<'a>(rows: &'a [Row], message: &str, size: usize, resolution: Option<f64>) -> Option<&'a Row> {
-    first(&rows, |r| r.message == message && r.size == size && r.resolution == resolution)
+    first(rows, |r| r.message == message && r.size == size && r.resolution == resolution)
 }
 
 impl Figure for Rate {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "handoff-rate",
-        title: "What bits buy",
-        caption: "KL from the estimate to what the receiver decodes against the length of the message. Coded mixtures need a \
-                      seventh of the bits of their parameters as floats, and a hundredth of those of particles.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Vec<Row>, "handoff-rate", "What bits buy", "our own comparison",
+        "KL from the estimate to what the receiver decodes against the length of the message. Coded mixtures need a \
+         seventh of the bits of their parameters as floats, and a hundredth of those of particles.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(p.trials as f64, 1e6 * p.trials as f64)

@@ -121,16 +121,9 @@ impl Rows {
 }
 
 impl Figure for Reductions {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "handoff-reduction",
-        title: "What a reduction loses",
-        caption: "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
-                      2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Rows, "handoff-reduction", "What a reduction loses", "our own comparison",
+        "KL from the kernel estimate to the reduced mixture, by quadrature, over beliefs of uncompressed filters at times \
+         2, 5 and 8. The recommended pipeline loses less than half of what the paper's cut does.");
 
     fn measures_time(&self) -> bool {
         true

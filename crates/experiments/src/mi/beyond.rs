@@ -405,17 +405,10 @@ fn grouping() -> Result<Vec<Grouping>, Error> {
 pub struct Beyond;
 
 impl Figure for Beyond {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "mi-beyond",
-        title: "Beyond the publication",
-        caption: "Levels made of several intervals beat every contiguous design found once noise is shared or small: a quarter \
-                      of the squared error at a noise of 0.3. With them: where identical quantizers lose their optimality, which \
-                      words suit which channel, bounds that no design can beat, and the iterations each algorithm takes.",
-        source: "",
-    };
+    figure!(Parameters => Rows, "mi-beyond", "Beyond the publication", "",
+        "Levels made of several intervals beat every contiguous design found once noise is shared or small: a quarter \
+         of the squared error at a noise of 0.3. With them: where identical quantizers lose their optimality, which \
+         words suit which channel, bounds that no design can beat, and the iterations each algorithm takes.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         Ok(Rows {

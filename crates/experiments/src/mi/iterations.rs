@@ -133,49 +133,33 @@ pub struct Iterations<S> {
 
 /// Figure 4.2.
 pub static FIGURE42: Iterations<Clean> = Iterations {
-    about: About {
-        id: "mi-fig4-2",
-        title: "Information over iterations, clean channel",
-        caption: "Mutual information rises in two steps, one per sensor, to a plateau each.",
-        source: "thesis, Figure 4.2",
-    },
+    about: About::of("mi-fig4-2", "Information over iterations, clean channel", "thesis, Figure 4.2")
+        .showing("Mutual information rises in two steps, one per sensor, to a plateau each."),
     shows: Shows::Information,
     setting: PhantomData,
 };
 
 /// Figure 4.3.
 pub static FIGURE43: Iterations<Clean> = Iterations {
-    about: About {
-        id: "mi-fig4-3",
-        title: "Squared error over iterations, clean channel",
-        caption: "The squared error falls while the information rises, though it is not what is optimised.",
-        source: "thesis, Figure 4.3",
-    },
+    about: About::of("mi-fig4-3", "Squared error over iterations, clean channel", "thesis, Figure 4.3")
+        .showing("The squared error falls while the information rises, though it is not what is optimised."),
     shows: Shows::Error,
     setting: PhantomData,
 };
 
 /// Figure 4.4.
 pub static FIGURE44: Iterations<Channels> = Iterations {
-    about: About {
-        id: "mi-fig4-4",
-        title: "Information over iterations, noisy channels",
-        caption: "Joint information at four crossovers, natural words. It rises for the better channels; at 0.05 the first stage \
-                  lowers it, and the greedy result is below its start.",
-        source: "thesis, Figure 4.4",
-    },
+    about: About::of("mi-fig4-4", "Information over iterations, noisy channels", "thesis, Figure 4.4")
+        .showing("Joint information at four crossovers, natural words. It rises for the better channels; at 0.05 the first stage \
+                  lowers it, and the greedy result is below its start."),
     shows: Shows::Information,
     setting: PhantomData,
 };
 
 /// Figure 4.5.
 pub static FIGURE45: Iterations<Channels> = Iterations {
-    about: About {
-        id: "mi-fig4-5",
-        title: "Squared error over iterations, noisy channels",
-        caption: "Squared error at four crossovers, natural words. It falls at every step, on every channel.",
-        source: "thesis, Figure 4.5",
-    },
+    about: About::of("mi-fig4-5", "Squared error over iterations, noisy channels", "thesis, Figure 4.5")
+        .showing("Squared error at four crossovers, natural words. It falls at every step, on every channel."),
     shows: Shows::Error,
     setting: PhantomData,
 };

@@ -87,18 +87,11 @@ rows! {
 pub struct Table41;
 
 impl Figure for Table41 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "mi-table4-1",
-        title: "Two sensors of equal noise",
-        caption: "Squared error of two-sensor designs for mutual information and for squared error: the greedy chain, the \
-                      joint optimum, Lloyd-Max quantizers of the unknown and of the sample, and the printed breakpoints. With \
-                      independent noise all differences are in the fourth digit. With correlation 0.85 the printed solution is \
-                      a saddle: the best contiguous pair is asymmetric.",
-        source: "thesis, Table 4.1",
-    };
+    figure!(Parameters => Rows, "mi-table4-1", "Two sensors of equal noise", "thesis, Table 4.1",
+        "Squared error of two-sensor designs for mutual information and for squared error: the greedy chain, the \
+         joint optimum, Lloyd-Max quantizers of the unknown and of the sample, and the printed breakpoints. With \
+         independent noise all differences are in the fourth digit. With correlation 0.85 the printed solution is \
+         a saddle: the best contiguous pair is asymmetric.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let (mut designs, mut searches) = (Vec::new(), Vec::new());

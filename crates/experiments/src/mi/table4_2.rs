@@ -55,16 +55,9 @@ rows! {
 pub struct Table42;
 
 impl Figure for Table42 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "mi-table4-2",
-        title: "Two sensors of unequal noise",
-        caption: "Squared error when one sensor has half the other's noise variance. The printed Lloyd-Max baseline is scaled \
-                      to the noise; scaled to the sample, as it should be, it beats the mutual-information design.",
-        source: "thesis, Table 4.2",
-    };
+    figure!(Parameters => Rows, "mi-table4-2", "Two sensors of unequal noise", "thesis, Table 4.2",
+        "Squared error when one sensor has half the other's noise variance. The printed Lloyd-Max baseline is scaled \
+         to the noise; scaled to the sample, as it should be, it beats the mutual-information design.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let as_printed = p.noise_variances == [1.0, 0.5];

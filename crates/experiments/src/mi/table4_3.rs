@@ -89,17 +89,10 @@ impl Rows {
 pub struct Table43;
 
 impl Figure for Table43 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "mi-table4-3",
-        title: "Nine sensors",
-        caption: "Nine equal sensors of four levels. Identical quantizers need 220 outcomes instead of 262144, so their whole \
-                      error curve is exact; the greedy chain gives nine different quantizers. The printed design stopped 7.5 % \
-                      short of the optimum.",
-        source: "thesis, Table 4.3",
-    };
+    figure!(Parameters => Rows, "mi-table4-3", "Nine sensors", "thesis, Table 4.3",
+        "Nine equal sensors of four levels. Identical quantizers need 220 outcomes instead of 262144, so their whole \
+         error curve is exact; the greedy chain gives nine different quantizers. The printed design stopped 7.5 % \
+         short of the optimum.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let scene = scene(&vec![p.noise_sd; p.sensors], 0.0)?;

@@ -120,17 +120,10 @@ impl Design {
 pub struct Table44;
 
 impl Figure for Table44 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "mi-table4-4",
-        title: "Detection by five sensors",
-        caption: "Error probability of the optimal decision between 0 and a signal from five sensors of four levels, exact by \
-                      counting. Mutual information and the Matusita distance give almost the least error; the J-divergence is \
-                      far off at the strong signal.",
-        source: "thesis, Table 4.4",
-    };
+    figure!(Parameters => Rows, "mi-table4-4", "Detection by five sensors", "thesis, Table 4.4",
+        "Error probability of the optimal decision between 0 and a signal from five sensors of four levels, exact by \
+         counting. Mutual information and the Matusita distance give almost the least error; the J-divergence is \
+         far off at the strong signal.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let mut rows = Rows {

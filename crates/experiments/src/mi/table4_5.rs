@@ -56,17 +56,10 @@ rows! {
 pub struct Table45;
 
 impl Figure for Table45 {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "mi-table4-5",
-        title: "Words over a binary symmetric channel",
-        caption: "Two sensors of four levels whose two-bit words cross a binary symmetric channel. With natural words the \
-                      breakpoints shrink as the channel gets worse, as printed; with Gray words they hardly move. At a crossover \
-                      of 0.05 information prefers Gray words and squared error natural ones.",
-        source: "thesis, Table 4.5",
-    };
+    figure!(Parameters => Vec<Row>, "mi-table4-5", "Words over a binary symmetric channel", "thesis, Table 4.5",
+        "Two sensors of four levels whose two-bit words cross a binary symmetric channel. With natural words the \
+         breakpoints shrink as the channel gets worse, as printed; with Gray words they hardly move. At a crossover \
+         of 0.05 information prefers Gray words and squared error natural ones.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();
@@ -104,7 +97,7 @@ impl Figure for Table45 {
         claims.references("outer2", "outer breakpoint", rows, |r| (key(r), r.pair.outer2));
         claims.references("printed", "printed error, natural words, three digits", rows, |r| (key(r), r.pair.mse));
         let at = |crossover: f64, labelling: &str, design: &str| {
-            first(&rows, |r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design)).map(|r| &r.pair)
+            first(rows, |r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design)).map(|r| &r.pair)
         };
         let what = "the printed breakpoint exceeds the joint optimum of natural words by 0.5 to 1.1 %";
         here.all("excess", what, PRINTED, |(crossover, outer)| {
@@ -122,21 +115,21 @@ impl Figure for Table45 {
         let third = at(0.05, "third", "mse-joint").zip(at(0.05, "gray", "mse-joint"));
         let what = "the third assignment is much worse";
         here.above("third-worst", what, third.map(|(a, b)| a.mse - b.mse), 0.04);
-        let natural = select(&rows, |r| r.labelling == "natural" && r.design == "mi-joint");
+        let natural = select(rows, |r| r.labelling == "natural" && r.design == "mi-joint");
         here.increasing("worse", "errors grow with the crossover", natural.map(|r| r.pair.mse));
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
         let panel = |title: &str, axis: &str, value: fn(&Row) -> f64, printed: fn(&Row) -> Option<f64>| {
             let lines = LABELLINGS.iter().enumerate().flat_map(|(i, (labelling, title, _))| {
-                let own = select(&rows, |r| r.labelling == *labelling && r.design == "mi-joint");
+                let own = select(rows, |r| r.labelling == *labelling && r.design == "mi-joint");
                 let line = points(own, |r| (r.crossover, value(r)));
                 [
                     Layer::line(*title, line.clone()).coloured(i),
                     Layer::points("", line).coloured(i),
                 ]
             });
-            let print = select(&rows, |r| r.labelling == "natural" && r.design == "printed");
+            let print = select(rows, |r| r.labelling == "natural" && r.design == "printed");
             Panel::linear(title, "crossover probability", axis)
                 .with_all(lines)
                 .with(Layer::points("printed", points(print, |r| (r.crossover, printed(r)))).styled(6, Marker::Cross))
@@ -192,17 +185,10 @@ rows! {
 pub struct Mismatch;
 
 impl Figure for Mismatch {
-    type Parameters = Parameters;
-    type Tables = Mismatches;
-
-    const ABOUT: About = About {
-        id: "mi-table4-5-mismatch",
-        title: "Designed for one channel, used on another",
-        caption: "Squared error when the joint information design for one crossover meets another (the decoder knows the true \
-                      one). Designing for a clean channel costs 2.6 % at a crossover of 0.05 with natural words and nothing with \
-                      Gray words.",
-        source: "thesis, Table 4.5 and text",
-    };
+    figure!(Parameters => Mismatches, "mi-table4-5-mismatch", "Designed for one channel, used on another", "thesis, Table 4.5 and text",
+        "Squared error when the joint information design for one crossover meets another (the decoder knows the true \
+         one). Designing for a clean channel costs 2.6 % at a crossover of 0.05 with natural words and nothing with \
+         Gray words.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Mismatches, Error> {
         let (mut rows, mut printed) = (Vec::new(), Vec::new());
@@ -245,7 +231,7 @@ impl Figure for Mismatch {
         claims.references("printed", what, natural, |r| (format!("{} 0 0.05", r.labelling), r.mse));
         for (labelling, matched) in [("natural", &[0.0, 0.01, 0.05][..]), ("gray", &[0.0, 0.05])] {
             let least_is_matched = |truth: &f64| {
-                let met = || select(&rows, |r| r.labelling == labelling && r.true_crossover == *truth);
+                let met = || select(rows, |r| r.labelling == labelling && r.true_crossover == *truth);
                 met()
                     .min_by(|a, b| a.mse.total_cmp(&b.mse))
                     .is_some_and(|best| best.designed_for == *truth)

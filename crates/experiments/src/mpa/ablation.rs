@@ -92,16 +92,9 @@ fn variants(n: usize) -> Result<Vec<(&'static str, MessagePassing, IntervalRule)
 }
 
 impl Figure for Ablation {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "mpa-ablation",
-        title: "Which erratum costs what",
-        caption: "Improved message passing with one printed choice put back at a time, 50 and 30 dB, four levels. Full rings, the \
-                      printed interval and transferred velocities cost most.",
-        source: "",
-    };
+    figure!(Parameters => Vec<Row>, "mpa-ablation", "Which erratum costs what", "",
+        "Improved message passing with one printed choice put back at a time, 50 and 30 dB, four levels. Full rings, the \
+         printed interval and transferred velocities cost most.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rows = Vec::new();

@@ -205,16 +205,9 @@ rows! {
 }
 
 impl Figure for Fig37 {
-    type Parameters = Parameters;
-    type Tables = Vec<Step>;
-
-    const ABOUT: About = About {
-        id: "mpa-fig3-7",
-        title: "Two targets, two measurements in unknown order",
-        caption: "Tracks with the printed rule of thumb and with the exact probability. After a crossing the labels cannot be told \
-                      apart, by any rule.",
-        source: "particle message passing, Figure 3.7",
-    };
+    figure!(Parameters => Vec<Step>, "mpa-fig3-7", "Two targets, two measurements in unknown order", "particle message passing, Figure 3.7",
+        "Tracks with the printed rule of thumb and with the exact probability. After a crossing the labels cannot be told \
+         apart, by any rule.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Step>, Error> {
         let mut tracks = Vec::new();
@@ -297,16 +290,9 @@ rows! {
 }
 
 impl Figure for Table {
-    type Parameters = Effort;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "mpa-table3-da",
-        title: "Rules of association",
-        caption: "Labelled and unlabelled errors of two random walks, and how far the probabilities are from what was. The exact \
-                      likelihood is better than the printed rule, most of all inside a particle filter.",
-        source: "particle message passing, Section 3.5",
-    };
+    figure!(Effort => Vec<Row>, "mpa-table3-da", "Rules of association", "particle message passing, Section 3.5",
+        "Labelled and unlabelled errors of two random walks, and how far the probabilities are from what was. The exact \
+         likelihood is better than the printed rule, most of all inside a particle filter.");
 
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut rules = Vec::new();

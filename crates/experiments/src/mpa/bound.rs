@@ -51,16 +51,9 @@ const SNRS: [f64; 4] = [20.0, 30.0, 40.0, 50.0];
 type Sums = Vec<[Matrix4<f64>; 2]>;
 
 impl Figure for Bounds {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "mpa-crlb",
-        title: "Bounds for quantized ranges",
-        caption: "Posterior Cramer-Rao bounds over free trajectories, accelerations known, with the references of the grid filter; \
-                      and what is reached. At 50 dB the bound is far below: information sits at the edges of the cells.",
-        source: "",
-    };
+    figure!(Parameters => Vec<Row>, "mpa-crlb", "Bounds for quantized ranges", "",
+        "Posterior Cramer-Rao bounds over free trajectories, accelerations known, with the references of the grid filter; \
+         and what is reached. At 50 dB the bound is far below: information sits at the edges of the cells.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let target = Target::printed()?;

@@ -29,17 +29,10 @@ const LEVELS: [usize; 4] = [2, 4, 8, 16];
 const NAMES: [&str; 3] = ["published", "predicted", "adaptive"];
 
 impl Figure for Encoders {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "mpa-encoder",
-        title: "Where the cells should lie",
-        caption: "The grid of 15 and Gaussian message passing with the published encoder, with the predicted range as reference, \
-                      and with cells as wide as the innovation. Without one additional bit the error falls by up to thirty times, and \
-                      four bits reach the filter of unquantized ranges.",
-        source: "",
-    };
+    figure!(Parameters => Rows, "mpa-encoder", "Where the cells should lie", "",
+        "The grid of 15 and Gaussian message passing with the published encoder, with the predicted range as reference, \
+         and with cells as wide as the innovation. Without one additional bit the error falls by up to thirty times, and \
+         four bits reach the filter of unquantized ranges.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let methods = [

@@ -147,16 +147,9 @@ fn case<const D: usize>(
 }
 
 impl Figure for Gibbs {
-    type Parameters = Draws;
-    type Tables = GibbsRows;
-
-    const ABOUT: About = About {
-        id: "mpa-gibbs",
-        title: "How fast Gibbs sweeps forget their start",
-        caption: "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
-                      separated modes (B), and what the sampler draws after five. In A the chain's own bias after five sweeps is 0.0093.",
-        source: "particle message passing, Section 2.1.4",
-    };
+    figure!(Draws => GibbsRows, "mpa-gibbs", "How fast Gibbs sweeps forget their start", "particle message passing, Section 2.1.4",
+        "Total variation of the labels after some sweeps, exactly, for moderately overlapping mixtures (A, C) and for two \
+         separated modes (B), and what the sampler draws after five. In A the chain's own bias after five sweeps is 0.0093.");
 
     fn run(&self, p: &Draws, context: &Context<'_>) -> Result<GibbsRows, Error> {
         let mut rows = GibbsRows {
@@ -262,16 +255,9 @@ rows! {
 }
 
 impl Figure for Rings {
-    type Parameters = None;
-    type Tables = RingRows;
-
-    const ABOUT: About = About {
-        id: "mpa-ring",
-        title: "Errata in closed form: radii, kernels, weights",
-        caption: "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
-                      Silverman's kernel; and the second moment of the printed ratio weights, which equal weights make 1.",
-        source: "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
-    };
+    figure!(None => RingRows, "mpa-ring", "Errata in closed form: radii, kernels, weights", "particle message passing, equations 3.8, 3.9, 3.20 to 3.22",
+        "Mean radius of the printed ring and of the message, over the cell's distance; errors of the printed and of \
+         Silverman's kernel; and the second moment of the printed ratio weights, which equal weights make 1.");
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<RingRows, Error> {
         let ring = |(lower, upper, deviation): (f64, f64, f64)| -> Result<Ring, Error> {
@@ -376,16 +362,9 @@ rows! {
 }
 
 impl Figure for Bits {
-    type Parameters = None;
-    type Tables = Vec<BitRow>;
-
-    const ABOUT: About = About {
-        id: "mpa-bits",
-        title: "Bits of a step",
-        caption: "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
-                      Where all nodes receive all levels and run the same deterministic tracker, none is needed.",
-        source: "particle message passing, Section 3.3",
-    };
+    figure!(None => Vec<BitRow>, "mpa-bits", "Bits of a step", "particle message passing, Section 3.3",
+        "The hand-over of mean and covariance makes the published protocol dearer than sending the ranges as they are. \
+         Where all nodes receive all levels and run the same deterministic tracker, none is needed.");
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<Vec<BitRow>, Error> {
         let mut bits = Vec::new();
@@ -469,15 +448,8 @@ fn graphs() -> Result<[(&'static str, FactorGraph); 3], Error> {
 }
 
 impl Figure for Graphs {
-    type Parameters = None;
-    type Tables = GraphRows;
-
-    const ABOUT: About = About {
-        id: "mpa-graphs",
-        title: "The factor graphs",
-        caption: "Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).",
-        source: "particle message passing, Figures 2.1, 3.2, 3.6",
-    };
+    figure!(None => GraphRows, "mpa-graphs", "The factor graphs", "particle message passing, Figures 2.1, 3.2, 3.6",
+        "Nodes and edges of the example (2.1), one tracking step (3.2) and one association step (3.6).");
 
     fn run(&self, _: &None, _: &Context<'_>) -> Result<GraphRows, Error> {
         let (mut nodes, mut edges) = (Vec::new(), Vec::new());

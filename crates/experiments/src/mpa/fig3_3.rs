@@ -52,16 +52,9 @@ rows! {
 pub struct Fig33;
 
 impl Figure for Fig33 {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "mpa-fig3-3",
-        title: "One trajectory, six trackers",
-        caption: "A manoeuvring target among five sensors that send two bits each per step. The naive filter and message passing \
-                      as published wander off; the grid filter stays on the track.",
-        source: "particle message passing, Figure 3.3",
-    };
+    figure!(Parameters => Rows, "mpa-fig3-3", "One trajectory, six trackers", "particle message passing, Figure 3.3",
+        "A manoeuvring target among five sensors that send two bits each per step. The naive filter and message passing \
+         as published wander off; the grid filter stays on the track.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let (target, point) = (Target::printed()?, Point::published(p.snr_db, p.levels, SPEED)?);

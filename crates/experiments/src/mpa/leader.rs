@@ -42,17 +42,10 @@ pub struct Leaders;
 const SETTINGS: [(f64, usize); 3] = [(50.0, 40), (50.0, 10), (30.0, 40)];
 
 impl Figure for Leaders {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "mpa-leader",
-        title: "Elections among copies that drew for themselves",
-        caption: "Five sensors, each with its own message passing and its own seed; the leader's mean and covariance, rounded to \
-                      32 bits, are what all go on with. In 98 of 100 steps exactly one claims the lead. One shared seed, or a \
-                      deterministic tracker, would make it all of them.",
-        source: "particle message passing, Section 3.3",
-    };
+    figure!(Parameters => Vec<Row>, "mpa-leader", "Elections among copies that drew for themselves", "particle message passing, Section 3.3",
+        "Five sensors, each with its own message passing and its own seed; the leader's mean and covariance, rounded to \
+         32 bits, are what all go on with. In 98 of 100 steps exactly one claims the lead. One shared seed, or a \
+         deterministic tracker, would make it all of them.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (target, sensors) = (Target::printed()?, canonical());

@@ -25,16 +25,9 @@ rows! {
 }
 
 impl Figure for Mse {
-    type Parameters = Effort;
-    type Tables = Mses;
-
-    const ABOUT: About = About {
-        id: "mpa-table3-mse",
-        title: "Errors of all trackers",
-        caption: "Position error at 50 dB with four levels. The interval likelihood on a small grid is a third below Gaussian \
-                      message passing; particle message passing as published loses the target.",
-        source: "particle message passing, Section 3.4",
-    };
+    figure!(Effort => Mses, "mpa-table3-mse", "Errors of all trackers", "particle message passing, Section 3.4",
+        "Position error at 50 dB with four levels. The interval likelihood on a small grid is a third below Gaussian \
+         message passing; particle message passing as published loses the target.");
 
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Mses, Error> {
         let mut methods = gaussian();
@@ -168,16 +161,9 @@ pub struct Fig34;
 const SIZES: [usize; 7] = [3, 5, 10, 20, 40, 100, 500];
 
 impl Figure for Fig34 {
-    type Parameters = Effort;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "mpa-fig3-4",
-        title: "Error over the number of particles",
-        caption: "40 dB, four levels. Message passing needs forty particles, guided draws ten; neither closes the gap to the filter \
-                      of unquantized ranges.",
-        source: "particle message passing, Figure 3.4",
-    };
+    figure!(Effort => Vec<Row>, "mpa-fig3-4", "Error over the number of particles", "particle message passing, Figure 3.4",
+        "40 dB, four levels. Message passing needs forty particles, guided draws ten; neither closes the gap to the filter \
+         of unquantized ranges.");
 
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut methods = gaussian();
@@ -250,16 +236,9 @@ parameters! {
 }
 
 impl Figure for Fig35 {
-    type Parameters = LevelEffort;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "mpa-fig3-5",
-        title: "Error over the number of levels",
-        caption: "50 dB, forty particles, the published encoder. Each bit is worth a factor of about four between two and six bits; \
-                      what is left at eight bits is the noise.",
-        source: "particle message passing, Figure 3.5",
-    };
+    figure!(LevelEffort => Vec<Row>, "mpa-fig3-5", "Error over the number of levels", "particle message passing, Figure 3.5",
+        "50 dB, forty particles, the published encoder. Each bit is worth a factor of about four between two and six bits; \
+         what is left at eight bits is the noise.");
 
     fn run(&self, p: &LevelEffort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut methods = gaussian();
@@ -320,16 +299,9 @@ impl Figure for Fig35 {
 pub struct Low;
 
 impl Figure for Low {
-    type Parameters = Effort;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "mpa-table3-low",
-        title: "Low signal-to-noise ratios",
-        caption: "30 and 20 dB. More than four levels still help at 30 dB; at 20 dB eight are enough. The printed numbers for `SNR \
-                      = 30` fit 20 dB.",
-        source: "particle message passing, Section 3.4",
-    };
+    figure!(Effort => Vec<Row>, "mpa-table3-low", "Low signal-to-noise ratios", "particle message passing, Section 3.4",
+        "30 and 20 dB. More than four levels still help at 30 dB; at 20 dB eight are enough. The printed numbers for `SNR \
+         = 30` fit 20 dB.");
 
     fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut trackers = Vec::new();

@@ -143,17 +143,10 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
 }
 
 impl Figure for Faulty {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "network-faults",
-        title: "What faults cost",
-        caption: "Four one-bit sensors of the scalar world under lost frames, inverted bits, random delays and dying sensors. Told the \
-                      prediction in full, a sensor loses only the slot whose question is lost; following by echo, it must first be given the \
-                      belief again, which takes two slots and grows with the loss. Right: slots until a restarted sensor answers.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Vec<Row>, "network-faults", "What faults cost", "our own comparison",
+        "Four one-bit sensors of the scalar world under lost frames, inverted bits, random delays and dying sensors. Told the \
+         prediction in full, a sensor loses only the slot whose question is lost; following by echo, it must first be given the \
+         belief again, which takes two slots and grows with the loss. Right: slots until a restarted sensor answers.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let levels = [
@@ -198,7 +191,7 @@ impl Figure for Faulty {
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
         let at = |fault: &str, level: f64, feedback: &str| {
-            first(&rows, |r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
+            first(rows, |r| (r.fault, r.level, r.feedback) == (fault, level, feedback))
         };
         let gap = |feedback| {
             at("loss", 0.0, feedback)
@@ -221,7 +214,7 @@ impl Figure for Faulty {
         here.near("recovery-echoed", what, clean.map(|c| c.0), 2.0, 0.0);
         let restart = at("loss", 0.0, "told").map(|r| r.disagreements.value);
         here.near("told", "without faults on air nobody disagrees with a centre that tells", restart, 0.0, 0.0);
-        let lossy = select(&rows, |r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
+        let lossy = select(rows, |r| r.fault == "loss" && r.level > 0.0 && r.feedback == "echoed");
         claims.all("noted", "replicas that miss frames are seen to disagree", lossy, |r| r.disagreements.value > 0.0);
     }
 

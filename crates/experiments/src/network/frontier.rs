@@ -88,18 +88,11 @@ fn rows_of(world: &'static str, schemes: &[Scheme], runs: &Comparison<5>, floor:
 }
 
 impl Figure for Frontier {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "network-frontier",
-        title: "One frontier for all schemes",
-        caption: "Root mean squared error of every scheme against its payload, against all bits on air, and against the energy of \
-                      all radios (CC2420 at 0 dBm), on the same scalar and plane worlds with four sensors. The line joins what nothing else \
-                      beats in both. By payload one bit a sensor is a bargain; on air a frame's overhead of 200 bits buries the difference \
-                      between one bit and 32, so that few frames win, and sensors that are silent while they are predicted (adaptive) win most.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Vec<Row>, "network-frontier", "One frontier for all schemes", "our own comparison",
+        "Root mean squared error of every scheme against its payload, against all bits on air, and against the energy of \
+         all radios (CC2420 at 0 dBm), on the same scalar and plane worlds with four sensors. The line joins what nothing else \
+         beats in both. By payload one bit a sensor is a bargain; on air a frame's overhead of 200 bits buries the difference \
+         between one bit and 32, so that few frames win, and sensors that are silent while they are predicted (adaptive) win most.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(2e-2 * (p.trials * p.slots as u64) as f64, 1e8)
@@ -141,11 +134,11 @@ impl Figure for Frontier {
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         let find = |world: &str, scheme: &str, setting: &str, feedback: &str| {
-            first(&rows, |r| (r.world, r.scheme, r.setting.as_str(), r.feedback) == (world, scheme, setting, feedback))
+            first(rows, |r| (r.world, r.scheme, r.setting.as_str(), r.feedback) == (world, scheme, setting, feedback))
         };
         let ratio = |a: Option<&Row>, b: Option<&Row>, of: fn(&Row) -> f64| a.zip(b).map(|(a, b)| of(a) / of(b));
         let slack = |r: &&Row| r.floor - 4.0 * r.rmse.standard_error.unwrap_or(0.0);
-        let loud = || select(&rows, |r| !["CFwMD", "CFwMD2", "adaptive"].contains(&r.scheme));
+        let loud = || select(rows, |r| !["CFwMD", "CFwMD2", "adaptive"].contains(&r.scheme));
         claims.all("floor", "no scheme that pays for every symbol beats the floor", loud(), |r| {
             r.rmse.value >= slack(&r)
         });

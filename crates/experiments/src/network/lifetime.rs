@@ -51,17 +51,10 @@ pub struct Lifetime;
 const DAY: f64 = 86_400.0;
 
 impl Figure for Lifetime {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "network-lifetime",
-        title: "Days on two AA cells",
-        caption: "Life of the busiest sensor (CC2420, two AA cells) against the error of the scheme it runs, in the scalar world. At a \
-                      slot a second the node's own 6 mW decide and no scheme matters; at fifty slots a second, or once the processor sleeps, \
-                      the scheme decides.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Vec<Row>, "network-lifetime", "Days on two AA cells", "our own comparison",
+        "Life of the busiest sensor (CC2420, two AA cells) against the error of the scheme it runs, in the scalar world. At a \
+         slot a second the node's own 6 mW decide and no scheme matters; at fifty slots a second, or once the processor sleeps, \
+         the scheme decides.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (world, schemes) = (worlds::scalar()?, schemes::scalar_schemes());
@@ -100,7 +93,7 @@ impl Figure for Lifetime {
         let here = claims.at_defaults();
         claims.all("idle", "no node outlives one that is silent", rows, |r| r.days <= r.idle_days);
         let at = |scheme: &str, setting: &str, period: f64, baseline: f64| {
-            first(&rows, |r| {
+            first(rows, |r| {
                 (r.scheme, r.setting.as_str(), r.period, r.baseline) == (scheme, setting, period, baseline)
                     && r.feedback != "told"
             })

@@ -128,16 +128,9 @@ fn measure(context: &Context<'_>, nodes: u64, slots: u64) -> Result<(Row, Time),
 }
 
 impl Figure for Scale {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "network-scale",
-        title: "A million nodes",
-        caption: "Memory of the simulated network and time of an event against the number of nodes, each of which sends a bit \
-                      towards a root in every slot. Memory is linear; an event costs a little more where the queue leaves the cache.",
-        source: "our own measurement",
-    };
+    figure!(Parameters => Rows, "network-scale", "A million nodes", "our own measurement",
+        "Memory of the simulated network and time of an event against the number of nodes, each of which sends a bit \
+         towards a root in every slot. Memory is linear; an event costs a little more where the queue leaves the cache.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         let nodes: u64 = p.nodes.iter().sum();

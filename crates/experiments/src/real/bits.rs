@@ -157,18 +157,11 @@ pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 }
 
 impl Figure for Bits {
-    type Parameters = Parameters;
-    type Tables = Rows;
-
-    const ABOUT: About = About {
-        id: "real-bits",
-        title: "Real signals: error against bits",
-        caption: "Root mean square error against bits per sample on signals with the traits of recordings, or on the columns of \
-                      a file. The adaptive scheme needs no fit and bounds every error; the baselines are what an engineer would \
-                      try first, and deadband DPCM with an adaptive code, whose order is chosen in hindsight. Errors below a \
-                      millionth of the signal's range are drawn there.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Rows, "real-bits", "Real signals: error against bits", "our own comparison",
+        "Root mean square error against bits per sample on signals with the traits of recordings, or on the columns of \
+         a file. The adaptive scheme needs no fit and bounds every error; the baselines are what an engineer would \
+         try first, and deadband DPCM with an adaptive code, whose order is chosen in hindsight. Errors below a \
+         millionth of the signal's range are drawn there.");
 
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(2e-4 * (p.source.samples * p.rate.len()) as f64, 1e4 * p.source.samples as f64)

@@ -133,16 +133,9 @@ fn one(point: &Point<'_>, sums: &mut Sums, trial: Trial) -> Result<(), Error> {
 }
 
 impl Figure for Loss {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "real-loss",
-        title: "Real signals: loss and recovery",
-        caption: "A lost packet leaves the receiver out of step until the next refresh that arrives. Frequent refreshes cost bits \
-                  and shorten that time; the counter of the packets tells the receiver in which slots it must not trust itself.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Vec<Row>, "real-loss", "Real signals: loss and recovery", "our own comparison",
+        "A lost packet leaves the receiver out of step until the next refresh that arrives. Frequent refreshes cost bits \
+         and shorten that time; the counter of the packets tells the receiver in which slots it must not trust itself.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-loss", context)?;

@@ -86,16 +86,9 @@ fn mean<'a>(rows: impl Iterator<Item = &'a Row>, of: impl Fn(&Row) -> f64) -> Op
 }
 
 impl Figure for Models {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "real-models",
-        title: "Real signals: what the bank believed",
-        caption: "Weights of the three families of models, and the mean scale of their noise, over time: a plume raises the scale \
-                      within a few reports, a smooth drift is given to the velocities, a calm to the narrowest walks.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Vec<Row>, "real-models", "Real signals: what the bank believed", "our own comparison",
+        "Weights of the three families of models, and the mean scale of their noise, over time: a plume raises the scale \
+         within a few reports, a smooth drift is given to the velocities, a calm to the narrowest walks.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-models", context)?;
@@ -122,7 +115,7 @@ impl Figure for Models {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let columns = distinct(&rows, |r| r.column.clone());
+        let columns = distinct(rows, |r| r.column.clone());
         let panels = columns.iter().flat_map(|column| {
             let of = |y: fn(&Row) -> f64| {
                 let chosen = rows.iter().filter(|r| r.column == *column);

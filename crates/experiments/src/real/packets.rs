@@ -76,18 +76,11 @@ fn compare(recording: &Recording, target: f64, context: &Context<'_>) -> Result<
 }
 
 impl Figure for Packets {
-    type Parameters = Parameters;
-    type Tables = Vec<Row>;
-
-    const ABOUT: About = About {
-        id: "real-packets",
-        title: "Real signals: error against packets",
-        caption: "Root mean square error against packets per sample. Where a packet costs the same whatever it holds, codes gain \
-                      nothing: only the prediction counts, and what a packet holds. Send-on-delta sends the sample itself, and is \
-                      ahead where signals jump and rest; the bank is ahead where they have a velocity. Errors below a \
-                      millionth of the signal's range are drawn there.",
-        source: "our own comparison",
-    };
+    figure!(Parameters => Vec<Row>, "real-packets", "Real signals: error against packets", "our own comparison",
+        "Root mean square error against packets per sample. Where a packet costs the same whatever it holds, codes gain \
+         nothing: only the prediction counts, and what a packet holds. Send-on-delta sends the sample itself, and is \
+         ahead where signals jump and rest; the bank is ahead where they have a velocity. Errors below a \
+         millionth of the signal's range are drawn there.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-packets", context)?;
@@ -112,7 +105,7 @@ impl Figure for Packets {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<Row>) -> Plot {
-        let columns = distinct(&rows, |r| r.column.clone());
+        let columns = distinct(rows, |r| r.column.clone());
         let panel = |column: &String| {
             let curve = |(colour, scheme): (usize, &&'static str)| {
                 let chosen = rows.iter().filter(|r| r.column == *column && r.scheme == *scheme);
