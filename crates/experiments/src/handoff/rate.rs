@@ -147,9 +147,11 @@ impl Figure for Rate {
         let place = |r: &Row| (r.bits.value, r.kl);
         let of = |size: usize| select(rows, move |r| r.message == "coded" && r.size == size);
         let all = |message: &'static str| select(rows, move |r| r.message == message);
-        let layers = p.components.iter().enumerate().flat_map(|(i, m)| {
-            Layer::curve(format!("coded, {m} components"), i, of(*m).map(place).collect())
-        });
+        let layers = p
+            .components
+            .iter()
+            .enumerate()
+            .flat_map(|(i, m)| Layer::curve(format!("coded, {m} components"), i, of(*m).map(place).collect()));
         let panel = Panel::loglog("One belief", "message / bit", "KL / nat")
             .with_all(layers)
             .with(Layer::dashed("mixture as floats", points(all("f32"), place)).coloured(5))

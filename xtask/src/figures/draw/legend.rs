@@ -62,7 +62,8 @@ impl<'a> Entry<'a> {
     }
 }
 
-/// Both lists in one without what both have; none if a name looks otherwise in the other, or a look has another name there.
+/// Both lists in one without what both have; none if they have nothing in common, if a name looks otherwise in the other, or if a
+/// look has another name there.
 fn union<'a>(one: &[Entry<'a>], other: &[Entry<'a>]) -> Option<Vec<Entry<'a>>> {
     let mut all = one.to_vec();
     for entry in other {
@@ -73,11 +74,12 @@ fn union<'a>(one: &[Entry<'a>], other: &[Entry<'a>]) -> Option<Vec<Entry<'a>>> {
             Some(_) => return None,
         }
     }
-    Some(all)
+    let shared = all.len() < one.len() + other.len();
+    (shared || one.is_empty() || other.is_empty()).then_some(all)
 }
 
-/// The legends below rows of panels: one for a row where no name or look has two meanings, and one for several such rows, below
-/// the last.
+/// The legends below rows of panels: one for a row whose panels share entries and no name or look has two meanings, and one for
+/// several such rows, below the last.
 pub(super) fn of_rows<'a>(rows: &[&'a [Panel]], columns: usize) -> Vec<Vec<Block<'a>>> {
     let width = PANEL_WIDTH as i32;
     let of_row = |row: &&'a [Panel]| {
@@ -99,8 +101,8 @@ pub(super) fn of_rows<'a>(rows: &[&'a [Panel]], columns: usize) -> Vec<Vec<Block
         let ([(.., one)], [(.., other)]) = (&legends[next - 1][..], &legends[next][..]) else {
             continue;
         };
-        let shared = one.iter().any(|a| other.iter().any(|b| a.layer.label == b.layer.label));
-        if let Some(all) = union(one, other).filter(|_| shared) {
+        let both = !one.is_empty() && !other.is_empty();
+        if let Some(all) = union(one, other).filter(|_| both) {
             legends[next][0].2 = all;
             legends[next - 1].clear();
         }
