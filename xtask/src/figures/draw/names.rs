@@ -14,7 +14,11 @@ const WIDEST: f64 = 1500.0;
 const NAME: i32 = 84;
 
 /// The names of an axis in their lines; none on an axis of numbers.
-pub(super) struct Names(Vec<(f64, Vec<String>)>);
+pub(super) struct Names {
+    lines: Vec<(f64, Vec<String>)>,
+    /// Whether every other name stands lower, where words are wider than the room.
+    staggered: bool,
+}
 
 impl Names {
     /// Below an axis of this length: no name reaches into its neighbours' room.
@@ -22,7 +26,15 @@ impl Names {
         let mut places: Vec<f64> = axis.names().iter().map(|(at, _)| axis.position(*at)).collect();
         places.sort_by(f64::total_cmp);
         let gaps = places.windows(2).map(|pair| pair[1] - pair[0]);
-        Self::within(axis, 0.94 * length * gaps.fold(1.0, f64::min))
+        let room = 0.94 * length * gaps.fold(1.0, f64::min);
+        let level = Self::within(axis, room);
+        let staggered = level.width() > room;
+        let lines = if staggered {
+            Self::within(axis, 2.0 * room).lines
+        } else {
+            level.lines
+        };
+        Self { lines, staggered }
     }
 
     pub(super) fn left(axis: &Scaled) -> Self {
@@ -30,36 +42,54 @@ impl Names {
     }
 
     fn within(axis: &Scaled, room: f64) -> Self {
-        Self(axis.names().iter().map(|(at, name)| (*at, lines(name, room))).collect())
+        let lines = axis.names().iter().map(|(at, name)| (*at, lines(name, room))).collect();
+        Self {
+            lines,
+            staggered: false,
+        }
     }
 
     /// Lines of the name that has most.
+    fn most(&self) -> i32 {
+        self.lines
+            .iter()
+            .map(|(_, lines)| lines.len() as i32)
+            .max()
+            .unwrap_or(1)
+    }
+
+    /// Lines below an axis.
     pub(super) fn depth(&self) -> i32 {
-        self.0.iter().map(|(_, lines)| lines.len() as i32).max().unwrap_or(1)
+        self.most() * if self.staggered { 2 } else { 1 }
     }
 
     /// Lines of all names when each has as many as the deepest.
     pub(super) fn height(&self) -> i32 {
-        self.0.len() as i32 * self.depth() * NAME
+        self.lines.len() as i32 * self.most() * NAME
     }
 
     pub(super) fn width(&self) -> f64 {
-        let lines = self.0.iter().flat_map(|(_, lines)| lines);
+        let lines = self.lines.iter().flat_map(|(_, lines)| lines);
         lines.map(|line| wide(line, TICK)).fold(0.0, f64::max)
     }
 
     /// Writes them below the frame.
     pub(super) fn draw_below(&self, frame: &Frame<'_, '_>) -> Result<(), String> {
-        for (at, lines) in &self.0 {
+        for ((at, lines), place) in self.lines.iter().zip(0..) {
             let x = frame.across(*at).round() as i32;
-            column(frame, lines, (x, frame.bottom as i32 + GAP), Pos::new(HPos::Center, VPos::Top))?;
+            let lower = if self.staggered {
+                place % 2 * self.most() * NAME
+            } else {
+                0
+            };
+            column(frame, lines, (x, frame.bottom as i32 + GAP + lower), Pos::new(HPos::Center, VPos::Top))?;
         }
         Ok(())
     }
 
     /// Writes them left of the frame.
     pub(super) fn draw_left(&self, frame: &Frame<'_, '_>) -> Result<(), String> {
-        for (at, lines) in &self.0 {
+        for (at, lines) in &self.lines {
             let y = frame.down(*at).round() as i32 - (lines.len() as i32 - 1) * NAME / 2;
             column(frame, lines, (frame.left as i32 - GAP, y), Pos::new(HPos::Right, VPos::Center))?;
         }
