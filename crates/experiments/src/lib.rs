@@ -35,6 +35,7 @@ pub mod reference;
 mod schema;
 mod sweep;
 mod table;
+mod words;
 
 pub use claim::{Claim, Claims, Expected, Verdict};
 pub use error::Error;

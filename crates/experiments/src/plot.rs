@@ -16,6 +16,7 @@
 //! ```
 
 use crate::Measured;
+use crate::words::in_words;
 
 /// The points of a curve, a row each; rows without a value are left out.
 pub fn points<R, Y: Into<Option<f64>>>(
@@ -127,7 +128,7 @@ impl Axis {
     #[must_use]
     pub fn named(self, names: impl IntoIterator<Item = (f64, String)>) -> Self {
         Self {
-            names: names.into_iter().collect(),
+            names: names.into_iter().map(|(at, name)| (at, in_words(name))).collect(),
             ..self
         }
     }
@@ -136,10 +137,12 @@ impl Axis {
 /// How a line is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stroke {
-    /// Solid.
+    /// Solid, or in the broad dashes of its place in the palette.
     Solid,
     /// Dashed: bounds, references, asymptotes.
     Dashed,
+    /// Without the dashes that tell schemes apart: the truth.
+    Unbroken,
 }
 
 /// The shape of a point.
@@ -161,6 +164,18 @@ pub enum Marker {
     OpenSquare,
     /// An upright cross.
     Plus,
+    /// An open triangle.
+    OpenTriangle,
+    /// An open diamond.
+    OpenDiamond,
+    /// A filled triangle that points down.
+    Wedge,
+    /// An open triangle that points down.
+    OpenWedge,
+    /// Three strokes.
+    Star,
+    /// An open circle with a dot.
+    Ring,
 }
 
 /// What a layer draws.
@@ -173,7 +188,7 @@ pub enum Shape {
         /// Solid or dashed.
         stroke: Stroke,
     },
-    /// Markers, with vertical error bars of one standard error (half lengths) where given.
+    /// Markers, with error bars of one standard error (half lengths) where given.
     Points {
         /// The points.
         points: Vec<(f64, f64)>,
@@ -181,6 +196,8 @@ pub enum Shape {
         errors: Vec<f64>,
         /// The marker; by colour where absent.
         marker: Option<Marker>,
+        /// Whether error bars lie horizontally.
+        sideways: bool,
     },
     /// Vertical bars from zero (from the lower limit on a log axis), `width` wide in units of the horizontal axis.
     Bars {
@@ -231,7 +248,7 @@ pub struct Layer {
 impl Layer {
     fn new(label: impl Into<String>, shape: Shape) -> Self {
         Self {
-            label: label.into(),
+            label: in_words(label.into()),
             colour: None,
             inline: false,
             shape,
@@ -247,6 +264,12 @@ impl Layer {
                 stroke: Stroke::Solid,
             },
         )
+    }
+
+    /// A black line without the dashes that tell schemes apart: the truth that is estimated, edges.
+    pub fn unbroken(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        let stroke = Stroke::Unbroken;
+        Self::new(label, Shape::Line { points, stroke }).coloured(6)
     }
 
     /// A dashed line: a bound or a reference.
@@ -268,6 +291,7 @@ impl Layer {
                 points,
                 errors: Vec::new(),
                 marker: None,
+                sideways: false,
             },
         )
     }
@@ -355,6 +379,15 @@ impl Layer {
     pub fn with_errors(mut self, half_lengths: Vec<f64>) -> Self {
         if let Shape::Points { errors, .. } = &mut self.shape {
             *errors = half_lengths;
+        }
+        self
+    }
+
+    /// Lays error bars along the horizontal axis; ignored by other shapes.
+    #[must_use]
+    pub fn lying(mut self) -> Self {
+        if let Shape::Points { sideways, .. } = &mut self.shape {
+            *sideways = true;
         }
         self
     }

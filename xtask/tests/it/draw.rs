@@ -1,7 +1,21 @@
 //! Plots become SVG: every shape leaves its elements, whatever the data.
 
 use fewbits_experiments::plot::{Axis, Layer, Marker, Panel, Plot};
+use fewbits_experiments::{Context, all};
 use xtask::figures::to_svg;
+
+/// The text elements of a drawing: attributes and words.
+fn texts(svg: &str) -> Vec<(&str, &str)> {
+    let elements = svg.split("<text ").skip(1);
+    elements
+        .filter_map(|rest| rest.split_once("</text>")?.0.split_once('>'))
+        .collect()
+}
+
+fn attribute(element: &str, name: &str) -> f64 {
+    let value = element.split_once(&format!("{name}=\"")).unwrap().1;
+    value[..value.find('"').unwrap()].parse().unwrap()
+}
 
 fn svg(panel: Panel) -> String {
     to_svg("test", &Plot::of(panel)).unwrap()
@@ -59,4 +73,61 @@ fn what_has_no_place_on_an_axis_is_left_out() {
     assert!(!drawn.contains("NaN") && !drawn.contains("inf"));
     // Nothing at all to draw is a picture too.
     assert!(svg(empty().with(Layer::line("", Vec::new()))).starts_with("<svg"));
+}
+
+#[test]
+fn text_is_at_least_seven_points_in_print_and_inside_the_picture() {
+    for (id, panels) in [("dymbo-fig4", 1), ("handoff-fig2", 2), ("assign-table6-1", 2)] {
+        let figure = all().into_iter().find(|figure| figure.about().id == id).unwrap();
+        let parameters = figure.configure(&[], true).unwrap();
+        let plot = figure.produce(&parameters, &Context::new(1)).unwrap().plot;
+        let drawn = to_svg(id, &plot).unwrap();
+        let width = attribute(&drawn, "width");
+        let texts = texts(&drawn);
+        assert!(texts.len() > 10, "{id}");
+        for (element, words) in texts {
+            let size = attribute(element, "font-size");
+            let points = size / width * f64::from(panels) * 3.58 * 72.0;
+            assert!(points >= 7.0, "{id}: {words} in {points} pt");
+            // Narrower than any font is.
+            let (x, wide) = (attribute(element, "x"), 0.4 * size * words.trim().chars().count() as f64);
+            let (left, right) = match element {
+                e if e.contains("rotate") => (x, x),
+                e if e.contains("\"end\"") => (x - wide, x),
+                e if e.contains("\"middle\"") => (x - 0.5 * wide, x + 0.5 * wide),
+                _ => (x, x + wide),
+            };
+            assert!(left >= 0.0 && right <= width, "{id}: {words} is cut");
+        }
+    }
+}
+
+#[test]
+fn a_legend_stands_once_unless_a_name_or_a_look_has_two_meanings() {
+    let curve = |name: &str| empty().with(Layer::line(name, vec![(0.0, 1.0), (1.0, 2.0)]));
+    let legends = |panels: Vec<Panel>| count(&to_svg("test", &Plot::grid(2, panels)).unwrap(), "scheme");
+    assert_eq!(legends(vec![curve("scheme"), curve("scheme")]), 1);
+    assert_eq!(legends(vec![curve("scheme"); 4]), 1);
+    assert_eq!(legends(vec![curve("scheme"), curve("another scheme")]), 2);
+    assert_eq!(legends(vec![curve("scheme"), curve("scheme").without_legend()]), 1);
+}
+
+#[test]
+fn a_curve_of_one_point_is_a_mark() {
+    let alone = svg(empty().with(Layer::line("", vec![(1.0, 1.0)])));
+    assert_eq!(count(&alone, "<circle"), 1);
+}
+
+#[test]
+fn names_of_contours_stand_apart() {
+    let contour =
+        |i: u32| Layer::line(format!("level {i}"), (0..100).map(|k| (f64::from(k), f64::from(1 << i))).collect());
+    let drawn = svg(empty().with_all((0..4).map(|i| contour(i).inline())).without_legend());
+    let names: Vec<_> = texts(&drawn)
+        .into_iter()
+        .filter(|(_, words)| words.contains("level"))
+        .collect();
+    let mut heights: Vec<f64> = names.iter().map(|(element, _)| attribute(element, " y")).collect();
+    heights.sort_by(f64::total_cmp);
+    assert!(heights.len() == 4 && heights.windows(2).all(|pair| pair[1] - pair[0] > 68.0), "{heights:?}");
 }

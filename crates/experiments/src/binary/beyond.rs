@@ -371,26 +371,18 @@ impl Figure for Beyond {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let last = rows.changes.len();
-        let place = |i: usize| (last - i) as f64;
-        let all = || rows.changes.iter().enumerate();
-        let bars = all().map(|(i, r)| (r.change_percent.min(0.0), 0.0, place(i) - 0.35, place(i) + 0.35));
-        // The descriptions stand right of the bars: no axis has room for them.
-        let names = all().map(|(i, r)| (58.0, place(i), format!("{}: {}", r.idea, r.case)));
-        let numbers = all().map(|(i, r)| (r.change_percent - 7.0, place(i), format!("{:.1}", r.change_percent)));
-        let ticks = [-100.0, -75.0, -50.0, -25.0, 0.0].map(|at| (at, format!("{at}")));
+        let all = || (0..).map(|i: i32| f64::from(-i)).zip(&rows.changes);
+        let bars = all().map(|(at, r)| (r.change_percent.min(0.0), 0.0, at - 0.35, at + 0.35));
+        let numbers = all().map(|(at, r)| (r.change_percent - 14.0, at, format!("{:.1}", r.change_percent)));
+        let names = rows.changes.iter().map(|r| format!("{}: {}", r.idea, r.case));
         Plot::of(
             Panel::new(
                 "Change of the mean squared error",
-                Axis::linear("change / %").between(-110.0, 120.0).named(ticks),
-                Axis::linear("")
-                    .between(0.4, last as f64 + 0.6)
-                    .named([(1.0, String::new())]),
+                Axis::linear("change / %").between(-132.0, 2.0),
+                Axis::ladder(names),
             )
             .with(Layer::boxes("", bars.collect()).coloured(0))
-            .with(Layer::texts(numbers.collect()).coloured(6))
-            .with(Layer::texts(names.collect()).coloured(6))
-            .without_legend(),
+            .with(Layer::texts(numbers.collect())),
         )
     }
 }

@@ -201,7 +201,7 @@ fn field_panel(title: &str, rows: &Fields, of: fn(&Point) -> f64) -> Panel {
     let ends = |axis: &[f64]| (axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(1.0));
     let ((x0, x1), (y0, y1)) = (ends(&x), ends(&y));
     Panel::new(title, Axis::linear("x (m)").between(x0, x1), Axis::linear("y (m)").between(y0, y1))
-        .with(Layer::heat("log10 p/peak", x, y, values))
+        .with(Layer::heat("lg(p/peak)", x, y, values))
         .with(Layer::points("source", vec![B.source.into()]).styled(3, Marker::OpenCircle))
 }
 

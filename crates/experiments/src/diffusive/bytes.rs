@@ -66,19 +66,9 @@ impl Figure for Bytes {
     fn plot(&self, _: &Settings, rows: &Vec<Summary>) -> Plot {
         let mut panel =
             Panel::loglog("Cost and accuracy", "bytes of all messages (median)", "error at the end (m, median)");
-        let markers = [
-            Marker::Circle,
-            Marker::Square,
-            Marker::Triangle,
-            Marker::Diamond,
-            Marker::Cross,
-            Marker::Plus,
-            Marker::Circle,
-            Marker::Square,
-        ];
-        for (row, marker) in rows.iter().zip(markers.into_iter().cycle()) {
+        for row in rows {
             let place = row.bytes_median.zip(row.final_err_median).map(|(b, e)| (b.value, e));
-            panel = panel.with(Layer::measured(row.scheme, place, |at| at).marked(marker));
+            panel = panel.with(Layer::measured(row.scheme, place, |at| at));
         }
         Plot::of(panel)
     }

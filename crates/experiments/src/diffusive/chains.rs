@@ -205,7 +205,7 @@ impl Figure for Chains {
         let last = rows.curves.iter().map(|c| c.step).max().unwrap_or(1) as f64;
         let limit = || Layer::dashed("threshold", vec![(1.0, threshold), (last, threshold)]).coloured(7);
         let determinants = |title: &str, chosen: &dyn Fn(&Scheme) -> bool| {
-            let axis = Axis::linear("log10 det of the covariance (m^4)");
+            let axis = Axis::linear("lg det of the covariance (m^4)");
             let mut panel = Panel::new(title, Axis::linear("nodes"), axis).with(limit());
             for (i, scheme) in schemes.iter().filter(|s| chosen(s)).enumerate() {
                 let line = points(of(scheme), |c| (c.step as f64, c.log10det_med.map_or(f64::NAN, |m| m.value)));

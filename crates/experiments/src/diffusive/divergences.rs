@@ -179,10 +179,8 @@ impl Figure for Divergences {
         for (i, rep) in shown.chain([TWO_PHASES]).enumerate() {
             let of = || rows.iter().filter(|r| r.rep == rep);
             let scalars = of().next().map_or(0, |r| r.scalars);
-            panel = panel.with(
-                Layer::line(format!("{rep} ({scalars})"), points(of(), |r| (r.nodes as f64, r.kl_median.value)))
-                    .coloured(i),
-            );
+            let marks = of().map(|r| (r.nodes as f64, r.kl_median)).collect();
+            panel = panel.with_all(Layer::curve(format!("{rep} ({scalars})"), i, marks));
         }
         Plot::of(panel)
     }

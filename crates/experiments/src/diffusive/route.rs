@@ -142,7 +142,7 @@ impl Figure for Trace {
                 (r.step as f64, total)
             })
             .collect();
-        let determinant = Panel::linear("Test", "nodes", "log10 det of the covariance (m^4)");
+        let determinant = Panel::linear("Test", "nodes", "lg det of the covariance (m^4)");
         let sent = Panel::linear("Messages", "nodes", "bytes so far");
         Plot::grid(
             2,
@@ -247,7 +247,8 @@ impl Figure for Route {
     fn plot(&self, _: &Parameters, rows: &RouteRows) -> Plot {
         let axis = |label: &str| Axis::linear(label).between(0.0, 100.0);
         let mut panel = Panel::new("Route and belief", axis("x (m)"), axis("y (m)"));
-        panel = panel.with(Layer::points("deployed", rows.field.iter().map(|p| (p.x, p.y)).collect()).coloured(7));
+        panel = panel
+            .with(Layer::points("deployed", rows.field.iter().map(|p| (p.x, p.y)).collect()).styled(7, Marker::Circle));
         for r in &rows.route {
             let covariance = nalgebra::Matrix2::new(r.variance_x, r.covariance_xy, r.covariance_xy, r.variance_y);
             let belief = fewbits_core::Gaussian::new(nalgebra::Vector2::new(r.estimate_x, r.estimate_y), covariance);

@@ -211,8 +211,9 @@ impl Figure for Unknowns {
         for (c, model) in ["sample-wise", "node-wise", "joint"].into_iter().enumerate() {
             let of = || select(&rows.models, |m| m.model == model);
             let width = points(of(), |m| (m.nodes as f64, m.width.value));
+            let bias_of = Layer::measured(model, of(), |m| (m.nodes as f64, m.bias));
             bias = bias
-                .with(Layer::points(model, points(of(), |m| (m.nodes as f64, m.bias.value))).coloured(c))
+                .with(bias_of.coloured(c))
                 .with(Layer::dashed(format!("{model}: width"), width).coloured(c));
         }
         Plot::grid(2, vec![bound, bias])

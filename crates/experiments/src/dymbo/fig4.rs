@@ -56,9 +56,6 @@ rows! {
     }
 }
 
-/// Noise ratios in the picture.
-const SHOWN: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
-
 fn loss(a: f64, gamma: f64) -> Option<f64> {
     steady::loss(&Plant { a, gamma }.model().ok()?).ok()
 }
@@ -135,20 +132,21 @@ impl Figure for Loss {
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
         let (x, y) = (Axis::log("gamma = process / measurement variance"), Axis::linear("plant coefficient a"));
-        let mut panel = Panel::new(
-            "Loss: steady variance over the Kalman filter's",
-            x.between(*SHOWN.start(), *SHOWN.end()),
-            y.between(0.0, 1.0),
-        );
-        // Contours that leave the picture would pile up at its edge.
+        let mut panel =
+            Panel::new("Loss: steady variance over the Kalman filter's", x.between(1e-3, 10.0), y.between(0.0, 1.0));
         let curve = |kind: &str, level: f64| {
-            let shown = |c: &&Contour| c.kind == kind && c.level == level && SHOWN.contains(&c.gamma);
+            let shown = |c: &&Contour| c.kind == kind && c.level == level;
             points(rows.contours.iter().filter(shown), |c| (c.gamma, c.a))
         };
         for (i, &level) in p.level.iter().enumerate() {
-            panel = panel.with(Layer::line(level.to_string(), curve("riccati", level)).coloured(i));
+            let mut line = curve("riccati", level);
+            // The table is too coarse for a contour that comes near a = 1 without reaching it.
+            let last = line.last().map_or(1.0, |(_, a)| *a);
+            let near_one = (1..12).map(|k| 1.0 - 0.01 * 0.5_f64.powi(k)).filter(|a| *a > last);
+            line.extend(near_one.filter_map(|a| Some((steady::noise_ratio_at_loss(level, a).ok()??, a))));
+            panel = panel.with(Layer::line(level.to_string(), line).coloured(i).inline());
         }
-        panel = panel.with(Layer::dashed("2, exact", curve("exact", 2.0)).coloured(p.level.len()));
+        panel = panel.with(Layer::dashed("2, by the exact error", curve("exact", 2.0)).coloured(p.level.len()));
         Plot::of(panel)
     }
 }

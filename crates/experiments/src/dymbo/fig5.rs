@@ -284,10 +284,10 @@ impl Figure for Convergence {
             panels.push(
                 Panel::new(curve[0].plant.title(), x, y)
                     .with(Layer::line("Kalman, exact", line(|r| r.kf_pred)).coloured(0))
-                    .with(marks("Kalman, simulated", |r| r.kf_mse).styled(0, Marker::Square))
+                    .with(marks("Kalman, simulated", |r| r.kf_mse).coloured(0))
                     .with(Layer::line("sign bit, exact", line(|r| r.dymbo_exact)).coloured(1))
                     .with(marks("sign bit, simulated", |r| r.dymbo_mse).coloured(1))
-                    .with(marks("sign bit with prior, simulated", |r| r.informed_mse).styled(2, Marker::Triangle))
+                    .with(marks("sign bit with prior, simulated", |r| r.informed_mse).coloured(2))
                     .with(Layer::dashed("sign bit, steady", line(|r| r.dymbo_minf)).coloured(3)),
             );
         }
@@ -296,7 +296,7 @@ impl Figure for Convergence {
             let title = format!("One run, gamma = {}", path[0].plant.gamma);
             panels.push(
                 Panel::linear(title, "step n", "state / sigma")
-                    .with(Layer::line("state", line(|r| r.theta)).coloured(4))
+                    .with(Layer::unbroken("state", line(|r| r.theta)))
                     .with(Layer::dashed("Kalman", line(|r| r.kf)).coloured(0))
                     .with(Layer::line("sign bit", line(|r| r.dymbo)).coloured(1)),
             );

@@ -144,21 +144,18 @@ impl Figure for Rate {
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {
-        let of = |message: &'static str, size: usize| {
-            points(rows.iter().filter(move |r| r.message == message && r.size == size), |r| (r.bits.value, r.kl.value))
-        };
-        let all = |message: &'static str| {
-            points(rows.iter().filter(move |r| r.message == message), |r| (r.bits.value, r.kl.value))
-        };
+        let place = |r: &Row| (r.bits.value, r.kl);
+        let of = |size: usize| select(rows, move |r| r.message == "coded" && r.size == size);
+        let all = |message: &'static str| select(rows, move |r| r.message == message);
         let layers = p
             .components
             .iter()
             .enumerate()
-            .map(|(i, m)| Layer::line(format!("coded, {m} components"), of("coded", *m)).coloured(i));
+            .flat_map(|(i, m)| Layer::curve(format!("coded, {m} components"), i, of(*m).map(place).collect()));
         let panel = Panel::loglog("One belief", "message / bit", "KL / nat")
             .with_all(layers)
-            .with(Layer::dashed("mixture as floats", all("f32")).coloured(5))
-            .with(Layer::points("particles as floats", all("particles")).coloured(6));
+            .with(Layer::dashed("mixture as floats", points(all("f32"), place)).coloured(5))
+            .with(Layer::measured("particles as floats", all("particles"), place).coloured(6));
         Plot::of(panel)
     }
 }

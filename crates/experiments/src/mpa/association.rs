@@ -250,8 +250,8 @@ impl Figure for Fig37 {
             let of = |rule: &'static str| select(t, move |r| r.variance == *variance && r.rule == rule);
             let k = |r: &Step| r.k as f64;
             Panel::linear(format!("R = {variance}"), "step", "position")
-                .with(Layer::line("target 1", points(of("jpda"), |r| (k(r), r.t1))).coloured(0))
-                .with(Layer::line("target 2", points(of("jpda"), |r| (k(r), r.t2))).coloured(1))
+                .with(Layer::unbroken("target 1", points(of("jpda"), |r| (k(r), r.t1))))
+                .with(Layer::unbroken("target 2", points(of("jpda"), |r| (k(r), r.t2))))
                 .with(Layer::points("printed, 1", points(of("tanh"), |r| (k(r), r.estimate1))).coloured(2))
                 .with(Layer::points("printed, 2", points(of("tanh"), |r| (k(r), r.estimate2))).coloured(3))
                 .with(Layer::dashed("exact, 1", points(of("jpda"), |r| (k(r), r.estimate1))).coloured(4))

@@ -148,7 +148,7 @@ impl Figure for Bounds {
         let panel = |levels: usize| {
             let here: Vec<&Row> = t.iter().filter(|r| r.levels == levels).collect();
             let snr = |r: &&Row| r.snr_db;
-            Panel::semilog(format!("{levels} levels"), "SNR / dB", "mean squared error")
+            Panel::semilog(format!("{levels} levels"), "SNR / dB", super::scores::MSE)
                 .with(Layer::line("bound", points(&here, |r| (snr(r), r.quantized.value))).coloured(0))
                 .with(Layer::points("grid, median", points(&here, |r| (snr(r), r.grid_median))).coloured(1))
                 .with(Layer::measured("grid, mean", &here, |r| (snr(r), r.grid)).coloured(2))

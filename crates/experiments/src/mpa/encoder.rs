@@ -113,9 +113,9 @@ impl Figure for Encoders {
             });
             let reference = t.encoders.iter().find(|r| r.snr_db == snr && r.method == "EKF-U");
             let level = reference.map_or(Vec::new(), |r| vec![(1.0, r.score.mse.value), (4.0, r.score.mse.value)]);
-            Panel::semilog(format!("{snr} dB"), "bits", "mean squared error")
+            Panel::semilog(format!("{snr} dB"), "bits", super::scores::MSE)
                 .with_all(lines)
-                .with(Layer::dashed("unquantized EKF", level))
+                .with(Layer::dashed("EKF-U", level))
         };
         Plot::grid(3, [50.0, 40.0, 30.0].map(panel).to_vec())
     }

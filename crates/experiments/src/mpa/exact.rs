@@ -491,10 +491,8 @@ impl Figure for Graphs {
                 list.iter().position(|n| n.node == node).map(|i| place(list, i, y))
             };
             let lines = t.edges.iter().filter(|e| e.graph == name).filter_map(|e| {
-                Some(
-                    Layer::line("", vec![at(&functions, &e.function, 1.0)?, at(&variables, &e.variable, 0.0)?])
-                        .coloured(7),
-                )
+                let ends = vec![at(&functions, &e.function, 1.0)?, at(&variables, &e.variable, 0.0)?];
+                Some(Layer::unbroken("", ends))
             });
             let marks = |list: &[&NodeRow], y: f64| (0..list.len()).map(|i| place(list, i, y)).collect();
             let names = |list: &[&NodeRow], y: f64, shift: f64| {

@@ -111,10 +111,10 @@ impl Figure for Fig33 {
         let sensors = canonical().iter().map(|s| (s[0], s[1])).collect();
         let panel = Panel::new(
             "50 dB, four levels",
-            Axis::linear("x").between(0.0, 20.0),
-            Axis::linear("y").between(0.0, 20.0),
+            Axis::linear("x / m").between(0.0, 20.0),
+            Axis::linear("y / m").between(0.0, 20.0),
         )
-        .with(Layer::line("truth", truth).coloured(0))
+        .with(Layer::unbroken("truth", truth))
         .with_all(names.iter().enumerate().map(line))
         .with(Layer::points("sensors", sensors).coloured(8));
         Plot::of(panel)

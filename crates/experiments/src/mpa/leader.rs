@@ -125,18 +125,15 @@ impl Figure for Leaders {
     fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
         let names = t.iter().map(|r| format!("{} dB, N = {}", r.snr_db, r.particles));
         let rows: Vec<(usize, &Row)> = t.iter().enumerate().collect();
-        let others = points(&rows, |(i, r)| (*i as f64, r.none.value + r.several.value));
+        let rest = |share: Measured| Measured {
+            value: 1.0 - share.value,
+            ..share
+        };
         Plot::of(
             Panel::new("Elections", Axis::categories("", names), Axis::linear("share of steps"))
                 .with(Layer::measured("none claims", rows.clone(), |(i, r)| (i as f64, r.none)))
-                .with(Layer::points("none or several claim", others))
-                .with(Layer::measured("another than the nearest leads", rows, |(i, r)| {
-                    let share = Measured {
-                        value: 1.0 - r.nearest.value,
-                        ..r.nearest
-                    };
-                    (i as f64, share)
-                })),
+                .with(Layer::measured("none or several claim", rows.clone(), |(i, r)| (i as f64, rest(r.one))))
+                .with(Layer::measured("another than the nearest leads", rows, |(i, r)| (i as f64, rest(r.nearest)))),
         )
     }
 }

@@ -100,6 +100,9 @@ pub(super) fn loses_no_more(claims: &mut Claims, rows: &[Row]) {
     full.references_at_most("lost-most", "share of lost tracks", rows, |r| (r.key(), r.score.lost));
 }
 
+/// The axis of squared position errors.
+pub(super) const MSE: &str = "mean squared error / m^2";
+
 /// The score of a method at a point.
 pub(super) fn find<'a>(rows: &'a [Row], point: &str, method: &str) -> Option<&'a Row> {
     rows.iter().find(|r| r.point == point && r.method == method)
@@ -115,9 +118,15 @@ pub(super) fn ladder<'a>(title: &str, rows: impl IntoIterator<Item = &'a Row>) -
     let rows: Vec<&Row> = rows.into_iter().collect();
     let numbered = || rows.iter().enumerate().map(|(i, r)| (-(i as f64), *r));
     let y = Axis::ladder(rows.iter().map(|r| r.method.as_str()));
-    Panel::new(title, Axis::log("mean squared error"), y)
-        .with(Layer::points("mean", points(numbered(), |(at, r)| (r.score.mse.value, at))))
-        .with(Layer::points("median", points(numbered(), |(at, r)| (r.score.median.value, at))))
+    let lying = |label: &str, of: fn(&Row) -> Measured| {
+        let errors = rows.iter().map(|r| of(r).standard_error.unwrap_or(0.0)).collect();
+        Layer::points(label, points(numbered(), |(at, r)| (of(r).value, at)))
+            .with_errors(errors)
+            .lying()
+    };
+    Panel::new(title, Axis::log(MSE), y)
+        .with(lying("mean", |r| r.score.mse))
+        .with(lying("median", |r| r.score.median))
 }
 
 /// All the cheap Gaussian trackers.

@@ -1,6 +1,6 @@
 //! `mpa-table3-mse`, `mpa-fig3-4`, `mpa-fig3-5`, `mpa-table3-low`: all trackers over particles, levels and noise.
 
-use super::scores::{Effort, Row, agree, clouds, find, gaussian, ladder, loses_no_more, messages, mse, rows};
+use super::scores::{Effort, MSE, Row, agree, clouds, find, gaussian, ladder, loses_no_more, messages, mse, rows};
 use super::world::{LAYOUTS, Method, Point};
 use crate::prelude::*;
 use fewbits_pf_mpa::Reports;
@@ -131,9 +131,12 @@ impl Figure for Mse {
             let of: Vec<&Row> = t.speeds.iter().filter(|r| r.family == f).collect();
             Layer::measured(f, of, |r| (speed(r), r.score.mse))
         });
-        let second =
-            Panel::new("speed of the encoder", Axis::linear("V").between(0.8, 4.2), Axis::log("mean squared error"))
-                .with_all(lines);
+        let second = Panel::new(
+            "Speed that the encoder expects",
+            Axis::linear("speed V / (m/step)").between(0.8, 4.2),
+            Axis::log(MSE),
+        )
+        .with_all(lines);
         Plot::grid(1, vec![first, second])
     }
 }
@@ -144,7 +147,11 @@ rows! {}
 fn families(rows: &[Row], shown: &[&str], x: impl Fn(&Row) -> f64) -> Vec<Layer> {
     let line = |(i, family): (usize, &&str)| {
         let of: Vec<&Row> = rows.iter().filter(|r| r.family == **family).collect();
-        Layer::measured(*family, of, |r| (x(r), r.score.mse)).coloured(i)
+        let label = match *family {
+            "improved" | "narrow" | "published" => format!("messages, {family}"),
+            other => other.to_owned(),
+        };
+        Layer::measured(label, of, |r| (x(r), r.score.mse)).coloured(i)
     };
     shown.iter().enumerate().map(line).collect()
 }
@@ -203,11 +210,12 @@ impl Figure for Fig34 {
             let value = mse(t, "40dB-L4", method);
             value.map(|v| vec![(3.0, v), (500.0, v)]).unwrap_or_default()
         };
+        let particles = Axis::log("particles").named(SIZES.map(|n| (n as f64, n.to_string())));
         Plot::of(
-            Panel::loglog("40 dB, four levels", "particles", "mean squared error")
+            Panel::new("40 dB, four levels", particles, Axis::log(MSE))
                 .with_all(families(t, &shown, size))
                 .with(Layer::dashed("grid of 15", level("grid-15")))
-                .with(Layer::dashed("unquantized EKF", level("EKF-U"))),
+                .with(Layer::dashed("EKF-U", level("EKF-U"))),
         )
     }
 }
@@ -280,10 +288,10 @@ impl Figure for Fig35 {
         let grid: Vec<&Row> = t.iter().filter(|r| r.method == "grid-15").collect();
         let unquantized: Vec<&Row> = t.iter().filter(|r| r.method == "EKF-U").collect();
         Plot::of(
-            Panel::semilog("50 dB, forty particles", "bits", "mean squared error")
+            Panel::semilog("50 dB, forty particles", "bits", MSE)
                 .with_all(families(t, &shown, bits))
                 .with(Layer::measured("grid of 15", grid, |r| (bits(r), r.score.mse)))
-                .with(Layer::dashed("unquantized EKF", points(unquantized, |r| (bits(r), r.score.mse.value)))),
+                .with(Layer::dashed("EKF-U", points(unquantized, |r| (bits(r), r.score.mse.value)))),
         )
     }
 }
@@ -335,7 +343,7 @@ impl Figure for Low {
                 .filter(|r| r.snr_db == snr && r.size != Some(500))
                 .cloned()
                 .collect();
-            Panel::loglog(format!("{snr} dB"), "levels", "mean squared error").with_all(families(
+            Panel::loglog(format!("{snr} dB"), "levels", MSE).with_all(families(
                 &here,
                 &["EKF-U", "EKF-Q", "GMPA", "GMPA-transfer"],
                 |r| r.levels as f64,

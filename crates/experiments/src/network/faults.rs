@@ -241,7 +241,7 @@ impl Figure for Faulty {
                         Layer::measured("following by echo", of("echoed"), |r: &Row| (r.level, of_row(r))).coloured(1),
                     )
             };
-            panels.push(both(Panel::new("error", axis(), Axis::linear("RMSE")), |r| r.rmse));
+            panels.push(both(Panel::new("error", axis(), Axis::linear("RMSE / noise deviation")), |r| r.rmse));
             panels.push(both(Panel::new("recovery of a restarted sensor", axis(), Axis::linear("slots")), |r| {
                 r.recovery
             }));

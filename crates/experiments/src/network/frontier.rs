@@ -188,24 +188,25 @@ impl Figure for Frontier {
         let families = distinct(rows, |r| r.scheme);
         let mut panels = Vec::new();
         for (i, (label, of, best)) in axes.iter().enumerate() {
-            for world in ["scalar", "plane"] {
-                let mut panel = Panel::loglog(world, *label, "RMSE");
-                if i != 2 {
-                    panel = panel.without_legend();
-                }
+            // The noise of a measurement has a deviation of 1, in the plane 1 m.
+            for (world, unit) in [
+                ("scalar", "RMSE / noise deviation"),
+                ("plane", "RMSE of the position / m"),
+            ] {
+                let mut panel = Panel::loglog(world, *label, unit);
                 let here = || rows.iter().filter(|r| r.world == world);
                 if i == 0 {
                     let mut floor = points(here(), |r| (of(r), r.floor));
                     floor.sort_by(|a, b| a.0.total_cmp(&b.0));
-                    panel = panel.with(Layer::dashed("floor", floor).coloured(7));
+                    panel = panel.with(Layer::dashed("no scheme is below, unless by silence", floor).coloured(7));
                 }
                 for (colour, family) in families.iter().enumerate() {
-                    let points = points(here().filter(|r| r.scheme == *family), |r| (of(r), r.rmse.value));
-                    panel = panel.with(Layer::points(*family, points).coloured(colour));
+                    let rows = here().filter(|r| r.scheme == *family);
+                    panel = panel.with(Layer::measured(*family, rows, |r| (of(r), r.rmse)).coloured(colour));
                 }
                 let mut frontier = points(here().filter(|r| best(r) == "yes"), |r| (of(r), r.rmse.value));
                 frontier.sort_by(|a, b| a.0.total_cmp(&b.0));
-                panels.push(panel.with(Layer::line("nothing beats these", frontier).coloured(0)));
+                panels.push(panel.with(Layer::unbroken("nothing beats these", frontier)));
             }
         }
         Plot::grid(2, panels)

@@ -120,14 +120,10 @@ impl Figure for Lifetime {
             for period in &p.period {
                 let here = || rows.iter().filter(|r| r.baseline == *baseline && r.period == *period);
                 let title = format!("{} ms a slot, {baseline} mW", period * 1e3);
-                let last = panels.len() + 1 == p.baseline.len() * p.period.len();
-                let mut panel = Panel::semilog(title, "days", "RMSE");
-                if !last {
-                    panel = panel.without_legend();
-                }
+                let mut panel = Panel::semilog(title, "days", "RMSE / noise deviation");
                 for (colour, family) in families.iter().enumerate() {
-                    let points = points(here().filter(|r| r.scheme == *family), |r| (r.days, r.rmse.value));
-                    panel = panel.with(Layer::points(*family, points).coloured(colour));
+                    let rows = here().filter(|r| r.scheme == *family);
+                    panel = panel.with(Layer::measured(*family, rows, |r| (r.days, r.rmse)).coloured(colour));
                 }
                 panels.push(panel);
             }

@@ -171,7 +171,7 @@ impl Figure for Scale {
                 Panel::new("memory", nodes(), Axis::log("MB"))
                     .with(Layer::line("network", memory))
                     .with(Layer::dashed("1 GiB", limit)),
-                Panel::new("time", nodes(), Axis::linear("us an event")).with(Layer::line("event", times)),
+                Panel::new("time", nodes(), Axis::linear("µs an event")).with(Layer::line("event", times)),
             ],
         )
     }

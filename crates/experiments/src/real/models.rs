@@ -136,8 +136,8 @@ impl Figure for Models {
             let chosen = rows.iter().filter(|r| r.column == *column);
             Layer::line(column, points(chosen, |r| (r.slot as f64, r.scale)))
         };
-        let scales = Panel::linear("scale of the models", "slot", "log2 of the noise, steps")
-            .with_all(columns.iter().map(scale));
+        let scales =
+            Panel::linear("scale of the models", "slot", "log_2(noise / step)").with_all(columns.iter().map(scale));
         Plot::grid(2, panels.chain([scales]).collect())
     }
 }

@@ -3,7 +3,7 @@
 use super::Area;
 use super::scale::Scaled;
 use fewbits_experiments::plot::Marker;
-use plotters::element::{Circle, PathElement, Polygon, Rectangle};
+use plotters::element::{Circle, PathElement, Polygon};
 use plotters::style::{RGBColor, ShapeStyle};
 
 /// A place on paper, in units from the top left.
@@ -48,6 +48,15 @@ impl Frame<'_, '_> {
             self.down(y).clamp(self.top, self.bottom)
         } else {
             self.bottom
+        }
+    }
+
+    /// The horizontal place of a value, cut at the frame; what an axis cannot show lies left.
+    pub(super) fn across_cut(&self, x: f64) -> f64 {
+        if self.x.accepts(x) {
+            self.across(x).clamp(self.left, self.right)
+        } else {
+            self.left
         }
     }
 
@@ -151,33 +160,44 @@ pub(super) fn mark(area: &Area<'_>, place: Place, marker: Marker, colour: RGBCol
     let (fill, pen) = (colour.filled(), colour.stroke_width(7));
     let (x, y) = place;
     let at = |dx: f64, dy: f64| round((x + dx * MARK, y + dy * MARK));
-    let cross = |d: [(f64, f64); 4]| {
-        let stroke = |a: (f64, f64), b: (f64, f64)| PathElement::new(vec![at(a.0, a.1), at(b.0, b.1)], pen);
-        area.draw(&stroke(d[0], d[1]))
-            .and_then(|()| area.draw(&stroke(d[2], d[3])))
+    let cross = |d: &[(f64, f64)]| {
+        let mut strokes = d.chunks_exact(2).map(|d| vec![at(d[0].0, d[0].1), at(d[1].0, d[1].1)]);
+        strokes.try_for_each(|stroke| area.draw(&PathElement::new(stroke, pen)))
     };
+    let filled = |d: &[(f64, f64)]| area.draw(&Polygon::new(d.iter().map(|d| at(d.0, d.1)).collect::<Vec<_>>(), fill));
+    // A path that goes on over its first side: the SVG back end gives a rectangle's outline no width.
+    let outline = |d: &[(f64, f64)]| {
+        let round = d.iter().chain(&d[..2]).map(|d| at(d.0, d.1)).collect::<Vec<_>>();
+        area.draw(&PathElement::new(round, pen))
+    };
+    let up = [(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)];
+    let down = up.map(|(x, y)| (x, -y));
+    let square = [(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)];
+    let diamond = [(0.0, -1.3), (1.1, 0.0), (0.0, 1.3), (-1.1, 0.0)];
     match marker {
         Marker::Circle => area.draw(&Circle::new(round(place), MARK as i32, fill)),
         Marker::OpenCircle => area.draw(&Circle::new(round(place), MARK as i32, pen)),
-        Marker::Square => area.draw(&Rectangle::new([at(-0.9, -0.9), at(0.9, 0.9)], fill)),
-        // A path: the SVG back end gives a rectangle's outline no width.
-        Marker::OpenSquare => {
-            let corners = [
-                (-0.9, -0.9),
-                (0.9, -0.9),
-                (0.9, 0.9),
-                (-0.9, 0.9),
-                (-0.9, -0.9),
-                (0.9, -0.9),
-            ];
-            area.draw(&PathElement::new(corners.map(|(x, y)| at(x, y)).to_vec(), pen))
-        }
-        Marker::Triangle => area.draw(&Polygon::new(vec![at(0.0, -1.2), at(1.1, 0.8), at(-1.1, 0.8)], fill)),
-        Marker::Diamond => {
-            area.draw(&Polygon::new(vec![at(0.0, -1.3), at(1.1, 0.0), at(0.0, 1.3), at(-1.1, 0.0)], fill))
-        }
-        Marker::Cross => cross([(-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)]),
-        Marker::Plus => cross([(-1.2, 0.0), (1.2, 0.0), (0.0, -1.2), (0.0, 1.2)]),
+        Marker::Ring => area
+            .draw(&Circle::new(round(place), MARK as i32, pen))
+            .and_then(|()| area.draw(&Circle::new(round(place), 7, fill))),
+        Marker::Square => filled(&square),
+        Marker::OpenSquare => outline(&square),
+        Marker::Triangle => filled(&up),
+        Marker::OpenTriangle => outline(&up),
+        Marker::Wedge => filled(&down),
+        Marker::OpenWedge => outline(&down),
+        Marker::Diamond => filled(&diamond),
+        Marker::OpenDiamond => outline(&diamond),
+        Marker::Cross => cross(&[(-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)]),
+        Marker::Plus => cross(&[(-1.2, 0.0), (1.2, 0.0), (0.0, -1.2), (0.0, 1.2)]),
+        Marker::Star => cross(&[
+            (0.0, -1.3),
+            (0.0, 1.3),
+            (-1.1, -0.65),
+            (1.1, 0.65),
+            (-1.1, 0.65),
+            (1.1, -0.65),
+        ]),
     }
     .map_err(|e| e.to_string())
 }

@@ -1,51 +1,53 @@
 //! Layers on their axes.
 
 use super::frame::{Frame, mark};
-use super::style::{PAPER, TICK, colour, dashes, heat, marker, pen, text};
+use super::style::{PAPER, TICK, colour, dashes, heat, marker, pen, text, wide};
 use fewbits_experiments::plot::{Layer, Shape};
 use plotters::element::{PathElement, Polygon, Rectangle, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, RGBColor};
+use plotters::style::{Color, FontTransform, RGBColor};
 
 fn why(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
 /// Draws one layer; `shades` are the values at the ends of the colour ramp of fields.
-pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, position: usize, shades: (f64, f64)) -> Result<(), String> {
-    let ink = colour(layer, position);
+pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> Result<(), String> {
+    let ink = colour(layer);
     match &layer.shape {
         Shape::Line { points, stroke } => {
-            frame.curve(points, dashes(layer, position, *stroke), pen(layer, position, *stroke))?;
-            if layer.inline {
-                inline(frame, points, &layer.label)
-            } else {
-                Ok(())
+            // A curve of one point would be nothing.
+            let alone = points.first().filter(|_| points.len() == 1);
+            match alone.and_then(|p| frame.place(*p)).filter(|at| frame.inside(*at)) {
+                Some(at) => mark(frame.area, at, marker(layer), ink),
+                None => frame.curve(points, dashes(layer, *stroke), pen(layer, *stroke)),
             }
         }
         Shape::Points {
             points,
             errors,
-            marker: own,
+            sideways,
+            ..
         } => {
             let shown = || {
                 points
                     .iter()
                     .filter_map(|p| Some((p, frame.place(*p).filter(|at| frame.inside(*at))?)))
             };
-            for ((p, at), error) in shown().zip(errors_of(points, errors, frame)) {
-                let bar = [frame.down_cut(p.1 - error), frame.down_cut(p.1 + error)];
-                let line = bar.map(|y| (at.0.round() as i32, y.round() as i32)).to_vec();
-                if error > 0.0 {
-                    frame
-                        .area
-                        .draw(&PathElement::new(line, ink.stroke_width(6)))
-                        .map_err(why)?;
-                }
+            let round = |x: f64, y: f64| (x.round() as i32, y.round() as i32);
+            for ((p, at), error) in shown()
+                .zip(errors_of(points, errors, frame))
+                .filter(|(_, error)| *error > 0.0)
+            {
+                let end = |sign: f64| match sideways {
+                    true => round(frame.across_cut(p.0 + sign * error), at.1),
+                    false => round(at.0, frame.down_cut(p.1 + sign * error)),
+                };
+                let bar = PathElement::new(vec![end(-1.0), end(1.0)], ink.stroke_width(6));
+                frame.area.draw(&bar).map_err(why)?;
             }
-            let marker = marker(layer, position, *own);
             for (_, at) in shown() {
-                mark(frame.area, at, marker, ink)?;
+                mark(frame.area, at, marker(layer), ink)?;
             }
             Ok(())
         }
@@ -93,25 +95,60 @@ fn errors_of(points: &[(f64, f64)], errors: &[f64], frame: &Frame<'_, '_>) -> Ve
     points.iter().enumerate().filter(|(_, p)| shown(p)).map(error).collect()
 }
 
-/// Writes a curve's name on it, at the middle of its visible part: contours.
-fn inline(frame: &Frame<'_, '_>, points: &[(f64, f64)], label: &str) -> Result<(), String> {
-    let seen: Vec<_> = points
-        .iter()
-        .filter_map(|p| frame.place(*p))
-        .filter(|at| frame.inside(*at))
-        .collect();
-    let Some(middle) = seen.get(seen.len() / 2) else {
-        return Ok(());
+/// Writes the names of contours on them, along steep ones upwards: as near to the middle of what is seen as no other contour and
+/// no other name allows.
+pub(super) fn names(frame: &Frame<'_, '_>, layers: &[Layer]) -> Result<(), String> {
+    type Box = (f64, f64, f64, f64);
+    let meet = |a: &Box, b: &Box| a.0 < b.1 && b.0 < a.1 && a.2 < b.3 && b.2 < a.3;
+    let seen = |layer: &Layer| match &layer.shape {
+        Shape::Line { points, .. } if layer.inline => points
+            .iter()
+            .filter_map(|p| frame.place(*p))
+            .filter(|at| frame.inside(*at))
+            .collect(),
+        _ => Vec::new(),
     };
-    let (x, y) = (middle.0.round() as i32, middle.1.round() as i32);
-    let (half, high) = (label.chars().count() as i32 * TICK * 3 / 10 + 8, TICK / 2);
-    let ground = Rectangle::new([(x - half, y - high), (x + half, y + high)], PAPER.mix(0.85).filled());
-    frame.area.draw(&ground).map_err(why)?;
-    let style = text(TICK).pos(Pos::new(HPos::Center, VPos::Center));
-    frame
-        .area
-        .draw(&Text::new(label.to_owned(), (x, y), style))
-        .map_err(why)
+    let curves: Vec<Vec<(f64, f64)>> = layers.iter().map(seen).collect();
+    let mut written: Vec<Box> = Vec::new();
+    for (i, (layer, curve)) in layers.iter().zip(&curves).enumerate().filter(|(_, (_, c))| c.len() > 2) {
+        let steep = |at: usize| {
+            let (a, b) = (curve[at.saturating_sub(1)], curve[(at + 1).min(curve.len() - 1)]);
+            (b.1 - a.1).abs() > (b.0 - a.0).abs()
+        };
+        let ground = |at: usize| {
+            let (x, y) = curve[at];
+            let (half, high) = (0.5 * wide(&layer.label, TICK) + 8.0, 0.42 * f64::from(TICK));
+            let (half, high) = if steep(at) { (high, half) } else { (half, high) };
+            (x - half, x + half, y - high, y + high)
+        };
+        let free = |at: &usize| {
+            let here = ground(*at);
+            let mut others = curves
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| *j != i)
+                .flat_map(|(_, curve)| curve);
+            let crossed = others.any(|p| meet(&here, &(p.0, p.0, p.1, p.1)));
+            !crossed && !written.iter().any(|other| meet(&here, other))
+        };
+        let shares = [0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7, 0.25, 0.75, 0.2, 0.8];
+        let places = shares.map(|share: f64| (share * (curve.len() - 1) as f64) as usize);
+        let at = places.into_iter().find(free).unwrap_or(places[0]);
+        let here = ground(at);
+        let round = |x: f64, y: f64| (x.round() as i32, y.round() as i32);
+        let paper = Rectangle::new([round(here.0, here.2), round(here.1, here.3)], PAPER.mix(0.9).filled());
+        frame.area.draw(&paper).map_err(why)?;
+        let style = text(TICK).pos(Pos::new(HPos::Center, VPos::Center));
+        let style = if steep(at) {
+            style.transform(FontTransform::Rotate270)
+        } else {
+            style
+        };
+        let name = Text::new(layer.label.clone(), round(curve[at].0, curve[at].1), style);
+        frame.area.draw(&name).map_err(why)?;
+        written.push(here);
+    }
+    Ok(())
 }
 
 /// Filled rectangles `(left, right, bottom, top)`, cut at the frame.
@@ -167,9 +204,17 @@ pub(super) fn edges(centres: &[f64]) -> Vec<f64> {
 pub(super) fn extent(layer: &Layer) -> (Vec<f64>, Vec<f64>) {
     match &layer.shape {
         Shape::Line { points, .. } => points.iter().copied().unzip(),
-        Shape::Points { points, errors, .. } => {
-            let (x, mut y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
-            y.extend(points.iter().zip(errors).flat_map(|(p, e)| [p.1 - e, p.1 + e]));
+        Shape::Points {
+            points,
+            errors,
+            sideways,
+            ..
+        } => {
+            let (mut x, mut y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
+            for (p, e) in points.iter().zip(errors) {
+                let (along, at) = if *sideways { (&mut x, p.0) } else { (&mut y, p.1) };
+                along.extend([at - e, at + e]);
+            }
             (x, y)
         }
         Shape::Bars { points, width } => (

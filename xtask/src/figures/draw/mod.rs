@@ -3,6 +3,7 @@
 mod frame;
 mod legend;
 mod marks;
+mod names;
 mod scale;
 mod style;
 mod typeset;
@@ -10,14 +11,17 @@ mod typeset;
 use super::Error;
 use fewbits_experiments::plot::{Panel, Plot, Shape};
 use frame::Frame;
+use names::{GAP, Names};
 use plotters::backend::SVGBackend;
 use plotters::chart::ChartBuilder;
 use plotters::coord::Shift;
-use plotters::coord::ranged1d::{BoldPoints, Ranged, ValueFormatter};
+use plotters::coord::ranged1d::ValueFormatter;
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
+use plotters::element::Text;
 use plotters::style::ShapeStyle;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use scale::Scaled;
-use style::{GRID, INK, PANEL_HEIGHT, PANEL_WIDTH, PAPER, TEXT, TICK, text, title};
+use style::{GRID, INK, LINE, PANEL_HEIGHT, PANEL_WIDTH, PAPER, TEXT, TICK, TITLE, text, wide};
 pub(super) use typeset::typeset;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -26,26 +30,47 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 const COLOUR_BAR: i32 = 440;
 /// Most panels a row.
 const COLUMNS: usize = 2;
+/// Above a frame, with the title.
+const ABOVE: i32 = 150;
+/// Right of a frame: half a number at the end of its axis.
+const RIGHT: i32 = 100;
+const MARGIN: i32 = 20;
 
 /// Draws a plot.
 ///
 /// # Errors
 /// If the back end refuses an element.
 pub fn to_svg(id: &str, plot: &Plot) -> Result<String, Error> {
-    let plot = &typeset::words(plot.clone());
+    let plot = &style::numbered(typeset::words(plot.clone()));
     let columns = plot.columns.min(plot.panels.len()).clamp(1, COLUMNS);
     let rows: Vec<&[Panel]> = plot.panels.chunks(columns).collect();
-    let width = PANEL_WIDTH as i32;
-    let height = |row: &&[Panel]| {
-        let legends = row.iter().map(|panel| legend::height(panel, width));
-        PANEL_HEIGHT as i32 + legends.max().unwrap_or(0) + 40
-    };
-    let heights: Vec<i32> = rows.iter().map(height).collect();
+    let legends = legend::of_rows(&rows, columns);
+    let panels = |row: &[Panel]| row.iter().map(height).max().unwrap_or(PANEL_HEIGHT);
+    let heights: Vec<(i32, i32)> = rows
+        .iter()
+        .zip(&legends)
+        .map(|(row, legend)| (panels(row), legend::height(legend) + 70))
+        .collect();
     let mut svg = String::new();
     {
-        let size = (PANEL_WIDTH * columns as u32, heights.iter().sum::<i32>().max(1) as u32);
+        let total = heights.iter().map(|(panels, legend)| panels + legend).sum::<i32>();
+        let size = (PANEL_WIDTH * columns as u32, total.max(1) as u32);
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        draw(&root, plot, &rows, &heights).map_err(|reason| Error::Draw {
+        let all = || {
+            root.fill(&PAPER).map_err(why)?;
+            let mut top = 0;
+            for ((row, legend), (panels, below)) in rows.iter().zip(&legends).zip(&heights) {
+                for (column, panel) in row.iter().enumerate() {
+                    let left = PANEL_WIDTH as i32 * column as i32;
+                    let place = root.clone().shrink((left, top), (PANEL_WIDTH, *panels as u32));
+                    draw_panel(&root, &place, panel, plot)?;
+                }
+                legend::draw(&root, legend, top + panels + 24)?;
+                top += panels + below;
+            }
+            root.present().map_err(why)
+        };
+        all().map_err(|reason| Error::Draw {
             id: id.to_owned(),
             reason,
         })?;
@@ -57,18 +82,10 @@ fn why(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
-fn draw(root: &Area<'_>, plot: &Plot, rows: &[&[Panel]], heights: &[i32]) -> Result<(), String> {
-    root.fill(&PAPER).map_err(why)?;
-    let mut top = 0;
-    for (row, height) in rows.iter().zip(heights) {
-        for (column, panel) in row.iter().enumerate() {
-            let left = PANEL_WIDTH as i32 * column as i32;
-            let place = root.clone().shrink((left, top), (PANEL_WIDTH, *height as u32));
-            draw_panel(root, &place, panel, plot)?;
-        }
-        top += height;
-    }
-    root.present().map_err(why)
+/// Height of a panel: names left of it have room.
+fn height(panel: &Panel) -> i32 {
+    let names = Names::left(&Scaled::new(&panel.y, std::iter::empty(), false));
+    PANEL_HEIGHT.max(names.height() + ABOVE + 260)
 }
 
 /// Least and largest value of all fields of a plot with this label: what is compared has one scale.
@@ -85,6 +102,15 @@ fn shades(plot: &Plot, label: &str) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
 }
 
+/// Numbers and names in print; names are written by [`Names`].
+fn tick(axis: &Scaled, value: f64) -> String {
+    if axis.names().is_empty() {
+        axis.format_ext(&value)
+    } else {
+        String::new()
+    }
+}
+
 fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> Result<(), String> {
     let is_heat = |shape: &Shape| matches!(shape, Shape::Heat { .. });
     let heat = panel
@@ -92,19 +118,26 @@ fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> R
         .iter()
         .find(|layer| is_heat(&layer.shape))
         .map(|layer| layer.label.as_str());
+    let marks = panel
+        .layers
+        .iter()
+        .any(|layer| matches!(layer.shape, Shape::Points { .. }));
     let (width, _) = area.dim_in_pixel();
-    let (upper, below) = area.split_vertically(PANEL_HEIGHT as i32);
-    legend::draw(&below, panel)?;
-    let (main, margin) = upper.split_horizontally(width as i32 - if heat.is_some() { COLOUR_BAR } else { 0 });
-    let x = Scaled::new(&panel.x, panel.layers.iter().flat_map(|layer| marks::extent(layer).0));
-    let y = Scaled::new(&panel.y, panel.layers.iter().flat_map(|layer| marks::extent(layer).1));
-    let described = u32::from(!panel.y.label.is_empty()) * 100;
+    let (main, margin) = area.split_horizontally(width as i32 - if heat.is_some() { COLOUR_BAR } else { 0 });
+    let x = Scaled::new(&panel.x, panel.layers.iter().flat_map(|layer| marks::extent(layer).0), marks);
+    let y = Scaled::new(&panel.y, panel.layers.iter().flat_map(|layer| marks::extent(layer).1), marks);
+    let described = |label: &str| if label.is_empty() { 0 } else { LINE + 8 };
+    let left_names = Names::left(&y);
+    let numbers = y.ticks(9).into_iter().map(|v| wide(&tick(&y, v), TICK));
+    let left = GAP + 20 + described(&panel.y.label) + numbers.fold(left_names.width(), f64::max) as i32;
+    let length = f64::from(main.dim_in_pixel().0 as i32 - left - MARGIN - RIGHT);
+    let below_names = Names::below(&x, length);
     let mut chart = ChartBuilder::on(&main)
-        .caption(&panel.title, title())
-        .margin(36)
-        .margin_right(90)
-        .x_label_area_size(210)
-        .y_label_area_size(60 + described + widest_label(&y))
+        .margin(MARGIN)
+        .margin_top(ABOVE)
+        .margin_right(RIGHT)
+        .x_label_area_size(GAP + below_names.depth() * LINE + described(&panel.x.label))
+        .y_label_area_size(left)
         .build_cartesian_2d(x.clone(), y.clone())
         .map_err(why)?;
     chart
@@ -114,9 +147,10 @@ fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> R
         .axis_style(ShapeStyle::from(&INK).stroke_width(4))
         .label_style(text(TICK))
         .axis_desc_style(text(TEXT))
-        .x_label_formatter(&|v| x.format_ext(v))
-        .y_label_formatter(&|v| y.format_ext(v))
-        .x_labels(7)
+        .set_all_tick_mark_size(GAP / 2)
+        .x_label_formatter(&|v| tick(&x, *v))
+        .y_label_formatter(&|v| tick(&y, *v))
+        .x_labels(x.most_that_fit(length))
         .y_labels(9)
         .x_desc(&panel.x.label)
         .y_desc(&panel.y.label)
@@ -134,20 +168,20 @@ fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> R
         top,
         bottom,
     };
+    below_names.draw_below(&frame)?;
+    left_names.draw_left(&frame)?;
+    let (start, _) = area.get_base_pixel();
+    let half = (0.5 * wide(&panel.title, TITLE) + 40.0).min(0.5 * f64::from(width));
+    let (first, last) = (f64::from(start) + half, f64::from(start + width as i32) - half);
+    let middle = (0.5 * (left + right)).clamp(first, last.max(first)) as i32;
+    let style = text(TITLE).pos(Pos::new(HPos::Center, VPos::Center));
+    let title = Text::new(panel.title.clone(), (middle, down.start - 76), style);
+    root.draw(&title).map_err(why)?;
     let range = heat.map_or((0.0, 1.0), |label| shades(plot, label));
-    for (position, layer) in panel.layers.iter().enumerate() {
-        marks::draw(&frame, layer, position, range)?;
+    for layer in &panel.layers {
+        marks::draw(&frame, layer, range)?;
     }
-    heat.map_or(Ok(()), |label| legend::colour_bar(&margin, label, range))
-}
-
-/// Room for the widest number or name at the ticks of a vertical axis.
-fn widest_label(axis: &Scaled) -> u32 {
-    let ticks = axis.key_points(BoldPoints(9));
-    let widest = ticks
-        .iter()
-        .map(|v| axis.format_ext(v).chars().count() as u32)
-        .max()
-        .unwrap_or(4);
-    (f64::from(widest.clamp(3, 26)) * 0.56 * f64::from(TICK)) as u32
+    marks::names(&frame, &panel.layers)?;
+    let (_, above) = margin.get_base_pixel();
+    heat.map_or(Ok(()), |label| legend::colour_bar(&margin, label, range, (down.start - above, down.end - above)))
 }

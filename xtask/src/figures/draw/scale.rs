@@ -1,5 +1,6 @@
 //! One coordinate type for linear, logarithmic and named axes.
 
+use super::style::{TICK, wide};
 use fewbits_experiments::plot::{Axis, Scale};
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
@@ -14,15 +15,15 @@ pub(super) struct Scaled {
 }
 
 impl Scaled {
-    /// The axis over the data, with a margin, unless it fixes its own limits.
-    pub(super) fn new(axis: &Axis, values: impl Iterator<Item = f64>) -> Self {
+    /// The axis over the data, with a margin, unless it fixes its own limits; `marks` do not lie on the other axis.
+    pub(super) fn new(axis: &Axis, values: impl Iterator<Item = f64>, marks: bool) -> Self {
         let drawable = |v: &f64| v.is_finite() && (axis.scale == Scale::Linear || *v > 0.0);
         let (low, high) = axis.range.unwrap_or_else(|| {
             let (low, high) = values
                 .chain(axis.names.iter().map(|(at, _)| *at))
                 .filter(drawable)
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-            with_margin(axis.scale, low, high)
+            with_margin(axis.scale, low, high, marks)
         });
         Self {
             scale: axis.scale,
@@ -45,7 +46,22 @@ impl Scaled {
         }
     }
 
-    fn ticks(&self, most: usize) -> Vec<f64> {
+    pub(super) fn names(&self) -> &[(f64, String)] {
+        &self.names
+    }
+
+    /// The largest number of ticks, at most seven, whose numbers stand apart along an axis of this length.
+    pub(super) fn most_that_fit(&self, length: f64) -> usize {
+        let fit = |most: &usize| {
+            let half = |v: f64| 0.5 * wide(&self.format_ext(&v), TICK) + 14.0;
+            let ends = |v: &f64| (length * self.position(*v) - half(*v), length * self.position(*v) + half(*v));
+            let ticks: Vec<_> = self.ticks(*most).iter().map(ends).collect();
+            ticks.windows(2).all(|pair| pair[0].1 <= pair[1].0)
+        };
+        (2..=7).rev().find(fit).unwrap_or(2)
+    }
+
+    pub(super) fn ticks(&self, most: usize) -> Vec<f64> {
         if !self.names.is_empty() {
             return self.names.iter().map(|(at, _)| *at).collect();
         }
@@ -56,7 +72,7 @@ impl Scaled {
     }
 }
 
-fn with_margin(scale: Scale, low: f64, high: f64) -> (f64, f64) {
+fn with_margin(scale: Scale, low: f64, high: f64, marks: bool) -> (f64, f64) {
     if low > high {
         return if scale == Scale::Log { (0.1, 10.0) } else { (0.0, 1.0) };
     }
@@ -65,7 +81,8 @@ fn with_margin(scale: Scale, low: f64, high: f64) -> (f64, f64) {
         Scale::Linear => {
             let margin = 0.04 * (high - low);
             // Quantities that cannot be negative should not look as if they were.
-            let low = if low >= 0.0 && low < 0.3 * high {
+            let clear = !marks || low >= margin;
+            let low = if clear && low >= 0.0 && low < 0.3 * high {
                 0.0
             } else {
                 low - margin

@@ -76,6 +76,9 @@ pub(super) fn words(mut plot: Plot) -> Plot {
         for text in [&mut panel.title, &mut panel.x.label, &mut panel.y.label] {
             *text = typeset(text);
         }
+        for (_, name) in panel.x.names.iter_mut().chain(&mut panel.y.names) {
+            *name = typeset(name);
+        }
         for layer in &mut panel.layers {
             layer.label = typeset(&layer.label);
         }
