@@ -79,11 +79,9 @@ pub(super) fn zeros(f: impl Fn(f64) -> f64, start: f64, limit: f64) -> Vec<f64> 
 }
 
 fn bisect(f: &impl Fn(f64) -> f64, mut low: f64, mut high: f64, low_is_positive: bool) -> f64 {
-    for _ in 0..60 {
+    // From a step of 1 to the last place.
+    for _ in 0..50 {
         let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            break;
-        }
         if (f(middle) > 0.0) == low_is_positive {
             low = middle
         } else {

@@ -24,7 +24,7 @@ fn half_spaces() {
         let exact = Axis::half_space(1.3, wall).unwrap().with_wind(wind, flux).unwrap();
         let peak = exact.green(1.0 + wind, 1.0, 1.0).max(exact.green(1.0, 1.0, 1.0));
         let mut before = f64::INFINITY;
-        for cells in [600, 1200, 2400] {
+        for cells in [300, 600, 1200] {
             let numeric = Layered::new(&[(18.0, 1.3)], [wall, CLOSED], cells)
                 .unwrap()
                 .with_wind(wind, flux)
@@ -35,7 +35,7 @@ fn half_spaces() {
             assert!(error < 0.35 * before, "{loss} {wind} {flux:?} {cells}: {error} after {before}");
             before = error;
         }
-        assert!(before < 1e-4, "{loss} {wind} {flux:?}: {before}");
+        assert!(before < 4e-4, "{loss} {wind} {flux:?}: {before}");
     }
 }
 
@@ -67,15 +67,15 @@ fn slabs_and_two_media() {
 #[test]
 fn three_dimensions() {
     let air = Air::new(4.0, Vector3::zeros(), Ground::Wall(Wall::permeable(0.7).unwrap())).unwrap();
-    let numeric = Layered::new(&[(30.0, 4.0)], [Wall::permeable(0.7).unwrap(), CLOSED], 1500).unwrap();
+    let numeric = Layered::new(&[(30.0, 4.0)], [Wall::permeable(0.7).unwrap(), CLOSED], 750).unwrap();
     for distance in [0.0, 1.5, 4.0] {
         let exact = air.green(&Vector3::new(distance, 0.0, 0.5), &Vector3::new(0.0, 0.0, 1.0), 1.0);
-        close(numeric.green_3d(distance, (0.5, 1.0), 1.0, (200, 32)).unwrap(), exact, exact, 2e-4);
+        close(numeric.green_3d(distance, (0.5, 1.0), 1.0, (100, 32)).unwrap(), exact, exact, 8e-4);
     }
     let open = Space::new([Axis::open(4.0).unwrap(); 3]).unwrap();
-    let deep = Layered::new(&[(40.0, 4.0)], [CLOSED; 2], 1000).unwrap();
+    let deep = Layered::new(&[(40.0, 4.0)], [CLOSED; 2], 500).unwrap();
     let exact = open.green(&Vector3::new(1.0, 0.0, 20.4), &Vector3::new(0.0, 0.0, 20.0), 1.0);
-    close(deep.green_3d(1.0, (20.4, 20.0), 1.0, (100, 32)).unwrap(), exact, exact, 1e-3);
+    close(deep.green_3d(1.0, (20.4, 20.0), 1.0, (50, 32)).unwrap(), exact, exact, 4e-3);
 }
 
 #[test]

@@ -126,6 +126,22 @@ fn draws_from_a_cell_have_its_moments() {
     }
 }
 
+/// The exponential proposal is a little too long where rejection begins: the draws are not.
+#[test]
+fn draws_at_the_edge_of_rejection_are_not_exponential() {
+    for (i, (lower, upper)) in [(8.01, f64::INFINITY), (-8.3, -8.02)].into_iter().enumerate() {
+        let mut rng = Stream::new(7).named("edge").indexed(i as u64).rng();
+        let (draws, truth) = (400_000, truncated_moments(lower, upper).unwrap());
+        let mut sum = fewbits_monte_carlo::Moments::default();
+        for _ in 0..draws {
+            sum.add(normal::sample_truncated(&mut rng, lower, upper).unwrap());
+        }
+        assert!(sum.estimate().z_score(truth.mean).abs() < 4.5, "{sum:?}");
+        let error = (8.0 / f64::from(draws)).sqrt() * truth.variance;
+        assert!((sum.variance() - truth.variance).abs() < 4.5 * error, "{sum:?}");
+    }
+}
+
 proptest! {
     #[test]
     fn quantile_inverts_the_distribution_function(x in -37.0..8.0_f64) {
