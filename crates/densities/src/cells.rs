@@ -466,6 +466,9 @@ mod tests {
         let drawn = crate::Particles::from_belief(&mut rng, &cells, 20_000).unwrap();
         assert!((drawn.mean() - cells.mean()).amax() < 0.03 && (drawn.covariance() - cells.covariance()).amax() < 0.04);
         assert!(drawn.columns()[0].iter().all(|x| cells.columns()[0].contains(x)));
+        // Settled long before the cells are as narrow as they must be: 0.3 of 0.51.
+        let narrow = CellOptions { width: 0.3, ..options };
+        assert_eq!(Cells::cover(&target, lower, upper, 20, &narrow).unwrap().width(), 0.081_25);
         // Too few cells allowed at the start, and after the first splitting.
         for most in [200, 600] {
             let few = CellOptions {

@@ -54,7 +54,8 @@ pub(crate) fn absorb(density: &mut [f64], logs: &[f64]) -> Result<f64, Error> {
     // Where the density is zero the likelihood may be anything.
     let product = |(l, p): (&f64, &f64)| if *p > 0.0 { p * (l - peak).exp() } else { 0.0 };
     let sum = logs.iter().zip(&*density).map(product).sum::<f64>();
-    if !(peak.is_finite() && sum > 0.0 && sum.is_finite()) {
+    // A peak that is not finite leaves a sum that is no number.
+    if !(sum > 0.0 && sum.is_finite()) {
         return Err(Error::IMPOSSIBLE);
     }
     for (p, l) in density.iter_mut().zip(logs) {

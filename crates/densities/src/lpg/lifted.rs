@@ -400,6 +400,24 @@ mod tests {
         }
     }
 
+    /// Steep along the diagonal of the cell, in any unit.
+    #[test]
+    fn slices_of_cells_bound_ridges_in_every_unit() {
+        for unit in [1e-3, 1.0, 1e3] {
+            let scale = Matrix3::from_diagonal(&Vector3::new(unit, unit, 1.0));
+            let ridge = scale * Matrix3::new(1.0, -0.98, 0.0, -0.98, 1.0, 0.0, 0.0, 0.0, 0.5) * scale;
+            let ridge = Component::new(1.0, Vector3::zeros(), ridge).unwrap();
+            let belief = Lpg::new(&[ridge], 0, &[vec![1.0]]).unwrap();
+            let (mut slice, place) = (Slice::default(), |x: f64| Vector2::new(x, x) * unit);
+            let mut mass = |x: f64, half: f64| {
+                belief.slice(&place(x), half * unit, &mut slice);
+                slice.tilted([0.0; 3], [-9.0, 9.0]).log_mass
+            };
+            let (bound, corner, beyond) = (mass(1.0, 0.2), mass(0.8, 0.0), mass(0.6, 0.0));
+            assert!(bound >= corner - 1e-9 && bound < beyond, "{unit}: {corner} {bound} {beyond}");
+        }
+    }
+
     /// Absolute polynomials, as the bound of the whole has them at the same places; a coarse cell takes them for one at least.
     #[test]
     fn slices_of_cells_bound_as_the_whole_does() {

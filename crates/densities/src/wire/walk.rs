@@ -193,7 +193,8 @@ impl Scales {
                 count: (2.0 * NEPERS / log_step).ceil() as u64 + 1,
             },
             log_start: -NEPERS,
-            log_range: NEPERS + 1.0 + log_step,
+            // Its law ends by itself.
+            log_range: f64::INFINITY,
             ratio_step: r,
             ratio_scale: 0.5,
         }

@@ -194,6 +194,12 @@ fn responsibilities_are_shares_of_the_density() {
     let far = belief.responsibilities(&Vector1::new(1e4)).unwrap();
     assert_eq!(far, [0.0, 0.0, 1.0, 0.0]);
     assert_eq!(belief.responsibilities(&Vector1::new(1e200)), None);
+    // A component that is nothing, before one that is something.
+    let mixed = Mixture::new(vec![at(0.5, 0.0, 1e-150), at(0.5, 0.0, 1e10)]).unwrap();
+    let exact = -0.5 - (2.0 * 1e10 * std::f64::consts::TAU.sqrt()).ln();
+    let mut column = [0.0];
+    mixed.log_pdf_columns([&[1e10]], &mut column);
+    assert!((mixed.log_pdf(&Vector1::new(1e10)) - exact).abs() < 1e-12 && (column[0] - exact).abs() < 1e-12);
 }
 
 /// Systematic draws take `n w` of each where that is a whole number, whatever the offset, and one more or less elsewhere.

@@ -128,7 +128,7 @@ fn gibbs_sweeps_have_the_law_of_their_chain() {
     let views: Vec<&Mixture<1>> = factors.iter().collect();
     let belief = exact(&views).unwrap().belief;
     let mut rng = Stream::new(32).rng();
-    let n = 50_000;
+    let n = 15_000;
     // Total variation between chain and product after some sweeps, from the message-passing spec.
     for (sweeps, variation) in [
         (0, 0.526_71),
@@ -161,7 +161,7 @@ fn gibbs_and_importance_agree_in_the_plane() {
     let [a, b] = case_c();
     let truth = exact(&[&a, &b]).unwrap();
     let mut rng = Stream::new(33).rng();
-    let n = 50_000;
+    let n = 15_000;
     let slack = 4.0 * (truth.belief.covariance()[(0, 0)] / n as f64).sqrt();
     let draws = gibbs(&mut rng, &[&a, &b], n, 10).unwrap();
     assert!((draws.mean() - truth.belief.mean()).amax() < slack);
@@ -186,7 +186,7 @@ fn gibbs_minds_that_components_differ_in_width() {
     let b = own(&[(0.3, 1.2, 0.1), (0.7, -0.5, 2.0)]);
     let truth = exact(&[&a, &b]).unwrap().belief;
     let mut rng = Stream::new(35).rng();
-    let n = 40_000;
+    let n = 12_000;
     let draws = gibbs(&mut rng, &[&a, &b], n, 12).unwrap();
     for x in [-0.3, 0.05, 0.4, 1.0, 1.5, 2.2] {
         let below = draws.columns()[0].iter().filter(|s| **s < x).count() as f64 / n as f64;

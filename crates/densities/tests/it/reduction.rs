@@ -353,6 +353,12 @@ fn refinement_is_expectation_maximisation_with_a_floor() {
             }
         }
     }
+    let single =
+        Component::new(1.0, nalgebra::Vector2::new(1.0, -0.5), Matrix2::new(900.0, -40.0, -40.0, 500.0)).unwrap();
+    let ratio = |x: &nalgebra::Vector2<f64>| estimate.log_pdf(x) - single.log_pdf(x);
+    let kl: f64 = points.iter().map(|(x, w)| w * ratio(x)).sum();
+    let found = cubature(&estimate, &Mixture::new(vec![single]).unwrap(), Cubature::Spherical).kl_plugin;
+    assert!((found - kl).abs() < 1e-10, "{found} {kl}");
     let start = [
         (0.5, nalgebra::Vector2::new(0.2, 0.1), Matrix2::new(0.6, 0.05, 0.05, 0.4)),
         (0.3, nalgebra::Vector2::new(2.0, 1.5), Matrix2::new(0.9, -0.1, -0.1, 0.8)),

@@ -190,7 +190,7 @@ fn decoding_is_total() {
         })
         .collect();
     let mut decoded = 0;
-    for round in 0..200_000_usize {
+    for round in 0..60_000_usize {
         let bits = match round % 4 {
             0 | 1 => {
                 let n = rng.random_range(0..14_usize);
@@ -222,7 +222,7 @@ fn decoding_is_total() {
             );
         }
     }
-    assert!(decoded > 500, "{decoded}");
+    assert!(decoded > 150, "{decoded}");
 }
 
 #[test]
