@@ -3,6 +3,7 @@
 //! 1. Every crate opens with documentation, inherits the lints, and has a row in the table of `docs/architecture.md`.
 //! 2. A crate imports only from floors below its own, as that table says.
 //! 3. Every figure id in the docs exists, and every figure is in the docs.
+//! 4. Every file of integration tests is a module of the crate's one test binary.
 
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
 use fewbits_experiments::all;
@@ -66,9 +67,22 @@ pub fn check(root: &Path) -> Result<Vec<String>, Error> {
                 problems.push(format!("{shown}: does not open with documentation (`//!`)"));
             }
         }
+        let tests = path.join("tests/it");
+        if tests.is_dir() {
+            let listed = read(&tests.join("main.rs"))?;
+            let files = rust_files(&tests)?;
+            let stems = files.iter().filter_map(|file| file.file_stem()?.to_str());
+            problems
+                .extend(unlisted(&listed, stems).map(|stem| format!("crates/{name}: tests/it/{stem}.rs never runs")));
+        }
     }
     problems.extend(figure_problems(root)?);
     Ok(problems)
+}
+
+/// Files beside a test binary's root that are none of its modules.
+fn unlisted<'a>(root: &str, stems: impl Iterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
+    stems.filter(move |stem| *stem != "main" && !root.contains(&format!("mod {stem};")))
 }
 
 fn read(path: &Path) -> Result<String, Error> {
@@ -206,6 +220,12 @@ fn is_figure_id(word: &str, systems: &BTreeSet<&str>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tests_that_never_run_are_found() {
+        let found: Vec<&str> = super::unlisted("mod laws;\n", ["main", "laws", "fixtures"].into_iter()).collect();
+        assert_eq!(found, ["fixtures"]);
+    }
 
     #[test]
     fn the_workspace_is_tidy() {

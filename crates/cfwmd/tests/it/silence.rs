@@ -261,7 +261,7 @@ fn vector_moments_are_the_sums_over_a_lattice() {
     for loss in [0.0, 0.3] {
         let link = Link::lossy(loss).unwrap();
         let silence = EllipsoidSilence::new(&rule, &Vector2::new(0.2, 0.5), &noise, &link).unwrap();
-        let (n, h) = (110, 0.15);
+        let (n, h) = (50, 0.3);
         let (mut mass, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
         for m in (-n..=n).flat_map(|i| (-n..=n).map(move |j| Vector2::new(f64::from(i), f64::from(j)) * h)) {
             let p = h * h * (prior.log_pdf(&m).unwrap() + silence.log_likelihood(&m)).exp();

@@ -8,3 +8,9 @@
 )]
 
 mod diffusion_bodies;
+mod diffusion_entries;
+mod diffusion_fixtures;
+mod diffusion_laws;
+mod diffusion_sources;
+mod finite_volume;
+mod laws;
