@@ -401,6 +401,10 @@ mod tests {
             .sum();
         let expected = p - p * p / total * spread;
         assert!((value.expected_variance / expected - 1.0).abs() < 1e-6, "{value:?} {expected}");
+        // A cell that holds all of the prior says nothing, and costs nothing.
+        let coarse =
+            first_message_value(&RoundedSample::new(r, 200.0).unwrap(), &Gaussian::scalar(mean, 2.0).unwrap()).unwrap();
+        assert!((coarse.expected_variance - 2.0).abs() < 1e-12 && coarse.entropy_bits.abs() < 1e-12, "{coarse:?}");
         let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E * total).log2() - tau.log2();
         assert!((value.entropy_bits - entropy).abs() < 1e-4, "{value:?} {entropy}");
     }

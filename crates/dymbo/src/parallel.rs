@@ -257,7 +257,14 @@ mod tests {
     #[test]
     fn few_bits_have_closed_forms() {
         use std::f64::consts::{PI, TAU};
-        for (p, r) in [(1.0, 1.0), (4e4, 0.9), (0.003, 1.7), (30.0, 2.0), (1e-9, 1e3)] {
+        for (p, r) in [
+            (1.0, 1.0),
+            (4e4, 0.9),
+            (0.003, 1.7),
+            (30.0, 2.0),
+            (4e4, 1e4),
+            (1e-9, 1e3),
+        ] {
             for crossover in [0.0, 0.2] {
                 let link = Link::flipping(crossover).unwrap();
                 let clean = 1.0 - 2.0 * crossover;

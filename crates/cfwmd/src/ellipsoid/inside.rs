@@ -266,6 +266,9 @@ mod tests {
         assert!(line.moments(&Vector2::new(0.0, 2.0)).is_none());
         let point = region.under(&Matrix2::zeros()).unwrap();
         assert_eq!(point.log_probability(&Vector2::new(1.0, 0.9)), 0.0);
+        let moments = point.moments(&Vector2::new(1.0, 0.9)).unwrap();
+        assert!(moments.log_mass == 0.0 && (moments.mean - Vector2::new(1.0, 0.9)).amax() < 1e-15);
+        assert!(moments.covariance.amax() == 0.0 && point.moments(&Vector2::new(1.0, 1.1)).is_none());
     }
 
     #[test]
