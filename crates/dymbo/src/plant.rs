@@ -154,6 +154,7 @@ mod tests {
             assert!(matches!(ScalarPlant::new(bad.0, bad.1, bad.2), Err(Error::Argument(_))), "{bad:?}");
         }
         let plant = ScalarPlant::new(-0.7, 0.5, 2.0).unwrap();
+        assert_eq!(plant.noise_ratio(), 0.25);
         let json = serde_json::to_string(&plant).unwrap();
         assert_eq!(serde_json::from_str::<ScalarPlant>(&json).unwrap(), plant);
         assert!(serde_json::from_str::<ScalarPlant>(&json.replace("-0.7", "-1.7")).is_err());

@@ -7,6 +7,19 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use proptest::prelude::*;
 
 #[test]
+fn beliefs_that_ran_out_of_range_are_told() {
+    let sound = (Vector2::new(1.0, -2.0), Matrix2::new(1.0, 0.5, 0.5, 1.0));
+    assert!(Gaussian::from_trusted_parts(sound.0, sound.1).is_finite());
+    for k in 0..2 {
+        let (mut mean, mut covariance) = sound;
+        mean[k] = f64::NEG_INFINITY;
+        covariance[(1, k)] = f64::NAN;
+        assert!(!Gaussian::from_trusted_parts(mean, sound.1).is_finite());
+        assert!(!Gaussian::from_trusted_parts(sound.0, covariance).is_finite());
+    }
+}
+
+#[test]
 fn bad_beliefs_are_refused_by_name() {
     let mean = Vector2::zeros();
     for (covariance, what) in [

@@ -234,6 +234,9 @@ mod tests {
             let filter = ParallelFilter::new(wild, 3, fusion).unwrap();
             assert!(matches!(parallel_mse(&filter), Err(Error::UnstablePlant { .. })));
         }
+        let fine = ScalarPlant::new(1.0, 1e-10, 1.0).unwrap();
+        let filter = ParallelFilter::new(fine, 1000, CountFusion::Linear).unwrap();
+        assert!(parallel_mse(&filter).unwrap_err().to_string().contains("kernels"));
         let slow = ScalarPlant::new(1.0, 1e-6, 1.0).unwrap();
         let many = ParallelFilter::new(slow, 300, CountFusion::Linear).unwrap();
         let start = std::time::Instant::now();
