@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn tests_that_never_run_are_found() {
-        let found: Vec<&str> = super::unlisted("mod laws;\n", ["main", "laws", "fixtures"].into_iter()).collect();
+        let found: Vec<&str> = unlisted("mod laws;\n", ["main", "laws", "fixtures"].into_iter()).collect();
         assert_eq!(found, ["fixtures"]);
     }
 
