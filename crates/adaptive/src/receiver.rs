@@ -25,7 +25,7 @@ pub struct Tracked {
 /// The receiver's half: reports or silence in, reconstructions out.
 ///
 /// Over a link that loses packets ([`Config::resilient`]) a loss is noticed at the next packet, by its number, at the next
-/// scheduled refresh, if that is missing, or at once where the link says so ([`Observation::Erased`]). From the loss to the next
+/// scheduled refresh, if that is missing, or at once where the link says so ([`Observation::Lost`]). From the loss to the next
 /// refresh that arrives the error is not bounded; with a refresh every `R` slots that is at most `R - 1` slots plus `R` for each
 /// scheduled refresh that is lost in turn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -128,14 +128,14 @@ impl Receiver {
     ///
     /// # Errors
     /// If `elapsed` is 0, or a packet is none that the sensor can have sent; the receiver is then as it was: a packet that is
-    /// known to be damaged should be observed as [`Observation::Erased`].
+    /// known to be damaged should be observed as [`Observation::Lost`].
     pub fn receive_after(&mut self, elapsed: u32, observation: &Observation<Packet>) -> Result<Tracked, Error> {
         if elapsed == 0 {
             return Err(ArgumentError::new("elapsed", 0, "at least 1 slot").into());
         }
         match observation {
             Observation::Received(packet) => self.packet(elapsed, packet)?,
-            Observation::Erased => {
+            Observation::Lost => {
                 self.synchronised = false;
                 // The number of the packet that is gone is counted where the next one is compared.
             }

@@ -105,7 +105,7 @@ impl Scheme<1> for SlotScheme {
             return Err(ArgumentError::new("crossover", link.crossover(), expected).into());
         }
         let packet = match observation {
-            Observation::Erased => return Ok(Constant::ONE.into()),
+            Observation::Lost => return Ok(Constant::ONE.into()),
             Observation::Nothing => {
                 let cell = self.cell(self.slot.prediction)?;
                 return Ok(InCell::silence(cell, self.noise_variance, link)?.into());

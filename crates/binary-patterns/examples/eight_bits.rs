@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let table = bank.table(Decoder::Mmse)?;
     let mut seen = [true, false, true, true, false, true, true, false].map(|b| Observation::Received(Bit(b)));
     println!("estimate {:.4}", table.decode(&seen)?);
-    seen[3] = Observation::Erased;
+    seen[3] = Observation::Lost;
     println!("estimate without sensor 4: {:.4}", table.decode(&seen)?);
     Ok(())
 }

@@ -65,7 +65,7 @@ impl Scheme<1> for PatternSensor {
         let Bit(bit) = match observation {
             Observation::Received(bit) => *bit,
             Observation::Nothing => return Ok(Constant::new(link.loss())?.into()),
-            Observation::Erased => return Ok(Constant::ONE.into()),
+            Observation::Lost => return Ok(Constant::ONE.into()),
         };
         let cells = Quantizer::try_from(self.quantizer())?;
         let variance = self.noise_std() * self.noise_std();

@@ -137,7 +137,7 @@ mod tests {
         let others = bank(all[..2].to_vec()).table(Decoder::Mmse).unwrap();
         for bits in [[false, true], [true, true], [true, false]] {
             let mut seen = bits.map(|b| Observation::Received(Bit(b))).to_vec();
-            seen.push(Observation::Erased);
+            seen.push(Observation::Lost);
             assert!((table.decode(&seen).unwrap() - others.estimate(&bits).unwrap()).abs() < 1e-12);
             assert!(table.decode(&seen[..2]).is_err());
             seen[2] = Observation::Received(Bit(true));

@@ -56,7 +56,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
     ///
     /// # Errors
     /// If a number is not finite, the value violates the rule ([`Error::ProtocolViolation`]), or bits may be inverted on the
-    /// way: a value wants a checksum, and a report that fails it is [`Observation::Erased`].
+    /// way: a value wants a checksum, and a report that fails it is [`Observation::Lost`].
     pub fn received(
         &self,
         sensor: usize,
@@ -144,7 +144,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S
         match observation {
             Observation::Received(value) => self.received(0, broadcast, value, link),
             Observation::Nothing => self.silence(broadcast, link, 1),
-            Observation::Erased => Ok(Censored::constant(1.0)?),
+            Observation::Lost => Ok(Censored::constant(1.0)?),
         }
         .map_err(as_core)
     }

@@ -173,7 +173,7 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
                 log_share: arrival + 0.5 * (std::f64::consts::TAU / y).ln(),
                 floor: link.loss(),
             },
-            Observation::Erased => Bump {
+            Observation::Lost => Bump {
                 value: Value::scalar(prediction, r)?,
                 log_share: f64::NEG_INFINITY,
                 floor: 1.0,

@@ -18,7 +18,7 @@ pub enum Observation<R> {
     /// Nothing arrived: the sensor was silent, or its report was lost without a trace. The [`Link`] says how likely each is.
     Nothing,
     /// A report is known to be lost (a gap in sequence numbers, a failed checksum): no information.
-    Erased,
+    Lost,
 }
 
 impl<R> Observation<R> {
@@ -26,7 +26,7 @@ impl<R> Observation<R> {
     pub fn received(&self) -> Option<&R> {
         match self {
             Self::Received(report) => Some(report),
-            Self::Nothing | Self::Erased => None,
+            Self::Nothing | Self::Lost => None,
         }
     }
 
@@ -35,7 +35,7 @@ impl<R> Observation<R> {
         match self {
             Self::Received(report) => Observation::Received(f(report)),
             Self::Nothing => Observation::Nothing,
-            Self::Erased => Observation::Erased,
+            Self::Lost => Observation::Lost,
         }
     }
 }
@@ -50,7 +50,7 @@ impl<R> From<Option<R>> for Observation<R> {
 /// What a receiver knows of the channel: the only place where these numbers live.
 ///
 /// A report vanishes without a trace with probability `loss`; each bit of a report that arrives is inverted with probability
-/// `crossover`, independently (a binary symmetric channel). [`Observation::Erased`] is not a matter of the link's law:
+/// `crossover`, independently (a binary symmetric channel). [`Observation::Lost`] is not a matter of the link's law:
 /// factors condition on it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
@@ -118,7 +118,7 @@ impl Link {
     }
 
     /// Sends a report through the link: its bits, lost or inverted as the link's law says. Bits that no longer are a report
-    /// arrive as [`Observation::Erased`]; silence arrives as [`Observation::Nothing`].
+    /// arrive as [`Observation::Lost`]; silence arrives as [`Observation::Nothing`].
     ///
     /// # Errors
     /// If the report does not fit its format.
@@ -136,7 +136,7 @@ impl Link {
             return Ok(Observation::Nothing);
         }
         let received = self.flip(rng, sent);
-        Ok(M::from_bits(format, &received).map_or(Observation::Erased, Observation::Received))
+        Ok(M::from_bits(format, &received).map_or(Observation::Lost, Observation::Received))
     }
 
     /// Inverts each bit with the crossover probability.

@@ -18,7 +18,7 @@ use rand::Rng;
 ///
 /// Laws ([`crate::laws::scheme`]):
 /// 1. total probability: for every noise-free measurement, feedback and link, the probabilities of all observations but
-///    [`Observation::Erased`] sum (integrate) to one;
+///    [`Observation::Lost`] sum (integrate) to one;
 /// 2. honesty: what `encode` reports of `m + noise`, sent through [`Link::transmit`], has the frequencies that `factor` says;
 /// 3. an erased report has the factor 1.
 pub trait Scheme<const M: usize> {

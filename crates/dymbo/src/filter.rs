@@ -301,8 +301,8 @@ mod tests {
         let lossy = filter.with_link(Link::lossy(0.25).unwrap());
         let belief = Gaussian::scalar(1.0, 1.0).unwrap();
         for (filter, observation, log_likelihood) in [
-            (filter, Observation::Erased, 0.0),
-            (lossy, Observation::Erased, 0.0),
+            (filter, Observation::Lost, 0.0),
+            (lossy, Observation::Lost, 0.0),
             (lossy, Observation::Nothing, 0.25_f64.ln()),
         ] {
             let (posterior, info) = filter.step(&belief, &observation).unwrap();

@@ -22,7 +22,7 @@
 //!
 //! What a report says is a [`Factor`](fewbits_core::Factor), whatever the threshold and the [`Link`](fewbits_core::Link):
 //! `fewbits_filters::assumed_density::update` turns it into the moments of any Gaussian belief, and the filters here are its
-//! closed forms. Reports known to be lost are [`Observation::Erased`](fewbits_core::Observation::Erased). Smoothing is that of
+//! closed forms. Reports known to be lost are [`Observation::Lost`](fewbits_core::Observation::Lost). Smoothing is that of
 //! `fewbits_filters`, applied to the beliefs of any filter here.
 //!
 //! ```

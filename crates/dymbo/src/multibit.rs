@@ -198,7 +198,7 @@ mod tests {
             let (posterior, _) = filter.step(&belief, &Observation::Received(CellIndex(0))).unwrap();
             assert!((mass - (1.0 - link.loss())).abs() < 1e-14);
             assert!((variance / mass - posterior.covariance()[0]).abs() < 1e-12);
-            assert_eq!(filter.step(&belief, &Observation::Erased).unwrap().0, predicted);
+            assert_eq!(filter.step(&belief, &Observation::Lost).unwrap().0, predicted);
             let json = serde_json::to_string(&filter).unwrap();
             assert_eq!(serde_json::from_str::<MultibitFilter>(&json).unwrap(), filter);
         }

@@ -140,7 +140,7 @@ impl ParallelFilter {
         let scheme = SignBit::of(&self.plant);
         let factor = observations
             .iter()
-            .filter(|observation| **observation != Observation::Erased)
+            .filter(|observation| **observation != Observation::Lost)
             .map(|observation| scheme.factor(&mean, observation, &self.link))
             .collect::<Result<Product, _>>()?;
         let posterior = factor.tilted(&predicted)?;
@@ -237,7 +237,7 @@ mod tests {
         let belief = Gaussian::scalar(0.3, 1.0).unwrap();
         for link in [Link::PERFECT, Link::new(0.3, 0.1).unwrap()] {
             let dymbo = DymboFilter::new(plant()).with_link(link);
-            for observation in [Observation::Received(Sign::Above), Observation::Erased] {
+            for observation in [Observation::Received(Sign::Above), Observation::Lost] {
                 let (alone, info) = dymbo.step(&belief, &observation).unwrap();
                 for fusion in [CountFusion::Linear, CountFusion::Exact] {
                     let filter = ParallelFilter::new(plant(), 1, fusion).unwrap().with_link(link);
@@ -339,8 +339,8 @@ mod tests {
         let two = ParallelFilter::new(plant(), 2, CountFusion::Linear).unwrap();
         let belief = Gaussian::scalar(0.0, 1.0).unwrap();
         assert!(two.step(&belief, &count(3, 2)).is_err());
-        assert_eq!(two.step(&belief, &[Observation::Erased; 2]).unwrap().0, plant().predict(&belief));
-        assert!(two.step(&belief, &[Observation::Nothing, Observation::Erased]).is_err());
+        assert_eq!(two.step(&belief, &[Observation::Lost; 2]).unwrap().0, plant().predict(&belief));
+        assert!(two.step(&belief, &[Observation::Nothing, Observation::Lost]).is_err());
     }
 
     /// Regression: six seconds for one step. A wide prior costs no more than a narrow one, whatever else the machine does.

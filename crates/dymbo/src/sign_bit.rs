@@ -103,7 +103,7 @@ pub(crate) fn missing_probability<R>(observation: &Observation<R>, link: &Link) 
     match observation {
         Observation::Received(_) => None,
         Observation::Nothing => Some(link.loss()),
-        Observation::Erased => Some(1.0),
+        Observation::Lost => Some(1.0),
     }
 }
 
@@ -171,7 +171,7 @@ mod tests {
         for observation in [
             Observation::Received(Sign::Above),
             Observation::Nothing,
-            Observation::Erased,
+            Observation::Lost,
         ] {
             assert!(scheme.factor(&f64::NAN, &observation, &Link::PERFECT).is_err());
         }

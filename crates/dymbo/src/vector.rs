@@ -396,7 +396,7 @@ mod tests {
         assert!((parallel.covariance() - sequential.covariance()).amax() < 1e-14);
         // A sensor whose bit is lost might as well not be there.
         let two = SignFilter::new(dynamics(), [sensor; 2]).with_link(Link::flipping(0.1).unwrap());
-        let (without, _) = two.update_parallel(&belief(), &[Observation::Erased, BELOW]).unwrap();
+        let (without, _) = two.update_parallel(&belief(), &[Observation::Lost, BELOW]).unwrap();
         assert!((without.mean() - parallel.mean()).amax() < 1e-14);
         assert!((without.covariance() - parallel.covariance()).amax() < 1e-14);
         let blind = SignFilter::new(dynamics(), []);
@@ -412,7 +412,7 @@ mod tests {
             [[1.0, 0.5], [-0.3, 2.0], [0.0, 0.0], [0.8, 0.8]].map(|h| ScalarSensor::scalar(h.into(), 0.7).unwrap());
         for link in [Link::PERFECT, Link::new(0.2, 0.1).unwrap()] {
             let filter = SignFilter::new(dynamics(), sensors).with_link(link);
-            for last in [ABOVE, BELOW, Observation::Erased] {
+            for last in [ABOVE, BELOW, Observation::Lost] {
                 let bits = [ABOVE, BELOW, ABOVE, last];
                 let (mut belief_so_far, mut log_likelihood) = (belief(), 0.0);
                 for (i, bit) in bits.iter().enumerate() {

@@ -196,12 +196,12 @@ impl<E: Replicable> AdHoc<E> {
         let mut differs = None;
         let arrived = peer.heard.iter().enumerate().map(|(i, heard)| match heard {
             Heard::Nothing => Arrived::Nothing,
-            Heard::Damaged => Arrived::Erased,
+            Heard::Damaged => Arrived::Lost,
             Heard::Digest(sum) | Heard::Frame { digest: sum, .. } if *sum != peer.digest => {
                 if anchor || i == ANCHOR.index() {
                     differs = Some(SensorId(i as u32));
                 }
-                Arrived::Erased
+                Arrived::Lost
             }
             Heard::Digest(_) => Arrived::Nothing,
             Heard::Frame { report, .. } => Arrived::Report(report.clone()),

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) enum Arrived {
     #[default]
     Nothing,
-    Erased,
+    Lost,
     Report(#[serde(with = "stored")] BitString),
 }
 
@@ -55,7 +55,7 @@ pub(crate) fn settle<E: Estimator>(
         let observations = arrived.iter().enumerate().map(|(sensor, arrived)| {
             Ok(match arrived {
                 Arrived::Nothing => Observation::Nothing,
-                Arrived::Erased => Observation::Erased,
+                Arrived::Lost => Observation::Lost,
                 Arrived::Report(bits) => Observation::Received(E::Report::from_bits(&e.report_format(sensor), bits)?),
             })
         });
@@ -71,12 +71,12 @@ pub(crate) fn settle<E: Estimator>(
         return (belief, None);
     }
     for nothing in arrived.iter_mut().filter(|a| **a == Arrived::Nothing) {
-        *nothing = Arrived::Erased;
+        *nothing = Arrived::Lost;
     }
     if let Ok(belief) = attempt(arrived) {
         return (belief, Some(Note::Impossible { slot }));
     }
-    arrived.fill(Arrived::Erased);
+    arrived.fill(Arrived::Lost);
     (predicted.clone(), Some(Note::Refused { slot }))
 }
 
@@ -86,7 +86,7 @@ pub(crate) fn echo_bits(arrived: &[Arrived]) -> Result<BitString, CodecError> {
     for arrived in arrived {
         match arrived {
             Arrived::Nothing => writer.write(0, 1)?,
-            Arrived::Erased => writer.write(0b10, 2)?,
+            Arrived::Lost => writer.write(0b10, 2)?,
             Arrived::Report(bits) => {
                 writer.write(0b11, 2)?;
                 writer.append(bits);
@@ -108,7 +108,7 @@ pub(crate) fn echo_of<E: Estimator>(e: &E, bits: &BitString) -> Result<Vec<Arriv
                         let format = e.report_format(sensor);
                         Arrived::Report(E::Report::decode(&format, &mut reader)?.to_bits(&format)?)
                     } else {
-                        Arrived::Erased
+                        Arrived::Lost
                     }
                 }
             })

@@ -347,7 +347,7 @@ impl<E: Estimator> Star<E> {
             Kind::Report if frame.slot != centre.slot || centre.predicted.is_none() => context.note(Note::Late),
             Kind::Report if centre.arrived[sensor] != Arrived::Nothing => context.note(Note::Duplicate),
             Kind::Report if frame.digest != centre.digests[sensor] => {
-                centre.arrived[sensor] = Arrived::Erased;
+                centre.arrived[sensor] = Arrived::Lost;
                 let (with, slot) = (from, frame.slot);
                 context.note(Note::Disagreement { with, slot });
             }
@@ -357,7 +357,7 @@ impl<E: Estimator> Star<E> {
                     Ok(_) => Arrived::Report(frame.payload.clone()),
                     Err(_) => {
                         context.note(Note::Malformed);
-                        Arrived::Erased
+                        Arrived::Lost
                     }
                 };
             }
@@ -544,7 +544,7 @@ impl<E: Estimator> Protocol for Star<E> {
             && *arrived == Arrived::Nothing
             && centre.predicted.is_some()
         {
-            *arrived = Arrived::Erased;
+            *arrived = Arrived::Lost;
         }
         Ok(())
     }

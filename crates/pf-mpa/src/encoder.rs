@@ -245,7 +245,7 @@ impl Scheme<1> for QuantizedRange {
         let symbol = match observation {
             Observation::Received(symbol) => *symbol,
             Observation::Nothing => return RangeFactor::constant(link.loss(), self.noise).map_err(reported),
-            Observation::Erased => return RangeFactor::constant(1.0, self.noise).map_err(reported),
+            Observation::Lost => return RangeFactor::constant(1.0, self.noise).map_err(reported),
         };
         if link.crossover() == 0.0 {
             return self.cell_factor(symbol.0, reference, arrives).map_err(reported);

@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let decoder = MmseDecoder::new(&best.system, 16)?;
     let both = [sent[0], sent[1]].map(|level| Observation::Received(Symbol(level)));
     println!("both received: {:?}", decoder.decode(&both)?);
-    println!("second erased: {:?}", decoder.decode(&[both[0], Observation::Erased])?);
+    println!("second erased: {:?}", decoder.decode(&[both[0], Observation::Lost])?);
 
     // In other units the design is the same, and it can be stored.
     let millimetres = best.rescaled(1000.0, fewbits_quantizer_design::Criterion::MeanSquaredError)?;

@@ -33,7 +33,7 @@
 //! // The sensor's half: a sample becomes a level. The other half: what arrives becomes an estimate.
 //! let level = Symbol(best.quantizers()[0].encode(1.7)?);
 //! let decoder = MmseDecoder::new(&best.system, 16)?;
-//! let estimate = decoder.decode(&[Observation::Received(level), Observation::Erased])?;
+//! let estimate = decoder.decode(&[Observation::Received(level), Observation::Lost])?;
 //! assert!(estimate.mean > 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -105,7 +105,7 @@ impl Scheme<1> for QuantizingSensor {
         let symbol = match observation {
             Observation::Received(symbol) => *symbol,
             Observation::Nothing => return Ok(Constant::new(link.loss())?.into()),
-            Observation::Erased => return Ok(Constant::ONE.into()),
+            Observation::Lost => return Ok(Constant::ONE.into()),
         };
         let word = |symbol: usize| self.labelling.word(symbol).map(u64::from);
         let Some(received) = word(symbol.0) else {

@@ -338,7 +338,7 @@ mod tests {
             assert!((sensors.decode(&order, &seen).unwrap() - centre).abs() < 1e-15);
             assert!(sensors.decode(&order, &seen[..2]).is_err());
             // Without the finest bit the two cells of a pair are one.
-            seen[2] = Observation::Erased;
+            seen[2] = Observation::Lost;
             let pair = 2.0 * (2.0 * f64::from(cell / 2) + 1.0 - 4.0) / 4.0;
             assert!((sensors.decode(&order, &seen).unwrap() - pair).abs() < 1e-2);
         }

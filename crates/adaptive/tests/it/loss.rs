@@ -66,7 +66,7 @@ fn what_is_known_to_be_lost_is_noticed_at_once() {
     let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
     for (n, sample) in mixed(4, 300).into_iter().enumerate() {
         let report = sensor.encode(sample).unwrap().map(|r| r.packet);
-        let observation = if n == 130 { Observation::Erased } else { report.into() };
+        let observation = if n == 130 { Observation::Lost } else { report.into() };
         let tracked = receiver.receive(&observation).unwrap();
         assert_eq!(tracked.synchronised, !(130..200).contains(&n), "{n}");
     }

@@ -108,7 +108,7 @@ where
                         (*z, innovation.log_pdf(&(z - central)) + if clash { VIOLATION } else { 0.0 })
                     }
                     Observation::Nothing => impute(rng, innovation, rule, loss, central, &predicted),
-                    Observation::Erased => (central + noise(rng, innovation), 0.0),
+                    Observation::Lost => (central + noise(rng, innovation), 0.0),
                 };
                 let moved = step.gain * (z - predicted);
                 own.iter_mut().zip(moved.iter()).for_each(|(x, step)| *x += step);

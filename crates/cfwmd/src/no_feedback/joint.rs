@@ -242,7 +242,7 @@ pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M:
                     Ok(EllipsoidSilence::innovation_moments(rule, mu, covariance, loss)?)
                 })?;
             }
-            Observation::Erased => {
+            Observation::Lost => {
                 next.withhold(sensor, step, i, |mu, covariance| {
                     Ok(EllipsoidMoments {
                         log_mass: 0.0,

@@ -65,7 +65,7 @@ fn one_gaussian_update_has_the_exact_moments() {
             Observation::Nothing,
             Observation::Received(Vector1::new(6.0)),
             Observation::Nothing,
-            Observation::Erased,
+            Observation::Lost,
         ];
         let (ours, info) = network.fuse(&belief, &rules, &broadcast, &observations).unwrap();
         let likelihood = network.likelihood(&rules, &broadcast, &observations).unwrap();
@@ -76,7 +76,7 @@ fn one_gaussian_update_has_the_exact_moments() {
         // One silent vector sensor is exact; a second one meets a belief that is no longer quite Gaussian.
         let network = vector_network(loss);
         let rules = network.rules_under(&belief).unwrap();
-        for other in [Observation::Erased, Observation::Received(Vector2::new(5.0, 12.0))] {
+        for other in [Observation::Lost, Observation::Received(Vector2::new(5.0, 12.0))] {
             let observations = [Observation::Nothing, other];
             let (ours, info) = network.fuse(&belief, &rules, &broadcast, &observations).unwrap();
             let likelihood = network.likelihood(&rules, &broadcast, &observations).unwrap();
@@ -96,7 +96,7 @@ fn the_joint_likelihood_is_the_product_of_the_single_ones() {
         Observation::Received(Vector1::new(-3.0)),
         Observation::Nothing,
         Observation::Received(Vector1::new(6.5)),
-        Observation::Erased,
+        Observation::Lost,
     ];
     let likelihood = network.likelihood(&rules, belief.mean(), &observations).unwrap();
     let c = rules[0].half_width();
@@ -107,7 +107,7 @@ fn the_joint_likelihood_is_the_product_of_the_single_ones() {
         .map(|o| match o {
             Observation::Received(z) => (Value::scalar(z[0], 1.0).unwrap().into(), 0.9_f64.ln()),
             Observation::Nothing => (InCell::silence(cell, 1.0, &link).unwrap().into(), 0.0),
-            Observation::Erased => (Constant::ONE.into(), 0.0),
+            Observation::Lost => (Constant::ONE.into(), 0.0),
         })
         .collect();
     let x: Vec<f64> = (0..1000).map(|i| i as f64 * 0.02 - 9.0).collect();
@@ -304,7 +304,7 @@ fn bad_steps_are_typed_errors_and_leave_the_belief() {
     assert!(matches!(fuse(&[value(1.1), value(9.0)]).unwrap_err(), Error::ProtocolViolation { sensor: 0, .. }));
     assert!(matches!(fuse(&[value(9.0), value(f64::NAN)]).unwrap_err(), Error::Core(_)));
     assert!(fuse(&[Observation::Nothing, Observation::Nothing]).is_ok());
-    assert!(fuse(&[Observation::Erased, Observation::Erased]).unwrap().0 == belief);
+    assert!(fuse(&[Observation::Lost, Observation::Lost]).unwrap().0 == belief);
 
     let always = Network::new(network.sensors().to_vec(), 0.0, Link::PERFECT).unwrap();
     let rules = always.rules_under(&belief).unwrap();
@@ -384,7 +384,7 @@ fn a_singular_vector_prediction_is_updated_in_the_direction_it_has() {
     let network = vector_network(0.0);
     let predicted = kalman::predict(&dynamics, &Gaussian::known(Vector2::new(0.0, 10.0)).unwrap());
     let rules = network.rules_under(&predicted).unwrap();
-    let nothing = [Observation::Nothing, Observation::Erased];
+    let nothing = [Observation::Nothing, Observation::Lost];
     let (ours, info) = network.fuse(&predicted, &rules, predicted.mean(), &nothing).unwrap();
     // The same with a prior that is barely regular.
     let regular = Gaussian::new(*predicted.mean(), predicted.covariance() + Matrix2::identity() * 1e-9).unwrap();

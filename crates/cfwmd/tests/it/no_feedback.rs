@@ -177,7 +177,7 @@ fn erased_reports_leave_the_prediction() {
         let n = 20_000;
         let mut rng = Stream::new(11).rng();
         let belief = ImputedBelief::new(&start, 2, n).unwrap();
-        let (next, _) = imputing::step(&mut rng, network, &dynamics, &belief, &[Observation::Erased; 2]).unwrap();
+        let (next, _) = imputing::step(&mut rng, network, &dynamics, &belief, &[Observation::Lost; 2]).unwrap();
         let (mean, covariance) = (*next.state().mean(), *next.state().covariance());
         let slack = 4.5 * (expected.covariance().amax() / n as f64).sqrt();
         assert!((mean - expected.mean()).amax() < slack, "{mean} {}", expected.mean());
@@ -247,7 +247,7 @@ fn bad_steps_are_typed_errors() {
         let error = imputing::step(&mut rng, network, &dynamics, &imputed, &observations).unwrap_err();
         assert!(error.to_string().contains(words), "{error}");
     }
-    let erased = [Observation::Nothing, Observation::Erased];
+    let erased = [Observation::Nothing, Observation::Lost];
     assert!(joint::step(&network, &dynamics, &joint, &erased).is_ok());
     assert!(imputing::step(&mut rng, &network, &dynamics, &imputed, &erased).is_ok());
     assert!(ImputedBelief::new(&known(), 2, 0).is_err());

@@ -245,7 +245,7 @@ fn sweeps_of_ellipsoids_and_triggers_are_the_scalar() {
         let region = EllipsoidSilence::new(&rule, &Vector2::new(0.3, 0.1), &Matrix2::identity(), &link).unwrap();
         is_a_number(&region, &planes).unwrap();
         sweep_is_scalar(&region, &planes).unwrap();
-        for observation in [Observation::Nothing, Observation::Received(0.7), Observation::Erased] {
+        for observation in [Observation::Nothing, Observation::Received(0.7), Observation::Lost] {
             let bump = triggered.factor(&Vector1::new(0.2), &observation, &link).unwrap();
             sweep_is_scalar(&bump, &lines).unwrap();
         }
@@ -299,7 +299,7 @@ fn silence_has_the_probability_of_the_rule() {
         .unwrap();
     assert!((info.log_likelihood - expected).abs() < 1e-7);
     let (after, info) = two
-        .fuse(&belief, &rules, belief.mean(), &[Observation::Erased])
+        .fuse(&belief, &rules, belief.mean(), &[Observation::Lost])
         .unwrap();
     assert_eq!((after, info.log_likelihood), (belief, 0.0));
 }

@@ -63,7 +63,7 @@ fn erased_says_nothing<const M: usize, S: Scheme<M>>(
     measurements: &[SVector<f64, M>],
 ) -> Result<(), Violation> {
     const LAW: &str = "an erased report says nothing";
-    let erased = failed(LAW, scheme.factor(feedback, &Observation::Erased, link))?;
+    let erased = failed(LAW, scheme.factor(feedback, &Observation::Lost, link))?;
     for m in measurements {
         agree(LAW, format!("{m:?}"), erased.log_likelihood(m), 0.0, 1e-15, 1.0)?;
     }

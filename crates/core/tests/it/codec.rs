@@ -94,7 +94,7 @@ fn misuse_is_refused_and_writes_nothing() {
 
 #[test]
 fn nothing_is_not_erased() {
-    assert_ne!(Observation::<Sign>::Nothing, Observation::Erased);
+    assert_ne!(Observation::<Sign>::Nothing, Observation::Lost);
     assert_eq!(Observation::Received(Sign::Above).received(), Some(&Sign::Above));
     assert!(Cell::new(1.0, 1.0).is_err() && Cell::new(f64::NAN, 1.0).is_err());
     // P(1.5 <= 1 + N(0, 4) < 3) = Phi(1) - Phi(1/4).

@@ -384,7 +384,7 @@ impl Scheme<1> for Coin {
             Observation::Received(Sign::Above) => arrives * self.heads,
             Observation::Received(Sign::Below) => arrives * (1.0 - self.heads),
             Observation::Nothing => self.nothing,
-            Observation::Erased => self.erased,
+            Observation::Lost => self.erased,
         })?)
     }
 }

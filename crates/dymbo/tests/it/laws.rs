@@ -76,7 +76,7 @@ fn innovation_words_obey() {
             deviation: unit,
         };
         assert!(word.word(0.0, &nothing).is_err());
-        assert!(word.factor(&nothing, &Observation::Erased, &Link::PERFECT).is_err());
+        assert!(word.factor(&nothing, &Observation::Lost, &Link::PERFECT).is_err());
         assert_eq!(message::round_trip(&prediction, &word.feedback_format()), Ok(128));
     }
 }

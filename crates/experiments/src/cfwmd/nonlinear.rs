@@ -129,7 +129,7 @@ impl World {
                     _ if sends => Observation::Received(z),
                     Scheme::State | Scheme::StateAndCovariance => Observation::Nothing,
                     // To a filter that ignores silence it is no more than an erased report.
-                    _ => Observation::Erased,
+                    _ => Observation::Lost,
                 });
                 rules.push(rule);
             }

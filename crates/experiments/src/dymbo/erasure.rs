@@ -66,7 +66,7 @@ fn one_run(
         let sample = plant.sensor().sample(&mut rng, &state)[0];
         let bit = Sign::of(sample, filter.threshold(&belief))?;
         let observation = if rng.random_bool(loss) {
-            Observation::Erased
+            Observation::Lost
         } else {
             Observation::Received(bit)
         };

@@ -53,7 +53,7 @@ impl Scheme<1> for TwoSided {
             Observation::Received(sign) if *sign == sent => (1.0 - link.loss()) * (1.0 - link.crossover()),
             Observation::Received(_) => (1.0 - link.loss()) * link.crossover(),
             Observation::Nothing => link.loss(),
-            Observation::Erased => 1.0,
+            Observation::Lost => 1.0,
         };
         if !matches!(observation, Observation::Received(_)) {
             return Ok(Constant::new(given(Sign::Above))?.into());

@@ -118,7 +118,7 @@ where
             // A packet that the sensor cannot have sent is one that was damaged.
             let tracked = receiver
                 .receive(observation)
-                .or_else(|_| receiver.receive(&Observation::Erased))
+                .or_else(|_| receiver.receive(&Observation::Lost))
                 .map_err(failed)?;
             let (Some(value), true) = (tracked.value, tracked.synchronised) else {
                 continue;

@@ -77,7 +77,7 @@ impl<F: ScalarFilter> Estimator for Bits<F> {
         predicted: &Gaussian<1>,
         observations: &[Observation<Self::Report>],
     ) -> Result<Gaussian<1>, Error> {
-        let observation = observations.first().unwrap_or(&Observation::Erased);
+        let observation = observations.first().unwrap_or(&Observation::Lost);
         Ok(self.filter.update(predicted, observation).map_err(impossible)?.0)
     }
 

@@ -70,7 +70,7 @@ impl Scheme<1> for SendAll {
                 Censored::value(&Vector1::new(*value), &[[self.noise_variance]].into(), arrival)?
             }
             (Observation::Nothing, _) => Censored::constant(link.loss())?,
-            (Observation::Erased, _) => Censored::constant(1.0)?,
+            (Observation::Lost, _) => Censored::constant(1.0)?,
         })
     }
 }
@@ -96,7 +96,7 @@ mod tests {
         assert!(SendAll::new(0.0, NumberFormat::Double).is_err());
         assert!(
             plain
-                .factor(&(), &Observation::Erased, &Link::flipping(0.1).unwrap())
+                .factor(&(), &Observation::Lost, &Link::flipping(0.1).unwrap())
                 .is_err()
         );
     }

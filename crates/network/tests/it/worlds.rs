@@ -109,7 +109,7 @@ impl Scheme<1> for TwoSided {
         let received = match observation {
             Observation::Received(sign) => *sign,
             Observation::Nothing => return Ok(Constant::new(link.loss())?.into()),
-            Observation::Erased => return Ok(Constant::ONE.into()),
+            Observation::Lost => return Ok(Constant::ONE.into()),
         };
         let given = |sent: Sign| (1.0 - link.loss()) * link.word_probability(sent as u64, received as u64, 1);
         let edges = vec![prediction - self.reach, prediction + self.reach];

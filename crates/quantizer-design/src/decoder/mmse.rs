@@ -37,7 +37,7 @@ pub struct Estimate {
 /// let mut observations = [3, 2, 2, 3, 1, 2, 3, 2, 2].map(|t| Observation::Received(Symbol(t)));
 /// let estimate = decoder.decode(&observations)?;
 /// assert!((estimate.mean - 0.9).abs() < 0.1 && estimate.variance < 0.13);
-/// observations[0] = Observation::Erased;
+/// observations[0] = Observation::Lost;
 /// assert!(decoder.decode(&observations)?.variance > estimate.variance);
 /// # Ok::<(), fewbits_quantizer_design::Error>(())
 /// ```
@@ -244,7 +244,7 @@ mod tests {
             let decoder = MmseDecoder::new(&system, 20).unwrap();
             let others = System::identical(scene.subset(&[0, 1]).unwrap(), q).unwrap();
             let exact = MmseDecoder::new(&others, 10).unwrap().decode_symbols(&[3, 1]).unwrap();
-            for missing in [Observation::Erased, Observation::Nothing] {
+            for missing in [Observation::Lost, Observation::Nothing] {
                 let seen = [
                     Observation::Received(Symbol(3)),
                     missing,
@@ -254,12 +254,12 @@ mod tests {
                 assert!((found.mean - exact.mean).abs() < 1e-12 && (found.variance - exact.variance).abs() < 1e-12);
                 assert!(decoder.decode(&seen[..2]).is_err());
             }
-            let nothing = decoder.decode(&[Observation::Erased; 3]).unwrap();
+            let nothing = decoder.decode(&[Observation::Lost; 3]).unwrap();
             assert!(nothing.mean.abs() < 1e-13 && (nothing.variance - 1.0).abs() < 1e-12);
             let bad = [
                 Observation::Received(Symbol(4)),
-                Observation::Erased,
-                Observation::Erased,
+                Observation::Lost,
+                Observation::Lost,
             ];
             assert!(decoder.decode(&bad).is_err());
         }

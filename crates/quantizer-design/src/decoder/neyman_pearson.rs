@@ -147,14 +147,14 @@ mod tests {
         for a in 0..4 {
             for b in 0..4 {
                 let accepted = test
-                    .acceptance(&[received(a), Observation::Erased, received(b)])
+                    .acceptance(&[received(a), Observation::Lost, received(b)])
                     .unwrap();
                 spent += given[0][a] * given[0][b] * accepted;
             }
         }
         assert!((spent - 0.3).abs() < 1e-13);
         assert_eq!(test.acceptance(&[Observation::Nothing; 3]).unwrap(), 0.3);
-        assert!(test.acceptance(&[Observation::Erased; 2]).is_err());
+        assert!(test.acceptance(&[Observation::Lost; 2]).is_err());
         let json = serde_json::to_string(&test).unwrap();
         assert_eq!(serde_json::from_str::<NeymanPearson>(&json).unwrap(), test);
         assert!(
