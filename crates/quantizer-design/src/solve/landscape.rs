@@ -15,6 +15,8 @@ use fewbits_numerics::kernels;
 pub(super) const REACH: f64 = 4.5;
 /// Steps of that table.
 const PLACES: usize = 400;
+/// Sweeps over the cells of a sensor that a block serves, about.
+const SWEEPS: f64 = 5.0;
 /// Below this a probability is taken as zero in a logarithm.
 const LOG_FLOOR: f64 = 1e-300;
 
@@ -164,7 +166,7 @@ impl Landscape {
         self.scenarios[0].features.len()
     }
 
-    /// Multiplications that one block of each sensor takes.
+    /// Multiplications that one round over the sensors takes: their blocks, and the sweeps over cells and words with each.
     pub(super) fn work(&self, grid: usize) -> f64 {
         let outcomes: f64 = self.laws.iter().map(|l| l.outputs as f64).product();
         let nodes: f64 = self
@@ -172,10 +174,9 @@ impl Landscape {
             .iter()
             .map(|s| s.features.iter().map(|f| f.weights.len() as f64).sum::<f64>())
             .sum();
-        self.laws
-            .iter()
-            .map(|l| outcomes / l.outputs as f64 * grid as f64 * nodes)
-            .sum()
+        let sweeps = |l: &WordLaw| SWEEPS * (l.outputs * self.width()) as f64;
+        let block = |l: &WordLaw| outcomes / l.outputs as f64 * grid as f64 * (nodes + sweeps(l));
+        self.laws.iter().map(block).sum()
     }
 
     /// Tabulates a grid for one sensor.

@@ -16,7 +16,7 @@ use fewbits_monte_carlo::Stream;
 /// The joint search is left out where one round over the sensors takes more multiplications than this.
 const MAX_JOINT_WORK: f64 = 2e10;
 /// Multiplications that the starts of the joint search may take together, as far as they can be foreseen.
-const START_WORK: f64 = 1.5e9;
+const START_WORK: f64 = 6e8;
 /// Results of single sensors that are combined, and joint results that are refined.
 const KEPT: usize = 4;
 /// Times that grids are refined, each by a factor of three: breakpoints end within 1e-3 of a standard deviation, from where
