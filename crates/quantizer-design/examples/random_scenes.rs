@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let mut number = |default: u64| arguments.next().map_or(Ok(default), |a| a.parse::<u64>());
     let (count, first) = (number(100)?, number(0)?);
-    let limit = std::time::from_secs(5);
+    let limit = std::time::Duration::from_secs(5);
     let (mut worse, mut failed, mut unscaled) = (0, 0, 0);
     for i in first..first + count {
         let scale = [1.0, 1e-4, 1e4][i as usize % 3];
