@@ -17,6 +17,9 @@ use crate::runs::{self, Special};
 use crate::time::{self, TimeKind};
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint};
 
+/// The cells of one column; `None` is a gap.
+pub type Cells = Vec<Option<f64>>;
+
 /// Rows as they were restored, or are to be stored.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
@@ -24,7 +27,7 @@ pub struct Block {
     /// The tick of each row.
     pub ticks: Vec<i64>,
     /// One list of cells per column; `None` is a gap. A column that was not asked for is empty.
-    pub columns: Vec<Vec<Option<f64>>>,
+    pub columns: Vec<Cells>,
     /// For columns with a share of the range: the bound in this block in units of the column; 0 means lossless. `None` for others.
     pub share_bounds: Vec<Option<f64>>,
 }
@@ -112,9 +115,9 @@ fn encode_column(
 pub(crate) fn encode(
     header: &Header,
     ticks: &[i64],
-    columns: &[Vec<Option<f64>>],
+    columns: &[Cells],
     own_bounds: &[Option<f64>],
-) -> Result<(Vec<u8>, Vec<Vec<Option<f64>>>), Error> {
+) -> Result<(Vec<u8>, Vec<Cells>), Error> {
     let coded: Vec<CodedColumn> = columns
         .iter()
         .enumerate()

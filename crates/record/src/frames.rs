@@ -10,7 +10,7 @@
 //! content  := header's checksum (4 bytes), number of pieces - 1, number of this piece, bytes
 //! ```
 
-use crate::block::{self, Block};
+use crate::block::{self, Block, Cells};
 use crate::bound::Bound;
 use crate::error::{Damage, Error};
 use crate::header::Header;
@@ -37,7 +37,7 @@ pub struct FrameWriter {
     header: Option<Header>,
     max_bytes: usize,
     ticks: Vec<i64>,
-    columns: Vec<Vec<Option<f64>>>,
+    columns: Vec<Cells>,
     ends: Vec<Option<(f64, f64)>>,
     /// The most rows that are known to fit, and how many are tried next.
     fits: usize,
@@ -209,7 +209,7 @@ impl FrameWriter {
         let own: Vec<Option<f64>> = columns
             .map(|i| crate::recorder::own_bound(self.share_bound(i)?, header.share_bounds[i]))
             .collect();
-        let cells: Vec<Vec<Option<f64>>> = self.columns.iter().map(|cells| cells[..rows].to_vec()).collect();
+        let cells: Vec<Cells> = self.columns.iter().map(|cells| cells[..rows].to_vec()).collect();
         Ok(block::encode(header, &self.ticks[..rows], &cells, &own)?.0)
     }
 }

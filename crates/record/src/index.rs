@@ -11,6 +11,7 @@
 //! A segment follows its blocks, every 1024 blocks and at the end; so a recorder holds no more than that many entries. An entry without
 //! rows stands for damaged bytes that `resume` left in place.
 
+use crate::block::Cells;
 use crate::error::Damage;
 use crate::header::Header;
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint, zigzag};
@@ -48,7 +49,7 @@ impl Entry {
         }
     }
 
-    pub(crate) fn of(length: u64, ticks: &[i64], columns: &[Vec<Option<f64>>]) -> Self {
+    pub(crate) fn of(length: u64, ticks: &[i64], columns: &[Cells]) -> Self {
         let ends = columns.iter().map(|cells| {
             let finite = cells.iter().flatten().filter(|value| value.is_finite());
             finite.fold(None, |ends, value| {

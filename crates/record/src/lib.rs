@@ -64,7 +64,7 @@ mod schema;
 mod time;
 mod wire;
 
-pub use block::Block;
+pub use block::{Block, Cells};
 pub use bound::{Bound, MAX_DECIMALS, is_within, is_within_on_circle};
 pub use error::{Damage, Error};
 pub use frames::{FrameReader, FrameWriter, MIN_FRAME_BYTES};
@@ -72,3 +72,8 @@ pub use playback::{BlockInfo, Blocks, Playback, Row, Rows};
 pub use recorder::Recorder;
 pub use scan::BlockReader;
 pub use schema::{Column, MAX_CELLS, ROWS_PER_BLOCK, Schema, TimeBase, TimeFormat};
+
+/// The programs of the page, kept running.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/record.md")]
+mod page {}

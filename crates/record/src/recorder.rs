@@ -1,6 +1,6 @@
 //! Writing recordings.
 
-use crate::block;
+use crate::block::{self, Cells};
 use crate::bound::Bound;
 use crate::error::Error;
 use crate::header::Header;
@@ -39,7 +39,7 @@ pub struct Recorder<W> {
     schema: Schema,
     header: Option<Header>,
     ticks: Vec<i64>,
-    columns: Vec<Vec<Option<f64>>>,
+    columns: Vec<Cells>,
     /// Ends of each column's finite values so far.
     ends: Vec<Option<(f64, f64)>>,
     next_tick: i64,
