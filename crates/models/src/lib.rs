@@ -18,6 +18,7 @@
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
 //! | received amplitude that falls with distance | [`ReceivedPower`] |
 //! | a substance that diffuses through air, ground, vessels | [`diffusion`] |
+//! | what a source causes at sensors, in any medium | [`SourceModel`] |
 //!
 //! ```
 //! use fewbits_models::{constant_velocity_1d, Ar1};
@@ -41,6 +42,7 @@ mod error;
 mod linear_gaussian;
 mod linear_sensor;
 mod received_power;
+mod source_model;
 
 pub use ar1::Ar1;
 pub use constant_velocity::{constant_velocity_1d, constant_velocity_2d};
@@ -48,4 +50,5 @@ pub use error::Error;
 pub use linear_gaussian::LinearGaussian;
 pub use linear_sensor::{LinearSensor, ScalarSensor};
 pub use received_power::ReceivedPower;
+pub use source_model::{Homogeneous, Receptor, SourceGradient, SourceModel};
 pub use {nalgebra, rand};

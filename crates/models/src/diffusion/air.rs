@@ -4,6 +4,7 @@ use super::axis::Axis;
 use super::half_space::{Flux, Wall};
 use super::space::{ImpulseResponse, Space, step_response};
 use crate::Error;
+use crate::source_model::{Homogeneous, Receptor, SourceGradient, SourceModel};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive};
 use fewbits_numerics::kernels::scalar::exp;
@@ -44,15 +45,6 @@ pub struct Air {
     strength: f64,
 }
 
-/// A concentration and how it changes with the place of the source.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SourceGradient {
-    /// Concentration per unit rate, kg/m^3 per kg/s.
-    pub value: f64,
-    /// Its gradient with respect to the position of the source, per metre.
-    pub gradient: Vector3<f64>,
-}
-
 impl Air {
     /// Air of the given diffusivity (m^2/s) and wind (m/s).
     ///
@@ -90,6 +82,27 @@ impl Air {
             closest: positive("closest", closest)?,
             ..self
         })
+    }
+
+    /// The same air with another wind, m/s.
+    ///
+    /// # Errors
+    /// As [`Air::new`].
+    pub fn with_wind(&self, wind: Vector3<f64>) -> Result<Self, Error> {
+        Self::new(self.diffusivity, wind, self.ground)?.with_closest(self.closest)
+    }
+
+    /// The same air with another diffusivity, m^2/s.
+    ///
+    /// # Errors
+    /// If it is not a positive number.
+    pub fn with_diffusivity(&self, diffusivity: f64) -> Result<Self, Error> {
+        Self::new(diffusivity, self.wind, self.ground)?.with_closest(self.closest)
+    }
+
+    /// What bounds the air below.
+    pub fn ground(&self) -> Ground {
+        self.ground
     }
 
     /// Wind, m/s.
@@ -274,5 +287,69 @@ impl ImpulseResponse for Air {
 
     fn diffusivity(&self) -> f64 {
         self.diffusivity
+    }
+}
+
+/// Relative step of the central difference in the diffusivity.
+const DIFFUSIVITY_STEP: f64 = 1e-5;
+
+impl SourceModel for Air {
+    fn concentration(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> f64 {
+        self.concentration(&receptor.place, source, age)
+    }
+
+    fn source_gradient(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> SourceGradient {
+        self.source_gradient(&receptor.place, source, age)
+    }
+
+    /// The concentration grows by at most the factor `exp(slope * reach)`, with the largest slope of its logarithm within the square
+    /// (see [`Homogeneous`]). It is nowhere above that of a source straight upwind in open air at the square's least distance, twice
+    /// that over ground.
+    fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64 {
+        let here = self.concentration(&receptor.place, source, age);
+        if age <= 0.0 {
+            return here;
+        }
+        let reach = std::f64::consts::SQRT_2 * half_width;
+        let offset = receptor.place - source;
+        let near = offset
+            .z
+            .hypot((offset.x.hypot(offset.y) - reach).max(0.0))
+            .max(self.closest);
+        let far = offset.norm() + reach;
+        let slope = near.recip() + 2.0 * far / (4.0 * self.diffusivity * age) + self.speed / self.diffusivity;
+        let downwind = self.wind.try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let highest = if self.has_ground() { 2.0 } else { 1.0 } * self.terms(&(downwind * near), age).sum;
+        let growth = (slope * reach).exp_m1();
+        // An infinite growth of nothing would be NaN.
+        if growth * here < highest {
+            growth * here
+        } else {
+            highest
+        }
+    }
+
+    /// `z >= 0` above ground.
+    fn admits(&self, source: &Vector3<f64>, _: f64) -> bool {
+        !self.has_ground() || source.z >= 0.0
+    }
+
+    fn homogeneous(&self) -> Option<Homogeneous> {
+        Some(Homogeneous {
+            diffusivity: self.diffusivity,
+            wind: self.wind.xy(),
+            speed: self.speed,
+            closest: self.closest,
+        })
+    }
+
+    /// A central difference of relative step 1e-5, good to about nine digits.
+    fn diffusivity_slope(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> Option<f64> {
+        let at = |share: f64| {
+            let air = self.with_diffusivity(share * self.diffusivity).ok()?;
+            Some(air.concentration(&receptor.place, source, age))
+        };
+        let difference = at(1.0 + DIFFUSIVITY_STEP)? - at(1.0 - DIFFUSIVITY_STEP)?;
+        Some(difference / (2.0 * DIFFUSIVITY_STEP * self.diffusivity))
     }
 }

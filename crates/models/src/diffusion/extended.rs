@@ -1,7 +1,6 @@
 //! Sources that move, and sources that cover an area.
 
-use super::air::{Air, Ground};
-use super::space::ImpulseResponse;
+use super::air::Air;
 use crate::Error;
 use fewbits_numerics::error::{all_finite, at_least_one, positive};
 use fewbits_numerics::quadrature::Rule;
@@ -12,20 +11,19 @@ use std::f64::consts::{PI, TAU};
 /// velocity (m/s) while releasing at a constant rate.
 ///
 /// In the frame of the source the wind is `wind - velocity`, so that the closed form of [`Air`] holds with the offset measured
-/// from where the source **now** is.
+/// from where the source **now** is. The ground is that of `air`.
 ///
 /// # Errors
 /// If `velocity` is not finite, or not horizontal above ground.
 pub fn moving_source(
     air: &Air,
-    ground: Ground,
     field: &Vector3<f64>,
     start: &Vector3<f64>,
     velocity: &Vector3<f64>,
     age: f64,
 ) -> Result<f64, Error> {
     all_finite("velocity", velocity.as_slice())?;
-    let relative = Air::new(air.diffusivity(), air.wind() - velocity, ground)?.with_closest(air.closest())?;
+    let relative = air.with_wind(air.wind() - velocity)?;
     Ok(relative.concentration(field, &(start + velocity * age), age))
 }
 

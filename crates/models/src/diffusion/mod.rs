@@ -47,7 +47,8 @@ mod space;
 mod sphere;
 mod two_media;
 
-pub use air::{Air, CLOSEST, Ground, SourceGradient};
+pub use crate::source_model::SourceGradient;
+pub use air::{Air, CLOSEST, Ground};
 pub use axis::Axis;
 pub use contour::{contour, contour_radius};
 pub use cylinder::Cylinder;

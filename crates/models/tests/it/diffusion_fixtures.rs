@@ -98,7 +98,7 @@ fn moving_and_distributed_sources() {
     for e in entries("moving") {
         let air = Air::new(number(&e, "kappa"), Vector3::zeros(), Ground::Impermeable).unwrap();
         let (r, p, u) = (vector(&e, "r"), vector(&e, "p0"), vector(&e, "u"));
-        check(&e, moving_source(&air, Ground::Impermeable, &r, &p, &u, number(&e, "t")).unwrap());
+        check(&e, moving_source(&air, &r, &p, &u, number(&e, "t")).unwrap());
     }
     for e in entries("disk") {
         let air = Air::new(number(&e, "kappa"), Vector3::zeros(), Ground::Impermeable).unwrap();

@@ -294,12 +294,33 @@ fn a_moving_source_leaves_its_trail() {
     let (field, start, velocity) =
         (Vector3::new(3.1, 1.2, 0.9), Vector3::new(0.2, -0.4, 0.3), Vector3::new(0.9, 0.4, 0.0));
     let age = 2.6;
-    let got = moving_source(&air, Ground::Impermeable, &field, &start, &velocity, age).unwrap();
+    let got = moving_source(&air, &field, &start, &velocity, age).unwrap();
     let trail =
         Rule::gauss_legendre(40).composite(0.0, age, 30, |t| air.green(&field, &(start + velocity * t), age - t));
     close(got, trail, 1e-9);
-    assert!(moving_source(&air, Ground::Impermeable, &field, &start, &Vector3::z(), age).is_err());
-    assert!(moving_source(&air, Ground::Impermeable, &field, &start, &Vector3::repeat(f64::NAN), age).is_err());
+    assert!(moving_source(&air, &field, &start, &Vector3::z(), age).is_err());
+    assert!(moving_source(&air, &field, &start, &Vector3::repeat(f64::NAN), age).is_err());
+}
+
+/// Over any ground, and none: the integral over what was left behind.
+#[test]
+fn moving_source_keeps_the_airs_ground() {
+    let (field, start, velocity) =
+        (Vector3::new(3.1, 1.2, 0.9), Vector3::new(0.2, -0.4, 0.3), Vector3::new(0.9, 0.4, 0.0));
+    let age = 2.6;
+    let leaking = Ground::Wall(Wall::permeable(0.7).unwrap());
+    for ground in [
+        Ground::None,
+        Ground::Impermeable,
+        Ground::Wall(Wall::ABSORBING),
+        leaking,
+    ] {
+        let air = Air::new(1.4, Vector3::new(0.5, -0.3, 0.0), ground).unwrap();
+        let got = moving_source(&air, &field, &start, &velocity, age).unwrap();
+        let trail =
+            Rule::gauss_legendre(40).composite(0.0, age, 30, |t| air.green(&field, &(start + velocity * t), age - t));
+        close(got, trail, 1e-9);
+    }
 }
 
 /// The mean over the disk, by brute force in Cartesian coordinates.
