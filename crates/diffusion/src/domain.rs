@@ -101,7 +101,12 @@ impl Domain {
     /// If the number of cells is not that of the grid, a leak is negative or not finite, or [`Error::NoFreeCell`].
     pub fn new(grid: Grid, cells: &[Cell], sides: [[Boundary; 2]; 3]) -> Result<Self, Error> {
         if cells.len() != grid.cells() {
-            return Err(ArgumentError::new("cells", cells.len(), format!("{}, one for each cell of the grid", grid.cells())).into());
+            return Err(ArgumentError::new(
+                "cells",
+                cells.len(),
+                format!("{}, one for each cell of the grid", grid.cells()),
+            )
+            .into());
         }
         let of_cells = cells.iter().filter_map(|cell| match cell {
             Cell::Free => None,
@@ -128,7 +133,11 @@ impl Domain {
             for axis in 0..grid.dimension() {
                 let (area, half) = (grid.face_area(&at, axis), 0.5 * grid.width(axis, at[axis]));
                 for upper in [false, true] {
-                    let beyond = if upper { at[axis] + 1 < counts[axis] } else { at[axis] > 0 };
+                    let beyond = if upper {
+                        at[axis] + 1 < counts[axis]
+                    } else {
+                        at[axis] > 0
+                    };
                     let boundary = if beyond {
                         let mut next = at;
                         next[axis] = if upper { at[axis] + 1 } else { at[axis] - 1 };
@@ -137,7 +146,12 @@ impl Domain {
                             Cell::Blocked(boundary) => boundary,
                             _ if upper => {
                                 let halves = [half, 0.5 * grid.width(axis, next[axis])];
-                                faces.push(Face { cells: [number, numbers[other]], axis, area, halves });
+                                faces.push(Face {
+                                    cells: [number, numbers[other]],
+                                    axis,
+                                    area,
+                                    halves,
+                                });
                                 continue;
                             }
                             _ => continue,
@@ -148,12 +162,25 @@ impl Domain {
                         sides[axis][usize::from(upper)]
                     };
                     if boundary != Boundary::Closed {
-                        edge_faces.push(EdgeFace { cell: number, axis, upper, area, half, boundary });
+                        edge_faces.push(EdgeFace {
+                            cell: number,
+                            axis,
+                            upper,
+                            area,
+                            half,
+                            boundary,
+                        });
                     }
                 }
             }
         }
-        Ok(Self { grid, free, numbers, faces, edge_faces })
+        Ok(Self {
+            grid,
+            free,
+            numbers,
+            faces,
+            edge_faces,
+        })
     }
 
     /// Multiplies the leak of each face by `|normal . face|`, with the unit normal of the true wall at the centre of the face.
@@ -165,12 +192,14 @@ impl Domain {
     /// If a normal is not of length one.
     pub fn with_wall_normals(mut self, normal: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, Error> {
         for face in &mut self.edge_faces {
-            let Boundary::Leaking(leak) = face.boundary else { continue };
+            let Boundary::Leaking(leak) = face.boundary else {
+                continue;
+            };
             let mut centre = self.grid.centre(self.free[face.cell]);
             centre[face.axis] += if face.upper { face.half } else { -face.half };
             let n = normal(centre);
             let length = n.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if !((length - 1.0).abs() < 1e-6) {
+            if length.is_nan() || (length - 1.0).abs() > 1e-6 {
                 return Err(ArgumentError::new("normal", format!("{n:?} at {centre:?}"), "a vector of length 1").into());
             }
             face.boundary = Boundary::Leaking(leak * n[face.axis].abs());
@@ -219,10 +248,15 @@ impl Domain {
         self.number(cell).ok_or_else(|| {
             let distance = |cell: &usize| {
                 let centre = self.grid.centre(*cell);
-                (0..self.grid.dimension()).map(|i| (centre[i] - point[i]).powi(2)).sum::<f64>()
+                (0..self.grid.dimension())
+                    .map(|i| (centre[i] - point[i]).powi(2))
+                    .sum::<f64>()
             };
             let nearest = self.free.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            Error::Blocked { point, nearest: self.grid.centre(nearest.copied().unwrap_or(0)) }
+            Error::Blocked {
+                point,
+                nearest: self.grid.centre(nearest.copied().unwrap_or(0)),
+            }
         })
     }
 
@@ -231,7 +265,9 @@ impl Domain {
     /// # Errors
     /// As [`Domain::locate`].
     pub fn point(&self, point: [f64; 3]) -> Result<Patch, Error> {
-        Ok(Patch { shares: vec![(self.locate(point)?, 1.0)] })
+        Ok(Patch {
+            shares: vec![(self.locate(point)?, 1.0)],
+        })
     }
 
     /// All cells whose centres are in the box between two corners, with shares in proportion to their volumes.

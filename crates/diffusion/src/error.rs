@@ -92,7 +92,9 @@ pub enum Error {
         expected: usize,
     },
     /// A picture is not a plain PBM (`P1`) of the stated size.
-    #[error("the picture is not a plain PBM: {found} pixels, expected `P1`, width, height and {expected} pixels of 0 or 1")]
+    #[error(
+        "the picture is not a plain PBM: {found} pixels, expected `P1`, width, height and {expected} pixels of 0 or 1"
+    )]
     Picture {
         /// Number of pixels that could be read.
         found: usize,

@@ -44,8 +44,15 @@ impl SensorField {
     /// # Errors
     /// If a point is outside or blocked, or the transport has no steady state.
     pub fn steady(transport: &Transport, points: &[[f64; 3]]) -> Result<Self, Error> {
-        let patches = points.iter().map(|point| transport.domain().point(*point)).collect::<Result<Vec<_>, _>>()?;
-        let responses = Steady::new(transport)?.adjoint(&patches)?.into_iter().map(|field| vec![field]).collect();
+        let patches = points
+            .iter()
+            .map(|point| transport.domain().point(*point))
+            .collect::<Result<Vec<_>, _>>()?;
+        let responses = Steady::new(transport)?
+            .adjoint(&patches)?
+            .into_iter()
+            .map(|field| vec![field])
+            .collect();
         Self::with(transport, points, vec![f64::INFINITY], responses)
     }
 
@@ -60,18 +67,40 @@ impl SensorField {
         ages: &[f64],
         control: StepControl,
     ) -> Result<Self, Error> {
-        let patches = points.iter().map(|point| transport.domain().point(*point)).collect::<Result<Vec<_>, _>>()?;
+        let patches = points
+            .iter()
+            .map(|point| transport.domain().point(*point))
+            .collect::<Result<Vec<_>, _>>()?;
         let mut by_sensor = vec![Vec::with_capacity(ages.len()); points.len()];
-        for fields in Transient::new(transport).with_control(control)?.step_responses(&patches, ages)? {
-            by_sensor.iter_mut().zip(fields).for_each(|(sensor, field)| sensor.push(field));
+        for fields in Transient::new(transport)
+            .with_control(control)?
+            .step_responses(&patches, ages)?
+        {
+            by_sensor
+                .iter_mut()
+                .zip(fields)
+                .for_each(|(sensor, field)| sensor.push(field));
         }
         Self::with(transport, points, ages.to_vec(), by_sensor)
     }
 
-    fn with(transport: &Transport, points: &[[f64; 3]], ages: Vec<f64>, responses: Vec<Vec<Vec<f64>>>) -> Result<Self, Error> {
+    fn with(
+        transport: &Transport,
+        points: &[[f64; 3]],
+        ages: Vec<f64>,
+        responses: Vec<Vec<Vec<f64>>>,
+    ) -> Result<Self, Error> {
         let domain = transport.domain().clone();
-        let sensors = points.iter().map(|point| domain.locate(*point)).collect::<Result<_, _>>()?;
-        Ok(Self { domain, sensors, ages, responses })
+        let sensors = points
+            .iter()
+            .map(|point| domain.locate(*point))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            domain,
+            sensors,
+            ages,
+            responses,
+        })
     }
 
     /// The domain.
@@ -87,7 +116,7 @@ impl SensorField {
     /// The two responses about an age with their weights; nothing before age 0.
     fn about(&self, age: f64) -> [(usize, f64); 2] {
         let next = self.ages.partition_point(|known| *known < age);
-        if !(age > 0.0) {
+        if age.is_nan() || age <= 0.0 {
             return [(0, 0.0); 2];
         }
         match (next.checked_sub(1), self.ages.get(next)) {
@@ -114,7 +143,11 @@ impl SensorField {
         let mut within = [false; 3];
         for axis in 0..axes {
             upwards[axis] = point[axis] >= centre[axis];
-            let next = if upwards[axis] { at[axis] + 1 } else { at[axis].wrapping_sub(1) };
+            let next = if upwards[axis] {
+                at[axis] + 1
+            } else {
+                at[axis].wrapping_sub(1)
+            };
             within[axis] = next < grid.counts()[axis];
             if within[axis] {
                 widths[axis] = 0.5 * (grid.width(axis, at[axis]) + grid.width(axis, next));
@@ -127,23 +160,44 @@ impl SensorField {
             let mut cell = at;
             let mut inside = true;
             let mut reachable = false;
-            let mut nearer = number;
+            let mut nearer = corner & (corner - 1);
             for axis in (0..axes).filter(|axis| corner >> axis & 1 == 1) {
                 inside &= within[axis];
-                cell[axis] = if upwards[axis] { at[axis] + 1 } else { at[axis].wrapping_sub(1) };
-                reachable |= joined[corner ^ (1 << axis)];
-                nearer = corners[corner ^ (1 << axis)];
+                cell[axis] = if upwards[axis] {
+                    at[axis] + 1
+                } else {
+                    at[axis].wrapping_sub(1)
+                };
+                let without = corner ^ (1 << axis);
+                reachable |= joined[without];
+                // Prefer a corner with a value of its own: along a wall the field is that of the near side.
+                if joined[without] {
+                    nearer = without;
+                }
             }
-            let free = if inside { self.domain.number(grid.index(cell)) } else { None };
+            let free = if inside {
+                self.domain.number(grid.index(cell))
+            } else {
+                None
+            };
             joined[corner] = reachable && free.is_some();
-            corners[corner] = free.filter(|_| reachable).unwrap_or(nearer);
+            corners[corner] = free.filter(|_| reachable).unwrap_or(corners[nearer]);
         }
-        Some(Stencil { corners, position, widths, upwards, axes })
+        Some(Stencil {
+            corners,
+            position,
+            widths,
+            upwards,
+            axes,
+        })
     }
 
     /// Value and gradient of a response at a point.
     fn interpolate(&self, sensor: usize, point: &Vector3<f64>, age: f64) -> SourceGradient {
-        let mut result = SourceGradient { value: 0.0, gradient: Vector3::zeros() };
+        let mut result = SourceGradient {
+            value: 0.0,
+            gradient: Vector3::zeros(),
+        };
         let (Some(stencil), Some(fields)) = (self.stencil(&(*point).into()), self.responses.get(sensor)) else {
             return result;
         };
@@ -153,7 +207,14 @@ impl SensorField {
             result.gradient += weight * gradient;
         }
         // Steps in time may leave an error below zero.
-        if result.value < 0.0 { SourceGradient { value: 0.0, gradient: Vector3::zeros() } } else { result }
+        if result.value < 0.0 {
+            SourceGradient {
+                value: 0.0,
+                gradient: Vector3::zeros(),
+            }
+        } else {
+            result
+        }
     }
 }
 
@@ -170,7 +231,13 @@ impl Stencil {
     fn apply(&self, field: &[f64]) -> (f64, Vector3<f64>) {
         let (mut value, mut gradient) = (0.0, Vector3::zeros());
         for corner in 0..1_usize << self.axes {
-            let factor = |axis: usize| if corner >> axis & 1 == 1 { self.position[axis] } else { 1.0 - self.position[axis] };
+            let factor = |axis: usize| {
+                if corner >> axis & 1 == 1 {
+                    self.position[axis]
+                } else {
+                    1.0 - self.position[axis]
+                }
+            };
             let c = field[self.corners[corner]];
             value += c * (0..self.axes).map(factor).product::<f64>();
             for axis in 0..self.axes {
@@ -191,7 +258,8 @@ impl SourceModel for SensorField {
             Some(index) => Ok(Receptor { place: *place, index }),
             None => {
                 let shown = format!("({}, {}, {})", place.x, place.y, place.z);
-                Err(ArgumentError::new("place", shown, "a point in the cell of a sensor with an adjoint solution").into())
+                Err(ArgumentError::new("place", shown, "a point in the cell of a sensor with an adjoint solution")
+                    .into())
             }
         }
     }
@@ -206,7 +274,9 @@ impl SourceModel for SensorField {
 
     /// From the range of the response over the cells of the square and one more on each side; within a cell, its share of that.
     fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64 {
-        let Some(fields) = self.responses.get(receptor.index) else { return 0.0 };
+        let Some(fields) = self.responses.get(receptor.index) else {
+            return 0.0;
+        };
         let grid = self.domain.grid();
         let (mut ranges, mut narrowest) = ([(0, 0); 3], f64::INFINITY);
         for (axis, range) in ranges.iter_mut().enumerate().take(grid.dimension()) {
@@ -214,7 +284,8 @@ impl SourceModel for SensorField {
             let last = edges.len() - 2;
             let reach = if axis < 2 { half_width } else { 0.0 };
             let place = |x: f64| grid.along(axis, x.clamp(edges[0], edges[last + 1])).unwrap_or(0);
-            let (low, high) = (place(source[axis] - reach).saturating_sub(1), (place(source[axis] + reach) + 1).min(last));
+            let (low, high) =
+                (place(source[axis] - reach).saturating_sub(1), (place(source[axis] + reach) + 1).min(last));
             *range = (low, high);
             narrowest = (low..=high).map(|i| grid.width(axis, i)).fold(narrowest, f64::min);
         }
@@ -224,7 +295,10 @@ impl SourceModel for SensorField {
             for line in ranges[1].0..=ranges[1].1 {
                 for column in ranges[0].0..=ranges[0].1 {
                     if let Some(number) = self.domain.number(grid.index([column, line, layer])) {
-                        let c: f64 = weights.iter().map(|(field, weight)| weight * fields[*field][number]).sum();
+                        let c: f64 = weights
+                            .iter()
+                            .map(|(field, weight)| weight * fields[*field][number])
+                            .sum();
                         (least, most) = (least.min(c), most.max(c));
                     }
                 }

@@ -44,14 +44,21 @@ const MAX_DIVERGENCE: f64 = 1e-10;
 impl Flow {
     /// No wind.
     pub fn still(domain: &Domain) -> Self {
-        Self { inside: vec![0.0; domain.faces.len()], edge: vec![0.0; domain.edge_faces.len()] }
+        Self {
+            inside: vec![0.0; domain.faces.len()],
+            edge: vec![0.0; domain.edge_faces.len()],
+        }
     }
 
     /// The wind whose velocity, m/s, is a function of the point, m. It is evaluated at the centres of faces.
     ///
     /// # Errors
     /// If a velocity is not finite; [`Error::Divergence`] where divergence is refused.
-    pub fn from_velocity(domain: &Domain, velocity: impl Fn([f64; 3]) -> [f64; 3], divergence: Divergence) -> Result<Self, Error> {
+    pub fn from_velocity(
+        domain: &Domain,
+        velocity: impl Fn([f64; 3]) -> [f64; 3],
+        divergence: Divergence,
+    ) -> Result<Self, Error> {
         let grid = domain.grid();
         let at = |number: usize, axis: usize, by: f64| {
             let mut point = grid.centre(domain.free()[number]);
@@ -61,10 +68,18 @@ impl Flow {
         let inside = |face: &Face| face.area * at(face.cells[0], face.axis, face.halves[0]);
         Self {
             inside: domain.faces.iter().map(inside).collect(),
-            edge: domain.edge_faces.iter().map(|face| {
-                let outwards = if face.upper { 1.0 } else { -1.0 };
-                if face.boundary.is_open() { outwards * face.area * at(face.cell, face.axis, outwards * face.half) } else { 0.0 }
-            }).collect(),
+            edge: domain
+                .edge_faces
+                .iter()
+                .map(|face| {
+                    let outwards = if face.upper { 1.0 } else { -1.0 };
+                    if face.boundary.is_open() {
+                        outwards * face.area * at(face.cell, face.axis, outwards * face.half)
+                    } else {
+                        0.0
+                    }
+                })
+                .collect(),
         }
         .treated(domain, divergence)
     }
@@ -86,10 +101,18 @@ impl Flow {
         };
         Self {
             inside: domain.faces.iter().map(inside).collect(),
-            edge: domain.edge_faces.iter().map(|face| {
-                let outwards = if face.upper { face.area } else { -face.area };
-                if face.boundary.is_open() { outwards * velocities[face.cell][face.axis] } else { 0.0 }
-            }).collect(),
+            edge: domain
+                .edge_faces
+                .iter()
+                .map(|face| {
+                    let outwards = if face.upper { face.area } else { -face.area };
+                    if face.boundary.is_open() {
+                        outwards * velocities[face.cell][face.axis]
+                    } else {
+                        0.0
+                    }
+                })
+                .collect(),
         }
         .treated(domain, divergence)
     }
@@ -111,6 +134,7 @@ impl Flow {
         all_finite("velocity", &self.inside)?;
         all_finite("velocity", &self.edge)?;
         if divergence == Divergence::Project {
+            let before = self.largest();
             let net: Vec<f64> = self.divergence(domain).iter().map(|net| -net).collect();
             let phi = solve_potential(domain, net)?;
             for (flow, face) in self.inside.iter_mut().zip(&domain.faces) {
@@ -121,13 +145,20 @@ impl Flow {
                     *flow += face.area / face.half * phi[face.cell];
                 }
             }
+            // Nothing but rounding is left of a wind that cannot blow at all.
+            if self.largest() <= MAX_DIVERGENCE * before {
+                self = Self::still(domain);
+            }
         }
         self.check(domain)?;
         Ok(self)
     }
 
     pub(crate) fn largest(&self) -> f64 {
-        self.inside.iter().chain(&self.edge).fold(0.0, |most, flow| flow.abs().max(most))
+        self.inside
+            .iter()
+            .chain(&self.edge)
+            .fold(0.0, |most, flow| flow.abs().max(most))
     }
 
     /// Refuses a wind of another domain or with divergence.
@@ -135,21 +166,36 @@ impl Flow {
         let found = [self.inside.len(), self.edge.len()];
         let expected = [domain.faces.len(), domain.edge_faces.len()];
         if found != expected {
-            return Err(ArgumentError::new("flow", format!("of {found:?} faces"), format!("a flow of this domain's {expected:?}")).into());
+            return Err(ArgumentError::new(
+                "flow",
+                format!("of {found:?} faces"),
+                format!("a flow of this domain's {expected:?}"),
+            )
+            .into());
         }
         let largest = self.largest();
         let net = self.divergence(domain);
-        let worst = (0..net.len()).max_by(|a, b| net[*a].abs().total_cmp(&net[*b].abs())).unwrap_or(0);
+        let worst = (0..net.len())
+            .max_by(|a, b| net[*a].abs().total_cmp(&net[*b].abs()))
+            .unwrap_or(0);
         if net[worst].abs() > MAX_DIVERGENCE * largest {
             let cell = domain.grid().place(domain.free()[worst]);
-            return Err(Error::Divergence { cell, net: net[worst], largest });
+            return Err(Error::Divergence {
+                cell,
+                net: net[worst],
+                largest,
+            });
         }
         Ok(())
     }
 
     /// Flow through the upper face of a free cell across an axis, m^3/s; 0 at walls.
     pub fn above(&self, domain: &Domain, number: usize, axis: usize) -> f64 {
-        let inside = domain.faces.iter().zip(&self.inside).filter(|(face, _)| face.cells[0] == number && face.axis == axis);
+        let inside = domain
+            .faces
+            .iter()
+            .zip(&self.inside)
+            .filter(|(face, _)| face.cells[0] == number && face.axis == axis);
         let edge = domain.edge_faces.iter().zip(&self.edge);
         let edge = edge.filter(|(face, _)| face.cell == number && face.axis == axis && face.upper);
         inside.map(|pair| pair.1).chain(edge.map(|pair| pair.1)).sum()
@@ -179,15 +225,22 @@ impl PotentialFlow {
     pub fn new(domain: &Domain, total: f64) -> Result<Self, Error> {
         positive("total", total)?;
         let mut supply = vec![0.0; domain.free().len()];
-        let inflows = || domain.edge_faces.iter().filter(|face| face.boundary == Boundary::Inflow);
+        let inflows = || {
+            domain
+                .edge_faces
+                .iter()
+                .filter(|face| face.boundary == Boundary::Inflow)
+        };
         for face in inflows() {
             supply[face.cell] += face.area / face.half;
         }
         let mut potential = solve_potential(domain, supply)?;
-        let passing: f64 = inflows().map(|face| face.area / face.half * (1.0 - potential[face.cell])).sum();
+        let passing: f64 = inflows()
+            .map(|face| face.area / face.half * (1.0 - potential[face.cell]))
+            .sum();
         let conductances: f64 = inflows().map(|face| face.area / face.half).sum();
         // A part with inflows only has potential one but for rounding.
-        if !(passing > 1e-12 * conductances) {
+        if passing.is_nan() || passing <= 1e-12 * conductances {
             return Err(Error::NoPassage);
         }
         let difference = total / passing;
@@ -195,14 +248,22 @@ impl PotentialFlow {
         let fall = |face: &Face| conductance(face) * (potential[face.cells[0]] - potential[face.cells[1]]);
         let flow = Flow {
             inside: domain.faces.iter().map(fall).collect(),
-            edge: domain.edge_faces.iter().map(|face| match face.boundary {
-                Boundary::Inflow => face.area / face.half * (potential[face.cell] - difference),
-                Boundary::Outflow => face.area / face.half * potential[face.cell],
-                _ => 0.0,
-            }).collect(),
+            edge: domain
+                .edge_faces
+                .iter()
+                .map(|face| match face.boundary {
+                    Boundary::Inflow => face.area / face.half * (potential[face.cell] - difference),
+                    Boundary::Outflow => face.area / face.half * potential[face.cell],
+                    _ => 0.0,
+                })
+                .collect(),
         };
         flow.check(domain)?;
-        Ok(Self { flow, potential, difference })
+        Ok(Self {
+            flow,
+            potential,
+            difference,
+        })
     }
 }
 
@@ -245,6 +306,9 @@ fn solve_potential(domain: &Domain, supply: Vec<f64>) -> Result<Vec<f64>, Error>
         columns[(face.cells[1], 0)] += rate[1] * potential[face.cells[0]];
     }
     factor.solve(Direction::Forward, &mut columns);
-    potential.iter_mut().zip(columns.col_as_slice(0)).for_each(|(phi, change)| *phi += change);
+    potential
+        .iter_mut()
+        .zip(columns.col_as_slice(0))
+        .for_each(|(phi, change)| *phi += change);
     Ok(potential)
 }

@@ -103,7 +103,10 @@ impl Grid {
 
     /// Area of a cell's faces across an axis.
     pub(crate) fn face_area(&self, at: &[usize; 3], across: usize) -> f64 {
-        (0..3).filter(|axis| *axis != across).map(|axis| self.width(axis, at[axis])).product()
+        (0..3)
+            .filter(|axis| *axis != across)
+            .map(|axis| self.width(axis, at[axis]))
+            .product()
     }
 
     /// Place along an axis of the cells that hold a coordinate: of two cells that share it, the upper one; at the end of the grid the last.

@@ -42,7 +42,11 @@ impl Plan {
     /// [`Error::PlanCharacter`], [`Error::PlanLine`], or [`Error::NoFreeCell`] if there is no line.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-        let indent = lines.iter().map(|line| line.len() - line.trim_start().len()).min().unwrap_or(0);
+        let indent = lines
+            .iter()
+            .map(|line| line.len() - line.trim_start().len())
+            .min()
+            .unwrap_or(0);
         let (mut squares, mut columns) = (Vec::new(), None);
         for (line, text) in lines.iter().enumerate() {
             let before = squares.len();
@@ -51,7 +55,13 @@ impl Plan {
                     ' ' => squares.push('.'),
                     '.' | '#' | 'L' | 'A' | 'I' | 'O' => squares.push(character),
                     '\r' => {}
-                    _ => return Err(Error::PlanCharacter { character, line, column }),
+                    _ => {
+                        return Err(Error::PlanCharacter {
+                            character,
+                            line,
+                            column,
+                        });
+                    }
                 }
             }
             let found = squares.len() - before;
@@ -73,15 +83,25 @@ impl Plan {
         let uncommented = text.lines().map(|line| line.split('#').next().unwrap_or(""));
         let words: Vec<&str> = uncommented.flat_map(str::split_ascii_whitespace).collect();
         let unreadable = Error::Picture { found: 0, expected: 0 };
-        let [magic, width, height, pixels @ ..] = words.as_slice() else { return Err(unreadable) };
+        let [magic, width, height, pixels @ ..] = words.as_slice() else {
+            return Err(unreadable);
+        };
         let size = |word: &str| word.parse::<usize>().ok().filter(|n| *n > 0);
-        let (Some(columns), Some(lines), "P1") = (size(width), size(height), *magic) else { return Err(unreadable) };
+        let (Some(columns), Some(lines), "P1") = (size(width), size(height), *magic) else {
+            return Err(unreadable);
+        };
         let squares: Vec<char> = pixels.iter().flat_map(|word| word.chars()).collect();
         let expected = columns.checked_mul(lines).ok_or(unreadable)?;
         if squares.len() != expected || squares.iter().any(|pixel| !matches!(pixel, '0' | '1')) {
-            return Err(Error::Picture { found: squares.len(), expected });
+            return Err(Error::Picture {
+                found: squares.len(),
+                expected,
+            });
         }
-        let squares = squares.into_iter().map(|pixel| if pixel == '1' { '#' } else { '.' }).collect();
+        let squares = squares
+            .into_iter()
+            .map(|pixel| if pixel == '1' { '#' } else { '.' })
+            .collect();
         Ok(Self { columns, squares })
     }
 
@@ -92,7 +112,11 @@ impl Plan {
     pub fn with(mut self, character: char, squares: impl IntoIterator<Item = [usize; 2]>) -> Result<Self, Error> {
         for [column, line] in squares {
             if column >= self.columns || line >= self.lines() || !".#LAIO".contains(character) {
-                return Err(Error::PlanCharacter { character, line, column });
+                return Err(Error::PlanCharacter {
+                    character,
+                    line,
+                    column,
+                });
             }
             self.squares[line * self.columns + column] = character;
         }
@@ -127,7 +151,8 @@ impl Plan {
     /// If `width` is not positive, `split` is zero, `leak` is negative, or all squares are walls.
     pub fn domain(&self, width: f64, split: usize, leak: f64) -> Result<Domain, Error> {
         at_least_one("split", split)?;
-        let grid = Grid::uniform(&[self.columns * split, self.lines() * split], positive("width", width)? / split as f64)?;
+        let grid =
+            Grid::uniform(&[self.columns * split, self.lines() * split], positive("width", width)? / split as f64)?;
         self.on(grid, split, leak)
     }
 

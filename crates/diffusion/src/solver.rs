@@ -27,7 +27,10 @@ enum Entry {
 
 enum Symbolic {
     /// The matrix is symmetric after scaling: `exp(h) A exp(-h)`, with `exp(h)` for each cell.
-    Cholesky { symbolic: SymbolicLlt<usize>, scale: Vec<f64> },
+    Cholesky {
+        symbolic: SymbolicLlt<usize>,
+        scale: Vec<f64>,
+    },
     Lu(SymbolicLu<usize>),
 }
 
@@ -40,7 +43,7 @@ pub(crate) struct Solver {
 
 enum Numeric {
     Cholesky(Llt<usize, f64>),
-    Lu(Lu<usize, f64>),
+    Lu(Box<Lu<usize, f64>>),
 }
 
 /// A factored matrix.
@@ -70,18 +73,26 @@ fn potential(count: usize, faces: &[Face], rates: &[[f64; 2]]) -> Option<Vec<f64
             let cell = part[next];
             next += 1;
             for (other, face) in neighbours.of(cell) {
-                let change = if faces[*face].cells[0] == cell { -fall(*face) } else { fall(*face) };
+                let change = if faces[*face].cells[0] == cell {
+                    -fall(*face)
+                } else {
+                    fall(*face)
+                };
                 if psi[*other].is_nan() {
                     psi[*other] = psi[cell] + change;
                     part.push(*other);
                 }
+                let misfit = (psi[*other] - psi[cell] - change).abs();
                 // Not a number, if a rate is zero.
-                if !((psi[*other] - psi[cell] - change).abs() <= MAX_MISFIT) {
+                if misfit.is_nan() || misfit > MAX_MISFIT {
                     return None;
                 }
             }
         }
-        let ends = part.iter().map(|cell| psi[*cell]).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        let ends = part
+            .iter()
+            .map(|cell| psi[*cell])
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
         if ends[1] - ends[0] > MAX_SPREAD {
             return None;
         }
@@ -113,7 +124,10 @@ impl Solver {
         }
         drop(columns);
         let pattern = SymbolicSparseColMat::new_checked(count, count, starts, None, rows);
-        let failed = |_: FaerError| Error::Factorisation { unknowns: count, singular: false };
+        let failed = |_: FaerError| Error::Factorisation {
+            unknowns: count,
+            singular: false,
+        };
         let symbolic = match psi {
             Some(psi) => Symbolic::Cholesky {
                 symbolic: SymbolicLlt::try_new(pattern.as_ref(), Side::Lower).map_err(failed)?,
@@ -121,7 +135,11 @@ impl Solver {
             },
             None => Symbolic::Lu(SymbolicLu::try_new(pattern.as_ref()).map_err(failed)?),
         };
-        Ok(Self { pattern, entries, symbolic })
+        Ok(Self {
+            pattern,
+            entries,
+            symbolic,
+        })
     }
 
     /// Whether Cholesky serves.
@@ -133,11 +151,16 @@ impl Solver {
     pub(crate) fn factor(&self, diagonal: &[f64], rates: &[[f64; 2]], share: f64) -> Result<Factor<'_>, Error> {
         let value = |entry: &Entry| match (entry, &self.symbolic) {
             (Entry::Diagonal(cell), _) => diagonal[*cell],
-            (Entry::Rate { face, .. }, Symbolic::Cholesky { .. }) => -share * (rates[*face][0] * rates[*face][1]).sqrt(),
+            (Entry::Rate { face, .. }, Symbolic::Cholesky { .. }) => {
+                -share * (rates[*face][0] * rates[*face][1]).sqrt()
+            }
             (Entry::Rate { face, downwards }, Symbolic::Lu(_)) => -share * rates[*face][*downwards],
         };
         let matrix = SparseColMat::new(self.pattern.clone(), self.entries.iter().map(value).collect());
-        let failed = |singular| Error::Factorisation { unknowns: diagonal.len(), singular };
+        let failed = |singular| Error::Factorisation {
+            unknowns: diagonal.len(),
+            singular,
+        };
         let numeric = match &self.symbolic {
             Symbolic::Cholesky { symbolic, .. } => {
                 let factored = Llt::try_new_with_symbolic(symbolic.clone(), matrix.as_ref(), Side::Lower);
@@ -145,7 +168,9 @@ impl Solver {
             }
             Symbolic::Lu(symbolic) => {
                 let factored = Lu::try_new_with_symbolic(symbolic.clone(), matrix.as_ref());
-                Numeric::Lu(factored.map_err(|error| failed(matches!(error, LuError::SymbolicSingular { .. })))?)
+                Numeric::Lu(Box::new(
+                    factored.map_err(|error| failed(matches!(error, LuError::SymbolicSingular { .. })))?,
+                ))
             }
         };
         Ok(Factor { solver: self, numeric })

@@ -43,7 +43,11 @@ impl<'a> Steady<'a> {
         for source in sources {
             finite("rate", source.rate)?;
             self.transport.check_patch(&source.patch)?;
-            source.patch.shares.iter().for_each(|(cell, share)| right[*cell] += share * source.rate);
+            source
+                .patch
+                .shares
+                .iter()
+                .for_each(|(cell, share)| right[*cell] += share * source.rate);
         }
         self.from_amounts(&right)
     }
@@ -71,7 +75,10 @@ impl<'a> Steady<'a> {
             let mut columns = Mat::zeros(count, group.len());
             for (j, sensor) in group.iter().enumerate() {
                 self.transport.check_patch(sensor)?;
-                sensor.shares.iter().for_each(|(cell, share)| columns[(*cell, j)] += share);
+                sensor
+                    .shares
+                    .iter()
+                    .for_each(|(cell, share)| columns[(*cell, j)] += share);
             }
             self.factor.solve(Direction::Adjoint, &mut columns);
             fields.extend((0..group.len()).map(|j| columns.col_as_slice(j).to_vec()));

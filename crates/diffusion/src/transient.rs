@@ -85,7 +85,11 @@ const HALF_GAMMA: f64 = 0.5 * GAMMA;
 /// Weight of the first two slopes.
 const WEIGHT: f64 = 0.25 * std::f64::consts::SQRT_2;
 /// Weights of the third-order formula less those of the method (Hosea and Shampine, Applied Numerical Mathematics 20 (1996) 21).
-const ERROR: [f64; 3] = [(1.0 - WEIGHT) / 3.0 - WEIGHT, (3.0 * WEIGHT + 1.0) / 3.0 - WEIGHT, HALF_GAMMA / 3.0 - HALF_GAMMA];
+const ERROR: [f64; 3] = [
+    (1.0 - WEIGHT) / 3.0 - WEIGHT,
+    (3.0 * WEIGHT + 1.0) / 3.0 - WEIGHT,
+    HALF_GAMMA / 3.0 - HALF_GAMMA,
+];
 /// A step is doubled if its error is below the tolerance over this: the error grows eightfold, and half of that is margin.
 const DOUBLING_MARGIN: f64 = 16.0;
 
@@ -102,7 +106,12 @@ struct State {
 impl<'a> Transient<'a> {
     /// A solver with TR-BDF2 and the default tolerance.
     pub fn new(transport: &'a Transport) -> Self {
-        Self { transport, method: Method::default(), control: StepControl::default(), factors: Vec::new() }
+        Self {
+            transport,
+            method: Method::default(),
+            control: StepControl::default(),
+            factors: Vec::new(),
+        }
     }
 
     /// With another method.
@@ -149,10 +158,15 @@ impl<'a> Transient<'a> {
         let unit = common_unit(&instants);
         let (mut now, mut active, mut snapshots) = (0.0, vec![false; releases.len()], Vec::new());
         for (k, end) in instants.into_iter().enumerate() {
-            let before = std::mem::replace(&mut active, releases.iter().map(|r| r.start <= now && now < r.stop).collect());
+            let before =
+                std::mem::replace(&mut active, releases.iter().map(|r| r.start <= now && now < r.stop).collect());
             let mut source = Mat::zeros(initial.len(), 1);
             for (release, _) in releases.iter().zip(&active).filter(|pair| *pair.1) {
-                release.patch.shares.iter().for_each(|(cell, share)| source[(*cell, 0)] += share * release.rate);
+                release
+                    .patch
+                    .shares
+                    .iter()
+                    .for_each(|(cell, share)| source[(*cell, 0)] += share * release.rate);
             }
             if k == 0 || before != active {
                 state.wanted = self.first_step(&state.concentration, &source);
@@ -186,7 +200,10 @@ impl<'a> Transient<'a> {
         let mut source = Mat::zeros(count, sensors.len());
         for (j, sensor) in sensors.iter().enumerate() {
             self.transport.check_patch(sensor)?;
-            sensor.shares.iter().for_each(|(cell, share)| source[(*cell, j)] += share);
+            sensor
+                .shares
+                .iter()
+                .for_each(|(cell, share)| source[(*cell, j)] += share);
         }
         let mut state = self.begin(Mat::zeros(count, sensors.len()));
         state.wanted = self.first_step(&state.concentration, &source);
@@ -203,12 +220,20 @@ impl<'a> Transient<'a> {
 
     fn begin(&self, concentration: Mat<f64>) -> State {
         let dose = Mat::zeros(concentration.nrows(), concentration.ncols());
-        State { concentration, dose, lowest: 0.0, steps: 0, wanted: f64::INFINITY }
+        State {
+            concentration,
+            dose,
+            lowest: 0.0,
+            steps: 0,
+            wanted: f64::INFINITY,
+        }
     }
 
     /// A small share of the time in which a cell that holds or receives something loses it.
     fn first_step(&self, concentration: &Mat<f64>, source: &Mat<f64>) -> f64 {
-        let StepControl::Tolerance(tolerance) = self.control else { return f64::INFINITY };
+        let StepControl::Tolerance(tolerance) = self.control else {
+            return f64::INFINITY;
+        };
         let mut shortest = f64::INFINITY;
         for j in 0..source.ncols() {
             let pairs = concentration.col_as_slice(j).iter().zip(source.col_as_slice(j));
@@ -255,7 +280,7 @@ impl<'a> Transient<'a> {
         while left > 0 {
             let step = length(level);
             let (next, dose, error) = self.step(direction, &state.concentration, source, step)?;
-            if !(error <= tolerance) {
+            if error.is_nan() || error > tolerance {
                 if level <= MIN_SHARE_EXPONENT {
                     return Err(Error::StepTooSmall { step });
                 }
@@ -265,7 +290,11 @@ impl<'a> Transient<'a> {
             }
             state.accept(next, dose);
             left -= 1;
-            state.wanted = if error < tolerance / DOUBLING_MARGIN { 2.0 * step } else { step };
+            state.wanted = if error < tolerance / DOUBLING_MARGIN {
+                2.0 * step
+            } else {
+                step
+            };
             if left > 0 && left % 2 == 0 && length(level + 1) <= state.wanted {
                 (left, level) = (left / 2, level + 1);
             }
@@ -287,7 +316,8 @@ impl<'a> Transient<'a> {
         match self.method {
             Method::ImplicitEuler => {
                 let euler = |from: &Mat<f64>, step: f64, factor: &Factor<'_>| {
-                    let mut next = Mat::from_fn(rows, columns, |i, j| volumes[i] * from[(i, j)] + step * source[(i, j)]);
+                    let mut next =
+                        Mat::from_fn(rows, columns, |i, j| volumes[i] * from[(i, j)] + step * source[(i, j)]);
                     factor.solve(direction, &mut next);
                     next
                 };
@@ -306,13 +336,17 @@ impl<'a> Transient<'a> {
                     let mut out = Mat::zeros(rows, columns);
                     for j in 0..columns {
                         transport.apply(direction, c.col_as_slice(j), out.col_as_slice_mut(j));
-                        out.col_as_slice_mut(j).iter_mut().zip(source.col_as_slice(j)).for_each(|(out, s)| *out = s - *out);
+                        out.col_as_slice_mut(j)
+                            .iter_mut()
+                            .zip(source.col_as_slice(j))
+                            .for_each(|(out, s)| *out = s - *out);
                     }
                     out
                 };
                 let first = slope(now);
-                let mut middle =
-                    Mat::from_fn(rows, columns, |i, j| volumes[i] * now[(i, j)] + weight * (first[(i, j)] + source[(i, j)]));
+                let mut middle = Mat::from_fn(rows, columns, |i, j| {
+                    volumes[i] * now[(i, j)] + weight * (first[(i, j)] + source[(i, j)])
+                });
                 factor.solve(direction, &mut middle);
                 let second = slope(&middle);
                 let mut next = Mat::from_fn(rows, columns, |i, j| {
@@ -346,7 +380,10 @@ impl<'a> Transient<'a> {
                 if self.factors.len() == MAX_FACTORS {
                     self.factors.remove(0);
                 }
-                let factor = self.transport.solver()?.factor(&diagonal, &self.transport.rates, weight)?;
+                let factor = self
+                    .transport
+                    .solver()?
+                    .factor(&diagonal, &self.transport.rates, weight)?;
                 self.factors.push((weight, factor));
             }
         }
@@ -367,10 +404,18 @@ impl State {
 
 /// The largest error of a column over the largest number of that column, over all columns.
 fn relative_error(error: &Mat<f64>, values: &Mat<f64>) -> f64 {
-    let size = |column: &[f64]| column.iter().fold(0.0, |most: f64, x| if x.is_nan() { f64::INFINITY } else { most.max(x.abs()) });
+    let size = |column: &[f64]| {
+        column
+            .iter()
+            .fold(0.0, |most: f64, x| if x.is_nan() { f64::INFINITY } else { most.max(x.abs()) })
+    };
     let of_column = |j: usize| {
         let error = size(error.col_as_slice(j));
-        if error == 0.0 { 0.0 } else { error / size(values.col_as_slice(j)) }
+        if error == 0.0 {
+            0.0
+        } else {
+            error / size(values.col_as_slice(j))
+        }
     };
     (0..error.ncols()).map(of_column).fold(0.0, f64::max)
 }
@@ -386,7 +431,11 @@ fn check_instants(name: &'static str, instants: &[f64]) -> Result<(), Error> {
 
 /// The longest time of which all intervals are multiples, if the shortest interval has at most 64 of them: steps then have few lengths.
 fn common_unit(instants: &[f64]) -> Option<f64> {
-    let intervals = || instants.iter().scan(0.0, |before, t| Some(t - std::mem::replace(before, *t)));
+    let intervals = || {
+        instants
+            .iter()
+            .scan(0.0, |before, t| Some(t - std::mem::replace(before, *t)))
+    };
     let last = *instants.last()?;
     let mut unit = 0.0_f64;
     for interval in intervals() {

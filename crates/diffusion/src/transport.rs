@@ -124,9 +124,19 @@ impl Transport {
         let diffusivity = values("diffusivity", diffusivity.into(), domain.free().len(), positive)?;
         let decay = values("decay", decay.into(), domain.free().len(), non_negative)?;
         let volumes = domain.volumes();
-        let mut diagonal: Vec<f64> = decay.iter().zip(&volumes).map(|(decay, volume)| decay * volume).collect();
+        let mut diagonal: Vec<f64> = decay
+            .iter()
+            .zip(&volumes)
+            .map(|(decay, volume)| decay * volume)
+            .collect();
         let mut rates = Vec::with_capacity(domain.faces.len());
-        for (Face { cells, area, halves, .. }, flow) in domain.faces.iter().zip(&flow.inside) {
+        for (
+            Face {
+                cells, area, halves, ..
+            },
+            flow,
+        ) in domain.faces.iter().zip(&flow.inside)
+        {
             // Two half cells in series.
             let conductance = area / (halves[0] / diffusivity[cells[0]] + halves[1] / diffusivity[cells[1]]);
             let rate = scheme.weights(flow / conductance).map(|weight| conductance * weight);
@@ -135,7 +145,17 @@ impl Transport {
             rates.push(rate);
         }
         let (largest, mut edge_rates) = (flow.largest(), Vec::with_capacity(domain.edge_faces.len()));
-        for (EdgeFace { cell, area, half, boundary, .. }, flow) in domain.edge_faces.iter().zip(&flow.edge) {
+        for (
+            EdgeFace {
+                cell,
+                area,
+                half,
+                boundary,
+                ..
+            },
+            flow,
+        ) in domain.edge_faces.iter().zip(&flow.edge)
+        {
             let conductance = area * diffusivity[*cell] / half;
             let rate = match boundary {
                 Boundary::Closed | Boundary::Leaking(0.0) => [0.0; 2],
@@ -146,13 +166,24 @@ impl Transport {
                 // Rounding may leave a flow just below zero.
                 Boundary::Outflow if *flow >= -1e-10 * largest => [flow.max(0.0), 0.0],
                 Boundary::Outflow => {
-                    return Err(Error::Backflow { cell: domain.grid().place(domain.free()[*cell]), flow: *flow });
+                    return Err(Error::Backflow {
+                        cell: domain.grid().place(domain.free()[*cell]),
+                        flow: *flow,
+                    });
                 }
             };
             diagonal[*cell] += rate[0];
             edge_rates.push(rate);
         }
-        Ok(Self { domain, volumes, decay, rates, edge_rates, diagonal, solver: OnceLock::new() })
+        Ok(Self {
+            domain,
+            volumes,
+            decay,
+            rates,
+            edge_rates,
+            diagonal,
+            solver: OnceLock::new(),
+        })
     }
 
     /// The domain.
@@ -184,7 +215,11 @@ impl Transport {
         }
         for (face, rate) in self.domain.faces.iter().zip(&self.rates) {
             let [low, high] = face.cells;
-            let [up, down] = if direction == Direction::Forward { *rate } else { [rate[1], rate[0]] };
+            let [up, down] = if direction == Direction::Forward {
+                *rate
+            } else {
+                [rate[1], rate[0]]
+            };
             out[high] -= up * x[low];
             out[low] -= down * x[high];
         }
@@ -258,7 +293,9 @@ impl Transport {
         }
         match part.iter().position(|part| !drained[*part]) {
             None => Ok(()),
-            Some(cell) => Err(Error::NoSink { cell: self.domain.grid().place(self.domain.free()[cell]) }),
+            Some(cell) => Err(Error::NoSink {
+                cell: self.domain.grid().place(self.domain.free()[cell]),
+            }),
         }
     }
 
@@ -285,7 +322,12 @@ fn values(
         PerCell::Each(values) => values,
     };
     if values.len() != count {
-        return Err(ArgumentError::new(name, format!("{} values", values.len()), format!("{count}, one for each free cell")).into());
+        return Err(ArgumentError::new(
+            name,
+            format!("{} values", values.len()),
+            format!("{count}, one for each free cell"),
+        )
+        .into());
     }
     for value in &values {
         check(name, *value)?;

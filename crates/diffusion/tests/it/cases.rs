@@ -1,10 +1,10 @@
 //! The cases of `fixtures/geometry.json` as domains. Its `about` has the conventions.
 
+use fewbits_diffusion::Divergence;
 use fewbits_diffusion::{
-    Boundary, Cell, Domain, Flow, Grid, Method, Patch, PerCell, Plan, PotentialFlow, Release, Scheme, Source, Steady,
+    Boundary, Cell, Domain, Flow, Grid, Patch, PerCell, Plan, PotentialFlow, Release, Scheme, Source, Steady,
     StepControl, Transient, Transport,
 };
-use fewbits_diffusion::Divergence;
 use serde_json::Value;
 
 /// Width of the cells in which the fixture counts, m.
@@ -30,11 +30,21 @@ pub fn numbers(value: &Value) -> Vec<f64> {
 }
 
 fn squares(value: &Value) -> Vec<usize> {
-    value.as_array().unwrap().iter().map(|x| x.as_u64().unwrap() as usize).collect()
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|x| x.as_u64().unwrap() as usize)
+        .collect()
 }
 
 pub fn plan(all: &Value, name: &str) -> Plan {
-    let lines: Vec<&str> = all["plans"][name].as_array().unwrap().iter().map(|line| line.as_str().unwrap()).collect();
+    let lines: Vec<&str> = all["plans"][name]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|line| line.as_str().unwrap())
+        .collect();
     Plan::parse(&lines.join("\n")).unwrap()
 }
 
@@ -44,28 +54,44 @@ fn domain(all: &Value, name: &str, split: usize) -> Domain {
     if let Some(plan_name) = case["plan"].as_str() {
         let plan = plan(all, plan_name);
         return match case["depth"].as_f64() {
-            Some(depth) => plan.extruded(SQUARE, split, leak, (depth / SQUARE) as usize * split).unwrap(),
+            Some(depth) => plan
+                .extruded(SQUARE, split, leak, (depth / SQUARE) as usize * split)
+                .unwrap(),
             None => plan.domain(SQUARE, split, leak).unwrap(),
         };
     }
     let width = SQUARE / split as f64;
     if let Some(radius) = case["disc"].as_f64() {
         let grid = Grid::uniform(&[20 * split, 20 * split], width).unwrap();
-        let law = if name == "disc-leak" { Boundary::Leaking(leak) } else { Boundary::Absorbing };
+        let law = if name == "disc-leak" {
+            Boundary::Leaking(leak)
+        } else {
+            Boundary::Absorbing
+        };
         let offset = |point: [f64; 3]| [point[0] - 10.0 * SQUARE, point[1] - 10.0 * SQUARE];
         let cells: Vec<Cell> = (0..grid.cells())
             .map(|cell| {
                 let [x, y] = offset(grid.centre(cell));
-                if x.hypot(y) < radius { Cell::Free } else { Cell::Blocked(law) }
+                if x.hypot(y) < radius {
+                    Cell::Free
+                } else {
+                    Cell::Blocked(law)
+                }
             })
             .collect();
         let round = |point: [f64; 3]| {
             let [x, y] = offset(point);
             [x / x.hypot(y), y / x.hypot(y), 0.0]
         };
-        return Domain::new(grid, &cells, [[Boundary::Closed; 2]; 3]).unwrap().with_wall_normals(round).unwrap();
+        return Domain::new(grid, &cells, [[Boundary::Closed; 2]; 3])
+            .unwrap()
+            .with_wall_normals(round)
+            .unwrap();
     }
-    let counts: Vec<usize> = numbers(&case["size"]).iter().map(|size| (size / width).round() as usize).collect();
+    let counts: Vec<usize> = numbers(&case["size"])
+        .iter()
+        .map(|size| (size / width).round() as usize)
+        .collect();
     let grid = Grid::uniform(&counts, width).unwrap();
     let mut sides = [[Boundary::Closed; 2]; 3];
     match name {
@@ -91,10 +117,14 @@ impl Model {
                 let columns = squares(&regions[0]["columns"]);
                 let inside = columns[0] as f64 * SQUARE..(columns[1] + 1) as f64 * SQUARE;
                 let other = regions[0]["diffusivity"].as_f64().unwrap();
-                domain.sample(|[x, ..]| if inside.contains(&x) { other } else { everywhere }).into()
+                domain
+                    .sample(|[x, ..]| if inside.contains(&x) { other } else { everywhere })
+                    .into()
             }
         };
-        let potential = case["flow"].as_f64().map(|total| PotentialFlow::new(&domain, total).unwrap());
+        let potential = case["flow"]
+            .as_f64()
+            .map(|total| PotentialFlow::new(&domain, total).unwrap());
         let flow = match (&potential, case["wind"].as_array()) {
             (Some(potential), _) => potential.flow.clone(),
             (None, Some(wind)) => {
@@ -105,7 +135,13 @@ impl Model {
         };
         let decay = case["decay"].as_f64().unwrap();
         let transport = Transport::new(domain, diffusivity, &flow, decay, scheme).unwrap();
-        Self { case, split, transport, flow, potential }
+        Self {
+            case,
+            split,
+            transport,
+            flow,
+            potential,
+        }
     }
 
     /// The patch of one square of the fixture.
@@ -122,7 +158,10 @@ impl Model {
     }
 
     fn concentration(&self, source: &Value) -> Vec<f64> {
-        let source = Source { patch: self.square(source), rate: 1.0 };
+        let source = Source {
+            patch: self.square(source),
+            rate: 1.0,
+        };
         Steady::new(&self.transport).unwrap().concentration(&[source]).unwrap()
     }
 
@@ -132,11 +171,20 @@ impl Model {
         match entry["quantity"].as_str().unwrap() {
             "concentration" => {
                 let field = self.concentration(&entry["source"]);
-                self.patches(&entry["sensors"]).iter().map(|sensor| sensor.mean(&field)).collect()
+                self.patches(&entry["sensors"])
+                    .iter()
+                    .map(|sensor| sensor.mean(&field))
+                    .collect()
             }
             "adjoint_row" => {
-                let field = &Steady::new(&self.transport).unwrap().adjoint(&[self.square(&entry["sensor"])]).unwrap()[0];
-                self.patches(&entry["sources"]).iter().map(|source| source.mean(field)).collect()
+                let field = &Steady::new(&self.transport)
+                    .unwrap()
+                    .adjoint(&[self.square(&entry["sensor"])])
+                    .unwrap()[0];
+                self.patches(&entry["sources"])
+                    .iter()
+                    .map(|source| source.mean(field))
+                    .collect()
             }
             "reciprocity" => {
                 let (there, back) = (&entry["cells"][0], &entry["cells"][1]);
@@ -159,26 +207,45 @@ impl Model {
             "potential_difference" => vec![self.potential.as_ref().unwrap().difference],
             "potential" => {
                 let potential = &self.potential.as_ref().unwrap().potential;
-                self.patches(&entry["cells"]).iter().map(|cell| cell.mean(potential)).collect()
+                self.patches(&entry["cells"])
+                    .iter()
+                    .map(|cell| cell.mean(potential))
+                    .collect()
             }
-            "face_flow" => entry["faces"].as_array().unwrap().iter().map(|face| self.face_flow(face)).collect(),
+            "face_flow" => entry["faces"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|face| self.face_flow(face))
+                .collect(),
             "burst" => {
                 let mut initial = vec![0.0; domain.free().len()];
                 let source = self.square(&entry["source"]);
-                let at: Vec<usize> = (0..initial.len()).filter(|i| {
-                    let mut one = vec![0.0; initial.len()];
-                    one[*i] = 1.0;
-                    source.mean(&one) > 0.0
-                }).collect();
-                at.iter().for_each(|i| initial[*i] = 1.0 / (at.len() as f64 * domain.volumes()[*i]));
-                let mut run = Transient::new(&self.transport).with_control(StepControl::Tolerance(3e-6)).unwrap();
+                let at: Vec<usize> = (0..initial.len())
+                    .filter(|i| {
+                        let mut one = vec![0.0; initial.len()];
+                        one[*i] = 1.0;
+                        source.mean(&one) > 0.0
+                    })
+                    .collect();
+                at.iter()
+                    .for_each(|i| initial[*i] = 1.0 / (at.len() as f64 * domain.volumes()[*i]));
+                let mut run = self.in_time(entry);
                 let end = run.run(&initial, &[], &[entry["time"].as_f64().unwrap()]).unwrap();
-                self.patches(&entry["sensors"]).iter().map(|sensor| sensor.mean(&end[0].concentration)).collect()
+                self.patches(&entry["sensors"])
+                    .iter()
+                    .map(|sensor| sensor.mean(&end[0].concentration))
+                    .collect()
             }
             "release" | "mass" => {
                 let stop = entry["stop"].as_f64().unwrap();
-                let release = Release { patch: self.square(&entry["source"]), rate: 1.0, start: 0.0, stop };
-                let mut run = Transient::new(&self.transport).with_control(StepControl::Tolerance(3e-6)).unwrap();
+                let release = Release {
+                    patch: self.square(&entry["source"]),
+                    rate: 1.0,
+                    start: 0.0,
+                    stop,
+                };
+                let mut run = self.in_time(entry);
                 let initial = vec![0.0; domain.free().len()];
                 let snapshots = run.run(&initial, &[release], &numbers(&entry["times"])).unwrap();
                 if entry["quantity"] == "mass" {
@@ -195,6 +262,14 @@ impl Model {
         }
     }
 
+    /// Steps whose error, of which some tens add up, stays well below a tenth of the tolerance at this size of cells.
+    fn in_time(&self, entry: &Value) -> Transient<'_> {
+        let tolerance = entry["tolerance"]["exp"][self.split.ilog2() as usize].as_f64().unwrap();
+        Transient::new(&self.transport)
+            .with_control(StepControl::Tolerance(3e-4 * tolerance))
+            .unwrap()
+    }
+
     fn face_flow(&self, face: &Value) -> f64 {
         let domain = self.transport.domain();
         let axis = if face[2] == "x" { 0 } else { 1 };
@@ -204,7 +279,8 @@ impl Model {
                 let mut cell = [at[0] * self.split, at[1] * self.split, 0];
                 cell[axis] += self.split - 1;
                 cell[1 - axis] += k;
-                self.flow.above(domain, domain.number(domain.grid().index(cell)).unwrap(), axis)
+                self.flow
+                    .above(domain, domain.number(domain.grid().index(cell)).unwrap(), axis)
             })
             .sum()
     }

@@ -7,7 +7,11 @@
     reason = "a panic is how a test fails"
 )]
 
+mod bodies;
 mod cases;
+mod closed;
+mod closed_forms;
+mod field;
 mod fixtures;
 mod laws;
 mod refusals;
