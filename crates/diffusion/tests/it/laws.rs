@@ -58,7 +58,7 @@ fn steady_budget_closes_at_any_peclet_number() {
             let transport = windy(&domain, total, 0.05, scheme);
             let field = Steady::new(&transport)
                 .unwrap()
-                .concentration(&[source.clone()])
+                .concentration(std::slice::from_ref(&source))
                 .unwrap();
             let budget = transport.budget(&field).unwrap();
             assert!((budget.removed() - 1.0).abs() < 1e-10, "{scheme:?} {total}: {budget:?}");
@@ -168,7 +168,7 @@ fn adjoint_in_time_equals_forward() {
             .run(&vec![0.0; domain.free().len()], &[release], &[20.0, 40.0, 60.0, 100.0])
             .unwrap();
         let rows = solver()
-            .step_responses(&[sensor.clone()], &[20.0, 40.0, 60.0, 100.0])
+            .step_responses(std::slice::from_ref(&sensor), &[20.0, 40.0, 60.0, 100.0])
             .unwrap();
         let step: Vec<f64> = rows.iter().map(|row| 2.0 * source.mean(&row[0])).collect();
         // At 100 s the release has stopped for 60 s, after steps of 20, 20, 20 and 40 s.
@@ -200,7 +200,7 @@ fn adaptive_step_response_agrees_with_release() {
         .run(&vec![0.0; domain.free().len()], &[release], &[90.0])
         .unwrap();
     let rows = Transient::new(&transport)
-        .step_responses(&[sensor.clone()], &[45.0, 75.0])
+        .step_responses(std::slice::from_ref(&sensor), &[45.0, 75.0])
         .unwrap();
     let adjoint = 2.0 * (source.mean(&rows[1][0]) - source.mean(&rows[0][0]));
     let direct = sensor.mean(&forward[0].concentration);

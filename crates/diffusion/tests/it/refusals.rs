@@ -172,7 +172,12 @@ fn runs_are_checked() {
         release(1.0, -1.0, 1.0),
         release(1.0, f64::NAN, 1.0),
     ] {
-        assert!(solver.run(&vec![0.0; count], &[bad.clone()], &[1.0]).is_err(), "{bad:?}");
+        assert!(
+            solver
+                .run(&vec![0.0; count], std::slice::from_ref(&bad), &[1.0])
+                .is_err(),
+            "{bad:?}"
+        );
     }
     assert!(
         Transient::new(&transport)
