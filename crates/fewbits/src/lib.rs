@@ -1,7 +1,7 @@
 //! Estimation from sensors that may hardly speak: one bit a sample, a message only when it matters.
 //!
 //! This crate only re-exports; depend on the single crates if you need one of them. Each is behind a feature of its name,
-//! all on by default:
+//! all but `diffusion` (which builds a sparse solver) on by default:
 //!
 //! | module | feature | what it is for |
 //! |---|---|---|
@@ -10,6 +10,7 @@
 //! | `adaptive` | `adaptive` | any signal within a guaranteed error, in as few bits as it deserves |
 //! | `dymbo` | `dymbo` | Kalman-like filters fed with one sign bit a sample |
 //! | `cfwmd` | `cfwmd` | sensors that censor dull measurements, and fusion that hears their silence |
+//! | `diffusion` | `diffusion` | concentrations in rooms, walls and wind, by sparse factorisations |
 //! | `diffusive`, `topology` | `diffusive` | a diffusive source, found by a belief that walks the network |
 //! | `quantizers` | `quantizers` | the quantizer a sensor holds, its words, Lloyd-Max tables |
 //! | `quantizer_design` | `quantizer-design` | joint design and decoding of distributed scalar quantizers |
@@ -31,6 +32,8 @@ pub use fewbits_binary_patterns as binary_patterns;
 pub use fewbits_cfwmd as cfwmd;
 #[cfg(feature = "filters")]
 pub use fewbits_densities as densities;
+#[cfg(feature = "diffusion")]
+pub use fewbits_diffusion as diffusion;
 #[cfg(feature = "diffusive")]
 pub use fewbits_diffusive as diffusive;
 #[cfg(feature = "dymbo")]

@@ -1,9 +1,7 @@
 //! One coordinate of an environment.
 
 use super::half_space::{self, Flux, Wall};
-use super::slab::{self, SlabWall};
 use crate::Error;
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
 use std::f64::consts::PI;
 
@@ -11,7 +9,6 @@ use std::f64::consts::PI;
 enum Bounds {
     Open,
     Wall { wall: Wall, flux: Flux },
-    Slab { length: f64, walls: [SlabWall; 2] },
 }
 
 /// The Green's function of one coordinate: concentration (per metre) of a unit mass released at one point.
@@ -64,33 +61,15 @@ impl Axis {
         })
     }
 
-    /// The coordinate `0 <= z <= length` between two walls, the one at 0 first.
-    ///
-    /// # Errors
-    /// If `diffusivity` or `length` is not a positive number.
-    pub fn slab(diffusivity: f64, length: f64, walls: [SlabWall; 2]) -> Result<Self, Error> {
-        let bounds = Bounds::Slab {
-            length: positive("length", length)?,
-            walls,
-        };
-        Ok(Self {
-            bounds,
-            ..Self::open(diffusivity)?
-        })
-    }
-
     /// The same with a wind along the coordinate, m/s.
     ///
     /// # Errors
-    /// If `wind` is not finite, or blows across a slab: solve that by finite volumes.
+    /// If `wind` is not finite.
     pub fn with_wind(self, wind: f64, flux: Flux) -> Result<Self, Error> {
         finite("wind", wind)?;
         let bounds = match self.bounds {
             Bounds::Wall { wall, .. } => Bounds::Wall { wall, flux },
-            Bounds::Slab { .. } if wind != 0.0 => {
-                return Err(ArgumentError::new("wind", wind, "0 across a slab").into());
-            }
-            other => other,
+            Bounds::Open => Bounds::Open,
         };
         Ok(Self { wind, bounds, ..self })
     }
@@ -128,7 +107,6 @@ impl Axis {
                 let shift = v * distance / (2.0 * k) - v * v * age / (4.0 * k);
                 half_space::green(field, source, age, k, wall.loss() + change, shift)
             }
-            Bounds::Slab { length, walls } => slab::green(field, source, age, k, length, walls),
         }
     }
 }

@@ -6,15 +6,15 @@
 //!
 //! | question | answer |
 //! |---|---|
-//! | one coordinate: open, one wall, a slab | [`Axis`] |
-//! | two media side by side | [`TwoMedia`] |
-//! | a cross-section of a pipe, a tank, a ball | [`Cylinder`], [`Sphere`] |
+//! | one coordinate: open, one wall | [`Axis`] |
 //! | three dimensions with wind | [`Space`] |
 //! | a source that releases at a constant rate, closed form, with gradient | [`Air`] |
 //! | a release that lasts, varies, moves, covers a disk | [`Release`], [`moving_source`], [`disk_source`] |
 //! | where the concentration exceeds a threshold | [`contour_radius`], [`contour`] |
 //! | the same response at many places | [`Profile`] |
-//! | layered media, and the referee of the closed forms | [`Layered`] |
+//!
+//! Rooms, walls, slabs, vessels and media whose diffusivity varies have no closed form, or one for each shape: the crate
+//! `fewbits-diffusion` solves them by finite volumes.
 //!
 //! The central choice is that a Green's function takes field **and** source, `green(field, source, age)`: the difference
 //! `field - source` is enough only far from every wall, although equation (10) of the paper is written with it. The age counts
@@ -33,31 +33,20 @@
 
 mod air;
 mod axis;
-mod bessel;
 mod contour;
-mod cylinder;
 mod extended;
-mod finite_volume;
 mod half_space;
 mod integrate;
 mod profile;
 mod release;
-mod slab;
 mod space;
-mod sphere;
-mod two_media;
 
 pub use crate::source_model::SourceGradient;
 pub use air::{Air, CLOSEST, Ground};
 pub use axis::Axis;
 pub use contour::{contour, contour_radius};
-pub use cylinder::Cylinder;
 pub use extended::{disk_source, moving_source};
-pub use finite_volume::Layered;
 pub use half_space::{Flux, Wall};
 pub use profile::Profile;
 pub use release::Release;
-pub use slab::SlabWall;
 pub use space::{ImpulseResponse, Space, step_response};
-pub use sphere::Sphere;
-pub use two_media::TwoMedia;

@@ -18,7 +18,7 @@ pub trait ImpulseResponse {
     fn diffusivity(&self) -> f64;
 }
 
-/// An environment whose Green's function is a product of three coordinates: open, half-space or slab geometry, with wind.
+/// An environment whose Green's function is a product of three coordinates: open or half-space geometry, with wind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Space {
     axes: [Axis; 3],

@@ -1,9 +1,7 @@
 //! Reference values of the diffusion physics, computed by an independent program.
 
 use crate::diffusion_entries::{beginning_with, number};
-use fewbits_models::diffusion::{
-    Air, Axis, Flux, Ground, Release, SlabWall, TwoMedia, Wall, contour_radius, disk_source, moving_source,
-};
+use fewbits_models::diffusion::{Air, Axis, Flux, Ground, Release, Wall, contour_radius, disk_source, moving_source};
 use nalgebra::{Vector2, Vector3};
 use serde_json::Value;
 
@@ -35,32 +33,6 @@ fn half_space() {
             .with_wind(number(&e, "v"), flux)
             .unwrap();
         check(&e, axis.green(number(&e, "z"), number(&e, "z0"), number(&e, "t")));
-    }
-}
-
-#[test]
-fn slab() {
-    for e in entries("green1d_slab") {
-        let kind = e["inputs"]["kind"].as_str().unwrap();
-        let wall = |c| {
-            if c == 'n' {
-                SlabWall::Impermeable
-            } else {
-                SlabWall::Absorbing
-            }
-        };
-        let mut walls = kind.chars().map(wall);
-        let walls = [walls.next().unwrap(), walls.next().unwrap()];
-        let axis = Axis::slab(number(&e, "kappa"), number(&e, "L"), walls).unwrap();
-        check(&e, axis.green(number(&e, "z"), number(&e, "z0"), number(&e, "t")));
-    }
-}
-
-#[test]
-fn two_media() {
-    for e in entries("green1d_two_media") {
-        let media = TwoMedia::new(number(&e, "kappa1"), number(&e, "kappa2")).unwrap();
-        check(&e, media.green(number(&e, "z"), number(&e, "z0"), number(&e, "t")));
     }
 }
 

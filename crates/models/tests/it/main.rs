@@ -7,11 +7,9 @@
     reason = "a panic is how a test fails"
 )]
 
-mod diffusion_bodies;
 mod diffusion_entries;
 mod diffusion_fixtures;
 mod diffusion_laws;
 mod diffusion_sources;
-mod finite_volume;
 mod laws;
 mod source_model;

@@ -2,7 +2,7 @@
 
 use super::bessel::{spherical, spherical_derivative, zeros};
 use super::slab::SlabWall;
-use crate::Error;
+use fewbits_models::Error;
 use fewbits_numerics::error::positive;
 use nalgebra::Vector3;
 use std::f64::consts::PI;

@@ -1,10 +1,9 @@
 //! One coordinate between two walls, `0 <= z <= length`.
 
-use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// A wall of a slab.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SlabWall {
     /// Nothing passes.
     Impermeable,
@@ -16,7 +15,7 @@ pub enum SlabWall {
 const EIGEN_FROM: f64 = 0.2;
 
 /// Images below the switch, eigenfunctions above; both agree to rounding around it.
-pub(super) fn green(z: f64, z0: f64, age: f64, diffusivity: f64, length: f64, walls: [SlabWall; 2]) -> f64 {
+pub fn green(z: f64, z0: f64, age: f64, diffusivity: f64, length: f64, walls: [SlabWall; 2]) -> f64 {
     let inside = 0.0..=length;
     if age <= 0.0 || !inside.contains(&z) || !inside.contains(&z0) {
         return 0.0;

@@ -1,6 +1,6 @@
 //! Two half-lines of different diffusivity.
 
-use crate::Error;
+use fewbits_models::Error;
 use fewbits_numerics::error::positive;
 use std::f64::consts::PI;
 

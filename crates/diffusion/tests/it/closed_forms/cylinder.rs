@@ -2,7 +2,7 @@
 
 use super::bessel::{jn_derivative, zeros};
 use super::slab::SlabWall;
-use crate::Error;
+use fewbits_models::Error;
 use fewbits_numerics::error::positive;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -13,7 +13,7 @@ const DECAY: f64 = 40.0;
 const LARGEST_ZERO: f64 = 160.0;
 
 /// The Green's function of diffusion in a disk: concentration (per m^2) of a unit mass released at one point of the
-/// cross-section of an endless cylinder, or, times an [`Axis`](super::Axis) along it, of a cylinder in three dimensions.
+/// cross-section of an endless cylinder, or, times an `Axis` along it, of a cylinder in three dimensions.
 ///
 /// Eigenfunctions `J_m(j rho / a) cos m (phi - phi0)`, `j` running over the zeros of `J_m'` (impermeable) or `J_m` (absorbing).
 /// They are summed down to `exp(-40)` as long as that needs no zero above 160, that is for `kappa t > 0.0016 a^2`; before, the

@@ -1,7 +1,7 @@
 //! Bessel functions of integer order, spherical ones, and the zeros of both and of their derivatives.
 
 /// `J_m'(x)`.
-pub(super) fn jn_derivative(m: i32, x: f64) -> f64 {
+pub fn jn_derivative(m: i32, x: f64) -> f64 {
     if m == 0 {
         -libm::j1(x)
     } else {
@@ -15,7 +15,7 @@ const NEGLIGIBLE: f64 = 1e-40;
 const MILLER: u32 = 40;
 
 /// Spherical Bessel function `j_l(x)` for `x >= 0`: upwards where that is stable, downwards (Miller) elsewhere.
-pub(super) fn spherical(l: u32, x: f64) -> f64 {
+pub fn spherical(l: u32, x: f64) -> f64 {
     if x < NEGLIGIBLE {
         return if l == 0 { 1.0 } else { 0.0 };
     }
@@ -51,7 +51,7 @@ pub(super) fn spherical(l: u32, x: f64) -> f64 {
 }
 
 /// `j_l'(x)` for `x > 0`.
-pub(super) fn spherical_derivative(l: u32, x: f64) -> f64 {
+pub fn spherical_derivative(l: u32, x: f64) -> f64 {
     if l == 0 {
         return -spherical(1, x);
     }
@@ -61,7 +61,7 @@ pub(super) fn spherical_derivative(l: u32, x: f64) -> f64 {
 /// The positive zeros of `f` up to `limit`, increasing, from `start`, where `f` is not zero.
 ///
 /// Zeros of the functions of this file are more than 2 apart beyond their order, so that a step of 1 passes over none.
-pub(super) fn zeros(f: impl Fn(f64) -> f64, start: f64, limit: f64) -> Vec<f64> {
+pub fn zeros(f: impl Fn(f64) -> f64, start: f64, limit: f64) -> Vec<f64> {
     let mut found = Vec::new();
     let (mut x, mut value) = (start, f(start));
     while x < limit {

@@ -1,0 +1,104 @@
+//! What this crate refuses.
+
+use fewbits_numerics::ArgumentError;
+use thiserror::Error as ThisError;
+
+/// Errors of this crate. Cells are named by column, line and layer; points by their coordinates in metres.
+#[derive(Debug, Clone, PartialEq, ThisError)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument out of range.
+    #[error(transparent)]
+    Argument(#[from] ArgumentError),
+    /// A source or a sensor is outside the grid.
+    #[error("the point {point:?} is outside the grid")]
+    Outside {
+        /// The point.
+        point: [f64; 3],
+    },
+    /// A source or a sensor is in a blocked cell.
+    #[error("the point {point:?} is in a blocked cell: the centre of the nearest free cell is {nearest:?}")]
+    Blocked {
+        /// The point.
+        point: [f64; 3],
+        /// Centre of the free cell nearest to it.
+        nearest: [f64; 3],
+    },
+    /// Every cell is blocked.
+    #[error("every cell is blocked: at least one must be free")]
+    NoFreeCell,
+    /// The wind is not free of divergence on this grid.
+    #[error(
+        "the wind is not free of divergence: {net} leaves cell {cell:?} (the largest flow through a face is {largest}); use \
+         `Divergence::Project`"
+    )]
+    Divergence {
+        /// The cell with the largest net flow.
+        cell: [usize; 3],
+        /// Net flow out of it, m^3/s.
+        net: f64,
+        /// Largest flow through a face, m^3/s.
+        largest: f64,
+    },
+    /// A connected part has neither an exit nor decay, so that it has no steady state.
+    #[error("nothing can leave the part of cell {cell:?} and nothing decays there: it has no steady state")]
+    NoSink {
+        /// A cell of the part.
+        cell: [usize; 3],
+    },
+    /// No connected part touches an inflow and an outflow.
+    #[error("no connected part touches both an inflow and an outflow: no potential flow passes")]
+    NoPassage,
+    /// Wind enters through an outflow, whose law (no diffusive flux) does not say what it carries.
+    #[error("wind enters through the outflow at cell {cell:?} ({flow} m^3/s outwards): declare an inflow there")]
+    Backflow {
+        /// The cell inside the face.
+        cell: [usize; 3],
+        /// Flow outwards, m^3/s.
+        flow: f64,
+    },
+    /// A sparse factorisation failed: there is not enough memory, or the matrix is singular to rounding.
+    #[error("the matrix of {unknowns} cells cannot be factored: {}", if *.singular { "it is singular to rounding" } else { "not enough memory" })]
+    Factorisation {
+        /// Number of free cells.
+        unknowns: usize,
+        /// Whether the matrix is singular; otherwise memory ran out.
+        singular: bool,
+    },
+    /// The time step that the tolerance asks for is below the resolution of time.
+    #[error("a time step of {step} s does not reach the tolerance")]
+    StepTooSmall {
+        /// The smallest step tried, s.
+        step: f64,
+    },
+    /// A plan has a character without meaning.
+    #[error("the plan has {character:?} in line {line}, column {column}: expected one of . # L A I O")]
+    PlanCharacter {
+        /// The character.
+        character: char,
+        /// Line, from 0.
+        line: usize,
+        /// Column, from 0.
+        column: usize,
+    },
+    /// The lines of a plan differ in length.
+    #[error("line {line} of the plan has {found} cells: expected {expected}")]
+    PlanLine {
+        /// Line, from 0.
+        line: usize,
+        /// Its number of cells.
+        found: usize,
+        /// The number of cells of line 0.
+        expected: usize,
+    },
+    /// A picture is not a plain PBM (`P1`) of the stated size.
+    #[error(
+        "the picture is not a plain PBM: {found} pixels, expected `P1`, width, height and {expected} pixels of 0 or 1"
+    )]
+    Picture {
+        /// Number of pixels that could be read.
+        found: usize,
+        /// Width times height, 0 if the header cannot be read.
+        expected: usize,
+    },
+}

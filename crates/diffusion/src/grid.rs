@@ -1,0 +1,130 @@
+//! Rectilinear grids.
+
+use crate::Error;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, at_least_one, positive};
+
+/// Boxes of any widths side by side along one, two or three axes.
+///
+/// Cells are numbered with the first axis fastest. A missing axis has one cell from 0 to 1 m, so that amounts in a plane are per metre
+/// of height, and coordinates along it are ignored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    edges: [Vec<f64>; 3],
+    dimension: usize,
+}
+
+impl Grid {
+    /// A grid from the edges of its cells, m, along one to three axes: one more edge than cells, increasing.
+    ///
+    /// # Errors
+    /// If there are not one to three axes, an axis has fewer than two edges, or edges are not finite and increasing.
+    pub fn new(edges: &[Vec<f64>]) -> Result<Self, Error> {
+        if !(1..=3).contains(&edges.len()) {
+            return Err(ArgumentError::new("edges", format!("{} axes", edges.len()), "one to three axes").into());
+        }
+        for axis in edges {
+            all_finite("edges", axis)?;
+            if axis.len() < 2 || axis.windows(2).any(|pair| pair[0] >= pair[1]) {
+                return Err(ArgumentError::new("edges", format!("{axis:?}"), "two or more increasing numbers").into());
+            }
+        }
+        let axis = |i: usize| edges.get(i).cloned().unwrap_or_else(|| vec![0.0, 1.0]);
+        Ok(Self {
+            edges: [axis(0), axis(1), axis(2)],
+            dimension: edges.len(),
+        })
+    }
+
+    /// Equal cells of the given width, m, from the origin on: a count of cells for each of one to three axes.
+    ///
+    /// # Errors
+    /// If there are not one to three counts, one is zero, or `width` is not a positive number.
+    pub fn uniform(counts: &[usize], width: f64) -> Result<Self, Error> {
+        positive("width", width)?;
+        for count in counts {
+            at_least_one("counts", *count)?;
+        }
+        let axis = |n: &usize| (0..=*n).map(|i| i as f64 * width).collect();
+        Self::new(&counts.iter().map(axis).collect::<Vec<Vec<f64>>>())
+    }
+
+    /// Number of axes.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// Number of cells along each axis.
+    pub fn counts(&self) -> [usize; 3] {
+        [0, 1, 2].map(|axis| self.edges[axis].len() - 1)
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.counts().iter().product()
+    }
+
+    /// Edges of the cells along an axis, m.
+    pub fn edges(&self, axis: usize) -> &[f64] {
+        &self.edges[axis]
+    }
+
+    /// Number of the cell in the given column, line and layer.
+    #[inline]
+    pub fn index(&self, [column, line, layer]: [usize; 3]) -> usize {
+        let [nx, ny, _] = self.counts();
+        column + nx * (line + ny * layer)
+    }
+
+    /// Column, line and layer of a cell.
+    #[inline]
+    pub fn place(&self, cell: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.counts();
+        [cell % nx, cell / nx % ny, cell / (nx * ny)]
+    }
+
+    /// Width of the cells in one column (line, layer) of an axis, m.
+    #[inline]
+    pub fn width(&self, axis: usize, at: usize) -> f64 {
+        self.edges[axis][at + 1] - self.edges[axis][at]
+    }
+
+    /// Centre of a cell, m.
+    pub fn centre(&self, cell: usize) -> [f64; 3] {
+        let at = self.place(cell);
+        [0, 1, 2].map(|axis| 0.5 * (self.edges[axis][at[axis]] + self.edges[axis][at[axis] + 1]))
+    }
+
+    /// Volume of a cell, m^3; its area in a plane, its length on a line.
+    pub fn volume(&self, cell: usize) -> f64 {
+        let at = self.place(cell);
+        (0..3).map(|axis| self.width(axis, at[axis])).product()
+    }
+
+    /// Area of a cell's faces across an axis.
+    pub(crate) fn face_area(&self, at: &[usize; 3], across: usize) -> f64 {
+        (0..3)
+            .filter(|axis| *axis != across)
+            .map(|axis| self.width(axis, at[axis]))
+            .product()
+    }
+
+    /// Place along an axis of the cells that hold a coordinate: of two cells that share it, the upper one; at the end of the grid the last.
+    pub(crate) fn along(&self, axis: usize, coordinate: f64) -> Option<usize> {
+        if axis >= self.dimension {
+            return Some(0);
+        }
+        let edges = &self.edges[axis];
+        let last = edges.len() - 1;
+        if !(edges[0]..=edges[last]).contains(&coordinate) {
+            return None;
+        }
+        Some(edges.partition_point(|edge| *edge <= coordinate).clamp(1, last) - 1)
+    }
+
+    /// The cell that holds a point, m. A point on the face between two cells belongs to the upper one. `None` outside the grid.
+    pub fn cell_at(&self, point: [f64; 3]) -> Option<usize> {
+        let at = [0, 1, 2].map(|axis| self.along(axis, point[axis]));
+        Some(self.index([at[0]?, at[1]?, at[2]?]))
+    }
+}

@@ -1,0 +1,88 @@
+//! Steady concentrations.
+
+use crate::solver::{Direction, Factor};
+use crate::{Error, Patch, Transport};
+use faer::Mat;
+use fewbits_numerics::error::finite;
+
+/// A source: a patch and its rate, kg/s.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    /// Where it releases.
+    pub patch: Patch,
+    /// Its rate, kg/s.
+    pub rate: f64,
+}
+
+/// A factored transport without time.
+pub struct Steady<'a> {
+    transport: &'a Transport,
+    factor: Factor<'a>,
+}
+
+/// Columns that are solved together: enough to use the factor well, few enough that scratch memory stays below that of the factor.
+const COLUMNS: usize = 32;
+
+impl<'a> Steady<'a> {
+    /// Factors the transport.
+    ///
+    /// # Errors
+    /// [`Error::NoSink`] if a part has no steady state; [`Error::Factorisation`] if memory runs out.
+    pub fn new(transport: &'a Transport) -> Result<Self, Error> {
+        transport.check_sinks()?;
+        let factor = transport.solver()?.factor(&transport.diagonal, &transport.rates, 1.0)?;
+        Ok(Self { transport, factor })
+    }
+
+    /// The concentration in each free cell, kg/m^3, with all sources on.
+    ///
+    /// # Errors
+    /// If a rate is not finite, or a patch is of another domain.
+    pub fn concentration(&self, sources: &[Source]) -> Result<Vec<f64>, Error> {
+        let mut right = vec![0.0; self.transport.volumes.len()];
+        for source in sources {
+            finite("rate", source.rate)?;
+            self.transport.check_patch(&source.patch)?;
+            source
+                .patch
+                .shares
+                .iter()
+                .for_each(|(cell, share)| right[*cell] += share * source.rate);
+        }
+        self.from_amounts(&right)
+    }
+
+    /// The concentration with the given release in each free cell, kg/s.
+    ///
+    /// # Errors
+    /// If there is not one release for each free cell, or one is not finite.
+    pub fn from_amounts(&self, releases: &[f64]) -> Result<Vec<f64>, Error> {
+        // The same conditions as for a field.
+        self.transport.net_outflow(releases)?;
+        let mut columns = Mat::from_fn(releases.len(), 1, |i, _| releases[i]);
+        self.factor.solve(Direction::Forward, &mut columns);
+        Ok(columns.col_as_slice(0).to_vec())
+    }
+
+    /// For each sensor the concentration that it measures, kg/m^3 per kg/s, of a source in each free cell: one adjoint solution.
+    ///
+    /// # Errors
+    /// If a patch is of another domain.
+    pub fn adjoint(&self, sensors: &[Patch]) -> Result<Vec<Vec<f64>>, Error> {
+        let count = self.transport.volumes.len();
+        let mut fields = Vec::with_capacity(sensors.len());
+        for group in sensors.chunks(COLUMNS) {
+            let mut columns = Mat::zeros(count, group.len());
+            for (j, sensor) in group.iter().enumerate() {
+                self.transport.check_patch(sensor)?;
+                sensor
+                    .shares
+                    .iter()
+                    .for_each(|(cell, share)| columns[(*cell, j)] += share);
+            }
+            self.factor.solve(Direction::Adjoint, &mut columns);
+            fields.extend((0..group.len()).map(|j| columns.col_as_slice(j).to_vec()));
+        }
+        Ok(fields)
+    }
+}
