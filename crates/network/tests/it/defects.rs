@@ -168,9 +168,8 @@ fn patterns_have_the_variance_given_the_bits() {
     let mut rng = Stream::new(1).rng();
     let predicted = patterns.predict(&mut rng, 1, &patterns.start()).unwrap();
     assert!((predicted.covariance()[0] - variance).abs() < 1e-12);
-    let mut memory = patterns.memory(0);
     let bit = patterns
-        .report(&mut rng, 1, 0, &mut memory, &Vector1::new(5.0), &())
+        .report(&mut rng, 1, 0, &mut (), &Vector1::new(5.0), &())
         .unwrap()
         .unwrap();
     let after = patterns
@@ -188,7 +187,7 @@ fn patterns_have_the_variance_given_the_bits() {
 #[test]
 fn slots_without_time_for_all_are_refused() {
     let filter = ParallelFilter::new(plant(), 1000, CountFusion::Linear).unwrap();
-    let estimator = || ParallelDymboEstimator::new(filter.clone(), start()).unwrap();
+    let estimator = || ParallelDymboEstimator::new(filter, start()).unwrap();
     let measurements = || Measurements::from_fn(3, |_, _| Some(Vector1::new(0.0)));
     let star = |period: f64| {
         let clock = Clock::new(Seconds::new(period).unwrap()).unwrap();
