@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let start = Gaussian::scalar(0.0, plant.dynamics().stationary_variance()?)?;
     let mut rng = Stream::new(1).rng();
     let mut state = start.sample(&mut rng);
-    let (mut truths, mut measurements) = (Vec::new(), Vec::new());
+    let (mut truths, mut measurements) = (Vec::new(), Vec::<Vec<_>>::new());
     for _ in 0..slots {
         state = plant.dynamics().propagate(&mut rng, &state);
         truths.push(state[0]);
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let mut network = star.simulate(10.0, setup)?;
     network.run_until(clock.end(slots))?;
-    let truths: Vec<Vec<f64>> = truths.into_iter().map(|x| vec![x]).collect();
+    let truths: Vec<Vec<f64>> = truths.into_iter().map(|x: f64| vec![x]).collect();
     println!("{}", network.summary().with_errors(&truths, network.nodes()[0].estimates())?);
     Ok(())
 }

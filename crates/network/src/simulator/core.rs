@@ -55,6 +55,8 @@ pub(super) struct Outgoing {
 pub(super) struct State {
     pub(super) now: Instant,
     pub(super) queue: Queue,
+    /// For each node whether it lives. Every event asks for it; the ledger says the same, spread over more memory.
+    pub(super) alive: Vec<bool>,
     /// For each node the end of its last outage.
     pub(super) out_until: Vec<Instant>,
     /// For each node until when the air about it is taken.
@@ -98,6 +100,7 @@ impl SimulatorCore {
             state: State {
                 now: Instant::default(),
                 queue: Queue::default(),
+                alive: vec![true; nodes],
                 out_until: vec![Instant::default(); nodes],
                 busy_until: vec![Instant::default(); nodes],
                 batches: BTreeMap::new(),
@@ -132,6 +135,8 @@ impl SimulatorCore {
             None => known(from),
         };
         let consistent = state.ledger.accounts.len() == nodes
+            && state.alive.len() == nodes
+            && (0..nodes).all(|node| state.alive[node] == state.ledger.accounts[node].died.is_none())
             && state.out_until.len() == nodes
             && state.busy_until.len() == nodes
             && state.queue.is_consistent(known)
@@ -163,7 +168,7 @@ impl SimulatorCore {
 
     #[inline]
     pub(super) fn is_alive(&self, node: SensorId) -> bool {
-        self.state.ledger.accounts[node.index()].died.is_none()
+        self.state.alive[node.index()]
     }
 
     /// Whether a node's radio sends and receives.
@@ -227,6 +232,7 @@ impl SimulatorCore {
     }
 
     fn kill(&mut self, node: SensorId, at: Instant) {
+        self.state.alive[node.index()] = false;
         self.state.ledger.accounts[node.index()].died = Some(at);
         self.forget(node);
         self.note(node, Note::Died);
@@ -268,6 +274,7 @@ impl SimulatorCore {
         nodes * size_of::<[f64; 2]>()
             + graph
             + state.queue.memory()
+            + state.alive.capacity()
             + (state.out_until.capacity() + state.busy_until.capacity()) * size_of::<Instant>()
             + state.outgoing.len() * size_of::<Outgoing>()
             + state.ledger.accounts.capacity() * size_of::<Account>()
