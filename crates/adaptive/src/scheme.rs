@@ -146,7 +146,12 @@ impl Scheme<1> for SlotScheme {
         }))
     }
 
-    fn factor(&self, (): &(), observation: &Observation<Packet>, link: &Link) -> Result<SlotFactor, fewbits_core::Error> {
+    fn factor(
+        &self,
+        (): &(),
+        observation: &Observation<Packet>,
+        link: &Link,
+    ) -> Result<SlotFactor, fewbits_core::Error> {
         if link.crossover() > 0.0 {
             let expected = "0: a packet with a wrong bit must be erased by a checksum of the link";
             return Err(ArgumentError::new("crossover", link.crossover(), expected).into());

@@ -49,7 +49,11 @@ impl Bank {
         let (score, nodes) = self.posterior_score(observations)?;
         let w = weights_under(&score, &nodes);
         let (mass, _) = moments(&w, &nodes.x);
-        Ok(if mass > 0.0 { squared_error(&w, &nodes.x, estimate) / mass } else { 0.0 })
+        Ok(if mass > 0.0 {
+            squared_error(&w, &nodes.x, estimate) / mass
+        } else {
+            0.0
+        })
     }
 
     /// Log likelihood of the observations at the nodes of the source, and the nodes.

@@ -48,7 +48,10 @@ fn whole_sample_over_a_lossy_link_counts_its_arrival() {
     let (noise, loss, far) = (0.16, 0.2, 1e15);
     let scheme = SlotScheme::new(&sensor, noise).unwrap();
     let mut rng = Stream::new(1).rng();
-    let report = scheme.encode(&mut rng, &mut (), &Vector1::new(far), &()).unwrap().unwrap();
+    let report = scheme
+        .encode(&mut rng, &mut (), &Vector1::new(far), &())
+        .unwrap()
+        .unwrap();
     let factor = scheme
         .factor(&(), &Observation::Received(report), &Link::lossy(loss).unwrap())
         .unwrap();

@@ -1,4 +1,4 @@
-//! Where the nodes stand and who is in range of whom.
+//! Positions of the nodes, and who is in range of whom.
 
 use crate::error::Error;
 use crate::units::SensorId;
@@ -105,6 +105,17 @@ impl Field {
         Ok(())
     }
 
+    /// # Errors
+    /// [`Error::UnknownNode`]; [`Error::Unheard`] if there are other nodes and none is in range of it.
+    pub(crate) fn check_heard(&self, node: SensorId) -> Result<(), Error> {
+        self.check(node)?;
+        if self.len() > 1 && self.graph.neighbours(node.index()).is_empty() {
+            let (node, range) = (node.index(), self.range);
+            return Err(Error::Unheard { node, range });
+        }
+        Ok(())
+    }
+
     /// Routes from a node to all others.
     ///
     /// # Errors
@@ -130,16 +141,21 @@ mod tests {
         assert!(matches!(Field::new(&line(&[0.0, 1.0]), 0.0), Err(Error::Argument(_))));
         let field = Field::new(&line(&[0.0, 1.0, 5.0]), 2.0).unwrap();
         let link = |from, to| field.check_link(SensorId(from), SensorId(to));
-        assert_eq!(link(0, 1), Ok(()));
-        assert_eq!(link(1, 1), Err(Error::SelfLink { node: 1 }));
-        assert_eq!(link(0, 2), Err(Error::OutOfRange { from: 0, to: 2 }));
-        assert_eq!(link(0, 9), Err(Error::UnknownNode { node: 9, nodes: 3 }));
-        let lost = Error::Disconnected {
-            root: 0,
-            reached: 2,
-            nodes: 3,
-        };
-        assert_eq!(field.routes(SensorId(0)), Err(lost));
+        assert!(link(0, 1).is_ok());
+        assert!(matches!(link(1, 1), Err(Error::SelfLink { node: 1 })));
+        assert!(matches!(link(0, 2), Err(Error::OutOfRange { from: 0, to: 2 })));
+        assert!(matches!(link(0, 9), Err(Error::UnknownNode { node: 9, nodes: 3 })));
+        let lost = field.routes(SensorId(0));
+        assert!(matches!(
+            lost,
+            Err(Error::Disconnected {
+                root: 0,
+                reached: 2,
+                nodes: 3
+            })
+        ));
+        assert!(matches!(field.check_heard(SensorId(2)), Err(Error::Unheard { node: 2, .. })));
+        assert!(field.check_heard(SensorId(1)).is_ok());
         assert!(Field::star(0, 1.0).is_err() && Field::star(3, 0.0).is_err());
         assert!(Field::star(7, 10.0).unwrap().routes(SensorId(3)).is_ok());
     }

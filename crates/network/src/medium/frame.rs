@@ -1,11 +1,11 @@
-//! Frames: real bits with a header that lets two ends see whether they still agree.
+//! Frames: real bits with a header by which two ends see whether they still agree.
 
-use crate::channel::Check;
+use super::channel::Check;
 use crc::{CRC_16_XMODEM, Crc};
 use fewbits_core::{BitReader, BitString, BitWriter, CodecError};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What a frame carries.
+/// Kind of content of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -18,7 +18,7 @@ pub enum Kind {
     Echo,
     /// The whole shared state.
     Snapshot,
-    /// A wish for a snapshot.
+    /// A request for a snapshot.
     Request,
     /// A belief that travels on, and to whom.
     Handover,
@@ -45,7 +45,7 @@ const CHECK_BITS: u32 = 16;
 /// A frame: 64 bits of header (96 for a handover, which names its destination), the payload, a check of 16 bits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
-    /// What it carries.
+    /// Kind of content.
     pub kind: Kind,
     /// The sequence number: the slot that it belongs to, below `2^29`.
     pub slot: u32,
@@ -183,6 +183,11 @@ pub fn digest(slot: u64, bits: &BitString) -> u32 {
     let hash = bits.bytes().iter().fold(hash, add);
     (hash ^ hash >> 32) as u32
 }
+
+/// Bits as they are stored.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Stored(#[serde(with = "stored")] pub BitString);
 
 /// `BitString` for serde: bytes and length.
 pub(crate) mod stored {

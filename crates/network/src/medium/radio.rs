@@ -1,4 +1,4 @@
-//! What the radio takes.
+//! Energy, timing and framing of a radio.
 //!
 //! | preset | source |
 //! |---|---|
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Transceiver {
-    /// So much power while it sends or receives.
+    /// Constant power while it sends, and while it receives.
     Powers {
         /// While sending.
         transmit: Watts,
@@ -33,9 +33,10 @@ pub enum Transceiver {
 
 /// A radio with its framing, and the node it sits on.
 ///
-/// Every frame costs its preamble and link-layer header besides its own bits, the sender and each receiver a wake-up
-/// (sleep to active and back, at the power of receiving), and the turnaround before an acknowledgement. Nodes are synchronised
-/// to slots and sleep outside the frames that are for them; `guard` is how long a receiver listens in vain before each.
+/// A frame is sent as one link frame, or as several where it is longer than [`mtu`](Self::mtu) allows. Each link frame costs a preamble and a
+/// link-layer header besides its part of the bits. Sender and receivers pay a wake-up (sleep to active and back, at the power of
+/// receiving), and a turnaround before an acknowledgement. Nodes are synchronised to slots and sleep outside the frames that are for them;
+/// `guard` is how long a receiver listens before each.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Radio {
@@ -63,9 +64,15 @@ pub struct Radio {
     pub header: Bits,
     /// An acknowledgement with its preamble.
     pub acknowledgement: Bits,
-    /// Energy of the batteries.
-    pub battery: Joules,
+    /// Longest link frame without preamble; `None` for no limit.
+    pub mtu: Option<Bits>,
+    /// Energy of the batteries; `None` for a node on the mains.
+    pub battery: Option<Joules>,
 }
+
+/// Bits that each part of a frame carries where a frame is longer than a link frame: a fragment header (40 bits, RFC 4944, section 5.3) and the
+/// frame check of IEEE 802.15.4 (16 bits).
+pub const FRAGMENT_OVERHEAD: Bits = Bits(56);
 
 /// Two AA cells.
 pub const TWO_AA_CELLS: Joules = Joules::trusted(18_720.0);
@@ -110,7 +117,8 @@ impl Radio {
             preamble: Bits(48),
             header: Bits(72),
             acknowledgement: Bits(88),
-            battery: TWO_AA_CELLS,
+            mtu: Some(Bits(127 * 8)),
+            battery: Some(TWO_AA_CELLS),
         })
     }
 
@@ -132,15 +140,56 @@ impl Radio {
             preamble: Bits(0),
             header: Bits(0),
             acknowledgement: Bits(0),
-            battery: Joules::trusted(0.5),
+            mtu: None,
+            battery: Some(Joules::trusted(0.5)),
         }
     }
 
+    /// The same radio on a node that is fed by the mains: its energy is counted, and it never dies of it.
+    #[must_use]
+    pub fn on_mains(self) -> Self {
+        Self { battery: None, ..self }
+    }
+
     /// # Errors
-    /// If the bit rate is not positive.
+    /// If the bit rate is not positive, or a link frame has no room for a bit of a fragment.
     pub(crate) fn checked(self) -> Result<Self, ArgumentError> {
         positive("bit_rate", self.bit_rate)?;
-        Ok(self)
+        let least = self.header + FRAGMENT_OVERHEAD;
+        match self.mtu {
+            Some(mtu) if mtu <= least => Err(ArgumentError::new("mtu", mtu, format!("more than {least}"))),
+            _ => Ok(self),
+        }
+    }
+
+    /// Whether frames of one radio can be received by the other: bit rate and framing are the same.
+    pub(crate) fn understands(&self, other: &Self) -> bool {
+        let framing = |radio: &Self| (radio.preamble, radio.header, radio.acknowledgement, radio.mtu);
+        self.bit_rate == other.bit_rate && framing(self) == framing(other)
+    }
+
+    /// How many link frames carry a frame (or a batch) of `body` bits.
+    pub fn link_frames(&self, body: Bits) -> u64 {
+        match self.mtu {
+            Some(mtu) if self.header + body > mtu => {
+                let room = mtu.0.saturating_sub((self.header + FRAGMENT_OVERHEAD).0).max(1);
+                body.0.div_ceil(room)
+            }
+            _ => 1,
+        }
+    }
+
+    /// All bits on air of a frame (or a batch) of `body` bits, preambles and headers included.
+    pub fn on_air(&self, body: Bits) -> Bits {
+        match self.link_frames(body) {
+            1 => self.preamble + self.header + body,
+            several => (self.preamble + self.header + FRAGMENT_OVERHEAD) * several + body,
+        }
+    }
+
+    /// From the end of a frame to the end of its acknowledgement, both at once on air: turnaround and the acknowledgement itself.
+    pub fn answer_time(&self) -> Seconds {
+        self.turnaround + self.duration(self.acknowledgement)
     }
 
     /// Time on air.
@@ -171,7 +220,7 @@ impl Radio {
         self.active * (self.wake + self.doze)
     }
 
-    /// Energy of a turnaround.
+    /// Energy of a turnaround between sending and receiving.
     pub fn turn(&self) -> Joules {
         self.active * self.turnaround
     }
@@ -198,5 +247,21 @@ mod tests {
         let simple = Radio::first_order();
         assert!((simple.transmit(Bits(2000), 100.0).value() - 2000.0 * (50e-9 + 100e-12 * 1e4)).abs() < 1e-15);
         assert!((simple.receive(Bits(2000)).value() - 1e-4).abs() < 1e-18);
+    }
+
+    /// 127 bytes without preamble: header 9, frame 118 (one link frame), or parts of 111 bytes and 7 of fragment header and check.
+    #[test]
+    fn long_frames_are_cut_at_127_bytes() {
+        let radio = Radio::cc2420(0.0).unwrap();
+        assert_eq!((radio.link_frames(Bits(118 * 8)), radio.link_frames(Bits(118 * 8 + 1))), (1, 2));
+        assert_eq!(radio.on_air(Bits(118 * 8)), Bits(48 + 127 * 8));
+        assert_eq!(radio.on_air(Bits(2 * 888)), Bits(2 * (48 + 127 * 8)));
+        assert_eq!(radio.link_frames(Bits(32_000)), 37);
+        assert_eq!(Radio::first_order().link_frames(Bits(1 << 40)), 1);
+        let none = Radio {
+            mtu: Some(Bits(128)),
+            ..radio
+        };
+        assert!(none.checked().is_err() && radio.checked().is_ok());
     }
 }

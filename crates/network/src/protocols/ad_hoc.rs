@@ -1,12 +1,12 @@
-//! Sensors without a centre: every node hears every report and runs the filter.
+//! Sensors without a centre: every node receives every report and runs the filter.
 
 use crate::clock::Clock;
 use crate::error::Error;
-use crate::estimator::{Replicable, check_measurements};
-use crate::exchange::{Arrived, own, predict, settle};
-use crate::field::Field;
-use crate::frame::{Frame, Kind, digest, stored};
-use crate::log::Note;
+use crate::estimator::Replicable;
+use crate::measurements::Measurements;
+use crate::medium::{Field, Frame, Kind, digest, frame::stored};
+use crate::note::{Note, Stage};
+use crate::protocols::slot::{Arrived, Failures, check_fits, from_prior, own, predict, update_or_discard};
 use crate::simulator::{Context, Protocol, Setup, Simulator};
 use crate::units::SensorId;
 use fewbits_core::{BitString, Message};
@@ -14,7 +14,9 @@ use fewbits_monte_carlo::Stream;
 use serde::{Deserialize, Serialize};
 
 const ANCHOR: SensorId = SensorId(0);
+/// Timer: a slot begins.
 const BEGIN: u32 = 0;
+/// Timer: reports of the slot are awaited no longer.
 const DEADLINE: u32 = 1;
 
 /// Sensors that broadcast their reports to each other; every one of them estimates.
@@ -28,7 +30,7 @@ const DEADLINE: u32 = 1;
 #[derive(Debug, Clone)]
 pub struct AdHoc<E: Replicable> {
     estimator: E,
-    measurements: Vec<Vec<E::Measurement>>,
+    measurements: Measurements<E::Measurement>,
     clock: Clock,
     stream: Stream,
     beacon: u32,
@@ -62,6 +64,7 @@ pub struct Peer<B, Y> {
     lost: bool,
     /// At the anchor: somebody needs the belief.
     asked: bool,
+    failures: Failures,
     estimates: Vec<Vec<f64>>,
 }
 
@@ -83,20 +86,20 @@ impl<B, Y> Peer<B, Y> {
 }
 
 impl<E: Replicable> AdHoc<E> {
-    /// A network without a centre. `measurements[k][i]` is what sensor `i` measures in slot `k + 1`; `beacon` is after how many slots
-    /// a silent anchor sends its digest.
+    /// A network without a centre. `beacon` is after how many slots a silent anchor sends its digest; `stream` is what the estimator draws from.
     ///
     /// # Errors
-    /// If a slot has not one measurement for each sensor, there are 2^29 slots or more, or `beacon` is zero.
+    /// If a slot of a table has not one measurement per sensor, there are 2^29 slots or more, or `beacon` is zero.
     pub fn new(
         estimator: E,
-        measurements: Vec<Vec<E::Measurement>>,
+        measurements: impl Into<Measurements<E::Measurement>>,
         clock: Clock,
         beacon: u32,
         stream: Stream,
     ) -> Result<Self, Error> {
         fewbits_numerics::error::at_least_one("beacon", beacon as usize)?;
-        check_measurements(estimator.sensors(), &measurements)?;
+        let measurements = measurements.into();
+        measurements.check(estimator.sensors())?;
         Ok(Self {
             estimator,
             measurements,
@@ -109,9 +112,10 @@ impl<E: Replicable> AdHoc<E> {
     /// The network before its first slot: all nodes on a circle of the given radius, in range of each other.
     ///
     /// # Errors
-    /// If the setup or radius is out of range.
+    /// If the setup or radius is out of range; [`Error::SlotTooShort`] if a slot has no time for a report of every node.
     pub fn simulate(self, radius: f64, setup: Setup) -> Result<Simulator<Self>, Error> {
         let sensors = self.estimator.sensors();
+        check_fits(&self.clock, &setup, None, sensors)?;
         let start = self.estimator.start();
         let nodes = (0..sensors).map(|i| Peer {
             memory: self.estimator.memory(i),
@@ -122,6 +126,7 @@ impl<E: Replicable> AdHoc<E> {
             heard: Vec::new(),
             lost: false,
             asked: false,
+            failures: Failures::default(),
             estimates: Vec::new(),
         });
         let (nodes, clock) = (nodes.collect(), self.clock);
@@ -138,7 +143,8 @@ impl<E: Replicable> AdHoc<E> {
 
     fn begin(&self, peer: &mut Peer<E::Belief, E::Memory>, context: &mut Context<'_>) -> Result<(), Error> {
         let slot = self.clock.slot(context.now());
-        if slot as usize > self.measurements.len() {
+        let slots = self.measurements.slots();
+        if slot > slots {
             return Ok(());
         }
         context.at(self.clock.deadline(slot), DEADLINE);
@@ -147,51 +153,57 @@ impl<E: Replicable> AdHoc<E> {
         peer.slot = slot;
         peer.digest = self.digest(slot - 1, &peer.belief)?;
         peer.heard = vec![Heard::Nothing; self.estimator.sensors()];
-        peer.predicted = predict(&self.estimator, self.stream, slot, &peer.belief).ok();
+        let predicted = predict(&self.estimator, self.stream, slot, &peer.belief);
+        let failed = predicted.as_ref().err().map(Error::in_full);
+        peer.predicted = predicted.ok();
         if peer.lost {
             if context.id() != ANCHOR {
                 let request = Frame::new(Kind::Request, slot, peer.digest, BitString::default());
-                context.send(ANCHOR, request)?;
+                context.send(ANCHOR, &request)?;
             }
             return Ok(());
         }
         let Some(predicted) = &peer.predicted else {
-            context.note(Note::Refused { slot });
-            return Ok(());
+            let (stage, reason) = (Stage::Prediction, failed.unwrap_or_default());
+            return peer.failures.note(context, slots, Note::Failed { stage, slot, reason });
         };
         let anchor = context.id() == ANCHOR;
         if anchor && std::mem::take(&mut peer.asked) {
             let bits = self.estimator.belief_bits(&peer.belief)?;
-            context.broadcast(Frame::new(Kind::Snapshot, slot, peer.digest, bits))?;
+            context.broadcast(&Frame::new(Kind::Snapshot, slot, peer.digest, bits))?;
         }
         let format = self.estimator.question_format(index);
         let question = self.estimator.question(slot, predicted, index)?.to_bits(&format)?;
         let question = E::Question::from_bits(&format, &question)?;
-        let measurement = &self.measurements[slot as usize - 1][index];
         let mut rng = own(self.stream, index, slot);
-        let report = self
-            .estimator
-            .report(&mut rng, slot, index, &mut peer.memory, measurement, &question);
-        match report {
+        let memory = &mut peer.memory;
+        let report = self.measurements.with(slot, index, |measurement| {
+            self.estimator
+                .report(&mut rng, slot, index, memory, measurement, &question)
+        });
+        if report.is_none() {
+            context.note(Note::NotMeasured { slot });
+        }
+        match report.unwrap_or(Ok(None)) {
             Ok(Some(report)) => {
                 let report = report.to_bits(&self.estimator.report_format(index))?;
                 peer.heard[index] = Heard::Frame {
                     digest: peer.digest,
                     report: report.clone(),
                 };
-                context.broadcast(Frame::new(Kind::Report, slot, peer.digest, report))?;
+                context.broadcast(&Frame::new(Kind::Report, slot, peer.digest, report))?;
             }
             Ok(None) => {
                 if anchor && slot.is_multiple_of(self.beacon) {
-                    context.broadcast(Frame::new(Kind::Beacon, slot, peer.digest, BitString::default()))?;
+                    context.broadcast(&Frame::new(Kind::Beacon, slot, peer.digest, BitString::default()))?;
                 }
             }
-            Err(_) => context.note(Note::Refused { slot }),
+            Err(error) => peer.failures.record(context, slots, Stage::Report, slot, &error)?,
         }
         Ok(())
     }
 
-    fn finish(&self, peer: &mut Peer<E::Belief, E::Memory>, context: &mut Context<'_>) {
+    fn finish(&self, peer: &mut Peer<E::Belief, E::Memory>, context: &mut Context<'_>) -> Result<(), Error> {
         let (slot, anchor) = (peer.slot, context.id() == ANCHOR);
         let mut differs = None;
         let arrived = peer.heard.iter().enumerate().map(|(i, heard)| match heard {
@@ -215,35 +227,49 @@ impl<E: Replicable> AdHoc<E> {
                 peer.lost = true;
             }
         }
+        let mut note = None;
         if let Some(predicted) = peer.predicted.take() {
-            let (belief, note) = settle(&self.estimator, self.stream, slot, &predicted, &mut arrived);
-            if let Some(note) = note {
-                context.note(note);
-            }
-            peer.belief = belief;
+            let after = update_or_discard(&self.estimator, self.stream, slot, &predicted, &mut arrived);
+            (peer.belief, note) = after;
         }
         peer.estimates.resize(slot as usize - 1, Vec::new());
         peer.estimates.push(self.estimator.mean(&peer.belief));
+        match note {
+            Some(note) => peer.failures.note(context, self.measurements.slots(), note),
+            None => Ok(()),
+        }
     }
 
-    fn adopt(&self, peer: &mut Peer<E::Belief, E::Memory>, context: &mut Context<'_>, frame: &Frame) {
+    /// Takes the belief that the anchor has sent.
+    fn adopt(
+        &self,
+        peer: &mut Peer<E::Belief, E::Memory>,
+        context: &mut Context<'_>,
+        frame: &Frame,
+    ) -> Result<(), Error> {
         let slot = frame.slot;
         let belief = self.estimator.belief_of(&frame.payload);
         let agreed = digest(u64::from(slot - 1), &frame.payload) == frame.digest;
         let Some(belief) = belief.ok().filter(|_| agreed) else {
-            return context.note(Note::Malformed);
+            context.note(Note::Malformed);
+            return Ok(());
         };
         if frame.digest == peer.digest && !peer.lost {
-            return;
+            return Ok(());
         }
-        let Ok(predicted) = predict(&self.estimator, self.stream, slot, &belief) else {
-            return context.note(Note::Refused { slot });
+        let predicted = match predict(&self.estimator, self.stream, slot, &belief) {
+            Ok(predicted) => predicted,
+            Err(error) => {
+                let slots = self.measurements.slots();
+                return peer.failures.record(context, slots, Stage::Prediction, slot, &error);
+            }
         };
         peer.belief = belief;
         peer.predicted = Some(predicted);
         peer.digest = frame.digest;
         peer.lost = false;
         context.note(Note::Resynchronised { slot });
+        Ok(())
     }
 }
 
@@ -254,8 +280,7 @@ impl<E: Replicable> Protocol for AdHoc<E> {
         if token == BEGIN {
             return self.begin(peer, context);
         }
-        self.finish(peer, context);
-        Ok(())
+        self.finish(peer, context)
     }
 
     fn on_frame(
@@ -280,7 +305,7 @@ impl<E: Replicable> Protocol for AdHoc<E> {
         }
         let sender = from.index();
         match frame.kind {
-            Kind::Snapshot if from == ANCHOR => self.adopt(peer, context, frame),
+            Kind::Snapshot if from == ANCHOR => self.adopt(peer, context, frame)?,
             Kind::Report | Kind::Beacon if sender < peer.heard.len() => {
                 if !matches!(peer.heard[sender], Heard::Nothing) {
                     context.note(Note::Duplicate);
@@ -313,8 +338,8 @@ impl<E: Replicable> Protocol for AdHoc<E> {
 
     /// A node begins with what is known without reports and knows that it must ask; the anchor's is what all must take.
     fn on_restart(&self, peer: &mut Self::Node, context: &mut Context<'_>) -> Result<(), Error> {
-        let slot = self.clock.slot(context.now()).min(self.measurements.len() as u32);
-        if let Ok(belief) = crate::exchange::from_prior(&self.estimator, self.stream, slot) {
+        let slot = self.clock.slot(context.now()).min(self.measurements.slots());
+        if let Ok(belief) = from_prior(&self.estimator, self.stream, slot) {
             peer.belief = belief;
         }
         peer.memory = self.estimator.memory(context.id().index());

@@ -2,17 +2,18 @@
 
 use crate::clock::Clock;
 use crate::error::Error;
-use crate::exchange::shared;
-use crate::field::Field;
-use crate::frame::{Frame, Kind, digest};
-use crate::log::{Note, Stored};
-use crate::simulator::{Context, Protocol, Setup, Simulator};
+use crate::measurements::MAX_SLOTS;
+use crate::medium::{Field, Frame, Kind, Stored, digest};
+use crate::note::{Note, Stage};
+use crate::protocols::slot::shared;
+use crate::simulator::{Context, Protocol, Setup, Simulator, Ticket};
 use crate::units::SensorId;
 use fewbits_core::BitString;
 use fewbits_monte_carlo::Stream;
 use rand_pcg::Pcg64Dxsm;
 use serde::{Deserialize, Serialize};
 
+/// Timer: the slot of a leader begins.
 const LEAD: u32 = 0;
 
 /// What a leader does with the belief that it was handed.
@@ -41,15 +42,15 @@ pub struct Lead {
 /// slot k, leader:  belief = lead(message);  send it to the next leader, hop by hop along a shortest route, named slot k + 1
 ///         others:  a handover for somebody else goes on; one for oneself makes a leader; a second one of its slot is noted
 /// ```
-/// With acknowledgements, a leader whose handover is not acknowledged stays leader and notes it ([`Note::Retained`]): should the belief have
-/// arrived all the same there are two of them from then on, and where they meet the log has the disagreement.
+/// With acknowledgements, a node that gives up a handover leads itself and notes it ([`Note::Retained`]): should the belief have arrived all the same,
+/// there are two leaders from then on, and where they meet the log has the disagreement. A node that leads already keeps the belief that has seen
+/// more slots.
 #[derive(Debug, Clone)]
 pub struct Walk<W> {
     walker: W,
     clock: Clock,
     stream: Stream,
     last_slot: u32,
-    acknowledged: bool,
 }
 
 /// A node of a [`Walk`].
@@ -62,7 +63,20 @@ pub struct WalkNode {
     taken: Option<(u32, u32)>,
     /// Slot and digest of the last handover that it passed on.
     passed: Option<(u32, u32)>,
+    /// Handovers that it sent and that are not acknowledged yet.
+    pending: Vec<PendingHandover>,
     estimates: Vec<(u32, Vec<f64>)>,
+}
+
+/// A handover that was sent and is not acknowledged yet.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PendingHandover {
+    ticket: Ticket,
+    to: SensorId,
+    /// The slot in which its receiver is to lead.
+    slot: u32,
+    belief: Stored,
 }
 
 impl WalkNode {
@@ -84,8 +98,7 @@ impl<W: Walker> Walk<W> {
             walker,
             clock,
             stream,
-            last_slot: slots.min((1 << 29) - 1),
-            acknowledged: false,
+            last_slot: slots.min(MAX_SLOTS),
         }
     }
 
@@ -103,10 +116,9 @@ impl<W: Walker> Walk<W> {
     ///
     /// # Errors
     /// If the setup is out of range, `first` does not exist, or the field is not in one piece.
-    pub fn simulate(mut self, field: Field, first: SensorId, setup: Setup) -> Result<Simulator<Self>, Error> {
+    pub fn simulate(self, field: Field, first: SensorId, setup: Setup) -> Result<Simulator<Self>, Error> {
         field.check(first)?;
         field.routes(first)?;
-        self.acknowledged = setup.retries.is_some();
         let clock = self.clock;
         let mut nodes = vec![WalkNode::default(); field.len()];
         nodes[first.index()].leading = Some((1, None));
@@ -116,30 +128,51 @@ impl<W: Walker> Walk<W> {
     }
 
     fn lead(&self, node: &mut WalkNode, context: &mut Context<'_>) -> Result<(), Error> {
-        let Some((slot, message)) = node.leading.take() else {
+        // A timer that was set for an earlier handover must not start a slot that is still to come.
+        let Some((slot, message)) = node
+            .leading
+            .take_if(|(slot, _)| self.clock.start(*slot) <= context.now())
+        else {
             return Ok(());
         };
         let mut rng = shared(self.stream, "lead", slot);
         let message_bits = message.as_ref().map(|stored| &stored.0);
-        let Ok(step) = self.walker.lead(&mut rng, slot, context.id(), message_bits) else {
-            context.note(Note::Refused { slot });
-            self.stay(node, context, slot + 1, message);
-            return Ok(());
+        let step = match self.walker.lead(&mut rng, slot, context.id(), message_bits) {
+            Ok(step) => step,
+            Err(error) => {
+                self.stay(node, context, slot + 1, message);
+                return self.failed(context, slot, &error);
+            }
         };
         node.estimates.push((slot, step.estimate));
         let Some(next) = step.next else { return Ok(()) };
+        let belief = Stored(step.message);
         if next == context.id() {
-            self.stay(node, context, slot + 1, Some(Stored(step.message)));
+            self.stay(node, context, slot + 1, Some(belief));
             return Ok(());
         }
-        let sum = digest(u64::from(slot + 1), &step.message);
+        if slot >= self.last_slot {
+            return Ok(());
+        }
         let frame = Frame {
             destination: next.0,
-            ..Frame::new(Kind::Handover, slot + 1, sum, step.message.clone())
+            ..Frame::new(Kind::Handover, slot + 1, digest(u64::from(slot + 1), &belief.0), belief.0)
         };
-        if slot < self.last_slot && !self.pass(context, frame)? && self.acknowledged {
-            context.note(Note::Retained { slot });
-            self.stay(node, context, slot + 1, Some(Stored(step.message)));
+        self.pass(node, context, frame)
+    }
+
+    /// Notes that a leader's step failed. Leaders change, so failures count over the whole run.
+    fn failed(&self, context: &mut Context<'_>, slot: u32, error: &Error) -> Result<(), Error> {
+        let (stage, reason) = (Stage::Lead, error.in_full());
+        let last = Note::Failed { stage, slot, reason };
+        context.note(last.clone());
+        if context.failures() > u64::from(self.last_slot / 2) {
+            return Err(Error::MostSlotsFailed {
+                node: context.id(),
+                failed: u32::try_from(context.failures()).unwrap_or(u32::MAX),
+                slots: self.last_slot,
+                last,
+            });
         }
         Ok(())
     }
@@ -152,21 +185,49 @@ impl<W: Walker> Walk<W> {
         }
     }
 
-    /// Sends a handover one hop further. True if that was acknowledged.
-    fn pass(&self, context: &mut Context<'_>, frame: Frame) -> Result<bool, Error> {
-        let (id, destination) = (context.id(), frame.destination);
+    /// Takes a belief that another node was to lead with, or that another node has sent. Where this node leads already, the belief that has seen more
+    /// slots stays, of equals the one that is here.
+    fn take_over(&self, node: &mut WalkNode, context: &mut Context<'_>, with: SensorId, slot: u32, belief: Stored) {
+        if let Some(leads) = node.leads() {
+            context.note(Note::Disagreement { with, slot });
+            if leads >= slot {
+                return;
+            }
+        }
+        self.stay(node, context, slot, Some(belief));
+    }
+
+    /// Sends a handover one hop further. Without a route this node keeps it.
+    fn pass(&self, node: &mut WalkNode, context: &mut Context<'_>, frame: Frame) -> Result<(), Error> {
+        let (id, destination, slot) = (context.id(), frame.destination, frame.slot);
         let field = context.field();
         field.check(SensorId(destination))?;
         let hop = if field.graph().neighbours(id.index()).binary_search(&destination).is_ok() {
-            destination
+            Some(destination)
         } else {
             let routes = field.graph().hops_from(destination as usize)?;
-            match routes.parent(id.index()) {
-                Some(hop) => hop as u32,
-                None => return Ok(false),
-            }
+            routes.parent(id.index()).map(|hop| hop as u32)
         };
-        context.send_now(SensorId(hop), frame)
+        let Some(hop) = hop.map(SensorId) else {
+            self.keep(node, context, SensorId(destination), slot, Stored(frame.payload));
+            return Ok(());
+        };
+        let ticket = context.send_now(hop, &frame)?;
+        if context.has_acknowledgements() {
+            node.pending.push(PendingHandover {
+                ticket,
+                to: hop,
+                slot,
+                belief: Stored(frame.payload),
+            });
+        }
+        Ok(())
+    }
+
+    /// Keeps a belief that could not be handed over.
+    fn keep(&self, node: &mut WalkNode, context: &mut Context<'_>, with: SensorId, slot: u32, belief: Stored) {
+        context.note(Note::Retained { slot });
+        self.take_over(node, context, with, slot, belief);
     }
 }
 
@@ -212,27 +273,29 @@ impl<W: Walker> Protocol for Walk<W> {
             _ => *last = Some((slot, frame.digest)),
         }
         if !own {
-            if !self.pass(context, frame.clone())? && self.acknowledged {
-                // The belief is here now: whoever holds it leads.
-                context.note(Note::Retained { slot });
-                self.stay(node, context, slot, Some(Stored(frame.payload.clone())));
-            }
-            return Ok(());
+            return self.pass(node, context, frame.clone());
         }
-        if node.leading.is_some() {
-            // Two leaders have met: the belief that has seen more stays, the later one of equals goes.
-            context.note(Note::Disagreement { with: from, slot });
-            if node.leads().is_some_and(|leads| leads >= slot) {
-                return Ok(());
-            }
+        self.take_over(node, context, from, slot, Stored(frame.payload.clone()));
+        Ok(())
+    }
+
+    fn on_ack(&self, node: &mut WalkNode, _: &mut Context<'_>, ticket: Ticket) -> Result<(), Error> {
+        node.pending.retain(|handover| handover.ticket != ticket);
+        Ok(())
+    }
+
+    fn on_give_up(&self, node: &mut WalkNode, context: &mut Context<'_>, ticket: Ticket) -> Result<(), Error> {
+        if let Some(at) = node.pending.iter().position(|handover| handover.ticket == ticket) {
+            let handover = node.pending.remove(at);
+            self.keep(node, context, handover.to, handover.slot, handover.belief);
         }
-        self.stay(node, context, slot, Some(Stored(frame.payload.clone())));
         Ok(())
     }
 
     /// The belief is gone if it was here.
     fn on_restart(&self, node: &mut WalkNode, _: &mut Context<'_>) -> Result<(), Error> {
         node.leading = None;
+        node.pending.clear();
         Ok(())
     }
 }

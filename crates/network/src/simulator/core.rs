@@ -1,61 +1,113 @@
-//! What the runner knows that the nodes do not: time, books, who is alive.
+//! State of a running simulation that nodes cannot read directly: time, event queue, ledger of bits and joules, log, and which nodes work.
+//!
+//! [`Simulator`](super::Simulator) takes events from here; [`Context`](super::Context) is the part that a protocol may use. What is sent is in
+//! `transmission`.
 
-use crate::air::{Outcome, Spare, frames_of, replayed};
-use crate::channel::Check;
+use super::ledger::{Account, Ledger};
+use super::log::{Detail, Entry, Log, Reception};
+use super::queue::{Arrival, Event, EventKind, Queue};
+use super::setup::{FaultKind, Setup};
 use crate::error::Error;
-use crate::field::Field;
-use crate::frame::{Frame, Kind};
-use crate::ledger::Ledger;
-use crate::log::{Detail, Entry, Log, Note, Stored, Transmission};
-use crate::queue::{Event, Queue, What};
-use crate::simulator::{Mishap, Setup};
-use crate::units::{Bits, Instant, Joules, Seconds, SensorId};
-use fewbits_core::BitString;
+use crate::medium::loss::BurstState;
+use crate::medium::{Check, Field, Kind, ReceivedCopy, Stored};
+use crate::note::Note;
+use crate::units::{Instant, Joules, Seconds, SensorId};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 
-/// Bits of a frame's length in a batch.
-const LENGTH_BITS: u64 = 16;
+/// Names a frame that a node sent, for [`Protocol::on_ack`](super::Protocol::on_ack) and
+/// [`Protocol::on_give_up`](super::Protocol::on_give_up). No two frames of a run have the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Ticket(pub(super) u64);
+
+/// Frames to one receiver that wait for others.
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Batch {
+    /// The timer of the batch names this number. A batch that is full is sent before its timer fires, and the next batch has another number.
+    pub(super) number: u32,
+    pub(super) frames: Vec<Stored>,
+    pub(super) tickets: Vec<Ticket>,
+}
+
+/// Frames that wait for the air or for an acknowledgement.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Outgoing {
+    pub(super) from: SensorId,
+    pub(super) to: Option<SensorId>,
+    pub(super) frames: Vec<Stored>,
+    pub(super) tickets: Vec<Ticket>,
+    /// Attempts so far.
+    pub(super) attempts: u32,
+    /// The sender is awake from the attempt before.
+    pub(super) sender_awake: bool,
+    /// The receiver is awake from the attempt before.
+    pub(super) receiver_awake: bool,
+}
 
 /// What a snapshot holds besides the nodes.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct State {
-    pub(crate) now: Instant,
-    pub(crate) queue: Queue,
+pub(super) struct State {
+    pub(super) now: Instant,
+    pub(super) queue: Queue,
+    /// For each node whether it lives. Every event asks for it; the ledger says the same, spread over more memory.
+    pub(super) alive: Vec<bool>,
     /// For each node the end of its last outage.
-    out_until: Vec<Instant>,
-    outbox: BTreeMap<(SensorId, Option<SensorId>), Vec<Stored>>,
-    /// Transmissions so far.
-    transmissions: usize,
-    pub(crate) ledger: Ledger,
-    pub(crate) log: Log,
+    pub(super) out_until: Vec<Instant>,
+    /// For each node until when the air about it is taken.
+    pub(super) busy_until: Vec<Instant>,
+    pub(super) batches: BTreeMap<(SensorId, Option<SensorId>), Batch>,
+    pub(super) outgoing: BTreeMap<u32, Outgoing>,
+    /// Batches and outgoing frames are numbered together.
+    pub(super) next_number: u32,
+    pub(super) next_ticket: u64,
+    pub(super) bursts: BTreeMap<(SensorId, SensorId), BurstState>,
+    /// Transmissions and acknowledgements so far.
+    pub(super) transmissions: usize,
+    pub(super) ledger: Ledger,
+    pub(super) log: Log,
+}
+
+/// Memory of transmissions that are over, used again.
+#[derive(Debug, Default)]
+pub(super) struct BufferPool {
+    pub(super) receptions: Vec<Reception>,
+    pub(super) copies: Vec<Vec<ReceivedCopy>>,
 }
 
 #[derive(Debug)]
-pub(crate) struct Kernel {
-    pub(crate) field: Field,
-    pub(crate) setup: Setup,
-    pub(crate) air: Stream,
-    pub(crate) state: State,
-    pub(crate) recorded: Option<VecDeque<Transmission>>,
-    spare: Spare,
+pub(super) struct SimulatorCore {
+    pub(super) field: Field,
+    pub(super) setup: Setup,
+    pub(super) air: Stream,
+    pub(super) state: State,
+    /// What happened on air in the run that is replayed.
+    pub(super) recorded: Option<VecDeque<Entry>>,
+    pub(super) pool: BufferPool,
 }
 
-impl Kernel {
-    pub(crate) fn new(field: Field, setup: Setup) -> Result<Self, Error> {
-        setup.radio.checked()?;
-        setup.channel.checked()?;
+impl SimulatorCore {
+    pub(super) fn new(field: Field, setup: Setup) -> Result<Self, Error> {
+        setup.check(&field)?;
         let nodes = field.len();
-        let mut kernel = Self {
+        let mut core = Self {
             air: setup.stream.named("air"),
             state: State {
                 now: Instant::default(),
                 queue: Queue::default(),
+                alive: vec![true; nodes],
                 out_until: vec![Instant::default(); nodes],
-                outbox: BTreeMap::new(),
+                busy_until: vec![Instant::default(); nodes],
+                batches: BTreeMap::new(),
+                outgoing: BTreeMap::new(),
+                next_number: 0,
+                next_ticket: 0,
+                bursts: BTreeMap::new(),
                 transmissions: 0,
                 ledger: Ledger::new(nodes),
                 log: Log::default(),
@@ -63,69 +115,75 @@ impl Kernel {
             field,
             setup,
             recorded: None,
-            spare: Spare::default(),
+            pool: BufferPool::default(),
         };
-        for index in 0..kernel.setup.faults.len() {
-            let fault = kernel.setup.faults[index];
-            kernel.field.check(fault.node)?;
+        for index in 0..core.setup.faults.len() {
+            let fault = core.setup.faults[index];
             let index = u32::try_from(index)
-                .map_err(|_| ArgumentError::new("faults", kernel.setup.faults.len(), "fewer than 2^32"))?;
-            kernel.schedule(Instant::default().after(fault.at), fault.node, What::Mishap(index));
+                .map_err(|_| ArgumentError::new("faults", core.setup.faults.len(), "fewer than 2^32"))?;
+            core.schedule(Instant::default().after(fault.at), fault.node, EventKind::Fault(index));
         }
-        Ok(kernel)
+        Ok(core)
     }
 
-    pub(crate) fn resume(&mut self, state: State) -> Result<(), Error> {
+    /// Goes on with a stored state.
+    pub(super) fn resume(&mut self, state: State) -> Result<(), Error> {
         let nodes = self.field.len();
         let known = |id: SensorId| id.index() < nodes;
+        let reached = |from: SensorId, to: Option<SensorId>| match to {
+            Some(to) => self.field.check_link(from, to).is_ok(),
+            None => known(from),
+        };
         let consistent = state.ledger.accounts.len() == nodes
+            && state.alive.len() == nodes
+            && (0..nodes).all(|node| state.alive[node] == state.ledger.accounts[node].died.is_none())
             && state.out_until.len() == nodes
+            && state.busy_until.len() == nodes
             && state.queue.is_consistent(known)
-            && state
-                .outbox
-                .keys()
-                .all(|(from, to)| known(*from) && to.is_none_or(known));
+            && state.batches.keys().all(|(from, to)| reached(*from, *to))
+            && state.outgoing.values().all(|frame| reached(frame.from, frame.to))
+            && state.bursts.keys().all(|(from, to)| known(*from) && known(*to));
         if !consistent {
-            return Err(Error::Stored(format!("a snapshot of another network: expected {nodes} nodes")));
+            return Err(Error::SnapshotOfOtherNetwork {
+                found: state.ledger.accounts.len(),
+                expected: nodes,
+            });
         }
         self.state = state;
         Ok(())
     }
 
     #[inline]
-    pub(crate) fn schedule(&mut self, time: Instant, node: SensorId, what: What) {
-        self.state.queue.push(time.max(self.state.now), node, what);
+    pub(super) fn schedule(&mut self, time: Instant, node: SensorId, kind: EventKind) {
+        self.state.queue.push(time.max(self.state.now), node, kind);
     }
 
     /// The next event up to `end`; time moves on to it.
     #[inline]
-    pub(crate) fn next(&mut self, end: Instant) -> Option<Event> {
+    pub(super) fn next(&mut self, end: Instant) -> Option<Event> {
         let event = self.state.queue.pop(end)?;
         self.state.now = event.time;
         Some(event)
     }
 
     #[inline]
-    pub(crate) fn is_alive(&self, node: SensorId) -> bool {
-        self.state.ledger.accounts[node.index()].died.is_none()
+    pub(super) fn is_alive(&self, node: SensorId) -> bool {
+        self.state.alive[node.index()]
     }
 
-    pub(crate) fn listens(&self, node: SensorId) -> bool {
+    /// Whether a node's radio sends and receives.
+    pub(super) fn listens(&self, node: SensorId) -> bool {
         self.is_alive(node) && self.state.out_until[node.index()] <= self.state.now
     }
 
-    pub(crate) fn report_check(&self) -> Check {
-        self.setup.report_check
-    }
-
-    pub(crate) fn check_of(&self, kind: Kind) -> Check {
+    pub(super) fn check_of(&self, kind: Kind) -> Check {
         match kind {
             Kind::Report => self.setup.report_check,
             _ => Check::Whole,
         }
     }
 
-    pub(crate) fn note(&mut self, node: SensorId, note: Note) {
+    pub(super) fn note(&mut self, node: SensorId, note: Note) {
         let faults = &mut self.state.ledger.faults;
         match note {
             Note::Damaged | Note::Malformed => faults.damaged += 1,
@@ -133,6 +191,8 @@ impl Kernel {
             Note::Late => faults.late += 1,
             Note::Disagreement { .. } => faults.disagreements += 1,
             Note::Resynchronised { .. } => faults.resynchronisations += 1,
+            Note::TakenAsLost { .. } => faults.taken_as_lost += 1,
+            Note::Failed { .. } => faults.failures += 1,
             _ => {}
         }
         if self.setup.detail >= Detail::Notes {
@@ -141,22 +201,23 @@ impl Kernel {
         }
     }
 
-    /// What befalls a node; true if it begins anew.
-    pub(crate) fn mishap(&mut self, index: usize) -> bool {
+    /// Lets a fault happen. True if the node begins anew.
+    pub(super) fn fault(&mut self, index: usize) -> bool {
         let Some(fault) = self.setup.faults.get(index).copied() else {
             return false;
         };
         if !self.is_alive(fault.node) {
             return false;
         }
-        match fault.what {
-            Mishap::Death => self.kill(fault.node, self.state.now),
-            Mishap::Outage(duration) => {
+        match fault.kind {
+            FaultKind::Death => self.kill(fault.node, self.state.now),
+            FaultKind::Outage(duration) => {
                 let until = self.state.now.after(duration);
                 let out = &mut self.state.out_until[fault.node.index()];
                 *out = until.max(*out);
             }
-            Mishap::Restart => {
+            FaultKind::Restart => {
+                self.forget(fault.node);
                 self.note(fault.node, Note::Restarted);
                 return true;
             }
@@ -164,225 +225,59 @@ impl Kernel {
         false
     }
 
+    /// Drops all frames that a node's radio has not sent, or not been acknowledged.
+    fn forget(&mut self, node: SensorId) {
+        self.state.batches.retain(|(from, _), _| *from != node);
+        self.state.outgoing.retain(|_, frame| frame.from != node);
+    }
+
     fn kill(&mut self, node: SensorId, at: Instant) {
+        self.state.alive[node.index()] = false;
         self.state.ledger.accounts[node.index()].died = Some(at);
+        self.forget(node);
         self.note(node, Note::Died);
     }
 
-    pub(crate) fn deliver(&mut self, at: Instant, from: SensorId, to: SensorId, bits: BitString) {
-        self.state.queue.deliver(at.max(self.state.now), from, to, bits);
+    pub(super) fn deliver(&mut self, at: Instant, to: SensorId, arrival: Arrival) {
+        self.state.queue.deliver(at.max(self.state.now), to, arrival);
     }
 
-    /// Sends now, or puts into the outbox.
-    pub(crate) fn submit(&mut self, from: SensorId, to: Option<SensorId>, frame: Frame) -> Result<bool, Error> {
-        let batching = self.setup.batching;
-        if batching.most <= 1 {
-            return self.transmit(from, to, &frame);
-        }
-        let bits = Stored(frame.to_bits(self.check_of(frame.kind))?);
-        let waiting = self.state.outbox.entry((from, to)).or_default();
-        waiting.push(bits);
-        match waiting.len() {
-            n if n >= batching.most => self.flush(from, to)?,
-            1 => {
-                let at = self.state.now.after(batching.hold);
-                self.schedule(at, from, What::Flush(to));
-            }
-            _ => {}
-        }
-        Ok(false)
-    }
-
-    /// Sends what waits.
-    pub(crate) fn flush(&mut self, from: SensorId, to: Option<SensorId>) -> Result<(), Error> {
-        match self.state.outbox.remove(&(from, to)) {
-            Some(frames) if !frames.is_empty() => self.put_on_air(from, to, &frames).map(|_| ()),
-            _ => Ok(()),
-        }
-    }
-
-    pub(crate) fn transmit(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame) -> Result<bool, Error> {
-        let bits = Stored(frame.to_bits(self.check_of(frame.kind))?);
-        self.put_on_air(from, to, std::slice::from_ref(&bits))
-    }
-
-    fn put_on_air(&mut self, from: SensorId, to: Option<SensorId>, frames: &[Stored]) -> Result<bool, Error> {
-        self.drain(from);
-        if !self.listens(from) {
-            self.state.ledger.faults.lost += 1;
-            return Ok(false);
-        }
-        let own: u64 = frames.iter().map(|frame| frame.0.bits() as u64).sum();
-        let lengths = if frames.len() > 1 {
-            LENGTH_BITS * frames.len() as u64
-        } else {
-            0
-        };
-        let payload: u64 = frames.iter().map(payload_bits).sum();
-        let whole = self.setup.radio.preamble + self.setup.radio.header + Bits(own + lengths);
-        let mut spare = std::mem::take(&mut self.spare);
-        let mut outcome = match &mut self.recorded {
-            None => self.draw(from, to, frames, own as usize, &mut spare),
-            Some(recorded) => replayed(recorded.pop_front(), from, to, frames, self.state.transmissions)?,
-        };
-        self.state.transmissions += 1;
-        let (sending, receiving, air) = self.charge(from, to.is_none(), whole, payload, &outcome);
-        self.launch(from, whole, frames, &outcome);
-        if self.setup.detail >= Detail::Everything {
-            self.state.log.entries.push(Entry::Sent(Transmission {
-                at: self.state.now,
-                from,
-                to,
-                frames: frames.to_vec(),
-                payload,
-                air: air.0,
-                attempts: outcome.attempts,
-                answers: outcome.answers,
-                acknowledged: outcome.acknowledged,
-                receptions: std::mem::take(&mut outcome.receptions),
-                sending,
-                receiving,
-            }));
-        }
-        for reception in outcome.receptions.drain(..) {
-            let mut copies = reception.copies;
-            copies.clear();
-            spare.copies.push(copies);
-        }
-        spare.receptions = outcome.receptions;
-        self.spare = spare;
-        Ok(outcome.acknowledged)
-    }
-
-    /// Enters a transmission into the books; energies of senders and receivers, bits on air.
-    fn charge(
-        &mut self,
-        from: SensorId,
-        to_all: bool,
-        whole: Bits,
-        payload: u64,
-        outcome: &Outcome,
-    ) -> (Joules, Joules, Bits) {
-        let radio = &self.setup.radio;
-        let times = f64::from(outcome.attempts);
-        let scaled = |joules: Joules, n: f64| Joules::trusted(joules.value() * n);
-        let answers = f64::from(outcome.answers);
-        let farthest = outcome
-            .receptions
-            .iter()
-            .map(|reception| self.field.distance(from.0, reception.to.0));
-        // Without power control a broadcast reaches the whole range, and so does a frame to somebody who is not there.
-        let reach = match (to_all, outcome.receptions.is_empty()) {
-            (false, false) => farthest.fold(0.0, f64::max),
-            _ => self.field.range(),
-        };
-        let acknowledged = self.setup.retries.is_some() && !to_all;
-        let mut sending = scaled(radio.transmit(whole, reach), times) + radio.wake_up();
-        let mut own_receiving = Joules::ZERO;
-        let frame_time = radio.duration(whole);
-        let answer_time = radio.turnaround + radio.duration(radio.acknowledgement);
-        let mut awake = radio.wake.value() + radio.doze.value() + frame_time.value() * times;
-        if acknowledged {
-            own_receiving = scaled(radio.turn() + radio.receive(radio.acknowledgement), times);
-            awake += answer_time.value() * times;
-        }
-        let mut air = whole * u64::from(outcome.attempts);
-        let sender = &mut self.state.ledger.accounts[from.index()];
-        sender.payload += Bits(payload);
-        sender.air += air;
-        sender.frames = sender.frames.wrapping_add(outcome.attempts);
-        sender.sending += sending;
-        sender.receiving += own_receiving;
-        sender.awake += Seconds::trusted(awake);
-        let mut receiving = own_receiving;
-        for reception in &outcome.receptions {
-            let spent = radio.wake_up() + scaled(radio.listen() + radio.receive(whole), times);
-            let answering = scaled(radio.turn() + radio.transmit(radio.acknowledgement, reach), answers);
-            let answered = radio.acknowledgement * u64::from(outcome.answers);
-            let awake = radio.wake.value()
-                + radio.doze.value()
-                + (frame_time + radio.guard).value() * times
-                + answer_time.value() * answers;
-            let account = &mut self.state.ledger.accounts[reception.to.index()];
-            account.receiving += spent;
-            account.sending += answering;
-            account.air += answered;
-            account.awake += Seconds::trusted(awake);
-            receiving += spent;
-            sending += answering;
-            air += answered;
-        }
-        let messages = &mut self.state.ledger.messages;
-        messages.messages += 1;
-        messages.payload += Bits(payload);
-        messages.air += air;
-        messages.sending += sending;
-        messages.receiving += receiving;
-        self.drain(from);
-        for reception in &outcome.receptions {
-            self.drain(reception.to);
-        }
-        (sending, receiving, air)
-    }
-
-    /// A node whose batteries are empty dies: when they were, if it has only idled since.
+    /// A node whose batteries are empty dies. If it has only idled since, it died when they were.
     #[inline]
-    pub(crate) fn drain(&mut self, node: SensorId) {
-        let radio = &self.setup.radio;
+    pub(super) fn drain(&mut self, node: SensorId) {
+        let radio = self.setup.radio_of(node);
+        let Some(battery) = radio.battery else { return };
         let account = &self.state.ledger.accounts[node.index()];
         let spent = account.total(radio, self.state.now);
-        if account.died.is_none() && spent >= radio.battery {
-            self.exhaust(node, spent);
+        if account.died.is_none() && spent >= battery {
+            self.exhaust(node, spent - battery);
         }
     }
 
     #[cold]
-    fn exhaust(&mut self, node: SensorId, spent: Joules) {
-        let radio = &self.setup.radio;
+    fn exhaust(&mut self, node: SensorId, overspent: Joules) {
+        let radio = self.setup.radio_of(node);
         let idle = (radio.baseline + radio.sleep).value();
-        let since = if idle > 0.0 {
-            (spent - radio.battery).value() / idle
-        } else {
-            0.0
-        };
+        let since = if idle > 0.0 { overspent.value() / idle } else { 0.0 };
         let now = self.state.now.since_start().value();
         self.kill(node, Instant::default().after(Seconds::trusted((now - since).max(0.0))));
     }
 
     /// All nodes whose batteries are empty die.
-    pub(crate) fn drain_all(&mut self) {
+    pub(super) fn drain_all(&mut self) {
         (0..self.field.len() as u32).for_each(|node| self.drain(SensorId(node)));
     }
 
-    /// Schedules the arrivals.
-    fn launch(&mut self, from: SensorId, whole: Bits, frames: &[Stored], outcome: &Outcome) {
-        let on_air = self.state.now.after(self.setup.radio.duration(whole));
-        for reception in &outcome.receptions {
-            if reception.copies.is_empty() {
-                self.state.ledger.faults.lost += 1;
-            }
-            for copy in &reception.copies {
-                let at = on_air.after(copy.delay);
-                for bits in frames_of(frames, copy) {
-                    self.deliver(at, from, reception.to, bits);
-                }
-            }
-        }
-    }
-
-    pub(crate) fn memory(&self) -> usize {
+    pub(super) fn memory(&self) -> usize {
         let (state, nodes) = (&self.state, self.field.len());
         let graph = (nodes + 1) * size_of::<usize>() + 2 * self.field.graph().edges() * size_of::<u32>();
         nodes * size_of::<[f64; 2]>()
             + graph
             + state.queue.memory()
-            + state.out_until.capacity() * size_of::<Instant>()
-            + state.ledger.accounts.capacity() * size_of::<crate::ledger::Account>()
+            + state.alive.capacity()
+            + (state.out_until.capacity() + state.busy_until.capacity()) * size_of::<Instant>()
+            + state.outgoing.len() * size_of::<Outgoing>()
+            + state.ledger.accounts.capacity() * size_of::<Account>()
             + state.log.entries.capacity() * size_of::<Entry>()
     }
-}
-
-fn payload_bits(frame: &Stored) -> u64 {
-    let overhead = Frame::kind_of(&frame.0).map_or(0, Frame::overhead);
-    (frame.0.bits() as u64).saturating_sub(u64::from(overhead))
 }

@@ -1,10 +1,10 @@
-//! Who spent what: bits and joules, by node and by message.
+//! Bits and joules spent, by node and by message.
 
-use crate::radio::Radio;
+use crate::medium::Radio;
 use crate::units::{Bits, Instant, Joules, Seconds};
 use serde::{Deserialize, Serialize};
 
-/// What one node spent. All but the idle energy.
+/// What one node spent, without the idle energy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Account {
@@ -12,8 +12,10 @@ pub struct Account {
     pub payload: Bits,
     /// All bits that it put on air: preambles, headers, checks, acknowledgements, repetitions.
     pub air: Bits,
-    /// Frames that it sent, repetitions included.
+    /// Frames that it sent, repetitions included, acknowledgements not.
     pub frames: u32,
+    /// Acknowledgements that it sent.
+    pub acknowledgements: u32,
     /// Energy of sending.
     pub sending: Joules,
     /// Energy of receiving, useful or not.
@@ -41,7 +43,7 @@ impl Account {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Totals {
-    /// Transmissions: a batch is one.
+    /// Messages: a batch is one, repetitions and acknowledgements are none.
     pub messages: u64,
     /// Payload bits.
     pub payload: Bits,
@@ -59,8 +61,14 @@ pub struct Totals {
 pub struct Faults {
     /// Frames that no check accepted: malformed, truncated, damaged.
     pub damaged: u64,
-    /// Copies that never arrived: lost, or the receiver was out or dead.
+    /// Transmissions that never arrived: lost, or sender or receiver was out or dead. Acknowledgements too.
     pub lost: u64,
+    /// Messages whose sender gave up after all repetitions.
+    pub given_up: u64,
+    /// Steps of estimators and sensors that failed.
+    pub failures: u64,
+    /// Updates that succeeded only after missing reports were taken as lost.
+    pub taken_as_lost: u64,
     /// Frames that came a second time.
     pub duplicates: u64,
     /// Frames that came too late.
@@ -71,7 +79,7 @@ pub struct Faults {
     pub resynchronisations: u64,
 }
 
-/// The books: one account for each node, and the same spending counted by messages.
+/// One account per node, and the same spending counted by messages.
 ///
 /// Law: bits and energy of all accounts are those of all messages, and what is left of the energy is idle.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

@@ -1,10 +1,9 @@
 //! The message log: what was sent, what arrived of it, and what the nodes noticed. It can be written, read and replayed.
 
-use crate::channel::Copy;
 use crate::error::Error;
-use crate::frame::stored;
+use crate::medium::{ReceivedCopy, Stored};
+use crate::note::Note;
 use crate::units::{Instant, Joules, SensorId};
-use fewbits_core::BitString;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 
@@ -21,96 +20,59 @@ pub enum Detail {
     Everything,
 }
 
-/// Something that a node noticed or that happened to it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Note {
-    /// A frame that no check accepted.
-    Damaged,
-    /// A frame whose payload is no message of its format.
-    Malformed,
-    /// A frame that was here before.
-    Duplicate,
-    /// A frame of a slot that is over.
-    Late,
-    /// The sender's state is not the receiver's.
-    Disagreement {
-        /// Whose frame showed it.
-        with: SensorId,
-        /// The slot of the frame.
-        slot: u32,
-    },
-    /// A replica took the state that was sent to it.
-    Resynchronised {
-        /// From which slot on.
-        slot: u32,
-    },
-    /// What was observed was impossible under the belief; the reports that did not come were taken as lost.
-    Impossible {
-        /// The slot.
-        slot: u32,
-    },
-    /// An estimator or sensor refused what it got; the slot passed without it.
-    Refused {
-        /// The slot.
-        slot: u32,
-    },
-    /// A handover was not acknowledged: the leader stays.
-    Retained {
-        /// The slot.
-        slot: u32,
-    },
-    /// The node began anew without its memory.
-    Restarted,
-    /// The node died.
-    Died,
-}
-
-/// What arrived of a frame at one receiver.
+/// What arrived of a transmission at one receiver.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reception {
-    /// Who.
+    /// The receiver.
     pub to: SensorId,
-    /// The copies, each with the bits of the batch that were inverted.
-    pub copies: Vec<Copy>,
+    /// The copies that arrived, each with the bits of the batch that were inverted.
+    pub copies: Vec<ReceivedCopy>,
 }
 
-/// One transmission.
+/// One transmission: a frame or a batch, sent once. A repetition is a transmission of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Transmission {
-    /// When.
+    /// When it began.
     pub at: Instant,
-    /// Who.
+    /// The sender.
     pub from: SensorId,
-    /// To whom; nobody in particular for a broadcast.
+    /// The receiver; `None` for a broadcast.
     pub to: Option<SensorId>,
     /// Its bits: the frames of a batch, each as a string.
     pub frames: Vec<Stored>,
-    /// Payload bits among them.
+    /// Which attempt to send these frames this is, from 0.
+    pub attempt: u32,
+    /// Payload bits among its bits.
     pub payload: u64,
-    /// Bits on air with everything, repetitions and acknowledgements included.
+    /// Bits on air, with preambles and headers.
     pub air: u64,
-    /// How often it was sent.
-    pub attempts: u32,
-    /// Acknowledgements that were sent.
-    pub answers: u32,
-    /// Whether the sender knows that it arrived.
-    pub acknowledged: bool,
     /// What arrived where.
     pub receptions: Vec<Reception>,
-    /// Energy of the sender.
+    /// Energy of sending. Listening for an acknowledgement is part of `receiving`.
     pub sending: Joules,
-    /// Energy of the receivers.
+    /// Energy of receiving, of all nodes.
     pub receiving: Joules,
 }
 
-/// Bits as they are stored.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Stored(#[serde(with = "stored")] pub BitString);
+/// One acknowledgement.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Acknowledgement {
+    /// When the frame that it answers had arrived.
+    pub at: Instant,
+    /// Who acknowledges.
+    pub from: SensorId,
+    /// Whose frame.
+    pub to: SensorId,
+    /// Its bits on air.
+    pub air: u64,
+    /// The copies that arrived.
+    pub copies: Vec<ReceivedCopy>,
+    /// Energy of sending it. What receiving it takes is part of each [`Transmission`].
+    pub sending: Joules,
+}
 
 /// One line of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -118,11 +80,13 @@ pub struct Stored(#[serde(with = "stored")] pub BitString);
 pub enum Entry {
     /// A transmission.
     Sent(Transmission),
-    /// Something noticed.
+    /// An acknowledgement.
+    Answered(Acknowledgement),
+    /// Something that a node noticed or that happened to it.
     Noted {
         /// When.
         at: Instant,
-        /// By whom, or what it happened to.
+        /// The node.
         node: SensorId,
         /// What.
         note: Note,
@@ -138,35 +102,51 @@ pub struct Log {
 }
 
 impl Log {
-    /// Everything noticed, with when and by whom.
-    pub fn notes(&self) -> impl Iterator<Item = (Instant, SensorId, Note)> + '_ {
+    /// All notes, each with its time and node.
+    pub fn notes(&self) -> impl Iterator<Item = (Instant, SensorId, &Note)> + '_ {
         self.entries.iter().filter_map(|entry| match entry {
-            Entry::Noted { at, node, note } => Some((*at, *node, *note)),
-            Entry::Sent(_) => None,
+            Entry::Noted { at, node, note } => Some((*at, *node, note)),
+            Entry::Sent(_) | Entry::Answered(_) => None,
         })
     }
 
-    /// Every transmission.
+    /// All transmissions.
     pub fn transmissions(&self) -> impl Iterator<Item = &Transmission> + '_ {
         self.entries.iter().filter_map(|entry| match entry {
             Entry::Sent(transmission) => Some(transmission),
-            Entry::Noted { .. } => None,
+            Entry::Answered(_) | Entry::Noted { .. } => None,
+        })
+    }
+
+    /// All acknowledgements.
+    pub fn acknowledgements(&self) -> impl Iterator<Item = &Acknowledgement> + '_ {
+        self.entries.iter().filter_map(|entry| match entry {
+            Entry::Answered(acknowledgement) => Some(acknowledgement),
+            Entry::Sent(_) | Entry::Noted { .. } => None,
         })
     }
 
     /// Writes the log as CBOR.
     ///
     /// # Errors
-    /// [`Error::Stored`] if it cannot be written.
+    /// [`Error::Unwritable`].
     pub fn write(&self, to: impl Write) -> Result<(), Error> {
-        ciborium::into_writer(self, to).map_err(|error| Error::Stored(error.to_string()))
+        ciborium::into_writer(self, to).map_err(unwritable)
     }
 
     /// Reads a log.
     ///
     /// # Errors
-    /// [`Error::Stored`] if it is none.
+    /// [`Error::Unreadable`] if the bytes are no log.
     pub fn read(from: impl Read) -> Result<Self, Error> {
-        ciborium::from_reader(from).map_err(|error| Error::Stored(error.to_string()))
+        ciborium::from_reader(from).map_err(unreadable)
     }
+}
+
+pub(super) fn unwritable(error: ciborium::ser::Error<std::io::Error>) -> Error {
+    Error::Unwritable { source: error.into() }
+}
+
+pub(super) fn unreadable(error: ciborium::de::Error<std::io::Error>) -> Error {
+    Error::Unreadable { source: error.into() }
 }

@@ -1,214 +1,46 @@
-//! The event-driven runner.
+//! The event-driven simulator: what nodes may do, and the run itself.
+//!
+//! `core` has the state that nodes cannot read, `transmission` puts frames on air.
 
-use crate::channel::{Channel, Check};
+mod attempt;
+mod context;
+mod core;
+mod ledger;
+mod log;
+mod queue;
+mod setup;
+mod summary;
+pub(crate) mod transmission;
+
+pub use self::core::Ticket;
+pub use context::{Context, Protocol};
+pub use ledger::{Account, Faults, Ledger, Totals};
+pub use log::{Acknowledgement, Detail, Entry, Log, Reception, Transmission};
+pub use setup::{Batching, Fault, FaultKind, Setup};
+pub use summary::{EstimateError, Summary};
+
+use self::core::{SimulatorCore, State};
 use crate::error::Error;
-use crate::field::Field;
-use crate::frame::{Frame, Kind};
-use crate::kernel::Kernel;
-use crate::ledger::{Account, Ledger};
-use crate::log::{Detail, Log, Note};
-use crate::queue::{Event, What};
-use crate::radio::Radio;
+use crate::medium::{Check, Field, Frame, Kind};
+use crate::note::Note;
 use crate::units::{Instant, Joules, Seconds, SensorId};
 use fewbits_core::BitString;
-use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
+use log::{unreadable, unwritable};
+use queue::{Arrival, Event, EventKind};
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 
-/// What the nodes do: one small state machine a node, all under one protocol.
-///
-/// Handlers see their own node and the [`Context`], never another node: whatever passes between nodes is bits. An error of a
-/// handler ends the run; what may happen in a faulty network is no error but a [`Note`].
-pub trait Protocol {
-    /// What one node remembers.
-    type Node;
-
-    /// A timer that the node set, or that started it.
-    ///
-    /// # Errors
-    /// What ends the run.
-    fn on_timer(&self, node: &mut Self::Node, context: &mut Context<'_>, token: u32) -> Result<(), Error>;
-
-    /// A frame that passed its check.
-    ///
-    /// # Errors
-    /// What ends the run.
-    fn on_frame(
-        &self,
-        node: &mut Self::Node,
-        context: &mut Context<'_>,
-        from: SensorId,
-        frame: &Frame,
-    ) -> Result<(), Error>;
-
-    /// A frame that failed its check. Slots tell who sent it.
-    ///
-    /// # Errors
-    /// What ends the run.
-    fn on_damaged(&self, _: &mut Self::Node, _: &mut Context<'_>, _: SensorId) -> Result<(), Error> {
-        Ok(())
-    }
-
-    /// The node has lost its memory and begins anew.
-    ///
-    /// # Errors
-    /// What ends the run.
-    fn on_restart(&self, node: &mut Self::Node, context: &mut Context<'_>) -> Result<(), Error>;
-}
-
-/// Frames that wait for company: up to `most` to the same receiver, at most `hold` long, share one preamble and header.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Batching {
-    /// The most frames of a batch.
-    pub most: usize,
-    /// How long the first waits.
-    pub hold: Seconds,
-}
-
-impl Batching {
-    /// Every frame at once and alone.
-    pub const NONE: Self = Self {
-        most: 1,
-        hold: Seconds::ZERO,
-    };
-}
-
-/// Something that befalls a node.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Fault {
-    /// When.
-    pub at: Seconds,
-    /// Whom.
-    pub node: SensorId,
-    /// What.
-    pub what: Mishap,
-}
-
-/// What can befall a node.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Mishap {
-    /// It dies.
-    Death,
-    /// It loses its memory and begins anew.
-    Restart,
-    /// Its radio neither sends nor receives for so long.
-    Outage(Seconds),
-}
-
-/// Everything about a network but its nodes' behaviour.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Setup {
-    /// The radio of every node.
-    pub radio: Radio,
-    /// What the air does.
-    pub channel: Channel,
-    /// Repetitions of a frame to one receiver until it is acknowledged; `None` for no acknowledgements.
-    pub retries: Option<u32>,
-    /// Whether frames wait for company.
-    pub batching: Batching,
-    /// What the check of a report covers; other frames are checked whole.
-    pub report_check: Check,
-    /// What befalls the nodes.
-    pub faults: Vec<Fault>,
-    /// How much is logged.
-    pub detail: Detail,
-    /// All randomness of the network: every frame has a stream of its own.
-    pub stream: Stream,
-}
-
-impl Setup {
-    /// A network without faults.
-    pub fn new(radio: Radio, stream: Stream) -> Self {
-        Self {
-            radio,
-            channel: Channel::PERFECT,
-            retries: None,
-            batching: Batching::NONE,
-            report_check: Check::Whole,
-            faults: Vec::new(),
-            detail: Detail::Notes,
-            stream,
-        }
-    }
-}
-
-/// A node's view of the network while it handles an event.
-#[derive(Debug)]
-pub struct Context<'a> {
-    kernel: &'a mut Kernel,
-    node: SensorId,
-}
-
-impl Context<'_> {
-    /// Who handles the event.
-    pub fn id(&self) -> SensorId {
-        self.node
-    }
-
-    /// When.
-    pub fn now(&self) -> Instant {
-        self.kernel.state.now
-    }
-
-    /// Where everybody stands.
-    pub fn field(&self) -> &Field {
-        &self.kernel.field
-    }
-
-    /// Sets a timer; one in the past fires now.
-    pub fn at(&mut self, time: Instant, token: u32) {
-        self.kernel.schedule(time, self.node, What::Timer(token));
-    }
-
-    /// Sets a timer.
-    pub fn after(&mut self, duration: Seconds, token: u32) {
-        self.at(self.now().after(duration), token);
-    }
-
-    /// Sends to a neighbour, perhaps later in a batch. True if an acknowledgement came.
-    ///
-    /// # Errors
-    /// [`Error::UnknownNode`], [`Error::SelfLink`], [`Error::OutOfRange`]; if the frame does not fit its format.
-    pub fn send(&mut self, to: SensorId, frame: Frame) -> Result<bool, Error> {
-        self.kernel.field.check_link(self.node, to)?;
-        self.kernel.submit(self.node, Some(to), frame)
-    }
-
-    /// Sends to a neighbour at once and alone. True if an acknowledgement came.
-    ///
-    /// # Errors
-    /// As [`Context::send`].
-    pub fn send_now(&mut self, to: SensorId, frame: Frame) -> Result<bool, Error> {
-        self.kernel.field.check_link(self.node, to)?;
-        self.kernel.transmit(self.node, Some(to), &frame)
-    }
-
-    /// Sends to all neighbours, perhaps later in a batch.
-    ///
-    /// # Errors
-    /// If the frame does not fit its format.
-    pub fn broadcast(&mut self, frame: Frame) -> Result<(), Error> {
-        self.kernel.submit(self.node, None, frame).map(|_| ())
-    }
-
-    /// Notes something.
-    pub fn note(&mut self, note: Note) {
-        self.kernel.note(self.node, note);
-    }
-}
-
 /// A network at some instant.
+///
+/// The air is divided by an ideal schedule: a transmission begins when the air is free about its sender and about all nodes that hear it. Requests are
+/// served in the order in which they were made, and who waits sleeps. Acknowledgements follow their frames after a turnaround.
 #[derive(Debug)]
 pub struct Simulator<P: Protocol> {
     protocol: P,
     nodes: Vec<P::Node>,
-    kernel: Kernel,
+    core: SimulatorCore,
 }
 
 impl<P: Protocol> Simulator<P> {
@@ -223,7 +55,7 @@ impl<P: Protocol> Simulator<P> {
             return Err(ArgumentError::new("nodes", nodes.len(), expected).into());
         }
         Ok(Self {
-            kernel: Kernel::new(field, setup)?,
+            core: SimulatorCore::new(field, setup)?,
             protocol,
             nodes,
         })
@@ -232,10 +64,10 @@ impl<P: Protocol> Simulator<P> {
     /// Starts a node's first timer.
     ///
     /// # Errors
-    /// [`Error::UnknownNode`].
+    /// [`Error::UnknownNode`]; [`Error::Unheard`] if there are other nodes and none is in range.
     pub fn start(&mut self, node: SensorId, at: Instant, token: u32) -> Result<(), Error> {
-        self.kernel.field.check(node)?;
-        self.kernel.schedule(at, node, What::Timer(token));
+        self.core.field.check_heard(node)?;
+        self.core.schedule(at, node, EventKind::Timer(token));
         Ok(())
     }
 
@@ -244,16 +76,18 @@ impl<P: Protocol> Simulator<P> {
     /// # Errors
     /// [`Error::UnknownNode`].
     pub fn inject(&mut self, at: Instant, from: SensorId, to: SensorId, bits: BitString) -> Result<(), Error> {
-        self.kernel.field.check(from)?;
-        self.kernel.field.check(to)?;
-        self.kernel.deliver(at, from, to, bits);
+        self.core.field.check(from)?;
+        self.core.field.check(to)?;
+        let answer = None;
+        self.core.deliver(at, to, Arrival { from, answer, bits });
         Ok(())
     }
 
     /// Takes what happens to each transmission from a log instead of the channel.
     #[must_use]
     pub fn replaying(mut self, log: &Log) -> Self {
-        self.kernel.recorded = Some(log.transmissions().cloned().collect());
+        let on_air = |entry: &&Entry| !matches!(entry, Entry::Noted { .. });
+        self.core.recorded = Some(log.entries.iter().filter(on_air).cloned().collect());
         self
     }
 
@@ -264,12 +98,12 @@ impl<P: Protocol> Simulator<P> {
     /// Those of the protocol.
     pub fn run_until(&mut self, end: Instant) -> Result<u64, Error> {
         let mut events = 0;
-        while let Some(event) = self.kernel.next(end) {
+        while let Some(event) = self.core.next(end) {
             self.handle(event)?;
             events += 1;
         }
-        self.kernel.state.now = self.kernel.state.now.max(end);
-        self.kernel.drain_all();
+        self.core.state.now = self.core.state.now.max(end);
+        self.core.drain_all();
         Ok(events)
     }
 
@@ -279,7 +113,7 @@ impl<P: Protocol> Simulator<P> {
     /// Those of the protocol.
     pub fn run_events(&mut self, count: u64) -> Result<u64, Error> {
         for handled in 0..count {
-            match self.kernel.next(Instant(u64::MAX)) {
+            match self.core.next(Instant(u64::MAX)) {
                 Some(event) => self.handle(event)?,
                 None => return Ok(handled),
             }
@@ -289,55 +123,90 @@ impl<P: Protocol> Simulator<P> {
 
     fn handle(&mut self, event: Event) -> Result<(), Error> {
         let id = event.node;
-        match event.what() {
-            What::Mishap(index) => {
-                if self.kernel.mishap(index as usize) {
+        match event.kind() {
+            EventKind::Timer(token) => {
+                if !self.core.is_alive(id) {
+                    return Ok(());
+                }
+                let mut context = Context {
+                    core: &mut self.core,
+                    node: id,
+                };
+                self.protocol.on_timer(&mut self.nodes[id.index()], &mut context, token)
+            }
+            EventKind::Arrival(place) => match self.core.state.queue.take(place) {
+                Some(arrival) => self.arrive(id, arrival),
+                None => Ok(()),
+            },
+            EventKind::Fault(index) => {
+                if self.core.fault(index as usize) {
                     let mut context = Context {
-                        kernel: &mut self.kernel,
+                        core: &mut self.core,
                         node: id,
                     };
                     self.protocol.on_restart(&mut self.nodes[id.index()], &mut context)?;
                 }
                 Ok(())
             }
-            What::Flush(to) => self.kernel.flush(id, to),
-            What::Timer(token) => {
-                if !self.kernel.is_alive(id) {
-                    return Ok(());
-                }
-                let mut context = Context {
-                    kernel: &mut self.kernel,
-                    node: id,
-                };
-                self.protocol.on_timer(&mut self.nodes[id.index()], &mut context, token)
+            EventKind::Flush(batch) => self.core.flush(id, batch),
+            EventKind::Transmit(frame) => self.core.transmit(frame),
+            EventKind::Acknowledged(frame) => {
+                let tickets = self.core.acknowledged(id, frame);
+                self.tell(id, &tickets, P::on_ack)
             }
-            What::Arrival(place) => {
-                let Some((from, bits)) = self.kernel.state.queue.take(place) else {
-                    return Ok(());
-                };
-                self.kernel.drain(id);
-                if !self.kernel.listens(id) {
-                    self.kernel.state.ledger.faults.lost += 1;
-                    return Ok(());
-                }
-                let check = match Frame::kind_of(&bits) {
-                    Some(Kind::Report) => self.kernel.report_check(),
-                    _ => Check::Whole,
-                };
-                let frame = Frame::from_bits(&bits, check);
-                let mut context = Context {
-                    kernel: &mut self.kernel,
-                    node: id,
-                };
-                let node = &mut self.nodes[id.index()];
-                if let Ok(frame) = frame {
-                    self.protocol.on_frame(node, &mut context, from, &frame)
-                } else {
-                    context.note(Note::Damaged);
-                    self.protocol.on_damaged(node, &mut context, from)
-                }
+            EventKind::AckTimeout(frame) => {
+                let tickets = self.core.ack_timeout(frame)?;
+                self.tell(id, &tickets, P::on_give_up)
             }
         }
+    }
+
+    /// Bits have arrived. The receiver's radio acknowledges them by itself, before the node handles them.
+    fn arrive(&mut self, id: SensorId, arrival: Arrival) -> Result<(), Error> {
+        let Arrival { from, answer, bits } = arrival;
+        self.core.drain(id);
+        if !self.core.listens(id) {
+            self.core.state.ledger.faults.lost += 1;
+            return Ok(());
+        }
+        if let Some(frame) = answer {
+            self.core.answer(frame, id, from)?;
+        }
+        let check = match Frame::kind_of(&bits) {
+            Some(Kind::Report) => self.core.setup.report_check,
+            _ => Check::Whole,
+        };
+        let frame = Frame::from_bits(&bits, check);
+        let mut context = Context {
+            core: &mut self.core,
+            node: id,
+        };
+        let node = &mut self.nodes[id.index()];
+        if let Ok(frame) = frame {
+            self.protocol.on_frame(node, &mut context, from, &frame)
+        } else {
+            context.note(Note::Damaged);
+            self.protocol.on_damaged(node, &mut context, from)
+        }
+    }
+
+    /// Tells a node that lives what became of its frames.
+    fn tell(
+        &mut self,
+        id: SensorId,
+        tickets: &[Ticket],
+        handler: fn(&P, &mut P::Node, &mut Context<'_>, Ticket) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        for ticket in tickets {
+            if self.core.is_alive(id) {
+                let mut context = Context {
+                    core: &mut self.core,
+                    node: id,
+                };
+                handler(&self.protocol, &mut self.nodes[id.index()], &mut context, *ticket)?;
+            }
+        }
+        Ok(())
     }
 
     /// The protocol.
@@ -352,17 +221,17 @@ impl<P: Protocol> Simulator<P> {
 
     /// The time.
     pub fn now(&self) -> Instant {
-        self.kernel.state.now
+        self.core.state.now
     }
 
-    /// The books.
+    /// Bits, joules and faults, counted.
     pub fn ledger(&self) -> &Ledger {
-        &self.kernel.state.ledger
+        &self.core.state.ledger
     }
 
     /// The log.
     pub fn log(&self) -> &Log {
-        &self.kernel.state.log
+        &self.core.state.log
     }
 
     /// All energy of a node until now.
@@ -370,49 +239,70 @@ impl<P: Protocol> Simulator<P> {
     /// # Errors
     /// [`Error::UnknownNode`].
     pub fn energy(&self, node: SensorId) -> Result<Joules, Error> {
-        self.kernel.field.check(node)?;
+        self.core.field.check(node)?;
         let account: &Account = &self.ledger().accounts()[node.index()];
-        Ok(account.total(&self.kernel.setup.radio, self.now()))
+        Ok(account.total(self.core.setup.radio_of(node), self.now()))
     }
 
     /// Whether a node is alive.
     pub fn is_alive(&self, node: SensorId) -> bool {
-        node.index() < self.nodes.len() && self.kernel.is_alive(node)
+        node.index() < self.nodes.len() && self.core.is_alive(node)
     }
 
     /// Whether an outage keeps a node from sending and receiving.
     pub fn is_out(&self, node: SensorId) -> bool {
-        self.is_alive(node) && !self.kernel.listens(node)
+        self.is_alive(node) && !self.core.listens(node)
+    }
+
+    /// Cost, lifetime and faults until now. [`Summary::with_errors`] adds the estimation error.
+    pub fn summary(&self) -> Summary {
+        let now = self.now();
+        let lives = (0..self.nodes.len() as u32).filter_map(|node| {
+            let (radio, account) = (self.core.setup.radio_of(SensorId(node)), &self.ledger().accounts()[node as usize]);
+            let power = account.total(radio, now).value() / now.since_start().value();
+            let life = match account.died {
+                Some(died) => died.since_start().value(),
+                None => radio.battery?.value() / power,
+            };
+            Seconds::new(life).ok().map(|life| (life, SensorId(node)))
+        });
+        let first = lives.min_by(|a, b| a.0.value().total_cmp(&b.0.value()));
+        let energy = (0..self.nodes.len() as u32)
+            .map(|node| {
+                let account = &self.ledger().accounts()[node as usize];
+                account.total(self.core.setup.radio_of(SensorId(node)), now)
+            })
+            .sum();
+        Summary::new(now.since_start(), self.ledger(), energy, first)
     }
 
     /// Bytes that the network holds: nodes (their own heap memory not counted), queue, frames on air, books, field.
     pub fn memory(&self) -> usize {
-        self.nodes.capacity() * size_of::<P::Node>() + self.kernel.memory()
+        self.nodes.capacity() * size_of::<P::Node>() + self.core.memory()
     }
 
     /// Writes the whole run as CBOR: nodes, queue, frames on air, books, log. Protocol, field and setup are not part of it.
     ///
     /// # Errors
-    /// [`Error::Stored`].
+    /// [`Error::Unwritable`].
     pub fn snapshot(&self, to: impl Write) -> Result<(), Error>
     where
         P::Node: Serialize,
     {
-        ciborium::into_writer(&(&self.nodes, &self.kernel.state), to).map_err(|error| Error::Stored(error.to_string()))
+        ciborium::into_writer(&(&self.nodes, &self.core.state), to).map_err(unwritable)
     }
 
     /// A run as it was when the snapshot was taken, under the same protocol, field and setup.
     ///
     /// # Errors
-    /// [`Error::Stored`] if it is no snapshot or is one of another number of nodes; as [`Simulator::new`].
+    /// [`Error::Unreadable`] if it is no snapshot; [`Error::SnapshotOfOtherNetwork`]; as [`Simulator::new`].
     pub fn restore(protocol: P, field: Field, setup: Setup, from: impl Read) -> Result<Self, Error>
     where
         P::Node: DeserializeOwned,
     {
-        let (nodes, state) =
-            ciborium::from_reader(from).map_err(|error: ciborium::de::Error<_>| Error::Stored(error.to_string()))?;
+        let (nodes, state): (Vec<P::Node>, State) = ciborium::from_reader(from).map_err(unreadable)?;
         let mut restored = Self::new(protocol, nodes, field, setup)?;
-        restored.kernel.resume(state)?;
+        restored.core.resume(state)?;
         Ok(restored)
     }
 }

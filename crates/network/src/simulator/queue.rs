@@ -1,6 +1,6 @@
-//! What will happen, in order, and the frames that are under way.
+//! Events to come, in order, and the frames that are on their way.
 
-use crate::frame::stored;
+use crate::medium::frame::stored;
 use crate::units::{Instant, SensorId};
 use fewbits_core::BitString;
 use serde::{Deserialize, Serialize};
@@ -8,15 +8,40 @@ use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum What {
+pub(crate) enum EventKind {
+    /// A timer of the protocol, with its token.
     Timer(u32),
+    /// Bits arrive; the place where the queue keeps them.
     Arrival(u32),
-    Flush(Option<SensorId>),
-    Mishap(u32),
+    /// A fault, by its index in the setup.
+    Fault(u32),
+    /// The hold time of a batch is over. Without effect if the batch of this number was sent before.
+    Flush(u32),
+    /// The air is free for an attempt of an outgoing frame.
+    Transmit(u32),
+    /// The acknowledgement of an outgoing frame arrives at its sender.
+    Acknowledged(u32),
+    /// The sender has waited long enough for the acknowledgement of an outgoing frame. Without effect if it came.
+    AckTimeout(u32),
 }
 
-/// Events are ordered by time, then by when they were scheduled. Small, since the queue moves them: `rank` is the place in the
-/// order of scheduling, then three bits of what it is.
+impl EventKind {
+    /// A number below 8 for the kind, and the argument.
+    fn parts(self) -> (u64, u32) {
+        match self {
+            Self::Timer(token) => (0, token),
+            Self::Arrival(place) => (1, place),
+            Self::Fault(index) => (2, index),
+            Self::Flush(batch) => (3, batch),
+            Self::Transmit(frame) => (4, frame),
+            Self::Acknowledged(frame) => (5, frame),
+            Self::AckTimeout(frame) => (6, frame),
+        }
+    }
+}
+
+/// Events are ordered by time, then by when they were scheduled. Small, since the queue moves them: `rank` is the place in the order of
+/// scheduling, then three bits of its kind.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct Event {
     pub(crate) time: Instant,
@@ -26,29 +51,25 @@ pub(crate) struct Event {
 }
 
 impl Event {
-    fn new(time: Instant, sequence: u64, node: SensorId, what: What) -> Self {
-        let (kind, argument) = match what {
-            What::Timer(token) => (0, token),
-            What::Arrival(place) => (1, place),
-            What::Mishap(index) => (2, index),
-            What::Flush(None) => (3, 0),
-            What::Flush(Some(to)) => (4, to.0),
-        };
+    fn new(time: Instant, sequence: u64, node: SensorId, kind: EventKind) -> Self {
+        let (number, argument) = kind.parts();
         Self {
             time,
-            rank: sequence << 3 | kind,
+            rank: sequence << 3 | number,
             node,
             argument,
         }
     }
 
-    pub(crate) fn what(&self) -> What {
+    pub(crate) fn kind(&self) -> EventKind {
         match self.rank & 7 {
-            0 => What::Timer(self.argument),
-            1 => What::Arrival(self.argument),
-            2 => What::Mishap(self.argument),
-            3 => What::Flush(None),
-            _ => What::Flush(Some(SensorId(self.argument))),
+            0 => EventKind::Timer(self.argument),
+            1 => EventKind::Arrival(self.argument),
+            2 => EventKind::Fault(self.argument),
+            3 => EventKind::Flush(self.argument),
+            4 => EventKind::Transmit(self.argument),
+            5 => EventKind::Acknowledged(self.argument),
+            _ => EventKind::AckTimeout(self.argument),
         }
     }
 }
@@ -77,10 +98,12 @@ impl Eq for Event {}
 
 /// Bits on their way to a node.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Arrival {
-    from: SensorId,
+pub(crate) struct Arrival {
+    pub(crate) from: SensorId,
+    /// The outgoing frame that the receiver's radio acknowledges when these bits arrive.
+    pub(crate) answer: Option<u32>,
     #[serde(with = "stored")]
-    bits: BitString,
+    pub(crate) bits: BitString,
 }
 
 /// Events, and the bits of those that are arrivals.
@@ -97,8 +120,8 @@ pub(crate) struct Queue {
 
 impl Queue {
     #[inline]
-    pub(crate) fn push(&mut self, time: Instant, node: SensorId, what: What) {
-        let mut event = Event::new(time, self.sequence, node, what);
+    pub(crate) fn push(&mut self, time: Instant, node: SensorId, kind: EventKind) {
+        let mut event = Event::new(time, self.sequence, node, kind);
         self.sequence += 1;
         let first = self.front.or_else(|| self.heap.peek().map(|event| event.0));
         if first.is_none_or(|first| event < first) {
@@ -121,8 +144,8 @@ impl Queue {
     }
 
     /// Bits that arrive at a node.
-    pub(crate) fn deliver(&mut self, at: Instant, from: SensorId, to: SensorId, bits: BitString) {
-        let arrival = Some(Arrival { from, bits });
+    pub(crate) fn deliver(&mut self, at: Instant, to: SensorId, arrival: Arrival) {
+        let arrival = Some(arrival);
         let place = if let Some(place) = self.free.pop() {
             self.arrivals[place as usize] = arrival;
             place
@@ -130,14 +153,14 @@ impl Queue {
             self.arrivals.push(arrival);
             (self.arrivals.len() - 1) as u32
         };
-        self.push(at, to, What::Arrival(place));
+        self.push(at, to, EventKind::Arrival(place));
     }
 
-    /// What has arrived.
-    pub(crate) fn take(&mut self, place: u32) -> Option<(SensorId, BitString)> {
+    /// Takes what has arrived.
+    pub(crate) fn take(&mut self, place: u32) -> Option<Arrival> {
         let arrival = self.arrivals.get_mut(place as usize)?.take()?;
         self.free.push(place);
-        Some((arrival.from, arrival.bits))
+        Some(arrival)
     }
 
     /// Whether a queue that was read is in order and among nodes that exist.
@@ -149,7 +172,7 @@ impl Queue {
             && self.arrivals.iter().flatten().all(|arrival| known(arrival.from))
     }
 
-    /// Bytes that it holds.
+    /// Bytes that the queue holds.
     pub(crate) fn memory(&self) -> usize {
         self.heap.capacity() * size_of::<Reverse<Event>>()
             + self.arrivals.capacity() * size_of::<Option<Arrival>>()
@@ -176,7 +199,7 @@ mod tests {
             let mut waiting: Vec<(u64, u32)> = Vec::new();
             for (token, (time, pop)) in work.into_iter().enumerate() {
                 let token = token as u32;
-                queue.push(Instant(time), SensorId(token), What::Timer(token));
+                queue.push(Instant(time), SensorId(token), EventKind::Timer(token));
                 waiting.push((time, token));
                 if pop {
                     let mut stored = Vec::new();
@@ -187,29 +210,31 @@ mod tests {
                     let first = waiting.remove(0);
                     prop_assert!(first.0 == 0 || queue.pop(Instant(first.0 - 1)).is_none());
                     let event = queue.pop(Instant(first.0)).unwrap();
-                    prop_assert_eq!((event.time.0, event.what()), (first.0, What::Timer(first.1)));
+                    prop_assert_eq!((event.time.0, event.kind()), (first.0, EventKind::Timer(first.1)));
                 }
             }
             waiting.sort_unstable();
             for (time, token) in waiting {
                 let event = queue.pop(Instant(u64::MAX)).unwrap();
-                prop_assert_eq!((event.time.0, event.node, event.what()), (time, SensorId(token), What::Timer(token)));
+                prop_assert_eq!((event.time.0, event.node, event.kind()), (time, SensorId(token), EventKind::Timer(token)));
             }
             prop_assert!(queue.pop(Instant(u64::MAX)).is_none());
         }
     }
 
     #[test]
-    fn what_happens_is_kept_in_the_event() {
+    fn an_event_keeps_its_kind_and_argument() {
         let all = [
-            What::Timer(u32::MAX),
-            What::Arrival(7),
-            What::Mishap(0),
-            What::Flush(None),
-            What::Flush(Some(SensorId(3))),
+            EventKind::Timer(u32::MAX),
+            EventKind::Arrival(7),
+            EventKind::Fault(0),
+            EventKind::Flush(3),
+            EventKind::Transmit(4),
+            EventKind::Acknowledged(5),
+            EventKind::AckTimeout(6),
         ];
-        for what in all {
-            assert_eq!(Event::new(Instant(1), 1 << 60, SensorId(2), what).what(), what);
+        for kind in all {
+            assert_eq!(Event::new(Instant(1), 1 << 60, SensorId(2), kind).kind(), kind);
         }
     }
 }
