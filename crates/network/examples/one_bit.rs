@@ -5,13 +5,14 @@ use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::estimators::ParallelDymboEstimator;
 use fewbits_network::{Channel, Check, Clock, Radio, Seconds, Setup, Star};
+use nalgebra::Vector1;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (plant, slots) = (ScalarPlant::new(0.95, 0.2, 1.0)?, 1000);
     let start = Gaussian::scalar(0.0, plant.dynamics().stationary_variance()?)?;
     let mut rng = Stream::new(1).rng();
     let mut state = start.sample(&mut rng);
-    let (mut truths, mut measurements) = (Vec::new(), Vec::<Vec<_>>::new());
+    let (mut truths, mut measurements) = (Vec::new(), Vec::<Vec<Vector1<f64>>>::new());
     for _ in 0..slots {
         state = plant.dynamics().propagate(&mut rng, &state);
         truths.push(state[0]);
