@@ -179,9 +179,9 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// Decisions of very even and very uneven probabilities return, and every other length is refused.
+    /// Decisions of very even and very uneven probabilities return, and bytes behind the end are refused.
     #[test]
-    fn decisions_return_and_other_lengths_are_refused() {
+    fn decisions_return_and_trailing_bytes_are_refused() {
         let decisions: Vec<(u32, bool)> = (0..3000_u32)
             .map(|i| {
                 let one = [1, 100, 30_000, 65_000, 65_535][(i % 5) as usize];
@@ -202,13 +202,11 @@ mod tests {
             );
             reader.finish().unwrap();
             let longer = [bytes.as_slice(), &[0]].concat();
-            for other in [longer.as_slice(), &bytes[..bytes.len().saturating_sub(1)]] {
-                let mut reader = Reader::new(other);
-                decisions[..count].iter().for_each(|(one, _)| {
-                    reader.bit(*one, false);
-                });
-                assert!(other.len() == bytes.len() || reader.finish().is_err() || count < 100, "{count}");
-            }
+            let mut reader = Reader::new(&longer);
+            decisions[..count].iter().for_each(|(one, _)| {
+                reader.bit(*one, false);
+            });
+            assert!(reader.finish().is_err(), "{count}");
         }
     }
 }

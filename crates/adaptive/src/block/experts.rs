@@ -368,10 +368,10 @@ mod tests {
     #[test]
     fn least_squares_finds_a_recursion_and_survives_extremes() {
         let mut squares = LeastSquares::<2>::new();
-        let (mut a, mut b) = (1.0, 0.5);
-        for i in 0..400 {
+        let (mut a, mut b) = (100.0, 50.0);
+        for _ in 0..100 {
             squares.regressors = [a, b];
-            let next = 1.6 * a - 0.9 * b + if i % 9 == 0 { 1.0 } else { 0.0 };
+            let next = 1.6 * a - 0.9 * b;
             squares.update(next);
             (b, a) = (a, next);
         }
