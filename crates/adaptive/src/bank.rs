@@ -128,8 +128,11 @@ pub(crate) fn steady_gains(model: usize) -> [f64; 3] {
 /// Positions, velocities and weights of the models, in steps of the lattice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Bank {
+    #[serde(with = "fewbits_numerics::stored")]
     x: [f64; MODELS],
+    #[serde(with = "fewbits_numerics::stored")]
     v: [f64; MODELS],
+    #[serde(with = "fewbits_numerics::stored")]
     w: [f64; MODELS],
 }
 

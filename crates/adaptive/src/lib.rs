@@ -26,6 +26,7 @@
 //! | the two halves | [`Sensor`], [`Receiver`] |
 //! | whole bits in a slot, and a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
 //! | many samples at once, each block decodable alone | [`BlockCodec`] |
+//! | links that lose packets: one lost packet costs the slots until the next | [`CosetSensor`], [`CosetReceiver`] |
 //! | a slot for other filters | [`SlotScheme`] |
 //! | the same number of bits in every slot | [`FixedRate`] |
 //! | `delta` for a rate, on a recording | [`best_within`], [`replay`] |
@@ -44,6 +45,7 @@
 mod bank;
 mod block;
 mod config;
+mod coset;
 mod counts;
 mod error;
 mod fixed_rate;
@@ -61,6 +63,7 @@ mod tuning;
 pub use bank::{MODELS, SCALES};
 pub use block::{BlockCodec, Effort, JOINT_COLUMNS};
 pub use config::Config;
+pub use coset::{CosetConfig, CosetReceiver, CosetSensor, TOLERATED};
 pub use error::Error;
 pub use fixed_rate::{FixedRate, Word};
 pub use packet::Packet;

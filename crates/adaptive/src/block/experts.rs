@@ -6,6 +6,7 @@
 use super::elementary::exp2;
 use super::priors::FILTER_WEIGHTS;
 use crate::bank::{DECAYS, MODELS, SCALES, steady_gains};
+use fewbits_numerics::kernels::vectorised;
 use std::sync::LazyLock;
 
 /// Probability below and above an edge, each accurate relative to itself.
@@ -91,37 +92,48 @@ impl Filters {
     #[inline(always)]
     pub(super) fn tails(&self, edge: f32) -> Tails {
         let sharpness = &GAINS.sharpness;
-        let (mut below, mut above) = ([0.0; MODELS], [0.0; MODELS]);
-        for m in 0..MODELS {
-            let e = exp2(((self.position[m] - edge) * sharpness[m]).clamp(-FLAT, FLAT));
-            let share = self.weight[m] / (1.0 + e);
-            below[m] = share;
-            above[m] = e * share;
-        }
-        Tails {
-            below: sum(&below),
-            above: sum(&above),
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                let (mut below, mut above) = ([0.0; MODELS], [0.0; MODELS]);
+                for m in 0..MODELS {
+                    let e = exp2(((self.position[m] - edge) * sharpness[m]).clamp(-FLAT, FLAT));
+                    let share = self.weight[m] / (1.0 + e);
+                    below[m] = share;
+                    above[m] = e * share;
+                }
+                Tails {
+                    below: sum(&below),
+                    above: sum(&above),
+                }
+            },
+        )
     }
 
     /// The measurement update with an index `step` from the last one, which becomes the origin.
     #[inline(always)]
     pub(super) fn update(&mut self, step: f32) {
         let gains = &*GAINS;
-        let mut evidence = [0.0; MODELS];
-        for m in 0..MODELS {
-            let residual = step - self.position[m];
-            let z = (residual.abs() * gains.sharpness[m]).min(FLAT);
-            let half = 0.5 * gains.sharpness[m];
-            let (wide, narrow) = (exp2(half - z), exp2(-half - z));
-            evidence[m] = self.weight[m] * ((wide - narrow) / ((1.0 + wide) * (1.0 + narrow))).max(LEAST_EVIDENCE);
-            self.position[m] += gains.position[m] * residual - step;
-            self.velocity[m] += gains.velocity[m] * residual;
-        }
-        let inverse = 1.0 / sum(&evidence);
-        for m in 0..MODELS {
-            self.weight[m] = (evidence[m] * inverse).max(LEAST_WEIGHT);
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                let mut evidence = [0.0; MODELS];
+                for m in 0..MODELS {
+                    let residual = step - self.position[m];
+                    let z = (residual.abs() * gains.sharpness[m]).min(FLAT);
+                    let half = 0.5 * gains.sharpness[m];
+                    let (wide, narrow) = (exp2(half - z), exp2(-half - z));
+                    evidence[m] =
+                        self.weight[m] * ((wide - narrow) / ((1.0 + wide) * (1.0 + narrow))).max(LEAST_EVIDENCE);
+                    self.position[m] += gains.position[m] * residual - step;
+                    self.velocity[m] += gains.velocity[m] * residual;
+                }
+                let inverse = 1.0 / sum(&evidence);
+                for m in 0..MODELS {
+                    self.weight[m] = (evidence[m] * inverse).max(LEAST_WEIGHT);
+                }
+            },
+        );
     }
 
     #[cfg(test)]

@@ -7,6 +7,7 @@ mod allocation;
 mod bank;
 mod blocks;
 mod common;
+mod cosets;
 mod damage;
 mod guarantee;
 mod loss;
