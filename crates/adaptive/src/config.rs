@@ -135,7 +135,9 @@ impl Config {
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "Config", deny_unknown_fields)]
 struct Stored {
+    #[serde(with = "fewbits_numerics::stored")]
     delta: f64,
+    #[serde(default, with = "fewbits_numerics::stored")]
     period: Option<f64>,
     sequence_bits: u32,
     refresh_every: Option<u64>,

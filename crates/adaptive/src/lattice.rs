@@ -12,10 +12,14 @@ const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
 /// Points `anchor + step j` with whole `j`; around the circle there are `cells` of them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Lattice {
+    #[serde(with = "fewbits_numerics::stored")]
     anchor: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     step: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     delta: f64,
     /// The period, and its number of points.
+    #[serde(with = "fewbits_numerics::stored")]
     circle: Option<(f64, i64)>,
     decimal: Option<Decimal>,
 }
@@ -25,6 +29,7 @@ pub(crate) struct Lattice {
 struct Decimal {
     anchor: i64,
     step: i64,
+    #[serde(with = "fewbits_numerics::stored")]
     ten: f64,
 }
 

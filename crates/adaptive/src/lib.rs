@@ -25,6 +25,8 @@
 //! | the agreement: accuracy, circle, refreshes | [`Config`] |
 //! | the two halves | [`Sensor`], [`Receiver`] |
 //! | whole bits in a slot, and a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
+//! | many samples at once, each block decodable alone | [`BlockCodec`] |
+//! | links that lose packets: one lost packet costs the slots until the next | [`CosetSensor`], [`CosetReceiver`] |
 //! | a slot for other filters | [`SlotScheme`] |
 //! | the same number of bits in every slot | [`FixedRate`] |
 //! | `delta` for a rate, on a recording | [`best_within`], [`replay`] |
@@ -41,7 +43,9 @@
 //! Not here: loss models and the energy of a radio, baselines, files.
 
 mod bank;
+mod block;
 mod config;
+mod coset;
 mod counts;
 mod error;
 mod fixed_rate;
@@ -57,7 +61,9 @@ mod stream;
 mod tuning;
 
 pub use bank::{MODELS, SCALES};
+pub use block::{BlockCodec, Effort, JOINT_COLUMNS};
 pub use config::Config;
+pub use coset::{CosetConfig, CosetReceiver, CosetSensor, TOLERATED};
 pub use error::Error;
 pub use fixed_rate::{FixedRate, Word};
 pub use packet::Packet;

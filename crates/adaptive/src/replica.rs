@@ -33,9 +33,11 @@ pub(crate) struct Replica {
     before: i64,
     /// Slots between them.
     gap: u32,
+    #[serde(with = "fewbits_numerics::stored")]
     predictors: [f64; PREDICTORS],
     pub(crate) residuals: [Residuals; PREDICTORS],
     pub(crate) values: Values,
+    #[serde(with = "fewbits_numerics::stored")]
     pub(crate) coders: [f64; CODERS],
 }
 

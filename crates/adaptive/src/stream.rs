@@ -8,6 +8,7 @@ use constriction::UnwrapInfallible;
 use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
 use constriction::stream::queue::{RangeDecoder, RangeEncoder};
 use constriction::stream::{Decode, Encode};
+use crc::{CRC_32_ISO_HDLC, Crc};
 use fewbits_core::CodecError;
 use serde::{Deserialize, Serialize};
 use std::borrow::Borrow;
@@ -104,11 +105,19 @@ fn digit(value: u32, width: u32) -> Place {
     }
 }
 
+fn checksum(words: &[u32]) -> u32 {
+    const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+    let mut digest = CRC.digest();
+    words.iter().for_each(|word| digest.update(&word.to_le_bytes()));
+    digest.finalize()
+}
+
 /// Collects the reports of a [`Sensor`](crate::Sensor) in a stream.
 #[derive(Debug, Clone)]
 pub struct StreamWriter {
     encoder: RangeEncoder<u32, u64>,
     flags: Option<Flags>,
+    slots: u32,
 }
 
 impl StreamWriter {
@@ -117,6 +126,7 @@ impl StreamWriter {
         Self {
             encoder: RangeEncoder::new(),
             flags: (silence == Silence::Coded).then(Flags::new),
+            slots: 0,
         }
     }
 
@@ -141,10 +151,12 @@ impl StreamWriter {
         let mut packet = Packet::default();
         push_number(&mut packet, sample);
         self.encode(digit(packet.bits() as u32, 8))?;
+        self.slots = self.slots.saturating_add(1);
         self.raw(&packet)
     }
 
     pub(crate) fn put(&mut self, content: Option<&Content>, replica: &Replica, slot: &Slot) -> Result<(), CodecError> {
+        self.slots = self.slots.saturating_add(1);
         if let Some(flags) = &mut self.flags {
             let place = flags.place(content.is_none());
             flags.add(content.is_none());
@@ -170,7 +182,18 @@ impl StreamWriter {
         self.encoder.num_bits()
     }
 
-    /// The words of the finished stream.
+    /// The words of the finished stream, then the number of its slots and the CRC-32 (ISO-HDLC) of all of these, little-endian: for
+    /// [`StreamReader::open`]. Of 2^32 slots and more the number is `u32::MAX`.
+    pub fn seal(self) -> Vec<u32> {
+        let slots = self.slots;
+        let mut words = self.finish();
+        words.push(slots);
+        words.push(checksum(&words));
+        words
+    }
+
+    /// The words of the finished stream. Nothing in them tells a reader their number, or that some are missing or damaged: what holds
+    /// them must, or use [`seal`](Self::seal).
     pub fn finish(self) -> Vec<u32> {
         self.encoder.into_compressed().unwrap_infallible()
     }
@@ -183,6 +206,8 @@ pub struct StreamReader<'a> {
     flags: Option<Flags>,
     /// Silent slots, where the stream does not tell.
     silent: Option<bool>,
+    /// Slots that are left to be read, if the stream says how many it has.
+    left: Option<u32>,
 }
 
 fn damaged(value: impl std::fmt::Display) -> CodecError {
@@ -203,7 +228,42 @@ impl<'a> StreamReader<'a> {
             decoder: RangeDecoder::from_compressed(words).unwrap_infallible(),
             flags: (silence == Silence::Coded).then(Flags::new),
             silent: None,
+            left: None,
         })
+    }
+
+    /// A reader of a sealed stream ([`StreamWriter::seal`]). It reads as many slots as were written and then refuses.
+    ///
+    /// # Errors
+    /// If words are missing, too many or damaged.
+    pub fn open(sealed: &'a [u32], silence: Silence) -> Result<Self, CodecError> {
+        let [words @ .., slots, stored] = sealed else {
+            return Err(damaged(format!("{} words", sealed.len())));
+        };
+        let found = checksum(&sealed[..sealed.len() - 1]);
+        if found != *stored {
+            return Err(damaged(format!("checksum {found:#010x} where {stored:#010x} is stored")));
+        }
+        Ok(Self {
+            left: Some(*slots),
+            ..Self::new(words, silence)?
+        })
+    }
+
+    /// Slots that are left to be read; `None` if the stream was not sealed.
+    pub fn slots_left(&self) -> Option<u32> {
+        self.left
+    }
+
+    fn begin_slot(&mut self) -> Result<(), CodecError> {
+        match &mut self.left {
+            Some(0) => Err(damaged("no slot left")),
+            Some(u32::MAX) | None => Ok(()),
+            Some(left) => {
+                *left -= 1;
+                Ok(())
+            }
+        }
     }
 
     /// Tells a reader of [`Silence::Timed`] whether the next slot is silent.
@@ -239,6 +299,7 @@ impl<'a> StreamReader<'a> {
     }
 
     pub(crate) fn first(&mut self) -> Result<f64, CodecError> {
+        self.begin_slot()?;
         let packet = self.raw()?;
         let mut reader = packet.reader();
         let sample = read_number(&mut reader)?;
@@ -247,6 +308,7 @@ impl<'a> StreamReader<'a> {
     }
 
     pub(crate) fn get(&mut self, replica: &Replica, slot: &Slot) -> Result<Option<Content>, CodecError> {
+        self.begin_slot()?;
         let silent = match self.flags.take() {
             Some(mut flags) => {
                 let reported = flags.place(false);

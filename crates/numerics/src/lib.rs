@@ -29,7 +29,7 @@ pub mod newton;
 pub mod normal;
 pub mod quadrature;
 pub mod roots;
-mod stored;
+pub mod stored;
 pub mod tridiagonal;
 
 pub use error::ArgumentError;

@@ -378,7 +378,7 @@ impl Encoder {
             Self::Adaptive { loading } => {
                 let row = sensor.jacobian(about.mean());
                 let spread = (row * about.covariance() * row.transpose())[0].max(0.0);
-                loading * (spread.sqrt()).hypot(noise.deviation(centre))
+                loading * libm::hypot(spread.sqrt(), noise.deviation(centre))
             }
         };
         let reference = RangeReference { centre, half_width };

@@ -139,7 +139,7 @@ impl RangeSensor {
         let squared = dx * dx + dy * dy;
         // Squares that leave the range of numbers.
         if !(1e-280..=1e280).contains(&squared) {
-            dx.hypot(dy)
+            libm::hypot(dx, dy)
         } else {
             squared.sqrt()
         }

@@ -40,6 +40,36 @@ proptest! {
     }
 }
 
+/// Truncated at every word, every bit flipped, and read too far: none of it gives samples.
+#[test]
+fn damaged_sealed_streams_are_refused() {
+    let config = Config::new(0.1).unwrap();
+    let (mut sensor, mut stream) = (Sensor::new(config), StreamWriter::new(Silence::Coded));
+    let samples = mixed(9, 600);
+    for sample in &samples {
+        sensor.write_after(1, *sample, &mut stream).unwrap();
+    }
+    let words = stream.seal();
+    let open = |words: &[u32]| StreamReader::open(words, Silence::Coded).map(|reader| reader.slots_left());
+    assert_eq!(open(&words).unwrap(), Some(600));
+    for end in 0..words.len() {
+        assert!(open(&words[..end]).is_err(), "{end}");
+    }
+    for bit in 0..32 * words.len() {
+        let mut flipped = words.clone();
+        flipped[bit / 32] ^= 1 << (bit % 32);
+        assert!(open(&flipped).is_err(), "{bit}");
+    }
+    let mut reader = StreamReader::open(&words, Silence::Coded).unwrap();
+    let mut receiver = Receiver::new(config);
+    for sample in &samples {
+        assert!((receiver.read_after(1, &mut reader).unwrap() - sample).abs() <= 0.1);
+    }
+    let before = receiver.clone();
+    assert!(receiver.read_after(1, &mut reader).is_err());
+    assert_eq!(receiver, before);
+}
+
 #[test]
 fn packets_are_messages() {
     let mut sensor = Sensor::new(Config::new(0.01).unwrap().resilient(7, Some(31)).unwrap());

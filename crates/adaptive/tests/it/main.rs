@@ -5,7 +5,9 @@
 
 mod allocation;
 mod bank;
+mod blocks;
 mod common;
+mod cosets;
 mod damage;
 mod guarantee;
 mod loss;
