@@ -27,7 +27,7 @@ const NOISE: f64 = 0.15;
 /// `sqrt(3) / pi`: scale of the logistic law with standard deviation one.
 const LOGISTIC: f64 = 0.551_328_895_421_792_1;
 /// Per-slot factors of the velocities; zero is the random walk.
-const DECAYS: [f64; 3] = [0.0, 0.6, 0.95];
+pub(crate) const DECAYS: [f64; 3] = [0.0, 0.6, 0.95];
 /// Models of one family, by increasing scale.
 pub const SCALES: usize = MODELS / DECAYS.len();
 /// Beyond this many scales the tails are flat.
@@ -118,6 +118,12 @@ static STEADY: LazyLock<Steady> = LazyLock::new(|| {
     }
     steady
 });
+
+/// Of a model one slot ahead: one over the scale of its predictive law, and its gains of position and velocity.
+pub(crate) fn steady_gains(model: usize) -> [f64; 3] {
+    let shape = &STEADY.shape;
+    [shape.sharpness[model], shape.gain_x[model], shape.gain_v[model]]
+}
 
 /// Positions, velocities and weights of the models, in steps of the lattice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -25,6 +25,7 @@
 //! | the agreement: accuracy, circle, refreshes | [`Config`] |
 //! | the two halves | [`Sensor`], [`Receiver`] |
 //! | whole bits in a slot, and a whole recording | [`Packet`], [`StreamWriter`], [`StreamReader`] |
+//! | many samples at once, each block decodable alone | [`BlockCodec`] |
 //! | a slot for other filters | [`SlotScheme`] |
 //! | the same number of bits in every slot | [`FixedRate`] |
 //! | `delta` for a rate, on a recording | [`best_within`], [`replay`] |
@@ -41,6 +42,7 @@
 //! Not here: loss models and the energy of a radio, baselines, files.
 
 mod bank;
+mod block;
 mod config;
 mod counts;
 mod error;
@@ -57,6 +59,7 @@ mod stream;
 mod tuning;
 
 pub use bank::{MODELS, SCALES};
+pub use block::{BlockCodec, Effort, JOINT_COLUMNS};
 pub use config::Config;
 pub use error::Error;
 pub use fixed_rate::{FixedRate, Word};

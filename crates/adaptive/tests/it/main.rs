@@ -5,6 +5,7 @@
 
 mod allocation;
 mod bank;
+mod blocks;
 mod common;
 mod damage;
 mod guarantee;

@@ -1,0 +1,212 @@
+//! Binary arithmetic coding with byte-exact ends.
+//!
+//! An interval `[low, high]` of 64-bit numbers is split at each decision in the proportion of a 16-bit probability. Bytes that both
+//! ends share are emitted. The end is the fewest bytes that, continued by zeros, lie in the interval; the decoder computes them
+//! again, so bytes after the end are refused.
+
+use fewbits_core::CodecError;
+
+/// Bits of a probability.
+pub(super) const BITS: u32 = 16;
+/// An even probability.
+const EVEN: u32 = 1 << (BITS - 1);
+/// Decoders read at most this many bytes beyond the end: what the interval still holds.
+const AHEAD: usize = 8;
+
+/// Either end of the channel: a writer takes the bit that is given, a reader ignores it and returns the bit that was written.
+pub(super) trait Coder {
+    /// Codes one decision; `one` is the probability of `true` in units of `2^-16`, in `1..2^16`.
+    fn bit(&mut self, one: u32, bit: bool) -> bool;
+
+    /// `width` bits of `value` without a model, the highest first.
+    fn raw(&mut self, value: u64, width: u32) -> u64 {
+        (0..width)
+            .rev()
+            .fold(0, |read, i| read << 1 | u64::from(self.bit(EVEN, value >> i & 1 == 1)))
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Interval {
+    low: u64,
+    high: u64,
+}
+
+impl Interval {
+    const WHOLE: Self = Self { low: 0, high: u64::MAX };
+
+    #[inline(always)]
+    fn middle(self, one: u32) -> u64 {
+        self.low + ((self.high - self.low) >> BITS) * u64::from(one)
+    }
+
+    #[inline(always)]
+    fn halve(&mut self, middle: u64, bit: bool) {
+        if bit {
+            self.high = middle;
+        } else {
+            self.low = middle + 1;
+        }
+    }
+
+    /// Whether the highest byte is decided.
+    #[inline(always)]
+    fn settled(self) -> bool {
+        (self.low ^ self.high) >> 56 == 0
+    }
+
+    #[inline(always)]
+    fn shift(&mut self) {
+        self.low <<= 8;
+        self.high = self.high << 8 | 255;
+    }
+
+    /// The shortest end: its bytes, the first highest, and their number.
+    fn end(self) -> (u64, usize) {
+        (0..8)
+            .map(|count| {
+                let kept = if count == 0 { 0 } else { u64::MAX << (64 - 8 * count) };
+                (self.low.wrapping_add(!kept) & kept, count)
+            })
+            .find(|(value, _)| *value >= self.low && *value <= self.high)
+            .unwrap_or((self.low, 8))
+    }
+}
+
+/// Writes decisions as bytes.
+#[derive(Debug)]
+pub(super) struct Writer {
+    interval: Interval,
+    bytes: Vec<u8>,
+}
+
+impl Writer {
+    /// Appends to `bytes`.
+    pub(super) fn new(bytes: Vec<u8>) -> Self {
+        Self {
+            interval: Interval::WHOLE,
+            bytes,
+        }
+    }
+
+    pub(super) fn finish(mut self) -> Vec<u8> {
+        let (end, count) = self.interval.end();
+        self.bytes.extend_from_slice(&end.to_be_bytes()[..count]);
+        self.bytes
+    }
+}
+
+impl Coder for Writer {
+    #[inline(always)]
+    fn bit(&mut self, one: u32, bit: bool) -> bool {
+        let middle = self.interval.middle(one);
+        self.interval.halve(middle, bit);
+        while self.interval.settled() {
+            self.bytes.push((self.interval.high >> 56) as u8);
+            self.interval.shift();
+        }
+        bit
+    }
+}
+
+/// Reads what a [`Writer`] wrote; behind the end it reads zeros, and [`finish`](Self::finish) tells.
+#[derive(Debug)]
+pub(super) struct Reader<'a> {
+    interval: Interval,
+    window: u64,
+    bytes: &'a [u8],
+    /// Bytes shifted into the window, those behind the end included.
+    taken: usize,
+}
+
+impl<'a> Reader<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        let mut reader = Self {
+            interval: Interval::WHOLE,
+            window: 0,
+            bytes,
+            taken: 0,
+        };
+        (0..AHEAD).for_each(|_| reader.take());
+        reader
+    }
+
+    #[inline(always)]
+    fn take(&mut self) {
+        let byte = self.bytes.get(self.taken).copied().unwrap_or(0);
+        self.window = self.window << 8 | u64::from(byte);
+        self.taken += 1;
+    }
+
+    /// Whether more was read than any writer would have left to be read.
+    pub(super) fn overran(&self) -> bool {
+        self.taken > self.bytes.len() + AHEAD
+    }
+
+    /// # Errors
+    /// If the bytes are more, fewer or others than a writer of the decisions read would have ended with.
+    pub(super) fn finish(&self) -> Result<(), CodecError> {
+        let (end, count) = self.interval.end();
+        let settled = self.taken - AHEAD;
+        let tail = self.bytes.get(settled..).unwrap_or_default();
+        if self.bytes.len() == settled + count && tail == &end.to_be_bytes()[..count] {
+            return Ok(());
+        }
+        Err(CodecError::Invalid {
+            what: "block",
+            value: format!("{} bytes", self.bytes.len()),
+            expected: "the bytes that a writer of as many rows ends with",
+        })
+    }
+}
+
+impl Coder for Reader<'_> {
+    #[inline(always)]
+    fn bit(&mut self, one: u32, _: bool) -> bool {
+        let middle = self.interval.middle(one);
+        let bit = self.window <= middle;
+        self.interval.halve(middle, bit);
+        while self.interval.settled() {
+            self.interval.shift();
+            self.take();
+        }
+        bit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Decisions of very even and very uneven probabilities return, and bytes behind the end are refused.
+    #[test]
+    fn decisions_return_and_trailing_bytes_are_refused() {
+        let decisions: Vec<(u32, bool)> = (0..3000_u32)
+            .map(|i| {
+                let one = [1, 100, 30_000, 65_000, 65_535][(i % 5) as usize];
+                (one, i.wrapping_mul(2_654_435_761) >> 16 < one)
+            })
+            .collect();
+        for count in [0, 1, 2, 7, 100, 3000] {
+            let mut writer = Writer::new(Vec::new());
+            decisions[..count].iter().for_each(|(one, bit)| {
+                writer.bit(*one, *bit);
+            });
+            let bytes = writer.finish();
+            let mut reader = Reader::new(&bytes);
+            assert!(
+                decisions[..count]
+                    .iter()
+                    .all(|(one, bit)| reader.bit(*one, false) == *bit)
+            );
+            reader.finish().unwrap();
+            let longer = [bytes.as_slice(), &[0]].concat();
+            let mut reader = Reader::new(&longer);
+            decisions[..count].iter().for_each(|(one, _)| {
+                reader.bit(*one, false);
+            });
+            assert!(reader.finish().is_err(), "{count}");
+        }
+    }
+}

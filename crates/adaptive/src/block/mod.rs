@@ -1,0 +1,507 @@
+//! Blocks: many samples of one column as bytes, decodable alone.
+//!
+//! Where a stream must tell each sample before the next one is known, a block is known whole. [`BlockCodec`] chooses the grid of
+//! reconstructions from all its samples and codes their indices by a mixture of models. Nothing is carried from one block to the
+//! next.
+//!
+//! ```
+//! use fewbits_adaptive::{BlockCodec, Config};
+//! let samples: Vec<f64> = (0..512).map(|n| (20.0 + 3.0 * (f64::from(n) * 0.01).sin() * 10.0).round() / 10.0).collect();
+//! let codec = BlockCodec::new(Config::new(0.05)?);
+//! let bytes = codec.encode(&samples)?;
+//! assert!(bytes.len() < 64); // one bit per sample
+//! let read = codec.decode(&bytes, samples.len())?;
+//! assert!(read.iter().zip(&samples).all(|(value, sample)| (value - sample).abs() <= 0.05));
+//! # Ok::<(), fewbits_adaptive::Error>(())
+//! ```
+//!
+//! # Bytes
+//!
+//! | part | bytes | when |
+//! |---|---|---|
+//! | head | 1 | always: low 4 bits the grid (0 to 12: decimals of the samples; 13: line; 14: circle; 15: the samples themselves), then 2 bits the coding (0: models; 1: pco; 2: as they are), 1 bit joint, 1 bit whether a second byte follows |
+//! | second | 1 | bit 0: exceptions; bit 1: steps; bit 2: anchor |
+//! | steps | 2 varints | unit and origin (zigzag) in units of the last decimal |
+//! | anchor | 8 | a point of the line, little-endian; otherwise zero is one |
+//! | exceptions | varints and 8 each | number; rows since the last one; the sample |
+//! | indices | the rest | models: 6 bits length and as many bits of the first index (zigzag), then decisions (`block/model.rs`), all arithmetic coded; pco: its standalone format |
+//!
+//! There is no checksum, no length and no number of rows: a container holds all three. An arithmetic code has no redundancy: most
+//! truncated or damaged blocks decode to wrong samples. Trailing bytes are refused.
+
+mod coder;
+mod elementary;
+mod experts;
+mod grid;
+mod mixer;
+mod model;
+mod priors;
+
+use crate::{Config, Error};
+use coder::{Coder, Reader, Writer};
+use fewbits_core::CodecError;
+use fewbits_numerics::ArgumentError;
+use grid::{Bytes, DECIMALS, Grid, push_varint, unzigzag, zigzag};
+use model::Model;
+use pco::ChunkConfig;
+use pco::standalone::{DecompressorItem, FileDecompressor, simple_compress};
+
+/// Other columns that a joint block uses.
+pub const JOINT_COLUMNS: usize = 3;
+/// Rows from which an anchor of eight bytes is worth it.
+const ANCHORED_ROWS: usize = 1024;
+/// Bits per sample from which pco is tried beside the models, and from which the samples themselves are.
+const FINE: usize = 4;
+const VERY_FINE: usize = 16;
+/// Grids without decimals.
+const LINE: u8 = 13;
+const CIRCLE: u8 = 14;
+const SAMPLES: u8 = 15;
+/// Bits of the length of the first index.
+const FIRST_LENGTH: u32 = 6;
+
+/// How much time a block may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Effort {
+    /// Mixed models, and pco where the bound is fine: the fewest bits.
+    #[default]
+    Thorough,
+    /// Only pco: some ten times faster, at about 1.2 times the bits.
+    Fast,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Accuracy {
+    Within(Config),
+    Lossless,
+}
+
+/// How the indices are coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Coding {
+    Models,
+    Pco,
+    Raw,
+}
+
+/// Writes and reads blocks. Both ends hold the same accuracy; [`Effort`] is the writer's choice alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BlockCodec {
+    accuracy: Accuracy,
+    effort: Effort,
+}
+
+/// What was read before the indices.
+struct Head {
+    grid: Option<Grid>,
+    coding: Coding,
+    joint: bool,
+    exceptions: Vec<(usize, f64)>,
+}
+
+fn invalid(what: &'static str, value: impl ToString, expected: &'static str) -> CodecError {
+    CodecError::Invalid {
+        what,
+        value: value.to_string(),
+        expected,
+    }
+}
+
+fn from_pco(error: impl std::fmt::Display) -> CodecError {
+    invalid("pco block", error, "what a writer of as many rows wrote")
+}
+
+impl BlockCodec {
+    /// Every finite sample returns within [`Config::delta`], around the circle if there is one; samples of
+    /// [`Config::exact`] return exactly. What the configuration says of lost packets has no effect.
+    pub fn new(config: Config) -> Self {
+        Self {
+            accuracy: Accuracy::Within(config),
+            effort: Effort::default(),
+        }
+    }
+
+    /// Every sample returns to the last bit.
+    pub fn lossless() -> Self {
+        Self {
+            accuracy: Accuracy::Lossless,
+            effort: Effort::default(),
+        }
+    }
+
+    /// The same codec with another effort.
+    #[must_use]
+    pub fn with_effort(self, effort: Effort) -> Self {
+        Self { effort, ..self }
+    }
+
+    /// The bound of finite samples; zero if they return exactly.
+    fn delta(&self) -> f64 {
+        match self.accuracy {
+            Accuracy::Within(config) if config.resolution().is_none() => config.delta(),
+            _ => 0.0,
+        }
+    }
+
+    /// The samples of a column as one block. Samples that are not finite, and those that no point of the grid is near to, return
+    /// to the last bit; each costs some nine bytes.
+    ///
+    /// # Errors
+    /// If pco fails, which no samples are known to cause.
+    pub fn encode(&self, samples: &[f64]) -> Result<Vec<u8>, Error> {
+        self.encode_with(samples, &[])
+    }
+
+    /// As [`encode`](Self::encode), predicting also from the same rows of other columns (at most [`JOINT_COLUMNS`] of them are
+    /// used, the first ones). `others` are what the reader will have: their reconstructions. Where they do not help, the block is
+    /// the same as without them.
+    ///
+    /// # Errors
+    /// If a column has another number of rows, and as [`encode`](Self::encode).
+    pub fn encode_with(&self, samples: &[f64], others: &[&[f64]]) -> Result<Vec<u8>, Error> {
+        check_rows(samples.len(), others)?;
+        if samples.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut best: Option<Vec<u8>> = None;
+        let keep = |bytes: Vec<u8>, best: &mut Option<Vec<u8>>| {
+            if best.as_ref().is_none_or(|b| bytes.len() < b.len()) {
+                *best = Some(bytes);
+            }
+        };
+        if let Some(grid) = self.grid(samples) {
+            let (indices, exceptions) = self.indices(&grid, samples);
+            if self.effort == Effort::Thorough {
+                keep(with_models(&grid, &indices, &exceptions, None)?, &mut best);
+                if !others.is_empty() {
+                    let others = Others::new(others);
+                    keep(with_models(&grid, &indices, &exceptions, Some(&others))?, &mut best);
+                }
+            }
+            if best.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8) {
+                let mut bytes = Vec::new();
+                write_head(&grid, Coding::Pco, false, &exceptions, &mut bytes);
+                bytes.extend(simple_compress(&indices, &ChunkConfig::default()).map_err(from_pco)?);
+                keep(bytes, &mut best);
+            }
+        }
+        if best.as_ref().is_none_or(|b| b.len() > VERY_FINE * samples.len() / 8) {
+            let mut bytes = vec![SAMPLES | 1 << 4];
+            bytes.extend(simple_compress(samples, &ChunkConfig::default()).map_err(from_pco)?);
+            keep(bytes, &mut best);
+            let mut bytes = vec![SAMPLES | 2 << 4];
+            bytes.extend(samples.iter().flat_map(|x| x.to_le_bytes()));
+            keep(bytes, &mut best);
+        }
+        Ok(best.unwrap_or_default())
+    }
+
+    /// The samples of a block of so many rows.
+    ///
+    /// # Errors
+    /// If the bytes are none that a writer of the same accuracy and as many rows can have written, as far as this shows.
+    pub fn decode(&self, bytes: &[u8], rows: usize) -> Result<Vec<f64>, Error> {
+        self.decode_with(bytes, rows, &[])
+    }
+
+    /// As [`decode`](Self::decode), for a block of [`encode_with`](Self::encode_with) with the same other columns.
+    ///
+    /// # Errors
+    /// As [`decode`](Self::decode), or if a column has another number of rows.
+    pub fn decode_with(&self, bytes: &[u8], rows: usize, others: &[&[f64]]) -> Result<Vec<f64>, Error> {
+        check_rows(rows, others)?;
+        if rows == 0 {
+            return match bytes.len() {
+                0 => Ok(Vec::new()),
+                left => Err(CodecError::TrailingBits { left: 8 * left }.into()),
+            };
+        }
+        let mut bytes = Bytes(bytes);
+        let head = self.read_head(&mut bytes, rows)?;
+        let rest = bytes.0;
+        let Some(grid) = head.grid else {
+            return Ok(match head.coding {
+                Coding::Raw => raw_samples(rest, rows)?,
+                _ => from_pco_bytes::<f64>(rest, rows)?,
+            });
+        };
+        let indices = match head.coding {
+            Coding::Models => {
+                if head.joint && others.is_empty() {
+                    return Err(invalid("block", "joint", "the other columns that it was written with").into());
+                }
+                let others = head.joint.then(|| Others::new(others));
+                read_models(rest, rows, &grid, others.as_ref())?
+            }
+            _ => from_pco_bytes::<i64>(rest, rows)?,
+        };
+        let mut samples: Vec<f64> = indices.into_iter().map(|index| grid.value(index)).collect();
+        for (row, sample) in head.exceptions {
+            samples[row] = sample;
+        }
+        Ok(samples)
+    }
+
+    /// The grid that the samples want; `None` if only their own bits will do.
+    fn grid(&self, samples: &[f64]) -> Option<Grid> {
+        let finite = || samples.iter().copied().filter(|x| x.is_finite());
+        let first = finite().next()?;
+        if let Accuracy::Within(config) = self.accuracy
+            && let Some(period) = config.period()
+        {
+            return Some(Grid::circle(&config, period));
+        }
+        let lossless = self.accuracy == Accuracy::Lossless;
+        // Only a lossless block tells the two zeros apart.
+        let ordinary: Vec<f64> = finite()
+            .filter(|x| !lossless || x.to_bits() != (-0.0_f64).to_bits())
+            .map(|x| x + 0.0)
+            .collect();
+        Grid::decimal(&ordinary, self.delta()).or_else(|| match self.accuracy {
+            Accuracy::Lossless => None,
+            Accuracy::Within(config) => {
+                let anchor = if samples.len() >= ANCHORED_ROWS { first } else { 0.0 };
+                Some(Grid::line(config.delta(), anchor))
+            }
+        })
+    }
+
+    /// Whether a reconstruction keeps the bound.
+    fn is_within(&self, value: f64, sample: f64) -> bool {
+        match self.accuracy {
+            Accuracy::Lossless => value.to_bits() == sample.to_bits(),
+            Accuracy::Within(config) => match config.period() {
+                None => (value - sample).abs() <= config.delta(),
+                Some(period) => {
+                    let turned = sample.rem_euclid(period);
+                    let straight = (value - turned).abs();
+                    straight.min((period - straight).abs()) <= config.delta()
+                }
+            },
+        }
+    }
+
+    /// Indices, those of exceptions repeating the last one, and the exceptions.
+    fn indices(&self, grid: &Grid, samples: &[f64]) -> (Vec<i64>, Vec<(usize, f64)>) {
+        let mut exceptions = Vec::new();
+        let mut indices = Vec::with_capacity(samples.len());
+        let mut last = None;
+        for (row, sample) in samples.iter().enumerate() {
+            let near = last.unwrap_or(0);
+            match grid
+                .index(*sample, near)
+                .filter(|index| self.is_within(grid.value(*index), *sample))
+            {
+                Some(index) => last = Some(index),
+                None => exceptions.push((row, *sample)),
+            }
+            // Before the first ordinary sample, its index is not known yet.
+            indices.push(last);
+        }
+        let first = indices.iter().find_map(|index| *index).unwrap_or(0);
+        (indices.into_iter().map(|index| index.unwrap_or(first)).collect(), exceptions)
+    }
+
+    fn read_head(&self, bytes: &mut Bytes<'_>, rows: usize) -> Result<Head, CodecError> {
+        let [head] = bytes.array()?;
+        let kind = head & 15;
+        let coding = match (head >> 4 & 3, kind) {
+            (0, 0..SAMPLES) => Coding::Models,
+            (1, _) => Coding::Pco,
+            (2, SAMPLES) => Coding::Raw,
+            _ => return Err(invalid("head", head, "a grid and a coding that belong together")),
+        };
+        let [second] = if head & 128 == 0 { [0] } else { bytes.array()? };
+        if second > 7 || (head & 128 != 0 && second == 0) || (kind == SAMPLES && head & 192 != 0) {
+            return Err(invalid("second byte", second, "exceptions, steps or an anchor, and a grid that has them"));
+        }
+        let grid = match (kind, self.accuracy) {
+            (SAMPLES, _) => None,
+            (decimals @ 0..DECIMALS, _) if second & 2 == 0 => {
+                let width = Grid::width(self.delta(), crate::packet::TENS[usize::from(decimals)]);
+                let width = width.ok_or_else(|| invalid("decimals", decimals, "a grid not finer than the samples"))?;
+                Some(Grid::Decimal { decimals, width })
+            }
+            (decimals @ 0..DECIMALS, _) => Some(Grid::Stepped {
+                decimals,
+                unit: match i64::try_from(bytes.varint()?) {
+                    Ok(unit @ 1..) => unit,
+                    _ => return Err(invalid("unit", "too large", "1 to 2^63")),
+                },
+                origin: unzigzag(bytes.varint()?),
+            }),
+            (LINE, Accuracy::Within(config)) => {
+                let anchor = if second & 4 == 0 {
+                    0.0
+                } else {
+                    f64::from_le_bytes(bytes.array()?)
+                };
+                if !anchor.is_finite() {
+                    return Err(invalid("anchor", anchor, "a finite number"));
+                }
+                Some(Grid::line(config.delta(), anchor))
+            }
+            (CIRCLE, Accuracy::Within(config)) => match config.period() {
+                Some(period) => Some(Grid::circle(&config, period)),
+                None => return Err(invalid("grid", "circle", "the grid of a line")),
+            },
+            _ => return Err(invalid("grid", kind, "one of the agreed accuracy")),
+        };
+        let mut exceptions = Vec::new();
+        if second & 1 == 1 {
+            let count = bytes.varint()?;
+            let mut row = 0_u64;
+            for i in 0..count {
+                row = row.saturating_add(bytes.varint()?).saturating_add(u64::from(i > 0));
+                if row >= rows as u64 {
+                    return Err(invalid("exception", row, "a row of the block"));
+                }
+                exceptions.push((row as usize, f64::from_le_bytes(bytes.array()?)));
+            }
+        }
+        Ok(Head {
+            grid,
+            coding,
+            joint: head & 64 != 0,
+            exceptions,
+        })
+    }
+}
+
+fn check_rows(rows: usize, others: &[&[f64]]) -> Result<(), ArgumentError> {
+    match others.iter().find(|other| other.len() != rows) {
+        Some(other) => Err(ArgumentError::new("others", other.len(), format!("{rows} rows"))),
+        None => Ok(()),
+    }
+}
+
+fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &[(usize, f64)], bytes: &mut Vec<u8>) {
+    let (kind, own) = match grid {
+        Grid::Decimal { decimals, .. } => (*decimals, 0),
+        Grid::Stepped { decimals, .. } => (*decimals, 2),
+        Grid::Line { anchor, .. } => (LINE, if *anchor == 0.0 { 0 } else { 4 }),
+        Grid::Circle { .. } => (CIRCLE, 0),
+    };
+    let coding = match coding {
+        Coding::Models => 0,
+        Coding::Pco => 1,
+        Coding::Raw => 2,
+    };
+    let second = own | u8::from(!exceptions.is_empty());
+    bytes.push(kind | coding << 4 | u8::from(joint) << 6 | u8::from(second != 0) << 7);
+    if second != 0 {
+        bytes.push(second);
+    }
+    grid.write(bytes);
+    if !exceptions.is_empty() {
+        push_varint(bytes, exceptions.len() as u64);
+        let mut next = 0;
+        for (row, sample) in exceptions {
+            push_varint(bytes, (row - next) as u64);
+            bytes.extend_from_slice(&sample.to_le_bytes());
+            next = row + 1;
+        }
+    }
+}
+
+/// Differences of other columns from row to row, in units of their mean size: the same numbers at both ends.
+struct Others<'a> {
+    columns: Vec<(&'a [f64], f64)>,
+}
+
+impl<'a> Others<'a> {
+    fn new(others: &[&'a [f64]]) -> Self {
+        let columns = others.iter().take(JOINT_COLUMNS).map(|column| {
+            let sizes = column.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+            let (mut sum, mut count) = (0.0, 0.0);
+            for size in sizes.filter(|size| *size > 0.0 && *size < 1e100) {
+                sum += size;
+                count += 1.0;
+            }
+            (*column, if sum > 0.0 { count / sum } else { 0.0 })
+        });
+        Self {
+            columns: columns.collect(),
+        }
+    }
+
+    fn at(&self, row: usize) -> [f64; JOINT_COLUMNS] {
+        let mut found = [0.0; JOINT_COLUMNS];
+        for (found, (column, scale)) in found.iter_mut().zip(&self.columns) {
+            let step = (column[row] - column[row - 1]) * scale;
+            // What is not finite says nothing; the clamp bounds what a wild value does to least squares.
+            *found = if step.is_finite() { step.clamp(-1e6, 1e6) } else { 0.0 };
+        }
+        found
+    }
+}
+
+fn with_models(
+    grid: &Grid,
+    indices: &[i64],
+    exceptions: &[(usize, f64)],
+    others: Option<&Others<'_>>,
+) -> Result<Vec<u8>, CodecError> {
+    let mut bytes = Vec::with_capacity(64 + indices.len() / 2);
+    write_head(grid, Coding::Models, others.is_some(), exceptions, &mut bytes);
+    let mut writer = Writer::new(bytes);
+    let first = indices.first().copied().unwrap_or(0);
+    let length = u64::BITS - zigzag(first).leading_zeros();
+    writer.raw(u64::from(length), FIRST_LENGTH);
+    writer.raw(zigzag(first), length);
+    let mut model = Model::new(indices.len(), first, grid.cells(), others.is_some());
+    for (row, index) in indices.iter().enumerate().skip(1) {
+        let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
+        model.code(&mut writer, Some(*index), steps)?;
+    }
+    Ok(writer.finish())
+}
+
+fn read_models(bytes: &[u8], rows: usize, grid: &Grid, others: Option<&Others<'_>>) -> Result<Vec<i64>, CodecError> {
+    let mut reader = Reader::new(bytes);
+    let length = reader.raw(0, FIRST_LENGTH) as u32;
+    let first = unzigzag(reader.raw(0, length));
+    if first.unsigned_abs() > model::LARGEST as u64 {
+        return Err(invalid("first index", first, "at most 2^46 in size"));
+    }
+    let mut indices = vec![first];
+    let mut model = Model::new(rows, first, grid.cells(), others.is_some());
+    for row in 1..rows {
+        let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
+        indices.push(model.code(&mut reader, None, steps)?);
+        if reader.overran() {
+            break;
+        }
+    }
+    reader.finish()?;
+    Ok(indices)
+}
+
+fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, CodecError> {
+    let (samples, rest) = bytes.as_chunks::<8>();
+    if samples.len() != rows || !rest.is_empty() {
+        return Err(invalid("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
+    }
+    Ok(samples.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
+}
+
+/// Numbers of a pco stream: as many as rows, and nothing after them.
+fn from_pco_bytes<T: pco::data_types::Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, CodecError> {
+    let mut numbers = vec![T::default(); rows];
+    let mut room = numbers.as_mut_slice();
+    let (file, mut rest) = FileDecompressor::new(bytes).map_err(from_pco)?;
+    while let DecompressorItem::Chunk(mut chunk) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)? {
+        let count = chunk.n();
+        let (next, later) = room
+            .split_at_mut_checked(count)
+            .ok_or_else(|| from_pco(format!("{count} rows more")))?;
+        chunk.read(next).map_err(from_pco)?;
+        (room, rest) = (later, chunk.into_src());
+    }
+    // The footer of pco is one byte.
+    if !room.is_empty() || rest.len() != 1 {
+        return Err(from_pco(format!("{} rows too few, {} bytes left", room.len(), rest.len())));
+    }
+    Ok(numbers)
+}

@@ -1,0 +1,182 @@
+//! Blocks: the bound for wild samples, exact samples, damage, other columns.
+
+use super::common::mixed;
+use fewbits_adaptive::{BlockCodec, Config, Effort};
+use proptest::prelude::*;
+
+const EFFORTS: [Effort; 2] = [Effort::Thorough, Effort::Fast];
+
+fn distance(config: &Config, value: f64, sample: f64) -> f64 {
+    match config.period() {
+        None => (value - sample).abs(),
+        Some(period) => {
+            let straight = (value - sample.rem_euclid(period)).abs();
+            straight.min((period - straight).abs())
+        }
+    }
+}
+
+fn check(config: Config, samples: &[f64]) -> usize {
+    let mut size = 0;
+    for effort in EFFORTS {
+        let codec = BlockCodec::new(config).with_effort(effort);
+        let bytes = codec.encode(samples).unwrap();
+        let values = codec.decode(&bytes, samples.len()).unwrap();
+        assert_eq!(values.len(), samples.len());
+        for (value, sample) in values.iter().zip(samples) {
+            if sample.is_finite() {
+                assert!(distance(&config, *value, *sample) <= config.delta(), "{sample}: {value}");
+            } else {
+                assert_eq!(value.to_bits(), sample.to_bits());
+            }
+        }
+        size = size.max(bytes.len());
+    }
+    size
+}
+
+fn wild() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => -10.0..10.0_f64,
+        2 => (-300..300_i32, -1.0..1.0_f64).prop_map(|(e, m)| m * 10.0_f64.powi(e)),
+        1 => any::<f64>(),
+        1 => prop_oneof![Just(0.0), Just(-0.0), Just(f64::MAX), Just(f64::MIN), Just(5e-324), Just(f64::NAN), Just(f64::INFINITY)],
+        3 => (-50..50_i32).prop_map(|i| f64::from(i) * 0.25),
+        3 => (-5000..5000_i32).prop_map(|i| f64::from(i) / 1000.0),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(4), ..ProptestConfig::default() })]
+
+    #[test]
+    fn bound_holds_for_any_samples(samples in prop::collection::vec(wild(), 0..80), exponent in -300..300_i32, near in any::<bool>()) {
+        let delta = if near { 0.125 } else { 10.0_f64.powi(exponent) };
+        check(Config::new(delta).unwrap(), &samples);
+        check(Config::exact(2.0 * delta).unwrap(), &samples);
+    }
+
+    #[test]
+    fn bound_holds_for_decimals_at_any_delta(digits in prop::collection::vec(-9999..9999_i32, 1..80), delta in 1e-5..100.0_f64, power in 0..6_u32) {
+        let ten = f64::from(10_u32.pow(power));
+        let samples: Vec<f64> = digits.iter().map(|d| f64::from(*d) / ten).collect();
+        check(Config::new(delta).unwrap(), &samples);
+        // A whole number of steps is where rounding could lose a neighbour.
+        check(Config::new((delta / 5.0).ceil() / ten).unwrap(), &samples);
+        check(Config::new(0.5 * (delta / 5.0).ceil() / ten).unwrap(), &samples);
+    }
+
+    #[test]
+    fn bound_holds_on_any_circle(samples in prop::collection::vec(wild(), 1..60), delta in 0.001..400.0_f64) {
+        check(Config::new(delta).unwrap().circular(360.0).unwrap(), &samples);
+    }
+
+    #[test]
+    fn bound_holds_for_recorded_traits(seed in any::<u64>(), delta in 0.0001..10.0_f64) {
+        check(Config::new(delta).unwrap(), &mixed(seed, 1500));
+    }
+
+    #[test]
+    fn lossless_blocks_return_every_bit(samples in prop::collection::vec(wild(), 0..80), round in any::<bool>()) {
+        let samples: Vec<f64> = samples.into_iter().map(|x| if round { (x * 100.0).round() / 100.0 } else { x }).collect();
+        for effort in EFFORTS {
+            let codec = BlockCodec::lossless().with_effort(effort);
+            let values = codec.decode(&codec.encode(&samples).unwrap(), samples.len()).unwrap();
+            prop_assert!(values.iter().zip(&samples).all(|(value, sample)| value.to_bits() == sample.to_bits()));
+        }
+    }
+
+    #[test]
+    fn any_bytes_give_samples_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..60), rows in 0..300_usize, head in 0..16_u8, joint in any::<bool>()) {
+        let other = vec![1.0; rows];
+        let columns: &[&[f64]] = if joint { &[&other] } else { &[] };
+        let mut with_head = bytes.clone();
+        if let Some(first) = with_head.first_mut() {
+            *first = *first & 0xF0 | head;
+        }
+        let line = Config::new(0.1).unwrap();
+        for codec in [BlockCodec::new(line), BlockCodec::new(line.circular(360.0).unwrap()), BlockCodec::lossless()] {
+            if let Ok(samples) = codec.decode_with(&with_head, rows, columns) {
+                prop_assert_eq!(samples.len(), rows);
+            }
+        }
+    }
+}
+
+/// Cut short, lengthened, with a flipped bit or of another number of rows: the stated number of samples or an error, no panic. An
+/// arithmetic code has no redundancy, so that only a container's checksum can tell all of these apart.
+#[test]
+fn damaged_blocks_give_the_stated_rows_or_an_error() {
+    let samples: Vec<f64> = mixed(3, 500).iter().map(|x| (x * 1000.0).round() / 1000.0).collect();
+    let codec = BlockCodec::new(Config::new(0.05).unwrap());
+    for effort in EFFORTS {
+        let bytes = codec.with_effort(effort).encode(&samples).unwrap();
+        assert!(codec.decode(&[bytes.as_slice(), &[0]].concat(), 500).is_err());
+        assert!(codec.decode(&[], 500).is_err() && codec.decode(&bytes, 0).is_err());
+        let shortened = (0..bytes.len()).map(|end| (bytes[..end].to_vec(), 500));
+        let flipped = (0..8 * bytes.len()).map(|bit| {
+            let mut flipped = bytes.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            (flipped, 500)
+        });
+        let counted = [1, 10, 499, 501, 5000].map(|rows| (bytes.clone(), rows));
+        for (damaged, rows) in shortened.chain(flipped).chain(counted) {
+            if let Ok(values) = codec.decode(&damaged, rows) {
+                assert_eq!(values.len(), rows);
+            }
+        }
+    }
+}
+
+/// A number below 4096 that is hard to predict.
+fn scattered(n: u32) -> u32 {
+    let mut z = n.wrapping_add(1).wrapping_mul(0x9E37_79B9);
+    z = (z ^ z >> 16).wrapping_mul(0x85EB_CA6B);
+    z = (z ^ z >> 13).wrapping_mul(0xC2B2_AE35);
+    (z ^ z >> 16) >> 20
+}
+
+/// A cell holds as many of the instrument's steps as lie within the bound: 2 delta = 2.5 steps is three of them.
+#[test]
+fn decimal_cells_hold_every_neighbour_within_the_bound() {
+    let samples: Vec<f64> = (0..2000_u32).map(|n| f64::from(scattered(n)) / 10.0).collect();
+    let size = |delta: f64| check(Config::new(delta).unwrap(), &samples) as f64 * 8.0 / 2000.0;
+    // 4096 equally likely values: 12 bits less log2(3), and a few per cent for learning.
+    let expected = 12.0 - 3.0_f64.log2();
+    assert!((size(0.125) - expected).abs() < 0.4, "{}", size(0.125));
+}
+
+/// A column that follows another costs almost nothing beside it; one that does not, at most 1 % more than alone.
+#[test]
+fn joint_columns_help_or_cost_nothing() {
+    let codec = BlockCodec::new(Config::new(0.02).unwrap());
+    let (driver, unrelated) = (mixed(5, 3000), mixed(77, 3000));
+    let follower: Vec<f64> = driver.iter().map(|x| 3.0 - 0.5 * x).collect();
+    let read = |samples: &[f64]| codec.decode(&codec.encode(samples).unwrap(), samples.len()).unwrap();
+    for (other, most) in [(read(&driver), 0.6), (read(&unrelated), 1.01)] {
+        let alone = codec.encode(&follower).unwrap();
+        let joint = codec.encode_with(&follower, &[&other]).unwrap();
+        assert!((joint.len() as f64) < most * alone.len() as f64, "{} {}", joint.len(), alone.len());
+        let values = codec.decode_with(&joint, 3000, &[&other]).unwrap();
+        assert!(
+            values
+                .iter()
+                .zip(&follower)
+                .all(|(value, sample)| (value - sample).abs() <= 0.02)
+        );
+    }
+    assert!(codec.encode_with(&follower, &[&driver[1..]]).is_err());
+}
+
+/// The format is fixed: another machine, or a change of the models, must not write other bytes unnoticed.
+#[test]
+fn blocks_are_the_same_bytes_everywhere() {
+    let samples: Vec<f64> = (0..4000_u32)
+        .map(|n| f64::from(n % 50) + f64::from((n.wrapping_mul(2_654_435_761) >> 28) % 5) * 0.25)
+        .collect();
+    let bytes = BlockCodec::new(Config::new(0.3).unwrap()).encode(&samples).unwrap();
+    let digest = bytes
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
+    assert_eq!((bytes.len(), digest), (564, 0x1f8b_64c6_bd53_6d9b));
+}
