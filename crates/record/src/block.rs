@@ -85,18 +85,15 @@ fn encode_column(
     let mut specials: Vec<Option<Special>> = cells.iter().map(|cell| Special::of(*cell)).collect();
     let has_value: Vec<bool> = specials.iter().map(Option::is_none).collect();
     let samples = aligned(cells, &has_value);
-    let mut coded = codec::encode(&samples, &target, &[], effort);
-    let mut others = Vec::new();
-    if coded.id == CodecId::Adaptive && effort == Effort::Thorough {
-        let related = related::columns(cells, before);
-        if !related.is_empty() {
-            let values: Vec<Vec<f64>> = related.iter().map(|i| aligned(&before[*i], &has_value)).collect();
-            let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
-            let joint = codec::encode(&samples, &target, &values, effort);
-            if joint.cost() + 1 + 2 * related.len() < coded.cost() {
-                (coded, others) = (joint, related);
-            }
-        }
+    let mut others = match effort {
+        Effort::Thorough => related::columns(cells, before),
+        _ => Vec::new(),
+    };
+    let values: Vec<Vec<f64>> = others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
+    let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    let coded = codec::encode(&samples, &target, &values, effort);
+    if !coded.uses_others {
+        others.clear();
     }
     // Samples whose restored value breaks the promise are stored whole.
     let mut values = samples.iter().zip(&coded.restored);

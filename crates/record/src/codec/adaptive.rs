@@ -42,6 +42,11 @@ pub(super) fn encode(samples: &[f64], target: &Target, others: &[&[f64]], effort
     }
 }
 
+/// Whether the bytes were predicted from other columns: bit 6 of a block's first byte.
+pub(super) fn uses_others(bytes: &[u8]) -> bool {
+    bytes.first().is_some_and(|head| head & 0x40 != 0)
+}
+
 pub(super) fn decode(bytes: &[u8], count: usize, target: &Target, others: &[&[f64]]) -> Result<Vec<f64>, Damage> {
     let codec = codec(target).ok_or(Damage::Content("bound"))?;
     codec

@@ -59,6 +59,8 @@ pub(crate) struct Coded {
     pub(crate) restored: Vec<f64>,
     /// How many of them break the promise; the container stores those samples whole.
     pub(crate) broken: usize,
+    /// Whether other columns are needed to decode them.
+    pub(crate) uses_others: bool,
 }
 
 /// Bytes of a sample that the container stores whole.
@@ -72,18 +74,19 @@ impl Coded {
         let broken = pairs.filter(|(sample, value)| !target.holds(**sample, **value)).count();
         Some(Self {
             id,
+            uses_others: id == CodecId::Adaptive && adaptive::uses_others(&bytes),
             bytes,
             restored,
             broken,
         })
     }
 
-    pub(crate) fn cost(&self) -> usize {
+    fn cost(&self) -> usize {
         self.bytes.len() + REPAIR_BYTES * self.broken
     }
 }
 
-/// The smallest code of the samples, all finite. Every candidate is decoded before it is compared.
+/// A small code of the samples, all finite. It was decoded once, so that what it restores is known.
 ///
 /// `others`: the same rows of other columns, as a reader will have restored them; NaN where they have no value.
 pub(crate) fn encode(samples: &[f64], target: &Target, others: &[&[f64]], effort: Effort) -> Coded {
@@ -95,6 +98,7 @@ pub(crate) fn encode(samples: &[f64], target: &Target, others: &[&[f64]], effort
         bytes: plain::raw(samples),
         restored: samples.to_vec(),
         broken: 0,
+        uses_others: false,
     };
     constant.unwrap_or_else(|| {
         adaptive::encode(samples, target, others, effort)
