@@ -90,6 +90,9 @@ pub(crate) struct PackOptions {
     /// The recording. Without it standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+    /// Some ten times faster, at about 1.2 times the bits.
+    #[arg(long)]
+    pub(crate) fast: bool,
     /// Go on with the recording in `--output`, with its columns and bounds.
     #[arg(long, requires = "output", conflicts_with_all = ["bound", "rows_per_block"])]
     pub(crate) append: bool,

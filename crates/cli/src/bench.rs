@@ -7,7 +7,7 @@ use crate::arguments::BenchOptions;
 use crate::error::Error;
 use crate::pack::{Counted, schema};
 use crate::{Ending, output};
-use fewbits_record::{Bound, Playback, Recorder, Schema};
+use fewbits_record::{Bound, Effort, Playback, Recorder, Schema};
 use pco::ChunkConfig;
 use pco::standalone::{simple_compress, simple_decompress};
 use serde::Serialize;
@@ -41,14 +41,20 @@ fn line(codec: &'static str, promise: &'static str, bytes: usize, samples: usize
 
 type Cells = Vec<Vec<Option<f64>>>;
 
-fn ours(codec: &'static str, schema: Schema, ticks: &[i64], columns: &Cells) -> Result<Line, fewbits_record::Error> {
+fn ours(
+    codec: &'static str,
+    effort: Effort,
+    schema: Schema,
+    ticks: &[i64],
+    columns: &Cells,
+) -> Result<Line, fewbits_record::Error> {
     let samples = columns.len() * ticks.len();
     let start = Instant::now();
     let sink = Counted {
         sink: Vec::new(),
         bytes: 0,
     };
-    let mut recorder = Recorder::new(sink, schema);
+    let mut recorder = Recorder::new(sink, schema).with_effort(effort);
     let mut row = Vec::with_capacity(columns.len());
     for (i, tick) in ticks.iter().enumerate() {
         row.clear();
@@ -129,9 +135,14 @@ pub(crate) fn run(options: &BenchOptions) -> Result<Ending, Error> {
         .iter()
         .map(|cells| cells.iter().flatten().copied().filter(|x| x.is_finite()).collect())
         .collect();
-    let mut lines = vec![ours("fewbits", schema.clone(), &ticks, &columns).map_err(Error::recording(&file))?];
+    let mut lines = Vec::new();
+    for (name, effort) in [("fewbits", Effort::Thorough), ("fewbits --fast", Effort::Fast)] {
+        lines.push(ours(name, effort, schema.clone(), &ticks, &columns).map_err(Error::recording(&file))?);
+    }
     if let Ok(one) = schema.clone().with_rows_per_block(ticks.len()) {
-        lines.push(ours("fewbits, one block", one, &ticks, &columns).map_err(Error::recording(&file))?);
+        lines.push(
+            ours("fewbits, one block", Effort::Thorough, one, &ticks, &columns).map_err(Error::recording(&file))?,
+        );
     }
     if let Some(indices) = indices(&schema, &finite) {
         let (bytes, encode, decode) = packed(&indices)?;

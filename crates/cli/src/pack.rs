@@ -4,7 +4,7 @@ use crate::arguments::{BoundOptions, PackOptions, TableOptions};
 use crate::error::Error;
 use crate::input::{Survey, Table};
 use crate::{Ending, bounds, output};
-use fewbits_record::{Bound, Recorder, Schema};
+use fewbits_record::{Bound, Effort, Recorder, Schema};
 use serde::Serialize;
 use std::io::{Write, stderr};
 
@@ -52,10 +52,13 @@ fn fill<W: Write>(table: &mut Table, recorder: &mut Recorder<W>, file: &str) -> 
 
 /// Runs the task.
 pub(crate) fn run(options: &PackOptions) -> Result<Ending, Error> {
+    let effort = if options.fast { Effort::Fast } else { Effort::Thorough };
     let (rows, bytes, columns) = match (&options.output, options.append) {
         (Some(path), true) => {
             let file = path.display().to_string();
-            let mut recorder = Recorder::resume(path).map_err(Error::recording(&file))?;
+            let mut recorder = Recorder::resume(path)
+                .map_err(Error::recording(&file))?
+                .with_effort(effort);
             let mut table = Table::open(&options.table)?;
             let columns = recorder.schema().columns();
             if !columns.iter().map(fewbits_record::Column::name).eq(table.names.iter()) {
@@ -79,7 +82,7 @@ pub(crate) fn run(options: &PackOptions) -> Result<Ending, Error> {
             let (mut table, schema) = schema(&options.table, &options.bounds)?;
             let (sink, file) = output::open_binary(path.as_deref())?;
             let columns = schema.columns().len();
-            let mut recorder = Recorder::new(Counted { sink, bytes: 0 }, schema);
+            let mut recorder = Recorder::new(Counted { sink, bytes: 0 }, schema).with_effort(effort);
             let rows = fill(&mut table, &mut recorder, &file)?;
             let counted = recorder.finish().map_err(Error::recording(&file))?;
             (rows, counted.bytes, columns)

@@ -6,16 +6,22 @@
 //!            | varint 2 flags + 1, [rows varint], time, [descriptor per column]
 //!              then columns
 //! flags     := time kind (2 bits), rows follow (1), descriptors follow (1)
-//! descriptor:= codec id (4 bits), runs follow (1), a bound of its own follows (1)        plain: codec 2, nothing follows
-//! column    := [bound, 3 bytes] [runs] [length varint, but for the last column] bytes
+//! descriptor:= codec id (4 bits), runs follow (1), a bound of its own follows (1), others follow (1)       plain: codec 2, nothing follows
+//! column    := [bound, 3 bytes] [runs] [others] [length varint, but for the last column] bytes
+//! others    := number - 1 (byte), how many columns before this one each stands (varints)
+//!
+//! `others` are columns whose restored cells the codec used for the prediction; their rows are those in which this column has values.
 //! ```
 
-use crate::codec::{self, CodecId};
+use crate::bound::Bound;
+use crate::codec::{self, CodecId, JOINT_COLUMNS};
 use crate::error::{Damage, Error};
 use crate::header::Header;
-use crate::runs::{self, Special};
+use crate::related;
+use crate::runs::{self, Run, Special};
 use crate::time::{self, TimeKind};
 use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint};
+use fewbits_adaptive::Effort;
 
 /// The cells of one column; `None` is a gap.
 pub type Cells = Vec<Option<f64>>;
@@ -43,6 +49,8 @@ const ROWS_FOLLOW: u64 = 4;
 const DESCRIPTORS_FOLLOW: u64 = 8;
 const RUNS_FOLLOW: u8 = 0x10;
 const BOUND_FOLLOWS: u8 = 0x20;
+const OTHERS_FOLLOW: u8 = 0x40;
+const DESCRIPTOR_BITS: u8 = 15 | RUNS_FOLLOW | BOUND_FOLLOWS | OTHERS_FOLLOW;
 const PLAIN: u8 = CodecId::Adaptive as u8;
 
 /// The next smaller double of 12 bits of mantissa, as stored in three bytes.
@@ -52,23 +60,41 @@ pub(crate) fn rounded_down(bound: f64) -> f64 {
 
 struct CodedColumn {
     descriptor: u8,
-    /// Bound and runs.
+    /// Bound, runs and others.
     head: Vec<u8>,
     bytes: Vec<u8>,
-    restored: Vec<Option<f64>>,
+    restored: Cells,
 }
 
+/// The cells of another column in the rows in which a column has values; NaN for gaps.
+fn aligned(cells: &[Option<f64>], has_value: &[bool]) -> Vec<f64> {
+    let kept = cells.iter().zip(has_value).filter(|(_, kept)| **kept);
+    kept.map(|(cell, _)| cell.unwrap_or(f64::NAN)).collect()
+}
+
+/// One column of a block. `before` are the columns before it as a reader will restore them.
 fn encode_column(
     header: &Header,
-    column: usize,
     cells: &[Option<f64>],
     own: Option<f64>,
+    before: &[Cells],
+    effort: Effort,
 ) -> Result<CodedColumn, Error> {
+    let column = before.len();
     let target = header.target(column, own);
     let mut specials: Vec<Option<Special>> = cells.iter().map(|cell| Special::of(*cell)).collect();
-    let finite = cells.iter().zip(&specials).filter(|(_, special)| special.is_none());
-    let samples: Vec<f64> = finite.filter_map(|(cell, _)| *cell).collect();
-    let coded = codec::encode(&samples, &target);
+    let has_value: Vec<bool> = specials.iter().map(Option::is_none).collect();
+    let samples = aligned(cells, &has_value);
+    let mut others = match effort {
+        Effort::Thorough => related::columns(cells, before),
+        _ => Vec::new(),
+    };
+    let values: Vec<Vec<f64>> = others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
+    let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    let coded = codec::encode(&samples, &target, &values, effort);
+    if !coded.uses_others {
+        others.clear();
+    }
     // Samples whose restored value breaks the promise are stored whole.
     let mut values = samples.iter().zip(&coded.restored);
     for special in specials.iter_mut().filter(|special| special.is_none()) {
@@ -78,17 +104,6 @@ fn encode_column(
             *special = Some(Special::Whole(sample.to_bits()));
         }
     }
-    let mut restored = coded.restored.iter();
-    let restored = specials.iter().map(|special| match special {
-        None => restored.next().copied(),
-        Some(special) => {
-            if special.has_value() {
-                restored.next();
-            }
-            special.cell()
-        }
-    });
-    let restored = restored.collect();
     let mut descriptor = coded.id as u8;
     let mut head = Vec::new();
     if let Some(bound) = own {
@@ -103,11 +118,18 @@ fn encode_column(
             source: error.into(),
         })?;
     }
+    if !others.is_empty() {
+        descriptor |= OTHERS_FOLLOW;
+        head.push((others.len() - 1) as u8);
+        others
+            .iter()
+            .for_each(|other| push_varint(&mut head, (column - other) as u64));
+    }
     Ok(CodedColumn {
         descriptor,
         head,
         bytes: coded.bytes,
-        restored,
+        restored: merged(&runs, &coded.restored, cells.len()),
     })
 }
 
@@ -117,12 +139,14 @@ pub(crate) fn encode(
     ticks: &[i64],
     columns: &[Cells],
     own_bounds: &[Option<f64>],
+    effort: Effort,
 ) -> Result<(Vec<u8>, Vec<Cells>), Error> {
-    let coded: Vec<CodedColumn> = columns
-        .iter()
-        .enumerate()
-        .map(|(i, cells)| encode_column(header, i, cells, own_bounds[i]))
-        .collect::<Result<_, _>>()?;
+    let (mut coded, mut restored) = (Vec::with_capacity(columns.len()), Vec::with_capacity(columns.len()));
+    for (cells, own) in columns.iter().zip(own_bounds) {
+        let mut column = encode_column(header, cells, *own, &restored, effort)?;
+        restored.push(std::mem::take(&mut column.restored));
+        coded.push(column);
+    }
     let (kind, time) = time::encode(ticks, &header.grid());
     let mut body = Vec::new();
     let plain = coded.iter().all(|column| column.descriptor == PLAIN);
@@ -143,14 +167,12 @@ pub(crate) fn encode(
         }
     }
     let last = coded.len() - 1;
-    let mut restored = Vec::with_capacity(coded.len());
     for (i, column) in coded.into_iter().enumerate() {
         body.extend(column.head);
         if i < last {
             push_varint(&mut body, column.bytes.len() as u64);
         }
         body.extend(column.bytes);
-        restored.push(column.restored);
     }
     Ok((framed(header, body), restored))
 }
@@ -225,46 +247,119 @@ pub(crate) fn decode(header: &Header, bytes: &[u8], wanted: impl Fn(usize) -> bo
         }
         ticks
     };
-    let mut block = Block {
-        ticks,
-        columns: Vec::with_capacity(columns),
-        share_bounds: Vec::with_capacity(columns),
-    };
+    let mut sections = Vec::with_capacity(columns);
     for (i, descriptor) in descriptors.into_iter().enumerate() {
-        let own = if descriptor & BOUND_FOLLOWS != 0 {
-            Some(read_bound(&mut body)?)
-        } else {
-            None
-        };
-        let runs = if descriptor & RUNS_FOLLOW != 0 {
-            runs::read(&mut body, rows)?
-        } else {
-            Vec::new()
-        };
-        let id = CodecId::from_byte(descriptor & 15)?;
-        let length = if i + 1 < columns {
-            body.count(body.0.len(), "length of a column")?
-        } else {
-            body.0.len()
-        };
-        let bytes = body.take(length)?;
-        let shared = matches!(header.schema.columns[i].bound, crate::Bound::ShareOfRange(_));
-        block
-            .share_bounds
-            .push(shared.then(|| own.unwrap_or(header.share_bounds[i])));
-        let mut cells = Vec::new();
-        if wanted(i) {
-            let without: usize = runs
-                .iter()
-                .filter(|run| !run.special.has_value())
-                .map(|run| run.length)
-                .sum();
-            let values = codec::decode(id, bytes, rows - without, &header.target(i, own))?;
-            cells = merged(&runs, &values, rows);
-        }
-        block.columns.push(cells);
+        sections.push(read_section(header, &mut body, i, descriptor, rows)?);
     }
-    Ok(block)
+    // Columns that a wanted one was predicted from are decoded too; they stand before it.
+    let mut needed: Vec<bool> = (0..columns).map(&wanted).collect();
+    for i in (0..columns).rev() {
+        if needed[i] {
+            sections[i].others.iter().for_each(|other| needed[*other] = true);
+        }
+    }
+    let mut decoded: Vec<Cells> = Vec::with_capacity(columns);
+    for (i, section) in sections.iter().enumerate() {
+        let cells = if needed[i] {
+            section.cells(header, &decoded, rows)?
+        } else {
+            Cells::new()
+        };
+        decoded.push(cells);
+    }
+    for (_, cells) in decoded.iter_mut().enumerate().filter(|(i, _)| !wanted(*i)) {
+        *cells = Cells::new();
+    }
+    Ok(Block {
+        ticks,
+        columns: decoded,
+        share_bounds: sections
+            .iter()
+            .enumerate()
+            .map(|(i, section)| section.share_bound(header, i))
+            .collect(),
+    })
+}
+
+/// The bytes of one column, taken apart.
+struct Section<'a> {
+    id: CodecId,
+    own: Option<f64>,
+    runs: Vec<Run>,
+    others: Vec<usize>,
+    bytes: &'a [u8],
+}
+
+fn read_section<'a>(
+    header: &Header,
+    body: &mut Bytes<'a>,
+    column: usize,
+    descriptor: u8,
+    rows: usize,
+) -> Result<Section<'a>, Damage> {
+    if descriptor & !DESCRIPTOR_BITS != 0 {
+        return Err(Damage::Content("descriptor"));
+    }
+    let id = CodecId::from_byte(descriptor & 15)?;
+    let own = if descriptor & BOUND_FOLLOWS != 0 {
+        Some(read_bound(body)?)
+    } else {
+        None
+    };
+    let runs = if descriptor & RUNS_FOLLOW != 0 {
+        runs::read(body, rows)?
+    } else {
+        Vec::new()
+    };
+    let mut others = Vec::new();
+    if descriptor & OTHERS_FOLLOW != 0 {
+        let count = usize::from(body.byte()?) + 1;
+        if count > JOINT_COLUMNS {
+            return Err(Damage::Content("number of other columns"));
+        }
+        for _ in 0..count {
+            let back = body.count(column, "another column")?;
+            others.push(
+                column
+                    .checked_sub(back)
+                    .filter(|_| back > 0)
+                    .ok_or(Damage::Content("another column"))?,
+            );
+        }
+    }
+    let is_last = column + 1 == header.schema.columns.len();
+    let length = if is_last {
+        body.0.len()
+    } else {
+        body.count(body.0.len(), "length of a column")?
+    };
+    Ok(Section {
+        id,
+        own,
+        runs,
+        others,
+        bytes: body.take(length)?,
+    })
+}
+
+impl Section<'_> {
+    fn cells(&self, header: &Header, before: &[Cells], rows: usize) -> Result<Cells, Damage> {
+        let mut has_value = vec![true; rows];
+        for run in self.runs.iter().filter(|run| !run.special.has_value()) {
+            has_value[run.start..run.start + run.length].fill(false);
+        }
+        let count = has_value.iter().filter(|has| **has).count();
+        let others: Vec<Vec<f64>> = self.others.iter().map(|i| aligned(&before[*i], &has_value)).collect();
+        let others: Vec<&[f64]> = others.iter().map(Vec::as_slice).collect();
+        let target = header.target(before.len(), self.own);
+        let values = codec::decode(self.id, self.bytes, count, &target, &others)?;
+        Ok(merged(&self.runs, &values, rows))
+    }
+
+    fn share_bound(&self, header: &Header, column: usize) -> Option<f64> {
+        let shared = matches!(header.schema.columns[column].bound, Bound::ShareOfRange(_));
+        shared.then(|| self.own.unwrap_or(header.share_bounds[column]))
+    }
 }
 
 fn read_bound(body: &mut Bytes<'_>) -> Result<f64, Damage> {
@@ -278,7 +373,7 @@ fn read_bound(body: &mut Bytes<'_>) -> Result<f64, Damage> {
 }
 
 /// Values with the special cells between them.
-fn merged(runs: &[runs::Run], values: &[f64], rows: usize) -> Vec<Option<f64>> {
+fn merged(runs: &[Run], values: &[f64], rows: usize) -> Cells {
     let mut cells = Vec::with_capacity(rows);
     let mut values = values.iter().copied();
     for run in runs {

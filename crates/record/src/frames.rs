@@ -16,6 +16,7 @@ use crate::error::{Damage, Error};
 use crate::header::Header;
 use crate::schema::Schema;
 use crate::wire::{Bytes, CHECK_BYTES, checksum};
+use fewbits_adaptive::Effort;
 use fewbits_numerics::ArgumentError;
 use std::collections::VecDeque;
 
@@ -28,7 +29,9 @@ const MAX_PIECES: usize = 256;
 /// Frames that are kept while the header is not whole.
 const MAX_WAITING: usize = 256;
 /// Share of a frame that is aimed at when the number of rows for the next trial is guessed.
-const FILLED: f64 = 0.95;
+const FILLED: f64 = 0.97;
+/// A frame that is this full is sent.
+const FULL: f64 = 0.93;
 
 /// Makes frames of rows, each as long as the link takes.
 #[derive(Debug)]
@@ -39,8 +42,7 @@ pub struct FrameWriter {
     ticks: Vec<i64>,
     columns: Vec<Cells>,
     ends: Vec<Option<(f64, f64)>>,
-    /// The most rows that are known to fit, and how many are tried next.
-    fits: usize,
+    /// Rows at which it is tried next whether they fill a frame.
     next_trial: usize,
 }
 
@@ -64,7 +66,6 @@ impl FrameWriter {
             ticks: Vec::new(),
             columns: vec![Vec::new(); schema.columns.len()],
             ends: vec![None; schema.columns.len()],
-            fits: 0,
             next_trial: 1,
             schema,
         })
@@ -118,12 +119,11 @@ impl FrameWriter {
             let rows = self.ticks.len().min(self.schema.rows_per_block);
             let bytes = self.encode(rows)?;
             if bytes.len() > self.max_bytes {
-                frames.push(self.largest(rows)?);
+                frames.push(self.largest(rows, bytes.len())?);
             } else if rows == self.schema.rows_per_block {
                 frames.push(bytes);
                 self.forget(rows);
             } else {
-                self.fits = rows;
                 let guess = rows as f64 * FILLED * self.max_bytes as f64 / bytes.len() as f64;
                 self.next_trial = (guess as usize).max(rows + 1);
                 break;
@@ -142,7 +142,7 @@ impl FrameWriter {
             let rows = self.ticks.len().min(self.schema.rows_per_block);
             let bytes = self.encode(rows)?;
             if bytes.len() > self.max_bytes {
-                frames.push(self.largest(rows)?);
+                frames.push(self.largest(rows, bytes.len())?);
             } else {
                 frames.push(bytes);
                 self.forget(rows);
@@ -151,39 +151,41 @@ impl FrameWriter {
         Ok(frames)
     }
 
-    /// The frame of the most rows that fit, fewer than `too_many`; those rows are done.
-    fn largest(&mut self, too_many: usize) -> Result<Vec<u8>, Error> {
-        let (mut fits, mut too_many) = (self.fits.min(too_many - 1), too_many);
-        let mut best = None;
-        while too_many - fits > 1 || best.is_none() {
-            // Known to fit, but its bytes are not at hand: encode it once more.
-            let rows = if too_many - fits > 1 {
-                fits.midpoint(too_many)
-            } else {
-                fits
-            };
-            if rows == 0 {
-                let expected = "enough for one row: allow longer frames, wider bounds or fewer columns";
-                return Err(ArgumentError::new("max_bytes", self.max_bytes, expected).into());
-            }
+    /// A frame of the first rows, fewer than `too_many`, that is nearly full; those rows are done.
+    ///
+    /// Bytes grow nearly in proportion to rows, so the next trial is where the proportion of the last one says.
+    fn largest(&mut self, too_many: usize, bytes_of_too_many: usize) -> Result<Vec<u8>, Error> {
+        let (mut fits, mut too_many, mut best) = (0, too_many, None::<Vec<u8>>);
+        let mut proportion = self.max_bytes as f64 / bytes_of_too_many as f64;
+        while too_many - fits > 1 {
+            let guess = (FILLED * proportion * too_many as f64) as usize;
+            let rows = guess.clamp(fits + 1, too_many - 1);
             let bytes = self.encode(rows)?;
-            if bytes.len() <= self.max_bytes {
+            let filled = bytes.len() as f64 / self.max_bytes as f64;
+            if filled <= 1.0 {
                 (fits, best) = (rows, Some(bytes));
-            } else if rows == fits {
-                // Encoding more rows may make fewer of them longer, where a share's bound changed: search from the start.
-                (fits, too_many) = (0, rows);
+                if filled >= FULL {
+                    break;
+                }
+                // Half of the way to the rows that do not fit.
+                proportion = 0.5 * (1.0 + rows as f64 / too_many as f64) / FILLED;
             } else {
                 too_many = rows;
+                proportion = 1.0 / filled;
             }
         }
+        let Some(frame) = best else {
+            let expected = "enough for one row: allow longer frames, wider bounds or fewer columns";
+            return Err(ArgumentError::new("max_bytes", self.max_bytes, expected).into());
+        };
         self.forget(fits);
-        Ok(best.unwrap_or_default())
+        Ok(frame)
     }
 
     fn forget(&mut self, rows: usize) {
         self.ticks.drain(..rows);
         self.columns.iter_mut().for_each(|cells| drop(cells.drain(..rows)));
-        (self.fits, self.next_trial) = (0, rows.max(1));
+        self.next_trial = rows.max(1);
     }
 
     fn share_bound(&self, column: usize) -> Option<f64> {
@@ -210,7 +212,7 @@ impl FrameWriter {
             .map(|i| crate::recorder::own_bound(self.share_bound(i)?, header.share_bounds[i]))
             .collect();
         let cells: Vec<Cells> = self.columns.iter().map(|cells| cells[..rows].to_vec()).collect();
-        Ok(block::encode(header, &self.ticks[..rows], &cells, &own)?.0)
+        Ok(block::encode(header, &self.ticks[..rows], &cells, &own, Effort::Thorough)?.0)
     }
 }
 

@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! special  := 0, kind byte, length varint, content, CRC-32 of header's checksum and all of it
-//! segment  := kind `I`: number of blocks, per column two f32 (low and high end of all its blocks), per block: length in bytes, rows,
-//!             first tick after the last block's last, span, per column two bytes (low and high in 255ths between the ends, outwards)
+//! segment  := kind `I`: number of blocks, per column two f32 (low and high end of all its blocks), per block: twice the length in bytes,
+//!             plus 1 if rows, distance and span are those of the block before, which then do not follow; rows, distance of the first
+//!             tick from the last block's last, span; per column two bytes (low and high in 255ths between the ends, outwards)
 //! footer   := kind `F`: number of segments, per segment: bytes of its blocks, its own bytes, rows, least and largest tick
 //!             then behind the checksum: length of the footer (4 bytes, little-endian), "fEnd"
 //! ```
@@ -207,16 +208,23 @@ pub(crate) fn push_segment(entries: &[Entry], columns: usize) -> Vec<u8> {
         content.extend(high.to_le_bytes());
         scales.push((f64::from(low), f64::from(high)));
     }
-    let mut last = 0_i64;
+    let (mut last, mut before) = (0_i64, None);
     for entry in entries {
-        push_varint(&mut content, entry.length);
-        push_varint(&mut content, entry.rows);
+        let distance = entry.ticks.0.wrapping_sub(last);
+        let shape = (entry.rows, distance, entry.ticks.1.wrapping_sub(entry.ticks.0));
+        let same = before == Some(shape);
+        push_varint(&mut content, 2 * entry.length + u64::from(same));
+        if !same {
+            push_varint(&mut content, entry.rows);
+        }
         if entry.rows == 0 {
             continue;
         }
-        push_varint(&mut content, zigzag(entry.ticks.0.wrapping_sub(last)));
-        push_varint(&mut content, entry.ticks.1.wrapping_sub(entry.ticks.0) as u64);
-        last = entry.ticks.1;
+        if !same {
+            push_varint(&mut content, zigzag(distance));
+            push_varint(&mut content, shape.2 as u64);
+        }
+        (last, before) = (entry.ticks.1, Some(shape));
         for (ends, scale) in entry.ends.iter().zip(&scales) {
             let levels = ends.map_or([1, 0], |(low, high)| [level_below(low, *scale), level_above(high, *scale)]);
             content.extend(levels);
@@ -235,14 +243,23 @@ pub(crate) fn read_segment(content: &[u8], columns: usize) -> Result<Vec<Entry>,
         let high = f64::from(f32::from_le_bytes(reader.array()?));
         scales.push((low, high));
     }
-    let (mut entries, mut last) = (Vec::with_capacity(count), 0_i64);
+    let (mut entries, mut last, mut before) = (Vec::with_capacity(count), 0_i64, None);
     for _ in 0..count {
-        let mut entry = Entry::damaged(reader.varint()?, columns);
-        entry.rows = reader.varint()?;
+        let head = reader.varint()?;
+        let mut entry = Entry::damaged(head >> 1, columns);
+        let shape = if head & 1 == 1 {
+            before.ok_or(Damage::Content("block like the one before"))?
+        } else {
+            match reader.varint()? {
+                0 => (0, 0, 0),
+                rows => (rows, reader.signed()?, reader.varint()? as i64),
+            }
+        };
+        entry.rows = shape.0;
         if entry.rows > 0 {
-            let first = last.wrapping_add(reader.signed()?);
-            entry.ticks = (first, first.wrapping_add(reader.varint()? as i64));
-            last = entry.ticks.1;
+            let first = last.wrapping_add(shape.1);
+            entry.ticks = (first, first.wrapping_add(shape.2));
+            (last, before) = (entry.ticks.1, Some(shape));
             for (ends, scale) in entry.ends.iter_mut().zip(&scales) {
                 let [low, high] = reader.array()?;
                 *ends = (low <= high).then(|| (level_value(low, *scale), level_value(high, *scale)));

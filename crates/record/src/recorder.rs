@@ -7,6 +7,7 @@ use crate::header::Header;
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::resume;
 use crate::schema::{Schema, TimeBase};
+use fewbits_adaptive::Effort;
 use fewbits_numerics::ArgumentError;
 use std::fs::File;
 use std::io::Write;
@@ -49,6 +50,7 @@ pub struct Recorder<W> {
     segment_start: u64,
     entries: Vec<Entry>,
     segments: Vec<Segment>,
+    effort: Effort,
     broken: bool,
 }
 
@@ -121,8 +123,15 @@ impl<W: Write> Recorder<W> {
             segment_start: 0,
             entries: Vec::new(),
             segments: Vec::new(),
+            effort: Effort::default(),
             broken: false,
         }
+    }
+
+    /// How much time blocks may take; the fewest bits unless another effort is chosen. Readers need not know.
+    #[must_use]
+    pub fn with_effort(self, effort: Effort) -> Self {
+        Self { effort, ..self }
     }
 
     /// What is being recorded.
@@ -248,7 +257,7 @@ impl<W: Write> Recorder<W> {
         let own: Vec<Option<f64>> = (0..self.columns.len())
             .map(|i| own_bound(self.share_bound(i)?, header.share_bounds[i]))
             .collect();
-        let (bytes, restored) = block::encode(header, &self.ticks, &self.columns, &own)?;
+        let (bytes, restored) = block::encode(header, &self.ticks, &self.columns, &own, self.effort)?;
         self.write(&bytes)?;
         self.entries.push(Entry::of(bytes.len() as u64, &self.ticks, &restored));
         self.ticks.clear();

@@ -10,10 +10,10 @@
 //! The first kind that is within the tolerance is taken. All arithmetic is exact in 128 bits.
 
 use crate::bound::Promise;
-use crate::codec::greatest_common_divisor;
 use crate::codec::{self, CodecId, Target};
 use crate::error::Damage;
 use crate::wire::{Bytes, push_varint, zigzag};
+use fewbits_adaptive::Effort;
 
 /// How the ticks of a block are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,6 +97,13 @@ fn even_tick(start: i64, span: i64, row: usize, rows: usize) -> Option<i64> {
     i64::try_from(i128::from(start) + ahead).ok()
 }
 
+fn greatest_common_divisor(mut a: u64, mut b: u64) -> u64 {
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
 /// Start and span of evenly spaced ticks.
 fn even(ticks: &[i64], tolerance: u64) -> Option<(i64, i64)> {
     let (first, last) = (*ticks.first()?, *ticks.last()?);
@@ -146,7 +153,7 @@ fn coded(ticks: &[i64], grid: &Grid) -> Option<Vec<u8>> {
         (number.abs() < 1 << 52).then_some(number as f64)
     });
     let numbers: Vec<f64> = numbers.collect::<Option<_>>()?;
-    let coded = codec::encode(&numbers, &INTEGERS);
+    let coded = codec::encode(&numbers, &INTEGERS, &[], Effort::Thorough);
     if coded.broken > 0 || coded.bytes.len() >= 8 * ticks.len() {
         return None;
     }
@@ -181,7 +188,7 @@ pub(crate) fn decode(kind: TimeKind, bytes: &mut Bytes<'_>, rows: usize, grid: &
             let scale = i128::from(bytes.varint()?);
             let id = CodecId::from_byte(bytes.byte()?)?;
             let length = bytes.count(bytes.0.len(), "length of ticks")?;
-            let numbers = codec::decode(id, bytes.take(length)?, rows, &INTEGERS)?;
+            let numbers = codec::decode(id, bytes.take(length)?, rows, &INTEGERS, &[])?;
             let tick = |(row, number): (usize, f64)| {
                 // Whole numbers below 2^63, by saturation; the product stays below 2^127.
                 let ahead = (scale * i128::from(number as i64)).checked_add(mean * row as i128)?;

@@ -1,77 +1,55 @@
-//! The adaptive stream of `fewbits-adaptive`, from its first sample, once per column and block.
+//! The adaptive codec's blocks (`fewbits-adaptive`), for every promise.
 
 use super::Target;
-use super::plain::Steps;
-use crate::bound::Promise;
+use crate::bound::{Promise, TENS};
 use crate::error::Damage;
-use crate::wire::Bytes;
-use fewbits_adaptive::{Config, Receiver, Sensor, Silence, StreamReader, StreamWriter};
+use fewbits_adaptive::{BlockCodec, Config, Effort};
 
-fn config(target: &Target) -> Option<Config> {
-    let config = match target.promise {
-        Promise::Exact => None,
-        Promise::Within(delta) => Config::new(delta).ok(),
-        Promise::Decimals(places) => Config::exact(10_f64.powi(-i32::from(places))).ok(),
-    }?;
-    match target.circle() {
-        Some(period) => config.circular(period).ok(),
-        None => Some(config),
-    }
-}
-
-/// Whole numbers return exactly.
-fn whole_numbers() -> Option<Config> {
-    Config::exact(1.0).ok()
-}
-
-/// The words of a stream as bytes, highest first, without the zeros at the end.
-fn stream(config: Config, samples: impl Iterator<Item = f64>, bytes: &mut Vec<u8>) -> Option<()> {
-    let (mut sensor, mut writer) = (Sensor::new(config), StreamWriter::new(Silence::Coded));
-    for sample in samples {
-        sensor.write_after(1, sample, &mut writer).ok()?;
-    }
-    let start = bytes.len();
-    bytes.extend(writer.finish().into_iter().flat_map(u32::to_be_bytes));
-    let kept = bytes[start..].iter().rposition(|byte| *byte != 0);
-    bytes.truncate(start + kept.map_or(0, |last| last + 1));
-    Some(())
-}
-
-fn read(config: Config, bytes: &[u8], count: usize) -> Result<Vec<f64>, Damage> {
-    let word = |chunk: &[u8]| {
-        let mut word = [0; 4];
-        word[..chunk.len()].copy_from_slice(chunk);
-        u32::from_be_bytes(word)
+/// The codec of a promise. Decimals are rounded before, and then return exactly.
+fn codec(target: &Target) -> Option<BlockCodec> {
+    let delta = match target.promise {
+        Promise::Exact | Promise::Decimals(_) => return Some(BlockCodec::lossless()),
+        Promise::Within(delta) => delta,
     };
-    let words: Vec<u32> = bytes.chunks(4).map(word).collect();
-    let damaged = |_| Damage::Content("adaptive stream");
-    let mut reader = StreamReader::new(&words, Silence::Coded).map_err(|_| Damage::Content("adaptive stream"))?;
-    let mut receiver = Receiver::new(config);
-    (0..count)
-        .map(|_| receiver.read_after(1, &mut reader).map_err(damaged))
-        .collect()
+    let config = Config::new(delta).ok()?;
+    let config = match target.period {
+        Some(period) => config.circular(period).ok()?,
+        None => config,
+    };
+    Some(BlockCodec::new(config))
 }
 
-pub(super) fn encode(samples: &[f64], target: &Target) -> Option<Vec<u8>> {
-    let mut bytes = Vec::new();
-    stream(config(target)?, samples.iter().copied(), &mut bytes)?;
-    Some(bytes)
+/// The nearest number of so many decimals; numbers whose digits are no exact double stay as they are.
+fn rounded(sample: f64, places: u8) -> f64 {
+    let ten = TENS.get(usize::from(places)).copied().unwrap_or(1.0);
+    let digits = (sample * ten).round();
+    // Zero added: the negative zero is no number of its own here.
+    if digits.abs() < 9e15 {
+        digits / ten + 0.0
+    } else {
+        sample
+    }
 }
 
-pub(super) fn decode(bytes: &[u8], count: usize, target: &Target) -> Result<Vec<f64>, Damage> {
-    read(config(target).ok_or(Damage::Content("bound"))?, bytes, count)
+pub(super) fn encode(samples: &[f64], target: &Target, others: &[&[f64]], effort: Effort) -> Option<Vec<u8>> {
+    let codec = codec(target)?.with_effort(effort);
+    match target.promise {
+        Promise::Decimals(places) => {
+            let decimals: Vec<f64> = samples.iter().map(|sample| rounded(*sample, places)).collect();
+            codec.encode_with(&decimals, others).ok()
+        }
+        _ => codec.encode_with(samples, others).ok(),
+    }
 }
 
-pub(super) fn encode_steps(steps: &Steps) -> Option<Vec<u8>> {
-    let mut bytes = Vec::new();
-    steps.push_head(&mut bytes);
-    stream(whole_numbers()?, steps.multiples.iter().map(|m| *m as f64), &mut bytes)?;
-    Some(bytes)
+/// Whether the bytes were predicted from other columns: bit 6 of a block's first byte.
+pub(super) fn uses_others(bytes: &[u8]) -> bool {
+    bytes.first().is_some_and(|head| head & 0x40 != 0)
 }
 
-pub(super) fn decode_steps(bytes: &[u8], count: usize) -> Result<Vec<f64>, Damage> {
-    let mut reader = Bytes(bytes);
-    let steps = Steps::read_head(&mut reader)?;
-    let whole = read(whole_numbers().ok_or(Damage::Content("bound"))?, reader.0, count)?;
-    Ok(whole.into_iter().map(|multiple| steps.value(multiple as i64)).collect())
+pub(super) fn decode(bytes: &[u8], count: usize, target: &Target, others: &[&[f64]]) -> Result<Vec<f64>, Damage> {
+    let codec = codec(target).ok_or(Damage::Content("bound"))?;
+    codec
+        .decode_with(bytes, count, others)
+        .map_err(|_| Damage::Content("adaptive block"))
 }

@@ -4,7 +4,7 @@ use crate::common::{Cells, record, row_holds, rows, schema};
 use fewbits_record::{Block, BlockReader, Error, Playback, TimeBase};
 use std::io::Cursor;
 
-const ROWS: usize = 100;
+const ROWS: usize = 60;
 const PER_BLOCK: usize = 20;
 
 /// Checks every block that is read against the rows; returns how many rows were read and how many errors there were.

@@ -1,7 +1,7 @@
 //! Ranges, chosen columns, the index, pipes.
 
-use crate::common::{record, rows, schema};
-use fewbits_record::{BlockReader, Error, Playback, Recorder, TimeBase};
+use crate::common::{read, record, row_holds, rows, schema};
+use fewbits_record::{BlockReader, Bound, Column, Effort, Error, Playback, Recorder, Schema, TimeBase};
 use std::io::Cursor;
 
 #[test]
@@ -108,4 +108,55 @@ fn flushed_rows_can_be_read_at_once() {
             .sum::<usize>(),
         10
     );
+}
+
+#[test]
+fn related_columns_are_predicted_from_each_other() {
+    let mut numbers = crate::common::Numbers(9);
+    let (mut level, names) = (0.0, ["a", "b", "c", "d"]);
+    let rows: Vec<Vec<Option<f64>>> = (0..1500)
+        .map(|i| {
+            level += numbers.next() - 0.5;
+            let gap = |k: i32| i % 50 != k;
+            let noise = 0.002 * numbers.next();
+            vec![
+                gap(3).then_some(level),
+                gap(7).then_some(2.0 * level + noise),
+                Some(numbers.next()),
+                gap(3).then_some(5.0 - level),
+            ]
+        })
+        .collect();
+    let size = |chosen: &[usize]| {
+        let columns = chosen
+            .iter()
+            .map(|i| Column::new(names[*i], Bound::Absolute(0.01)).unwrap())
+            .collect();
+        let cells: Vec<_> = rows
+            .iter()
+            .map(|row| chosen.iter().map(|i| row[*i]).collect())
+            .collect();
+        record(Schema::new(columns, TimeBase::Numbered).unwrap(), &cells)
+    };
+    let together = size(&[0, 1, 2, 3]);
+    let apart: usize = (0..4).map(|i| size(&[i]).len()).sum();
+    assert!(together.len() * 5 < apart * 4, "{} {apart}", together.len());
+    // A column that was predicted from others is read alone all the same.
+    let mut playback = Playback::new(Cursor::new(&together)).unwrap();
+    for (row, sample) in playback.columns(&["d"]).unwrap().rows().zip(&rows) {
+        match (row.unwrap().values[0], sample[3]) {
+            (Some(value), Some(sample)) => assert!((value - sample).abs() <= 0.01),
+            (value, sample) => assert_eq!(value, sample),
+        }
+    }
+}
+
+#[test]
+fn fast_recordings_keep_promises_too() {
+    let truth = rows(600);
+    let mut recorder = Recorder::new(Vec::new(), schema(64, TimeBase::Numbered)).with_effort(Effort::Fast);
+    truth.iter().for_each(|row| recorder.push_next(row).unwrap());
+    for (row, sample) in read(&recorder.finish().unwrap()).iter().zip(&truth) {
+        assert!(row_holds(sample, &row.values));
+    }
 }

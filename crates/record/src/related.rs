@@ -1,0 +1,49 @@
+//! Which columns may help to predict another one.
+
+use crate::block::Cells;
+use crate::codec::JOINT_COLUMNS;
+
+/// Columns that are looked at: the nearest before.
+const MAX_LOOKED_AT: usize = 32;
+/// The least correlation of steps that is worth a trial. A predictor that explains a share `r^2` of the variance saves
+/// `-log2(1 - r^2) / 2` bits per sample: 0.07 at 0.3.
+const MIN_CORRELATION: f64 = 0.3;
+/// The least number of pairs of steps.
+const MIN_STEPS: f64 = 16.0;
+
+/// The columns before this one whose steps from row to row go with its own, the closest first.
+pub(crate) fn columns(cells: &[Option<f64>], before: &[Cells]) -> Vec<usize> {
+    let nearest = before.iter().enumerate().rev().take(MAX_LOOKED_AT);
+    let mut found: Vec<(usize, f64)> = nearest
+        .map(|(i, other)| (i, correlation(cells, other).abs()))
+        .filter(|(_, correlation)| *correlation >= MIN_CORRELATION)
+        .collect();
+    found.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    found.truncate(JOINT_COLUMNS);
+    found.into_iter().map(|(i, _)| i).collect()
+}
+
+fn finite_steps(cells: &[Option<f64>]) -> impl Iterator<Item = Option<f64>> {
+    cells
+        .windows(2)
+        .map(|pair| Some(pair[1]? - pair[0]?).filter(|step| step.is_finite()))
+}
+
+/// Correlation of steps about zero; 0 where it is unknown.
+fn correlation(a: &[Option<f64>], b: &[Option<f64>]) -> f64 {
+    let (mut count, mut products, mut squares_a, mut squares_b) = (0.0, 0.0, 0.0, 0.0);
+    for (a, b) in finite_steps(a).zip(finite_steps(b)) {
+        if let (Some(a), Some(b)) = (a, b) {
+            count += 1.0;
+            products += a * b;
+            squares_a += a * a;
+            squares_b += b * b;
+        }
+    }
+    let correlation = products / (squares_a.sqrt() * squares_b.sqrt());
+    if count >= MIN_STEPS && correlation.is_finite() {
+        correlation
+    } else {
+        0.0
+    }
+}
