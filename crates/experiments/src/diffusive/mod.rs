@@ -7,6 +7,8 @@ mod chains;
 mod common;
 mod divergences;
 mod envelope;
+mod plan_belief;
+mod rooms;
 mod route;
 mod selection;
 mod summary;
@@ -35,5 +37,6 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &envelope::Envelope,
         &selection::Selection,
         &unknowns::Unknowns,
+        &rooms::Rooms,
     ]
 }

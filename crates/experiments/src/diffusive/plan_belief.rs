@@ -1,0 +1,186 @@
+//! Beliefs over the cells of a floor plan: which cell holds a source of unknown rate, from steady readings of sensors.
+
+use fewbits_diffusive::{RateRange, RateSums};
+use fewbits_numerics::normal::log_interval;
+
+/// What sensors report.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Report {
+    /// The reading itself.
+    Value,
+    /// The cell of the reading, of eight: three bits.
+    Word,
+}
+
+/// Thresholds of a word.
+pub(super) const THRESHOLDS: usize = 7;
+/// Nodes of the table of a word's probabilities over the clean concentration.
+const NODES: usize = 4096;
+/// Distance of the rates, in their logarithm, at which the likelihood of words is averaged: below the least width that words leave.
+const RATE_STEP: f64 = 0.027;
+
+/// What a concentration becomes: noise, and the thresholds of words.
+pub(super) struct Instrument {
+    pub noise: f64,
+    pub thresholds: [f64; THRESHOLDS],
+    largest: f64,
+    /// `ln p(word | clean concentration)` at the nodes, for each word.
+    table: Vec<Vec<f64>>,
+}
+
+impl Instrument {
+    /// `noise` and the thresholds in kg/m^3; `largest` is the largest concentration that is told apart.
+    pub fn new(noise: f64, thresholds: [f64; THRESHOLDS], largest: f64) -> Self {
+        let edge = |k: usize| match k {
+            0 => f64::NEG_INFINITY,
+            k if k > THRESHOLDS => f64::INFINITY,
+            k => thresholds[k - 1],
+        };
+        let at = |word: usize, node: usize| {
+            let clean = largest * node as f64 / (NODES - 1) as f64;
+            log_interval((edge(word) - clean) / noise, (edge(word + 1) - clean) / noise)
+        };
+        let table = (0..=THRESHOLDS).map(|word| (0..NODES).map(|node| at(word, node)).collect());
+        Self {
+            noise,
+            thresholds,
+            largest,
+            table: table.collect(),
+        }
+    }
+
+    pub fn word(&self, reading: f64) -> usize {
+        self.thresholds.partition_point(|t| *t <= reading)
+    }
+
+    /// The sum of two rows of the table between nodes.
+    fn look_up(&self, row: &[f64], clean: f64) -> f64 {
+        let position = (clean / self.largest).clamp(0.0, 1.0) * (NODES - 1) as f64;
+        let low = (position as usize).min(NODES - 2);
+        row[low] + (position - low as f64) * (row[low + 1] - row[low])
+    }
+
+    /// Probabilities of the words.
+    pub fn words(&self, clean: f64) -> [f64; THRESHOLDS + 1] {
+        std::array::from_fn(|word| self.look_up(&self.table[word], clean).exp())
+    }
+}
+
+/// The belief after some sensors.
+pub(super) struct PlanBelief {
+    /// Probability of each cell.
+    pub weights: Vec<f64>,
+    /// The most probable cell.
+    pub mode: usize,
+    /// How far the readings are from what the best cell and rate predict, in standard deviations of that; above 0 is worse.
+    pub misfit: f64,
+}
+
+impl PlanBelief {
+    /// The belief of a uniform prior over cells, and over rates between `rates`, after the readings of some sensors (several of
+    /// each), whose responses per unit rate are given for each cell.
+    pub fn new(
+        instrument: &Instrument,
+        report: Report,
+        rates: [f64; 2],
+        sensors: &[(&[f64], &[f64])],
+        cells: usize,
+    ) -> Result<Self, fewbits_numerics::ArgumentError> {
+        let (logs, misfit) = match report {
+            Report::Value => of_values(instrument, rates, sensors, cells)?,
+            Report::Word => of_words(instrument, rates, sensors, cells),
+        };
+        let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut weights: Vec<f64> = logs.iter().map(|log| (log - largest).exp()).collect();
+        let total: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|weight| *weight /= total);
+        let mode = (0..cells)
+            .max_by(|a, b| weights[*a].total_cmp(&weights[*b]))
+            .unwrap_or(0);
+        Ok(Self { weights, mode, misfit })
+    }
+
+    /// The mass of the cells that are more probable than this one, and of this one.
+    pub fn above(&self, cell: usize) -> [f64; 2] {
+        let own = self.weights[cell];
+        [self.weights.iter().filter(|weight| **weight > own).sum(), own]
+    }
+}
+
+fn of_values(
+    instrument: &Instrument,
+    [low, high]: [f64; 2],
+    sensors: &[(&[f64], &[f64])],
+    cells: usize,
+) -> Result<(Vec<f64>, f64), fewbits_numerics::ArgumentError> {
+    let range = RateRange::new(low, high)?;
+    let samples: Vec<f64> = sensors.iter().flat_map(|sensor| sensor.1.iter().copied()).collect();
+    let (mut logs, mut smallest) = (Vec::with_capacity(cells), f64::INFINITY);
+    for cell in 0..cells {
+        let responses: Vec<f64> = sensors.iter().flat_map(|(a, y)| y.iter().map(|_| a[cell])).collect();
+        let sums = RateSums::of(&samples, &responses, instrument.noise)?;
+        logs.push(sums.log_marginal(&range));
+        let best = (sums.correlation / sums.response.max(f64::MIN_POSITIVE)).clamp(low, high);
+        smallest = smallest.min(sums.energy - best * (2.0 * sums.correlation - best * sums.response));
+    }
+    // Position and rate are fitted.
+    let freedom = (samples.len() as f64 - 3.0).max(1.0);
+    Ok((logs, (smallest - freedom) / (2.0 * freedom).sqrt()))
+}
+
+fn of_words(
+    instrument: &Instrument,
+    [low, high]: [f64; 2],
+    sensors: &[(&[f64], &[f64])],
+    cells: usize,
+) -> (Vec<f64>, f64) {
+    // One row for each sensor: all its words together.
+    let row = |readings: &[f64]| {
+        let mut row = vec![0.0; NODES];
+        for word in readings.iter().map(|y| instrument.word(*y)) {
+            row.iter_mut()
+                .zip(&instrument.table[word])
+                .for_each(|(sum, log)| *sum += log);
+        }
+        row
+    };
+    let rows: Vec<Vec<f64>> = sensors.iter().map(|sensor| row(sensor.1)).collect();
+    // Nodes in the logarithm of the rate, weighted by the uniform density.
+    let count = ((high / low).ln() / RATE_STEP).ceil() as usize;
+    let rate = |k: usize| low * (high / low).powf((k as f64 + 0.5) / count as f64);
+    let rates: Vec<f64> = (0..count).map(rate).collect();
+    let mut best = (f64::NEG_INFINITY, 0, 1.0);
+    let logs = (0..cells).map(|cell| {
+        let given = |rate: &f64| -> f64 {
+            let pairs = rows.iter().zip(sensors);
+            pairs
+                .map(|(row, sensor)| instrument.look_up(row, rate * sensor.0[cell]))
+                .sum()
+        };
+        let terms: Vec<f64> = rates.iter().map(|rate| given(rate) + rate.ln()).collect();
+        let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        for (log, rate) in terms.iter().zip(&rates) {
+            if log - rate.ln() > best.0 {
+                best = (log - rate.ln(), cell, *rate);
+            }
+        }
+        largest + terms.iter().map(|log| (log - largest).exp()).sum::<f64>().ln()
+    });
+    let logs: Vec<f64> = logs.collect();
+    // The logarithm of the likelihood has known moments if the best cell and rate are true.
+    let (log, cell, rate) = best;
+    let (mut mean, mut variance) = (0.0, 0.0);
+    for (responses, readings) in sensors {
+        let entropy = instrument.words(rate * responses[cell]).map(|p| {
+            if p > 0.0 {
+                [p * p.ln(), p * p.ln().powi(2)]
+            } else {
+                [0.0; 2]
+            }
+        });
+        let first: f64 = entropy.iter().map(|e| e[0]).sum();
+        mean += readings.len() as f64 * first;
+        variance += readings.len() as f64 * (entropy.iter().map(|e| e[1]).sum::<f64>() - first * first);
+    }
+    (logs, (mean - log) / variance.max(f64::MIN_POSITIVE).sqrt())
+}
