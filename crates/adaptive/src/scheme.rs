@@ -5,7 +5,7 @@ use crate::packet::Packet;
 use crate::replica::{Replica, Slot};
 use crate::report::{self, Content};
 use crate::{Error, Sensor};
-use fewbits_core::factor::{Constant, InCell, Scalar};
+use fewbits_core::factor::{InCell, Scalar};
 use fewbits_core::{Cell, Link, Observation, Scheme};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
@@ -105,7 +105,10 @@ impl Scheme<1> for SlotScheme {
             return Err(ArgumentError::new("crossover", link.crossover(), expected).into());
         }
         let packet = match observation {
-            Observation::Lost => return Ok(Constant::ONE.into()),
+            Observation::Lost => {
+                let silent = self.cell(self.slot.prediction)?;
+                return Ok(Scalar::outside(&silent, self.noise_variance, link.lost_given_sent())?);
+            }
             Observation::Nothing => {
                 let cell = self.cell(self.slot.prediction)?;
                 return Ok(InCell::silence(cell, self.noise_variance, link)?.into());
@@ -126,7 +129,7 @@ impl Scheme<1> for SlotScheme {
         Ok(match content {
             Content::Near(k) | Content::Far(k) => {
                 let cell = self.cell(self.slot.prediction + k)?;
-                InCell::new(cell, self.noise_variance, 0.0, 1.0 - link.loss())?.into()
+                InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into()
             }
             // No cell of the lattice: the sample itself.
             Content::Whole(sample) => {

@@ -1,7 +1,7 @@
 //! The Dymbo filter, and the closed loop of every scalar filter here.
 
 use crate::plant::{filtered_variance, innovation_gain, scalar};
-use crate::sign_bit::{self, SignBit, missing_probability};
+use crate::sign_bit::{self, SignBit};
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
@@ -201,7 +201,7 @@ impl ScalarFilter for DymboFilter {
         };
         let p = predicted.covariance()[0];
         // Both bits are equally likely at the prediction, whatever the crossover.
-        let log_likelihood = -LN_2 + (-self.link.loss()).ln_1p();
+        let log_likelihood = -LN_2 + self.link.arrival().ln();
         let report = Report {
             correction: bit.value() * self.gain(p),
             variance: filtered_variance(p, self.plant.measurement_variance(), self.information()),
@@ -251,7 +251,7 @@ pub(crate) fn without_report<R>(
         correction: 0.0,
         variance: predicted.covariance()[0],
         information: 0.0,
-        log_likelihood: missing_probability(observation, link).unwrap_or(1.0).ln(),
+        log_likelihood: link.delivery(observation).ln(),
         bits: 0,
     };
     report.correct(predicted)

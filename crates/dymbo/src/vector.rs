@@ -122,7 +122,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         let mean = predicted.mean() + step * bit.value();
         // Both bits are equally likely at the prediction, whatever the crossover.
         let info = VectorInfo {
-            log_likelihood: -LN_2 + (-self.link.loss()).ln_1p(),
+            log_likelihood: -LN_2 + self.link.of_received()?.ln(),
             bits: 1,
         };
         let covariance = predicted.covariance() - step * step.transpose();

@@ -1,6 +1,7 @@
 //! The region of silence of a vector sensor: an ellipsoid, and a Gaussian inside it.
 
 mod inside;
+mod outside;
 mod quadrature;
 
 pub(crate) use inside::symmetric_eigen;

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// | observation | cell | floor | share |
 /// |---|---|---|---|
-/// | sign bit over a link with loss `l` and crossover `e` | a half-line | `(1 - l) e` | `(1 - l)(1 - 2 e)` |
+/// | sign bit over a link with arrival `a` and crossover `c` | a half-line | `a c` | `a (1 - 2 c)` |
 /// | cell of a quantizer, perfect link | the cell | 0 | 1 |
 /// | nothing from a censoring sensor, loss `l` | region of silence | `l` | `1 - l` |
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +79,7 @@ impl InCell {
     /// If `threshold` is not finite or `r` not positive.
     #[inline]
     pub fn sign(sign: Sign, threshold: f64, noise_variance: f64, link: &Link) -> Result<Self, ArgumentError> {
-        let (arrives, crossover) = (1.0 - link.loss(), link.crossover());
+        let (arrives, crossover) = (link.arrival(), link.crossover());
         let cell = Cell::of_sign(sign, threshold)?;
         Self::new(cell, noise_variance, arrives * crossover, arrives * (1.0 - 2.0 * crossover))
     }

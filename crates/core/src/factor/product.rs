@@ -84,9 +84,14 @@ impl Product {
 
     /// Adds an observation; one that is there already is counted again.
     pub fn push(&mut self, factor: Scalar) {
-        match self.factors.iter_mut().find(|known| known.factor == factor) {
-            Some(known) => known.count += 1,
-            None => self.factors.push(Repeated { factor, count: 1 }),
+        self.push_repeated(Repeated { factor, count: 1 });
+    }
+
+    /// Adds several observations of one kind.
+    pub fn push_repeated(&mut self, more: Repeated) {
+        match self.factors.iter_mut().find(|known| known.factor == more.factor) {
+            Some(known) => known.count += more.count,
+            None => self.factors.push(more),
         }
     }
 

@@ -108,8 +108,14 @@ fn bad_numbers_are_refused_by_name() {
     assert!(Partition::new(vec![0.0, 0.0], vec![1.0, 0.0, 0.0], 1.0).is_err());
     assert!(Partition::new(vec![0.0], vec![1.0], 1.0).is_err());
     assert!(Partition::new(vec![], vec![0.0], 1.0).is_err());
-    assert!(Link::new(1.0, 0.0).is_err() && Link::new(0.0, 0.6).is_err() && Link::new(f64::NAN, 0.0).is_err());
+    assert!(Link::new(1.1, 0.0).is_err() && Link::new(0.0, 0.6).is_err() && Link::new(f64::NAN, 0.0).is_err());
     assert!(serde_json::from_str::<Link>(r#"{"loss":2,"crossover":0}"#).is_err());
+    assert!(serde_json::from_str::<Link>(r#"{"loss":0.6,"erasure":0.6,"crossover":0}"#).is_err());
+    let old = serde_json::from_str::<Link>(r#"{"loss":0.5,"crossover":0.25}"#).unwrap();
+    assert_eq!(old, Link::new(0.5, 0.25).unwrap());
+    let known = old.with_erasure(0.5).unwrap();
+    assert_eq!(serde_json::from_str::<Link>(&serde_json::to_string(&known).unwrap()).unwrap(), known);
+    assert!(old.with_erasure(-0.1).is_err() && old.with_erasure(f64::NAN).is_err());
     assert!(serde_json::from_str::<Cell>(r#"{"lower":3,"upper":1}"#).is_err());
     assert!(serde_json::from_str::<Gaussian<1>>(r#"{"mean":[0],"covariance":[-1]}"#).is_err());
 }

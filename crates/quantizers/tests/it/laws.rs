@@ -36,11 +36,12 @@ fn points(sensor: &QuantizingSensor) -> Vec<Scalar> {
         .to_vec()
 }
 
-fn links() -> [Link; 3] {
+fn links() -> [Link; 4] {
     [
         Link::PERFECT,
         Link::new(0.2, 0.1).unwrap(),
         Link::flipping(0.5).unwrap(),
+        Link::new(0.2, 0.1).unwrap().with_erasure(0.3).unwrap(),
     ]
 }
 
