@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::ellipsoid::{EllipsoidMoments, GaussianInEllipsoid};
 use crate::rule::CensoringRule;
-use fewbits_core::columns::state_at;
+use fewbits_core::columns::{lengths_agree, state_at};
 use fewbits_core::factor::{Constant, InCell, Partition, Product, Repeated, Scalar, Value};
 use fewbits_core::number::Levels;
 use fewbits_core::{Cell, Columns, Factor, Gaussian, Link, Tilted};
@@ -120,6 +120,9 @@ impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         let (floor, log_share, outside) = match self.missing {
             Missing::Nothing { loss } => (loss, (1.0 - loss).ln(), false),
             Missing::Lost { scale } => (0.0, scale.ln(), true),
@@ -143,13 +146,19 @@ impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
         let total = symmetrised(&(spread + self.noise));
         let mu = prior.mean() - self.prediction;
         let after = self.missing.innovation_moments(&self.rule, &mu, &total)?;
-        let factor = Cholesky::new(total).ok_or(fewbits_core::Error::Impossible)?;
+        let what = "the posterior of a missing report";
+        let factor = Cholesky::new(total).ok_or(fewbits_core::Error::NotANumber { what })?;
         let gain = factor.solve(spread).transpose();
         let keep = SMatrix::<f64, M, M>::identity() - gain;
+        let mean = prior.mean() + gain * (after.mean - mu);
+        let covariance = keep * spread * keep.transpose() + gain * (self.noise + after.covariance) * gain.transpose();
+        if mean.iter().chain(covariance.iter()).any(|x| !x.is_finite()) {
+            return Err(fewbits_core::Error::NotANumber { what });
+        }
         Ok(Tilted {
             log_evidence: after.log_mass,
-            mean: prior.mean() + gain * (after.mean - mu),
-            covariance: keep * spread * keep.transpose() + gain * (self.noise + after.covariance) * gain.transpose(),
+            mean,
+            covariance,
         })
     }
 }
@@ -364,6 +373,9 @@ impl<const M: usize> Factor<M> for Censored<M> {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         if self.log_scale != 0.0 {
             log_weights.iter_mut().for_each(|w| *w += self.log_scale);
         }
@@ -391,6 +403,10 @@ impl<const M: usize> Factor<M> for Censored<M> {
             Kind::Scalar(factor) => Tilted::unchanged(prior, factor.log_likelihood(&[prior.mean()[0]].into())),
         }?;
         tilted.log_evidence += self.log_scale;
+        if !tilted.log_evidence.is_finite() {
+            let what = "the evidence of a censored value";
+            return Err(fewbits_core::Error::unlikely_or_no_number(tilted.log_evidence, what));
+        }
         Ok(tilted)
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::censored::add_mixed;
+use fewbits_core::columns::lengths_agree;
 use fewbits_core::factor::{Tilted, Value};
 use fewbits_core::{Columns, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
 use fewbits_numerics::ArgumentError;
@@ -91,6 +92,7 @@ impl Bump {
         match self.kind {
             Kind::Above { floor: 0.0 } => log_peak,
             Kind::Above { floor } => (floor + log_peak.exp()).ln(),
+            Kind::Below { .. } if log_peak.is_nan() => log_peak,
             // Rounding may lift `g` above one where the noise is nothing beside `1/Y`.
             Kind::Below { scale } => scale.ln() + (-log_peak.min(0.0).exp_m1()).ln(),
         }
@@ -103,6 +105,9 @@ impl Factor<1> for Bump {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         let add = |from: usize, logs: &mut [f64]| {
             self.value
                 .add_log_likelihoods(&[&means[0][from..from + logs.len()]], logs);
@@ -133,20 +138,33 @@ impl Factor<1> for Bump {
             let shift = step * (-w / left);
             let removed = variance * variance / (variance + self.value.noise_covariance()[0]);
             let second = (removed - w * step[0] * step[0]) / left + after;
+            let (mean, spread) = (prior.mean()[0] + shift[0], second - shift[0] * shift[0]);
+            if !(mean.is_finite() && spread.is_finite()) {
+                return Err(fewbits_core::Error::NotANumber {
+                    what: "the posterior of a known loss",
+                });
+            }
             return Ok(Tilted {
                 log_evidence,
-                mean: prior.mean() + shift,
-                covariance: [[(second - shift[0] * shift[0]).max(0.0)]].into(),
+                mean: [mean].into(),
+                covariance: [[spread.max(0.0)]].into(),
             });
         }
-        let weight = match self.kind {
-            Kind::Above { floor: 0.0 } => 1.0,
-            _ => (log_inside - log_evidence).exp(),
-        };
+        if let Kind::Above { floor: 0.0 } = self.kind {
+            return Ok(Tilted { log_evidence, ..inside });
+        }
+        let weight = (log_inside - log_evidence).exp();
+        let mean = prior.mean() + step * weight;
+        let spread = (prior.covariance() + step * step * weight) * (1.0 - weight) + inside.covariance * weight;
+        if !(log_evidence.is_finite() && mean[0].is_finite() && spread[0].is_finite()) {
+            return Err(fewbits_core::Error::NotANumber {
+                what: "the posterior of a silence",
+            });
+        }
         Ok(Tilted {
             log_evidence,
-            mean: prior.mean() + step * weight,
-            covariance: (prior.covariance() + step * step * weight) * (1.0 - weight) + inside.covariance * weight,
+            mean,
+            covariance: spread,
         })
     }
 }
@@ -190,7 +208,7 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
     ) -> Result<Bump, fewbits_core::Error> {
         let (prediction, r) = (self.sensing.mean(broadcast)[0], self.sensing.noise_covariance_at(broadcast)[0]);
         let y = self.trigger.precision;
-        let log_scale = 0.5 * (std::f64::consts::TAU / y).ln();
+        let log_scale = 0.5 * (std::f64::consts::TAU.ln() - y.ln());
         Ok(match observation {
             Observation::Received(z) => {
                 fewbits_numerics::error::within("crossover", link.crossover(), 0.0, 0.0)?;

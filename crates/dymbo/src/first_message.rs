@@ -224,7 +224,7 @@ impl Initialisation {
             Self::Fine { scheme, message } => {
                 let tau = scheme.resolution;
                 let variance = scheme.noise_variance + tau * tau / 12.0;
-                Ok(scalar(finite("message", scheme.value(*message))?, variance))
+                Ok(scalar(finite("message", scheme.value(*message))?, finite("resolution^2", variance)?))
             }
             Self::FineWithPrior { scheme, message, prior } => {
                 let factor = scheme.factor(&(), &Observation::Received(*message), &Link::PERFECT)?;

@@ -377,7 +377,9 @@ impl Encoder {
             Self::Adaptive { loading } => {
                 let row = sensor.jacobian(about.mean());
                 let spread = (row * about.covariance() * row.transpose())[0].max(0.0);
-                loading * (spread.sqrt()).hypot(noise.deviation(centre))
+                // A platform's `hypot` may differ in the last bit; both ends must agree on it.
+                let deviation = noise.deviation(centre);
+                loading * (spread + deviation * deviation).sqrt()
             }
         };
         let reference = RangeReference { centre, half_width };

@@ -90,6 +90,10 @@ impl Quantizer {
         if labels.len() != breakpoints.len() + 1 {
             return refuse("labels", format!("{} labels", labels.len()), format!("{} labels", breakpoints.len() + 1));
         }
+        // Each level labels a cell, so that no label reaches the number of cells.
+        if let Some(label) = labels.iter().find(|label| **label >= labels.len()) {
+            return refuse("labels", format!("label {label}"), format!("labels below {}, the cells", labels.len()));
+        }
         let levels = labels.iter().max().map_or(0, |m| m + 1);
         if levels < 2 {
             return refuse("labels", "a single level", "at least two levels");

@@ -73,18 +73,24 @@ impl<const M: usize> GaussianInEllipsoid<M> {
     /// `ln P(nu inside)` for `nu ~ N(mu, V)`.
     pub fn log_probability(&self, mu: &SVector<f64, M>) -> f64 {
         let b = self.forward * mu;
+        if let Some(x) = b.iter().find(|x| !x.is_finite()) {
+            return if x.is_nan() { f64::NAN } else { f64::NEG_INFINITY };
+        }
         log_mass(self.variances.as_slice(), b.as_slice(), self.threshold)
     }
 
-    /// Mass, mean and covariance of `nu ~ N(mu, V)` inside; `None` if the mass is zero.
+    /// Mass, mean and covariance of `nu ~ N(mu, V)` inside; `None` if the mass is zero or `mu` is not finite.
     pub fn moments(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
-        let b = self.forward * mu;
+        let b = self.finite(mu)?;
         self.back(moments(self.variances.as_slice(), &b, 0, self.threshold))
     }
 
     /// `ln P(nu outside)`, with digits however small it is.
     pub fn log_probability_outside(&self, mu: &SVector<f64, M>) -> f64 {
         let b = self.forward * mu;
+        if let Some(x) = b.iter().find(|x| !x.is_finite()) {
+            return if x.is_nan() { f64::NAN } else { 0.0 };
+        }
         let inside = log_mass(self.variances.as_slice(), b.as_slice(), self.threshold);
         if inside < MOSTLY_INSIDE.ln() {
             return (-inside.exp()).ln_1p();
@@ -92,10 +98,15 @@ impl<const M: usize> GaussianInEllipsoid<M> {
         outside::log_mass(self.variances.as_slice(), b.as_slice(), self.threshold)
     }
 
-    /// Mass, mean and covariance of `nu ~ N(mu, V)` outside; `None` if the mass is zero.
+    /// Mass, mean and covariance of `nu ~ N(mu, V)` outside; `None` if the mass is zero or `mu` is not finite.
     pub fn moments_outside(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
-        let b = self.forward * mu;
+        let b = self.finite(mu)?;
         self.back(outside::moments(self.variances.as_slice(), &b, 0, self.threshold))
+    }
+
+    /// Whitened coordinates, if they are numbers.
+    fn finite(&self, mu: &SVector<f64, M>) -> Option<SVector<f64, M>> {
+        Some(self.forward * mu).filter(|b| b.iter().all(|x| x.is_finite()))
     }
 
     /// From whitened coordinates to those of the innovation.

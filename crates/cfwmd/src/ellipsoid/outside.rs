@@ -156,6 +156,10 @@ fn integrate(cuts: &[f64], f: impl Fn(f64) -> f64, mut visit: impl FnMut(f64, f6
     let mass = |a: f64, b: f64| panel(a, b).map(|(theta, w)| w * (f(theta) - peak).exp()).sum::<f64>();
     let mut waiting: Vec<_> = panels().rev().map(|(a, b)| (a, b, mass(a, b), 0)).collect();
     let whole: f64 = waiting.iter().map(|panel| panel.2).sum();
+    // Halving a panel that is no number would never end.
+    if !whole.is_finite() {
+        return;
+    }
     while let Some((a, b, coarse, depth)) = waiting.pop() {
         let middle = 0.5 * (a + b);
         let (left, right) = (mass(a, middle), mass(middle, b));

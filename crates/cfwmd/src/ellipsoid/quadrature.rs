@@ -46,6 +46,10 @@ fn integrate(variances: &[f64], means: &[f64], eta: f64, f: impl Fn(f64) -> f64,
     let mass = |a: f64, b: f64| panel(a, b).map(|(theta, w)| w * (f(theta) - peak).exp()).sum::<f64>();
     let tolerance = TOLERANCE.max(ROUNDING * peak.abs());
     let whole = mass(cuts[0], cuts[1]) + mass(cuts[1], cuts[2]);
+    // Halving a panel that is no number would never end.
+    if !whole.is_finite() {
+        return;
+    }
     // Depth first, left to right: at most one waiting panel for each halving.
     let mut waiting = [(0.0, 0.0, 0.0, 0_u32); HALVINGS as usize + 4];
     waiting[0] = (cuts[1], cuts[2], mass(cuts[1], cuts[2]), 0);

@@ -244,6 +244,11 @@ pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M:
             next.withhold(sensor, step, i, |mu, covariance| Ok(missing.innovation_moments(rule, mu, covariance)?))?;
     }
     next.shorten();
+    let mut numbers = next.mean.iter().chain(next.root.iter());
+    if !(info.log_likelihood.is_finite() && numbers.all(|x| x.is_finite())) {
+        let what = "the joint belief (from the models or the reports)";
+        return Err(fewbits_core::Error::unlikely_or_no_number(info.log_likelihood, what).into());
+    }
     Ok((next, info))
 }
 

@@ -399,11 +399,12 @@ fn a_singular_vector_prediction_is_updated_in_the_direction_it_has() {
 /// such slots was 1.7 at half the messages and 2.8 at a fifth.
 #[test]
 fn known_losses_leave_a_consistent_belief() {
-    let dynamics = constant_velocity_1d(1.0, 1.0).unwrap();
+    let dynamics = constant_velocity_1d(1.0, 4.0).unwrap();
     let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), 1.0).unwrap();
-    for rate in [0.5, 0.2] {
+    for (rate, ignorant) in [(0.5, 1.4), (0.2, 1.9)] {
         let link = Link::PERFECT.with_erasure(0.3).unwrap();
-        let network = Network::new(vec![sensor], Budget::new(rate, 1).unwrap().threshold(1).unwrap(), link).unwrap();
+        let threshold = Budget::new(2.0 * rate, 2).unwrap().threshold(1).unwrap();
+        let network = Network::new(vec![sensor; 2], threshold, link).unwrap();
         let start = Gaussian::new(Vector2::new(0.0, 1.0), Matrix2::identity()).unwrap();
         let mut rng = Stream::new(24).fast_rng();
         let (mut nees, mut ignoring) = (Moments::default(), Moments::default());
@@ -413,19 +414,19 @@ fn known_losses_leave_a_consistent_belief() {
                 truth = dynamics.propagate(&mut rng, &truth);
                 let predicted = kalman::predict(&dynamics, &belief);
                 let rules = network.rules_under(&predicted).unwrap();
-                let z = sensor.sample(&mut rng, &truth);
-                let (observations, _) = network.transmit(&mut rng, &rules, predicted.mean(), &[z]).unwrap();
-                belief = network
-                    .fuse(&predicted, &rules, predicted.mean(), &observations)
-                    .unwrap()
-                    .0;
-                if observations[0] == Observation::Lost {
+                let z = [0, 1].map(|_| sensor.sample(&mut rng, &truth));
+                let (observations, _) = network.transmit(&mut rng, &rules, predicted.mean(), &z).unwrap();
+                let fuse =
+                    |seen: &[Observation<_>]| network.fuse(&predicted, &rules, predicted.mean(), seen).unwrap().0;
+                belief = fuse(&observations);
+                if observations == [Observation::Lost; 2] {
                     nees.add(belief.normalised_error_squared(&truth).unwrap());
+                    // What was done before: nothing is learnt from the loss.
                     ignoring.add(predicted.normalised_error_squared(&truth).unwrap());
                 }
             }
         }
         assert!((nees.mean() - 1.0).abs() < 0.1, "{rate}: {} +- {}", nees.mean(), nees.standard_error());
-        assert!(ignoring.mean() > 1.3, "{rate}: {}", ignoring.mean());
+        assert!(ignoring.mean() > ignorant, "{rate}: {}", ignoring.mean());
     }
 }

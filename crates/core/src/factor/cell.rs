@@ -2,7 +2,7 @@
 
 use super::{Factor, Tilted};
 use crate::cell::Cell;
-use crate::columns::Columns;
+use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use crate::observation::Link;
@@ -170,6 +170,9 @@ impl Factor<1> for InCell {
     /// Probabilities into a short buffer, then their logarithms: each stage stays in vector registers.
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
         const BLOCK: usize = 128;
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         let (lower, upper) = (self.cell.lower(), self.cell.upper());
         let (scale, floor, share, log_share) = (1.0 / self.deviation, self.floor, self.share, self.log_share);
         // A half-line is one cut, rising (`m` above the edge) or falling.
@@ -183,7 +186,7 @@ impl Factor<1> for InCell {
         let wide = (upper - lower) * scale >= scalar::WIDE;
         let (mut buffer, mut upper_edges) = ([0.0; BLOCK], [0.0; BLOCK]);
         for (log_weights, means) in log_weights.chunks_mut(BLOCK).zip(means[0].chunks(BLOCK)) {
-            let buffer = &mut buffer[..means.len().min(log_weights.len())];
+            let buffer = &mut buffer[..means.len()];
             if let Some((edge, scale)) = cut {
                 buffer.iter_mut().zip(means).for_each(|(x, m)| *x = (m - edge) * scale);
                 match floor > 0.0 {

@@ -2,7 +2,7 @@
 
 use super::moments::{Feature, tilted_by_quadrature};
 use super::{Factor, Scalar, Tilted};
-use crate::columns::Columns;
+use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, at_least_one};
@@ -50,6 +50,9 @@ impl Factor<1> for Repeated {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         let mut logs = [0.0; BLOCK];
         for (means, log_weights) in means[0].chunks(BLOCK).zip(log_weights.chunks_mut(BLOCK)) {
             let logs = &mut logs[..means.len()];
@@ -120,8 +123,10 @@ impl Factor<1> for Product {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
-        for factor in &self.factors {
-            factor.add_log_likelihoods(means, log_weights);
+        if lengths_agree(means, log_weights) {
+            for factor in &self.factors {
+                factor.add_log_likelihoods(means, log_weights);
+            }
         }
     }
 

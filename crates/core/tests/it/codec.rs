@@ -143,3 +143,16 @@ fn an_empty_field_leaves_no_byte_and_a_cleared_writer_begins_again() {
     writer.write(0x3, 2).unwrap();
     assert_eq!((writer.bits(), writer.finish().bytes()), (2, &[0xc0][..]));
 }
+
+/// Defect: bits behind the end of a message were kept, so that equal messages compared unequal.
+#[test]
+fn padding_is_no_part_of_a_message() {
+    let padded = BitString::from_bytes(vec![0b1010_1111, 0xff], 4).unwrap();
+    assert_eq!(padded, BitString::from_bytes(vec![0b1010_0000], 4).unwrap());
+    assert_eq!((padded.bits(), padded.bytes()), (4, &[0b1010_0000][..]));
+    let mut writer = BitWriter::new();
+    writer.append(&padded);
+    writer.write(0, 4).unwrap();
+    assert_eq!(writer.finish().bytes(), [0b1010_0000]);
+    assert_eq!(BitString::from_bytes(vec![0xff], 0).unwrap(), BitString::default());
+}

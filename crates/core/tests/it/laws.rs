@@ -1,5 +1,6 @@
 //! Every law holds for an honest implementation, whatever its unit and with no noise at all, and refuses each way of being wrong.
 
+use fewbits_core::columns::lengths_agree;
 use fewbits_core::factor::{Constant, Factor, Tilted, Value};
 use fewbits_core::{
     Belief, BitReader, BitWriter, CodecError, Columns, ColumnsMut, Density, Dynamics, Error, Gaussian,
@@ -178,10 +179,12 @@ impl Likelihood<2> for Plane {
 
     fn add_log_likelihoods(&self, states: Columns<'_, 2>, log_weights: &mut [f64]) {
         let factor = if self.has(Fault::Sweep) { 1.0 + 1e-9 } else { 1.0 };
-        log_weights
-            .iter_mut()
-            .zip(states[0])
-            .for_each(|(log, x)| *log -= x.abs() * factor);
+        if lengths_agree(&states, log_weights) {
+            log_weights
+                .iter_mut()
+                .zip(states[0])
+                .for_each(|(log, x)| *log -= x.abs() * factor);
+        }
     }
 }
 

@@ -14,3 +14,4 @@ mod diffusion_laws;
 mod diffusion_sources;
 mod finite_volume;
 mod laws;
+mod wild;

@@ -130,3 +130,11 @@ proptest! {
         prop_assert!(message::decoding_is_total::<Symbol>(&BitString::from_bytes(bytes, bits).unwrap(), &labelling));
     }
 }
+
+/// Defect: a label of `usize::MAX` overflowed, from JSON too.
+#[test]
+fn huge_labels_are_refused() {
+    assert!(Quantizer::with_labels(vec![0.0], vec![0, usize::MAX]).is_err());
+    let json = format!(r#"{{"breakpoints":[0.0],"labels":[0,{}]}}"#, usize::MAX);
+    assert!(serde_json::from_str::<Quantizer>(&json).is_err());
+}
