@@ -207,6 +207,7 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
         link: &Link,
     ) -> Result<Bump, fewbits_core::Error> {
         let (prediction, r) = (self.sensing.mean(broadcast)[0], self.sensing.noise_covariance_at(broadcast)[0]);
+        finite("prediction", prediction)?;
         let y = self.trigger.precision;
         let log_scale = 0.5 * (std::f64::consts::TAU.ln() - y.ln());
         Ok(match observation {

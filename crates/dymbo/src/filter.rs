@@ -5,6 +5,7 @@ use crate::sign_bit::{self, SignBit};
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
+use fewbits_numerics::error::finite;
 use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -154,9 +155,9 @@ impl DymboFilter {
     /// it is `sigma_u`.
     ///
     /// # Errors
-    /// If the variance has no finite steady state.
+    /// If the variance has no finite steady state, or leaves the range of numbers.
     pub fn steady_step(&self) -> Result<f64, Error> {
-        Ok(self.gain(self.plant.steady_state(self.information())?.predicted_variance))
+        Ok(finite("steady step", self.gain(self.plant.steady_state(self.information())?.predicted_variance))?)
     }
 
     #[inline]

@@ -109,6 +109,14 @@ impl Partition {
         if m.is_nan() {
             return m;
         }
+        if m.is_infinite() {
+            let outermost = if m > 0.0 {
+                self.given_cell.last()
+            } else {
+                self.given_cell.first()
+            };
+            return outermost.map_or(f64::NEG_INFINITY, |p| p.ln());
+        }
         let standard = |edge: f64| (edge - m) / self.deviation;
         let logs: Vec<f64> = self
             .parts()

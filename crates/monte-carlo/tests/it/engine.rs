@@ -157,14 +157,14 @@ fn a_failing_trial_stops_those_behind_it() {
         |(), ()| (),
     );
     // The lowest index of all that fail, on any number of threads.
-    assert!(matches!(failed, Err(fewbits_monte_carlo::MonteCarloError::Trial { index: 70, .. })), "{failed:?}");
+    assert!(matches!(failed, Err(MonteCarloError::Trial { index: 70, .. })), "{failed:?}");
     assert!(begun.load(Ordering::Relaxed) < 100_000, "{begun:?}");
 }
 
 /// One value says nothing about its error.
 #[test]
 fn a_single_trial_has_no_standard_error() {
-    let one: fewbits_monte_carlo::Moments = [2.0].into_iter().collect();
+    let one: Moments = [2.0].into_iter().collect();
     assert_eq!((one.standard_error(), one.root_mean().standard_error), (f64::INFINITY, f64::INFINITY));
-    assert_eq!(fewbits_monte_carlo::Moments::default().estimate().standard_error, f64::INFINITY);
+    assert_eq!(Moments::default().estimate().standard_error, f64::INFINITY);
 }
