@@ -5,7 +5,7 @@ use crate::packet::Packet;
 use crate::replica::{Replica, Slot};
 use crate::report::{self, Content};
 use crate::{Error, Sensor};
-use fewbits_core::factor::{Constant, Factor, InCell, Scalar, Tilted, Value};
+use fewbits_core::factor::{Factor, InCell, Scalar, Tilted, Value};
 use fewbits_core::{Cell, Columns, Gaussian, Link, Observation, Scheme};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
@@ -157,7 +157,11 @@ impl Scheme<1> for SlotScheme {
             return Err(ArgumentError::new("crossover", link.crossover(), expected).into());
         }
         let packet = match observation {
-            Observation::Lost => return Ok(SlotFactor::Cells(Constant::ONE.into())),
+            Observation::Lost => {
+                let silent = self.cell(self.slot.prediction)?;
+                let spoke = Scalar::outside(&silent, self.noise_variance, link.lost_given_sent())?;
+                return Ok(SlotFactor::Cells(spoke));
+            }
             Observation::Nothing => {
                 let cell = self.cell(self.slot.prediction)?;
                 return Ok(SlotFactor::Cells(InCell::silence(cell, self.noise_variance, link)?.into()));
@@ -178,12 +182,12 @@ impl Scheme<1> for SlotScheme {
         Ok(match content {
             Content::Near(k) | Content::Far(k) => {
                 let cell = self.cell(self.slot.prediction + k)?;
-                SlotFactor::Cells(InCell::new(cell, self.noise_variance, 0.0, 1.0 - link.loss())?.into())
+                SlotFactor::Cells(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into())
             }
             // No cell of the lattice: the sample itself.
             Content::Whole(sample) => SlotFactor::Sample {
                 value: Value::scalar(sample, self.noise_variance)?,
-                log_arrival: (-link.loss()).ln_1p(),
+                log_arrival: link.of_received()?.ln(),
             },
         })
     }

@@ -38,7 +38,7 @@ impl BinaryQuantizer {
     }
 }
 
-/// A sensor that reports in every slot: nothing received is a loss.
+/// A sensor that reports in every slot: a missing report says nothing about the measurement.
 impl Scheme<1> for PatternSensor {
     type State = ();
     type Feedback = ();
@@ -64,12 +64,12 @@ impl Scheme<1> for PatternSensor {
     fn factor(&self, (): &(), observation: &Observation<Bit>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
         let Bit(bit) = match observation {
             Observation::Received(bit) => *bit,
-            Observation::Nothing => return Ok(Constant::new(link.loss())?.into()),
-            Observation::Lost => return Ok(Constant::ONE.into()),
+            missing => return Ok(Constant::of_delivery(missing, link).into()),
         };
+        let arrival = link.of_received()?;
         let cells = Quantizer::try_from(self.quantizer())?;
         let variance = self.noise_std() * self.noise_std();
-        let given = |level: usize| (1.0 - link.loss()) * link.word_probability(level as u64, u64::from(bit), 1);
+        let given = |level: usize| arrival * link.word_probability(level as u64, u64::from(bit), 1);
         Ok(cells.factor_of(variance, given)?)
     }
 }
@@ -96,7 +96,7 @@ mod tests {
             let sensor = PatternSensor::with_deviation(quantizer, 0.3 * scale).unwrap();
             let points = [-1e9, -3.0, -0.4, 0.0, 0.7, 30.0].map(|m| SVector::from([scale * m]));
             let prior = Gaussian::scalar(0.2 * scale, scale * scale).unwrap();
-            for link in [Link::PERFECT, Link::new(0.3, 0.1).unwrap()] {
+            for link in [Link::PERFECT, Link::new(0.3, 0.1).unwrap().with_erasure(0.2).unwrap()] {
                 let bits = [Bit(false), Bit(true)];
                 scheme::total_probability(&sensor, &(), &link, bits, &points).unwrap();
                 let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);

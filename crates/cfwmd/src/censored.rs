@@ -3,60 +3,56 @@
 use crate::Error;
 use crate::ellipsoid::{EllipsoidMoments, GaussianInEllipsoid};
 use crate::rule::CensoringRule;
-use fewbits_core::columns::state_at;
-use fewbits_core::factor::{Constant, InCell, Partition, Repeated, Scalar, Value};
+use fewbits_core::columns::{lengths_agree, state_at};
+use fewbits_core::factor::{Constant, InCell, Partition, Product, Repeated, Scalar, Value};
 use fewbits_core::number::Levels;
 use fewbits_core::{Cell, Columns, Factor, Gaussian, Link, Tilted};
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::kernels;
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{Cholesky, SMatrix, SVector};
 
-/// Nothing arrived from a sensor that is silent if its innovation lies in an ellipsoid about zero:
-///
-/// `p(nothing | m) = loss + (1 - loss) P(m + n - prediction in ellipsoid)`, `n ~ N(0, R)`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EllipsoidSilence<const M: usize> {
-    rule: CensoringRule<M>,
-    prediction: SVector<f64, M>,
-    noise: SMatrix<f64, M, M>,
-    inside: GaussianInEllipsoid<M>,
-    loss: f64,
+/// What a missing report of a censoring sensor says about its innovation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Missing {
+    /// Nothing arrived: the innovation lies in the region of silence, or its report was lost without a trace.
+    Nothing { loss: f64 },
+    /// A report is known to be lost: the innovation lies outside. `scale` is [`Link::lost_given_sent`].
+    Lost { scale: f64 },
 }
 
-impl<const M: usize> EllipsoidSilence<M> {
-    /// Silence under `rule` about `prediction`, over a link that loses reports; noise covariance `R`.
-    ///
-    /// # Errors
-    /// If `R` is not a covariance or the prediction not finite.
-    pub fn new(
-        rule: &CensoringRule<M>,
-        prediction: &SVector<f64, M>,
-        noise: &SMatrix<f64, M, M>,
-        link: &Link,
-    ) -> Result<Self, ArgumentError> {
-        fewbits_numerics::error::all_finite("prediction", prediction.as_slice())?;
-        Ok(Self {
-            inside: rule.region().under(noise)?,
-            rule: rule.clone(),
-            prediction: *prediction,
-            noise: *noise,
-            loss: link.loss(),
-        })
+impl Missing {
+    pub(crate) fn nothing(link: &Link) -> Self {
+        Self::Nothing { loss: link.loss() }
     }
 
-    /// Moments of the innovation `nu ~ N(mu, V)` given that nothing arrived: inside the region, or outside and lost.
+    pub(crate) fn lost(link: &Link) -> Self {
+        Self::Lost {
+            scale: link.lost_given_sent(),
+        }
+    }
+
+    /// Moments of the innovation `nu ~ N(mu, V)` of a sensor with this rule, given that its report is missing.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if the silence has probability zero.
-    pub fn innovation_moments(
+    /// [`fewbits_core::Error::Impossible`] if that has probability zero.
+    pub(crate) fn innovation_moments<const M: usize>(
+        self,
         rule: &CensoringRule<M>,
         mu: &SVector<f64, M>,
         covariance: &SMatrix<f64, M, M>,
-        loss: f64,
     ) -> Result<EllipsoidMoments<M>, fewbits_core::Error> {
-        let inside = rule.region().under(covariance)?.moments(mu);
-        let Some(inside) = inside else {
+        let under = rule.region().under(covariance)?;
+        let loss = match self {
+            Self::Nothing { loss } => loss,
+            Self::Lost { scale } => {
+                let mut outside = under.moments_outside(mu).ok_or(fewbits_core::Error::Impossible)?;
+                outside.log_mass += scale.ln();
+                return Ok(outside);
+            }
+        };
+        let Some(inside) = under.moments(mu) else {
             return if loss > 0.0 {
                 Ok(EllipsoidMoments {
                     log_mass: loss.ln(),
@@ -82,40 +78,87 @@ impl<const M: usize> EllipsoidSilence<M> {
     }
 }
 
-impl<const M: usize> Factor<M> for EllipsoidSilence<M> {
+/// No report of a sensor that is silent if its innovation lies in an ellipsoid about zero. With `s(m)` the probability
+/// `P(m + n - prediction in ellipsoid)`, `n ~ N(0, R)`:
+///
+/// `p(nothing | m) = loss + (1 - loss) s(m)` and `p(lost | m) = e (1 - s(m))`, `e` the link's [`lost_given_sent`](Link::lost_given_sent).
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct EllipsoidMissing<const M: usize> {
+    rule: CensoringRule<M>,
+    prediction: SVector<f64, M>,
+    noise: SMatrix<f64, M, M>,
+    inside: GaussianInEllipsoid<M>,
+    missing: Missing,
+}
+
+impl<const M: usize> EllipsoidMissing<M> {
+    fn new(
+        rule: &CensoringRule<M>,
+        prediction: &SVector<f64, M>,
+        noise: &SMatrix<f64, M, M>,
+        missing: Missing,
+    ) -> Result<Self, ArgumentError> {
+        fewbits_numerics::error::all_finite("prediction", prediction.as_slice())?;
+        Ok(Self {
+            inside: rule.region().under(noise)?,
+            rule: rule.clone(),
+            prediction: *prediction,
+            noise: *noise,
+            missing,
+        })
+    }
+}
+
+impl<const M: usize> Factor<M> for EllipsoidMissing<M> {
     fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
-        let inside = self.inside.log_probability(&(m - self.prediction));
-        if self.loss == 0.0 {
-            inside
-        } else {
-            (self.loss + (1.0 - self.loss) * inside.exp()).ln()
+        let mu = m - self.prediction;
+        match self.missing {
+            Missing::Nothing { loss: 0.0 } => self.inside.log_probability(&mu),
+            Missing::Nothing { loss } => (loss + (1.0 - loss) * self.inside.log_probability(&mu).exp()).ln(),
+            Missing::Lost { scale } => scale.ln() + self.inside.log_probability_outside(&mu),
         }
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
-        add_mixed(self.loss, (1.0 - self.loss).ln(), log_weights, |from, logs| {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
+        let (floor, log_share, outside) = match self.missing {
+            Missing::Nothing { loss } => (loss, (1.0 - loss).ln(), false),
+            Missing::Lost { scale } => (0.0, scale.ln(), true),
+        };
+        add_mixed(floor, log_share, log_weights, |from, logs| {
             for (i, log) in logs.iter_mut().enumerate() {
-                *log += self
-                    .inside
-                    .log_probability(&(state_at(means, from + i) - self.prediction));
+                let mu = state_at(means, from + i) - self.prediction;
+                *log += if outside {
+                    self.inside.log_probability_outside(&mu)
+                } else {
+                    self.inside.log_probability(&mu)
+                };
             }
         });
     }
 
-    /// With `nu = m + n - prediction` of covariance `S = V + R` and moments `E`, `C` given silence, `K = V S^-1`:
+    /// With `nu = m + n - prediction` of covariance `S = V + R` and moments `E`, `C` given that the report is missing, `K = V S^-1`:
     /// mean `mu + K (E - E0 nu)`, covariance `(I - K) V (I - K)' + K R K' + K C K'`.
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, fewbits_core::Error> {
         let spread = prior.covariance();
         let total = symmetrised(&(spread + self.noise));
         let mu = prior.mean() - self.prediction;
-        let after = Self::innovation_moments(&self.rule, &mu, &total, self.loss)?;
-        let factor = Cholesky::new(total).ok_or(fewbits_core::Error::Impossible)?;
+        let after = self.missing.innovation_moments(&self.rule, &mu, &total)?;
+        let what = "the posterior of a missing report";
+        let factor = Cholesky::new(total).ok_or(fewbits_core::Error::NotANumber { what })?;
         let gain = factor.solve(spread).transpose();
         let keep = SMatrix::<f64, M, M>::identity() - gain;
+        let mean = prior.mean() + gain * (after.mean - mu);
+        let covariance = keep * spread * keep.transpose() + gain * (self.noise + after.covariance) * gain.transpose();
+        if mean.iter().chain(covariance.iter()).any(|x| !x.is_finite()) {
+            return Err(fewbits_core::Error::NotANumber { what });
+        }
         Ok(Tilted {
             log_evidence: after.log_mass,
-            mean: prior.mean() + gain * (after.mean - mu),
-            covariance: keep * spread * keep.transpose() + gain * (self.noise + after.covariance) * gain.transpose(),
+            mean,
+            covariance,
         })
     }
 }
@@ -141,14 +184,23 @@ pub(crate) fn add_mixed(floor: f64, log_share: f64, log_weights: &mut [f64], add
     }
 }
 
+/// How many reports of identical sensors are missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MissingReports {
+    /// Sensors from which nothing arrived ([`Observation::Nothing`](fewbits_core::Observation::Nothing)).
+    pub nothing: usize,
+    /// Sensors whose report is known to be lost ([`Observation::Lost`](fewbits_core::Observation::Lost)).
+    pub lost: usize,
+}
+
 /// The factor of one censoring sensor, or of several that are identical: `ln p(observation | m)`.
 ///
 /// | observation | scalar | vector |
 /// |---|---|---|
 /// | a value | [`Value`] | [`Value`] |
 /// | a value in fixed format | the cell of its level outside the interval of silence, [`InCell`] or [`Partition`] | |
-/// | nothing | [`InCell`]: the interval of silence, mixed with the loss of the link | [`EllipsoidSilence`] |
-/// | a report known to be lost | [`Constant`] | [`Constant`] |
+/// | nothing | [`InCell`]: the interval of silence, mixed with the loss of the link | an [`Ellipsoid`](crate::ellipsoid::Ellipsoid), mixed with the loss |
+/// | a report known to be lost | [`Partition`]: outside the interval of silence | outside the ellipsoid |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Censored<const M: usize> {
     kind: Kind<M>,
@@ -159,17 +211,17 @@ pub struct Censored<const M: usize> {
 #[derive(Debug, Clone, PartialEq)]
 enum Kind<const M: usize> {
     Value(Value<M>),
-    Ellipsoid(Box<EllipsoidSilence<M>>),
+    Ellipsoid(Box<EllipsoidMissing<M>>),
     /// Of the only component; `M` is 1.
-    Scalar(Repeated),
+    Scalar(Product),
 }
 
 impl<const M: usize> Censored<M> {
-    fn scalar(factor: Scalar, count: usize) -> Result<Self, ArgumentError> {
-        Ok(Self {
-            kind: Kind::Scalar(Repeated::new(factor, count)?),
+    fn scalar(factor: Scalar) -> Self {
+        Self {
+            kind: Kind::Scalar(Product::from_iter([factor])),
             log_scale: 0.0,
-        })
+        }
     }
 
     /// An observation of the same probability whatever the measurement.
@@ -177,7 +229,7 @@ impl<const M: usize> Censored<M> {
     /// # Errors
     /// If `probability` is outside `[0, 1]`.
     pub fn constant(probability: f64) -> Result<Self, ArgumentError> {
-        Self::scalar(Constant::new(probability)?.into(), 1)
+        Ok(Self::scalar(Constant::new(probability)?.into()))
     }
 
     /// The measurement itself, which arrives with probability `arrival`.
@@ -197,7 +249,7 @@ impl<const M: usize> Censored<M> {
     /// # Errors
     /// If there is no value, a number is not finite or `R` not positive definite.
     pub fn values(values: &[SVector<f64, M>], noise: &SMatrix<f64, M, M>, arrival: f64) -> Result<Self, ArgumentError> {
-        let count = fewbits_numerics::error::at_least_one("values", values.len())? as f64;
+        let count = at_least_one("values", values.len())? as f64;
         let mean = values.iter().sum::<SVector<f64, M>>() / count;
         let mut all = Self::value(&mean, &(noise / count), 1.0)?;
         let single = Value::new(mean, *noise)?;
@@ -210,7 +262,7 @@ impl<const M: usize> Censored<M> {
     /// Nothing arrived from `count` identical sensors, each silent by `rule` about `prediction`, in noise `R`.
     ///
     /// # Errors
-    /// If a number is not finite, `R` not a covariance, `count` zero, or `count` above one for a vector measurement.
+    /// As [`Censored::missing`].
     pub fn silence(
         rule: &CensoringRule<M>,
         prediction: &SVector<f64, M>,
@@ -218,21 +270,57 @@ impl<const M: usize> Censored<M> {
         link: &Link,
         count: usize,
     ) -> Result<Self, ArgumentError> {
+        let silent = MissingReports {
+            nothing: count,
+            lost: 0,
+        };
+        Self::missing(rule, prediction, noise, link, silent)
+    }
+
+    /// The missing reports of identical sensors, each silent by `rule` about `prediction`, in noise `R`.
+    ///
+    /// # Errors
+    /// If a number is not finite, `R` not a covariance, no report is missing, or more than one of a vector measurement.
+    pub fn missing(
+        rule: &CensoringRule<M>,
+        prediction: &SVector<f64, M>,
+        noise: &SMatrix<f64, M, M>,
+        link: &Link,
+        reports: MissingReports,
+    ) -> Result<Self, ArgumentError> {
+        let count = at_least_one("reports", reports.nothing.saturating_add(reports.lost))?;
         if M != 1 {
-            fewbits_numerics::error::within("count", count as f64, 1.0, 1.0)?;
+            fewbits_numerics::error::within("reports", count as f64, 1.0, 1.0)?;
+            let kind = if reports.lost == 1 {
+                Missing::lost(link)
+            } else {
+                Missing::nothing(link)
+            };
             return Ok(Self {
-                kind: Kind::Ellipsoid(Box::new(EllipsoidSilence::new(rule, prediction, noise, link)?)),
+                kind: Kind::Ellipsoid(Box::new(EllipsoidMissing::new(rule, prediction, noise, kind)?)),
                 log_scale: 0.0,
             });
         }
         fewbits_numerics::error::finite("prediction", prediction[0])?;
         let (low, high) = rule.interval(prediction[0]);
-        let factor: Scalar = match Cell::new(low, high) {
-            Ok(cell) => InCell::silence(cell, noise[(0, 0)], link)?.into(),
+        let (loss, scale) = (link.loss(), link.lost_given_sent());
+        let (nothing, lost): (Scalar, Scalar) = match Cell::new(low, high) {
+            Ok(cell) => {
+                (InCell::silence(cell, noise[(0, 0)], link)?.into(), Scalar::outside(&cell, noise[(0, 0)], scale)?)
+            }
             // Everything is sent: only the link can be to blame.
-            Err(_) => Constant::new(link.loss())?.into(),
+            Err(_) => (Constant::new(loss)?.into(), Constant::new(scale)?.into()),
         };
-        Self::scalar(factor, count)
+        let mut product = Product::new();
+        for (factor, count) in [(nothing, reports.nothing), (lost, reports.lost)] {
+            if count > 0 {
+                product.push_repeated(Repeated::new(factor, count)?);
+            }
+        }
+        Ok(Self {
+            kind: Kind::Scalar(product),
+            log_scale: 0.0,
+        })
     }
 
     /// A value that arrived as one of a few levels, from a scalar sensor with this rule and prediction.
@@ -270,7 +358,7 @@ impl<const M: usize> Censored<M> {
                 ));
             }
         };
-        Self::scalar(factor, 1)
+        Ok(Self::scalar(factor))
     }
 }
 
@@ -285,6 +373,9 @@ impl<const M: usize> Factor<M> for Censored<M> {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         if self.log_scale != 0.0 {
             log_weights.iter_mut().for_each(|w| *w += self.log_scale);
         }
@@ -312,6 +403,10 @@ impl<const M: usize> Factor<M> for Censored<M> {
             Kind::Scalar(factor) => Tilted::unchanged(prior, factor.log_likelihood(&[prior.mean()[0]].into())),
         }?;
         tilted.log_evidence += self.log_scale;
+        if !tilted.log_evidence.is_finite() {
+            let what = "the evidence of a censored value";
+            return Err(fewbits_core::Error::unlikely_or_no_number(tilted.log_evidence, what));
+        }
         Ok(tilted)
     }
 }

@@ -1,7 +1,7 @@
 //! A network of censoring sensors with feedback, as its fusion centre knows it.
 
 use crate::Error;
-use crate::censored::Censored;
+use crate::censored::{Censored, MissingReports};
 use crate::rule::CensoringRule;
 use crate::scheme::{Censoring, rule_under};
 use fewbits_core::{Gaussian, LinearSensing, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
@@ -136,7 +136,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     }
 
     /// What was observed, as a likelihood for particle and grid filters: one entry per group of identical scalar sensors that
-    /// sent a value, one per group that is silent under the same rule, one per sensor otherwise.
+    /// sent a value, one per group whose reports are missing under the same rule, one per sensor otherwise.
     ///
     /// # Errors
     /// If the numbers of rules or observations are wrong, a number is not finite, or a value violates its rule.
@@ -163,41 +163,43 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
                 let values: Vec<_> = (i..observations.len()).filter_map(received).collect();
                 if !values.is_empty() {
                     let noise = self.sensors[i].noise_covariance_at(broadcast);
-                    push(Censored::values(&values, &noise, 1.0 - self.link.loss())?);
+                    push(Censored::values(&values, &noise, self.link.of_received()?)?);
                 }
             }
-            let count = self.silent_together(rules, observations, i);
-            if count > 0 {
-                push(self.scheme(i, &rules[i])?.silence(broadcast, &self.link, count)?);
+            if let Some(missing) = self.missing_together(rules, observations, i) {
+                push(self.scheme(i, &rules[i])?.missing(broadcast, &self.link, missing)?);
             }
         }
         Ok(all)
     }
 
-    /// How many silent sensors share the factor of sensor `i`: itself and, for scalar measurements, later identical ones under
-    /// the same rule; none if it reported or an earlier one shares its own factor with it.
-    fn silent_together(
+    /// The missing reports that share the factor of sensor `i`: its own and, for scalar measurements, those of later identical
+    /// sensors under the same rule. `None` if its report arrived, or an earlier sensor's factor includes it.
+    fn missing_together(
         &self,
         rules: &[CensoringRule<M>],
         observations: &[Observation<SVector<f64, M>>],
         i: usize,
-    ) -> usize {
-        let silent = |j: usize| matches!(observations[j], Observation::Nothing);
-        let alike = |j: usize| silent(j) && self.identical[j] == self.identical[i] && rules[j] == rules[i];
-        match (silent(i), M) {
-            (false, _) => 0,
-            (true, 1) if (0..i).any(alike) => 0,
-            (true, 1) => (i..self.sensors.len()).filter(|j| alike(*j)).count(),
-            (true, _) => 1,
+    ) -> Option<MissingReports> {
+        let missing = |j: usize| observations[j].received().is_none();
+        let alike = |j: usize| missing(j) && self.identical[j] == self.identical[i] && rules[j] == rules[i];
+        if !missing(i) || (M == 1 && (0..i).any(alike)) {
+            return None;
         }
+        let last = if M == 1 { self.sensors.len() } else { i + 1 };
+        let of = |kind| (i..last).filter(|j| alike(*j) && observations[*j] == kind).count();
+        Some(MissingReports {
+            nothing: of(Observation::Nothing),
+            lost: of(Observation::Lost),
+        })
     }
 }
 
 impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Network<S, D, M> {
-    /// One update of the Gaussian fusion centre: values, then silences. `broadcast` is the state prediction that the sensors
+    /// One update of the Gaussian fusion centre: values, then missing reports. `broadcast` is the state prediction that the sensors
     /// compared with; without rounding it is the mean of `predicted`.
     ///
-    /// Identical silent scalar sensors are fused together and exactly; distinct or vector ones one after the other.
+    /// Missing reports of identical scalar sensors are fused together and exactly; of distinct or vector ones one after the other.
     ///
     /// # Errors
     /// As [`Network::likelihood`]; [`fewbits_core::Error::Impossible`] if the observations have probability zero.
@@ -228,14 +230,13 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
                 scheme.check_value(i, &sensor.mean(broadcast), value, &self.link)?;
                 let (next, step) = kalman::update(sensor, &belief, value)?;
                 belief = next;
-                log_likelihood += step.log_likelihood + (-self.link.loss()).ln_1p();
+                log_likelihood += step.log_likelihood + self.link.of_received()?.ln();
             }
         }
         for i in 0..self.sensors.len() {
-            let count = self.silent_together(rules, observations, i);
-            if count > 0 {
-                let silence = self.scheme(i, &rules[i])?.silence(broadcast, &self.link, count)?;
-                log_likelihood += update(&mut belief, i, silence)?;
+            if let Some(missing) = self.missing_together(rules, observations, i) {
+                let factor = self.scheme(i, &rules[i])?.missing(broadcast, &self.link, missing)?;
+                log_likelihood += update(&mut belief, i, factor)?;
             }
         }
         let received = observations.iter().filter(|o| o.received().is_some()).count();

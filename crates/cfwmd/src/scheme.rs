@@ -1,7 +1,7 @@
 //! Censoring sensors with feedback, both halves: the sensor's, and what its reports and its silence mean.
 
 use crate::Error;
-use crate::censored::{Censored, as_core};
+use crate::censored::{Censored, MissingReports, as_core};
 use crate::rule::CensoringRule;
 use fewbits_core::{
     BitReader, BitWriter, CodecError, Gaussian, Link, Message, NumberFormat, Observation, Scheme, Sensing,
@@ -42,14 +42,19 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         &self.rule
     }
 
-    /// The factor of `count` identical sensors from which nothing arrived (one, for vectors).
+    /// The factor of the missing reports of sensors identical with this one (of one, for vectors).
     ///
     /// # Errors
-    /// If the broadcast is not finite.
-    pub fn silence(&self, broadcast: &SVector<f64, D>, link: &Link, count: usize) -> Result<Censored<M>, Error> {
+    /// If the broadcast is not finite; as [`Censored::missing`].
+    pub fn missing(
+        &self,
+        broadcast: &SVector<f64, D>,
+        link: &Link,
+        reports: MissingReports,
+    ) -> Result<Censored<M>, Error> {
         let prediction = self.sensing.mean(broadcast);
         let noise = self.sensing.noise_covariance_at(broadcast);
-        Ok(Censored::silence(&self.rule, &prediction, &noise, link, count)?)
+        Ok(Censored::missing(&self.rule, &prediction, &noise, link, reports)?)
     }
 
     /// The factor of a received value; `sensor` is named if the rule would not have sent it.
@@ -64,7 +69,7 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Censoring<S, D, M> {
         value: &SVector<f64, M>,
         link: &Link,
     ) -> Result<Censored<M>, Error> {
-        let (prediction, arrival) = (self.sensing.mean(broadcast), 1.0 - link.loss());
+        let (prediction, arrival) = (self.sensing.mean(broadcast), link.of_received()?);
         let noise = self.sensing.noise_covariance_at(broadcast);
         if let NumberFormat::Fixed(levels) = &self.format {
             finite_over(link, value, &prediction)?;
@@ -143,8 +148,8 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S
     ) -> Result<Censored<M>, fewbits_core::Error> {
         match observation {
             Observation::Received(value) => self.received(0, broadcast, value, link),
-            Observation::Nothing => self.silence(broadcast, link, 1),
-            Observation::Lost => Ok(Censored::constant(1.0)?),
+            Observation::Nothing => self.missing(broadcast, link, MissingReports { nothing: 1, lost: 0 }),
+            Observation::Lost => self.missing(broadcast, link, MissingReports { nothing: 0, lost: 1 }),
         }
         .map_err(as_core)
     }

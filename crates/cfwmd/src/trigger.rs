@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::censored::add_mixed;
+use fewbits_core::columns::lengths_agree;
 use fewbits_core::factor::{Tilted, Value};
 use fewbits_core::{Columns, Factor, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing};
 use fewbits_numerics::ArgumentError;
@@ -69,20 +70,31 @@ pub struct Triggered<S, const D: usize> {
     pub trigger: StochasticTrigger,
 }
 
-/// What a triggered sensor's report or silence says: `floor + exp(log_share) N(centre; m, variance)`.
+/// What a triggered sensor's report, its silence or a known loss says, with `g(m) = exp(log_share) N(centre; m, variance)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bump {
     value: Value<1>,
     log_share: f64,
-    floor: f64,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    /// `floor + g(m)`: a report (floor 0), or nothing over a link that loses reports.
+    Above { floor: f64 },
+    /// `scale (1 - g(m))`, `g` the probability of silence: a known loss.
+    Below { scale: f64 },
 }
 
 impl Bump {
+    /// The logarithm of the factor where that of `g` is `log_peak`.
     fn mixed(&self, log_peak: f64) -> f64 {
-        if self.floor == 0.0 {
-            log_peak
-        } else {
-            (self.floor + log_peak.exp()).ln()
+        match self.kind {
+            Kind::Above { floor: 0.0 } => log_peak,
+            Kind::Above { floor } => (floor + log_peak.exp()).ln(),
+            Kind::Below { .. } if log_peak.is_nan() => log_peak,
+            // Rounding may lift `g` above one where the noise is nothing beside `1/Y`.
+            Kind::Below { scale } => scale.ln() + (-log_peak.min(0.0).exp_m1()).ln(),
         }
     }
 }
@@ -93,29 +105,66 @@ impl Factor<1> for Bump {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
-        add_mixed(self.floor, self.log_share, log_weights, |from, logs| {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
+        let add = |from: usize, logs: &mut [f64]| {
             self.value
                 .add_log_likelihoods(&[&means[0][from..from + logs.len()]], logs);
-        });
+        };
+        match self.kind {
+            Kind::Above { floor } => add_mixed(floor, self.log_share, log_weights, add),
+            Kind::Below { .. } => add_mixed(0.0, self.log_share, log_weights, |from, logs| {
+                add(from, logs);
+                logs.iter_mut().for_each(|log| *log = self.mixed(*log));
+            }),
+        }
     }
 
-    /// The mixture of the prior, by the weight of the floor, and of the Kalman update.
+    /// Silence: the mixture of the prior, by the weight of the floor, and of the Kalman update. A known loss: what that update
+    /// leaves of the prior.
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, fewbits_core::Error> {
         let inside = self.value.tilted(prior)?;
-        let log_evidence = self.mixed(self.log_share + inside.log_evidence);
+        let log_inside = self.log_share + inside.log_evidence;
+        let log_evidence = self.mixed(log_inside);
         if log_evidence == f64::NEG_INFINITY {
             return Err(fewbits_core::Error::Impossible);
         }
-        let weight = if self.floor == 0.0 {
-            1.0
-        } else {
-            (self.log_share + inside.log_evidence - log_evidence).exp()
-        };
         let step = inside.mean - prior.mean();
+        if let Kind::Below { .. } = self.kind {
+            // E[d^2] = (V - w (C + step^2)) / (1 - w) about the prior's mean, with the difference V - C formed first.
+            let (w, left) = (log_inside.exp(), -log_inside.exp_m1());
+            let (variance, after) = (prior.covariance()[0], inside.covariance[0]);
+            let shift = step * (-w / left);
+            let removed = variance * variance / (variance + self.value.noise_covariance()[0]);
+            let second = (removed - w * step[0] * step[0]) / left + after;
+            let (mean, spread) = (prior.mean()[0] + shift[0], second - shift[0] * shift[0]);
+            if !(mean.is_finite() && spread.is_finite()) {
+                return Err(fewbits_core::Error::NotANumber {
+                    what: "the posterior of a known loss",
+                });
+            }
+            return Ok(Tilted {
+                log_evidence,
+                mean: [mean].into(),
+                covariance: [[spread.max(0.0)]].into(),
+            });
+        }
+        if let Kind::Above { floor: 0.0 } = self.kind {
+            return Ok(Tilted { log_evidence, ..inside });
+        }
+        let weight = (log_inside - log_evidence).exp();
+        let mean = prior.mean() + step * weight;
+        let spread = (prior.covariance() + step * step * weight) * (1.0 - weight) + inside.covariance * weight;
+        if !(log_evidence.is_finite() && mean[0].is_finite() && spread[0].is_finite()) {
+            return Err(fewbits_core::Error::NotANumber {
+                what: "the posterior of a silence",
+            });
+        }
         Ok(Tilted {
             log_evidence,
-            mean: prior.mean() + step * weight,
-            covariance: (prior.covariance() + step * step * weight) * (1.0 - weight) + inside.covariance * weight,
+            mean,
+            covariance: spread,
         })
     }
 }
@@ -149,8 +198,8 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
         Ok((rng.random::<f64>() < self.trigger.probability(innovation)).then_some(z))
     }
 
-    /// Silence: `E exp(-(m + n - prediction)^2 Y/2) = sqrt(2 pi/Y) N(prediction; m, r + 1/Y)`. An erased report has the
-    /// factor 1.
+    /// Silence: `s(m) = E exp(-(m + n - prediction)^2 Y/2) = sqrt(2 pi/Y) N(prediction; m, r + 1/Y)`. A known loss:
+    /// `1 - s(m)`.
     fn factor(
         &self,
         broadcast: &SVector<f64, D>,
@@ -158,25 +207,29 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
         link: &Link,
     ) -> Result<Bump, fewbits_core::Error> {
         let (prediction, r) = (self.sensing.mean(broadcast)[0], self.sensing.noise_covariance_at(broadcast)[0]);
-        let (arrival, y) = ((1.0 - link.loss()).ln(), self.trigger.precision);
+        finite("prediction", prediction)?;
+        let y = self.trigger.precision;
+        let log_scale = 0.5 * (std::f64::consts::TAU.ln() - y.ln());
         Ok(match observation {
             Observation::Received(z) => {
                 fewbits_numerics::error::within("crossover", link.crossover(), 0.0, 0.0)?;
                 Bump {
                     value: Value::scalar(*z, r)?,
-                    log_share: arrival + self.trigger.probability(z - prediction).ln(),
-                    floor: 0.0,
+                    log_share: link.of_received()?.ln() + self.trigger.probability(z - prediction).ln(),
+                    kind: Kind::Above { floor: 0.0 },
                 }
             }
             Observation::Nothing => Bump {
                 value: Value::scalar(prediction, r + 1.0 / y)?,
-                log_share: arrival + 0.5 * (std::f64::consts::TAU / y).ln(),
-                floor: link.loss(),
+                log_share: (-link.loss()).ln_1p() + log_scale,
+                kind: Kind::Above { floor: link.loss() },
             },
             Observation::Lost => Bump {
-                value: Value::scalar(prediction, r)?,
-                log_share: f64::NEG_INFINITY,
-                floor: 1.0,
+                value: Value::scalar(prediction, r + 1.0 / y)?,
+                log_share: log_scale,
+                kind: Kind::Below {
+                    scale: link.lost_given_sent(),
+                },
             },
         })
     }

@@ -1,6 +1,6 @@
 //! What is known about the state at one moment.
 
-use crate::columns::{Columns, ColumnsMut, state_at};
+use crate::columns::{Columns, ColumnsMut, lengths_agree, state_at};
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 
@@ -14,7 +14,8 @@ pub trait Belief<const D: usize> {
     /// Covariance.
     fn covariance(&self) -> SMatrix<f64, D, D>;
 
-    /// Fills the columns with independent draws.
+    /// Fills the columns with independent draws; with NaN where columns differ in length
+    /// ([`columns_agree`](crate::columns::columns_agree)).
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>);
 
     /// One draw.
@@ -32,10 +33,12 @@ pub trait Density<const D: usize>: Belief<D> {
     /// `ln p(state)`: finite or `-inf`, never NaN for a finite state.
     fn log_density(&self, state: &SVector<f64, D>) -> f64;
 
-    /// Adds the log density of every state to `logs`. Override where a sweep is faster.
+    /// Adds the log density of every state to `logs`; NaN where lengths differ ([`lengths_agree`]). Override where a sweep is faster.
     fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
-        for (i, log) in logs.iter_mut().enumerate() {
-            *log += self.log_density(&state_at(states, i));
+        if lengths_agree(states, logs) {
+            for (i, log) in logs.iter_mut().enumerate() {
+                *log += self.log_density(&state_at(states, i));
+            }
         }
     }
 }

@@ -81,21 +81,24 @@ impl Clone for BitString {
 }
 
 impl BitString {
-    /// The first `bits` bits of `bytes`.
+    /// The first `bits` bits of `bytes`. What lies behind them is dropped, so that messages of equal bits are equal.
     ///
     /// # Errors
     /// If `bytes` is too short.
     pub fn from_bytes(bytes: Vec<u8>, bits: usize) -> Result<Self, CodecError> {
-        if bits > bytes.len() * 8 {
+        if bits > bytes.len().saturating_mul(8) {
             return Err(CodecError::EndOfMessage {
                 requested: u32::try_from(bits).unwrap_or(u32::MAX),
                 available: bytes.len() * 8,
             });
         }
-        Ok(Self {
-            bytes: bytes.into(),
-            bits,
-        })
+        let mut bytes: SmallVec<[u8; 16]> = bytes.into();
+        bytes.truncate(bits.div_ceil(8));
+        let padding = 8 * bytes.len() - bits;
+        if let Some(last) = bytes.last_mut() {
+            *last = *last >> padding << padding;
+        }
+        Ok(Self { bytes, bits })
     }
 
     /// Length in bits: the price of the message.

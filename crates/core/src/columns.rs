@@ -22,6 +22,44 @@ pub fn set_state<const D: usize>(columns: &mut ColumnsMut<'_, D>, i: usize, stat
     }
 }
 
+/// Whether a sweep from `columns` to `out` may run: all are of one length.
+///
+/// The one rule for sweeps over slices of unequal lengths: nothing is truncated and nothing panics, but all of `out` becomes NaN, which
+/// whoever weighs refuses ([`crate::Error::NotANumber`]). Every sweep begins with this check.
+#[inline]
+pub fn lengths_agree<const D: usize>(columns: &Columns<'_, D>, out: &mut [f64]) -> bool {
+    let agree = columns.iter().all(|column| column.len() == out.len());
+    if !agree {
+        out.fill(f64::NAN);
+    }
+    agree
+}
+
+/// The same for a sweep over the states of `columns` in place.
+#[inline]
+pub fn columns_agree<const D: usize>(columns: &mut ColumnsMut<'_, D>) -> bool {
+    let agree = columns.windows(2).all(|pair| pair[0].len() == pair[1].len());
+    if !agree {
+        columns.iter_mut().for_each(|column| column.fill(f64::NAN));
+    }
+    agree
+}
+
+/// The same for a sweep from states to measurements.
+#[inline]
+pub fn measurements_agree<const D: usize, const M: usize>(
+    states: &Columns<'_, D>,
+    means: &mut ColumnsMut<'_, M>,
+) -> bool {
+    let agree = means
+        .iter()
+        .all(|mean| states.iter().all(|state| state.len() == mean.len()));
+    if !agree {
+        means.iter_mut().for_each(|mean| mean.fill(f64::NAN));
+    }
+    agree
+}
+
 /// Number of states: the length of the shortest column, 0 where `D` is 0.
 #[inline]
 pub fn count<T: AsRef<[f64]>>(columns: &[T]) -> usize {

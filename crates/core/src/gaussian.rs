@@ -1,7 +1,7 @@
 //! The Gaussian belief.
 
 use crate::belief::{Belief, Density};
-use crate::columns::{Columns, ColumnsMut, count, set_state};
+use crate::columns::{Columns, ColumnsMut, columns_agree, count, lengths_agree, set_state};
 use fewbits_numerics::error::{self, ArgumentError};
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
@@ -140,7 +140,7 @@ impl<const D: usize> Gaussian<D> {
     /// Kullback-Leibler divergence `KL(self || other)` in nats.
     ///
     /// # Errors
-    /// If either covariance is singular.
+    /// If either covariance is singular, or the divergence leaves the range of numbers.
     pub fn kl_divergence(&self, other: &Self) -> Result<f64, ArgumentError> {
         let (own, reference) = (self.cholesky()?, other.cholesky()?);
         let log_ratio: f64 = reference
@@ -152,7 +152,7 @@ impl<const D: usize> Gaussian<D> {
             .sum();
         let trace = reference.solve(&self.covariance).trace();
         let shift = other.mean - self.mean;
-        Ok(log_ratio + 0.5 * (trace + shift.dot(&reference.solve(&shift)) - D as f64))
+        error::finite("divergence", log_ratio + 0.5 * (trace + shift.dot(&reference.solve(&shift)) - D as f64))
     }
 }
 
@@ -211,6 +211,9 @@ fn sample_normals<const D: usize, R: Rng + ?Sized>(
     factor: &SMatrix<f64, D, D>,
     mut states: ColumnsMut<'_, D>,
 ) {
+    if !columns_agree(&mut states) {
+        return;
+    }
     for i in 0..count(&states) {
         let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
         set_state(&mut states, i, &(mean + factor * z));
@@ -273,6 +276,9 @@ impl<const D: usize> FactoredGaussian<D> {
     /// Adds `ln N(x; mean, covariance)` of every state to `logs`: blocks of columns through the forward substitution.
     pub(crate) fn add_log_pdfs(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
         const BLOCK: usize = 64;
+        if !lengths_agree(states, logs) {
+            return;
+        }
         let (mut white, mut square) = ([[0.0; BLOCK]; D], [0.0; BLOCK]);
         for (start, logs) in (0..).step_by(BLOCK).zip(logs.chunks_mut(BLOCK)) {
             let count = logs.len();

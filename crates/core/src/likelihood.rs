@@ -1,6 +1,6 @@
 //! How likely what was observed is, for each state.
 
-use crate::columns::{Columns, state_at};
+use crate::columns::{Columns, lengths_agree, state_at};
 use crate::factor::Factor;
 use crate::sensing::Sensing;
 use nalgebra::SVector;
@@ -9,16 +9,19 @@ use nalgebra::SVector;
 ///
 /// A sensing model and a [`Factor`] compose into one ([`Observed`]); observations of one instant multiply (slices).
 ///
-/// Laws ([`crate::laws::likelihood`]): finite or `-inf`, never NaN for a finite state; `add_log_likelihoods` adds what
-/// `log_likelihood` returns, to rounding.
+/// Laws ([`crate::laws::likelihood`]): finite or `-inf`, never NaN for a finite state; where the state is NaN it is NaN, or no more than
+/// at any state of numbers; `add_log_likelihoods` adds what `log_likelihood` returns, to rounding, and where lengths differ all of
+/// `log_weights` becomes NaN ([`lengths_agree`](crate::columns::lengths_agree)).
 pub trait Likelihood<const D: usize> {
     /// `ln p(observed | state)`.
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64;
 
     /// Adds the log likelihood of every state of a cloud to `log_weights`. Override where a sweep is faster.
     fn add_log_likelihoods(&self, states: Columns<'_, D>, log_weights: &mut [f64]) {
-        for (i, log_weight) in log_weights.iter_mut().enumerate() {
-            *log_weight += self.log_likelihood(&state_at(&states, i));
+        if lengths_agree(&states, log_weights) {
+            for (i, log_weight) in log_weights.iter_mut().enumerate() {
+                *log_weight += self.log_likelihood(&state_at(&states, i));
+            }
         }
     }
 }
@@ -40,8 +43,10 @@ impl<const D: usize, L: Likelihood<D>> Likelihood<D> for [L] {
     }
 
     fn add_log_likelihoods(&self, states: Columns<'_, D>, log_weights: &mut [f64]) {
-        for observed in self {
-            observed.add_log_likelihoods(states, log_weights);
+        if lengths_agree(&states, log_weights) {
+            for observed in self {
+                observed.add_log_likelihoods(states, log_weights);
+            }
         }
     }
 }
@@ -82,6 +87,9 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> Likelihood<
     }
 
     fn add_log_likelihoods(&self, states: Columns<'_, D>, log_weights: &mut [f64]) {
+        if !lengths_agree(&states, log_weights) {
+            return;
+        }
         let mut means = [[0.0; BLOCK]; M];
         for (block, log_weights) in log_weights.chunks_mut(BLOCK).enumerate() {
             let (start, count) = (block * BLOCK, log_weights.len());

@@ -1,6 +1,7 @@
 //! What is observed of a sensor in one slot, and the link that it crosses.
 
 use crate::bits::BitString;
+use crate::error::Error;
 use crate::message::Message;
 use fewbits_numerics::ArgumentError;
 #[cfg(feature = "serde")]
@@ -9,7 +10,18 @@ use rand::{Rng, RngExt};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// What arrives at the receiver in one slot from one sensor.
+/// What arrives at the receiver in one slot from one sensor that was asked.
+///
+/// With `s(m)` the probability that the sensor is silent, and a [`Link`] of loss `l` and erasure `e`:
+///
+/// | observation | probability given `m` |
+/// |---|---|
+/// | `Received(r)` | `(1 - l - e) p(r | m)` |
+/// | `Nothing` | `s(m) + l (1 - s(m))` |
+/// | `Lost` | `e (1 - s(m))` |
+///
+/// They sum to one for every `m`. A sensor that was not asked (asleep, out of turn, known to be switched off) gives no observation
+/// and no factor at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Observation<R> {
@@ -17,7 +29,8 @@ pub enum Observation<R> {
     Received(R),
     /// Nothing arrived: the sensor was silent, or its report was lost without a trace. The [`Link`] says how likely each is.
     Nothing,
-    /// A report is known to be lost (a gap in sequence numbers, a failed checksum): no information.
+    /// A report is known to have been sent and was not understood (a gap in sequence numbers, a failed checksum). It says that the
+    /// sensor spoke: `p(spoke | m)`, which is 1 only for sensors that always speak.
     Lost,
 }
 
@@ -49,42 +62,72 @@ impl<R> From<Option<R>> for Observation<R> {
 
 /// What a receiver knows of the channel: the only place where these numbers live.
 ///
-/// A report vanishes without a trace with probability `loss`; each bit of a report that arrives is inverted with probability
-/// `crossover`, independently (a binary symmetric channel). [`Observation::Lost`] is not a matter of the link's law:
-/// factors condition on it.
+/// A report that was sent vanishes without a trace with probability `loss`, is known to be lost with probability `erasure`, and
+/// arrives otherwise. Each bit of a report that arrives is inverted with probability `crossover`, independently (a binary symmetric
+/// channel). A receiver that cannot tell a lost report from silence has `erasure = 0`.
+///
+/// ```
+/// use fewbits_core::Link;
+/// let link = Link::new(0.1, 0.01)?.with_erasure(0.2)?;
+/// assert!((link.arrival() - 0.7).abs() < 1e-15);
+/// assert!(Link::lossy(0.9)?.with_erasure(0.2).is_err());
+/// # Ok::<(), fewbits_core::ArgumentError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Numbers"))]
 pub struct Link {
     loss: f64,
+    erasure: f64,
     crossover: f64,
 }
 
 #[cfg(feature = "serde")]
-stored! { Link as Numbers { loss: f64, crossover: f64 } => Link::new(loss, crossover), ArgumentError }
+stored! { Link as Numbers { loss: f64, #[serde(default)] erasure: f64, crossover: f64 } =>
+Link::new(loss, crossover)?.with_erasure(erasure), ArgumentError }
 
 impl Link {
     /// A link that delivers every report as it was sent.
     pub const PERFECT: Self = Self {
         loss: 0.0,
+        erasure: 0.0,
         crossover: 0.0,
     };
 
-    /// A link that loses a report with probability `loss` and inverts a bit with probability `crossover`.
+    /// A link that loses a report without a trace with probability `loss` and inverts a bit with probability `crossover`.
+    ///
+    /// With `loss` 1 nothing ever arrives: to its receiver a dead sensor is such a link. A report that arrives all the same is
+    /// impossible.
     ///
     /// # Errors
-    /// If `loss` is outside `[0, 1)` or `crossover` outside `[0, 1/2]` (beyond one half, the receiver inverts all bits).
+    /// If `loss` is outside `[0, 1]` or `crossover` outside `[0, 1/2]` (beyond one half, the receiver inverts all bits).
     pub fn new(loss: f64, crossover: f64) -> Result<Self, ArgumentError> {
-        if !(0.0..1.0).contains(&loss) {
-            return Err(ArgumentError::new("loss", loss, "a probability in [0, 1)"));
+        if !(0.0..=1.0).contains(&loss) {
+            return Err(ArgumentError::new("loss", loss, "a probability in [0, 1]"));
         }
         if !(0.0..=0.5).contains(&crossover) {
             return Err(ArgumentError::new("crossover", crossover, "a probability in [0, 1/2]"));
         }
-        Ok(Self { loss, crossover })
+        Ok(Self {
+            loss,
+            erasure: 0.0,
+            crossover,
+        })
     }
 
-    /// A link that loses a report with probability `loss`.
+    /// The same link, where a report is also known to be lost with probability `erasure`.
+    ///
+    /// # Errors
+    /// If `erasure` is negative, or above one together with the loss.
+    pub fn with_erasure(self, erasure: f64) -> Result<Self, ArgumentError> {
+        if erasure >= 0.0 && self.loss + erasure <= 1.0 {
+            return Ok(Self { erasure, ..self });
+        }
+        let expected = format!("a probability of at most 1 together with the loss {}", self.loss);
+        Err(ArgumentError::new("erasure", erasure, expected))
+    }
+
+    /// A link that loses a report without a trace with probability `loss`.
     ///
     /// # Errors
     /// As [`Link::new`].
@@ -100,14 +143,53 @@ impl Link {
         Self::new(0.0, crossover)
     }
 
-    /// Probability that a report vanishes without a trace.
+    /// Probability that a report that was sent vanishes without a trace.
     pub fn loss(&self) -> f64 {
         self.loss
+    }
+
+    /// Probability that a report that was sent is known to be lost.
+    pub fn erasure(&self) -> f64 {
+        self.erasure
     }
 
     /// Probability that a bit arrives inverted.
     pub fn crossover(&self) -> f64 {
         self.crossover
+    }
+
+    /// Probability that a report that was sent arrives: `1 - loss - erasure`.
+    pub fn arrival(&self) -> f64 {
+        (1.0 - (self.loss + self.erasure)).max(0.0)
+    }
+
+    /// [`Link::arrival`] as part of the factor of a report that did arrive.
+    ///
+    /// # Errors
+    /// [`Error::Impossible`] if nothing arrives over this link.
+    pub fn of_received(&self) -> Result<f64, Error> {
+        match self.arrival() {
+            0.0 => Err(Error::Impossible),
+            arrival => Ok(arrival),
+        }
+    }
+
+    /// What multiplies `p(spoke | m)` in the factor of [`Observation::Lost`]: the erasure, or 1 where that is 0.
+    ///
+    /// A loss that is known over a link without known losses contradicts the link, not the sensor. It is therefore conditioned on:
+    /// its factor is `p(spoke | m)` alone. The posterior does not depend on this choice, since a positive erasure cancels from it.
+    pub fn lost_given_sent(&self) -> f64 {
+        if self.erasure > 0.0 { self.erasure } else { 1.0 }
+    }
+
+    /// Probability of `observation` given that a report was sent, whatever the report: arrival, loss, or
+    /// [`lost_given_sent`](Self::lost_given_sent). It is the whole factor of a missing report if the sensor always speaks.
+    pub fn delivery<R>(&self, observation: &Observation<R>) -> f64 {
+        match observation {
+            Observation::Received(_) => self.arrival(),
+            Observation::Nothing => self.loss,
+            Observation::Lost => self.lost_given_sent(),
+        }
     }
 
     /// `p(word received | word sent, a word arrived)` for words of `bits` bits: `e^d (1 - e)^(bits - d)` with `d` bits
@@ -118,7 +200,7 @@ impl Link {
     }
 
     /// Sends a report through the link: its bits, lost or inverted as the link's law says. Bits that no longer are a report
-    /// arrive as [`Observation::Lost`]; silence arrives as [`Observation::Nothing`].
+    /// arrive as [`Observation::Lost`] (see law 3 of [`Scheme`](crate::Scheme)); silence arrives as [`Observation::Nothing`].
     ///
     /// # Errors
     /// If the report does not fit its format.
@@ -132,8 +214,16 @@ impl Link {
             return Ok(Observation::Nothing);
         };
         let sent = report.to_bits(format)?;
-        if self.loss > 0.0 && rng.random::<f64>() < self.loss {
-            return Ok(Observation::Nothing);
+        let missing = self.loss + self.erasure;
+        if missing > 0.0 {
+            let u = rng.random::<f64>();
+            if u < missing {
+                return Ok(if u < self.loss {
+                    Observation::Nothing
+                } else {
+                    Observation::Lost
+                });
+            }
         }
         let received = self.flip(rng, sent);
         Ok(M::from_bits(format, &received).map_or(Observation::Lost, Observation::Received))

@@ -17,10 +17,13 @@ use rand::Rng;
 /// it; a scheme whose noise depends on the measurement knows how.
 ///
 /// Laws ([`crate::laws::scheme`]):
-/// 1. total probability: for every noise-free measurement, feedback and link, the probabilities of all observations but
-///    [`Observation::Lost`] sum (integrate) to one;
+/// 1. total probability: for every noise-free measurement, feedback and link, the probabilities of all observations sum
+///    (integrate) to one, [`Observation::Lost`] included. Where `Lost` cannot occur (no known losses, all words decode), its factor
+///    is `p(the sensor spoke | m)`, see [`Link::lost_given_sent`];
 /// 2. honesty: what `encode` reports of `m + noise`, sent through [`Link::transmit`], has the frequencies that `factor` says;
-/// 3. an erased report has the factor 1.
+/// 3. words that are no report: over a link that inverts bits, either all words of the report's format decode, or `factor` adds the
+///    probability of those that do not, computed from the code book, to that of `Lost`, or it refuses such a link. Laws 1 and 2
+///    together check it: `transmit` delivers such words as `Lost`.
 pub trait Scheme<const M: usize> {
     /// What the sensor remembers from slot to slot; `()` for most.
     type State;
@@ -52,7 +55,7 @@ pub trait Scheme<const M: usize> {
         feedback: &Self::Feedback,
     ) -> Result<Option<Self::Report>, Error>;
 
-    /// The receiver's half: `p(observation | h(x) = m)`.
+    /// The receiver's half: `p(observation | h(x) = m)`, by the table of [`Observation`].
     ///
     /// # Errors
     /// If the feedback is not finite, or the report is none that the scheme can send.

@@ -1,6 +1,6 @@
 //! How the world is sensed.
 
-use crate::columns::{Columns, ColumnsMut, count, set_state, state_at};
+use crate::columns::{Columns, ColumnsMut, count, measurements_agree, set_state, state_at};
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 
@@ -21,10 +21,13 @@ pub trait Sensing<const D: usize, const M: usize> {
     /// Draws a measurement of `state`.
     fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M>;
 
-    /// Writes the noise-free measurement of every state to `means`. Override where a loop over columns is faster.
+    /// Writes the noise-free measurement of every state to `means`; NaN where lengths differ
+    /// ([`measurements_agree`](crate::columns::measurements_agree)). Override where a loop over columns is faster.
     fn mean_columns(&self, states: &Columns<'_, D>, mut means: ColumnsMut<'_, M>) {
-        for i in 0..count(&means) {
-            set_state(&mut means, i, &self.mean(&state_at(states, i)));
+        if measurements_agree(states, &mut means) {
+            for i in 0..count(&means) {
+                set_state(&mut means, i, &self.mean(&state_at(states, i)));
+            }
         }
     }
 }

@@ -191,7 +191,8 @@ impl<const D: usize> Particles<D> {
     /// `ln sum_i exp(log weight_i)` after the change: the log-likelihood estimate if log likelihoods were added.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if no weight is left or one is NaN or infinite; the belief is then as it was before.
+    /// [`fewbits_core::Error::Impossible`] if no weight is left, [`fewbits_core::Error::NotANumber`] if one is NaN or infinite; the belief is
+    /// then as it was before.
     pub fn reweigh(&mut self, change: impl FnOnce(Columns<'_, D>, &mut [f64])) -> Result<f64, Error> {
         self.scratch.clear();
         self.scratch.extend_from_slice(&self.log_weights);

@@ -54,7 +54,11 @@ pub(crate) fn absorb(density: &mut [f64], logs: &[f64]) -> Result<f64, Error> {
     // Where the density is zero the likelihood may be anything.
     let product = |(l, p): (&f64, &f64)| if *p > 0.0 { p * (l - peak).exp() } else { 0.0 };
     let sum = logs.iter().zip(&*density).map(product).sum::<f64>();
-    // A peak that is not finite leaves a sum that is no number.
+    let no_number = logs.iter().zip(&*density).any(|(l, p)| *p > 0.0 && l.is_nan());
+    if no_number || peak == f64::INFINITY {
+        return Err(fewbits_core::Error::NotANumber { what: "the likelihood" }.into());
+    }
+    // A peak of `-inf` leaves a sum that is no number.
     if !(sum > 0.0 && sum.is_finite()) {
         return Err(Error::IMPOSSIBLE);
     }
@@ -153,7 +157,10 @@ impl PointMass {
         }
         let sum: f64 = self.density.iter().zip(likelihood).map(|(p, l)| p * l).sum();
         let evidence = sum * self.grid.spacing();
-        if !(evidence > 0.0 && evidence.is_finite()) {
+        if !evidence.is_finite() {
+            return Err(fewbits_core::Error::NotANumber { what: "the likelihood" }.into());
+        }
+        if evidence <= 0.0 {
             return Err(Error::IMPOSSIBLE);
         }
         for (p, l) in self.density.iter_mut().zip(likelihood) {

@@ -43,9 +43,11 @@ pub(crate) fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut 
 /// Normalises log weights and writes their exponentials; returns `ln sum exp` and the effective
 /// sample size. On failure `weights` is as it was.
 pub(crate) fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error> {
-    let largest = largest_number(logs)
-        .filter(|l| l.is_finite())
-        .ok_or(Error::IMPOSSIBLE)?;
+    let what = "a log weight";
+    let largest = largest_number(logs).ok_or(fewbits_core::Error::NotANumber { what })?;
+    if !largest.is_finite() {
+        return Err(fewbits_core::Error::unlikely_or_no_number(largest, what).into());
+    }
     let sums = exp_minus(logs, largest, weights);
     let log_sum = largest + sums.sum.ln();
     let scale = 1.0 / sums.sum;

@@ -1,10 +1,11 @@
 //! The Dymbo filter, and the closed loop of every scalar filter here.
 
 use crate::plant::{filtered_variance, innovation_gain, scalar};
-use crate::sign_bit::{self, SignBit, missing_probability};
+use crate::sign_bit::{self, SignBit};
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Gaussian, Link, Observation, Scheme, Sign};
+use fewbits_numerics::error::finite;
 use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -154,9 +155,9 @@ impl DymboFilter {
     /// it is `sigma_u`.
     ///
     /// # Errors
-    /// If the variance has no finite steady state.
+    /// If the variance has no finite steady state, or leaves the range of numbers.
     pub fn steady_step(&self) -> Result<f64, Error> {
-        Ok(self.gain(self.plant.steady_state(self.information())?.predicted_variance))
+        Ok(finite("steady step", self.gain(self.plant.steady_state(self.information())?.predicted_variance))?)
     }
 
     #[inline]
@@ -201,7 +202,7 @@ impl ScalarFilter for DymboFilter {
         };
         let p = predicted.covariance()[0];
         // Both bits are equally likely at the prediction, whatever the crossover.
-        let log_likelihood = -LN_2 + (-self.link.loss()).ln_1p();
+        let log_likelihood = -LN_2 + self.link.arrival().ln();
         let report = Report {
             correction: bit.value() * self.gain(p),
             variance: filtered_variance(p, self.plant.measurement_variance(), self.information()),
@@ -251,7 +252,7 @@ pub(crate) fn without_report<R>(
         correction: 0.0,
         variance: predicted.covariance()[0],
         information: 0.0,
-        log_likelihood: missing_probability(observation, link).unwrap_or(1.0).ln(),
+        log_likelihood: link.delivery(observation).ln(),
         bits: 0,
     };
     report.correct(predicted)

@@ -2,7 +2,6 @@
 
 use crate::Error;
 use crate::plant::scalar;
-use crate::sign_bit::missing_probability;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Factor, Gaussian, Link, Message, Observation, Scheme};
 use fewbits_numerics::error::{ArgumentError, finite, positive, within};
@@ -167,9 +166,9 @@ impl Scheme<1> for RoundedSample {
     /// Over a link that inverts bits, words of up to 12 bits.
     fn factor(&self, (): &(), observation: &Observation<Multiple>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
         let Observation::Received(multiple) = observation else {
-            return Ok(Constant::new(missing_probability(observation, link).unwrap_or(1.0))?.into());
+            return Ok(Constant::of_delivery(observation, link).into());
         };
-        let (cell, arrives) = (self.cell(*multiple)?, 1.0 - link.loss());
+        let (cell, arrives) = (self.cell(*multiple)?, link.of_received()?);
         if link.crossover() == 0.0 {
             return Ok(InCell::new(cell, self.noise_variance, 0.0, arrives)?.into());
         }
@@ -225,7 +224,7 @@ impl Initialisation {
             Self::Fine { scheme, message } => {
                 let tau = scheme.resolution;
                 let variance = scheme.noise_variance + tau * tau / 12.0;
-                Ok(scalar(finite("message", scheme.value(*message))?, variance))
+                Ok(scalar(finite("message", scheme.value(*message))?, finite("resolution^2", variance)?))
             }
             Self::FineWithPrior { scheme, message, prior } => {
                 let factor = scheme.factor(&(), &Observation::Received(*message), &Link::PERFECT)?;

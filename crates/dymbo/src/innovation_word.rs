@@ -1,7 +1,6 @@
 //! Several bits a sample: the cell of the normalised innovation.
 
 use crate::Error;
-use crate::sign_bit::missing_probability;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Link, Message, NumberFormat, Observation, Scheme};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
@@ -175,9 +174,9 @@ impl Scheme<1> for InnovationWord {
     ) -> Result<Scalar, fewbits_core::Error> {
         let edges = self.edges(prediction)?;
         let Observation::Received(word) = observation else {
-            return Ok(Constant::new(missing_probability(observation, link).unwrap_or(1.0))?.into());
+            return Ok(Constant::of_delivery(observation, link).into());
         };
-        let arrives = 1.0 - link.loss();
+        let arrives = link.of_received()?;
         if link.crossover() == 0.0 {
             let cell = self.cell(*word, prediction)?;
             return Ok(InCell::new(cell, self.noise_variance, 0.0, arrives)?.into());

@@ -136,7 +136,7 @@ impl ScalarFilter for MultibitFilter {
             correction: innovation_gain(p, r) * level,
             variance: filtered_variance(p, r, self.information),
             information: self.information,
-            log_likelihood: probability.ln() + (-self.link.loss()).ln_1p(),
+            log_likelihood: probability.ln() + self.link.arrival().ln(),
             bits: self.scheme.bits(),
         };
         report.correct(predicted)

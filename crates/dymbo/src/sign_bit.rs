@@ -91,19 +91,12 @@ impl Scheme<1> for SignBit {
     ) -> Result<Scalar, fewbits_core::Error> {
         finite("threshold", *threshold)?;
         match observation {
-            Observation::Received(bit) => Ok(InCell::sign(*bit, *threshold, self.noise_variance, link)?.into()),
-            missing => Ok(Constant::new(missing_probability(missing, link).unwrap_or(1.0))?.into()),
+            Observation::Received(bit) => {
+                link.of_received()?;
+                Ok(InCell::sign(*bit, *threshold, self.noise_variance, link)?.into())
+            }
+            missing => Ok(Constant::of_delivery(missing, link).into()),
         }
-    }
-}
-
-/// Probability of an observation without a report, by sensors that always report: the link's loss, or 1 for a report that is
-/// known to be lost. `None` if a report was received.
-pub(crate) fn missing_probability<R>(observation: &Observation<R>, link: &Link) -> Option<f64> {
-    match observation {
-        Observation::Received(_) => None,
-        Observation::Nothing => Some(link.loss()),
-        Observation::Lost => Some(1.0),
     }
 }
 

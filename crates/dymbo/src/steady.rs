@@ -85,7 +85,7 @@ pub(crate) fn crossing(
 /// # Errors
 /// If there is no finite bound.
 pub fn erasure_bound(plant: &ScalarPlant, link: &Link) -> Result<ScalarSteadyState, Error> {
-    plant.steady_state(crate::sign_bit::information(link) * (1.0 - link.loss()))
+    plant.steady_state(crate::sign_bit::information(link) * link.arrival())
 }
 
 /// The fixed point of a slot's variance recursion: `slot` maps a predicted variance to the filtered one, is increasing and

@@ -10,9 +10,9 @@ use fewbits_core::{Factor, Gaussian, LinearDynamics, Link, Observation, Scheme, 
 use fewbits_filters::{SteadyState, assumed_density, kalman};
 use fewbits_models::ScalarSensor;
 use fewbits_numerics::error::{ArgumentError, finite};
-use fewbits_numerics::linalg::symmetrised;
+use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};
 use fewbits_numerics::normal::SQRT_2_OVER_PI;
-use nalgebra::{Cholesky, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 use std::f64::consts::LN_2;
 
 /// What an update reveals besides the new belief.
@@ -122,13 +122,14 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         let mean = predicted.mean() + step * bit.value();
         // Both bits are equally likely at the prediction, whatever the crossover.
         let info = VectorInfo {
-            log_likelihood: -LN_2 + (-self.link.loss()).ln_1p(),
+            log_likelihood: -LN_2 + self.link.of_received()?.ln(),
             bits: 1,
         };
         let covariance = predicted.covariance() - step * step.transpose();
         let posterior = Gaussian::from_symmetric_parts(mean, covariance);
         if !posterior.is_finite() {
-            return Err(Error::IMPOSSIBLE);
+            let what = "the posterior (from the belief or the sensor)";
+            return Err(fewbits_core::Error::NotANumber { what }.into());
         }
         Ok((posterior, info))
     }
@@ -160,7 +161,7 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
     /// `sqrt(2/pi) P H' D^(-1/2)`, shrunk by the crossovers.
     ///
     /// # Errors
-    /// [`fewbits_filters::Error::SingularInnovation`] if the belief is no covariance; [`fewbits_core::Error::Impossible`].
+    /// If the belief is no covariance; [`fewbits_core::Error::Impossible`]; [`fewbits_core::Error::NotANumber`].
     pub fn update_parallel(
         &self,
         predicted: &Gaussian<D>,
@@ -190,7 +191,12 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
             info.log_likelihood += tilted.log_evidence;
             info.bits += u32::from(observation.received().is_some());
         }
-        Ok((Gaussian::from_trusted_parts(predicted.mean() + gain * signs, covariance), info))
+        let posterior = Gaussian::from_trusted_parts(predicted.mean() + gain * signs, covariance);
+        if !(posterior.is_finite() && info.log_likelihood.is_finite()) {
+            let what = "the posterior (from the belief or the sensors)";
+            return Err(fewbits_core::Error::unlikely_or_no_number(info.log_likelihood, what).into());
+        }
+        Ok((posterior, info))
     }
 
     /// Covariances of the innovations with the state, and with one another.
@@ -224,17 +230,23 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
                 0.0
             }
         });
-        // Cholesky reads the lower triangle. asin near 1 would turn a rounding error of 1e-16 into 1e-8.
+        // asin near 1 would turn a rounding error of 1e-16 into 1e-8.
         let mut bits = SMatrix::<f64, M, M>::identity();
         for (i, j) in (0..M).flat_map(|i| (0..i).map(move |j| (i, j))) {
             if received(i) && received(j) {
                 let correlation = spread[(i, j)] / (deviations[i] * deviations[j]);
                 bits[(i, j)] = information * correlation.clamp(-1.0, 1.0).asin();
+                bits[(j, i)] = bits[(i, j)];
             }
         }
-        let factor = Cholesky::new(bits).ok_or(fewbits_filters::Error::SingularInnovation)?;
-        let gain = factor.solve(&with_state.transpose()).transpose();
-        Ok((gain, predicted.covariance() - gain * with_state.transpose()))
+        // Bits of sensors whose noise is nothing beside the prediction's are the same bit: their covariance is singular.
+        let gain = solve_semidefinite(&bits, &with_state.transpose())?.transpose();
+        let covariance = predicted.covariance() - gain * with_state.transpose();
+        if covariance.iter().any(|v| !v.is_finite()) {
+            let what = "the covariance of the bits (from the belief or the sensors)";
+            return Err(fewbits_core::Error::NotANumber { what }.into());
+        }
+        Ok((gain, covariance))
     }
 
     /// Steady covariances with the threshold refreshed after every sensor, in the order of the sensors, when every bit arrives.
@@ -377,6 +389,24 @@ mod tests {
     }
 
     /// Regression: an index beyond the sensors was a panic.
+    /// Defect: where the prediction's variance is 1e16 times the noise the covariance of the bits is singular, and the update failed.
+    #[test]
+    fn parallel_bits_of_nearly_noiseless_sensors_are_one_bit() {
+        let sensor = |h: [f64; 2]| ScalarSensor::scalar(h.into(), 1.0).unwrap();
+        let wide = Gaussian::new(Vector2::new(0.0, 1.0), SMatrix::<f64, 2, 2>::identity() * 1e16).unwrap();
+        let [one, two] = [sensor([1.0, 0.0]), sensor([0.6, 0.8])];
+        let same = SignFilter::new(dynamics(), [one, one]);
+        let (both, info) = same.update_parallel(&wide, &[ABOVE, ABOVE]).unwrap();
+        let (alone, _) = SignFilter::new(dynamics(), [one])
+            .update_parallel(&wide, &[ABOVE])
+            .unwrap();
+        assert!((both.mean() - alone.mean()).amax() < 1e-6 * alone.mean().amax());
+        assert!((both.covariance() - alone.covariance()).amax() < 1e-6 * 1e16 && info.bits == 2);
+        let three = SignFilter::new(dynamics(), [one, one, two]);
+        let (after, _) = three.update_parallel(&wide, &[ABOVE, ABOVE, BELOW]).unwrap();
+        assert!(Gaussian::new(*after.mean(), *after.covariance()).is_ok());
+    }
+
     #[test]
     fn refuses_sensors_that_are_not_there() {
         let filter = SignFilter::new(dynamics(), [ScalarSensor::scalar(Vector2::new(1.0, 0.5), 1.0).unwrap()]);

@@ -1,9 +1,8 @@
 //! The assumed-density filter: one update for every factor.
 
-use crate::linalg::solve_semidefinite;
 use crate::{Error, extended_kalman};
 use fewbits_core::{Factor, Gaussian, GaussianDynamics, Observed, Sensing};
-use fewbits_numerics::linalg::{congruence, congruence_of, times_transposed};
+use fewbits_numerics::linalg::{congruence, congruence_of, solve_semidefinite, times_transposed};
 use nalgebra::{SMatrix, SVector};
 
 /// What an update reveals besides the new belief.
@@ -31,7 +30,8 @@ pub struct UpdateInfo<const D: usize, const M: usize> {
 /// the Kalman filter, with a sign bit the vector filter of Dymbo, with silence that of CFwMD.
 ///
 /// # Errors
-/// [`fewbits_core::Error::Impossible`] if the observation has probability zero under the belief.
+/// [`fewbits_core::Error::Impossible`] if the observation has probability zero under the belief;
+/// [`fewbits_core::Error::NotANumber`] if the belief, the model or the factor leaves the range of numbers.
 pub fn update<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     matrix: &SMatrix<f64, M, D>,
@@ -73,6 +73,10 @@ fn update_at<const D: usize, const M: usize>(
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
     let cross = times_transposed(belief.covariance(), matrix);
     let prior = Gaussian::from_symmetric_parts(predicted, congruence_of(matrix, &cross));
+    if !prior.is_finite() {
+        let what = "the predicted measurement (from the belief or the sensing model)";
+        return Err(fewbits_core::Error::NotANumber { what }.into());
+    }
     let tilted = factor.tilted(&prior)?;
     let correction = tilted.mean - prior.mean();
     let gain = solve_semidefinite(prior.covariance(), &cross.transpose())?.transpose();
@@ -85,8 +89,9 @@ fn update_at<const D: usize, const M: usize>(
     };
     let mean = belief.mean() + gain * correction;
     let posterior = Gaussian::from_symmetric_parts(mean, covariance);
-    if !posterior.is_finite() {
-        return Err(Error::IMPOSSIBLE);
+    if !(posterior.is_finite() && info.log_likelihood.is_finite()) {
+        let what = "the posterior (from the belief, the sensing model or the factor)";
+        return Err(fewbits_core::Error::unlikely_or_no_number(info.log_likelihood, what).into());
     }
     Ok((posterior, info))
 }

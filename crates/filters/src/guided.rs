@@ -1,11 +1,10 @@
 //! Proposals that have seen what was observed: the optimal one for a value, a tilted one for any factor.
 
 use crate::Error;
-use crate::linalg::solve_semidefinite;
 use crate::particle::Proposal;
 use fewbits_core::factor::Tilted;
 use fewbits_core::{Belief, Factor, Gaussian, GaussianDynamics, LinearDynamics, LinearSensing, Observed, Sensing};
-use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
+use fewbits_numerics::linalg::{semidefinite_factor, solve_semidefinite, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::{Rng, RngExt};

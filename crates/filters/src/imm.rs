@@ -267,7 +267,7 @@ impl<G> Imm<G> {
             .copied()
             .fold(f64::NEG_INFINITY, f64::max);
         if !peak.is_finite() {
-            return Err(Error::IMPOSSIBLE);
+            return Err(fewbits_core::Error::unlikely_or_no_number(peak, "the evidence of a model").into());
         }
         workspace
             .probabilities

@@ -43,7 +43,8 @@ pub fn predict<const D: usize>(dynamics: &impl LinearDynamics<D>, belief: &Gauss
 /// ```
 ///
 /// # Errors
-/// A measurement that is not finite; [`Error::SingularInnovation`].
+/// A measurement that is not finite; [`Error::SingularInnovation`]; [`fewbits_core::Error::NotANumber`] if the belief or the model leaves
+/// the range of numbers.
 pub fn update<const D: usize, const M: usize>(
     sensing: &impl LinearSensing<D, M>,
     belief: &Gaussian<D>,
@@ -66,6 +67,7 @@ pub fn update<const D: usize, const M: usize>(
         let keep = SMatrix::<f64, D, D>::identity() - times_transposed(&gain, &matrix.transpose());
         congruence(&keep, belief.covariance()) + congruence(&gain, noise)
     };
+    let posterior = Gaussian::from_symmetric_parts(belief.mean() + gain * innovation, covariance);
     let log_root_determinant = log_product(roots.as_slice());
     let squared = innovation.dot(&over(&innovation.transpose(), &lower).transpose());
     let info = KalmanInfo {
@@ -75,7 +77,13 @@ pub fn update<const D: usize, const M: usize>(
         log_likelihood: -0.5 * squared - log_root_determinant - M as f64 * LN_SQRT_2PI,
         normalised_innovation_squared: squared / M as f64,
     };
-    Ok((Gaussian::from_symmetric_parts(belief.mean() + gain * innovation, covariance), info))
+    if !(posterior.is_finite() && info.log_likelihood.is_finite()) {
+        return Err(fewbits_core::Error::NotANumber {
+            what: "the posterior (from the belief, the sensing model or the measurement)",
+        }
+        .into());
+    }
+    Ok((posterior, info))
 }
 
 /// `a (l l')^-1` of a lower triangular `l`, with one division for each of its columns.
@@ -275,6 +283,19 @@ mod tests {
                 .0;
             assert!(Gaussian::new(*belief.mean(), *belief.covariance()).is_ok());
         }
+    }
+
+    /// Defect: a variance of 1e300 seen through 1e10 gave a belief of NaN.
+    #[test]
+    fn overflow_is_an_error_and_no_belief() {
+        let sensing = LinearSensor::scalar(SVector::<f64, 1>::new(1e10), 1.0).unwrap();
+        let wide = Gaussian::scalar(0.0, 1e300).unwrap();
+        let no_number = |error: Error| matches!(error, Error::Core(fewbits_core::Error::NotANumber { .. }));
+        assert!(no_number(update(&sensing, &wide, &SVector::from([1.0])).unwrap_err()));
+        let far = Gaussian::scalar(1e300, 1.0).unwrap();
+        assert!(no_number(update(&sensing, &far, &SVector::from([1.0])).unwrap_err()));
+        let value = Value::scalar(1.0, 1.0).unwrap();
+        assert!(no_number(assumed_density::update(&wide, &SMatrix::<f64, 1, 1>::new(1e10), &value).unwrap_err()));
     }
 
     #[test]

@@ -43,7 +43,6 @@ pub mod extended_kalman;
 mod guided;
 mod imm;
 pub mod kalman;
-mod linalg;
 mod moved;
 mod particle;
 mod plane;

@@ -3,10 +3,10 @@
 //! Both need nothing but the filtered beliefs and the dynamics, so they smooth the output of any filter that keeps Gaussian
 //! beliefs, whatever its messages were.
 
-use crate::linalg::solve_semidefinite;
 use crate::{Error, kalman};
 use fewbits_core::{Gaussian, LinearDynamics};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::linalg::solve_semidefinite;
 use nalgebra::SMatrix;
 use std::collections::VecDeque;
 

@@ -1,6 +1,7 @@
 //! Linear dynamics driven by Gaussian noise.
 
 use crate::Error;
+use fewbits_core::columns::columns_agree;
 use fewbits_core::{ColumnsMut, Dynamics, GaussianDynamics, LinearDynamics};
 use fewbits_numerics::error::{ArgumentError, all_finite, non_negative};
 use fewbits_numerics::kernels::{StandardNormals, vectorised};
@@ -184,6 +185,9 @@ impl<const D: usize, const U: usize> Dynamics<D> for LinearGaussian<D, U> {
     /// Blocks of particles: first their normal draws, then one sweep a coordinate, which vectorises.
     fn propagate_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
         const BLOCK: usize = 128;
+        if !columns_agree(&mut states) {
+            return;
+        }
         let mut normals = StandardNormals::new(rng);
         let mut draws = [[0.0; BLOCK]; U];
         let mut next = [[0.0; BLOCK]; D];

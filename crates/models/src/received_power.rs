@@ -1,6 +1,7 @@
 //! Sensing of a source's received amplitude, which falls with distance.
 
 use crate::Error;
+use fewbits_core::columns::measurements_agree;
 use fewbits_core::{Columns, ColumnsMut, Sensing};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
@@ -123,14 +124,28 @@ impl<const D: usize> ReceivedPower<D> {
         if distance == 0.0 {
             return Vector2::zeros();
         }
-        let spread = 1.0 + self.attenuation * distance.powf(self.exponent);
-        // d^(n-1) times a unit vector: no negative power, so that n < 2 is safe close to the sensor.
-        let steepness = -0.5 * self.power.sqrt() * self.attenuation * self.exponent / (spread * spread.sqrt());
-        offset / distance * (steepness * distance.powf(self.exponent - 1.0))
+        // `-(n/2) h(d) u/d` with `u = alpha d^n / (1 + alpha d^n)`, in which only bounded numbers meet: `d^n` may overflow.
+        let spread = self.attenuation * distance.powf(self.exponent);
+        let share = if spread == f64::INFINITY {
+            1.0
+        } else {
+            spread / (1.0 + spread)
+        };
+        let amplitude = (self.power / (1.0 + spread)).sqrt();
+        let steepness = 0.5 * self.exponent * amplitude * (share / distance);
+        if steepness.is_finite() {
+            return offset / distance * -steepness;
+        }
+        // Only the product of enormous and vanishing numbers is left to logarithms.
+        let log = (0.5 * self.exponent).ln() + amplitude.ln() + share.ln() - distance.ln();
+        offset / distance * -log.exp().min(f64::MAX)
     }
 
-    /// Writes the noise-free amplitude of every state of a cloud to `amplitudes`.
+    /// Writes the noise-free amplitude of every state of a cloud to `amplitudes`; NaN where lengths differ.
     pub fn amplitudes(&self, states: &Columns<'_, D>, amplitudes: &mut [f64]) {
+        if !measurements_agree(states, &mut [&mut *amplitudes]) {
+            return;
+        }
         let count = amplitudes.len();
         let (x, y) = (&states[self.axes[0]][..count], &states[self.axes[1]][..count]);
         let (sx, sy) = (self.position[0], self.position[1]);
@@ -190,6 +205,21 @@ mod tests {
             assert_eq!(sensor.slope_at(0.0, 0.0), Vector2::zeros());
             assert!(sensor.slope_at(1e-200, 0.0)[0].is_finite());
         }
+    }
+
+    /// Defect: with an exponent of 4 the slope at a distance of 1e103 was `0 * inf`.
+    #[test]
+    fn slopes_far_away_are_numbers() {
+        for exponent in [1.0, 2.0, 4.0, 300.0] {
+            let sensor = ReceivedPower::<4>::new(Vector2::zeros(), [0, 2], 1000.0, 1.0, exponent, 1.0).unwrap();
+            for d in [1e-300, 1e-3, 1.0, 1e3, 1e103, 1e300] {
+                let slope = sensor.slope_at(d, 0.0);
+                assert!(slope[0].is_finite() && slope[0] <= 0.0 && slope[1] == 0.0, "{exponent} {d}: {slope}");
+            }
+        }
+        // Far away h = sqrt(P0 / alpha) d^(-n/2).
+        let sensor = ReceivedPower::<4>::new(Vector2::zeros(), [0, 2], 9.0, 1.0, 4.0, 1.0).unwrap();
+        assert!((sensor.slope_at(1e60, 0.0)[0] / (-6.0e-180) - 1.0).abs() < 1e-12);
     }
 
     #[test]

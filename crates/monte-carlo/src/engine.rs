@@ -9,7 +9,7 @@ use crate::stream::Stream;
 use rayon::prelude::*;
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use thiserror::Error;
 
 /// Trials folded together before results are merged. Part of the result's definition: do not tune at run time.
@@ -24,7 +24,7 @@ pub struct Trial {
     pub stream: Stream,
 }
 
-/// Why a run has no result. The failing trial of lowest index among those that ran is reported.
+/// Why a run has no result. The failing trial of lowest index is reported, on any number of threads.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MonteCarloError {
@@ -163,7 +163,8 @@ impl<'a> MonteCarlo<'a> {
         )
     }
 
-    /// Folds all trials into one accumulator, in trial order within chunks and chunk order between them.
+    /// Folds all trials into one accumulator, in trial order within chunks and chunk order between them. Once a trial has failed, those
+    /// of higher index are not begun.
     ///
     /// # Errors
     /// If a trial fails or panics, or the run is cancelled.
@@ -176,8 +177,11 @@ impl<'a> MonteCarlo<'a> {
         let chunks = 0..self.trials.div_ceil(CHUNK);
         #[cfg(feature = "rayon")]
         let chunks = chunks.into_par_iter();
-        let chunks: Vec<Result<A, MonteCarloError>> =
-            chunks.map(|chunk| self.fold_chunk(chunk, &empty, &trial)).collect();
+        // The lowest index that has failed so far. Trials below it still run, so that the one reported does not depend on the threads.
+        let failed = AtomicU64::new(u64::MAX);
+        let chunks: Vec<Result<A, MonteCarloError>> = chunks
+            .map(|chunk| self.fold_chunk(chunk, &failed, &empty, &trial))
+            .collect();
         let mut total = empty();
         for chunk in chunks {
             merge(&mut total, chunk?);
@@ -188,6 +192,7 @@ impl<'a> MonteCarlo<'a> {
     fn fold_chunk<A, E: Display>(
         &self,
         chunk: u64,
+        failed: &AtomicU64,
         empty: impl Fn() -> A,
         trial: impl Fn(&mut A, Trial) -> Result<(), E>,
     ) -> Result<A, MonteCarloError> {
@@ -195,10 +200,13 @@ impl<'a> MonteCarlo<'a> {
         let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.trials);
         let finished = indices.end - indices.start;
         for index in indices {
-            if self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+            let stopped = failed.load(Ordering::Relaxed) < index;
+            if stopped || self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
                 return Err(MonteCarloError::Cancelled);
             }
-            self.single(index, |it| trial(&mut accumulator, it))?;
+            self.single(index, |it| trial(&mut accumulator, it)).inspect_err(|_| {
+                failed.fetch_min(index, Ordering::Relaxed);
+            })?;
         }
         if let Some(progress) = self.progress {
             progress(finished);

@@ -63,9 +63,12 @@ impl Moments {
         }
     }
 
-    /// Standard error of the mean of independent values.
+    /// Standard error of the mean of independent values; infinite for fewer than two, which say nothing about it.
     pub fn standard_error(&self) -> f64 {
-        (self.variance() / self.count.max(1) as f64).sqrt()
+        if self.count < 2 {
+            return f64::INFINITY;
+        }
+        (self.variance() / self.count as f64).sqrt()
     }
 
     /// Square root of the mean with its standard error by the delta method: an RMSE from squared errors.
@@ -73,7 +76,7 @@ impl Moments {
         let root = self.mean.max(0.0).sqrt();
         Estimate {
             value: root,
-            standard_error: if root > 0.0 {
+            standard_error: if root > 0.0 || self.count < 2 {
                 self.standard_error() / (2.0 * root)
             } else {
                 0.0
@@ -106,7 +109,7 @@ impl FromIterator<f64> for Moments {
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
-    /// Its standard error.
+    /// Its standard error; infinite where a single value leaves it unknown.
     pub standard_error: f64,
 }
 

@@ -1,7 +1,7 @@
 //! What small covariance matrices need beyond nalgebra.
 
 use crate::error::{self, ArgumentError};
-use nalgebra::{ArrayStorage, SMatrix, SVector};
+use nalgebra::{ArrayStorage, Cholesky, Const, SMatrix, SVector};
 
 /// Pivots below this share of the variance of their own coordinate count as zero.
 pub const SEMIDEFINITE_TOLERANCE: f64 = 1e-12;
@@ -10,7 +10,8 @@ pub const SYMMETRY_TOLERANCE: f64 = 1e-9;
 
 /// `(m + m')/2`.
 pub fn symmetrised<const D: usize>(m: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
-    (m + m.transpose()) * 0.5
+    // Halves first, since the largest number has no double; equal entries as they are, since the smallest has no half.
+    m.zip_map(&m.transpose(), |a, b| if a == b { a } else { 0.5 * a + 0.5 * b })
 }
 
 /// `a b'`. Zeros of `b`, of which the matrices of models are full, cost nothing.
@@ -58,6 +59,38 @@ pub fn congruence_of<const M: usize, const D: usize>(
     out
 }
 
+/// Whether the entries `(i, j)` and `(j, i)` agree to rounding, relative to the standard deviations of their row and column. The one
+/// rule of symmetry: a tolerance relative to the largest entry would let a coordinate of a large unit hide an asymmetry among
+/// small ones.
+fn agree(below: f64, above: f64, row: f64, column: f64) -> bool {
+    (below / row / column - above / row / column).abs() <= SYMMETRY_TOLERANCE
+}
+
+/// A symmetric positive definite matrix, symmetric to the last bit, with its lower Cholesky factor. Whoever draws with the factor and
+/// weighs with the matrix then uses the same covariance.
+///
+/// # Errors
+/// If `m` has an entry that is not finite, is not symmetric (by the deviations of row and column), or is not positive definite.
+pub fn definite_factor<const D: usize>(
+    name: &'static str,
+    m: &SMatrix<f64, D, D>,
+) -> Result<(SMatrix<f64, D, D>, SMatrix<f64, D, D>), ArgumentError> {
+    error::all_finite(name, m.as_slice())?;
+    let indefinite = || ArgumentError::new(name, format!("{m:?}"), "a symmetric positive definite matrix");
+    let deviations: SVector<f64, D> = m.diagonal().map(f64::sqrt);
+    for i in 0..D {
+        for j in 0..i {
+            if !agree(m[(i, j)], m[(j, i)], deviations[i], deviations[j]) {
+                return Err(indefinite());
+            }
+        }
+    }
+    let matrix = symmetrised(m);
+    let lower = Cholesky::new(matrix).ok_or_else(indefinite)?.unpack();
+    error::all_finite(name, lower.as_slice())?;
+    Ok((matrix, lower))
+}
+
 /// A square root `S` with `S S' = m` of a symmetric positive **semi**definite matrix, by Cholesky with diagonal pivoting.
 ///
 /// Unlike a plain Cholesky factor it exists for singular matrices (rank-1 process noise, a known start). The matrix is scaled
@@ -88,11 +121,10 @@ pub fn semidefinite_factor<const D: usize>(
                 }
                 continue;
             }
-            let (below, above) = (below / deviations[i] / deviations[j], above / deviations[i] / deviations[j]);
-            if (below - above).abs() > SYMMETRY_TOLERANCE {
+            if !agree(below, above, deviations[i], deviations[j]) {
                 return Err(ArgumentError::new(name, format!("{m:?}"), "a symmetric matrix"));
             }
-            rest[(i, j)] = 0.5 * (below + above);
+            rest[(i, j)] = 0.5 * (below / deviations[i] / deviations[j] + above / deviations[i] / deviations[j]);
             rest[(j, i)] = rest[(i, j)];
         }
     }
@@ -115,10 +147,54 @@ pub fn semidefinite_factor<const D: usize>(
     Ok(factor)
 }
 
+/// Share of a variance below which a Cholesky pivot is rounding.
+const PIVOT: f64 = 1e-11;
+
+/// Solves `S X = B` for a covariance `S` and columns of `B` in its range, in the sense of the pseudo-inverse where `S` is
+/// singular to rounding. Rows are scaled by their standard deviations first, so that no unit matters.
+///
+/// # Errors
+/// If `S` is no covariance.
+pub fn solve_semidefinite<const D: usize, const N: usize>(
+    covariance: &SMatrix<f64, D, D>,
+    right: &SMatrix<f64, D, N>,
+) -> Result<SMatrix<f64, D, N>, ArgumentError> {
+    if D == 1 {
+        let v = covariance[0];
+        return Ok(if v > 0.0 { right / v } else { SMatrix::zeros() });
+    }
+    let scale = covariance
+        .diagonal()
+        .map(|v| if v > 0.0 { 1.0 / v.sqrt() } else { 0.0 });
+    let scaled = SMatrix::from_fn(|i, j| covariance[(i, j)] * scale[i] * scale[j]);
+    let right = SMatrix::<f64, D, N>::from_fn(|i, j| right[(i, j)] * scale[i]);
+    let sound = |f: &Cholesky<f64, Const<D>>| f.l_dirty().diagonal().iter().all(|d| d * d > PIVOT);
+    let regular = Cholesky::new(scaled).filter(sound);
+    let solution = match regular {
+        Some(factor) => factor.solve(&right),
+        None => {
+            // S = L L' with r independent columns, so S^+ = L (L'L)^-2 L'; ones stand in for the columns beyond the rank.
+            let mut factor = semidefinite_factor("covariance", &scaled)?;
+            let mut unit = SMatrix::<f64, D, D>::zeros();
+            for i in 0..D {
+                if factor.column(i).norm_squared() <= PIVOT {
+                    factor.column_mut(i).fill(0.0);
+                    unit[(i, i)] = 1.0;
+                }
+            }
+            let gram = Cholesky::new(factor.transpose() * factor + unit).ok_or_else(|| {
+                ArgumentError::new("covariance", format!("{covariance:?}"), "a positive semidefinite matrix")
+            })?;
+            factor * gram.solve(&gram.solve(&(factor.transpose() * right)))
+        }
+    };
+    Ok(SMatrix::from_fn(|i, j| solution[(i, j)] * scale[i]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+    use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2, Vector3};
     use proptest::prelude::*;
 
     fn close<const D: usize>(m: &SMatrix<f64, D, D>) -> bool {
@@ -144,6 +220,53 @@ mod tests {
         let found = congruence(&a, &p);
         assert!((found - a * p * a.transpose()).amax() < 1e-14);
         assert_eq!(found, found.transpose());
+    }
+
+    /// The coordinates of the three unknowns differ by ten orders of magnitude in their units.
+    #[test]
+    fn solutions_solve_whatever_the_unit_and_the_rank() {
+        let units = Matrix3::from_diagonal(&[1e-5, 1.0, 1e5].into());
+        let regular = Matrix3::new(2.0, 0.3, -0.4, 0.3, 1.1, 0.5, -0.4, 0.5, 1.7);
+        let columns = Matrix3x2::new(1.0, 0.5, -0.7, 2.0, 0.4, -1.3);
+        for (s, solution) in [
+            (regular, Matrix3x2::new(0.3, -1.0, 1.9, 0.2, -0.6, 0.8)),
+            // Of rank two and one: the minimum-norm solution is looked for in the range.
+            (columns * columns.transpose(), Matrix3x2::new(0.3, -1.0, 1.9, 0.2, -0.6, 0.8)),
+            (columns.column(0) * columns.column(0).transpose(), Matrix3x2::new(0.3, -1.0, 1.9, 0.2, -0.6, 0.8)),
+        ] {
+            let (s, right) = (units * s * units, units * s * solution);
+            let x = solve_semidefinite(&s, &right).unwrap();
+            let off = (s * x - right).component_div(&(units * Matrix3x2::repeat(1.0)));
+            assert!(off.amax() < 1e-9, "{off}");
+        }
+        let line = solve_semidefinite(
+            &SMatrix::<f64, 1, 1>::new(4.0),
+            &Matrix2x3::repeat(2.0).fixed_view::<1, 3>(0, 0).into(),
+        );
+        assert_eq!(line.unwrap(), SMatrix::<f64, 1, 3>::repeat(0.5));
+        let nothing = solve_semidefinite(&SMatrix::<f64, 1, 1>::new(0.0), &SMatrix::<f64, 1, 1>::new(0.0));
+        assert_eq!(nothing.unwrap()[0], 0.0);
+    }
+
+    /// Defect: one large entry hid an asymmetry, so that draws and gains used different covariances.
+    #[test]
+    fn definite_matrices_are_judged_by_row_and_column() {
+        let asymmetric = Matrix3::new(1.0, 0.9, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1e10);
+        assert!(definite_factor("m", &asymmetric).is_err());
+        let units = Matrix3::from_diagonal(&Vector3::new(1e-9, 1.0, 1e5));
+        let regular = Matrix3::new(2.0, 0.3, -0.4, 0.3 + 1e-12, 1.1, 0.5, -0.4, 0.5, 1.7);
+        let (matrix, lower) = definite_factor("m", &(units * regular * units)).unwrap();
+        assert_eq!(matrix, matrix.transpose());
+        let back = lower * lower.transpose();
+        assert!((0..9).all(|k| (back[k] - matrix[k]).abs() <= 1e-14 * matrix[k].abs()));
+        for bad in [
+            Matrix3::zeros(),
+            -Matrix3::identity(),
+            Matrix3::from_element(1.0),
+            Matrix3::from_element(f64::NAN),
+        ] {
+            assert!(definite_factor("m", &bad).is_err());
+        }
     }
 
     #[test]

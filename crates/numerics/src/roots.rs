@@ -51,7 +51,7 @@ pub enum RootError {
 /// quadratic interpolation where three points support it, bisection elsewhere.
 ///
 /// The answer lies within `tolerance` (in the unit of the argument) of a change of sign, or within four units in its last
-/// place; `tolerance = 0.0` asks for the latter. Infinite values of `f` count as signs.
+/// place, or within 1e-30 of the bracket's width where the root is next to zero; `tolerance = 0.0` asks for the latter. Infinite values of `f` count as signs.
 ///
 /// ```
 /// use fewbits_numerics::roots::bracketed;

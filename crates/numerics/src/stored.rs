@@ -176,7 +176,7 @@ pub fn deserialize<'de, T: Floats, D: Deserializer<'de>>(deserializer: D) -> Res
 
 /// How a type with a checking constructor is written and read by serde: the fields of its stored form, each with its type and its
 /// value, and the constructor that reads them. The type itself says `#[serde(try_from = "Form", into = "Form")]`; without values
-/// (second form) it is written by its own derive, and `into` is left out.
+/// (second form) it is written by its own derive, and `into` is left out; fields may then have serde's attributes.
 ///
 /// ```
 /// use fewbits_numerics::{ArgumentError, error::positive, stored};
@@ -211,11 +211,11 @@ macro_rules! stored {
             }
         }
     };
-    ($(#[$meta:meta])* $type:ident as $form:ident { $($field:ident: $kind:ty),+ $(,)? } => $make:expr, $error:ty) => {
+    ($(#[$meta:meta])* $type:ident as $form:ident { $($(#[$attribute:meta])* $field:ident: $kind:ty),+ $(,)? } => $make:expr, $error:ty) => {
         $(#[$meta])*
         #[derive(::serde::Deserialize)]
         #[serde(deny_unknown_fields)]
-        struct $form { $($field: $kind),+ }
+        struct $form { $($(#[$attribute])* $field: $kind),+ }
 
         impl TryFrom<$form> for $type {
             type Error = $error;

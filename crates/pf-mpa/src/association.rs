@@ -36,11 +36,12 @@ impl Rule {
     /// `P(r = 0)` for predictions with the given mean and variance, measurement variance `r`.
     ///
     /// # Errors
-    /// If a variance is negative, `r` is not above zero, or a number is not finite.
+    /// If a variance is negative, `r` is not above zero, or a number is not finite; [`fewbits_core::Error::NotANumber`] if the likelihoods
+    /// of both orders leave the range of numbers.
     pub fn probability(self, targets: &[Gaussian<1>; 2], z: [f64; 2], r: f64) -> Result<f64, Error> {
         fewbits_numerics::error::all_finite("z", &z)?;
         positive("r", r)?;
-        Ok(self.of(targets, z, r))
+        number(self.of(targets, z, r), "the ratio of the likelihoods")
     }
 
     fn of(self, targets: &[Gaussian<1>; 2], z: [f64; 2], r: f64) -> f64 {
@@ -50,15 +51,23 @@ impl Rule {
                 separation(means(targets), z).map_or(0.5, |d| if d == f64::INFINITY { 1.0 } else { d / (1.0 + d) })
             }
             Self::Exact => {
-                let log = |target: &Gaussian<1>, z: f64| {
-                    normal::log_pdf_with(z, target.mean()[0], target.covariance()[0] + r)
+                // ln N(z0; m, s) - ln N(z1; m, s) as a product: two fits that underflow do not meet as infinities.
+                let log_ratio = |target: &Gaussian<1>| {
+                    let middle = 0.5 * z[0] + 0.5 * z[1] - target.mean()[0];
+                    (z[1] - z[0]) / (target.covariance()[0] + r) * middle
                 };
-                let straight = log(&targets[0], z[0]) + log(&targets[1], z[1]);
-                let swapped = log(&targets[0], z[1]) + log(&targets[1], z[0]);
-                sigmoid(straight - swapped)
+                sigmoid(log_ratio(&targets[0]) - log_ratio(&targets[1]))
             }
         }
     }
+}
+
+/// Passes numbers on.
+fn number(value: f64, what: &'static str) -> Result<f64, Error> {
+    if value.is_nan() {
+        return Err(fewbits_core::Error::NotANumber { what }.into());
+    }
+    Ok(value)
 }
 
 fn means(targets: &[Gaussian<1>; 2]) -> [f64; 2] {
@@ -195,7 +204,8 @@ impl Hypotheses {
     /// One step; returns `P(r = 0)`.
     ///
     /// # Errors
-    /// If a variance is negative or `r` is not above zero, or a number is not finite. The hypotheses are then as they were.
+    /// If a variance is negative or `r` is not above zero, or a number is not finite; [`fewbits_core::Error::Impossible`] if the
+    /// measurements are out of reach of every hypothesis. The hypotheses are then as they were.
     pub fn step(&mut self, z: [f64; 2], q: f64, r: f64) -> Result<f64, Error> {
         fewbits_numerics::error::all_finite("z", &z)?;
         non_negative("q", q)?;
@@ -214,6 +224,13 @@ impl Hypotheses {
             }
         }
         let largest = next.iter().fold(f64::NEG_INFINITY, |m, h| m.max(h.0));
+        let finite = next
+            .iter()
+            .all(|h| !h.0.is_nan() && h.1.iter().all(Gaussian::is_finite));
+        if !(finite && largest.is_finite()) {
+            let what = "the hypotheses (from the targets or the measurements)";
+            return Err(fewbits_core::Error::unlikely_or_no_number(largest, what).into());
+        }
         let total: f64 = next.iter().map(|h| (h.0 - largest).exp()).sum();
         let straight: f64 = next.iter().step_by(2).map(|h| (h.0 - largest).exp()).sum();
         next.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -236,6 +253,19 @@ mod tests {
 
     fn pair(m: [f64; 2], v: f64) -> [Gaussian<1>; 2] {
         m.map(|m| Gaussian::scalar(m, v).unwrap())
+    }
+
+    /// Defect: measurements at 1e200 gave a probability of NaN, and the hypotheses stayed NaN ever after.
+    #[test]
+    fn measurements_out_of_reach_are_errors() {
+        let targets = pair([0.0, 1.0], 1.0);
+        assert_eq!(Rule::Exact.probability(&targets, [1e200, 1e200], 1.0).unwrap(), 0.5);
+        assert!(Rule::Exact.probability(&targets, [1e200, -3e200], 1.0).is_err());
+        let mut hypotheses = Hypotheses::new(4, targets).unwrap();
+        let before = hypotheses.clone();
+        assert!(hypotheses.step([1e200, 1e200], 0.1, 1.0).is_err());
+        assert_eq!(hypotheses, before);
+        assert!((0.0..=1.0).contains(&hypotheses.step([0.1, 0.8], 0.1, 1.0).unwrap()));
     }
 
     #[test]

@@ -241,12 +241,11 @@ impl Scheme<1> for QuantizedRange {
         observation: &Observation<Symbol>,
         link: &Link,
     ) -> Result<RangeFactor, fewbits_core::Error> {
-        let arrives = 1.0 - link.loss();
         let symbol = match observation {
             Observation::Received(symbol) => *symbol,
-            Observation::Nothing => return RangeFactor::constant(link.loss(), self.noise).map_err(reported),
-            Observation::Lost => return RangeFactor::constant(1.0, self.noise).map_err(reported),
+            missing => return RangeFactor::constant(link.delivery(missing), self.noise).map_err(reported),
         };
+        let arrives = link.of_received()?;
         if link.crossover() == 0.0 {
             return self.cell_factor(symbol.0, reference, arrives).map_err(reported);
         }

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::sensor::RangeNoise;
+use fewbits_core::columns::lengths_agree;
 use fewbits_core::factor::{Factor, Feature, Tilted, tilted_by_quadrature};
 use fewbits_core::{Cell, Columns, Gaussian};
 use fewbits_numerics::error::{finite, within};
@@ -215,6 +216,9 @@ impl Factor<1> for RangeFactor {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         let noise = self.noise;
         let pairs = log_weights.iter_mut().zip(means[0]);
         match &self.kind {

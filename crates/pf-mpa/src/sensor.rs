@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::error::refuse;
+use fewbits_core::columns::measurements_agree;
 use fewbits_core::{Columns, ColumnsMut, Sensing};
 use fewbits_numerics::error::{all_finite, finite, non_negative};
 use fewbits_numerics::kernels::vectorised;
@@ -213,6 +214,9 @@ impl<const D: usize> Sensing<D, 1> for RangeSensor {
     }
 
     fn mean_columns(&self, states: &Columns<'_, D>, [means]: ColumnsMut<'_, 1>) {
+        if !measurements_agree(states, &mut [&mut *means]) {
+            return;
+        }
         self.distances(states[0], states[1], means);
     }
 }
@@ -247,6 +251,9 @@ impl<const D: usize> Sensing<D, 1> for BiasedRangeSensor {
     }
 
     fn mean_columns(&self, states: &Columns<'_, D>, [means]: ColumnsMut<'_, 1>) {
+        if !measurements_agree(states, &mut [&mut *means]) {
+            return;
+        }
         self.0.distances(states[0], states[1], means);
         for (i, mean) in means.iter_mut().enumerate() {
             *mean += states[2][i];

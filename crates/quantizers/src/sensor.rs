@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// A sensor that reports the level of its scalar sample in every slot: a [`Scheme`], so that every filter takes it.
 ///
 /// Over a [`Link`] of crossover `e` each bit of the word is inverted with probability `e`; a word that no level uses is a symbol,
-/// too. The sensor is never silent, so nothing received is a loss.
+/// too, so no received word is undecodable. The sensor is never silent: a missing report says nothing about the sample.
 ///
 /// ```
 /// use fewbits_core::factor::Factor;
@@ -104,16 +104,16 @@ impl Scheme<1> for QuantizingSensor {
     fn factor(&self, (): &(), observation: &Observation<Symbol>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
         let symbol = match observation {
             Observation::Received(symbol) => *symbol,
-            Observation::Nothing => return Ok(Constant::new(link.loss())?.into()),
-            Observation::Lost => return Ok(Constant::ONE.into()),
+            missing => return Ok(Constant::of_delivery(missing, link).into()),
         };
+        let arrival = link.of_received()?;
         let word = |symbol: usize| self.labelling.word(symbol).map(u64::from);
         let Some(received) = word(symbol.0) else {
             return refuse("symbol", symbol.0, format!("a number below {}", self.labelling.symbols()));
         };
         let given_level = |level: usize| {
             let sent = word(level).unwrap_or(received);
-            (1.0 - link.loss()) * link.word_probability(sent, received, self.labelling.bits())
+            arrival * link.word_probability(sent, received, self.labelling.bits())
         };
         Ok(self.quantizer.factor_of(self.noise_variance, given_level)?)
     }

@@ -22,7 +22,7 @@ fn slots_obey_the_laws_of_schemes() {
         let reports = || (-40..=40).filter(|k| *k != 0).map(|k| scheme.packet(k).unwrap());
         let centre = scheme.prediction();
         let measurements = [-3.0, -0.4, 0.0, 0.29, 2.0].map(|d| Vector1::new(centre + d));
-        for link in [Link::PERFECT, Link::lossy(0.2).unwrap()] {
+        for link in [Link::PERFECT, Link::lossy(0.2).unwrap().with_erasure(0.3).unwrap()] {
             laws::scheme::total_probability(&scheme, &(), &link, reports(), &measurements).unwrap();
             let noise = |rng: &mut _| Vector1::new(0.4 * normal(rng));
             let few = (-3..=3).filter(|k| *k != 0).map(|k| scheme.packet(k).unwrap());

@@ -1,12 +1,16 @@
 //! A Gaussian inside an ellipsoid: probability, mean and covariance.
 
-use super::quadrature::{log_mass, moments};
+use super::outside;
+use super::quadrature::{Moments, log_mass, moments};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::all_finite;
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
 
-/// Probability and moments of `N(mu, V)` inside an [`Ellipsoid`](super::Ellipsoid), by conditioning instead of sampling.
+/// Above this probability inside, one minus it has lost too many digits, and the mass outside is integrated itself.
+const MOSTLY_INSIDE: f64 = 0.9;
+
+/// Probability and moments of `N(mu, V)` inside (and outside) an [`Ellipsoid`](super::Ellipsoid), by conditioning instead of sampling.
 ///
 /// In coordinates whitened by `S` and rotated onto the eigenvectors of the whitened `V`, the region is the ball
 /// `|q|^2 < eta` and the components `q_j ~ N(b_j, w_j)` are independent.
@@ -25,14 +29,14 @@ pub struct GaussianInEllipsoid<const M: usize> {
     threshold: f64,
 }
 
-/// Mean and covariance of a Gaussian restricted to an ellipsoid.
+/// Mean and covariance of a Gaussian restricted to an ellipsoid, or to what lies outside it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EllipsoidMoments<const M: usize> {
-    /// `ln P(inside)`.
+    /// `ln P` of the restriction.
     pub log_mass: f64,
-    /// Mean given inside.
+    /// Mean given the restriction.
     pub mean: SVector<f64, M>,
-    /// Covariance given inside.
+    /// Covariance given the restriction.
     pub covariance: SMatrix<f64, M, M>,
 }
 
@@ -69,20 +73,48 @@ impl<const M: usize> GaussianInEllipsoid<M> {
     /// `ln P(nu inside)` for `nu ~ N(mu, V)`.
     pub fn log_probability(&self, mu: &SVector<f64, M>) -> f64 {
         let b = self.forward * mu;
+        if let Some(x) = b.iter().find(|x| !x.is_finite()) {
+            return if x.is_nan() { f64::NAN } else { f64::NEG_INFINITY };
+        }
         log_mass(self.variances.as_slice(), b.as_slice(), self.threshold)
     }
 
-    /// Mass, mean and covariance of `nu ~ N(mu, V)` inside; `None` if the mass is zero.
+    /// Mass, mean and covariance of `nu ~ N(mu, V)` inside; `None` if the mass is zero or `mu` is not finite.
     pub fn moments(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
+        let b = self.finite(mu)?;
+        self.back(moments(self.variances.as_slice(), &b, 0, self.threshold))
+    }
+
+    /// `ln P(nu outside)`, with digits however small it is.
+    pub fn log_probability_outside(&self, mu: &SVector<f64, M>) -> f64 {
         let b = self.forward * mu;
-        let inside = moments(self.variances.as_slice(), &b, 0, self.threshold);
-        if !inside.log_mass.is_finite() {
-            return None;
+        if let Some(x) = b.iter().find(|x| !x.is_finite()) {
+            return if x.is_nan() { f64::NAN } else { 0.0 };
         }
-        Some(EllipsoidMoments {
-            log_mass: inside.log_mass,
-            mean: self.backward * inside.mean,
-            covariance: symmetrised(&(self.backward * inside.covariance * self.backward.transpose())),
+        let inside = log_mass(self.variances.as_slice(), b.as_slice(), self.threshold);
+        if inside < MOSTLY_INSIDE.ln() {
+            return (-inside.exp()).ln_1p();
+        }
+        outside::log_mass(self.variances.as_slice(), b.as_slice(), self.threshold)
+    }
+
+    /// Mass, mean and covariance of `nu ~ N(mu, V)` outside; `None` if the mass is zero or `mu` is not finite.
+    pub fn moments_outside(&self, mu: &SVector<f64, M>) -> Option<EllipsoidMoments<M>> {
+        let b = self.finite(mu)?;
+        self.back(outside::moments(self.variances.as_slice(), &b, 0, self.threshold))
+    }
+
+    /// Whitened coordinates, if they are numbers.
+    fn finite(&self, mu: &SVector<f64, M>) -> Option<SVector<f64, M>> {
+        Some(self.forward * mu).filter(|b| b.iter().all(|x| x.is_finite()))
+    }
+
+    /// From whitened coordinates to those of the innovation.
+    fn back(&self, white: Moments<M>) -> Option<EllipsoidMoments<M>> {
+        white.log_mass.is_finite().then(|| EllipsoidMoments {
+            log_mass: white.log_mass,
+            mean: self.backward * white.mean,
+            covariance: symmetrised(&(self.backward * white.covariance * self.backward.transpose())),
         })
     }
 }

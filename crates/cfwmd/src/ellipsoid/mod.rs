@@ -1,14 +1,16 @@
 //! The region of silence of a vector sensor: an ellipsoid, and a Gaussian inside it.
 
 mod inside;
+mod outside;
 mod quadrature;
 
 pub(crate) use inside::symmetric_eigen;
 pub use inside::{EllipsoidMoments, GaussianInEllipsoid};
 
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, non_negative};
-use nalgebra::{Cholesky, SMatrix, SVector};
+use fewbits_numerics::error::non_negative;
+use fewbits_numerics::linalg::definite_factor;
+use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 /// The region of silence `nu' S^-1 nu < eta` of an innovation of `M` components.
@@ -51,17 +53,10 @@ impl<const M: usize> Ellipsoid<M> {
     /// # Errors
     /// If an entry is not finite, `S` is not positive definite or the threshold is negative.
     pub fn new(innovation_covariance: &SMatrix<f64, M, M>, threshold: f64) -> Result<Self, ArgumentError> {
-        all_finite("innovation_covariance", innovation_covariance.as_slice())?;
-        let factor = Cholesky::new(*innovation_covariance).ok_or_else(|| {
-            ArgumentError::new(
-                "innovation_covariance",
-                format!("{innovation_covariance:?}"),
-                "a positive definite matrix",
-            )
-        })?;
+        let (innovation_covariance, lower) = definite_factor("innovation_covariance", innovation_covariance)?;
         Ok(Self {
-            lower: factor.unpack(),
-            innovation_covariance: *innovation_covariance,
+            lower,
+            innovation_covariance,
             threshold: non_negative("threshold", threshold)?,
         })
     }

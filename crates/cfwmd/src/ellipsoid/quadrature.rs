@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::OnceLock;
 
 /// A variance below this share of the ball's squared radius is a known number.
-const KNOWN: f64 = 1e-16;
+pub(super) const KNOWN: f64 = 1e-16;
 /// Means up to this many deviations need 24 nodes, up to the next 40; beyond them the quadrature is adaptive ...
 const NEAR: f64 = 4.0;
 const FAR: f64 = 8.0;
@@ -22,7 +22,7 @@ const ROUNDING: f64 = 4e-15;
 const HALVINGS: u32 = 40;
 
 /// Nodes of a panel.
-fn panel(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
+pub(super) fn panel(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
     gauss_legendre::<24>().on(a, b)
 }
 
@@ -46,6 +46,10 @@ fn integrate(variances: &[f64], means: &[f64], eta: f64, f: impl Fn(f64) -> f64,
     let mass = |a: f64, b: f64| panel(a, b).map(|(theta, w)| w * (f(theta) - peak).exp()).sum::<f64>();
     let tolerance = TOLERANCE.max(ROUNDING * peak.abs());
     let whole = mass(cuts[0], cuts[1]) + mass(cuts[1], cuts[2]);
+    // Halving a panel that is no number would never end.
+    if !whole.is_finite() {
+        return;
+    }
     // Depth first, left to right: at most one waiting panel for each halving.
     let mut waiting = [(0.0, 0.0, 0.0, 0_u32); HALVINGS as usize + 4];
     waiting[0] = (cuts[1], cuts[2], mass(cuts[1], cuts[2]), 0);
@@ -104,7 +108,7 @@ fn bulk(f: impl Fn(f64) -> f64) -> ([f64; 3], f64) {
 
 /// The leading component along its axis, `q_1 = sqrt(eta) sin(theta)`: its value, the squared radius that is left, and the
 /// logarithm of its density times `dq_1/dtheta`.
-fn leading(variance: f64, mean: f64, eta: f64) -> impl Fn(f64) -> (f64, f64, f64) {
+pub(super) fn leading(variance: f64, mean: f64, eta: f64) -> impl Fn(f64) -> (f64, f64, f64) {
     let (radius, deviation) = (eta.sqrt(), variance.sqrt());
     let log_scale = (radius / deviation).ln();
     move |theta: f64| {
@@ -175,14 +179,14 @@ fn tame_plane(variances: [f64; 2], means: [f64; 2], eta: f64) -> f64 {
 
 /// `ln sum exp` of terms that arrive one after the other.
 #[derive(Default)]
-struct LogSum {
+pub(super) struct LogSum {
     /// Largest term and the sum of all relative to it.
     terms: Option<(f64, f64)>,
 }
 
 impl LogSum {
     /// Adds `exp(term)` and returns its share of the sum so far.
-    fn add(&mut self, term: f64) -> f64 {
+    pub(super) fn add(&mut self, term: f64) -> f64 {
         if term == f64::NEG_INFINITY {
             return 0.0;
         }
@@ -195,7 +199,7 @@ impl LogSum {
         (term - largest).exp() / sum
     }
 
-    fn value(&self) -> f64 {
+    pub(super) fn value(&self) -> f64 {
         self.terms
             .map_or(f64::NEG_INFINITY, |(largest, sum)| largest + sum.ln())
     }
@@ -209,7 +213,7 @@ pub(super) struct Moments<const M: usize> {
 }
 
 impl<const M: usize> Moments<M> {
-    fn with_mass(log_mass: f64) -> Self {
+    pub(super) fn with_mass(log_mass: f64) -> Self {
         Self {
             log_mass,
             mean: SVector::zeros(),

@@ -65,7 +65,7 @@ impl<const D: usize> ImputedBelief<D> {
 /// predict: xc = F xc, xhat_i = F xhat_i;  P = F P F' + Q
 /// received z of i:  w *= N(z; H xc, S);  w *= 1{|z - H xhat_i| >= threshold};  Kalman update of xc, own update of xhat_i
 /// nothing from i:   z ~ N(H xc, S) where |z - H xhat_i| < threshold, w *= P(there);  the same updates with that z
-/// erased:           z ~ N(H xc, S);  the same updates
+/// lost from i:      z ~ N(H xc, S) where |z - H xhat_i| >= threshold, w *= P(there);  the same updates
 /// ```
 /// Scalar measurements are drawn from their conditional law; vector ones uniformly in the ellipsoid and weighted. With loss the
 /// law of what did not arrive is `N(z) (loss + (1 - loss) 1{inside})`.
@@ -92,7 +92,7 @@ where
         estimate.copy_from_slice(moved.as_slice());
     }
     let steps = advance(&mut next.own, network, dynamics)?;
-    let loss = network.link().loss();
+    let (link, loss) = (network.link(), network.link().loss());
     let mut log_weights = vec![0.0; next.cloud.means().len()];
     let sensors = || network.sensors().iter().zip(&steps).zip(observations).enumerate();
     for received in [true, false] {
@@ -108,7 +108,7 @@ where
                         (*z, innovation.log_pdf(&(z - central)) + if clash { VIOLATION } else { 0.0 })
                     }
                     Observation::Nothing => impute(rng, innovation, rule, loss, central, &predicted),
-                    Observation::Lost => (central + noise(rng, innovation), 0.0),
+                    Observation::Lost => impute_sent(rng, innovation, rule, central, &predicted),
                 };
                 let moved = step.gain * (z - predicted);
                 own.iter_mut().zip(moved.iter()).for_each(|(x, step)| *x += step);
@@ -123,7 +123,11 @@ where
             .zip(&log_weights)
             .for_each(|(log, increment)| *log += increment);
     })?;
-    info.log_likelihood = increment + info.received as f64 * (-loss).ln_1p();
+    let lost = observations.iter().filter(|o| **o == Observation::Lost).count();
+    if info.received > 0 {
+        info.log_likelihood += info.received as f64 * link.of_received()?.ln();
+    }
+    info.log_likelihood += increment + lost as f64 * link.lost_given_sent().ln();
     Ok((next, info))
 }
 
@@ -174,6 +178,41 @@ fn impute<const M: usize, R: Rng + ?Sized>(
             log_target - log_proposal
         },
     )
+}
+
+/// A measurement that was sent and is known to be lost, `z ~ q`, with `ln (N(z; central, S) 1{outside} / q(z))`.
+fn impute_sent<const M: usize, R: Rng + ?Sized>(
+    rng: &mut R,
+    innovation: &FactoredGaussian<M>,
+    rule: &CensoringRule<M>,
+    central: &SVector<f64, M>,
+    own: &SVector<f64, M>,
+) -> (SVector<f64, M>, f64) {
+    /// Half of the vectors are drawn this much wider, so that a region far outside is found.
+    const WIDER: f64 = 3.0;
+    if M == 1 {
+        let (interval, deviation) = (rule.interval(own[0]), innovation.lower()[(0, 0)]);
+        let (low, high) = ((interval.0 - central[0]) / deviation, (interval.1 - central[0]) / deviation);
+        let tails = [normal::log_cdf(low), normal::log_cdf(-high)];
+        let largest = tails[0].max(tails[1]);
+        let total = largest + tails.iter().map(|tail| (tail - largest).exp()).sum::<f64>().ln();
+        let (from, to) = if rng.random::<f64>() < (tails[0] - total).exp() {
+            (f64::NEG_INFINITY, low)
+        } else {
+            (high, f64::INFINITY)
+        };
+        return normal::sample_truncated(rng, from, to)
+            .map_or((*central, VIOLATION), |x| (SVector::repeat(central[0] + deviation * x), total));
+    }
+    let scale = if rng.random::<bool>() { 1.0 } else { WIDER };
+    let z = central + noise(rng, innovation) * scale;
+    if rule.statistic(&(z - own)) < rule.threshold() {
+        return (z, VIOLATION);
+    }
+    // q = (N(z; central, S) + N(z; central, WIDER^2 S)) / 2.
+    let squared = innovation.squared_distance(&(z - central));
+    let ratio = WIDER.powi(-(M as i32)) * (0.5 * squared * (1.0 - WIDER.powi(-2))).exp();
+    (z, -(0.5 * (1.0 + ratio)).ln())
 }
 
 /// From the conditional law itself: truncated to the interval, or outside it and lost.

@@ -2,7 +2,7 @@
 
 use super::{advance, check};
 use crate::Error;
-use crate::censored::EllipsoidSilence;
+use crate::censored::Missing;
 use crate::ellipsoid::{EllipsoidMoments, symmetric_eigen};
 use crate::network::{FusionInfo, Network};
 use crate::rule::{CensoringRule, OwnRecursion, OwnStep};
@@ -210,7 +210,7 @@ impl<const D: usize> JointBelief<D> {
 ///              xhat_i <- (I - W H) xhat_i + W z
 /// nothing:     y = H (x - xhat_i) + n lies inside the ellipsoid (or was lost): moments, regress everything on y
 ///              xhat_i <- xhat_i + W y
-/// erased:      y as predicted; xhat_i <- xhat_i + W y
+/// lost:        y lies outside the ellipsoid: the same with the moments there
 /// ```
 ///
 /// # Errors
@@ -226,35 +226,29 @@ pub fn step<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M:
     let (mut next, mut info) = (belief.clone(), FusionInfo::default());
     let steps = advance(&mut next.own, network, dynamics)?;
     next.predict(dynamics)?;
-    let arrival = (-network.link().loss()).ln_1p();
+    let link = network.link();
     let sensors = || network.sensors().iter().zip(&steps).zip(observations).enumerate();
     for (i, ((sensor, step), observation)) in sensors() {
         if let Observation::Received(value) = observation {
-            info.log_likelihood += arrival + next.receive(sensor, step, i, value)?;
+            info.log_likelihood += link.of_received()?.ln() + next.receive(sensor, step, i, value)?;
             info.received += 1;
         }
     }
     for (i, ((sensor, (step, rule)), observation)) in sensors() {
-        match observation {
-            Observation::Nothing => {
-                info.log_likelihood += next.withhold(sensor, step, i, |mu, covariance| {
-                    let loss = network.link().loss();
-                    Ok(EllipsoidSilence::innovation_moments(rule, mu, covariance, loss)?)
-                })?;
-            }
-            Observation::Lost => {
-                next.withhold(sensor, step, i, |mu, covariance| {
-                    Ok(EllipsoidMoments {
-                        log_mass: 0.0,
-                        mean: *mu,
-                        covariance: *covariance,
-                    })
-                })?;
-            }
-            Observation::Received(_) => {}
-        }
+        let missing = match observation {
+            Observation::Nothing => Missing::nothing(link),
+            Observation::Lost => Missing::lost(link),
+            Observation::Received(_) => continue,
+        };
+        info.log_likelihood +=
+            next.withhold(sensor, step, i, |mu, covariance| Ok(missing.innovation_moments(rule, mu, covariance)?))?;
     }
     next.shorten();
+    let mut numbers = next.mean.iter().chain(next.root.iter());
+    if !(info.log_likelihood.is_finite() && numbers.all(|x| x.is_finite())) {
+        let what = "the joint belief (from the models or the reports)";
+        return Err(fewbits_core::Error::unlikely_or_no_number(info.log_likelihood, what).into());
+    }
     Ok((next, info))
 }
 

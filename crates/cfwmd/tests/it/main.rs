@@ -8,6 +8,7 @@ mod fusion;
 mod no_feedback;
 mod schemes;
 mod silence;
+mod wild;
 
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::rule::CensoringRule;

@@ -26,8 +26,9 @@ fn field() -> ReceivedPower<4> {
     ReceivedPower::new(Vector2::new(3.0, -1.0), [0, 2], 100.0, 1.0, 2.0, 0.8).unwrap()
 }
 
-fn links() -> [Link; 2] {
-    [Link::PERFECT, Link::lossy(0.3).unwrap()]
+fn links() -> [Link; 3] {
+    let lossy = Link::lossy(0.3).unwrap();
+    [Link::PERFECT, lossy, lossy.with_erasure(0.2).unwrap()]
 }
 
 /// Laws 1 and 2 of a scalar scheme whose report is a real number, without memory.
@@ -50,14 +51,21 @@ fn scalar_laws<S: Scheme<1, State = ()>>(
         };
         total_probability_with(scheme, feedback, &link, received, &measurements, 1e-3).unwrap();
         let nothing = scheme.factor(feedback, &Observation::Nothing, &link).unwrap();
+        let lost = scheme.factor(feedback, &Observation::Lost, &link).unwrap();
         let mut rng = Stream::new(8).rng();
         for m in measurements {
-            let p = nothing.log_likelihood(&m).exp();
+            let [nothing, lost] = [&nothing, &lost].map(|factor| factor.log_likelihood(&m).exp());
             let measure = |rng: &mut _| m + Vector1::new(draw(rng) * r.sqrt());
-            honesty(scheme, feedback, &link, &mut rng, 20_000, measure, |o| matches!(o, Observation::Nothing), p)
+            honesty(scheme, feedback, &link, &mut rng, 20_000, measure, |o| matches!(o, Observation::Nothing), nothing)
                 .unwrap();
+            if link.erasure() > 0.0 {
+                honesty(scheme, feedback, &link, &mut rng, 20_000, measure, |o| matches!(o, Observation::Lost), lost)
+                    .unwrap();
+            }
         }
-        tilted_is_quadrature(&nothing, &Gaussian::scalar(0.7, 2.0).unwrap(), 16.0, 4001, 1e-9).unwrap();
+        for missing in [nothing, lost] {
+            tilted_is_quadrature(&missing, &Gaussian::scalar(0.7, 2.0).unwrap(), 16.0, 4001, 1e-9).unwrap();
+        }
     }
 }
 
@@ -142,12 +150,29 @@ fn vectors_are_lawful() {
     let broadcast = Vector2::new(0.5, 2.0);
     for link in links() {
         let nothing = scheme.factor(&broadcast, &Observation::Nothing, &link).unwrap();
+        let lost = scheme.factor(&broadcast, &Observation::Lost, &link).unwrap();
         let mut rng = Stream::new(9).rng();
         for m in [Vector2::new(0.0, 2.5), Vector2::new(3.0, -1.0)] {
-            let p = nothing.log_likelihood(&m).exp();
+            let [p, known] = [&nothing, &lost].map(|factor| factor.log_likelihood(&m).exp());
             let measure = |rng: &mut _| m + sensor.noise_factor() * Vector2::new(draw(rng), draw(rng));
             honesty(&scheme, &broadcast, &link, &mut rng, 40_000, measure, |o| matches!(o, Observation::Nothing), p)
                 .unwrap();
+            if link.erasure() > 0.0 {
+                honesty(
+                    &scheme,
+                    &broadcast,
+                    &link,
+                    &mut rng,
+                    40_000,
+                    measure,
+                    |o| matches!(o, Observation::Lost),
+                    known,
+                )
+                .unwrap();
+            }
+            // Sent or silent.
+            let silent = (p - link.loss()) / (1.0 - link.loss());
+            assert!((known / link.lost_given_sent() + silent - 1.0).abs() < 1e-7);
             // What is sent arrives with its density: the share of reports in a half plane.
             let half = |o: &Observation<Vector2<f64>>| o.received().is_some_and(|z| z[0] > 4.0);
             let reach = gauss_legendre::<24>();

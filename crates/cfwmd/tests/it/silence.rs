@@ -1,7 +1,7 @@
 //! Moments after silence against brute force.
 
 use crate::Silence;
-use fewbits_cfwmd::censored::EllipsoidSilence;
+use fewbits_cfwmd::censored::{Censored, MissingReports};
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::CensoringRule;
 use fewbits_cfwmd::threshold::threshold;
@@ -242,9 +242,12 @@ fn sweeps_of_ellipsoids_and_triggers_are_the_scalar() {
     let triggered: Triggered<_, 1> = Triggered { sensing, trigger };
     for loss in [0.0, 0.3] {
         let link = Link::lossy(loss).unwrap();
-        let region = EllipsoidSilence::new(&rule, &Vector2::new(0.3, 0.1), &Matrix2::identity(), &link).unwrap();
-        is_a_number(&region, &planes).unwrap();
-        sweep_is_scalar(&region, &planes).unwrap();
+        for reports in MISSING {
+            let region =
+                Censored::missing(&rule, &Vector2::new(0.3, 0.1), &Matrix2::identity(), &link, reports).unwrap();
+            is_a_number(&region, &planes).unwrap();
+            sweep_is_scalar(&region, &planes).unwrap();
+        }
         for observation in [Observation::Nothing, Observation::Received(0.7), Observation::Lost] {
             let bump = triggered.factor(&Vector1::new(0.2), &observation, &link).unwrap();
             sweep_is_scalar(&bump, &lines).unwrap();
@@ -252,15 +255,20 @@ fn sweeps_of_ellipsoids_and_triggers_are_the_scalar() {
     }
 }
 
-/// Evidence and moments of a silent vector sensor under a belief of its measurement, by summing over a lattice.
+const MISSING: [MissingReports; 2] = [
+    MissingReports { nothing: 1, lost: 0 },
+    MissingReports { nothing: 0, lost: 1 },
+];
+
+/// Evidence and moments of a vector sensor without report under a belief of its measurement, by summing over a lattice.
 #[test]
 fn vector_moments_are_the_sums_over_a_lattice() {
     let rule = CensoringRule::new(&Matrix2::new(2.0, 0.5, 0.5, 1.2), 1.9).unwrap();
     let noise = Matrix2::new(0.9, -0.2, -0.2, 0.6);
     let prior = Gaussian::new(Vector2::new(1.1, -0.4), Matrix2::new(1.5, 0.6, 0.6, 2.1)).unwrap();
-    for loss in [0.0, 0.3] {
-        let link = Link::lossy(loss).unwrap();
-        let silence = EllipsoidSilence::new(&rule, &Vector2::new(0.2, 0.5), &noise, &link).unwrap();
+    for (loss, reports) in [(0.0, MISSING[0]), (0.3, MISSING[0]), (0.3, MISSING[1])] {
+        let link = Link::lossy(loss).unwrap().with_erasure(0.5).unwrap();
+        let silence = Censored::missing(&rule, &Vector2::new(0.2, 0.5), &noise, &link, reports).unwrap();
         let (n, h) = (50, 0.3);
         let (mut mass, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
         for m in (-n..=n).flat_map(|i| (-n..=n).map(move |j| Vector2::new(f64::from(i), f64::from(j)) * h)) {
@@ -277,7 +285,7 @@ fn vector_moments_are_the_sums_over_a_lattice() {
     }
 }
 
-/// Under the broadcast's own belief a sensor is silent with one less its rate; an erased report changes nothing.
+/// Under the broadcast's own belief a sensor speaks with its rate and is silent with one less it.
 #[test]
 fn silence_has_the_probability_of_the_rule() {
     let belief = Gaussian::new(Vector2::new(1.0, 10.0), Matrix2::new(3.0, 1.0, 1.0, 2.0)).unwrap();
@@ -298,8 +306,8 @@ fn silence_has_the_probability_of_the_rule() {
         .fuse(&belief, &rules, belief.mean(), &[Observation::Nothing])
         .unwrap();
     assert!((info.log_likelihood - expected).abs() < 1e-7);
-    let (after, info) = two
-        .fuse(&belief, &rules, belief.mean(), &[Observation::Lost])
-        .unwrap();
-    assert_eq!((after, info.log_likelihood), (belief, 0.0));
+    let (after, info) = two.fuse(&belief, &rules, belief.mean(), &[Observation::Lost]).unwrap();
+    assert!((info.log_likelihood - f64::ln(rate)).abs() < 1e-7);
+    assert!((after.mean() - belief.mean()).amax() < 1e-9);
+    assert!(after.covariance()[(0, 0)] > belief.covariance()[(0, 0)]);
 }

@@ -2,7 +2,7 @@
 
 use super::{Factor, Tilted};
 use crate::cell::Cell;
-use crate::columns::Columns;
+use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use crate::observation::Link;
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// | observation | cell | floor | share |
 /// |---|---|---|---|
-/// | sign bit over a link with loss `l` and crossover `e` | a half-line | `(1 - l) e` | `(1 - l)(1 - 2 e)` |
+/// | sign bit over a link with arrival `a` and crossover `c` | a half-line | `a c` | `a (1 - 2 c)` |
 /// | cell of a quantizer, perfect link | the cell | 0 | 1 |
 /// | nothing from a censoring sensor, loss `l` | region of silence | `l` | `1 - l` |
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +79,7 @@ impl InCell {
     /// If `threshold` is not finite or `r` not positive.
     #[inline]
     pub fn sign(sign: Sign, threshold: f64, noise_variance: f64, link: &Link) -> Result<Self, ArgumentError> {
-        let (arrives, crossover) = (1.0 - link.loss(), link.crossover());
+        let (arrives, crossover) = (link.arrival(), link.crossover());
         let cell = Cell::of_sign(sign, threshold)?;
         Self::new(cell, noise_variance, arrives * crossover, arrives * (1.0 - 2.0 * crossover))
     }
@@ -170,6 +170,9 @@ impl Factor<1> for InCell {
     /// Probabilities into a short buffer, then their logarithms: each stage stays in vector registers.
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
         const BLOCK: usize = 128;
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         let (lower, upper) = (self.cell.lower(), self.cell.upper());
         let (scale, floor, share, log_share) = (1.0 / self.deviation, self.floor, self.share, self.log_share);
         // A half-line is one cut, rising (`m` above the edge) or falling.
@@ -183,7 +186,7 @@ impl Factor<1> for InCell {
         let wide = (upper - lower) * scale >= scalar::WIDE;
         let (mut buffer, mut upper_edges) = ([0.0; BLOCK], [0.0; BLOCK]);
         for (log_weights, means) in log_weights.chunks_mut(BLOCK).zip(means[0].chunks(BLOCK)) {
-            let buffer = &mut buffer[..means.len().min(log_weights.len())];
+            let buffer = &mut buffer[..means.len()];
             if let Some((edge, scale)) = cut {
                 buffer.iter_mut().zip(means).for_each(|(x, m)| *x = (m - edge) * scale);
                 match floor > 0.0 {

@@ -28,7 +28,7 @@ pub use product::{Product, Repeated};
 pub use scalar::{Constant, Scalar};
 pub use value::Value;
 
-use crate::columns::{Columns, count, state_at};
+use crate::columns::{Columns, lengths_agree, state_at};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use nalgebra::{SMatrix, SVector};
@@ -36,8 +36,10 @@ use nalgebra::{SMatrix, SVector};
 /// `p(observation | h(x) = m)` for the `M` components of a noise-free measurement `m`.
 ///
 /// Laws ([`crate::laws::factor`]):
-/// 1. `log_likelihood` is finite or `-inf` for every finite `m`, never NaN;
-/// 2. `add_log_likelihoods` adds what `log_likelihood` returns, to rounding;
+/// 1. `log_likelihood` is finite or `-inf` for every finite `m`; where `m` is NaN it is NaN, or no more than at any number, so that a
+///    NaN never raises a weight;
+/// 2. `add_log_likelihoods` adds what `log_likelihood` returns, to rounding; where lengths differ all of `log_weights` becomes NaN
+///    ([`lengths_agree`](crate::columns::lengths_agree));
 /// 3. `tilted` agrees with quadrature of `log_likelihood` against the prior.
 pub trait Factor<const M: usize> {
     /// `ln p(observation | h(x) = m)`.
@@ -45,15 +47,18 @@ pub trait Factor<const M: usize> {
 
     /// Adds the log likelihood of every column of `means` to `log_weights`. Override where a sweep is faster.
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
-        for i in 0..count(means).min(log_weights.len()) {
-            log_weights[i] += self.log_likelihood(&state_at(means, i));
+        if lengths_agree(means, log_weights) {
+            for (i, log_weight) in log_weights.iter_mut().enumerate() {
+                *log_weight += self.log_likelihood(&state_at(means, i));
+            }
         }
     }
 
     /// Evidence and moments of the posterior of `m ~ prior`.
     ///
     /// # Errors
-    /// [`Error::Impossible`] if the observation has probability zero under the prior; [`Error::NotConverged`].
+    /// [`Error::Impossible`] if the observation has probability zero under the prior; [`Error::NotANumber`] if the prior or the likelihood
+    /// leaves the range of numbers; [`Error::NotConverged`].
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error>;
 }
 
@@ -70,9 +75,15 @@ pub struct Tilted<const M: usize> {
 
 impl<const M: usize> Tilted<M> {
     /// The prior itself: an observation that says nothing, of probability `exp(log_evidence)`.
+    ///
+    /// # Errors
+    /// [`Error::Impossible`] for a probability of zero, [`Error::NotANumber`] for NaN or an infinite likelihood.
     pub fn unchanged(prior: &Gaussian<M>, log_evidence: f64) -> Result<Self, Error> {
         if log_evidence == f64::NEG_INFINITY {
             return Err(Error::Impossible);
+        }
+        if !log_evidence.is_finite() {
+            return Err(Error::NotANumber { what: "the likelihood" });
         }
         Ok(Self {
             log_evidence,
@@ -83,7 +94,8 @@ impl<const M: usize> Tilted<M> {
 }
 
 impl Tilted<1> {
-    /// A scalar posterior, if its numbers are numbers.
+    /// A scalar posterior, if its numbers are numbers. Under a finite prior the factors of this crate leave the range of numbers only
+    /// where the observation is out of reach.
     #[inline]
     pub(crate) fn scalar(log_evidence: f64, mean: f64, variance: f64) -> Result<Self, Error> {
         if !(log_evidence.is_finite() && mean.is_finite() && variance.is_finite()) {

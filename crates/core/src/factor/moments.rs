@@ -35,7 +35,8 @@ const ROUNDING: f64 = 1e-9;
 /// `exp(-46)`; and what is left is integrated adaptively, with panels that begin at the features.
 ///
 /// # Errors
-/// [`Error::Impossible`] if the posterior is zero wherever it was looked for; [`Error::NotConverged`].
+/// [`Error::Impossible`] if the posterior is zero wherever it was looked for; [`Error::NotANumber`] if the likelihood or the prior is
+/// none; [`Error::NotConverged`].
 pub fn tilted_by_quadrature(
     prior: &Gaussian<1>,
     features: impl IntoIterator<Item = Feature>,
@@ -43,6 +44,9 @@ pub fn tilted_by_quadrature(
 ) -> Result<Tilted<1>, Error> {
     let (centre, variance) = (prior.mean()[0], prior.covariance()[0]);
     let deviation = variance.sqrt();
+    if !(centre.is_finite() && deviation.is_finite()) {
+        return Err(Error::NotANumber { what: "the prior" });
+    }
     if deviation == 0.0 {
         let mut log = [0.0];
         log_likelihoods(&[centre], &mut log);
@@ -59,48 +63,61 @@ pub fn tilted_by_quadrature(
         deviation,
         log_likelihoods,
         evaluations: 0,
+        no_number: false,
     };
-    if let Some(tilted) = posterior.by_trapezoid(&features) {
-        return Ok(tilted);
+    let tilted = posterior.tilted(&features);
+    if posterior.no_number {
+        return Err(Error::NotANumber { what: "the likelihood" });
     }
-    let places = candidates(&features);
-    let mut values = vec![0.0; places.len()];
-    posterior.logs(&places, &mut values);
-    let best = (0..places.len())
-        .max_by(|i, j| values[*i].total_cmp(&values[*j]))
-        .ok_or(Error::Impossible)?;
-    if values[best] == f64::NEG_INFINITY {
-        return Err(Error::Impossible);
-    }
-    let beside = |i: Option<usize>, otherwise: f64| {
-        i.and_then(|i| Some((*places.get(i)?, values[i])))
-            .unwrap_or((otherwise, f64::NEG_INFINITY))
-    };
-    let left = beside(best.checked_sub(1), places[best] - 1.0);
-    let right = beside(Some(best + 1), places[best] + 1.0);
-    let (mode, peak) = posterior.maximum(left, (places[best], values[best]), right);
+    tilted
+}
 
-    // Every place still worth counting, and a step beyond the outermost ones.
-    let counted = || {
-        (0..places.len())
-            .filter(|i| values[*i] > peak - DROP)
-            .map(|i| places[i])
-    };
-    let finest = features.iter().map(|f| f.1).fold(1.0, f64::min) / 64.0;
-    let low = posterior.edge(counted().fold(mode, f64::min), -finest, peak - DROP);
-    let high = posterior.edge(counted().fold(mode, f64::max), finest, peak - DROP);
-    let mut breaks = vec![low, mode, high];
-    let around = features
-        .iter()
-        .flat_map(|(at, width)| [-8.0, -3.0, 0.0, 3.0, 8.0].map(|k| at + k * width));
-    breaks.extend(around.filter(|t| low < *t && *t < high));
-    breaks.sort_by(f64::total_cmp);
-    breaks.dedup();
-    let sums = posterior.integrate(&breaks, mode, peak)?;
-    let shift = sums[1] / sums[0];
-    let second = sums[2] / sums[0] - shift * shift;
-    let log_evidence = peak + sums[0].ln() - LN_SQRT_2PI;
-    Tilted::scalar(log_evidence, centre + deviation * (mode + shift), variance * second)
+impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
+    fn tilted(&mut self, features: &[(f64, f64)]) -> Result<Tilted<1>, Error> {
+        let posterior = self;
+        let (centre, deviation) = (posterior.centre, posterior.deviation);
+        if let Some(tilted) = posterior.by_trapezoid(features) {
+            return Ok(tilted);
+        }
+        let places = candidates(features);
+        let mut values = vec![0.0; places.len()];
+        posterior.logs(&places, &mut values);
+        let best = (0..places.len())
+            .max_by(|i, j| values[*i].total_cmp(&values[*j]))
+            .ok_or(Error::Impossible)?;
+        if values[best] == f64::NEG_INFINITY {
+            return Err(Error::Impossible);
+        }
+        let beside = |i: Option<usize>, otherwise: f64| {
+            i.and_then(|i| Some((*places.get(i)?, values[i])))
+                .unwrap_or((otherwise, f64::NEG_INFINITY))
+        };
+        let left = beside(best.checked_sub(1), places[best] - 1.0);
+        let right = beside(Some(best + 1), places[best] + 1.0);
+        let (mode, peak) = posterior.maximum(left, (places[best], values[best]), right);
+
+        // Every place still worth counting, and a step beyond the outermost ones.
+        let counted = || {
+            (0..places.len())
+                .filter(|i| values[*i] > peak - DROP)
+                .map(|i| places[i])
+        };
+        let finest = features.iter().map(|f| f.1).fold(1.0, f64::min) / 64.0;
+        let low = posterior.edge(counted().fold(mode, f64::min), -finest, peak - DROP);
+        let high = posterior.edge(counted().fold(mode, f64::max), finest, peak - DROP);
+        let mut breaks = vec![low, mode, high];
+        let around = features
+            .iter()
+            .flat_map(|(at, width)| [-8.0, -3.0, 0.0, 3.0, 8.0].map(|k| at + k * width));
+        breaks.extend(around.filter(|t| low < *t && *t < high));
+        breaks.sort_by(f64::total_cmp);
+        breaks.dedup();
+        let sums = posterior.integrate(&breaks, mode, peak)?;
+        let shift = sums[1] / sums[0];
+        let second = sums[2] / sums[0] - shift * shift;
+        let log_evidence = peak + sums[0].ln() - LN_SQRT_2PI;
+        Tilted::scalar(log_evidence, centre + deviation * (mode + shift), deviation * deviation * second)
+    }
 }
 
 /// Places at which to look for the mode: increasing, without repetition.
@@ -132,6 +149,8 @@ struct Posterior<F> {
     deviation: f64,
     log_likelihoods: F,
     evaluations: usize,
+    /// Whether the likelihood was NaN or infinite somewhere.
+    no_number: bool,
 }
 
 impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
@@ -145,8 +164,9 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
                 *log = -0.5 * t * t;
             }
             (self.log_likelihoods)(nodes, logs);
-            for log in logs.iter_mut().filter(|log| log.is_nan()) {
+            for log in logs.iter_mut().filter(|log| log.is_nan() || **log == f64::INFINITY) {
                 *log = f64::NEG_INFINITY;
+                self.no_number = true;
             }
             self.evaluations += at.len();
         }

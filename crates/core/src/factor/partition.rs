@@ -2,7 +2,7 @@
 
 use super::moments::Feature;
 use super::{Factor, Tilted};
-use crate::columns::Columns;
+use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, all_finite, positive};
@@ -106,6 +106,17 @@ impl Partition {
 
     /// `ln p(observation | m)`.
     pub fn log_probability(&self, m: f64) -> f64 {
+        if m.is_nan() {
+            return m;
+        }
+        if m.is_infinite() {
+            let outermost = if m > 0.0 {
+                self.given_cell.last()
+            } else {
+                self.given_cell.first()
+            };
+            return outermost.map_or(f64::NEG_INFINITY, |p| p.ln());
+        }
         let standard = |edge: f64| (edge - m) / self.deviation;
         let logs: Vec<f64> = self
             .parts()
@@ -158,6 +169,9 @@ impl Factor<1> for Partition {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         let mut probabilities = [0.0; BLOCK];
         for (log_weights, means) in log_weights.chunks_mut(BLOCK).zip(means[0].chunks(BLOCK)) {
             let probabilities = &mut probabilities[..means.len()];
@@ -176,7 +190,8 @@ impl Factor<1> for Partition {
                 },
             );
             for ((log_weight, m), p) in log_weights.iter_mut().zip(means).zip(&*probabilities) {
-                if *p <= LEAST {
+                // A whole line is certain even of NaN, which must not count as a measurement.
+                if *p <= LEAST || p.is_nan() || m.is_nan() {
                     *log_weight += self.log_probability(*m);
                 }
             }

@@ -2,7 +2,7 @@
 
 use super::moments::{Feature, tilted_by_quadrature};
 use super::{Factor, Scalar, Tilted};
-use crate::columns::Columns;
+use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::error::{ArgumentError, at_least_one};
@@ -50,6 +50,9 @@ impl Factor<1> for Repeated {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         let mut logs = [0.0; BLOCK];
         for (means, log_weights) in means[0].chunks(BLOCK).zip(log_weights.chunks_mut(BLOCK)) {
             let logs = &mut logs[..means.len()];
@@ -84,9 +87,14 @@ impl Product {
 
     /// Adds an observation; one that is there already is counted again.
     pub fn push(&mut self, factor: Scalar) {
-        match self.factors.iter_mut().find(|known| known.factor == factor) {
-            Some(known) => known.count += 1,
-            None => self.factors.push(Repeated { factor, count: 1 }),
+        self.push_repeated(Repeated { factor, count: 1 });
+    }
+
+    /// Adds several observations of one kind.
+    pub fn push_repeated(&mut self, more: Repeated) {
+        match self.factors.iter_mut().find(|known| known.factor == more.factor) {
+            Some(known) => known.count += more.count,
+            None => self.factors.push(more),
         }
     }
 
@@ -115,8 +123,10 @@ impl Factor<1> for Product {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
-        for factor in &self.factors {
-            factor.add_log_likelihoods(means, log_weights);
+        if lengths_agree(means, log_weights) {
+            for factor in &self.factors {
+                factor.add_log_likelihoods(means, log_weights);
+            }
         }
     }
 

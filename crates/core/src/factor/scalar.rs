@@ -6,6 +6,8 @@ use crate::cell::Cell;
 use crate::columns::Columns;
 use crate::error::Error;
 use crate::gaussian::Gaussian;
+use crate::observation::{Link, Observation};
+use fewbits_numerics::error::ArgumentError;
 use nalgebra::SVector;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -26,9 +28,17 @@ impl Constant {
     ///
     /// # Errors
     /// If `probability` is outside `[0, 1]`.
-    pub fn new(probability: f64) -> Result<Self, fewbits_numerics::ArgumentError> {
+    pub fn new(probability: f64) -> Result<Self, ArgumentError> {
         fewbits_numerics::error::within("probability", probability, 0.0, 1.0)?;
         Ok(Self { probability })
+    }
+
+    /// A missing report of a sensor that always speaks: `Nothing` is a loss without a trace, `Lost` a known one, and neither says
+    /// anything about `m`.
+    pub fn of_delivery<R>(observation: &Observation<R>, link: &Link) -> Self {
+        Self {
+            probability: link.delivery(observation),
+        }
     }
 
     /// Its probability.
@@ -64,6 +74,23 @@ pub enum Scalar {
 }
 
 impl Scalar {
+    /// `p(observation | m) = p P(m + n outside cell)`: a known loss from a sensor that is silent if and only if its measurement lies
+    /// in `cell`, with `p` the link's [`lost_given_sent`](crate::Link::lost_given_sent). Impossible if `cell` is the whole line.
+    ///
+    /// # Errors
+    /// If `r` is not positive or `p` is outside `(0, 1]`.
+    pub fn outside(cell: &Cell, noise_variance: f64, p: f64) -> Result<Self, ArgumentError> {
+        let lower = (cell.lower() > f64::NEG_INFINITY).then_some(cell.lower());
+        let upper = (cell.upper() < f64::INFINITY).then_some(cell.upper());
+        let (edges, given_cell) = match (lower, upper) {
+            (None, None) => return Ok(Constant::new(0.0)?.into()),
+            (Some(lower), None) => (vec![lower], vec![p, 0.0]),
+            (None, Some(upper)) => (vec![upper], vec![0.0, p]),
+            (Some(lower), Some(upper)) => (vec![lower, upper], vec![p, 0.0, p]),
+        };
+        Ok(Partition::new(edges, given_cell, noise_variance)?.into())
+    }
+
     /// `p(observation | measurement)` as a function of the noisy measurement, piecewise constant: cells with their
     /// probabilities, zeros left out. Empty for a value, which is a point.
     pub fn pieces(&self) -> Vec<(Cell, f64)> {

@@ -1,7 +1,7 @@
 //! A value in Gaussian noise.
 
 use super::{Factor, Tilted};
-use crate::columns::Columns;
+use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::{FactoredGaussian, Gaussian};
 use fewbits_numerics::error::{ArgumentError, all_finite};
@@ -77,6 +77,9 @@ impl<const M: usize> Factor<M> for Value<M> {
     }
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         if M == 1 {
             // A plain quadratic: kept free of branches so that it vectorises.
             let value = self.value()[0];
@@ -98,7 +101,9 @@ impl<const M: usize> Factor<M> for Value<M> {
     /// `N(z; mu, S)`.
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         let (spread, noise) = (prior.covariance(), self.noise_covariance());
-        let factor = Cholesky::new(spread + noise).ok_or(Error::Impossible)?;
+        let factor = Cholesky::new(spread + noise).ok_or(Error::NotANumber {
+            what: "the prior's covariance",
+        })?;
         let gain = factor.solve(spread).transpose();
         let keep = SMatrix::<f64, M, M>::identity() - gain;
         let innovation = self.value() - prior.mean();
@@ -106,13 +111,15 @@ impl<const M: usize> Factor<M> for Value<M> {
         let squared = innovation.dot(&factor.solve(&innovation));
         let log_evidence = -0.5 * squared - log_root_determinant - M as f64 * fewbits_numerics::normal::LN_SQRT_2PI;
         let mean = prior.mean() + gain * innovation;
-        if !(log_evidence.is_finite() && mean.iter().all(|x| x.is_finite())) {
-            return Err(Error::Impossible);
+        let covariance = keep * spread * keep.transpose() + gain * noise * gain.transpose();
+        let finite = log_evidence.is_finite() && mean.iter().chain(covariance.iter()).all(|x| x.is_finite());
+        if !finite {
+            return Err(Error::unlikely_or_no_number(log_evidence, "the posterior of a value"));
         }
         Ok(Tilted {
             log_evidence,
             mean,
-            covariance: keep * spread * keep.transpose() + gain * noise * gain.transpose(),
+            covariance,
         })
     }
 }

@@ -6,21 +6,30 @@ use crate::gaussian::Gaussian;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::SVector;
 
-/// Law 1: finite or `-inf`, never NaN or `+inf`, at every finite measurement.
+/// Law 1: finite or `-inf`, never NaN or `+inf`, at every finite measurement; and a measurement with a NaN has NaN, or no more than
+/// the least of the others.
 ///
 /// # Errors
 /// The first measurement at which the law fails.
 pub fn is_a_number<const M: usize>(factor: &impl Factor<M>, measurements: &[SVector<f64, M>]) -> Result<(), Violation> {
+    let mut least = f64::INFINITY;
     for m in measurements {
         let value = factor.log_likelihood(m);
         if value.is_nan() || value == f64::INFINITY {
             return Err(Violation::new("a log likelihood is a number", format!("{value} at {m:?}"), "finite or -inf"));
         }
+        least = least.min(value);
+    }
+    for (m, k) in measurements.iter().flat_map(|m| (0..M).map(move |k| (m, k))) {
+        let mut broken = *m;
+        broken[k] = f64::NAN;
+        super::never_raises(factor.log_likelihood(&broken), least, format!("{broken:?}"))?;
     }
     Ok(())
 }
 
-/// Law 2: the sweep adds what the scalar function returns.
+/// Law 2: the sweep adds what the scalar function returns, for measurements with a NaN among them, too; where lengths differ it
+/// writes NaN everywhere.
 ///
 /// # Errors
 /// The first measurement at which the law fails.
@@ -28,13 +37,9 @@ pub fn sweep_is_scalar<const M: usize>(
     factor: &impl Factor<M>,
     measurements: &[SVector<f64, M>],
 ) -> Result<(), Violation> {
-    let columns: [Vec<f64>; M] = std::array::from_fn(|k| measurements.iter().map(|m| m[k]).collect());
-    let mut sums = vec![0.25; measurements.len()];
-    factor.add_log_likelihoods(&columns.each_ref().map(Vec::as_slice), &mut sums);
-    for (m, sum) in measurements.iter().zip(&sums) {
-        agree("a sweep is the scalar", format!("{m:?}"), *sum, 0.25 + factor.log_likelihood(m), 1e-12, 1.0)?;
-    }
-    Ok(())
+    let broken = measurements.iter().take(1).map(|m| m.map(|_| f64::NAN));
+    let all: Vec<SVector<f64, M>> = measurements.iter().copied().chain(broken).collect();
+    super::sweep(&all, |columns, sums| factor.add_log_likelihoods(&columns, sums), |m| factor.log_likelihood(m))
 }
 
 /// Law 3: `tilted` agrees with the trapezoid rule over `prior mean +- reach` with `points` nodes, which the caller chooses

@@ -11,6 +11,9 @@ pub mod message;
 pub mod scheme;
 pub mod sensing;
 
+use crate::columns::Columns;
+use nalgebra::SVector;
+
 /// A law that an implementation breaks.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{law}: {found}, expected {expected}")]
@@ -56,6 +59,44 @@ fn agree(
     } else {
         Err(Violation::new(law, format!("{found} at {at}"), expected))
     }
+}
+
+/// What is no number must not be likelier than what is.
+fn never_raises(value: f64, least: f64, at: impl std::fmt::Display) -> Result<(), Violation> {
+    if value.is_nan() || value <= least {
+        Ok(())
+    } else {
+        let expected = format!("NaN, or at most {least}");
+        Err(Violation::new("a NaN never raises a weight", format!("{value} at {at}"), expected))
+    }
+}
+
+/// Compares a sweep with the scalar function at the same points, and lets it run over slices of unequal lengths.
+fn sweep<const D: usize>(
+    points: &[SVector<f64, D>],
+    add: impl Fn(Columns<'_, D>, &mut [f64]),
+    alone: impl Fn(&SVector<f64, D>) -> f64,
+) -> Result<(), Violation> {
+    const LENGTHS: &str = "a sweep over slices of unequal lengths writes NaN";
+    let columns: [Vec<f64>; D] = std::array::from_fn(|k| points.iter().map(|x| x[k]).collect());
+    let mut sums = vec![0.25; points.len()];
+    add(columns.each_ref().map(Vec::as_slice), &mut sums);
+    for (x, sum) in points.iter().zip(&sums) {
+        let no_number = x.iter().any(|x| x.is_nan()) && (sum.is_nan() || *sum == f64::NEG_INFINITY);
+        if !no_number {
+            agree("a sweep is the scalar", format!("{x:?}"), *sum, 0.25 + alone(x), 1e-12, 1.0)?;
+        }
+    }
+    if D > 0 {
+        for length in [points.len() + 1, points.len().saturating_sub(1)] {
+            let mut sums = vec![0.25; length];
+            add(columns.each_ref().map(Vec::as_slice), &mut sums);
+            if let Some(sum) = sums.iter().find(|sum| !sum.is_nan()) {
+                return Err(Violation::new(LENGTHS, format!("{sum} of {length} for {} points", points.len()), "NaN"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Mean and standard error of draws.

@@ -10,8 +10,9 @@ use rand::Rng;
 const TOTAL: &str = "the observations that a scheme can cause have total probability one";
 const HONEST: &str = "reports have the frequencies that their factors say";
 
-/// Law 1 for a scheme with finitely many reports: at every measurement, the probabilities of all `reports` and of
-/// [`Observation::Nothing`] sum to one; and an erased report has the factor 1 (law 3).
+/// Law 1 for a scheme with finitely many reports: at every measurement, the probabilities of all `reports`, of
+/// [`Observation::Nothing`] and of [`Observation::Lost`] sum to one. Where `Lost` cannot occur it must have the probability that
+/// the sensor spoke.
 ///
 /// # Errors
 /// If `factor` fails, or the measurement at which the law fails.
@@ -22,20 +23,16 @@ pub fn total_probability<const M: usize, S: Scheme<M>>(
     reports: impl IntoIterator<Item = S::Report>,
     measurements: &[SVector<f64, M>],
 ) -> Result<(), Violation> {
-    let observations = reports.into_iter().map(Observation::Received);
     let mut factors = Vec::new();
-    for observation in observations.chain([Observation::Nothing]) {
-        factors.push(failed(TOTAL, scheme.factor(feedback, &observation, link))?);
+    for report in reports {
+        factors.push(failed(TOTAL, scheme.factor(feedback, &Observation::Received(report), link))?);
     }
-    for m in measurements {
-        let total: f64 = factors.iter().map(|factor| factor.log_likelihood(m).exp()).sum();
-        agree(TOTAL, format!("{m:?}"), total, 1.0, 1e-12, 0.0)?;
-    }
-    erased_says_nothing(scheme, feedback, link, measurements)
+    let received = |m: &SVector<f64, M>| factors.iter().map(|factor| factor.log_likelihood(m).exp()).sum();
+    total_probability_with(scheme, feedback, link, received, measurements, 1e-12)
 }
 
-/// Law 1 for a scheme with a continuous report: `density_total(m)` must be the integral of the received reports' densities
-/// at `m`, by a quadrature that suits the scheme; it is completed by [`Observation::Nothing`].
+/// Law 1 for a scheme with a continuous report: `received(m)` must be the integral of the received reports' densities at `m`, by
+/// a quadrature that suits the scheme; it is completed by [`Observation::Nothing`] and [`Observation::Lost`].
 ///
 /// # Errors
 /// As [`total_probability`].
@@ -43,29 +40,23 @@ pub fn total_probability_with<const M: usize, S: Scheme<M>>(
     scheme: &S,
     feedback: &S::Feedback,
     link: &Link,
-    density_total: impl Fn(&SVector<f64, M>) -> f64,
+    received: impl Fn(&SVector<f64, M>) -> f64,
     measurements: &[SVector<f64, M>],
     tolerance: f64,
 ) -> Result<(), Violation> {
+    const LOST: &str = "a loss that is known where the link knows of none has the probability that the sensor spoke";
     let nothing = failed(TOTAL, scheme.factor(feedback, &Observation::Nothing, link))?;
+    let lost = failed(TOTAL, scheme.factor(feedback, &Observation::Lost, link))?;
     for m in measurements {
-        let total = density_total(m) + nothing.log_likelihood(m).exp();
-        agree(TOTAL, format!("{m:?}"), total, 1.0, tolerance, 0.0)?;
-    }
-    erased_says_nothing(scheme, feedback, link, measurements)
-}
-
-/// Law 3.
-fn erased_says_nothing<const M: usize, S: Scheme<M>>(
-    scheme: &S,
-    feedback: &S::Feedback,
-    link: &Link,
-    measurements: &[SVector<f64, M>],
-) -> Result<(), Violation> {
-    const LAW: &str = "an erased report says nothing";
-    let erased = failed(LAW, scheme.factor(feedback, &Observation::Lost, link))?;
-    for m in measurements {
-        agree(LAW, format!("{m:?}"), erased.log_likelihood(m), 0.0, 1e-15, 1.0)?;
+        let (nothing, lost) = (nothing.log_likelihood(m).exp(), lost.log_likelihood(m).exp());
+        let total = received(m) + nothing;
+        if link.erasure() == 0.0 && (total - 1.0).abs() <= tolerance {
+            // From `Nothing` = s + loss (1 - s).
+            let spoke = (1.0 - nothing) / (1.0 - link.loss());
+            agree(LOST, format!("{m:?}"), lost, spoke, tolerance, 1.0)?;
+        } else {
+            agree(TOTAL, format!("{m:?}"), total + lost, 1.0, tolerance, 0.0)?;
+        }
     }
     Ok(())
 }
@@ -105,7 +96,8 @@ pub fn honesty<const M: usize, S: Scheme<M>, R: Rng + ?Sized>(
     }
 }
 
-/// Law 2 for every report of a scheme with finitely many, and for nothing.
+/// Law 2 for every report of a scheme with finitely many, for nothing, and for known losses, which must have what the other
+/// probabilities leave of one.
 ///
 /// # Errors
 /// As [`honesty`].
@@ -124,11 +116,15 @@ where
     S::Report: PartialEq,
 {
     let observations = reports.into_iter().map(Observation::Received);
+    let mut left = 1.0;
     for expected in observations.chain([Observation::Nothing]) {
         let factor = failed(HONEST, scheme.factor(feedback, &expected, link))?;
         let probability = factor.log_likelihood(m).exp();
+        left -= probability;
         let measure = |rng: &mut R| m + noise(rng);
         honesty(scheme, feedback, link, rng, draws, measure, |seen| *seen == expected, probability)?;
     }
-    Ok(())
+    let measure = |rng: &mut R| m + noise(rng);
+    let lost = |seen: &Observation<S::Report>| *seen == Observation::Lost;
+    honesty(scheme, feedback, link, rng, draws, measure, lost, left.clamp(0.0, 1.0))
 }

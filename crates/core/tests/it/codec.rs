@@ -107,18 +107,19 @@ fn nothing_is_not_erased() {
 /// Frequencies of what a link delivers are those it promises.
 #[test]
 fn a_link_loses_and_inverts_as_it_says() {
-    let link = Link::new(0.25, 0.1).unwrap();
+    let link = Link::new(0.25, 0.1).unwrap().with_erasure(0.2).unwrap();
     let mut rng = fewbits_monte_carlo::Stream::new(3).rng();
     let n = 40_000;
-    let (mut nothing, mut inverted) = (0, 0);
+    let (mut nothing, mut inverted, mut lost) = (0, 0, 0);
     for _ in 0..n {
         match link.transmit(&mut rng, Some(&Sign::Above), &()).unwrap() {
             Observation::Nothing => nothing += 1,
             Observation::Received(Sign::Below) => inverted += 1,
-            _ => {}
+            Observation::Received(Sign::Above) => {}
+            Observation::Lost => lost += 1,
         }
     }
-    for (count, p) in [(nothing, 0.25), (inverted, 0.075)] {
+    for (count, p) in [(nothing, 0.25), (inverted, 0.055), (lost, 0.2)] {
         let error = (p * (1.0 - p) / f64::from(n)).sqrt();
         assert!((f64::from(count) / f64::from(n) - p).abs() < 4.0 * error);
     }
@@ -141,4 +142,17 @@ fn an_empty_field_leaves_no_byte_and_a_cleared_writer_begins_again() {
     writer.clear();
     writer.write(0x3, 2).unwrap();
     assert_eq!((writer.bits(), writer.finish().bytes()), (2, &[0xc0][..]));
+}
+
+/// Defect: bits behind the end of a message were kept, so that equal messages compared unequal.
+#[test]
+fn padding_is_no_part_of_a_message() {
+    let padded = BitString::from_bytes(vec![0b1010_1111, 0xff], 4).unwrap();
+    assert_eq!(padded, BitString::from_bytes(vec![0b1010_0000], 4).unwrap());
+    assert_eq!((padded.bits(), padded.bytes()), (4, &[0b1010_0000][..]));
+    let mut writer = BitWriter::new();
+    writer.append(&padded);
+    writer.write(0, 4).unwrap();
+    assert_eq!(writer.finish().bytes(), [0b1010_0000]);
+    assert_eq!(BitString::from_bytes(vec![0xff], 0).unwrap(), BitString::default());
 }

@@ -108,8 +108,14 @@ fn bad_numbers_are_refused_by_name() {
     assert!(Partition::new(vec![0.0, 0.0], vec![1.0, 0.0, 0.0], 1.0).is_err());
     assert!(Partition::new(vec![0.0], vec![1.0], 1.0).is_err());
     assert!(Partition::new(vec![], vec![0.0], 1.0).is_err());
-    assert!(Link::new(1.0, 0.0).is_err() && Link::new(0.0, 0.6).is_err() && Link::new(f64::NAN, 0.0).is_err());
+    assert!(Link::new(1.1, 0.0).is_err() && Link::new(0.0, 0.6).is_err() && Link::new(f64::NAN, 0.0).is_err());
     assert!(serde_json::from_str::<Link>(r#"{"loss":2,"crossover":0}"#).is_err());
+    assert!(serde_json::from_str::<Link>(r#"{"loss":0.6,"erasure":0.6,"crossover":0}"#).is_err());
+    let old = serde_json::from_str::<Link>(r#"{"loss":0.5,"crossover":0.25}"#).unwrap();
+    assert_eq!(old, Link::new(0.5, 0.25).unwrap());
+    let known = old.with_erasure(0.5).unwrap();
+    assert_eq!(serde_json::from_str::<Link>(&serde_json::to_string(&known).unwrap()).unwrap(), known);
+    assert!(old.with_erasure(-0.1).is_err() && old.with_erasure(f64::NAN).is_err());
     assert!(serde_json::from_str::<Cell>(r#"{"lower":3,"upper":1}"#).is_err());
     assert!(serde_json::from_str::<Gaussian<1>>(r#"{"mean":[0],"covariance":[-1]}"#).is_err());
 }
@@ -278,4 +284,31 @@ fn a_partition_far_away_is_its_nearest_cell() {
     }
     let sure = Partition::new(vec![-1.0, 0.3], vec![1.0, 0.99, 1.0], 0.4).unwrap();
     assert_eq!(sure.log_probability(60.0), 0.0);
+}
+
+/// Defect: a NaN particle had the likelihood 1 under a partition, alone and in a sweep.
+#[test]
+fn a_nan_particle_never_gains_weight() {
+    let partition = Partition::new(vec![-1.0, 1.0], vec![0.2, 0.0, 0.7], 0.5).unwrap();
+    assert!(partition.log_probability(f64::NAN).is_nan());
+    let mut logs = [0.0; 3];
+    partition.add_log_likelihoods(&[&[0.0, f64::NAN, 50.0]], &mut logs);
+    assert!(logs[0] < 0.0 && logs[1].is_nan() && (logs[2] - 0.7_f64.ln()).abs() < 1e-12);
+    let everywhere = Partition::new(vec![0.0], vec![0.5, 0.5], 1.0).unwrap();
+    factor::is_a_number(&everywhere, &points()).unwrap();
+    factor::sweep_is_scalar(&everywhere, &points()).unwrap();
+}
+
+/// Defect: a likelihood of NaN was evidence of NaN at a known prior, and "impossible" at any other.
+#[test]
+fn a_nan_likelihood_is_blamed_on_the_likelihood() {
+    for variance in [0.0, 1.0, 1e-300, 1e300] {
+        let prior = Gaussian::scalar(0.4, variance).unwrap();
+        for nothing in [f64::NAN, f64::INFINITY] {
+            let tilted = tilted_by_quadrature(&prior, [], |_, logs| logs.fill(nothing));
+            assert!(matches!(tilted, Err(Error::NotANumber { .. })), "{variance}: {tilted:?}");
+        }
+        let tilted = tilted_by_quadrature(&prior, [], |_, logs| logs.fill(f64::NEG_INFINITY));
+        assert_eq!(tilted, Err(Error::Impossible));
+    }
 }

@@ -1,9 +1,11 @@
 //! Every law holds for an honest implementation, whatever its unit and with no noise at all, and refuses each way of being wrong.
 
+use fewbits_core::columns::lengths_agree;
 use fewbits_core::factor::{Constant, Factor, Tilted, Value};
 use fewbits_core::{
-    Belief, Columns, ColumnsMut, Density, Dynamics, Error, Gaussian, GaussianDynamics, Likelihood, LinearDynamics,
-    Link, NumberFormat, Observation, Scheme, Sensing, Sign, laws,
+    Belief, BitReader, BitWriter, CodecError, Columns, ColumnsMut, Density, Dynamics, Error, Gaussian,
+    GaussianDynamics, Likelihood, LinearDynamics, Link, Message, NumberFormat, Observation, Scheme, Sensing, Sign,
+    laws,
 };
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, SVector, Vector1, Vector2};
@@ -177,10 +179,12 @@ impl Likelihood<2> for Plane {
 
     fn add_log_likelihoods(&self, states: Columns<'_, 2>, log_weights: &mut [f64]) {
         let factor = if self.has(Fault::Sweep) { 1.0 + 1e-9 } else { 1.0 };
-        log_weights
-            .iter_mut()
-            .zip(states[0])
-            .for_each(|(log, x)| *log -= x.abs() * factor);
+        if lengths_agree(&states, log_weights) {
+            log_weights
+                .iter_mut()
+                .zip(states[0])
+                .for_each(|(log, x)| *log -= x.abs() * factor);
+        }
     }
 }
 
@@ -343,11 +347,11 @@ fn laws_of_factors_refuse_what_is_wrong() {
     }
 }
 
-/// A coin, reported over a link, with a factor that believes in `heads` and in what it is told about silence and erasure.
+/// A coin, reported over a link, with a factor that believes in `heads` and in what it is told about missing reports.
 struct Coin {
     heads: f64,
     nothing: f64,
-    erased: f64,
+    lost: f64,
 }
 
 impl Scheme<1> for Coin {
@@ -379,36 +383,127 @@ impl Scheme<1> for Coin {
     }
 
     fn factor(&self, _: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Constant, Error> {
-        let arrives = 1.0 - link.loss();
+        let arrives = link.arrival();
         Ok(Constant::new(match observation {
             Observation::Received(Sign::Above) => arrives * self.heads,
             Observation::Received(Sign::Below) => arrives * (1.0 - self.heads),
             Observation::Nothing => self.nothing,
-            Observation::Lost => self.erased,
+            Observation::Lost => self.lost,
         })?)
     }
 }
 
 #[test]
 fn laws_of_schemes_refuse_what_is_wrong() {
-    let link = Link::lossy(0.2).unwrap();
     let signs = [Sign::Above, Sign::Below];
     let m = Vector1::new(0.0);
-    let total = |coin: &Coin| laws::scheme::total_probability(coin, &0.0, &link, signs, &[m]);
-    let with = |coin: &Coin| laws::scheme::total_probability_with(coin, &0.0, &link, |_| 0.8, &[m], 1e-12);
-    let honest = |coin: &Coin| {
-        let rng = &mut Stream::new(5).rng();
-        laws::scheme::frequencies(coin, &0.0, &link, rng, 40_000, &m, |_| m, signs)
-    };
-    let coin = |heads, nothing, erased| Coin { heads, nothing, erased };
-    let right = coin(0.3, 0.2, 1.0);
-    assert!(total(&right).is_ok() && with(&right).is_ok() && honest(&right).is_ok());
-    for wrong in [coin(0.3, 0.19, 1.0), coin(0.3, 0.2, 0.9)] {
-        assert!(total(&wrong).is_err() && with(&wrong).is_err());
+    let coin = |heads, nothing, lost| Coin { heads, nothing, lost };
+    // Without known losses `Lost` is conditioned on; with them it has its probability.
+    for (link, lost) in [
+        (Link::lossy(0.2).unwrap(), 1.0),
+        (Link::lossy(0.2).unwrap().with_erasure(0.1).unwrap(), 0.1),
+    ] {
+        let total = |coin: &Coin| laws::scheme::total_probability(coin, &0.0, &link, signs, &[m]);
+        let arrives = link.arrival();
+        let with = |coin: &Coin| laws::scheme::total_probability_with(coin, &0.0, &link, |_| arrives, &[m], 1e-12);
+        let honest = |coin: &Coin| {
+            let rng = &mut Stream::new(5).rng();
+            laws::scheme::frequencies(coin, &0.0, &link, rng, 40_000, &m, |_| m, signs)
+        };
+        let right = coin(0.3, 0.2, lost);
+        assert!(total(&right).is_ok() && with(&right).is_ok() && honest(&right).is_ok());
+        for wrong in [coin(0.3, 0.19, lost), coin(0.3, 0.2, 0.9 * lost)] {
+            assert!(total(&wrong).is_err() && with(&wrong).is_err());
+        }
+        let biased = coin(0.33, 0.2, lost);
+        assert!(total(&biased).is_ok() && honest(&biased).is_err());
+        assert!(honest(&coin(0.3, 0.25, lost)).is_err());
     }
-    let biased = coin(0.33, 0.2, 1.0);
-    assert!(total(&biased).is_ok() && honest(&biased).is_err());
-    assert!(honest(&coin(0.3, 0.25, 1.0)).is_err());
+}
+
+/// One of three colours, whatever is measured: words of two bits, of which the fourth is no report.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Colour(u64);
+
+impl Message for Colour {
+    type Format = ();
+
+    fn encode(&self, (): &(), writer: &mut BitWriter) -> Result<(), CodecError> {
+        writer.write(self.0, 2)
+    }
+
+    fn decode((): &(), reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        match reader.read(2)? {
+            word @ 0..3 => Ok(Self(word)),
+            word => Err(CodecError::Invalid {
+                what: "colour",
+                value: word.to_string(),
+                expected: "0, 1 or 2",
+            }),
+        }
+    }
+}
+
+/// Draws a colour. Its factor knows what becomes of words that are no colour, or forgets it.
+struct Painter {
+    knows_undecodable_words: bool,
+}
+
+impl Scheme<1> for Painter {
+    type State = ();
+    type Feedback = f64;
+    type Report = Colour;
+    type Factor = Constant;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn report_format(&self) {}
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        (): &mut (),
+        _: &Vector1<f64>,
+        _: &f64,
+    ) -> Result<Option<Colour>, Error> {
+        Ok(Some(Colour(rng.random_range(0..3))))
+    }
+
+    fn factor(&self, _: &f64, observation: &Observation<Colour>, link: &Link) -> Result<Constant, Error> {
+        let arrives = |word: u64| {
+            let sent = (0..3).map(|sent| link.word_probability(sent, word, 2) / 3.0);
+            link.arrival() * sent.sum::<f64>()
+        };
+        let undecodable = arrives(3);
+        Ok(match observation {
+            Observation::Received(Colour(word)) => Constant::new(arrives(*word))?,
+            Observation::Lost if self.knows_undecodable_words && undecodable > 0.0 => {
+                Constant::new(link.erasure() + undecodable)?
+            }
+            missing => Constant::of_delivery(missing, link),
+        })
+    }
+}
+
+#[test]
+fn undecodable_words_count_as_known_losses() {
+    let m = [Vector1::new(0.0)];
+    let colours = || (0..3).map(Colour);
+    let flipping = Link::new(0.1, 0.2).unwrap();
+    for link in [flipping, flipping.with_erasure(0.15).unwrap(), Link::PERFECT] {
+        let painter = |knows_undecodable_words| Painter {
+            knows_undecodable_words,
+        };
+        let total = |painter: &Painter| laws::scheme::total_probability(painter, &0.0, &link, colours(), &m);
+        total(&painter(true)).unwrap();
+        assert_eq!(total(&painter(false)).is_ok(), link.crossover() == 0.0);
+        let rng = &mut Stream::new(6).rng();
+        laws::scheme::frequencies(&painter(true), &0.0, &link, rng, 40_000, &m[0], |_| m[0], colours()).unwrap();
+    }
 }
 
 /// A plane turned and pushed along one coordinate, without a sweep of its own.

@@ -7,3 +7,4 @@ mod codec;
 mod factor;
 mod laws;
 mod moments;
+mod wild;

@@ -21,6 +21,7 @@ where
         Link::flipping(0.1).unwrap(),
         Link::new(0.2, 0.5).unwrap(),
         Link::new(0.25, 0.05).unwrap(),
+        Link::new(0.25, 0.05).unwrap().with_erasure(0.3).unwrap(),
     ] {
         scheme::total_probability(scheme_, feedback, &link, reports.to_vec(), &points).unwrap();
         for report in reports {

@@ -3,10 +3,11 @@
 use super::rows::{Ensemble, Record, simulate};
 use super::setting::Field;
 use crate::{Context, Error};
+use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::threshold::Budget;
-use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Sensing};
+use fewbits_core::{Belief, Dynamics, Gaussian, Link, Observation, Observed, Sensing};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Resampling, Schedule, Workspace};
 use fewbits_models::{LinearGaussian, ReceivedPower, constant_velocity_2d};
@@ -125,16 +126,27 @@ impl World {
                     Scheme::Random => draws.coins[k][i] < budget.rate(),
                     _ => rule.sends(&(z - sensor.mean(&expected))),
                 };
-                observations.push(match scheme {
-                    _ if sends => Observation::Received(z),
-                    Scheme::State | Scheme::StateAndCovariance => Observation::Nothing,
-                    // To a filter that ignores silence it is no more than an erased report.
-                    _ => Observation::Lost,
+                observations.push(if sends {
+                    Observation::Received(z)
+                } else {
+                    Observation::Nothing
                 });
                 rules.push(rule);
             }
             let sent = observations.iter().filter(|o| o.received().is_some()).count();
-            let likelihood = network.likelihood(&rules, &expected, &observations)?;
+            let likelihood = match scheme {
+                Scheme::State | Scheme::StateAndCovariance => network.likelihood(&rules, &expected, &observations)?,
+                // A filter that ignores silence takes it for no observation.
+                Scheme::All | Scheme::Random | Scheme::Ignored => {
+                    let sensors = self.sensors.iter().zip(&observations);
+                    let received = sensors.filter_map(|(sensor, seen)| seen.received().map(|z| (sensor, z)));
+                    let values = received.map(|(sensor, z)| {
+                        let noise = sensor.noise_covariance_at(&expected);
+                        Ok(Observed::new(*sensor, Censored::values(&[*z], &noise, 1.0)?))
+                    });
+                    values.collect::<Result<Vec<_>, Error>>()?
+                }
+            };
             filter.step_in_place(&mut rng, &self.dynamics, &mut cloud, &likelihood, &mut workspace)?;
             let mean = cloud.mean();
             let covariance = match scheme {

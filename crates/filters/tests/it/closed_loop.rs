@@ -50,13 +50,11 @@ impl Scheme<1> for TwoSided {
 
     fn factor(&self, prediction: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, CoreError> {
         let given = |sent| match observation {
-            Observation::Received(sign) if *sign == sent => (1.0 - link.loss()) * (1.0 - link.crossover()),
-            Observation::Received(_) => (1.0 - link.loss()) * link.crossover(),
-            Observation::Nothing => link.loss(),
-            Observation::Lost => 1.0,
+            Observation::Received(sign) if *sign == sent => link.arrival() * (1.0 - link.crossover()),
+            _ => link.arrival() * link.crossover(),
         };
-        if !matches!(observation, Observation::Received(_)) {
-            return Ok(Constant::new(given(Sign::Above))?.into());
+        if observation.received().is_none() {
+            return Ok(Constant::of_delivery(observation, link).into());
         }
         let edges = vec![prediction - self.reach, prediction + self.reach];
         let given_cell = vec![given(Sign::Above), given(Sign::Below), given(Sign::Above)];
@@ -66,7 +64,7 @@ impl Scheme<1> for TwoSided {
 
 #[test]
 fn the_scheme_obeys_the_laws() {
-    let (scheme, link) = (TwoSided { reach: 0.9 }, Link::new(0.2, 0.1).unwrap());
+    let (scheme, link) = (TwoSided { reach: 0.9 }, Link::new(0.2, 0.1).unwrap().with_erasure(0.1).unwrap());
     let measurements = [-3.0, -0.5, 0.2, 1.4, 40.0].map(Vector1::new);
     laws::scheme::total_probability(&scheme, &0.3, &link, [Sign::Below, Sign::Above], &measurements).unwrap();
     let mut rng = Stream::new(3).fast_rng();

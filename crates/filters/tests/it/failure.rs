@@ -16,6 +16,11 @@ fn impossible<T: std::fmt::Debug>(result: Result<T, impl Into<Error>>) {
     assert!(matches!(error, Err(Error::Core(CoreError::Impossible))), "{error:?}");
 }
 
+fn no_number<T: std::fmt::Debug>(result: Result<T, impl Into<Error>>) {
+    let error = result.map_err(Into::into);
+    assert!(matches!(error, Err(Error::Core(CoreError::NotANumber { .. }))), "{error:?}");
+}
+
 fn direct<const D: usize>() -> LinearSensor<D, 1> {
     LinearSensor::scalar(SVector::from_fn(|d, _| f64::from(u8::from(d == 0))), 1.0).unwrap()
 }
@@ -65,7 +70,7 @@ fn particle_filters() {
             impossible(filter.step_in_place(&mut rng, &dynamics, &mut belief, never, &mut workspace));
             impossible(filter.auxiliary_step(&mut rng, &dynamics, &mut belief, never, &mut workspace));
         }
-        impossible(filter.update(&mut belief, &NotANumber));
+        no_number(filter.update(&mut belief, &NotANumber));
         impossible(filter.guided_step(&mut rng, &Nowhere, &mut belief, &mut workspace));
         assert_eq!(belief, before);
         assert_eq!(belief.weights(), before.weights());
@@ -99,7 +104,9 @@ fn the_grid_filters() {
         impossible(filter.step(&belief, never));
         impossible(belief.update(never));
     }
-    impossible(belief.update_with(|_| f64::NAN));
+    no_number(belief.update_with(|_| f64::NAN));
+    no_number(belief.update_with(|x| if x > 1.0 { f64::NAN } else { 0.0 }));
+    no_number(belief.reweight(&vec![f64::NAN; grid.points()]));
     impossible(belief.reweight(&vec![0.0; grid.points()]));
     assert_eq!(belief, before);
 

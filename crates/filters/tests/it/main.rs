@@ -11,3 +11,4 @@ mod rao_blackwell;
 mod resample;
 mod state_noise;
 mod tangent;
+mod wild;

@@ -13,3 +13,4 @@ mod diffusion_laws;
 mod diffusion_sources;
 mod laws;
 mod source_model;
+mod wild;

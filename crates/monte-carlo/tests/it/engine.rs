@@ -141,3 +141,30 @@ fn paired_comparison_and_consistency() {
     assert_eq!((difference.mean(), difference.standard_error()), (0.5, 0.0));
     assert!(paired_difference(&[1.0], &[]).is_err());
 }
+
+/// Defect: after a failure all other chunks ran to their end.
+#[test]
+fn a_failing_trial_stops_those_behind_it() {
+    use std::sync::atomic::{AtomicU64, Ordering};
+    let begun = AtomicU64::new(0);
+    let run = MonteCarlo::new(Stream::new(1), 1_000_000);
+    let failed = run.fold(
+        || (),
+        |(), trial| {
+            begun.fetch_add(1, Ordering::Relaxed);
+            if trial.index % 1000 == 70 { Err("no") } else { Ok(()) }
+        },
+        |(), ()| (),
+    );
+    // The lowest index of all that fail, on any number of threads.
+    assert!(matches!(failed, Err(MonteCarloError::Trial { index: 70, .. })), "{failed:?}");
+    assert!(begun.load(Ordering::Relaxed) < 100_000, "{begun:?}");
+}
+
+/// One value says nothing about its error.
+#[test]
+fn a_single_trial_has_no_standard_error() {
+    let one: Moments = [2.0].into_iter().collect();
+    assert_eq!((one.standard_error(), one.root_mean().standard_error), (f64::INFINITY, f64::INFINITY));
+    assert_eq!(Moments::default().estimate().standard_error, f64::INFINITY);
+}

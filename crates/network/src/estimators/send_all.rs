@@ -60,17 +60,15 @@ impl Scheme<1> for SendAll {
 
     fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<Censored<1>, Error> {
         within("crossover", link.crossover(), 0.0, 0.0)?;
-        let arrival = 1.0 - link.loss();
         Ok(match (observation, &self.format) {
             (Observation::Received(value), NumberFormat::Fixed(levels)) => {
-                Censored::level(*value, levels, &self.always, *value, self.noise_variance, arrival)?
+                Censored::level(*value, levels, &self.always, *value, self.noise_variance, link.of_received()?)?
             }
             (Observation::Received(value), _) => {
                 all_finite("report", &[*value])?;
-                Censored::value(&Vector1::new(*value), &[[self.noise_variance]].into(), arrival)?
+                Censored::value(&Vector1::new(*value), &[[self.noise_variance]].into(), link.of_received()?)?
             }
-            (Observation::Nothing, _) => Censored::constant(link.loss())?,
-            (Observation::Lost, _) => Censored::constant(1.0)?,
+            (missing, _) => Censored::constant(link.delivery(missing))?,
         })
     }
 }
@@ -87,7 +85,7 @@ mod tests {
         let scheme = SendAll::new(0.5, format).unwrap();
         let levels = (0..8).map(|i| format.rounded(-2.0 + 4.0 * f64::from(i) / 7.0).unwrap());
         let points = [-9.0, -0.3, 0.0, 1.1].map(Vector1::new);
-        let link = Link::lossy(0.2).unwrap();
+        let link = Link::lossy(0.2).unwrap().with_erasure(0.1).unwrap();
         laws::scheme::total_probability(&scheme, &(), &link, levels, &points).unwrap();
         let plain = SendAll::new(0.5, NumberFormat::Double).unwrap();
         let factor = plain.factor(&(), &Observation::Received(1.0), &link).unwrap();

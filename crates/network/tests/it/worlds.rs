@@ -108,10 +108,9 @@ impl Scheme<1> for TwoSided {
     fn factor(&self, prediction: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, Error> {
         let received = match observation {
             Observation::Received(sign) => *sign,
-            Observation::Nothing => return Ok(Constant::new(link.loss())?.into()),
-            Observation::Lost => return Ok(Constant::ONE.into()),
+            missing => return Ok(Constant::of_delivery(missing, link).into()),
         };
-        let given = |sent: Sign| (1.0 - link.loss()) * link.word_probability(sent as u64, received as u64, 1);
+        let given = |sent: Sign| link.arrival() * link.word_probability(sent as u64, received as u64, 1);
         let edges = vec![prediction - self.reach, prediction + self.reach];
         let given_cell = [Sign::Above, Sign::Below, Sign::Above].map(given).to_vec();
         Ok(Partition::new(edges, given_cell, self.noise_variance)?.into())

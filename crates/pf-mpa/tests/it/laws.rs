@@ -33,7 +33,7 @@ fn schemes_obey_their_laws() {
                 let range = QuantizedRange::new(levels, noise)
                     .unwrap()
                     .with_labelling(Labelling::gray(levels).unwrap());
-                for link in [Link::PERFECT, Link::new(0.2, 0.1).unwrap()] {
+                for link in [Link::PERFECT, Link::new(0.2, 0.1).unwrap().with_erasure(0.3).unwrap()] {
                     let symbols = || {
                         (0..if link.crossover() > 0.0 {
                             1 << range.bits()

@@ -36,11 +36,12 @@ fn points(sensor: &QuantizingSensor) -> Vec<Scalar> {
         .to_vec()
 }
 
-fn links() -> [Link; 3] {
+fn links() -> [Link; 4] {
     [
         Link::PERFECT,
         Link::new(0.2, 0.1).unwrap(),
         Link::flipping(0.5).unwrap(),
+        Link::new(0.2, 0.1).unwrap().with_erasure(0.3).unwrap(),
     ]
 }
 
@@ -128,4 +129,12 @@ proptest! {
         let bits = bytes.len() * 8;
         prop_assert!(message::decoding_is_total::<Symbol>(&BitString::from_bytes(bytes, bits).unwrap(), &labelling));
     }
+}
+
+/// Defect: a label of `usize::MAX` overflowed, from JSON too.
+#[test]
+fn huge_labels_are_refused() {
+    assert!(Quantizer::with_labels(vec![0.0], vec![0, usize::MAX]).is_err());
+    let json = format!(r#"{{"breakpoints":[0.0],"labels":[0,{}]}}"#, usize::MAX);
+    assert!(serde_json::from_str::<Quantizer>(&json).is_err());
 }

@@ -1,0 +1,135 @@
+//! Wild arguments: every step returns a belief of numbers or an error, and an error leaves the belief as it was.
+
+use fewbits_core::factor::{InCell, Scalar, Value};
+use fewbits_core::{Cell, Gaussian, Likelihood, Link, Observed};
+use fewbits_filters::{
+    CloudWorkspace, GaussianCloud, Grid, ParticleFilter, Particles, PointMass, PointMassFilter, RaoBlackwellised,
+    Workspace,
+};
+use fewbits_filters::{assumed_density, extended_kalman, kalman};
+use fewbits_models::{Ar1, LinearSensor, ReceivedPower};
+use fewbits_monte_carlo::Stream;
+use nalgebra::{Matrix2, SVector, Vector1, Vector2};
+use proptest::prelude::*;
+
+/// Numbers that a caller may hand over by mistake, and some that make sense.
+fn wild() -> impl Strategy<Value = f64> {
+    const EXTREMES: [f64; 14] = [
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        0.0,
+        -0.0,
+        1e300,
+        -1e300,
+        1e-300,
+        -1e-300,
+        f64::MAX,
+        f64::MIN_POSITIVE,
+        5e-324,
+        1e154,
+        1e16,
+    ];
+    prop_oneof![
+        2 => prop::sample::select(EXTREMES.to_vec()),
+        3 => -3.0..3.0_f64,
+        3 => 1e-3..4.0_f64,
+        1 => (-300..300_i32).prop_map(|k| 10.0_f64.powi(k)),
+    ]
+}
+/// A caller's likelihood that may be anything.
+struct Anything([f64; 2]);
+
+impl<const D: usize> Likelihood<D> for Anything {
+    fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
+        if state[0] > 0.2 { self.0[0] } else { self.0[1] }
+    }
+}
+
+fn finite<const D: usize>(belief: &Gaussian<D>) -> bool {
+    belief.is_finite() && belief.covariance().diagonal().min() >= -1e-9 * belief.covariance().amax()
+}
+
+fn factors(x: &[f64]) -> Vec<Scalar> {
+    let mut all: Vec<Scalar> = Vec::new();
+    all.extend(Value::scalar(x[0], x[1]).map(Scalar::from));
+    let link = Link::lossy(x[2]).unwrap_or(Link::PERFECT);
+    if let Ok(cell) = Cell::new(x[0], x[3]) {
+        all.extend(InCell::silence(cell, x[1], &link).map(Scalar::from));
+        all.extend(Scalar::outside(&cell, x[1], 1.0));
+    }
+    all
+}
+
+proptest! {
+    #[test]
+    fn gaussian_filters_return_numbers_or_errors(x in prop::array::uniform16(wild())) {
+        if let Ok(belief) = Gaussian::new(Vector2::new(x[0], x[1]), Matrix2::new(x[2], x[3], x[3], x[4])) {
+            if let Ok(sensor) = LinearSensor::scalar(Vector2::new(x[5], x[6]), x[7]) {
+                if let Ok((after, info)) = kalman::update(&sensor, &belief, &Vector1::new(x[8])) {
+                    prop_assert!(finite(&after) && info.log_likelihood.is_finite(), "{:?} {:?}: {:?}", belief, sensor, after);
+                }
+                for factor in factors(&x[8..12]) {
+                    if let Ok((after, info)) = assumed_density::update(&belief, sensor.matrix(), &factor) {
+                        prop_assert!(finite(&after) && info.log_likelihood.is_finite(), "{:?} {:?} {:?}: {:?}", belief, sensor, factor, after);
+                    }
+                }
+            }
+            if let Ok(power) = ReceivedPower::<2>::new(Vector2::new(x[5], x[6]), [0, 1], x[7], x[12], x[13], x[14]) {
+                if let Ok((after, info)) = extended_kalman::update(&power, &belief, &Vector1::new(x[8])) {
+                    prop_assert!(finite(&after) && info.log_likelihood.is_finite(), "{:?} {:?}: {:?}", belief, power, after);
+                }
+            }
+        }
+    }
+}
+
+proptest! {
+    // One case in 4 of `PROPTEST_CASES`: clouds and grids.
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(4), ..ProptestConfig::default() })]
+    #[test]
+    fn clouds_and_grids_return_numbers_or_stay_as_they_were(x in prop::array::uniform8(wild())) {
+        let start = Gaussian::scalar(0.1, 1.3).unwrap();
+        let mut rng = Stream::new(2).rng();
+        let before = Particles::from_belief(&mut rng, &start, 20).unwrap();
+        let cloud_before = GaussianCloud::agreed(&start, 20).unwrap();
+        let grid = Grid::symmetric(6.0, 0.25).unwrap();
+        let grid_before = PointMass::normal(grid, 0.1, 1.3).unwrap();
+        let Ok(dynamics) = Ar1::new(x[6], x[7]).or_else(|_| Ar1::new(0.9, 0.5)) else { return Ok(()) };
+        let sensor = LinearSensor::<1, 1>::direct(1.0).unwrap();
+        let anything = Anything([x[4], x[5]]);
+        let mut belief = before.clone();
+        match ParticleFilter::default().step_in_place(&mut rng, &dynamics, &mut belief, &anything, &mut Workspace::default()) {
+            Ok(info) => prop_assert!(info.log_likelihood.is_finite() && belief.mean()[0].is_finite()),
+            Err(_) => prop_assert_eq!(&belief, &before),
+        }
+        let mut density = grid_before.clone();
+        match density.update(&anything) {
+            Ok(log) => prop_assert!(log.is_finite() && density.mean().is_finite()),
+            Err(_) => prop_assert_eq!(&density, &grid_before),
+        }
+        for factor in factors(&x[..4]) {
+            let observed = Observed::new(sensor, factor);
+            let mut belief = before.clone();
+            match ParticleFilter::default().step_in_place(&mut rng, &dynamics, &mut belief, &observed, &mut Workspace::default()) {
+                Ok(info) => prop_assert!(info.log_likelihood.is_finite() && belief.mean()[0].is_finite(), "{:?} {:?}", dynamics, observed),
+                Err(_) => prop_assert_eq!(&belief, &before),
+            }
+            let mut cloud = cloud_before.clone();
+            match RaoBlackwellised::default().step_in_place(&mut rng, &dynamics, &mut cloud, &observed, &mut CloudWorkspace::default()) {
+                Ok(info) => prop_assert!(info.log_likelihood.is_finite() && cloud.gaussian().is_finite(), "{:?} {:?}", dynamics, observed),
+                Err(_) => prop_assert_eq!(&cloud, &cloud_before),
+            }
+            let mut density = grid_before.clone();
+            match density.update(&observed) {
+                Ok(log) => prop_assert!(log.is_finite() && density.mean().is_finite()),
+                Err(_) => prop_assert_eq!(&density, &grid_before),
+            }
+        }
+        if let Ok(filter) = PointMassFilter::new(&dynamics, grid)
+            && let Ok(predicted) = filter.predict(&grid_before)
+        {
+            prop_assert!(predicted.mean().is_finite() && predicted.variance().is_finite());
+        }
+    }
+}
