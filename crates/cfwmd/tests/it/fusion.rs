@@ -416,9 +416,8 @@ fn known_losses_leave_a_consistent_belief() {
                 let rules = network.rules_under(&predicted).unwrap();
                 let z = [0, 1].map(|_| sensor.sample(&mut rng, &truth));
                 let (observations, _) = network.transmit(&mut rng, &rules, predicted.mean(), &z).unwrap();
-                let fuse =
-                    |seen: &[Observation<_>]| network.fuse(&predicted, &rules, predicted.mean(), seen).unwrap().0;
-                belief = fuse(&observations);
+                let fused = network.fuse(&predicted, &rules, predicted.mean(), &observations);
+                belief = fused.unwrap().0;
                 if observations == [Observation::Lost; 2] {
                     nees.add(belief.normalised_error_squared(&truth).unwrap());
                     // What was done before: nothing is learnt from the loss.

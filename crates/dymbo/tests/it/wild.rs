@@ -60,10 +60,11 @@ proptest! {
             if let Ok(step) = dymbo.steady_step() {
                 prop_assert!(step.is_finite(), "{:?}", dymbo);
             }
-            if let Ok(words) = MultibitFilter::new(plant, bits) {
-                if let Ok((after, info)) = words.with_link(link).step(&belief, &Observation::Received(CellIndex(word % 300))) {
-                    prop_assert!(finite(&after) && info.log_likelihood.is_finite(), "{:?} {:?}", plant, belief);
-                }
+            let word = Observation::Received(CellIndex(word % 300));
+            if let Ok(words) = MultibitFilter::new(plant, bits)
+                && let Ok((after, info)) = words.with_link(link).step(&belief, &word)
+            {
+                prop_assert!(finite(&after) && info.log_likelihood.is_finite(), "{:?} {:?}", plant, belief);
             }
             for fusion in [CountFusion::Linear, CountFusion::Exact] {
                 if let Ok(parallel) = ParallelFilter::new(plant, 3, fusion) {

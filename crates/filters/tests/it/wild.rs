@@ -75,10 +75,10 @@ proptest! {
                     }
                 }
             }
-            if let Ok(power) = ReceivedPower::<2>::new(Vector2::new(x[5], x[6]), [0, 1], x[7], x[12], x[13], x[14]) {
-                if let Ok((after, info)) = extended_kalman::update(&power, &belief, &Vector1::new(x[8])) {
-                    prop_assert!(finite(&after) && info.log_likelihood.is_finite(), "{:?} {:?}: {:?}", belief, power, after);
-                }
+            if let Ok(power) = ReceivedPower::<2>::new(Vector2::new(x[5], x[6]), [0, 1], x[7], x[12], x[13], x[14])
+                && let Ok((after, info)) = extended_kalman::update(&power, &belief, &Vector1::new(x[8]))
+            {
+                prop_assert!(finite(&after) && info.log_likelihood.is_finite(), "{:?} {:?}: {:?}", belief, power, after);
             }
         }
     }
