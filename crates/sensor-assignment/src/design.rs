@@ -11,12 +11,15 @@ use fewbits_quantizer_design::Scene;
 use fewbits_quantizer_design::design::AllowedCells;
 use fewbits_quantizer_design::solve::{Bits, Request};
 
+/// Breakpoints of a sensor, and the word of each cell.
+pub type BitCells = (Vec<f64>, Vec<usize>);
+
 /// Breakpoints and words of the Gray bit that each sensor sends under the best linear assignment, sensor by sensor, for the
 /// uniform unknown of the prior's mean and variance.
 ///
 /// # Errors
 /// If there are more than 16 sensors.
-pub fn bit_cells(scene: &Scene) -> Result<Vec<(Vec<f64>, Vec<usize>)>, Error> {
+pub fn bit_cells(scene: &Scene) -> Result<Vec<BitCells>, Error> {
     let half_width = 3f64.sqrt() * scene.prior().deviation();
     let deviations: Vec<f64> = (0..scene.sensors()).map(|n| scene.noise().deviation(n)).collect();
     let sensors = CodedSensors::with_deviations(half_width, &deviations)?;

@@ -36,7 +36,7 @@ mod setup;
 
 pub use coded::CodedSensors;
 pub use cost::{bit_error, flipped_estimate, pair_cost, pair_costs, quantization_error};
-pub use design::{bit_cells, bit_per_sensor};
+pub use design::{BitCells, bit_cells, bit_per_sensor};
 pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, brute_force, exchange};
 pub use error::Error;
 pub use linear::{CostMatrix, DualCertificate, JonkerVolgenant, LinearAssignment};
