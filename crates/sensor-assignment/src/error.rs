@@ -5,6 +5,8 @@ fewbits_numerics::errors! {
     pub enum Error wraps {
         /// The sensors' patterns were refused.
         Patterns(fewbits_binary_patterns::Error),
+        /// The design of the cells was refused.
+        Design(fewbits_quantizer_design::Error),
     } and {
         /// A cost matrix that is not square.
         #[error("the cost matrix has {entries} entries: expected {size} x {size}")]
@@ -37,4 +39,4 @@ fewbits_numerics::errors! {
     }
 }
 
-fewbits_numerics::lift!(fewbits_binary_patterns => Patterns);
+fewbits_numerics::lift!(fewbits_binary_patterns => Patterns, fewbits_quantizer_design => Design);

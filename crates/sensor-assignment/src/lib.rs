@@ -19,12 +19,16 @@
 //! # Ok::<(), fewbits_sensor_assignment::Error>(())
 //! ```
 //!
+//! [`bit_per_sensor`] goes on from there: it hands the assigned patterns to the design of `fewbits-quantizer-design` as its start,
+//! for any prior, correlated noise and links that lose or invert bits, and returns what that returns.
+//!
 //! Table 6.1 of the thesis heads its row of noise variances "sigma" (erratum `assign-1`).
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod coded;
 mod cost;
+mod design;
 mod enumerate;
 mod error;
 mod linear;
@@ -32,6 +36,7 @@ mod setup;
 
 pub use coded::CodedSensors;
 pub use cost::{bit_error, flipped_estimate, pair_cost, pair_costs, quantization_error};
+pub use design::{BitCells, bit_cells, bit_per_sensor};
 pub use enumerate::{AllErrors, Estimator, Exchanged, all_errors, brute_force, exchange};
 pub use error::Error;
 pub use linear::{CostMatrix, DualCertificate, JonkerVolgenant, LinearAssignment};

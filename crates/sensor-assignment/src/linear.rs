@@ -1,8 +1,7 @@
-//! Linear assignment: a published solver behind a trait of ours, with a proof of optimality for every answer.
+//! Linear assignment, with a proof of optimality for every answer.
 
 use super::coded::check_permutation;
 use crate::Error;
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::all_finite;
 use serde::{Deserialize, Serialize};
 
@@ -13,13 +12,14 @@ const SLACK: f64 = 1e-12;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
 pub struct CostMatrix {
-    /// Stored as the solver takes it, so that solving copies nothing.
-    costs: lapjv::Matrix<f64>,
+    size: usize,
+    /// Row by row.
+    costs: Vec<f64>,
 }
 
 impl From<CostMatrix> for Vec<Vec<f64>> {
     fn from(matrix: CostMatrix) -> Self {
-        matrix.costs.outer_iter().map(|row| row.to_vec()).collect()
+        matrix.rows().map(<[f64]>::to_vec).collect()
     }
 }
 
@@ -49,19 +49,21 @@ impl CostMatrix {
             return Err(Error::NotSquare { entries, size });
         }
         all_finite("costs", &costs)?;
-        lapjv::Matrix::from_shape_vec((size, size), costs)
-            .map(|costs| Self { costs })
-            .map_err(|_| Error::NotSquare { entries, size })
+        Ok(Self { size, costs })
     }
 
     /// Number of rows.
     pub fn size(&self) -> usize {
-        self.costs.nrows()
+        self.size
     }
 
     /// The cost of matching `row` with `column`, if both exist.
     pub fn get(&self, row: usize, column: usize) -> Option<f64> {
-        self.costs.get((row, column)).copied()
+        (row < self.size && column < self.size).then(|| self.costs[row * self.size + column])
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.costs.chunks_exact(self.size)
     }
 
     /// Total cost of an assignment, the column of each row.
@@ -70,7 +72,7 @@ impl CostMatrix {
     /// If the assignment is not a permutation.
     pub fn cost(&self, assignment: &[usize]) -> Result<f64, Error> {
         check_permutation(assignment, self.size())?;
-        Ok(assignment.iter().enumerate().map(|(i, &j)| self.costs[(i, j)]).sum())
+        Ok(assignment.iter().zip(self.rows()).map(|(&j, row)| row[j]).sum())
     }
 
     /// Dual variables that prove (or disprove) that an assignment is optimal.
@@ -89,7 +91,7 @@ impl CostMatrix {
         let mut columns = vec![0.0f64; n];
         for _ in 0..=n {
             let mut changed = false;
-            for (i, row) in self.costs.outer_iter().enumerate() {
+            for (i, row) in self.rows().enumerate() {
                 let own = assignment[i];
                 let base = columns[own] - row[own];
                 for (j, c) in row.iter().enumerate() {
@@ -105,10 +107,10 @@ impl CostMatrix {
             }
         }
         let rows: Vec<f64> = (0..n)
-            .map(|i| self.costs[(i, assignment[i])] - columns[assignment[i]])
+            .map(|i| self.costs[i * n + assignment[i]] - columns[assignment[i]])
             .collect();
         let mut violation = 0.0f64;
-        for (i, row) in self.costs.outer_iter().enumerate() {
+        for (i, row) in self.rows().enumerate() {
             for (c, v) in row.iter().zip(&columns) {
                 violation = violation.max(rows[i] + v - c);
             }
@@ -159,23 +161,73 @@ pub trait LinearAssignment {
     fn solve(&self, costs: &CostMatrix) -> Result<Vec<usize>, Error>;
 }
 
-/// The shortest-augmenting-path algorithm of Jonker and Volgenant (1987), from the `lapjv` crate.
+/// Shortest augmenting paths (Jonker and Volgenant 1987), `O(n^3)` in the worst case.
 ///
-/// `O(n^3)` in the worst case. The thesis describes the older Hungarian method with its Hopcroft-Karp step; the answer is the
-/// same, which the certificate proves.
+/// ```text
+/// u, v <- 0                                            # duals: u_i + v_j <= c_ij throughout
+/// for each row
+///     slack_j <- c_ij - u_i - v_j along paths from that row that alternate between free and matched entries
+///     repeat
+///         raise the duals of what is reached until another column has slack 0
+///     until that column is free
+///     exchange matched and free entries along the path to it
+/// ```
+///
+/// The thesis describes the older Hungarian method with its Hopcroft-Karp step; the answer is the same, which the certificate
+/// proves.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct JonkerVolgenant;
 
 impl LinearAssignment for JonkerVolgenant {
-    // Inlined so that the generic solver is compiled once, in the caller, with the caller's optimisation.
-    #[inline]
     fn solve(&self, costs: &CostMatrix) -> Result<Vec<usize>, Error> {
-        if costs.size() == 1 {
-            return Ok(vec![0]);
+        let n = costs.size;
+        let largest = costs.costs.iter().fold(0.0f64, |m, c| m.max(c.abs()));
+        // Differences of the largest numbers would overflow.
+        let unit = if largest > 0.0 { largest } else { 1.0 };
+        let cost = |row: usize, column: usize| costs.costs[(row - 1) * n + column - 1] / unit;
+        // Rows and columns count from 1; column 0 stands for the row that is being matched, row 0 for none.
+        let (mut u, mut v, mut row_of) = (vec![0.0; n + 1], vec![0.0; n + 1], vec![0; n + 1]);
+        for row in 1..=n {
+            row_of[0] = row;
+            let (mut slack, mut before) = (vec![f64::INFINITY; n + 1], vec![0; n + 1]);
+            let mut reached = vec![false; n + 1];
+            let mut column = 0;
+            loop {
+                reached[column] = true;
+                let here = row_of[column];
+                let (mut least, mut next) = (f64::INFINITY, 0);
+                for j in (1..=n).filter(|j| !reached[*j]) {
+                    let reduced = cost(here, j) - u[here] - v[j];
+                    if reduced < slack[j] {
+                        (slack[j], before[j]) = (reduced, column);
+                    }
+                    if slack[j] < least {
+                        (least, next) = (slack[j], j);
+                    }
+                }
+                for j in 0..=n {
+                    if reached[j] {
+                        u[row_of[j]] += least;
+                        v[j] -= least;
+                    } else {
+                        slack[j] -= least;
+                    }
+                }
+                column = next;
+                if row_of[column] == 0 {
+                    break;
+                }
+            }
+            while column != 0 {
+                row_of[column] = row_of[before[column]];
+                column = before[column];
+            }
         }
-        lapjv::lapjv(&costs.costs)
-            .map(|(columns, _)| columns)
-            .map_err(|error| ArgumentError::new("costs", error, "a matrix that the solver accepts").into())
+        let mut columns = vec![0; n];
+        for column in 1..=n {
+            columns[row_of[column] - 1] = column - 1;
+        }
+        Ok(columns)
     }
 }
 
@@ -221,6 +273,19 @@ mod tests {
             });
             prop_assert!(all_right);
         }
+    }
+
+    #[test]
+    fn costs_near_the_largest_number_are_assigned() {
+        let costs = CostMatrix::new(2, vec![1e308, -1e308, -1e308, 1e308]).unwrap();
+        assert_eq!(JonkerVolgenant.solve(&costs).unwrap(), [1, 0]);
+        assert_eq!(
+            JonkerVolgenant
+                .solve(&CostMatrix::new(3, vec![0.0; 9]).unwrap())
+                .unwrap()
+                .len(),
+            3
+        );
     }
 
     #[test]

@@ -39,6 +39,8 @@ pub(crate) enum Resolution {
     Full,
     /// To about 1e-5, for searches.
     Coarse,
+    /// To about one per cent, for searches over many joint symbols.
+    Rough,
 }
 
 impl Resolution {
@@ -47,6 +49,7 @@ impl Resolution {
         match self {
             Self::Full => 1.0,
             Self::Coarse => 2.0,
+            Self::Rough => 3.0,
         }
     }
 
@@ -54,7 +57,8 @@ impl Resolution {
     fn reach(self) -> f64 {
         match self {
             Self::Full => 1.0,
-            Self::Coarse => 0.55,
+            Self::Coarse => 0.7,
+            Self::Rough => 0.42,
         }
     }
 }
@@ -106,8 +110,8 @@ impl Scene {
     }
 
     /// The scene on fewer nodes.
-    pub(crate) fn coarse(&self) -> Result<Self, Error> {
-        Self::resolved(self.prior.clone(), self.noise.clone(), Resolution::Coarse)
+    pub(crate) fn at(&self, resolution: Resolution) -> Result<Self, Error> {
+        Self::resolved(self.prior.clone(), self.noise.clone(), resolution)
     }
 
     fn resolved(prior: Prior, noise: Noise, resolution: Resolution) -> Result<Self, Error> {
@@ -189,7 +193,7 @@ impl Scene {
         let equal = noise.loadings.iter().all(|a| *a == shared);
         if equal && !self.is_discrete() {
             // Everything depends on s = x + a u alone: one axis of nodes instead of two.
-            let step = resolution.step().min(1.5) * f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
+            let step = resolution.step() * f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
             let reach = resolution.reach() * FACTOR_REACH * shared.abs();
             let half_width = match &self.prior {
                 Prior::Continuous(density) => {

@@ -8,7 +8,7 @@ use crate::criterion::{Criterion, Scored};
 use crate::error::Error;
 use crate::law::negative_entropy;
 use crate::moments::{Table, dot, moments};
-use crate::scene::{Feature, Scene};
+use crate::scene::{Feature, Resolution, Scene};
 use fewbits_numerics::kernels;
 
 /// Reach of the table of a sample, in its standard deviations.
@@ -117,9 +117,17 @@ pub(super) struct Block {
 }
 
 impl Landscape {
-    /// `scenes` are weighted; more than one only for squared error. Each becomes coarse here.
-    pub(super) fn new(scenes: &[(f64, &Scene)], criterion: Criterion, laws: Vec<WordLaw>) -> Result<Self, Error> {
-        let coarse = scenes.iter().map(|(_, s)| s.coarse()).collect::<Result<Vec<_>, _>>()?;
+    /// `scenes` are weighted; more than one only for squared error. Each is put on fewer nodes here.
+    pub(super) fn new(
+        scenes: &[(f64, &Scene)],
+        criterion: Criterion,
+        laws: Vec<WordLaw>,
+        resolution: Resolution,
+    ) -> Result<Self, Error> {
+        let coarse = scenes
+            .iter()
+            .map(|(_, s)| s.at(resolution))
+            .collect::<Result<Vec<_>, _>>()?;
         let scored = Scored::new(criterion, &coarse[0])?;
         let reference = coarse[0].mean;
         let scenarios = coarse

@@ -8,13 +8,20 @@ use super::solution::Solution;
 use crate::criterion::Criterion;
 use crate::design::AllowedCells;
 use crate::error::Error;
-use crate::scene::Scene;
+use crate::scene::{Resolution, Scene};
 use crate::system::OUTCOME_LIMIT;
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
+use fewbits_quantizers::lloyd_max;
 
 /// The joint search is left out where one round over the sensors takes more multiplications than this.
 const MAX_JOINT_WORK: f64 = 2e10;
+/// A round over the sensors of less than this is run after the time limit, too, to refine the best result.
+const LATE_WORK: f64 = 1e8;
+/// Starts of a single sensor that a time limit does not end: Gray words, natural words, fewer levels.
+const FIRST_STARTS: usize = 3;
+/// Above this the joint search goes over rough nodes.
+const MAX_COARSE_WORK: f64 = 5e8;
 /// Multiplications that the starts of the joint search may take together, as far as they can be foreseen.
 const START_WORK: f64 = 6e8;
 /// Results of single sensors that are combined, and joint results that are refined.
@@ -83,7 +90,12 @@ pub(super) fn solve(request: &Request<'_>, bits: &[u32], control: &mut Control<'
         AllowedCells::Intervals => Shape::Intervals,
         AllowedCells::Any => Shape::Any,
     };
-    let mut searched = search(&scene, request.criterion, &participants, shape, request.starts, control)?;
+    let given = request
+        .start
+        .as_ref()
+        .map(|all| sensors.iter().map(|n| all[*n].clone()).collect::<Vec<_>>());
+    let starts = (request.starts, given.as_deref());
+    let mut searched = search(&scene, request.criterion, &participants, shape, starts, control)?;
     searched
         .designs
         .extend(classic_detection(&scene, request.criterion, &participants));
@@ -96,11 +108,8 @@ pub(super) fn solve(request: &Request<'_>, bits: &[u32], control: &mut Control<'
             cells,
             certificate,
             scope,
-        } = polish(&scene, request.criterion, &participants, cells, searched.apart)?;
+        } = polish(&scene, request.criterion, &participants, cells, searched.apart, control.stopped)?;
         found.push(Solution::new(request, &participants, system, cells, certificate, scope)?);
-        if done + 1 < parts && !control.go_on() {
-            break;
-        }
     }
     control.report(Stage::Certificate, parts, parts);
     Ok(found)
@@ -148,7 +157,7 @@ pub(super) fn search(
     criterion: Criterion,
     participants: &[Participant],
     shape: Shape,
-    starts: usize,
+    (starts, given): (usize, Option<&[WordedCells]>),
     control: &mut Control<'_>,
 ) -> Result<Searched, Error> {
     let laws: Vec<WordLaw> = participants.iter().map(Participant::law).collect();
@@ -162,23 +171,38 @@ pub(super) fn search(
             apart: false,
         });
     }
-    let landscape = Landscape::new(&[(1.0, scene)], criterion, laws)?;
+    let mut landscape = Landscape::new(&[(1.0, scene)], criterion, laws.clone(), Resolution::Coarse)?;
     let cells: Vec<usize> = participants.iter().map(|p| grid_cells(p.bits)).collect();
     let largest = cells.iter().copied().max().unwrap_or(0);
-    let work = landscape.work(largest);
+    let mut work = landscape.work(largest);
+    let work_is_large = work > MAX_COARSE_WORK;
+    if work_is_large {
+        landscape = Landscape::new(&[(1.0, scene)], criterion, laws, Resolution::Rough)?;
+        work = landscape.work(largest);
+    }
     if work > MAX_JOINT_WORK {
         return Ok(Searched {
-            designs: vec![best_alone()],
+            designs: vec![best_alone(), plain(scene, participants)?],
             value: f64::NAN,
             apart: true,
         });
     }
     let grids: Vec<Grid> = (0..cells.len())
-        .map(|n| landscape.grid(n, first_edges(&landscape, n, cells[n])))
+        .map(|n| {
+            let mut edges = first_edges(&landscape, n, cells[n]);
+            edges.extend(given.iter().flat_map(|given| &given[n].breakpoints));
+            edges.sort_by(f64::total_cmp);
+            edges.dedup();
+            landscape.grid(n, edges)
+        })
         .collect();
     // A climb takes some ten rounds.
     let starts = ((START_WORK / (10.0 * work)) as usize).clamp(2, starts.max(2));
     let mut points: Vec<Point> = Vec::new();
+    if let Some(given) = given {
+        let words = given.iter().zip(&grids).map(|(c, g)| c.on(&g.edges)).collect();
+        points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.go_on()));
+    }
     for i in 0..starts {
         let words = joint_start(&landscape, &grids, participants, &singles, i);
         points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.go_on()));
@@ -193,7 +217,7 @@ pub(super) fn search(
         .fold(f64::MIN_POSITIVE, f64::max);
     let points = best_few(points, SAME * unit);
     // Newton's method needs a close start; where it is not affordable the grids alone do it.
-    let refinements = if super::polish::is_affordable(scene, criterion, outcomes) {
+    let refinements = if super::polish::is_affordable(scene, criterion, outcomes, control.stopped) {
         REFINEMENTS
     } else {
         MORE_REFINEMENTS
@@ -203,10 +227,12 @@ pub(super) fn search(
     for (p, mut point) in points.into_iter().enumerate() {
         let mut spacings: Vec<f64> = (0..cells.len()).map(|n| spacing(&landscape, n, cells[n])).collect();
         for r in 0..refinements {
-            if !control.go_on() {
+            // The best result is refined whatever the time, if that is quick.
+            let is_due = p == 0 && work <= LATE_WORK;
+            if !is_due && !control.go_on() {
                 break;
             }
-            point = refine(&landscape, point, &mut spacings, shape, &mut || control.go_on());
+            point = refine(&landscape, point, &mut spacings, shape, &mut || is_due || control.go_on());
             control.report(Stage::Refinement, p * refinements + r + 1, parts);
         }
         refined.push(point);
@@ -215,12 +241,31 @@ pub(super) fn search(
     let best = refined.first().map_or(0.0, |p| p.value);
     refined.retain(|p| best - p.value <= CLOSE * unit);
     let value = refined.first().map_or(f64::NAN, |p| p.value);
-    let designs = refined.iter().map(cells_of).collect();
+    let mut designs: Vec<Vec<WordedCells>> = refined.iter().map(cells_of).collect();
+    if work_is_large || control.stopped {
+        // What the search has seen is rough or cut short: the exact values decide between its best and two plain designs.
+        designs.truncate(1);
+        designs.push(best_alone());
+        designs.push(plain(scene, participants)?);
+    }
     Ok(Searched {
         designs,
         value,
         apart: true,
     })
+}
+
+/// Lloyd-Max cells of a normal sample with Gray words.
+fn plain(scene: &Scene, participants: &[Participant]) -> Result<Vec<WordedCells>, Error> {
+    let of = |(n, participant): (usize, &Participant)| {
+        let levels = 1usize << participant.bits;
+        let lloyd = lloyd_max::gaussian(levels)?.affine(scene.sample_mean(), scene.sample_deviation(n))?;
+        Ok(WordedCells {
+            breakpoints: lloyd.breakpoints().to_vec(),
+            words: (0..levels).map(|z| z ^ (z >> 1)).collect(),
+        })
+    };
+    participants.iter().enumerate().map(of).collect()
 }
 
 fn cells_of(point: &Point) -> Vec<WordedCells> {
@@ -262,20 +307,22 @@ fn single_sensors(
             continue;
         }
         let own = scene.subset(&[n])?;
-        let landscape = Landscape::new(&[(1.0, &own)], criterion, vec![laws[n].clone()])?;
+        let landscape = Landscape::new(&[(1.0, &own)], criterion, vec![laws[n].clone()], Resolution::Coarse)?;
         let bits = participants[n].bits;
         let cells = grid_cells(bits);
         let grid = landscape.grid(0, first_edges(&landscape, 0, cells));
         let starts = match bits {
-            ..=3 => 24,
-            4 => 16,
+            ..=3 => 12,
+            4 => 8,
             _ => 4,
         };
         let mut points = Vec::new();
         for i in 0..starts {
             let words = single_start(&landscape, 0, &grid, bits, i);
-            points.push(climb(&landscape, vec![grid.clone()], vec![words], shape, &mut || control.go_on()));
-            if !control.go_on() {
+            // The first starts are run whatever the time.
+            let mut go_on = || i < FIRST_STARTS || control.go_on();
+            points.push(climb(&landscape, vec![grid.clone()], vec![words], shape, &mut go_on));
+            if i + 1 >= FIRST_STARTS && !control.go_on() {
                 break;
             }
         }

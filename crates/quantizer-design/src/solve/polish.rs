@@ -6,14 +6,19 @@ use crate::criterion::{Criterion, Scored};
 use crate::design::{Scope, joint};
 use crate::error::Error;
 use crate::newton::{Certificate, Newton};
-use crate::scene::Scene;
+use crate::scene::{Resolution, Scene};
 use crate::system::{SensorGroup, System};
 use fewbits_quantizers::{Channel, Quantizer};
 
-/// Newton's method is left out where one evaluation takes more multiplications than this.
-const MAX_EVALUATION_WORK: f64 = 3e7;
+/// Newton's method is left out where the second derivatives take more multiplications than this.
+const MAX_HESSIAN_WORK: f64 = 1e8;
+/// The same after the time limit.
+const LATE_HESSIAN_WORK: f64 = 3e7;
 
-/// A design on the full nodes.
+/// A design whose evaluation takes more multiplications than this stays on coarse nodes, where its value is known to 1e-5.
+const MAX_VALUE_WORK: f64 = 1e9;
+
+/// A design on the full nodes, or on coarse ones if it is too large.
 pub(super) struct Polished {
     pub(super) system: System,
     /// Cells and words of each participant.
@@ -23,10 +28,19 @@ pub(super) struct Polished {
 }
 
 /// Whether Newton's method on the full nodes is worth its time.
-pub(super) fn is_affordable(scene: &Scene, criterion: Criterion, outcomes: f64) -> bool {
+pub(super) fn is_affordable(scene: &Scene, criterion: Criterion, outcomes: f64, is_late: bool) -> bool {
+    // A table as large as that of the outcomes for each sensor, twice, and for each pair.
+    let sensors = scene.sensors() as f64;
+    let tables = 1.0 + 2.0 * sensors + 0.5 * sensors * (sensors - 1.0);
+    let limit = if is_late { LATE_HESSIAN_WORK } else { MAX_HESSIAN_WORK };
+    tables * evaluation_work(scene, criterion, outcomes) <= limit
+}
+
+/// Multiplications that one evaluation takes.
+fn evaluation_work(scene: &Scene, criterion: Criterion, outcomes: f64) -> f64 {
     let per_outcome = Scored::new(criterion, scene)
         .map_or(f64::INFINITY, |s| s.features().iter().map(|f| f.weights.len() as f64).sum::<f64>());
-    outcomes * per_outcome <= MAX_EVALUATION_WORK
+    outcomes * per_outcome
 }
 
 /// Climbs to the stationary point next to a design. Where Newton's method does not converge, or would take too long, the design
@@ -37,6 +51,7 @@ pub(super) fn polish(
     participants: &[Participant],
     mut cells: Vec<WordedCells>,
     apart: bool,
+    is_late: bool,
 ) -> Result<Polished, Error> {
     let scope = if apart {
         Scope::EverySensor
@@ -44,12 +59,15 @@ pub(super) fn polish(
         Scope::SharedBreakpoints
     };
     // Most of the way goes on coarse nodes, which are a tenth as many.
-    let coarse = scene.coarse()?;
+    let coarse = scene.at(Resolution::Coarse)?;
     let mut is_coarse = true;
     loop {
         let system = system_of(if is_coarse { &coarse } else { scene }, participants, &cells, apart)?;
         let unproved = |cells: Vec<WordedCells>| {
-            let system = system_of(scene, participants, &cells, apart)?;
+            let mut system = system_of(scene, participants, &cells, apart)?;
+            if evaluation_work(scene, criterion, system.outcomes() as f64) > MAX_VALUE_WORK {
+                system = system_of(&coarse, participants, &cells, apart)?;
+            }
             Ok(Polished {
                 system,
                 cells,
@@ -57,7 +75,7 @@ pub(super) fn polish(
                 scope,
             })
         };
-        if !is_affordable(system.scene(), criterion, system.outcomes() as f64) {
+        if !is_affordable(system.scene(), criterion, system.outcomes() as f64, is_late) {
             return unproved(cells);
         }
         let newton = Newton {
@@ -176,4 +194,32 @@ fn parts_of(
         .map(|row| used.iter().map(|w| row[*w]).collect())
         .collect();
     Ok((Quantizer::with_labels(breakpoints, labels)?, Channel::from_rows(&rows)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::{Noise, Prior, Resolution, Scene};
+    use crate::{Criterion, System};
+
+    #[test]
+    fn coarse_nodes_give_five_digits() {
+        let priors = [
+            Prior::normal(3.0, 1.0).unwrap(),
+            Prior::uniform(0.0, 3.0).unwrap(),
+            Prior::mixture(&[(0.6, -1.0, 0.4), (0.4, 1.5, 0.6)]).unwrap(),
+            Prior::density(|x| x * (-x).exp(), 0.0..=12.0).unwrap(),
+        ];
+        for prior in priors {
+            for (deviations, rho) in [([0.3, 0.3], 0.0), ([0.3, 0.3], 0.6), ([0.3, 0.8], 0.85)] {
+                let noise = Noise::equicorrelated_with_deviations(&deviations, rho).unwrap();
+                let scene = Scene::new(prior.clone(), noise).unwrap();
+                let full = System::lloyd_max(scene.clone(), 4).unwrap();
+                let coarse = System::ideal(scene.at(Resolution::Coarse).unwrap(), full.quantizers()).unwrap();
+                for criterion in [Criterion::MeanSquaredError, Criterion::MutualInformation] {
+                    let [a, b] = [&full, &coarse].map(|s| s.value(criterion).unwrap());
+                    assert!((a / b - 1.0).abs() < 1e-5, "{prior:?} {rho} {criterion:?}: {a} {b}");
+                }
+            }
+        }
+    }
 }

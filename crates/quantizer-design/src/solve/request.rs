@@ -1,5 +1,6 @@
 //! What is asked of a design.
 
+use super::search::WordedCells;
 use super::solution::{Solution, Solutions};
 use super::{pipeline, share};
 use crate::criterion::Criterion;
@@ -7,6 +8,7 @@ use crate::design::AllowedCells;
 use crate::error::{Error, refuse};
 use crate::scene::{Prior, Scene};
 use fewbits_core::Link;
+use fewbits_quantizers::quantizer::check_increasing;
 use std::time::{Duration, Instant};
 
 /// Longest word of a sensor. More bits need no joint design: a Lloyd-Max quantizer loses next to nothing.
@@ -74,6 +76,8 @@ pub struct Request<'a> {
     pub(super) criterion: Criterion,
     pub(super) cells: AllowedCells,
     pub(super) starts: usize,
+    /// Breakpoints and words of every sensor to start from.
+    pub(super) start: Option<Vec<WordedCells>>,
     pub(super) time_limit: Option<Duration>,
     pub(super) progress: Option<&'a mut dyn FnMut(Progress)>,
 }
@@ -89,6 +93,7 @@ impl<'a> Request<'a> {
             criterion: Criterion::MeanSquaredError,
             cells: AllowedCells::Intervals,
             starts: 60,
+            start: None,
             time_limit: None,
             progress: None,
         }
@@ -147,6 +152,32 @@ impl<'a> Request<'a> {
         self
     }
 
+    /// Tries a design of the caller's as a start, too: breakpoints and the word of each cell, for every sensor of the scene.
+    ///
+    /// # Errors
+    /// If there is not one entry per sensor, breakpoints do not increase, or there is not one word per cell.
+    pub fn with_start(mut self, cells: Vec<(Vec<f64>, Vec<usize>)>) -> Result<Self, Error> {
+        if cells.len() != self.scene.sensors() {
+            return refuse(
+                "cells",
+                format!("{} entries", cells.len()),
+                format!("one per sensor, {}", self.scene.sensors()),
+            );
+        }
+        for (breakpoints, words) in &cells {
+            check_increasing(breakpoints)?;
+            if words.len() != breakpoints.len() + 1 {
+                let given = format!("{} words for {} breakpoints", words.len(), breakpoints.len());
+                return refuse("cells", given, "one word per cell");
+            }
+        }
+        let cells = cells
+            .into_iter()
+            .map(|(breakpoints, words)| WordedCells { breakpoints, words });
+        self.start = Some(cells.collect());
+        Ok(self)
+    }
+
     /// Ends the search after this time with the best design so far. The certificate of that design comes on top.
     #[must_use]
     pub fn with_time_limit(mut self, limit: Duration) -> Self {
@@ -185,6 +216,11 @@ impl<'a> Request<'a> {
         }
         if let Some(bits) = bits.iter().find(|b| **b > MAX_BITS) {
             return refuse("bits", bits, format!("at most {MAX_BITS} bits per sensor"));
+        }
+        for (bits, cells) in bits.iter().zip(self.start.iter().flatten()) {
+            if let Some(word) = cells.words.iter().find(|w| **w >= 1 << bits) {
+                return refuse("word", word, format!("a word of {bits} bits"));
+            }
         }
         if bits.iter().all(|b| *b == 0) {
             return refuse("bits", "0 for every sensor", "at least one bit");

@@ -8,7 +8,7 @@ use super::solution::{SensorDesign, Solution};
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
 use crate::law::Reports;
-use crate::scene::Scene;
+use crate::scene::{Resolution, Scene};
 use crate::system::System;
 use fewbits_numerics::error::{non_negative, within};
 
@@ -183,7 +183,7 @@ pub fn minimax(
     let laws: Vec<WordLaw> = participants.iter().map(Participant::law).collect();
     let mut weights = vec![1.0 / scenes.len() as f64; scenes.len()];
     let weighted: Vec<(f64, &Scene)> = weights.iter().copied().zip(&scenes).collect();
-    let mut landscape = Landscape::new(&weighted, Criterion::MeanSquaredError, laws)?;
+    let mut landscape = Landscape::new(&weighted, Criterion::MeanSquaredError, laws, Resolution::Coarse)?;
     let mut cells: Vec<WordedCells> = nominal
         .sensors()
         .iter()

@@ -161,7 +161,8 @@ impl Solution {
         self.criterion
     }
 
-    /// Value of the criterion: squared units, nats, or a probability.
+    /// Value of the criterion: squared units, nats, or a probability. Exact to 1e-12, or to 1e-5 for a design with so many joint
+    /// symbols and nodes that one evaluation would take seconds.
     pub fn value(&self) -> f64 {
         self.value
     }

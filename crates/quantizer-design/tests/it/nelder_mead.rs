@@ -7,6 +7,9 @@ pub fn minimise(f: &mut dyn FnMut(&[f64]) -> f64, start: &[f64], step: f64, unti
     let n = start.len();
     let mut simplex: Vec<(f64, Vec<f64>)> = vec![(f(start), start.to_vec())];
     for i in 0..n {
+        if Instant::now() >= until {
+            return simplex.iter().map(|c| c.0).fold(f64::INFINITY, f64::min);
+        }
         let mut corner = start.to_vec();
         corner[i] += step;
         simplex.push((f(&corner), corner));

@@ -1,0 +1,79 @@
+//! Which sensor sends which bit, together with the design of the cells.
+//!
+//! The linear assignment knows a uniform unknown, independent noise and clear links. Its answer is a start for the design on
+//! request, which knows all the rest: the edges of the patterns move, cells merge, and the decoder is that of least squared
+//! error.
+
+use crate::linear::{JonkerVolgenant, LinearAssignment};
+use crate::{CodedSensors, Error, pair_costs};
+use fewbits_core::Link;
+use fewbits_quantizer_design::Scene;
+use fewbits_quantizer_design::design::AllowedCells;
+use fewbits_quantizer_design::solve::{Bits, Request};
+
+/// Breakpoints of a sensor, and the word of each cell.
+pub type BitCells = (Vec<f64>, Vec<usize>);
+
+/// Breakpoints and words of the Gray bit that each sensor sends under the best linear assignment, sensor by sensor, for the
+/// uniform unknown of the prior's mean and variance.
+///
+/// # Errors
+/// If there are more than 16 sensors.
+pub fn bit_cells(scene: &Scene) -> Result<Vec<BitCells>, Error> {
+    let half_width = 3f64.sqrt() * scene.prior().deviation();
+    let deviations: Vec<f64> = (0..scene.sensors()).map(|n| scene.noise().deviation(n)).collect();
+    let sensors = CodedSensors::with_deviations(half_width, &deviations)?;
+    let assignment = JonkerVolgenant.solve(&pair_costs(&sensors)?)?;
+    let mean = scene.prior().mean();
+    let mut cells = vec![(Vec::new(), Vec::new()); deviations.len()];
+    for (sensor, quantizer) in assignment.iter().zip(sensors.quantizers()) {
+        let breakpoints: Vec<f64> = quantizer.breakpoints().iter().map(|b| mean + b).collect();
+        let words = (0..=breakpoints.len()).map(|cell| cell % 2).collect();
+        cells[*sensor] = (breakpoints, words);
+    }
+    Ok(cells)
+}
+
+/// A request for the estimate from one bit per sensor that starts from [`bit_cells`] beside the usual starts: set what else is
+/// wanted, and run it.
+///
+/// ```
+/// use fewbits_core::Link;
+/// use fewbits_quantizer_design::{Noise, Prior, Scene};
+/// let noise = Noise::independent_with_deviations(&[0.2, 0.1, 0.05])?;
+/// let scene = Scene::new(Prior::uniform(0.0, 2.0)?, noise)?;
+/// let solutions = fewbits_sensor_assignment::bit_per_sensor(scene, Link::flipping(0.01)?)?.with_starts(4).run()?;
+/// assert!(solutions.best().value() < 0.08);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// As [`bit_cells`].
+pub fn bit_per_sensor(scene: Scene, link: Link) -> Result<Request<'static>, Error> {
+    let cells = bit_cells(&scene)?;
+    Ok(Request::estimation(scene, Bits::Each(1), link)
+        .with_cells(AllowedCells::Any)
+        .with_start(cells)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fewbits_quantizer_design::{Noise, Prior};
+
+    /// The design starts from the assigned patterns, so it is no worse than their exact error.
+    #[test]
+    fn designed_cells_are_no_worse_than_patterns() {
+        let deviations = [0.2, 0.1, 0.05, 0.12];
+        let sensors = CodedSensors::with_deviations(1.0, &deviations).unwrap();
+        let assignment = JonkerVolgenant.solve(&pair_costs(&sensors).unwrap()).unwrap();
+        for (scale, mean) in [(1.0, 0.0), (1e-4, 3.0)] {
+            let noise = Noise::independent_with_deviations(&deviations.map(|d| scale * d)).unwrap();
+            let prior = Prior::uniform(mean - scale, mean + scale).unwrap();
+            let request = bit_per_sensor(Scene::new(prior, noise).unwrap(), Link::PERFECT).unwrap();
+            let found = request.with_starts(2).run().unwrap().best().value() / (scale * scale);
+            let patterns = sensors.mmse(&assignment).unwrap();
+            assert!(found <= patterns * (1.0 + 1e-6), "{found} {patterns}");
+        }
+    }
+}
