@@ -4,6 +4,7 @@
 //! 2. A crate imports only from floors below its own, as that table says.
 //! 3. Every figure id in the docs exists, and every figure is in the docs.
 //! 4. Every file of integration tests is a module of the crate's one test binary.
+//! 5. Every relative link of a page leads to a file, and every page of `docs` is linked from `docs/index.md`.
 
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
 use fewbits_experiments::all;
@@ -77,6 +78,7 @@ pub fn check(root: &Path) -> Result<Vec<String>, Error> {
         }
     }
     problems.extend(figure_problems(root)?);
+    problems.extend(link_problems(root)?);
     Ok(problems)
 }
 
@@ -206,6 +208,40 @@ fn figure_problems(root: &Path) -> Result<Vec<String>, Error> {
     Ok(unknown.chain(missing).collect())
 }
 
+/// Links of pages that lead nowhere, and pages that the index does not have.
+fn link_problems(root: &Path) -> Result<Vec<String>, Error> {
+    let docs = root.join("docs");
+    let mut problems = Vec::new();
+    let index = read(&docs.join("index.md"))?;
+    for path in list(&docs)?.into_iter().chain(list(root)?) {
+        if path.extension().is_none_or(|extension| extension != "md") {
+            continue;
+        }
+        let (folder, name) = (path.parent().unwrap_or(root), path.file_name().unwrap_or_default());
+        let shown = path.strip_prefix(root).unwrap_or(&path).display().to_string();
+        for link in links(&read(&path)?) {
+            if !folder.join(&link).exists() {
+                problems.push(format!("{shown}: the link to {link} leads nowhere"));
+            }
+        }
+        let name = name.to_string_lossy();
+        if folder == docs && name != "index.md" && !index.contains(&format!("({name})")) {
+            problems.push(format!("{shown}: docs/index.md does not link to it"));
+        }
+    }
+    Ok(problems)
+}
+
+/// The files that relative links of a page name, without anchors.
+fn links(page: &str) -> Vec<String> {
+    let targets = page.split("](").skip(1).filter_map(|rest| rest.split_once(')'));
+    targets
+        .map(|(target, _)| target.split('#').next().unwrap_or_default())
+        .filter(|target| !target.is_empty() && !target.contains("://") && !target.contains(char::is_whitespace))
+        .map(str::to_owned)
+        .collect()
+}
+
 /// `<system>-<word>`, where the word names a figure, a table or an experiment of ours; a bare number names an erratum.
 fn is_figure_id(word: &str, systems: &BTreeSet<&str>) -> bool {
     word.split_once('-').is_some_and(|(system, rest)| {
@@ -231,6 +267,12 @@ mod tests {
     fn the_workspace_is_tidy() {
         let problems = check(&Path::new(env!("CARGO_MANIFEST_DIR")).join("..")).unwrap();
         assert!(problems.is_empty(), "\n{}", problems.join("\n"));
+    }
+
+    #[test]
+    fn relative_links_are_found_without_anchors() {
+        let page = "[a](one.md) ![b](images/two.svg) [c](three.md#part) [d](https://example.org/x) [e](#here) `f[0](x, y)`";
+        assert_eq!(links(page), ["one.md", "images/two.svg", "three.md"]);
     }
 
     #[test]

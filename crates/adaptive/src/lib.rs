@@ -62,7 +62,7 @@ pub use error::Error;
 pub use fixed_rate::{FixedRate, Word};
 pub use packet::Packet;
 pub use receiver::{Receiver, Tracked};
-pub use scheme::SlotScheme;
+pub use scheme::{SlotFactor, SlotScheme};
 pub use sensor::{Report, Sensor};
 pub use stream::{Silence, StreamReader, StreamWriter};
 pub use tuning::{Replay, best_within, own_steps, replay};

@@ -5,11 +5,11 @@ use crate::packet::Packet;
 use crate::replica::{Replica, Slot};
 use crate::report::{self, Content};
 use crate::{Error, Sensor};
-use fewbits_core::factor::{Constant, InCell, Scalar};
-use fewbits_core::{Cell, Link, Observation, Scheme};
+use fewbits_core::factor::{Constant, Factor, InCell, Scalar, Tilted, Value};
+use fewbits_core::{Cell, Columns, Gaussian, Link, Observation, Scheme};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
-use nalgebra::Vector1;
+use nalgebra::{SVector, Vector1};
 use rand::Rng;
 
 /// The next slot of a sensor, for any filter of the workspace: a receiver that has a model of its own hears, beside the
@@ -72,11 +72,58 @@ impl SlotScheme {
     }
 }
 
+/// What a slot says about the noise-free measurement.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum SlotFactor {
+    /// The measurement lies in a cell of the lattice, or nothing is known of it.
+    Cells(Scalar),
+    /// The sample itself was sent and arrived, which has a probability of its own.
+    Sample {
+        /// The sample in its noise.
+        value: Value<1>,
+        /// `ln` of the probability that a report arrives.
+        log_arrival: f64,
+    },
+}
+
+impl Factor<1> for SlotFactor {
+    fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
+        match self {
+            Self::Cells(factor) => factor.log_likelihood(m),
+            Self::Sample { value, log_arrival } => value.log_likelihood(m) + log_arrival,
+        }
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, 1>, log_weights: &mut [f64]) {
+        match self {
+            Self::Cells(factor) => factor.add_log_likelihoods(means, log_weights),
+            Self::Sample { value, log_arrival } => {
+                value.add_log_likelihoods(means, log_weights);
+                log_weights.iter_mut().for_each(|log| *log += log_arrival);
+            }
+        }
+    }
+
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, fewbits_core::Error> {
+        match self {
+            Self::Cells(factor) => factor.tilted(prior),
+            Self::Sample { value, log_arrival } => {
+                let alone = value.tilted(prior)?;
+                Ok(Tilted {
+                    log_evidence: alone.log_evidence + log_arrival,
+                    ..alone
+                })
+            }
+        }
+    }
+}
+
 impl Scheme<1> for SlotScheme {
     type State = ();
     type Feedback = ();
     type Report = Packet;
-    type Factor = Scalar;
+    type Factor = SlotFactor;
 
     fn start(&self) {}
 
@@ -99,16 +146,21 @@ impl Scheme<1> for SlotScheme {
         }))
     }
 
-    fn factor(&self, (): &(), observation: &Observation<Packet>, link: &Link) -> Result<Scalar, fewbits_core::Error> {
+    fn factor(
+        &self,
+        (): &(),
+        observation: &Observation<Packet>,
+        link: &Link,
+    ) -> Result<SlotFactor, fewbits_core::Error> {
         if link.crossover() > 0.0 {
             let expected = "0: a packet with a wrong bit must be erased by a checksum of the link";
             return Err(ArgumentError::new("crossover", link.crossover(), expected).into());
         }
         let packet = match observation {
-            Observation::Lost => return Ok(Constant::ONE.into()),
+            Observation::Lost => return Ok(SlotFactor::Cells(Constant::ONE.into())),
             Observation::Nothing => {
                 let cell = self.cell(self.slot.prediction)?;
-                return Ok(InCell::silence(cell, self.noise_variance, link)?.into());
+                return Ok(SlotFactor::Cells(InCell::silence(cell, self.noise_variance, link)?.into()));
             }
             Observation::Received(packet) => packet,
         };
@@ -126,13 +178,13 @@ impl Scheme<1> for SlotScheme {
         Ok(match content {
             Content::Near(k) | Content::Far(k) => {
                 let cell = self.cell(self.slot.prediction + k)?;
-                InCell::new(cell, self.noise_variance, 0.0, 1.0 - link.loss())?.into()
+                SlotFactor::Cells(InCell::new(cell, self.noise_variance, 0.0, 1.0 - link.loss())?.into())
             }
             // No cell of the lattice: the sample itself.
-            Content::Whole(sample) => {
-                fewbits_core::factor::Value::new(Vector1::new(sample), Vector1::new(self.noise_variance))
-                    .map(Into::into)?
-            }
+            Content::Whole(sample) => SlotFactor::Sample {
+                value: Value::scalar(sample, self.noise_variance)?,
+                log_arrival: (-link.loss()).ln_1p(),
+            },
         })
     }
 }

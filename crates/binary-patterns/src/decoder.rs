@@ -36,6 +36,28 @@ impl Bank {
     /// # Errors
     /// If the number of observations is not the number of sensors.
     pub fn posterior_mean(&self, observations: &[Observation<Bit>]) -> Result<f64, Error> {
+        let (score, nodes) = self.posterior_score(observations)?;
+        Ok(mean_under(&score, &nodes))
+    }
+
+    /// `E[(x - estimate)^2 | observations]` from one observation per sensor; a bit that is missing says nothing. At the posterior mean it is
+    /// the posterior variance. In squared units of the source.
+    ///
+    /// # Errors
+    /// If the number of observations is not the number of sensors.
+    pub fn posterior_squared_error(&self, observations: &[Observation<Bit>], estimate: f64) -> Result<f64, Error> {
+        let (score, nodes) = self.posterior_score(observations)?;
+        let w = weights_under(&score, &nodes);
+        let (mass, _) = moments(&w, &nodes.x);
+        Ok(if mass > 0.0 {
+            squared_error(&w, &nodes.x, estimate) / mass
+        } else {
+            0.0
+        })
+    }
+
+    /// Log likelihood of the observations at the nodes of the source, and the nodes.
+    fn posterior_score(&self, observations: &[Observation<Bit>]) -> Result<(Vec<f64>, Nodes), Error> {
         if observations.len() != self.sensors() {
             let given = format!("{} observations", observations.len());
             return Err(ArgumentError::new("observations", given, format!("{}", self.sensors())).into());
@@ -51,7 +73,7 @@ impl Bank {
                 *s += sensor.log_probabilities(*x)[usize::from(*bit)];
             }
         }
-        Ok(mean_under(&score, &nodes))
+        Ok((score, nodes))
     }
 
     /// The look-up table of a decoder.
@@ -262,10 +284,15 @@ fn first_largest(scores: &[f64], slack: impl Fn(f64) -> f64) -> usize {
 
 /// Mean of the source when its density is multiplied by the exponential of `score`, given at the nodes.
 fn mean_under(score: &[f64], nodes: &Nodes) -> f64 {
-    let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let w: Vec<f64> = score.iter().zip(&nodes.w).map(|(s, w)| w * (s - best).exp()).collect();
-    let (mass, first) = moments(&w, &nodes.x);
+    let (mass, first) = moments(&weights_under(score, nodes), &nodes.x);
     if mass > 0.0 { first / mass } else { 0.0 }
+}
+
+/// Weights of the nodes times the exponential of `score`, up to a constant. The largest score is subtracted first, so that not all of them
+/// underflow.
+fn weights_under(score: &[f64], nodes: &Nodes) -> Vec<f64> {
+    let best = score.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    score.iter().zip(&nodes.w).map(|(s, w)| w * (s - best).exp()).collect()
 }
 
 /// `(sum w, sum w x)`.

@@ -68,6 +68,15 @@ impl LookupTable {
         self.bank.posterior_mean(observations)
     }
 
+    /// The estimate of [`decode`](Self::decode), and its mean squared error given the observations, in squared units of the source.
+    ///
+    /// # Errors
+    /// If the number of observations is not the number of sensors.
+    pub fn decode_with_error(&self, observations: &[Observation<Bit>]) -> Result<(f64, f64), Error> {
+        let estimate = self.decode(observations)?;
+        Ok((estimate, self.bank.posterior_squared_error(observations, estimate)?))
+    }
+
     /// The estimate for one bit a sensor.
     ///
     /// # Errors
@@ -146,5 +155,36 @@ mod tests {
         }
         let json = serde_json::to_string(&table).unwrap();
         assert_eq!(serde_json::from_str::<LookupTable>(&json).unwrap(), table);
+    }
+
+    /// The mean squared error of every outcome, weighted by its probability, is the mean squared error of the table.
+    #[test]
+    fn errors_given_the_bits_average_to_the_mse() {
+        let quantizers = [vec![0.0], vec![-0.5, 0.5], vec![0.25]].map(|edges| BinaryQuantizer::new(edges).unwrap());
+        let source = Source::uniform(1.0).unwrap();
+        let bank = Bank::homogeneous_with_deviation(source, quantizers.to_vec(), 0.2).unwrap();
+        for decoder in [Decoder::Mmse, Decoder::ContinuousMap] {
+            let table = bank.table(decoder).unwrap();
+            let mut average = 0.0;
+            for word in 0..8 {
+                let bits = [word & 4 != 0, word & 2 != 0, word & 1 != 0];
+                // P(bits) by the trapezoidal rule over the source, which is uniform on [-1, 1].
+                let steps = 4000;
+                let probability: f64 = (0..=steps)
+                    .map(|i| {
+                        let x = -1.0 + 2.0 * f64::from(i) / f64::from(steps);
+                        let end = if i == 0 || i == steps { 0.5 } else { 1.0 };
+                        let given = |n: usize| bank.sensor(n).probabilities(x)[usize::from(bits[n])];
+                        end * given(0) * given(1) * given(2) / f64::from(steps)
+                    })
+                    .sum();
+                let seen = bits.map(|b| Observation::Received(Bit(b)));
+                let (estimate, error) = table.decode_with_error(&seen).unwrap();
+                assert_eq!(estimate, table.estimate(&bits).unwrap());
+                average += probability * error;
+            }
+            let mse = bank.mse(decoder).unwrap();
+            assert!((average / mse - 1.0).abs() < 1e-6, "{average} for {mse}");
+        }
     }
 }

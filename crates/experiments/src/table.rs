@@ -32,7 +32,8 @@ impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number(x) if *x != 0.0 && !(1e-4..1e15).contains(&x.abs()) && x.is_finite() => write!(f, "{x:e}"),
-            Self::Number(x) => write!(f, "{x}"),
+            // A negative zero is written as zero.
+            Self::Number(x) => write!(f, "{}", x + 0.0),
             Self::Integer(i) => write!(f, "{i}"),
             Self::Text(text) => f.write_str(text),
             Self::Missing => Ok(()),

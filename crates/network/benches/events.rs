@@ -49,7 +49,7 @@ impl Protocol for Ticking {
         if self.reports {
             let mut bit = BitWriter::new();
             bit.write_bit(true);
-            context.send(SensorId(token ^ 1), Frame::new(Kind::Report, 1, 0, bit.finish()))?;
+            context.send(SensorId(token ^ 1), &Frame::new(Kind::Report, 1, 0, bit.finish()))?;
         }
         Ok(())
     }
@@ -71,7 +71,7 @@ fn run(bencher: divan::Bencher<'_, '_>, size: u64, reports: bool) {
     let network = || -> Result<_, Error> {
         let field = Field::new(&Deployment::given(positions)?, 2.0)?;
         let mut radio = Radio::first_order();
-        radio.battery = fewbits_network::Joules::new(1e9)?;
+        radio.battery = Some(fewbits_network::Joules::new(1e9)?);
         let setup = Setup::new(radio, Stream::new(1));
         let mut network = Simulator::new(Ticking { reports }, vec![0; size as usize], field, setup)?;
         for i in 0..size {

@@ -1,4 +1,4 @@
-//! Slots.
+//! Slots: the common time of all nodes.
 
 use crate::units::{Instant, Seconds};
 use fewbits_numerics::ArgumentError;
@@ -30,6 +30,11 @@ impl Clock {
     /// Length of a slot.
     pub fn period(&self) -> Seconds {
         Instant(self.period).since_start()
+    }
+
+    /// From the beginning of a slot to its deadline.
+    pub fn reporting_time(&self) -> Seconds {
+        Instant(self.deadline).since_start()
     }
 
     /// Beginning of a slot.

@@ -1,62 +1,178 @@
 //! Errors of this crate.
 
-use fewbits_core::CodecError;
+use crate::note::Note;
+use crate::units::{Seconds, SensorId};
+use fewbits_core::{ArgumentError, CodecError};
 
-fewbits_numerics::errors! {
-    /// What the simulated network refuses.
-    pub enum Error {
-        /// A node that does not exist.
-        #[error("node {node} does not exist: the network has {nodes} nodes")]
-        UnknownNode {
-            /// Its index.
-            node: usize,
-            /// Number of nodes.
-            nodes: usize,
-        },
-        /// A node that sends to itself.
-        #[error("node {node} sends to itself: expected another node")]
-        SelfLink {
-            /// Its index.
-            node: usize,
-        },
-        /// Two nodes that are not in range of each other.
-        #[error("node {to} is out of range of node {from}")]
-        OutOfRange {
-            /// The sender.
-            from: usize,
-            /// The receiver.
-            to: usize,
-        },
-        /// A network that a protocol needs in one piece.
-        #[error("the network is disconnected: {reached} of {nodes} nodes are reached from node {root}")]
-        Disconnected {
-            /// Where the search began.
-            root: usize,
-            /// Nodes that it reached.
-            reached: usize,
-            /// Number of nodes.
-            nodes: usize,
-        },
-        /// A message that does not fit its format.
-        #[error("message does not fit its format: {0}")]
-        Codec(#[from] CodecError),
-        /// An estimator or scheme failed.
-        #[error("estimator: {0}")]
-        Estimator(String),
-        /// What was observed has probability zero under the belief.
-        #[error("the observation is impossible under the belief")]
-        Impossible,
-        /// A stored log or snapshot that cannot be read or written.
-        #[error("stored run: {0}")]
-        Stored(String),
-        /// A replayed run that left its log.
-        #[error("the run left its log at transmission {transmission}: {difference}")]
-        LeftLog {
-            /// Number of the transmission.
-            transmission: usize,
-            /// What differs.
-            difference: &'static str,
-        },
+/// What a crate below this one, or an estimator of the user's own, reported.
+pub type Cause = Box<dyn std::error::Error + Send + Sync>;
+
+/// What the simulated network refuses.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument out of range.
+    #[error(transparent)]
+    Argument(#[from] ArgumentError),
+    /// A node that does not exist.
+    #[error("node {node} does not exist: the network has {nodes} nodes")]
+    UnknownNode {
+        /// Index of the node.
+        node: usize,
+        /// Number of nodes.
+        nodes: usize,
+    },
+    /// A node that sends to itself.
+    #[error("node {node} sends to itself: expected another node")]
+    SelfLink {
+        /// Index of the node.
+        node: usize,
+    },
+    /// Two nodes that are not in range of each other.
+    #[error("node {to} is out of range of node {from}")]
+    OutOfRange {
+        /// The sender.
+        from: usize,
+        /// The receiver.
+        to: usize,
+    },
+    /// A node that takes part although no other node is in range of it.
+    #[error("nobody hears node {node}: expected another node within {range} m")]
+    Unheard {
+        /// Index of the node.
+        node: usize,
+        /// Range of the radios, metres.
+        range: f64,
+    },
+    /// A network that a protocol needs in one piece.
+    #[error("the network is disconnected: {reached} of {nodes} nodes are reached from node {root}")]
+    Disconnected {
+        /// Where the search began.
+        root: usize,
+        /// Nodes that it reached.
+        reached: usize,
+        /// Number of nodes.
+        nodes: usize,
+    },
+    /// The frames of one slot take longer than the slot has time for reports.
+    #[error(
+        "the slot is too short: {frames} frames take at least {needed} of air, and {available} are there before the deadline"
+    )]
+    SlotTooShort {
+        /// Frames of a slot in which every sensor reports.
+        frames: usize,
+        /// Their time on air without payload of reports.
+        needed: Seconds,
+        /// From the beginning of a slot to its deadline.
+        available: Seconds,
+    },
+    /// A node failed in more than half of the slots of the run.
+    #[error("{node} failed in {failed} of {slots} slots; the last time: {last}")]
+    MostSlotsFailed {
+        /// The node.
+        node: SensorId,
+        /// Slots in which it failed.
+        failed: u32,
+        /// Slots of the run.
+        slots: u32,
+        /// What it noted the last time.
+        last: Note,
+    },
+    /// A message that does not fit its format.
+    #[error("message does not fit its format: {0}")]
+    Codec(#[from] CodecError),
+    /// The echo of a slot does not decode to the reports that it was made of: reports do not say where they end, and the estimator says that they
+    /// do ([`Estimator::report_end`](crate::Estimator::report_end)).
+    #[error("reports do not say where they end: the echo of slot {slot} does not decode to them")]
+    UnreadableEcho {
+        /// The slot.
+        slot: u32,
+    },
+    /// What was observed has probability zero under the belief.
+    #[error("the observation is impossible under the belief")]
+    Impossible,
+    /// An update gave a number that is not finite.
+    #[error("the estimate is {value} in coordinate {coordinate}: expected a finite number")]
+    NotFinite {
+        /// Which coordinate.
+        coordinate: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// An estimator or scheme failed for another reason than an impossible observation.
+    #[error("{name} failed")]
+    Estimator {
+        /// Name of the estimator or of its crate.
+        name: &'static str,
+        /// What it reported.
+        source: Cause,
+    },
+    /// A leader that has no reading in its slot.
+    #[error("{node} has no reading in slot {slot}")]
+    NoReading {
+        /// The leader.
+        node: SensorId,
+        /// The slot.
+        slot: u32,
+    },
+    /// A handover whose content is not what the walker sends: other records, another kind of message.
+    #[error("the handover is none of this walk: expected {expected}")]
+    ForeignHandover {
+        /// What was expected.
+        expected: &'static str,
+    },
+    /// A walker's step that ended without an estimate.
+    #[error("the step gave no estimate")]
+    NoEstimate,
+    /// A log or snapshot that cannot be written.
+    #[error("the run cannot be written")]
+    Unwritable {
+        /// Why.
+        source: Cause,
+    },
+    /// A stored log or snapshot that cannot be read.
+    #[error("the stored run cannot be read")]
+    Unreadable {
+        /// Why.
+        source: Cause,
+    },
+    /// A snapshot that names nodes which the network does not have.
+    #[error("the snapshot has {found} nodes: expected {expected}, all that it names among them")]
+    SnapshotOfOtherNetwork {
+        /// Nodes of the snapshot.
+        found: usize,
+        /// Nodes of the network.
+        expected: usize,
+    },
+    /// A replayed run that left its log.
+    #[error("the run left its log at transmission {transmission}: {difference}")]
+    LeftLog {
+        /// Number of the transmission, acknowledgements counted.
+        transmission: usize,
+        /// What differs.
+        difference: &'static str,
+    },
+}
+
+impl Error {
+    /// The error of an estimator, under the estimator's name.
+    pub fn estimator(name: &'static str, source: impl Into<Cause>) -> Self {
+        Self::Estimator {
+            name,
+            source: source.into(),
+        }
+    }
+
+    /// The message with those of all sources, as one line of a log.
+    pub fn in_full(&self) -> String {
+        let mut text = self.to_string();
+        let mut source = std::error::Error::source(self);
+        while let Some(error) = source {
+            text.push_str(": ");
+            text.push_str(&error.to_string());
+            source = error.source();
+        }
+        text
     }
 }
 
@@ -65,7 +181,7 @@ impl From<fewbits_topology::Error> for Error {
         match error {
             fewbits_topology::Error::NoSuchNode { node, nodes } => Self::UnknownNode { node, nodes },
             fewbits_topology::Error::Argument(error) => Self::Argument(error),
-            other => Self::Estimator(other.to_string()),
+            other => Self::estimator("topology", other),
         }
     }
 }
@@ -75,7 +191,7 @@ impl From<fewbits_core::Error> for Error {
         match error {
             fewbits_core::Error::Impossible => Self::Impossible,
             fewbits_core::Error::Argument(error) => Self::Argument(error),
-            other => Self::Estimator(other.to_string()),
+            other => Self::estimator("update", other),
         }
     }
 }
@@ -85,7 +201,7 @@ impl From<fewbits_filters::Error> for Error {
         match error {
             fewbits_filters::Error::Core(error) => error.into(),
             fewbits_filters::Error::Argument(error) => Self::Argument(error),
-            other => Self::Estimator(other.to_string()),
+            other => Self::estimator("filter", other),
         }
     }
 }

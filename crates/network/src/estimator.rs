@@ -1,8 +1,7 @@
-//! The one adapter: what an estimator must offer to run over a network.
+//! What an estimator must offer to run over a network.
 
 use crate::error::Error;
 use fewbits_core::{BitReader, BitString, BitWriter, CodecError, Gaussian, Message, NumberFormat, Observation};
-use fewbits_numerics::error::refuse;
 use rand_pcg::Pcg64Dxsm;
 
 /// Sensors that report, and a receiver that estimates: slot by slot.
@@ -16,7 +15,7 @@ use rand_pcg::Pcg64Dxsm;
 /// Laws: all methods are functions of their arguments, so that two ends that share belief, slot and stream stay equal; a failed
 /// `update` changes nothing.
 pub trait Estimator {
-    /// What the receiver knows.
+    /// What the receiver knows of the state.
     type Belief: Clone;
     /// What a sensor measures in a slot.
     type Measurement;
@@ -42,7 +41,7 @@ pub trait Estimator {
     /// Those of the filter.
     fn predict(&self, rng: &mut Pcg64Dxsm, slot: u32, belief: &Self::Belief) -> Result<Self::Belief, Error>;
 
-    /// What `sensor` is told.
+    /// What `sensor` is told before it measures, made from the prediction.
     ///
     /// # Errors
     /// Those of the scheme.
@@ -53,6 +52,11 @@ pub trait Estimator {
 
     /// How reports travel.
     fn report_format(&self, sensor: usize) -> <Self::Report as Message>::Format;
+
+    /// How the end of a report is found where several reports travel in one message, as in the echo of a slot.
+    fn report_end(&self) -> ReportEnd {
+        ReportEnd::InReport
+    }
 
     /// The sensor's half; `None` is silence.
     ///
@@ -80,8 +84,19 @@ pub trait Estimator {
         observations: &[Observation<Self::Report>],
     ) -> Result<Self::Belief, Error>;
 
-    /// The estimate.
+    /// The estimate: one number per coordinate.
     fn mean(&self, belief: &Self::Belief) -> Vec<f64>;
+}
+
+/// How the end of a report is found where other bits follow it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum ReportEnd {
+    /// Decoding reads as many bits as the report has, whatever follows.
+    #[default]
+    InReport,
+    /// Decoding reads all bits that there are. Where several reports travel together, a length of 16 bits goes before each.
+    OfMessage,
 }
 
 /// An estimator whose belief can itself be sent, so that replicas can be brought together again.
@@ -97,17 +112,6 @@ pub trait Replicable: Estimator {
     /// # Errors
     /// If the bits are no belief.
     fn belief_of(&self, bits: &BitString) -> Result<Self::Belief, Error>;
-}
-
-/// One measurement for each sensor in every slot, and slots that a frame can number.
-pub(crate) fn check_measurements<M>(sensors: usize, measurements: &[Vec<M>]) -> Result<(), Error> {
-    if let Some(slot) = measurements.iter().find(|slot| slot.len() != sensors) {
-        return refuse("measurements", slot.len(), format!("{sensors} in every slot, one per sensor"));
-    }
-    if measurements.len() >= 1 << 29 {
-        return refuse("measurements", measurements.len(), "fewer than 2^29 slots");
-    }
-    Ok(())
 }
 
 /// A belief that is sent whole: `D` means and `D (D + 1)/2` covariances in double precision.

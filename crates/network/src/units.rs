@@ -1,4 +1,4 @@
-//! Quantities that must not be mixed up.
+//! Quantities with units, so that bits, joules, seconds and watts are not mixed up.
 
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::non_negative;
@@ -7,35 +7,46 @@ use std::fmt;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Mul, Sub};
 
-/// A number of bits.
+/// A number of bits; sums saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Bits(pub u64);
 
-/// Which sensor, or node: its index in the field.
+/// Index of a node in the field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct SensorId(pub u32);
 
 impl SensorId {
-    /// Its index.
+    /// The index as a `usize`.
     pub fn index(self) -> usize {
         self.0 as usize
     }
 }
 
-macro_rules! quantity {
-    ($(#[$meta:meta])* $name:ident, $unit:literal) => {
-        $(#[$meta])*
-        #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
-        #[serde(try_from = "f64", into = "f64")]
-        pub struct $name(f64);
+/// Energy, finite and never negative.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
+#[serde(try_from = "f64", into = "f64")]
+pub struct Joules(f64);
 
+/// A duration, finite and never negative.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
+#[serde(try_from = "f64", into = "f64")]
+pub struct Seconds(f64);
+
+/// Power, finite and never negative.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
+#[serde(try_from = "f64", into = "f64")]
+pub struct Watts(f64);
+
+/// Construction, sums and display of a quantity in its unit.
+macro_rules! quantity_operations {
+    ($name:ident, $unit:literal) => {
         impl $name {
-            /// Nothing.
+            /// Zero.
             pub const ZERO: Self = Self(0.0);
 
-            /// The quantity.
+            /// A value in the unit of the type.
             ///
             /// # Errors
             /// If it is negative or not finite.
@@ -48,7 +59,7 @@ macro_rules! quantity {
                 Self(value)
             }
 
-            /// Its value.
+            /// The number, in the unit of the type.
             pub const fn value(self) -> f64 {
                 self.0
             }
@@ -105,21 +116,9 @@ macro_rules! quantity {
     };
 }
 
-quantity!(
-    /// Energy, finite and never negative.
-    Joules,
-    "J"
-);
-quantity!(
-    /// A duration, finite and never negative.
-    Seconds,
-    "s"
-);
-quantity!(
-    /// Power, finite and never negative.
-    Watts,
-    "W"
-);
+quantity_operations!(Joules, "J");
+quantity_operations!(Seconds, "s");
+quantity_operations!(Watts, "W");
 
 impl Mul<Seconds> for Watts {
     type Output = Joules;

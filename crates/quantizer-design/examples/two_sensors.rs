@@ -7,7 +7,7 @@ use fewbits_quantizer_design::{Scene, Symbol, design};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // A standard normal unknown; the second sensor is the better one.
     let scene = Scene::gaussian_with_deviations(1.0, &[1.0, 0.7])?;
-    let best = design::design(&scene, 2)?;
+    let best = design::estimation(&scene, 2)?;
     for quantizer in best.quantizers() {
         println!("breakpoints {:.4?}, levels of the cells {:?}", quantizer.breakpoints(), quantizer.labels());
     }

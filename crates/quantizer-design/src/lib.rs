@@ -1,7 +1,7 @@
 //! Joint design of the scalar quantizers of several sensors, and what follows from their symbols.
 //!
 //! Several sensors measure one unknown through noise, and each may report a few bits. Which cells should each sensor use so
-//! that together they say most? [`design::design`] answers with sensible choices; everything behind it is for the specialist:
+//! that together they say most? [`design::estimation`] and [`design::detection`] answer with sensible choices; everything behind it is for the specialist:
 //!
 //! | module | what it holds |
 //! |---|---|
@@ -47,6 +47,7 @@ pub mod bounds;
 pub mod decoder;
 pub mod design;
 pub mod scene;
+pub mod solve;
 pub mod system;
 pub mod table;
 

@@ -26,6 +26,8 @@ pub enum Certificate {
     Flat,
     /// Some change improves it to second order.
     Saddle,
+    /// The point is not known to be stationary: the iteration was not run to its end, or the breakpoints were rounded.
+    Unproved,
 }
 
 impl Certificate {

@@ -15,6 +15,18 @@ fewbits_numerics::errors! {
             /// Size of the last change, in the units of the stop rule.
             change: f64,
         },
+        /// A design ended where the error is not least: a cell is empty, or some change of the breakpoints still lowers the error.
+        #[error("{algorithm} ended at no optimum: cell {cell} of {levels} has probability {probability:e}")]
+        NotOptimal {
+            /// Which iteration.
+            algorithm: &'static str,
+            /// The least probable cell.
+            cell: usize,
+            /// Number of cells.
+            levels: usize,
+            /// Probability of that cell.
+            probability: f64,
+        },
         /// A table would be larger than allowed.
         #[error("{table} would need {needed} entries: at most {limit} are allowed")]
         TooLarge {
@@ -38,6 +50,12 @@ impl From<Error> for fewbits_core::Error {
             Error::NotConverged { iterations, .. } => Self::NotConverged {
                 evaluations: iterations,
             },
+            Error::NotOptimal { cell, levels, .. } => ArgumentError::new(
+                "levels",
+                levels,
+                format!("a number of levels that leaves cell {cell} something to hold"),
+            )
+            .into(),
             Error::TooLarge { table, needed, limit } => {
                 ArgumentError::new("table", format!("{table} of {needed} entries"), format!("at most {limit}")).into()
             }

@@ -90,6 +90,9 @@ impl Quantizer {
         if labels.len() != breakpoints.len() + 1 {
             return refuse("labels", format!("{} labels", labels.len()), format!("{} labels", breakpoints.len() + 1));
         }
+        if let Some(label) = labels.iter().find(|label| **label >= labels.len()) {
+            return refuse("labels", label, format!("numbers below {}, the number of cells", labels.len()));
+        }
         let levels = labels.iter().max().map_or(0, |m| m + 1);
         if levels < 2 {
             return refuse("labels", "a single level", "at least two levels");
@@ -291,6 +294,13 @@ mod tests {
         assert!(q.factor(0, &channel, 0.0).is_err());
         let never = Channel::from_rows(&[vec![1.0, 1.0, 1.0], vec![0.0; 3]]).unwrap();
         assert_eq!(q.factor(1, &never, 0.25).unwrap().log_likelihood(&[0.0].into()), f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn the_largest_label_is_refused_not_overflowed() {
+        assert!(Quantizer::with_labels(vec![0.0], vec![0, usize::MAX]).is_err());
+        let json = format!(r#"{{"breakpoints":[1.0],"labels":[0,{}]}}"#, usize::MAX);
+        assert!(serde_json::from_str::<Quantizer>(&json).is_err());
     }
 
     #[test]

@@ -1,12 +1,18 @@
 //! `--list` and `describe`: what figures there are, and what one takes and gives.
 
+use super::times::{expected_seconds, in_words};
 use fewbits_experiments::{AnyFigure, Column};
 use std::fmt::Write;
+use std::time::Duration;
 
-/// One line a figure.
-pub(super) fn list(figures: &[&'static dyn AnyFigure]) -> String {
+/// One line per figure: id, expected time on two cores, title.
+pub(super) fn list(figures: &[&'static dyn AnyFigure], quick: bool) -> String {
     let width = figures.iter().map(|f| f.about().id.len()).max().unwrap_or(0);
-    let line = |f: &&dyn AnyFigure| format!("{:width$}  {}\n", f.about().id, f.about().title);
+    let line = |f: &&dyn AnyFigure| {
+        let seconds = expected_seconds(f.about().id, quick);
+        let time = in_words(Duration::from_secs_f64(seconds));
+        format!("{:width$}  {time:>7}  {}\n", f.about().id, f.about().title)
+    };
     figures.iter().map(line).collect()
 }
 

@@ -1,9 +1,11 @@
-//! `index.html`: the state of this run, failures first; figures of earlier runs stand greyed behind it.
+//! `index.html`: the state of this run, failures first, then the systems in the order of the publications. Figures of earlier
+//! runs stand greyed at the end of their system.
 
 use super::draw::typeset;
 use super::record::{Judged, Record};
 use fewbits_experiments::{Verdict, plain};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde_json::Value as Json;
 use std::collections::BTreeSet;
 
 const STYLE: &str = include_str!("gallery.css");
@@ -35,10 +37,60 @@ impl Standing {
     }
 }
 
+/// Systems in the order of the publications, then ours, with their headings.
+const SYSTEMS: [(&str, &str); 10] = [
+    ("dymbo", "Dymbo: one bit per sample"),
+    ("cfwmd", "CFwMD: censored measurements"),
+    ("mi", "Quantizers designed by mutual information"),
+    ("binary", "Binary patterns"),
+    ("assign", "Which bit to ask of which sensor"),
+    ("mpa", "Tracking from quantized ranges"),
+    ("handoff", "Compressed hand-off"),
+    ("diffusive", "A diffusive source"),
+    ("network", "The simulated network"),
+    ("real", "Recorded signals"),
+];
+
+/// Figures under one heading.
+struct Section<'a> {
+    id: &'a str,
+    title: &'a str,
+    figures: Vec<(Standing, &'a Record)>,
+}
+
+/// What failed in this run, then each system with its figures in their order; those of earlier runs last.
+fn sections<'a>(records: impl Iterator<Item = &'a Record>, this_run: &BTreeSet<String>) -> Vec<Section<'a>> {
+    let order: Vec<&str> = fewbits_experiments::all()
+        .iter()
+        .map(|figure| figure.about().id)
+        .collect();
+    let place = |r: &Record| order.iter().position(|id| *id == r.id).unwrap_or(order.len());
+    let mut records: Vec<(Standing, &Record)> = records.map(|r| (Standing::of(r, this_run), r)).collect();
+    records.sort_by_key(|(standing, r)| (*standing == Standing::Earlier, place(r)));
+    let (failed, others): (Vec<_>, Vec<_>) = records.into_iter().partition(|(s, _)| *s == Standing::Failed);
+    let mut sections = vec![Section {
+        id: "failed",
+        title: "Failed in this run",
+        figures: failed,
+    }];
+    for (id, title) in SYSTEMS {
+        let figures = others.iter().copied().filter(|(_, r)| r.system() == id).collect();
+        sections.push(Section { id, title, figures });
+    }
+    let known = |r: &Record| SYSTEMS.iter().any(|(id, _)| *id == r.system());
+    sections.push(Section {
+        id: "others",
+        title: "Others",
+        figures: others.iter().copied().filter(|(_, r)| !known(r)).collect(),
+    });
+    sections.retain(|section| !section.figures.is_empty());
+    sections
+}
+
 /// The page over all records of a directory, of which `this_run` were made now; `note` says what a reader must know first.
 pub(super) fn page<'a>(records: impl Iterator<Item = &'a Record>, this_run: &BTreeSet<String>, note: &str) -> String {
-    let mut records: Vec<(Standing, &Record)> = records.map(|r| (Standing::of(r, this_run), r)).collect();
-    records.sort_by_key(|(standing, _)| *standing);
+    let sections = sections(records, this_run);
+    let records: Vec<(Standing, &Record)> = sections.iter().flat_map(|s| &s.figures).copied().collect();
     let now = || {
         records
             .iter()
@@ -70,31 +122,64 @@ pub(super) fn page<'a>(records: impl Iterator<Item = &'a Record>, this_run: &BTr
                     }
                     @if !note.is_empty() { p.notice { (note) } }
                     @for notice in notices(&records) { p.notice { (notice) } }
-                    form role="search" aria-label="Choose figures" {
-                        label { "Search " input id="search" type="search" placeholder="id, title, claim"; }
-                        label { "System "
-                            select id="system" { option value="" { "all" } @for s in &systems { option { (s) } } }
-                        }
-                        label { "Verdict "
-                            select id="verdict" {
-                                option value="" { "all" }
-                                @for s in [Standing::Failed, Standing::Passed, Standing::Earlier] { option value=(s.word()) { (s.word()) } }
+                    details.index {
+                        summary { "Find a figure" }
+                        form role="search" aria-label="Choose figures" {
+                            label { "Search " input id="search" type="search" placeholder="id, title, claim"; }
+                            label { "System "
+                                select id="system" { option value="" { "all" } @for s in &systems { option { (s) } } }
                             }
+                            label { "Source "
+                                select id="source" {
+                                    option value="" { "all" }
+                                    option value="paper" { "publications" }
+                                    option value="ours" { "ours" }
+                                }
+                            }
+                            label { "Verdict "
+                                select id="verdict" {
+                                    option value="" { "all" }
+                                    @for s in [Standing::Failed, Standing::Passed, Standing::Earlier] { option value=(s.word()) { (s.word()) } }
+                                }
+                            }
+                            output id="shown" aria-live="polite" {}
                         }
-                        output id="shown" aria-live="polite" {}
+                        nav aria-label="Figures" { @for section in &sections { (index(section)) } }
                     }
-                    nav aria-label="Figures" { ul {
-                        @for (standing, r) in &records {
-                            li data-figure=(r.id) { a class=(standing.word()) href={ "#" (r.id) } { (r.id) } " " small { (tally(r)) } }
-                        }
-                    } }
                 }
-                main id="figures" { @for (standing, r) in &records { (figure(*standing, r)) } }
+                main id="figures" {
+                    @for section in &sections {
+                        section.system data-section=(section.id) {
+                            h2 { (section.title) }
+                            @for (standing, r) in &section.figures { (figure(*standing, r)) }
+                        }
+                    }
+                }
                 script { (PreEscaped(SCRIPT)) }
             }
         }
     }
     .into_string()
+}
+
+/// A section's figures as small pictures with titles.
+fn index(section: &Section<'_>) -> Markup {
+    html! {
+        h2 { (section.title) }
+        ul {
+            @for (standing, r) in &section.figures {
+                li data-figure=(r.id) {
+                    a class=(standing.word()) href={ "#" (r.id) } {
+                        @if let Some(svg) = r.files.iter().find(|name| name.ends_with(".svg")) {
+                            img src=(svg) alt="" loading="lazy" decoding="async";
+                        }
+                        (typeset(&r.title))
+                    }
+                    small { (r.id) ", " (tally(r)) }
+                }
+            }
+        }
+    }
 }
 
 /// What differs between the figures on the page, and so forbids to read them as one run.
@@ -120,8 +205,9 @@ fn notices(records: &[(Standing, &Record)]) -> Vec<String> {
         ));
     }
     if earlier > 0 {
-        notices
-            .push(format!("{earlier} figures were not run this time; they stand greyed at the end, with their date."));
+        notices.push(format!(
+            "{earlier} figures were not run this time; they stand greyed behind the others, with their date."
+        ));
     }
     notices
 }
@@ -141,8 +227,9 @@ fn figure(standing: Standing, r: &Record) -> Markup {
     let skipped = r.count(Verdict::Skipped);
     let downloads = r.files.iter().cloned().chain([format!("{}.json", r.id)]);
     html! {
-        article id=(r.id) class=(standing.word()) data-system=(r.system()) aria-labelledby={ (r.id) "-title" } {
-            h2 id={ (r.id) "-title" } { (typeset(&r.title)) " " small { (r.id) } }
+        @let origin = if r.source.is_empty() { "ours" } else { "paper" };
+        article id=(r.id) class=(standing.word()) data-system=(r.system()) data-source=(origin) aria-labelledby={ (r.id) "-title" } {
+            h3 id={ (r.id) "-title" } { (typeset(&r.title)) " " small { (r.id) } }
             p.standing {
                 span class={ "badge " (standing.word()) } { (standing.word()) }
                 @if r.quick { " " span.badge { "quick" } }
@@ -165,14 +252,37 @@ fn figure(standing: Standing, r: &Record) -> Markup {
                         }
                     }
                     details {
-                        summary { "Parameters" }
+                        summary { "Command and parameters" }
+                        pre { code { (r.command()) } }
                         dl {
                             @for (name, value) in &r.parameters { dt { (name) } dd { (plain(value)) } }
                             dt { "seed" } dd { (r.seed) }
                         }
                         p { small { "Version " (r.version) ", commit " (r.commit) ", " (r.finished) ", " (format!("{:.2}", r.wall_time_s)) " s." } }
                     }
+                    @for (name, columns) in &r.columns { (columns_of(name, columns)) }
                     p.downloads { "Download: " @for name in downloads { a href=(name) download { (name) } " " } }
+                }
+            }
+        }
+    }
+}
+
+/// The columns of one CSV file with their units and meanings.
+fn columns_of(name: &str, columns: &Json) -> Markup {
+    let text = |column: &Json, key: &str| column[key].as_str().unwrap_or_default().to_owned();
+    let columns = columns.as_array().map_or(&[][..], Vec::as_slice);
+    html! {
+        details {
+            summary { "Columns of " (name) }
+            div.scroll tabindex="0" role="region" aria-label={ "Columns of " (name) } {
+                table {
+                    thead { tr { th scope="col" { "column" } th scope="col" { "unit" } th scope="col" { "meaning" } } }
+                    tbody {
+                        @for column in columns {
+                            tr { td { code { (text(column, "name")) } } td { (typeset(&text(column, "unit"))) } td { (typeset(&text(column, "meaning"))) } }
+                        }
+                    }
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! What is on disk about a figure: the content of its JSON, which gallery, summary, `--failed` and `merge` read back.
 
 use super::{Error, Options};
+use fewbits_experiments::plot::{Plot, Shape};
 use fewbits_experiments::{About, Claim, Outcome, Verdict, plain};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json, json};
@@ -25,6 +26,9 @@ pub(super) struct Record {
     pub(super) version: String,
     #[serde(default)]
     pub(super) commit: String,
+    /// Of all that the result depends on; none if it may change without that.
+    #[serde(default)]
+    pub(super) fingerprint: Option<String>,
     #[serde(default)]
     pub(super) finished: String,
     pub(super) wall_time_s: f64,
@@ -93,9 +97,24 @@ static COMMIT: LazyLock<String> = LazyLock::new(|| {
     git(&["rev-parse", "--short", "HEAD"]).map_or_else(String::new, |hash| hash + if changed { "+" } else { "" })
 });
 
+/// Whether a plot shows error bars.
+fn has_error_bars(plot: &Plot) -> bool {
+    let layers = plot.panels.iter().flat_map(|panel| &panel.layers);
+    layers.into_iter().any(|layer| match &layer.shape {
+        Shape::Points { errors, .. } => errors.iter().any(|error| *error > 0.0),
+        _ => false,
+    })
+}
+
 impl Record {
     /// A figure's record without result.
-    pub(super) fn new(about: About, parameters: &Map<String, Json>, elapsed: Duration, options: &Options) -> Self {
+    pub(super) fn new(
+        about: About,
+        parameters: &Map<String, Json>,
+        elapsed: Duration,
+        options: &Options,
+        fingerprint: Option<String>,
+    ) -> Self {
         Self {
             id: about.id.to_owned(),
             title: about.title.to_owned(),
@@ -107,6 +126,7 @@ impl Record {
             quick: options.quick,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             commit: COMMIT.clone(),
+            fingerprint,
             finished: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
             wall_time_s: elapsed.as_secs_f64(),
             files: Vec::new(),
@@ -121,6 +141,9 @@ impl Record {
     pub(super) fn with(mut self, outcome: &Outcome) -> Self {
         self.rows = outcome.tables.main.len();
         self.claims = outcome.claims.iter().map(Judged::from).collect();
+        if has_error_bars(&outcome.plot) && !self.caption.contains("standard error") {
+            self.caption.push_str(" Error bars: one standard error.");
+        }
         self
     }
 
@@ -128,6 +151,28 @@ impl Record {
     pub(super) fn failed(mut self, error: String) -> Self {
         self.error = Some(error);
         self
+    }
+
+    /// The command that makes it again.
+    pub(super) fn command(&self) -> String {
+        let figures = fewbits_experiments::all();
+        let defaults = figures
+            .iter()
+            .find(|figure| figure.about().id == self.id)
+            .and_then(|figure| figure.configure(&[], self.quick).ok())
+            .unwrap_or_default();
+        let mut command = format!("cargo xtask figures {}", self.id);
+        let changed = |(name, value): &(&String, &Json)| defaults.get(*name) != Some(value);
+        for (name, value) in self.parameters.iter().filter(changed) {
+            command.push_str(&format!(" --set {name}={}", plain(value).replace(", ", ",")));
+        }
+        if self.seed != 1 {
+            command.push_str(&format!(" --seed {}", self.seed));
+        }
+        if self.quick {
+            command.push_str(" --quick");
+        }
+        command
     }
 
     pub(super) fn system(&self) -> &str {

@@ -30,10 +30,10 @@ pub(super) fn figures(patterns: &[String]) -> Result<Vec<&'static dyn AnyFigure>
             }
         }
         if !found {
-            let valid: Vec<_> = figures.iter().map(|figure| figure.about().id).collect();
+            let ids: Vec<_> = figures.iter().map(|figure| figure.about().id).collect();
             return Err(Error::UnknownFigure {
                 pattern: pattern.clone(),
-                valid: valid.join(", "),
+                advice: advice(pattern, &ids),
             });
         }
     }
@@ -43,6 +43,22 @@ pub(super) fn figures(patterns: &[String]) -> Result<Vec<&'static dyn AnyFigure>
         .filter(|(_, chosen)| *chosen)
         .map(|(figure, _)| figure)
         .collect())
+}
+
+/// The ids that are nearest to what was asked for; all if none is near.
+fn advice(pattern: &str, ids: &[&str]) -> String {
+    const NEAR: f64 = 0.88;
+    const MOST: usize = 4;
+    let mut near: Vec<(f64, &str)> = ids.iter().map(|id| (strsim::jaro_winkler(pattern, id), *id)).collect();
+    near.retain(|(similarity, _)| *similarity >= NEAR);
+    near.sort_by(|a, b| b.0.total_cmp(&a.0));
+    near.truncate(MOST);
+    if near.is_empty() {
+        format!("the figures are: {}", ids.join(", "))
+    } else {
+        let near: Vec<_> = near.into_iter().map(|(_, id)| id).collect();
+        format!("did you mean {}? (`--list` names all figures)", near.join(", "))
+    }
 }
 
 /// Every `n`-th figure, beginning with the `i`-th, of a shard `i/n`.

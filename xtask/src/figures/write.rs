@@ -1,10 +1,12 @@
 //! Files: each is written under a temporary name and then renamed, so that none is ever half-written.
 
 use super::record::Record;
-use super::{Error, draw};
+use super::{Ending, Error, draw, gallery, print, summary};
 use fewbits_experiments::{Outcome, Table};
 use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// The output directory.
 pub(super) struct Directory {
@@ -109,4 +111,48 @@ fn to_csv(table: &Table) -> Result<Vec<u8>, csv::Error> {
         writer.write_record(row.iter().map(ToString::to_string))?;
     }
     writer.into_inner().map_err(|error| error.into_error().into())
+}
+
+/// What a run leaves besides its figures: the gallery, and the summary as text and on standard output.
+pub(super) struct Summary<'a> {
+    pub(super) out: &'a Directory,
+    /// Whether standard output gets JSON.
+    pub(super) json: bool,
+    /// What a reader must know first; empty for nothing.
+    pub(super) note: &'a str,
+}
+
+impl Summary<'_> {
+    /// Writes `index.html` and `summary.txt`: `records` are those of this run, `all` those of the directory.
+    pub(super) fn write(
+        &self,
+        records: &[Record],
+        all: &BTreeMap<String, Record>,
+        elapsed: Duration,
+    ) -> Result<(), Error> {
+        let this_run: BTreeSet<String> = records.iter().map(|r| r.id.clone()).collect();
+        let page = gallery::page(all.values(), &this_run, self.note);
+        self.out.write("index.html", page.as_bytes())?;
+        let text = summary::text(records, self.out.path(), elapsed);
+        let note = if self.note.is_empty() {
+            String::new()
+        } else {
+            format!("{}\n", self.note)
+        };
+        self.out.write("summary.txt", format!("{note}{text}").as_bytes())
+    }
+
+    /// Prints the summary.
+    pub(super) fn print(&self, records: &[Record], elapsed: Duration) -> Ending {
+        let page = if self.json { summary::json } else { summary::text };
+        print(&page(records, self.out.path(), elapsed));
+        if !self.note.is_empty() {
+            eprintln!("{}", self.note);
+        }
+        if records.iter().all(Record::good) {
+            Ending::Good
+        } else {
+            Ending::Failed
+        }
+    }
 }

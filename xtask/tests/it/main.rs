@@ -45,7 +45,8 @@ fn a_figure_leaves_csv_json_svg_and_a_gallery() {
             "dymbo-prop2.csv",
             "dymbo-prop2.json",
             "dymbo-prop2.svg",
-            "index.html"
+            "index.html",
+            "summary.txt"
         ]
     );
     let document: serde_json::Value = serde_json::from_slice(&files["dymbo-prop2.json"]).unwrap();
@@ -62,6 +63,52 @@ fn a_figure_leaves_csv_json_svg_and_a_gallery() {
     assert!(text(&files["index.html"]).contains("dymbo-prop2.svg"));
     let summary = text(&run.stdout);
     assert!(summary.contains("dymbo-prop2") && summary.contains("index.html"), "{summary}");
+}
+
+#[test]
+fn each_finished_figure_is_a_line_off_a_terminal() {
+    let out = tempfile::tempdir().unwrap();
+    let run = figures(out.path(), &["mi-table4-[25]", "--quick"]);
+    let lines = text(&run.stderr);
+    assert!(lines.contains("2 figures to make"), "{lines}");
+    assert!(lines.contains("[1/2] ") && lines.contains("[2/2] ") && lines.contains("claims hold"), "{lines}");
+    let summary = text(&files(out.path())["summary.txt"]);
+    assert!(text(&run.stdout).contains("2 figures in") && summary.contains("2 figures in"), "{summary}");
+}
+
+#[test]
+fn unchanged_figures_are_kept_until_forced() {
+    let out = tempfile::tempdir().unwrap();
+    let stamp = || {
+        std::fs::metadata(out.path().join("mi-table4-2.csv"))
+            .unwrap()
+            .modified()
+            .unwrap()
+    };
+    assert!(figures(out.path(), &["mi-table4-2", "--quick"]).status.success());
+    let made = stamp();
+    let again = figures(out.path(), &["mi-table4-2", "--quick"]);
+    assert!(text(&again.stderr).contains("1 unchanged figures are kept"), "{}", text(&again.stderr));
+    assert!(text(&again.stdout).contains("mi-table4-2"));
+    assert_eq!(stamp(), made);
+    // Another seed, and the same again by force.
+    for arguments in [["--seed", "2"], ["--seed", "2"]] {
+        let before = stamp();
+        let force = ["mi-table4-2", "--quick", "--force"];
+        assert!(
+            figures(out.path(), &[&force[..], &arguments[..]].concat())
+                .status
+                .success()
+        );
+        assert_ne!(stamp(), before);
+    }
+}
+
+#[test]
+fn a_near_miss_of_an_id_is_mended() {
+    let out = tempfile::tempdir().unwrap();
+    let message = text(&figures(out.path(), &["dymbo-fgi5"]).stderr);
+    assert!(message.contains("did you mean dymbo-fig5"), "{message}");
 }
 
 #[test]

@@ -5,8 +5,8 @@ use crate::prelude::*;
 use fewbits_core::{Belief, Dynamics, Gaussian, Link, Sensing};
 use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
 use fewbits_models::{Ar1, LinearSensor};
-use fewbits_network::estimators::Counted;
-use fewbits_network::{Channel, Fault, Loss, Mishap, Seconds, SensorId, Setup, Star};
+use fewbits_network::estimators::ParallelDymboEstimator;
+use fewbits_network::{Channel, Fault, FaultKind, Loss, Seconds, SensorId, Setup, Star};
 use nalgebra::Vector1;
 
 const SENSORS: usize = 4;
@@ -83,7 +83,7 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
     let mut faults = vec![Fault {
         at: at(f64::from(middle) + 0.95)?,
         node: restarted,
-        what: Mishap::Restart,
+        kind: FaultKind::Restart,
     }];
     match point.fault {
         "loss" => channel.loss = Loss::Fixed(point.level),
@@ -93,8 +93,8 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
             // The last sensors die first, so that the restarted one is the last to go.
             for i in 0..point.level as u32 {
                 let node = SensorId(SENSORS as u32 - i);
-                let (at, what) = (at(slots as f64 / 4.0)?, Mishap::Death);
-                faults.push(Fault { at, node, what });
+                let (at, kind) = (at(slots as f64 / 4.0)?, FaultKind::Death);
+                faults.push(Fault { at, node, kind });
             }
         }
     }
@@ -107,7 +107,7 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
     };
     let filter = ParallelFilter::new(ScalarPlant::new(a, q, 1.0)?, SENSORS, CountFusion::Exact)?;
     let filter = filter.with_link(Link::lossy(lost.min(0.99))?);
-    let estimator = Counted::new(filter, start)?;
+    let estimator = ParallelDymboEstimator::new(filter, start)?;
     let own = stream.named("filter");
     let star = if point.echoed {
         Star::echoed(estimator, measurements, clock, own)

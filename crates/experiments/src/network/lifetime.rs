@@ -3,7 +3,7 @@
 use super::schemes::{self, Scheme};
 use super::worlds;
 use crate::prelude::*;
-use fewbits_network::Radio;
+use fewbits_network::{Radio, TWO_AA_CELLS};
 
 parameters! {
     pub struct Parameters {
@@ -72,7 +72,7 @@ impl Figure for Lifetime {
             for (i, scheme) in schemes.iter().enumerate() {
                 let energy = Measured::mean(&runs[0].moments(i, 4));
                 let idle = 1e-3 * baseline + radio.sleep.value();
-                let days = |power: f64| radio.battery.value() / power / DAY;
+                let days = |power: f64| TWO_AA_CELLS.value() / power / DAY;
                 rows.push(Row {
                     scheme: scheme.family(),
                     setting: scheme.setting(),

@@ -15,7 +15,10 @@ use fewbits_dymbo::{CountFusion, InnovationWord, MultibitFilter, ParallelFilter,
 use fewbits_filters::{AssumedDensity, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
-use fewbits_network::estimators::{Bits, Censors, Counted, Followers, Leaders, LookUp, Patterns, Reporting, SendAll};
+use fewbits_network::estimators::{
+    CensoringEstimator, DymboEstimator, Followers, Leaders, LookUp, ParallelDymboEstimator, Patterns, Reporting,
+    SendAll,
+};
 use fewbits_network::{Clock, Field, Ledger, Radio, Replicable, Seconds, SensorId, Setup, Star, Walk};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
 use fewbits_quantizer_design::{Criterion, Newton, Scene, System, design};
@@ -224,12 +227,12 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
         format: NumberFormat,
         shared: bool,
         slots: usize,
-    ) -> Result<Censors<G, LinearSensor<D, 1>, D, 1>, Error> {
+    ) -> Result<CensoringEstimator<G, LinearSensor<D, 1>, D, 1>, Error> {
         let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT)?;
         if shared {
-            return Ok(Censors::told(network, format, self.dynamics.clone(), self.start));
+            return Ok(CensoringEstimator::told(network, format, self.dynamics.clone(), self.start));
         }
-        Ok(Censors::own(network, format, self.dynamics.clone(), self.start, slots)?)
+        Ok(CensoringEstimator::own(network, format, self.dynamics.clone(), self.start, slots)?)
     }
 
     fn handed(&self, components: usize, resolution: f64, stream: Stream, slots: usize) -> Result<Bill, Error> {
@@ -389,12 +392,12 @@ impl World<1, Ar1> {
         match scheme {
             Scheme::SignBits { sensors, talk } => {
                 let filter = ParallelFilter::new(plant, sensors, CountFusion::Exact)?;
-                let counted = Counted::new(filter, start)?;
+                let counted = ParallelDymboEstimator::new(filter, start)?;
                 self.over_star(counted, talk, stream, slots)
             }
             Scheme::Word { bits, talk } => {
                 let filter = MultibitFilter::new(plant, bits)?;
-                self.over_star(Bits { filter, start }, talk, stream, slots)
+                self.over_star(DymboEstimator { filter, start }, talk, stream, slots)
             }
             Scheme::Information { levels } => {
                 let from = System::lloyd_max(scene()?, levels)?;

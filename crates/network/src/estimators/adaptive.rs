@@ -1,8 +1,7 @@
 //! Signals followed within a guaranteed error, and a filter of what they measure.
 
-use super::failed;
 use crate::error::Error;
-use crate::estimator::{Estimator, Replicable, gaussian_bits, gaussian_of};
+use crate::estimator::{Estimator, Replicable, ReportEnd, gaussian_bits, gaussian_of};
 use fewbits_adaptive::{Config, Packet, Receiver, Sensor};
 use fewbits_core::factor::InCell;
 use fewbits_core::{BitReader, BitString, BitWriter, Cell, CodecError, Gaussian, LinearDynamics, Observation, Sensing};
@@ -14,8 +13,8 @@ use serde::{Deserialize, Serialize};
 /// Sensors that each follow their own measurements by [`fewbits_adaptive`], knowing no model and told nothing, and a centre that
 /// knows one: the reconstruction `v` says that the measurement lies in `[v - delta, v + delta)`, silence included.
 ///
-/// Reports have no length of their own, which their frames have; so [`Star::told`](crate::Star::told) and
-/// [`AdHoc`](crate::AdHoc) carry them, and [`Star::echoed`](crate::Star::echoed), which repeats several in one frame, does not.
+/// Packets do not say where they end, their frames do: an echo of several packets has a length before each
+/// ([`ReportEnd::OfMessage`]).
 ///
 /// While a receiver is out of step with its sensor, its reconstructions say nothing. Over links that lose packets, take a
 /// [`Config::resilient`].
@@ -93,6 +92,10 @@ where
 
     fn report_format(&self, _: usize) {}
 
+    fn report_end(&self) -> ReportEnd {
+        ReportEnd::OfMessage
+    }
+
     fn report(
         &self,
         _: &mut Pcg64Dxsm,
@@ -102,7 +105,9 @@ where
         measurement: &Vector1<f64>,
         (): &(),
     ) -> Result<Option<Packet>, Error> {
-        let report = memory.encode(measurement[0]).map_err(failed)?;
+        let report = memory
+            .encode(measurement[0])
+            .map_err(|error| Error::estimator("adaptive", error))?;
         Ok(report.map(|report| report.packet))
     }
 
@@ -119,7 +124,7 @@ where
             let tracked = receiver
                 .receive(observation)
                 .or_else(|_| receiver.receive(&Observation::Lost))
-                .map_err(failed)?;
+                .map_err(|error| Error::estimator("adaptive", error))?;
             let (Some(value), true) = (tracked.value, tracked.synchronised) else {
                 continue;
             };
@@ -144,7 +149,7 @@ where
     fn belief_bits(&self, belief: &Followed<D>) -> Result<BitString, Error> {
         let (mut writer, mut stored) = (BitWriter::new(), Vec::new());
         gaussian_bits(&belief.state, &mut writer)?;
-        ciborium::into_writer(&belief.receivers, &mut stored).map_err(failed)?;
+        ciborium::into_writer(&belief.receivers, &mut stored).map_err(|error| Error::estimator("adaptive", error))?;
         stored.iter().try_for_each(|byte| writer.write(u64::from(*byte), 8))?;
         Ok(writer.finish())
     }
@@ -156,7 +161,8 @@ where
         while reader.remaining() > 0 {
             stored.push(reader.read(8)? as u8);
         }
-        let receivers: Vec<Receiver> = ciborium::from_reader(stored.as_slice()).map_err(failed)?;
+        let receivers: Vec<Receiver> =
+            ciborium::from_reader(stored.as_slice()).map_err(|error| Error::estimator("adaptive", error))?;
         if receivers.len() != self.sensors.len() || receivers.iter().any(|receiver| *receiver.config() != self.config) {
             let expected = "one receiver for each sensor, of the agreed configuration";
             return Err(CodecError::Invalid {

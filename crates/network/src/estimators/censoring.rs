@@ -1,6 +1,5 @@
 //! Censoring sensors; with threshold 0, sensors that send everything.
 
-use super::failed;
 use crate::error::Error;
 use crate::estimator::{Estimator, gaussian_replica};
 use fewbits_cfwmd::network::Network;
@@ -18,7 +17,7 @@ use rand_pcg::Pcg64Dxsm;
 fn of(error: fewbits_cfwmd::Error) -> Error {
     match error {
         fewbits_cfwmd::Error::Core(error) => error.into(),
-        other => failed(other),
+        other => Error::estimator("cfwmd", other),
     }
 }
 
@@ -61,7 +60,7 @@ impl<const D: usize> Message for Broadcast<D> {
 
 /// Censoring sensors under [`Network::fuse`]. CFwMD, CFwMD2, a schedule, or all-send by a threshold of 0.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Censors<G, S, const D: usize, const M: usize> {
+pub struct CensoringEstimator<G, S, const D: usize, const M: usize> {
     network: Network<S, D, M>,
     dynamics: G,
     start: Gaussian<D>,
@@ -71,7 +70,7 @@ pub struct Censors<G, S, const D: usize, const M: usize> {
     rules: Vec<Vec<CensoringRule<M>>>,
 }
 
-impl<G, S, const D: usize, const M: usize> Censors<G, S, D, M>
+impl<G, S, const D: usize, const M: usize> CensoringEstimator<G, S, D, M>
 where
     G: LinearDynamics<D>,
     S: LinearSensing<D, M> + Clone + PartialEq,
@@ -155,7 +154,7 @@ where
     }
 }
 
-impl<G, S, const D: usize, const M: usize> Estimator for Censors<G, S, D, M>
+impl<G, S, const D: usize, const M: usize> Estimator for CensoringEstimator<G, S, D, M>
 where
     G: LinearDynamics<D>,
     S: LinearSensing<D, M> + Clone + PartialEq,
@@ -236,5 +235,5 @@ where
     }
 }
 
-gaussian_replica!([G, S, const D: usize, const M: usize] Censors<G, S, D, M>
+gaussian_replica!([G, S, const D: usize, const M: usize] CensoringEstimator<G, S, D, M>
     where G: LinearDynamics<D>, S: LinearSensing<D, M> + Clone + PartialEq);

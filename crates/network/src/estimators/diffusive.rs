@@ -1,9 +1,8 @@
 //! A diffusing source found by records that travel from node to node.
 
-use super::failed;
 use crate::error::Error;
+use crate::protocols::{Lead, Walker};
 use crate::units::SensorId;
-use crate::walk::{Lead, Walker};
 use fewbits_core::{BitString, Message, NumberFormat};
 use fewbits_diffusive::message::{Contract, Packet};
 use fewbits_diffusive::{Form, Outcome, Search, SourceSensor, Status};
@@ -70,12 +69,14 @@ impl SourceChain {
                         }
                     }
                 })
-                .map_err(failed)
+                .map_err(|error| Error::estimator("diffusive", error))
         };
         let nobody = Cell::new(None);
         let outcome = run(known.len(), &nobody)?;
         if nobody.get().is_some() {
-            return Err(failed("the records are none of this search"));
+            return Err(Error::ForeignHandover {
+                expected: "records of this search",
+            });
         }
         let next = Cell::new(None);
         if outcome.status == Status::NodeLimit && known.len() < self.search.most_nodes {
@@ -86,7 +87,7 @@ impl SourceChain {
 }
 
 impl Walker for SourceChain {
-    fn lead(&self, _: &mut Pcg64Dxsm, _: u32, node: SensorId, message: Option<&BitString>) -> Result<Lead, Error> {
+    fn lead(&self, _: &mut Pcg64Dxsm, slot: u32, node: SensorId, message: Option<&BitString>) -> Result<Lead, Error> {
         let contract = Contract {
             wire: self.search.wire,
             noise: self.sensor.noise(),
@@ -96,13 +97,17 @@ impl Walker for SourceChain {
             None => Vec::new(),
             Some(bits) => match Packet::from_bits(&contract, bits)? {
                 Packet::Raw { records, .. } => records,
-                Packet::Belief { .. } => return Err(failed("a belief where records were expected")),
+                Packet::Belief { .. } => {
+                    return Err(Error::ForeignHandover {
+                        expected: "raw records",
+                    });
+                }
             },
         };
-        let own = self.samples.get(node.index()).ok_or_else(|| failed("no samples"))?;
+        let own = self.samples.get(node.index()).ok_or(Error::NoReading { node, slot })?;
         known.push((node.index(), own.clone()));
         let (outcome, next) = self.repeat(&known)?;
-        let estimate = outcome.estimate().ok_or_else(|| failed("no estimate"))?;
+        let estimate = outcome.estimate().ok_or(Error::NoEstimate)?;
         let packet = Packet::Raw {
             records: known,
             noise: contract.noise,

@@ -1,6 +1,5 @@
-//! One bit a sample, or a few.
+//! One bit per sample, or a few: the filters of Dymbo.
 
-use super::failed;
 use crate::error::Error;
 use crate::estimator::{Estimator, gaussian_replica};
 use fewbits_core::{Gaussian, Message, NumberFormat, Observation, Scheme, Sign};
@@ -12,20 +11,20 @@ fn impossible(error: fewbits_dymbo::Error) -> Error {
     match error {
         fewbits_dymbo::Error::Core(error) => error.into(),
         fewbits_dymbo::Error::Argument(error) => Error::Argument(error),
-        other => failed(other),
+        other => Error::estimator("dymbo", other),
     }
 }
 
-/// One sensor under a [`ScalarFilter`] of Dymbo: one bit a sample, or several.
+/// One sensor under a [`ScalarFilter`] of Dymbo: one bit per sample, or several.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Bits<F> {
+pub struct DymboEstimator<F> {
     /// The filter, with what it knows of the link.
     pub filter: F,
     /// What is known before the first slot.
     pub start: Gaussian<1>,
 }
 
-impl<F: ScalarFilter> Estimator for Bits<F> {
+impl<F: ScalarFilter> Estimator for DymboEstimator<F> {
     type Belief = Gaussian<1>;
     type Measurement = Vector1<f64>;
     type Question = <F::Scheme as Scheme<1>>::Feedback;
@@ -86,17 +85,17 @@ impl<F: ScalarFilter> Estimator for Bits<F> {
     }
 }
 
-gaussian_replica!([F] Bits<F> where F: ScalarFilter);
+gaussian_replica!([F] DymboEstimator<F> where F: ScalarFilter);
 
 /// `K` one-bit sensors of one threshold: [`ParallelFilter`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Counted {
+pub struct ParallelDymboEstimator {
     filter: ParallelFilter,
     scheme: SignBit,
     start: Gaussian<1>,
 }
 
-impl Counted {
+impl ParallelDymboEstimator {
     /// The filter, with what it knows of the links, and what is known before the first slot.
     ///
     /// # Errors
@@ -107,7 +106,7 @@ impl Counted {
     }
 }
 
-impl Estimator for Counted {
+impl Estimator for ParallelDymboEstimator {
     type Belief = Gaussian<1>;
     type Measurement = Vector1<f64>;
     type Question = f64;
@@ -166,4 +165,4 @@ impl Estimator for Counted {
     }
 }
 
-gaussian_replica!([] Counted);
+gaussian_replica!([] ParallelDymboEstimator);

@@ -1,9 +1,8 @@
 //! Leaders that follow a target by a coded mixture.
 
-use super::failed;
 use crate::error::Error;
+use crate::protocols::{Lead, Walker};
 use crate::units::SensorId;
-use crate::walk::{Lead, Walker};
 use fewbits_core::{BitString, Dynamics, Likelihood, Message};
 use fewbits_densities::Mixture;
 use fewbits_densities::wire::CodedMixture;
@@ -36,14 +35,18 @@ impl<const D: usize, G: Dynamics<D>, L: Likelihood<D>> Walker for Leaders<D, G, 
         };
         let at = (slot as usize).saturating_sub(1);
         let reading = self.readings.get(at).and_then(|slot| slot.get(node.index()));
-        let reading = reading.ok_or_else(|| failed(format_args!("{node} has no reading in slot {slot}")))?;
+        let reading = reading.ok_or(Error::NoReading { node, slot })?;
         let (particles, _) = self
             .filter
             .posterior(rng, &received, &self.dynamics, reading)
             .map_err(of)?;
         let estimate = self.filter.estimate(&particles).map_err(of)?;
-        let mixture = coded.reduction.reduce(&estimate, coded.components).map_err(failed)?;
-        let message = CodedMixture::new(&mixture, &coded.format, coded.resolution).map_err(failed)?;
+        let mixture = coded
+            .reduction
+            .reduce(&estimate, coded.components)
+            .map_err(|error| Error::estimator("handoff", error))?;
+        let message = CodedMixture::new(&mixture, &coded.format, coded.resolution)
+            .map_err(|error| Error::estimator("handoff", error))?;
         Ok(Lead {
             estimate: message.mixture().mean().as_slice().to_vec(),
             message: message.to_bits(&coded.format)?,
@@ -55,6 +58,6 @@ impl<const D: usize, G: Dynamics<D>, L: Likelihood<D>> Walker for Leaders<D, G, 
 fn of(error: fewbits_handoff::Error) -> Error {
     match error {
         fewbits_handoff::Error::Density(fewbits_densities::Error::Core(error)) => error.into(),
-        other => failed(other),
+        other => Error::estimator("handoff", other),
     }
 }

@@ -1,6 +1,5 @@
 //! Static quantizers and a table at the fusion centre: no feedback, no memory.
 
-use super::failed;
 use crate::error::Error;
 use crate::estimator::{Estimator, gaussian_replica};
 use fewbits_binary_patterns::{Bit, LookupTable, PatternSensor};
@@ -47,13 +46,13 @@ impl LookUp {
             let levels = quantizer.levels();
             Labelling::gray(levels)
                 .or_else(|_| Labelling::natural(levels))
-                .map_err(failed)
+                .map_err(|error| Error::estimator("look-up", error))
         };
         let (mean, variance) = moments(scene.values(), scene.weights());
         Ok(Self {
             labellings: quantizers.iter().map(labelling).collect::<Result<_, Error>>()?,
             quantizers,
-            decoder: MmseDecoder::new(system, limit).map_err(failed)?,
+            decoder: MmseDecoder::new(system, limit).map_err(|error| Error::estimator("look-up", error))?,
             prior: Gaussian::scalar(mean, variance)?,
         })
     }
@@ -66,14 +65,9 @@ fn moments(values: &[f64], weights: &[f64]) -> (f64, f64) {
     (mean, all().map(|(x, w)| w * (x - mean) * (x - mean)).sum::<f64>() / mass)
 }
 
-/// What estimators of a scalar share where every slot stands alone: nothing is asked, nothing is remembered.
+/// Methods of estimators of a scalar where every slot stands alone: nothing is asked, nothing is remembered.
 macro_rules! stands_alone {
     ($sensors:ident) => {
-        type Belief = Gaussian<1>;
-        type Measurement = Vector1<f64>;
-        type Question = ();
-        type Memory = ();
-
         fn sensors(&self) -> usize {
             self.$sensors.len()
         }
@@ -101,7 +95,11 @@ macro_rules! stands_alone {
 }
 
 impl Estimator for LookUp {
+    type Belief = Gaussian<1>;
+    type Measurement = Vector1<f64>;
+    type Question = ();
     type Report = Symbol;
+    type Memory = ();
 
     stands_alone!(quantizers);
 
@@ -118,7 +116,9 @@ impl Estimator for LookUp {
         measurement: &Vector1<f64>,
         (): &(),
     ) -> Result<Option<Symbol>, Error> {
-        let level = self.quantizers[sensor].encode(measurement[0]).map_err(failed)?;
+        let level = self.quantizers[sensor]
+            .encode(measurement[0])
+            .map_err(|error| Error::estimator("look-up", error))?;
         Ok(Some(Symbol(level)))
     }
 
@@ -131,7 +131,7 @@ impl Estimator for LookUp {
     ) -> Result<Gaussian<1>, Error> {
         let estimate = self.decoder.decode(observations).map_err(|error| match error {
             fewbits_quantizer_design::Error::ImpossibleOutcome => Error::Impossible,
-            other => failed(other),
+            other => Error::estimator("look-up", other),
         })?;
         Ok(Gaussian::scalar(estimate.mean, estimate.variance)?)
     }
@@ -139,7 +139,8 @@ impl Estimator for LookUp {
 
 gaussian_replica!([] LookUp);
 
-/// One-bit quantizers of patterned cells and their table. Every slot stands alone; the variance of the belief is that of the source.
+/// One-bit quantizers of patterned cells and their table. Every slot stands alone. The belief before the bits has the variance of the source,
+/// after them the mean squared error of the table's estimate given the bits.
 #[derive(Debug, Clone)]
 pub struct Patterns {
     sensors: Vec<PatternSensor>,
@@ -163,7 +164,11 @@ impl Patterns {
 }
 
 impl Estimator for Patterns {
+    type Belief = Gaussian<1>;
+    type Measurement = Vector1<f64>;
+    type Question = ();
     type Report = Bit;
+    type Memory = ();
 
     stands_alone!(sensors);
 
@@ -179,18 +184,24 @@ impl Estimator for Patterns {
         (): &(),
     ) -> Result<Option<Bit>, Error> {
         let quantizer = self.sensors[sensor].quantizer();
-        quantizer.report(measurement[0]).map(Some).map_err(failed)
+        quantizer
+            .report(measurement[0])
+            .map(Some)
+            .map_err(|error| Error::estimator("look-up", error))
     }
 
     fn update(
         &self,
         _: &mut Pcg64Dxsm,
         _: u32,
-        prior: &Gaussian<1>,
+        _: &Gaussian<1>,
         observations: &[Observation<Bit>],
     ) -> Result<Gaussian<1>, Error> {
-        let mean = self.table.decode(observations).map_err(failed)?;
-        Ok(Gaussian::scalar(mean, prior.covariance()[0])?)
+        let (mean, squared_error) = self
+            .table
+            .decode_with_error(observations)
+            .map_err(|error| Error::estimator("look-up", error))?;
+        Ok(Gaussian::scalar(mean, squared_error)?)
     }
 }
 

@@ -19,11 +19,11 @@ mod send_all;
 #[cfg(feature = "adaptive")]
 pub use adaptive::{Followed, Followers};
 #[cfg(feature = "cfwmd")]
-pub use censoring::{Broadcast, Censors};
+pub use censoring::{Broadcast, CensoringEstimator};
 #[cfg(feature = "diffusive")]
 pub use diffusive::SourceChain;
 #[cfg(feature = "dymbo")]
-pub use dymbo::{Bits, Counted};
+pub use dymbo::{DymboEstimator, ParallelDymboEstimator};
 #[cfg(feature = "handoff")]
 pub use handoff::Leaders;
 #[cfg(feature = "look-up")]
@@ -31,26 +31,3 @@ pub use look_up::{LookUp, Patterns};
 pub use scheme::Reporting;
 #[cfg(feature = "cfwmd")]
 pub use send_all::SendAll;
-
-#[cfg(any(
-    feature = "adaptive",
-    feature = "cfwmd",
-    feature = "diffusive",
-    feature = "dymbo",
-    feature = "handoff",
-    feature = "look-up"
-))]
-use crate::error::Error;
-
-/// An estimator's own error, in words.
-#[cfg(any(
-    feature = "adaptive",
-    feature = "cfwmd",
-    feature = "diffusive",
-    feature = "dymbo",
-    feature = "handoff",
-    feature = "look-up"
-))]
-fn failed(error: impl std::fmt::Display) -> Error {
-    Error::Estimator(error.to_string())
-}

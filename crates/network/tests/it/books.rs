@@ -5,7 +5,7 @@ use fewbits_cfwmd::network::Network;
 use fewbits_core::{BitString, Link, NumberFormat};
 use fewbits_models::constant_velocity_2d;
 use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::Censors;
+use fewbits_network::estimators::CensoringEstimator;
 use fewbits_network::{
     Batching, Bits, Channel, Context, Detail, Error, Field, Frame, Instant, Joules, Kind, Ledger, Loss, Protocol,
     Radio, Seconds, SensorId, Setup, Simulator, Star,
@@ -32,6 +32,7 @@ proptest! {
     fn bits_and_joules_conserve(
         seed in any::<u64>(), loss in 0.0..1.0_f64, crossover in 0.0..0.05_f64, duplication in 0.0..0.5_f64,
         retries in prop::option::of(0_u32..4), shadowed in any::<bool>(), first_order in any::<bool>(),
+        max_frames in 1_usize..4,
     ) {
         let loss = if shadowed {
             Loss::Shadowing { half: 12.0, exponent: 3.0, deviation: 4.0 }
@@ -43,6 +44,7 @@ proptest! {
             radio,
             channel: Channel { loss, crossover, duplication, ..Channel::PERFECT },
             retries,
+            batching: Batching { max_frames, hold: Seconds::new(0.05).unwrap() },
             detail: Detail::Everything,
             ..setup(seed)
         };
@@ -54,10 +56,13 @@ proptest! {
         // The log has the same messages.
         let log = network.log();
         let messages = network.ledger().messages();
-        prop_assert_eq!(log.transmissions().count() as u64, messages.messages);
-        prop_assert_eq!(log.transmissions().map(|t| t.payload).sum::<u64>(), messages.payload.0);
-        prop_assert_eq!(log.transmissions().map(|t| t.air).sum::<u64>(), messages.air.0);
-        prop_assert!(near(log.transmissions().map(|t| t.sending).sum(), messages.sending));
+        let first = || log.transmissions().filter(|t| t.attempt == 0);
+        prop_assert_eq!(first().count() as u64, messages.messages);
+        prop_assert_eq!(first().map(|t| t.payload).sum::<u64>(), messages.payload.0);
+        let (sent, answered) = (log.transmissions().map(|t| t.air), log.acknowledgements().map(|a| a.air));
+        prop_assert_eq!(sent.chain(answered).sum::<u64>(), messages.air.0);
+        let (sent, answered) = (log.transmissions().map(|t| t.sending), log.acknowledgements().map(|a| a.sending));
+        prop_assert!(near(sent.chain(answered).sum(), messages.sending));
         prop_assert!(near(log.transmissions().map(|t| t.receiving).sum(), messages.receiving));
         // Everything is sending, receiving or idle.
         let whole: Joules = (0..4).map(|i| network.energy(SensorId(i)).unwrap()).sum();
@@ -71,7 +76,7 @@ fn silence_costs_nothing_on_air() {
     // A threshold that nothing crosses: the sensors hear the centre and are silent.
     let network = Network::new(plane_sensors(), 1e6, Link::PERFECT).unwrap();
     let dynamics = constant_velocity_2d(1.0, 0.05).unwrap();
-    let estimator = Censors::own(network, NumberFormat::Double, dynamics, plane_start(), 10).unwrap();
+    let estimator = CensoringEstimator::own(network, NumberFormat::Double, dynamics, plane_start(), 10).unwrap();
     let star = Star::told(estimator, plane(10), clock(), Stream::new(1)).unwrap();
     let mut network = star.simulate(10.0, setup(1)).unwrap();
     network.run_until(clock().end(10)).unwrap();
@@ -125,7 +130,7 @@ impl Protocol for Chatter {
     fn on_timer(&self, _: &mut u32, context: &mut Context<'_>, _: u32) -> Result<(), Error> {
         let bit = BitString::from_bytes(vec![0x80], 1)?;
         context
-            .send(SensorId(0), Frame::new(Kind::Report, 1, 0, bit))
+            .send(SensorId(0), &Frame::new(Kind::Report, 1, 0, bit))
             .map(|_| ())
     }
 
@@ -153,7 +158,7 @@ fn frames_that_wait_for_company_share_preamble_and_header() {
         *network.ledger().messages()
     };
     let hold = Seconds::new(0.0025).unwrap();
-    let (alone, pairs) = (run(Batching::NONE), run(Batching { most: 3, hold }));
+    let (alone, pairs) = (run(Batching::NONE), run(Batching { max_frames: 3, hold }));
     assert_eq!((alone.messages, pairs.messages), (7, 3));
     assert_eq!((alone.payload, pairs.payload), (Bits(7), Bits(7)));
     // Two batches of three with a length of 16 bits each, and the last one alone.
@@ -165,7 +170,7 @@ fn frames_that_wait_for_company_share_preamble_and_header() {
 #[test]
 fn batteries_end() {
     let mut radio = Radio::cc2420(0.0).unwrap();
-    radio.battery = Joules::new(1.0).unwrap();
+    radio.battery = Some(Joules::new(1.0).unwrap());
     let star = Star::told(counted(Link::lossy(0.5).unwrap()), scalar(3, 300, 1), clock(), Stream::new(1)).unwrap();
     let mut network = star.simulate(10.0, Setup { radio, ..setup(1) }).unwrap();
     network.run_until(clock().end(300)).unwrap();
@@ -174,4 +179,27 @@ fn batteries_end() {
     assert!((120.0..136.0).contains(&died), "{died}");
     assert!((network.energy(SensorId(1)).unwrap().value() - 1.0).abs() < 0.01);
     assert!(!network.is_alive(SensorId(1)));
+}
+
+#[test]
+fn a_centre_on_the_mains_outlives_its_sensors() {
+    let mut radio = Radio::cc2420(0.0).unwrap();
+    radio.battery = Some(Joules::new(1.0).unwrap());
+    let radios = [(SensorId(0), radio.on_mains())].into();
+    let star = Star::told(counted(Link::lossy(0.5).unwrap()), scalar(3, 300, 1), clock(), Stream::new(1)).unwrap();
+    let mut network = star
+        .simulate(
+            10.0,
+            Setup {
+                radio,
+                radios,
+                ..setup(1)
+            },
+        )
+        .unwrap();
+    network.run_until(clock().end(300)).unwrap();
+    assert!(network.is_alive(SensorId(0)) && !network.is_alive(SensorId(1)));
+    assert!(network.energy(SensorId(0)).unwrap() > Joules::new(2.0).unwrap());
+    let (life, node) = network.summary().lifetime.unwrap();
+    assert!(node != SensorId(0) && (120.0..136.0).contains(&life.value()));
 }

@@ -6,13 +6,14 @@ use fewbits_adaptive::Config;
 use fewbits_core::{BitString, Gaussian, Link};
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::{Counted, Followers};
+use fewbits_network::estimators::{Followers, ParallelDymboEstimator};
 use fewbits_network::{
-    AdHoc, Channel, Check, Error, Fault, Field, Lead, Log, Loss, Mishap, Note, Seconds, SensorId, Setup, Simulator,
-    Star, StarNode, Walk, Walker,
+    AdHoc, Batching, Channel, Check, Error, Fault, FaultKind, Field, Lead, Log, Loss, Note, Seconds, SensorId, Setup,
+    Simulator, Star, StarNode, Walk, Walker,
 };
 use proptest::prelude::*;
 use rand_pcg::Pcg64Dxsm;
+use std::collections::BTreeMap;
 
 /// Slots under faults, and quiet ones after them.
 const FAULTY: u32 = 10;
@@ -25,21 +26,32 @@ fn seconds(s: f64) -> Seconds {
 }
 
 fn schedules() -> impl Strategy<Value = Setup> {
-    let mishap = prop_oneof![
-        1 => Just(Mishap::Death),
-        3 => Just(Mishap::Restart),
-        2 => (0.0..4.0_f64).prop_map(|s| Mishap::Outage(seconds(s))),
+    let kind = prop_oneof![
+        1 => Just(FaultKind::Death),
+        3 => Just(FaultKind::Restart),
+        2 => (0.0..4.0_f64).prop_map(|s| FaultKind::Outage(seconds(s))),
     ];
-    let fault = (0.0..f64::from(FAULTY), 0_u32..3, mishap).prop_map(|(at, node, what)| Fault {
+    let fault = (0.0..f64::from(FAULTY), 0_u32..3, kind).prop_map(|(at, node, kind)| Fault {
         at: seconds(at),
         node: SensorId(node),
-        what,
+        kind,
     });
     let often = |p: f64| prop_oneof![Just(0.0), 0.0..p];
     let channel = (often(0.6), often(0.02), often(1.5), often(0.6), often(0.4), often(0.4), often(2.5));
-    let rest = (prop::option::of(0_u32..3), any::<bool>(), prop::collection::vec(fault, 0..5), any::<u64>());
+    let burst = (0.0..1.0_f64, 0.1..3.0_f64).prop_map(|(bad, mean)| Loss::Burst {
+        good: 0.0,
+        bad,
+        mean_good: seconds(2.0),
+        mean_bad: seconds(mean),
+    });
+    let batching = (2_usize..4, 0.0..0.3_f64).prop_map(|(max_frames, hold)| Batching {
+        max_frames,
+        hold: seconds(hold),
+    });
+    let extras = (prop::option::of(burst), prop::option::weighted(0.2, batching));
+    let rest = (prop::option::of(0_u32..3), any::<bool>(), prop::collection::vec(fault, 0..5), any::<u64>(), extras);
     (channel, rest).prop_map(|((loss, crossover, delay, jitter, duplication, reordering, held), rest)| {
-        let (retries, header, faults, seed) = rest;
+        let (retries, header, faults, seed, (burst, batching)) = rest;
         Setup {
             channel: Channel {
                 loss: Loss::Fixed(loss),
@@ -50,6 +62,11 @@ fn schedules() -> impl Strategy<Value = Setup> {
                 reordering,
                 held: seconds(held),
             },
+            link_loss: burst
+                .into_iter()
+                .map(|loss| ((SensorId(1), SensorId(0)), loss))
+                .collect(),
+            batching: batching.unwrap_or(Batching::NONE),
             retries,
             report_check: if header { Check::Header } else { Check::Whole },
             faults,
@@ -58,7 +75,17 @@ fn schedules() -> impl Strategy<Value = Setup> {
     })
 }
 
-fn estimator() -> Counted {
+/// The same network over clear air.
+fn quiet(setup: Setup) -> Setup {
+    Setup {
+        channel: Channel::PERFECT,
+        link_loss: BTreeMap::new(),
+        faults: Vec::new(),
+        ..setup
+    }
+}
+
+fn estimator() -> ParallelDymboEstimator {
     counted(Link::new(0.3, 0.01).unwrap())
 }
 
@@ -74,7 +101,7 @@ fn finite(estimates: &[Vec<f64>]) -> bool {
 
 /// The centre and its replicas, slot by slot: whoever answers in a slot shares the centre's belief after the slot before.
 fn follow(
-    network: &mut Simulator<Star<Counted>>,
+    network: &mut Simulator<Star<ParallelDymboEstimator>>,
     slots: std::ops::RangeInclusive<u32>,
     mut before: Gaussian<1>,
 ) -> Result<Gaussian<1>, TestCaseError> {
@@ -125,7 +152,7 @@ proptest! {
         let mut stored = Vec::new();
         network.snapshot(&mut stored).unwrap();
         let star = network.protocol().clone();
-        let quiet = Setup { channel: Channel::PERFECT, faults: Vec::new(), ..setup };
+        let quiet = quiet(setup);
         let mut network = Simulator::restore(star, Field::star(3, 10.0).unwrap(), quiet, stored.as_slice()).unwrap();
         network.run_until(clock().end(slots)).unwrap();
         prop_assert!(finite(network.nodes()[0].estimates()));
@@ -154,7 +181,7 @@ proptest! {
         // The air clears: everybody who lives comes together again.
         let mut stored = Vec::new();
         network.snapshot(&mut stored).unwrap();
-        let quiet = Setup { channel: Channel::PERFECT, faults: Vec::new(), ..setup };
+        let quiet = quiet(setup);
         let field = Field::star(3, 10.0).unwrap();
         let mut network = Simulator::restore(star(), field, quiet, stored.as_slice()).unwrap();
         follow(&mut network, FAULTY + 1..=slots, before)?;
@@ -182,7 +209,7 @@ proptest! {
         let parted = alive[0] && (1..3).any(|i| {
             alive[i] && network.nodes()[i].belief() != network.nodes()[0].belief()
         });
-        let quiet = Setup { channel: Channel::PERFECT, faults: Vec::new(), ..setup };
+        let quiet = quiet(setup);
         let field = Field::ring(3, 10.0).unwrap();
         let mut network = Simulator::restore(peers(), field, quiet, stored.as_slice()).unwrap();
         network.run_until(clock().end(slots)).unwrap();
@@ -197,7 +224,7 @@ proptest! {
     fn a_walking_belief_never_doubles_in_silence(setup in schedules()) {
         let slots = FAULTY + QUIET;
         let retries = Some(setup.retries.unwrap_or(1));
-        let walk = Walk::new(Counter, clock(), slots, Stream::new(1));
+        let walk = Walk::new(StepCounter, clock(), slots, Stream::new(1));
         let field = Field::star(3, 10.0).unwrap();
         let mut network = walk.simulate(field, SensorId(0), Setup { retries, ..setup }).unwrap();
         network.run_until(clock().end(slots)).unwrap();
@@ -212,14 +239,14 @@ proptest! {
 }
 
 /// Whether a node's last outage outlasts the run: restored outages are not part of a setup.
-fn out(network: &Simulator<Star<Counted>>, node: usize) -> bool {
+fn out(network: &Simulator<Star<ParallelDymboEstimator>>, node: usize) -> bool {
     network.is_out(SensorId(node as u32)) || network.is_out(SensorId(0))
 }
 
 /// A belief that counts its steps and goes round.
-struct Counter;
+struct StepCounter;
 
-impl Walker for Counter {
+impl Walker for StepCounter {
     fn lead(&self, _: &mut Pcg64Dxsm, slot: u32, node: SensorId, message: Option<&BitString>) -> Result<Lead, Error> {
         let steps = message.map_or(0, |bits| bits.bytes()[0]);
         Ok(Lead {

@@ -20,7 +20,9 @@ use fewbits_handoff::{Coded, HandoffFilter};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::{Bits, Censors, Followers, Leaders, LookUp, Patterns, Reporting, SourceChain};
+use fewbits_network::estimators::{
+    CensoringEstimator, DymboEstimator, Followers, Leaders, LookUp, Patterns, Reporting, SourceChain,
+};
 use fewbits_network::{AdHoc, Estimator, Field, Ledger, Replicable, SensorId, Star, Walk};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizer_design::decoder::MmseDecoder;
@@ -114,7 +116,7 @@ fn one_bit_a_sample() {
             mean(&belief)
         })
         .collect();
-    let estimator = Bits { filter, start: start() };
+    let estimator = DymboEstimator { filter, start: start() };
     let (estimates, price) = told(estimator.clone(), &measurements);
     assert_eq!(estimates, alone);
     assert_eq!(price, Price::of(bits, 64 * SLOTS as u64));
@@ -135,7 +137,7 @@ fn one_to_eight_bits_a_sample() {
                 mean(&belief)
             })
             .collect();
-        let estimator = Bits { filter, start: start() };
+        let estimator = DymboEstimator { filter, start: start() };
         let (estimates, price) = told(estimator.clone(), &measurements);
         assert_eq!(estimates, alone);
         assert_eq!(price, Price::of(sent, 128 * SLOTS as u64));
@@ -211,9 +213,9 @@ fn censoring_sensors_and_all_send() {
             })
             .collect();
         let estimator = if with_covariance {
-            Censors::told(network, format, dynamics, start)
+            CensoringEstimator::told(network, format, dynamics, start)
         } else {
-            Censors::own(network, format, dynamics, start, SLOTS).unwrap()
+            CensoringEstimator::own(network, format, dynamics, start, SLOTS).unwrap()
         };
         let (estimates, price) = told(estimator.clone(), &measurements);
         assert_eq!(estimates, alone);
@@ -515,7 +517,7 @@ fn followed_signals() {
     let known = followers.start();
     assert_eq!(followers.belief_of(&followers.belief_bits(&known).unwrap()).unwrap(), known);
     assert!(followers.belief_of(&BitString::default()).is_err());
-    among_peers(&followers, &measurements, &alone, sent);
+    everywhere(&followers, &measurements, &alone, sent);
 }
 
 #[test]

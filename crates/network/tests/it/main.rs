@@ -7,8 +7,10 @@
     reason = "a panic is how a test fails"
 )]
 
+mod acknowledgements;
 mod attacks;
 mod books;
+mod defects;
 mod faults;
 mod lossless;
 mod stored;

@@ -4,7 +4,7 @@ use crate::worlds::{clock, counted, scalar, setup};
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{
-    Channel, Detail, Error, Fault, Field, Log, Loss, Mishap, Seconds, SensorId, Setup, Simulator, Star,
+    Channel, Detail, Error, Fault, FaultKind, Field, Log, Loss, Seconds, SensorId, Setup, Simulator, Star,
 };
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -29,34 +29,34 @@ fn faulty(seed: u64) -> Setup {
             Fault {
                 at: seconds(5.3),
                 node: SensorId(1),
-                what: Mishap::Restart,
+                kind: FaultKind::Restart,
             },
             Fault {
                 at: seconds(9.7),
                 node: SensorId(0),
-                what: Mishap::Restart,
+                kind: FaultKind::Restart,
             },
             Fault {
                 at: seconds(12.1),
                 node: SensorId(2),
-                what: Mishap::Outage(seconds(3.0)),
+                kind: FaultKind::Outage(seconds(3.0)),
             },
             Fault {
                 at: seconds(15.5),
                 node: SensorId(3),
-                what: Mishap::Death,
+                kind: FaultKind::Death,
             },
         ],
         ..setup(seed)
     }
 }
 
-fn star() -> Star<fewbits_network::estimators::Counted> {
+fn star() -> Star<fewbits_network::estimators::ParallelDymboEstimator> {
     let link = Link::lossy(0.4).unwrap();
     Star::echoed(counted(link), scalar(3, SLOTS as usize, 1), clock(), Stream::new(1)).unwrap()
 }
 
-fn network(seed: u64) -> Simulator<Star<fewbits_network::estimators::Counted>> {
+fn network(seed: u64) -> Simulator<Star<fewbits_network::estimators::ParallelDymboEstimator>> {
     star().simulate(10.0, faulty(seed)).unwrap()
 }
 

@@ -5,7 +5,7 @@ use fewbits_core::{Dynamics, Error, Gaussian, Link, NumberFormat, Observation, S
 use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::Counted;
+use fewbits_network::estimators::ParallelDymboEstimator;
 use fewbits_network::{Clock, Radio, Seconds, Setup};
 use nalgebra::{Matrix4, Vector1, Vector4};
 use rand::Rng;
@@ -67,11 +67,11 @@ pub fn setup(seed: u64) -> Setup {
 }
 
 /// Three one-bit sensors over a link that is known to be faulty.
-pub fn counted(link: Link) -> Counted {
+pub fn counted(link: Link) -> ParallelDymboEstimator {
     let filter = ParallelFilter::new(plant(), 3, CountFusion::Linear)
         .unwrap()
         .with_link(link);
-    Counted::new(filter, start()).unwrap()
+    ParallelDymboEstimator::new(filter, start()).unwrap()
 }
 
 /// The stranger's scheme of `docs/own-scheme.md`.

@@ -55,8 +55,10 @@ pub fn mean_fisher_information(system: &System) -> Result<f64, Error> {
 /// [`Error::Argument`] if the noise is correlated or the prior is not Gaussian.
 pub fn bayesian_cramer_rao(system: &System) -> Result<f64, Error> {
     match system.scene().prior() {
-        Prior::Gaussian { deviation } => Ok(1.0 / (mean_fisher_information(system)? + 1.0 / (deviation * deviation))),
-        Prior::Discrete { .. } => refuse("prior", "a discrete prior", "a smooth prior for the van Trees bound"),
+        Prior::Gaussian { deviation, .. } => {
+            Ok(1.0 / (mean_fisher_information(system)? + 1.0 / (deviation * deviation)))
+        }
+        _ => refuse("prior", "another prior", "a Gaussian prior for the van Trees bound"),
     }
 }
 

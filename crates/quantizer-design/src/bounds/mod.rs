@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | remote distortion-rate (2.15) | any code of one noisy source, any block length | [`remote_distortion_rate`] |
 //! | quadratic Gaussian CEO | any codes at separate sensors with independent noise | [`ceo`] |
+//! | unquantised samples | any quantizers at all | [`unquantised`] |
 //! | Bayesian Cramer-Rao (van Trees, constant weight) | these quantizers, any estimator | [`bayesian_cramer_rao`] |
 //!
 //! The Cramer-Rao bound `1 / J(x)` concerns unbiased estimators of a fixed `x`. The posterior mean is biased towards the prior
@@ -11,9 +12,12 @@
 
 mod ceo;
 mod fisher;
+mod unquantised;
 
 pub use ceo::{CEO_MAX_SENSORS, CeoBound, ceo};
 pub use fisher::{bayesian_cramer_rao, fisher_information, mean_fisher_information};
+
+pub use unquantised::unquantised;
 
 use crate::error::{Error, refuse};
 use crate::scene::{Noise, Prior};
@@ -35,10 +39,10 @@ pub fn remote_distortion_rate(prior: &Prior, noise: &Noise, bits: f64) -> Result
 /// Variance of a Gaussian prior.
 fn prior_variance(prior: &Prior) -> Result<f64, Error> {
     match prior {
-        Prior::Gaussian { deviation } => {
+        Prior::Gaussian { deviation, .. } => {
             Ok(fewbits_numerics::error::positive("prior variance", deviation * deviation)?)
         }
-        Prior::Discrete { .. } => refuse("prior", "a discrete prior", "a Gaussian prior"),
+        _ => refuse("prior", "another prior", "a Gaussian prior"),
     }
 }
 

@@ -256,11 +256,7 @@ mod tests {
             }
             let nothing = decoder.decode(&[Observation::Lost; 3]).unwrap();
             assert!(nothing.mean.abs() < 1e-13 && (nothing.variance - 1.0).abs() < 1e-12);
-            let bad = [
-                Observation::Received(Symbol(4)),
-                Observation::Lost,
-                Observation::Lost,
-            ];
+            let bad = [Observation::Received(Symbol(4)), Observation::Lost, Observation::Lost];
             assert!(decoder.decode(&bad).is_err());
         }
     }

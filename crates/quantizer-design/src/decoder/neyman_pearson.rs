@@ -146,9 +146,7 @@ mod tests {
         let mut spent = 0.0;
         for a in 0..4 {
             for b in 0..4 {
-                let accepted = test
-                    .acceptance(&[received(a), Observation::Lost, received(b)])
-                    .unwrap();
+                let accepted = test.acceptance(&[received(a), Observation::Lost, received(b)]).unwrap();
                 spent += given[0][a] * given[0][b] * accepted;
             }
         }

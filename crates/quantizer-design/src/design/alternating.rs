@@ -16,13 +16,14 @@
 //! relatively little; that objective is negative in common cases and depends on the unit of `x`, so mutual information itself
 //! is used here (errata). Edges are found by root search; deciding cell by cell on a fixed grid of `y` stalls up to 10 % short.
 
-use super::cells::{level_gains, single_sensor};
+use super::cells::{gains_of, level_gains, single_sensor};
 use crate::criterion::Criterion;
 use crate::error::Error;
+use crate::law::log_likelihoods;
 use crate::moments::{Table, dot};
 use crate::problem::Problem;
 use crate::system::System;
-use fewbits_numerics::{newton, normal};
+use fewbits_numerics::newton;
 use fewbits_quantizers::Quantizer;
 use serde::{Deserialize, Serialize};
 
@@ -131,7 +132,24 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
     let problem = Problem::new(system, criterion, &[group])?;
     let scene = system.scene();
     let (others, symbols) = problem.surroundings();
-    let gains = level_gains(scene, criterion, &others, &symbols, entry.channel());
+    let channel = entry.channel();
+    let gains = if scene.is_discrete() {
+        // Hypotheses may be so far apart that the probability of a wrong symbol underflows: its logarithm counts.
+        let values = scene.values.len();
+        let logs = log_likelihoods(system)?;
+        let inner: usize = system.groups()[group + 1..]
+            .iter()
+            .map(|g| g.outcomes() as usize)
+            .product();
+        let outputs = channel.outputs();
+        gains_of(scene, criterion, &others, channel, |at| {
+            let (other, symbol) = (at / outputs, at % outputs);
+            let outcome = (other / inner * outputs + symbol) * inner + other % inner;
+            &logs[outcome * values..(outcome + 1) * values]
+        })
+    } else {
+        level_gains(scene, criterion, &others, &symbols, channel)
+    };
     let (means, sd) = scene.sample_law(entry.sensors()[0]);
     let worth = Worth {
         gains: &gains,
@@ -163,7 +181,7 @@ pub fn alternating_step(system: &System, group: usize, criterion: Criterion) -> 
     Ok(Quantizer::with_labels(breakpoints, labels)?)
 }
 
-/// The functions `D_z(y)`.
+/// The functions `D_z(y)`: sums over the nodes of gains times the density of the sample, which far out is in logarithms only.
 struct Worth<'a> {
     gains: &'a Table,
     means: &'a [f64],
@@ -171,8 +189,17 @@ struct Worth<'a> {
 }
 
 impl Worth<'_> {
+    /// Logarithm of the sample's density at `y` given a node's mean, up to a constant.
+    fn log_density(&self, y: f64, mean: f64) -> f64 {
+        let u = (y - mean) / self.sd;
+        -0.5 * u * u
+    }
+
     fn best(&self, y: f64) -> usize {
-        let density: Vec<f64> = self.means.iter().map(|m| normal::pdf((y - m) / self.sd)).collect();
+        // Relative to the likeliest node: far from all means every density underflows.
+        let logs: Vec<f64> = self.means.iter().map(|m| self.log_density(y, *m)).collect();
+        let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let density: Vec<f64> = logs.iter().map(|l| (l - largest).exp()).collect();
         let mut best = (0, f64::NEG_INFINITY);
         for z in 0..self.gains.rows() {
             let worth = dot(&density, self.gains.row(z));
@@ -184,21 +211,41 @@ impl Worth<'_> {
     }
 
     /// Where level `after` overtakes level `before`, which is the better one at `low` and the worse at `high`.
+    ///
+    /// The root of `ln A - ln B`, where `A` is the sum over the nodes at which `after` gains and `B` that over the nodes at
+    /// which it loses. For two hypotheses this is a straight line.
     fn crossing(&self, before: usize, after: usize, low: f64, high: f64) -> f64 {
         let pairs = self.gains.row(after).iter().zip(self.gains.row(before));
-        let difference: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
-        let lead = |y: f64| {
-            let (mut value, mut slope) = (0.0, 0.0);
-            for (m, d) in self.means.iter().zip(&difference) {
-                let u = (y - m) / self.sd;
-                let term = normal::pdf(u) * d;
-                value += term;
-                slope -= u * term / self.sd;
+        let (mut gained, mut lost) = (Vec::new(), Vec::new());
+        for ((a, b), mean) in pairs.zip(self.means) {
+            match a - b {
+                d if d > 0.0 => gained.push((*mean, d.ln())),
+                d if d < 0.0 => lost.push((*mean, (-d).ln())),
+                _ => {}
             }
-            (value, slope)
+        }
+        let lead = |y: f64| {
+            let ((a, slope_a), (b, slope_b)) = (self.log_sum(&gained, y), self.log_sum(&lost, y));
+            (a - b, slope_a - slope_b)
         };
         let size = low.abs().max(high.abs()).max(self.sd);
         newton::increasing(lead, low, high, 0.5 * (low + high), 1e-15 * size)
+    }
+
+    /// `ln sum d p(y | mean)` over pairs `(mean, ln d)`, and its derivative with respect to `y`.
+    fn log_sum(&self, terms: &[(f64, f64)], y: f64) -> (f64, f64) {
+        let log = |(mean, d): &(f64, f64)| d + self.log_density(y, *mean);
+        let largest = terms.iter().map(log).fold(f64::NEG_INFINITY, f64::max);
+        if largest == f64::NEG_INFINITY {
+            return (largest, 0.0);
+        }
+        let (mut sum, mut slope) = (0.0, 0.0);
+        for term in terms {
+            let share = (log(term) - largest).exp();
+            sum += share;
+            slope -= share * (y - term.0) / (self.sd * self.sd);
+        }
+        (largest + sum.ln(), slope / sum)
     }
 }
 
@@ -227,6 +274,32 @@ mod tests {
             ..rule
         };
         assert!(matches!(alternate(&start, 0, criterion, &short), Err(Error::NotConverged { iterations: 3, .. })));
+    }
+
+    /// The best cells of two equally likely hypotheses meet midway, by symmetry. From a signal of 14 on densities underflow, from
+    /// 76 on the probabilities of wrong symbols.
+    #[test]
+    fn distant_hypotheses_are_parted_midway() {
+        use crate::scene::{Noise, Prior};
+        for signal in [4.0, 14.0, 40.0, 100.0, 1000.0] {
+            let noise = Noise::independent_with_deviations(&[1.0]).unwrap();
+            let scene = Scene::new(Prior::binary(signal, 0.5).unwrap(), noise).unwrap();
+            let start = Quantizer::new(vec![0.5 * signal + 0.1]).unwrap();
+            let system = System::ideal(scene, vec![start]).unwrap();
+            for criterion in [Criterion::MutualInformation, Criterion::BayesError] {
+                let step = alternating_step(&system, 0, criterion).unwrap();
+                assert_eq!(step.labels(), [0, 1], "{signal} {criterion:?}");
+            }
+            let rule = Alternating {
+                breakpoint_tolerance: 1e-9,
+                ..Alternating::default()
+            };
+            let end = alternate(&system, 0, Criterion::MutualInformation, &rule)
+                .unwrap()
+                .system
+                .quantizers();
+            assert!((end[0].breakpoints()[0] / signal - 0.5).abs() < 1e-6, "{signal}: {}", end[0].breakpoints()[0]);
+        }
     }
 
     #[test]

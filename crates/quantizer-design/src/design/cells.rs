@@ -11,6 +11,9 @@ use crate::scene::Scene;
 use crate::system::{SensorGroup, System};
 use fewbits_quantizers::Channel;
 
+/// The logarithm that stands for the probability of what cannot happen: finite, so that a weight of zero removes it.
+const LOG_IMPOSSIBLE: f64 = -1e12;
+
 /// The group if it is a single sensor.
 pub(super) fn single_sensor(system: &System, group: usize) -> Result<&SensorGroup, Error> {
     let entry = system.group(group)?;
@@ -31,13 +34,29 @@ pub(crate) fn level_gains(
     symbols: &Table,
     channel: &Channel,
 ) -> Table {
+    let values = scene.values.len();
+    let mut log_likelihood = moments(&[others, symbols], &scene.given);
+    for q in &mut log_likelihood {
+        *q = q.max(LOG_FLOOR).ln();
+    }
+    gains_of(scene, criterion, others, channel, |at| &log_likelihood[at * values..(at + 1) * values])
+}
+
+/// As [`level_gains`], from the logarithms of the likelihoods: `log_likelihood(i)` is one number per value of the unknown, of
+/// the outcome `i = other * outputs + symbol`. Probabilities may underflow, their logarithms may not.
+pub(crate) fn gains_of<'a>(
+    scene: &Scene,
+    criterion: Criterion,
+    others: &Table,
+    channel: &Channel,
+    log_likelihood: impl Fn(usize) -> &'a [f64],
+) -> Table {
     let (nodes, values) = (scene.nodes(), scene.values.len());
-    let likelihood = moments(&[others, symbols], &scene.given);
     let mut per_symbol = vec![0.0; channel.outputs() * nodes];
     let mut score = vec![0.0; values];
-    for (at, q) in likelihood.chunks_exact(values).enumerate() {
+    for at in 0..others.rows() * channel.outputs() {
         let (other, symbol) = (at / channel.outputs(), at % channel.outputs());
-        scores(scene, criterion, q, &mut score);
+        scores(scene, criterion, log_likelihood(at), &mut score);
         let reports = others.row(other);
         let out = &mut per_symbol[symbol * nodes..(symbol + 1) * nodes];
         for ((feature, w), s) in scene.given.iter().zip(&scene.weights).zip(&score) {
@@ -59,29 +78,40 @@ pub(crate) fn level_gains(
     Table::new(gains, nodes)
 }
 
-fn scores(scene: &Scene, criterion: Criterion, q: &[f64], out: &mut [f64]) {
-    let total: f64 = scene.weights.iter().zip(q).map(|(w, q)| w * q).sum();
+/// What the decoder's answer to one outcome is worth at each value of the unknown.
+fn scores(scene: &Scene, criterion: Criterion, log_likelihood: &[f64], out: &mut [f64]) {
+    // Relative to the most likely value, so that the largest number is 1.
+    let largest = log_likelihood.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        // An outcome that no value can cause.
+        out.fill(0.0);
+        return;
+    }
+    let relative = |l: &f64| (l - largest).exp();
+    let total: f64 = scene
+        .weights
+        .iter()
+        .zip(log_likelihood)
+        .map(|(w, l)| w * relative(l))
+        .sum();
     match criterion {
         Criterion::MutualInformation => {
-            for (o, q) in out.iter_mut().zip(q) {
-                *o = (q.max(LOG_FLOOR) / total.max(LOG_FLOOR)).ln();
+            let log_total = largest + total.max(LOG_FLOOR).ln();
+            for (o, l) in out.iter_mut().zip(log_likelihood) {
+                *o = (l - log_total).max(LOG_IMPOSSIBLE);
             }
         }
         Criterion::MeanSquaredError => {
-            let moment: f64 = scene
-                .weights
-                .iter()
-                .zip(&scene.values)
-                .zip(q)
-                .map(|((w, x), q)| w * (x - scene.mean) * q)
-                .sum();
+            let terms = scene.weights.iter().zip(&scene.values).zip(log_likelihood);
+            let moment: f64 = terms.map(|((w, x), l)| w * (x - scene.mean) * relative(l)).sum();
             let mean = scene.mean + if total > 0.0 { moment / total } else { 0.0 };
             for (o, x) in out.iter_mut().zip(&scene.values) {
                 *o = -(x - mean) * (x - mean);
             }
         }
         Criterion::BayesError => {
-            let best = crate::criterion::most_probable(&scene.weights, q);
+            let joint = |k: usize| scene.weights[k].ln() + log_likelihood[k];
+            let best = (1..out.len()).fold(0, |best, k| if joint(k) > joint(best) { k } else { best });
             for (k, o) in out.iter_mut().enumerate() {
                 *o = if k == best { 0.0 } else { -1.0 };
             }

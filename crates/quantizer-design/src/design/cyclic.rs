@@ -1,7 +1,7 @@
 //! One group after the other, each to its optimum given the others.
 
 use super::dynamic_programme::best_contiguous;
-use super::joint::{Design, breakpoint_scale, optimise_groups};
+use super::joint::{Design, breakpoint_scale, optimise_groups, with_opposed};
 use crate::criterion::{Criterion, Scored};
 use crate::error::Error;
 use crate::newton::{Certificate, Newton};
@@ -50,15 +50,16 @@ pub fn cyclic(
         if gain <= tolerance * size {
             let found = current.derivatives(criterion)?;
             let eigen = nalgebra::SymmetricEigen::new(found.hessian * criterion.sense());
-            let largest_curvature = eigen.eigenvalues.max();
             let unit = scored.unit(criterion.sense() * found.value, current.scene());
             let all: Vec<usize> = (0..current.groups().len()).collect();
+            let (largest_curvature, scope) = with_opposed(&current, &all, criterion, eigen.eigenvalues.max())?;
             let certificate = Certificate::of(largest_curvature, unit, breakpoint_scale(&current, &all));
             return Ok(Design {
                 system: current,
                 value: found.value,
                 largest_curvature,
                 certificate,
+                scope,
                 iterations,
                 evaluations,
             });

@@ -86,7 +86,7 @@ impl Design {
             information: system.value(Criterion::MutualInformation)?,
             bayes_error: match scene.prior() {
                 Prior::Discrete { .. } => Some(system.value(Criterion::BayesError)?),
-                Prior::Gaussian { .. } => None,
+                _ => None,
             },
             ceo_bound,
             estimator_bound,
@@ -117,16 +117,16 @@ impl Design {
     }
 }
 
-/// Quantizers of `bits` bits for every sensor of a scene, received as sent.
+/// Quantizers of `bits` bits for every sensor of a scene, received as sent, for the estimate of least mean squared error. To
+/// decide between the values of a discrete prior, use [`detection`].
 ///
-/// The criterion is squared error for a Gaussian prior, and for finitely many values error probability, started from the design
-/// of most information. Sensors that differ, or are few, are designed apart from Lloyd-Max quantizers and from random starts, and
+/// Sensors that differ, or are few, are designed apart from Lloyd-Max quantizers and from random starts, and
 /// two sensors of few levels also with folded cells; many equal sensors share one quantizer. The specialist's tools are in
 /// [`design`](crate::design).
 ///
 /// ```
 /// use fewbits_quantizer_design::{Certificate, Scene, design};
-/// let best = design::design(&Scene::gaussian_with_deviations(1.0, &[1.0, 1.0])?, 2)?;
+/// let best = design::estimation(&Scene::gaussian_with_deviations(1.0, &[1.0, 1.0])?, 2)?;
 /// let report = best.report()?;
 /// assert!((report.mean_squared_error - 0.388_403_07).abs() < 1e-7);
 /// assert_eq!(report.certificate, Certificate::LocalOptimum);
@@ -137,18 +137,8 @@ impl Design {
 /// # Errors
 /// Unless `bits` is in `1..=6`; [`Error::TooLarge`] if the sensors have more joint outcomes than can be enumerated;
 /// [`Error::NotConverged`].
-pub fn design(scene: &Scene, bits: u32) -> Result<Design, Error> {
-    if !(1..=MAX_BITS).contains(&bits) {
-        return refuse("bits", bits, format!("1 to {MAX_BITS} bits"));
-    }
-    let levels = 1usize << bits;
-    match scene.prior() {
-        Prior::Gaussian { .. } => for_estimation(scene, levels),
-        Prior::Discrete { .. } => for_decision(scene, levels),
-    }
-}
-
-fn for_estimation(scene: &Scene, levels: usize) -> Result<Design, Error> {
+pub fn estimation(scene: &Scene, bits: u32) -> Result<Design, Error> {
+    let levels = levels_of(bits)?;
     let criterion = Criterion::MeanSquaredError;
     let apart = System::lloyd_max(scene.clone(), levels)?;
     let newton = Newton::default();
@@ -173,7 +163,15 @@ fn for_estimation(scene: &Scene, levels: usize) -> Result<Design, Error> {
     })
 }
 
-fn for_decision(scene: &Scene, levels: usize) -> Result<Design, Error> {
+/// Quantizers of `bits` bits for every sensor of a scene, received as sent, for the decision between the values of a discrete
+/// prior with the least error probability. To estimate an unknown whose density is given at nodes, use [`estimation`].
+///
+/// Starts from the design of most information and, for two hypotheses, from that of largest Matusita distance.
+///
+/// # Errors
+/// As [`estimation`]; also if the prior is continuous.
+pub fn detection(scene: &Scene, bits: u32) -> Result<Design, Error> {
+    let levels = levels_of(bits)?;
     let newton = Newton::default();
     let apart = System::lloyd_max(scene.clone(), levels)?;
     let mut starts = vec![grouped(&apart)?];
@@ -200,6 +198,13 @@ fn for_decision(scene: &Scene, levels: usize) -> Result<Design, Error> {
         }
     }
     best.unwrap_or_else(|| refuse("scene", "no start", "a scene with sensors"))
+}
+
+fn levels_of(bits: u32) -> Result<usize, Error> {
+    if !(1..=MAX_BITS).contains(&bits) {
+        return refuse("bits", bits, format!("1 to {MAX_BITS} bits"));
+    }
+    Ok(1 << bits)
 }
 
 /// The same quantizers with all sensors of one law in one group.

@@ -1,8 +1,9 @@
 //! All breakpoints at once, or one sensor after the other, by Newton's method.
 
+use super::apart::{Opposed, halved, opposed};
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
-use crate::newton::{Certificate, Newton, climb};
+use crate::newton::{AtSaddle, Certificate, Newton, Objective, climb};
 use crate::problem::Problem;
 use crate::system::System;
 use fewbits_monte_carlo::Stream;
@@ -11,8 +12,21 @@ use fewbits_quantizers::Quantizer;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
+/// How far breakpoints move off a saddle, in standard deviations of the sample.
+const STEP_OFF: f64 = 0.05;
 /// A design whose rarest cell is rarer than this has lost a level.
 const VANISHED: f64 = 1e-12;
+
+/// The breakpoints over which a [`Certificate`] holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scope {
+    /// The breakpoints of every sensor that was designed, each by itself.
+    EverySensor,
+    /// The breakpoints that the sensors of a group share. Whether it is better to let them differ is not known: there are too many
+    /// joint outcomes to find out.
+    SharedBreakpoints,
+}
 
 /// A stationary point of a criterion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,6 +41,8 @@ pub struct Design {
     pub largest_curvature: f64,
     /// What the second derivatives prove.
     pub certificate: Certificate,
+    /// Over which breakpoints they were taken.
+    pub scope: Scope,
     /// Newton iterations.
     pub iterations: usize,
     /// Evaluations of the criterion, with or without derivatives.
@@ -39,6 +55,31 @@ impl Design {
         self.system.quantizers()
     }
 
+    /// The system with one group in halves, moved along the steepest of the curvatures that make this a saddle; `None` if no group
+    /// has such a curvature.
+    fn leave_shared_saddle(&self, criterion: Criterion) -> Result<Option<System>, Error> {
+        let mut steepest: Option<(usize, Opposed)> = None;
+        for group in 0..self.system.groups().len() {
+            let found = match opposed(&self.system, group, criterion) {
+                Err(Error::TooLarge { .. }) => None,
+                other => other?,
+            };
+            if let Some(found) = found
+                && found.curvature > steepest.as_ref().map_or(0.0, |s| s.1.curvature)
+            {
+                steepest = Some((group, found));
+            }
+        }
+        let Some((group, found)) = steepest else {
+            return Ok(None);
+        };
+        let length = STEP_OFF * breakpoint_scale(&self.system, &[group]);
+        match halved(&self.system, group, &found.direction, length) {
+            Ok(apart) if apart.check_outcomes().is_ok() => Ok(Some(apart)),
+            _ => Ok(None),
+        }
+    }
+
     /// Whether the point is a saddle: some change of the breakpoints improves it to second order.
     pub fn is_saddle(&self) -> bool {
         self.certificate == Certificate::Saddle
@@ -48,14 +89,32 @@ impl Design {
 /// The stationary point of `criterion` over the breakpoints of all groups (4.2), started from the system's own quantizers.
 ///
 /// Newton's method finds a *local* optimum; the joint criterion may have several, and from a symmetric start the symmetric one
-/// may be a saddle. See [`AtSaddle`](crate::AtSaddle) and [`multi_start`].
+/// may be a saddle. See [`AtSaddle`](crate::AtSaddle) and [`multi_start`]. The sensors of a group share their breakpoints, unless
+/// letting them differ is better to second order and [`AtSaddle::StepOff`](crate::AtSaddle::StepOff) is asked for: then the design
+/// has the group in two halves.
 ///
 /// # Errors
 /// [`Error::NotConverged`]; [`Error::VanishingCell`] if a level is squeezed out, as happens behind poor channels;
 /// [`Error::TooLarge`] and [`Error::Argument`] as [`System::value`].
 pub fn joint(system: &System, criterion: Criterion, newton: &Newton) -> Result<Design, Error> {
-    let all: Vec<usize> = (0..system.groups().len()).collect();
-    optimise_groups(system, &all, criterion, newton)
+    let every = |system: &System| (0..system.groups().len()).collect::<Vec<_>>();
+    let mut design = optimise_groups(system, &every(system), criterion, newton)?;
+    while newton.at_saddle == AtSaddle::StepOff && design.is_saddle() {
+        let Some(apart) = design.leave_shared_saddle(criterion)? else {
+            break;
+        };
+        match optimise_groups(&apart, &every(&apart), criterion, newton) {
+            Ok(next) if criterion.sense() * (next.value - design.value) > 0.0 => {
+                design = Design {
+                    iterations: design.iterations + next.iterations,
+                    evaluations: design.evaluations + next.evaluations,
+                    ..next
+                };
+            }
+            _ => break,
+        }
+    }
+    Ok(design)
 }
 
 /// As [`joint`], over the breakpoints of the groups `active` with all others fixed.
@@ -86,14 +145,37 @@ pub fn optimise_groups(
             probability,
         });
     }
+    let designed = problem.system_at(&found.point)?;
+    let unit = problem.unit(found.value);
+    let (largest_curvature, scope) = with_opposed(&designed, active, criterion, found.largest_curvature)?;
     Ok(Design {
-        system: problem.system_at(&found.point)?,
+        system: designed,
         value: (found.value + problem.offset()) * criterion.sense(),
-        largest_curvature: found.largest_curvature,
-        certificate: found.certificate,
+        largest_curvature,
+        certificate: Certificate::of(largest_curvature, unit, scale),
+        scope,
         iterations: found.iterations,
         evaluations: found.evaluations,
     })
+}
+
+/// The largest of a curvature and those over moves of the sensors of a group against each other.
+pub(super) fn with_opposed(
+    system: &System,
+    groups: &[usize],
+    criterion: Criterion,
+    mut curvature: f64,
+) -> Result<(f64, Scope), Error> {
+    let mut scope = Scope::EverySensor;
+    for group in groups {
+        match opposed(system, *group, criterion) {
+            Ok(Some(found)) => curvature = curvature.max(found.curvature),
+            Ok(None) => {}
+            Err(Error::TooLarge { .. }) => scope = Scope::SharedBreakpoints,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok((curvature, scope))
 }
 
 /// The size of the breakpoints of some groups: the least standard deviation of their samples.

@@ -4,13 +4,15 @@
 //! independent. Every joint probability is then a sum of products of one-dimensional cell probabilities with positive
 //! weights, which keeps relative accuracy in far cells where differences of bivariate distribution functions lose it.
 //!
-//! A Gaussian prior is integrated by the trapezoid rule, which converges faster than any power of the step for these
-//! integrands; Gauss-Hermite rules need many more nodes once the noise is narrower than the prior. A finite prior is its own
-//! rule, and so is any other density given by the nodes and weights of a quadrature rule.
+//! A Gaussian prior, a mixture and the smooth density of a sample are integrated by the trapezoid rule, which converges faster
+//! than any power of the step for these integrands; Gauss-Hermite rules need many more nodes once the noise is narrower than the
+//! prior. Densities on an interval take Gauss-Legendre panels. A finite prior is its own rule.
 
+mod continuous;
 mod noise;
 mod prior;
 
+pub use continuous::{Continuous, SampleFit};
 pub use noise::Noise;
 pub use prior::Prior;
 
@@ -30,6 +32,33 @@ const PRIOR_STEP: f64 = 0.25;
 const ENTROPY_STEP: f64 = 0.2;
 /// The same for products of cell probabilities of two sensors, which are entire functions; more sensors make them sharper.
 const PRODUCT_STEP: f64 = 0.4;
+/// How finely a scene is discretised.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Resolution {
+    /// Exact to 1e-12.
+    Full,
+    /// To about 1e-5, for searches.
+    Coarse,
+}
+
+impl Resolution {
+    /// Steps in units of the steps of the full resolution.
+    fn step(self) -> f64 {
+        match self {
+            Self::Full => 1.0,
+            Self::Coarse => 2.0,
+        }
+    }
+
+    /// Half-widths in units of those of the full resolution.
+    fn reach(self) -> f64 {
+        match self {
+            Self::Full => 1.0,
+            Self::Coarse => 0.55,
+        }
+    }
+}
+
 /// Most nodes a rule may take; less noise than this resolves asks for another method.
 const NODE_LIMIT: usize = 1 << 20;
 
@@ -73,16 +102,30 @@ impl Scene {
     /// # Errors
     /// If the noise is so much narrower than the prior that more than a million nodes would be needed.
     pub fn new(prior: Prior, noise: Noise) -> Result<Self, Error> {
+        Self::resolved(prior, noise, Resolution::Full)
+    }
+
+    /// The scene on fewer nodes.
+    pub(crate) fn coarse(&self) -> Result<Self, Error> {
+        Self::resolved(self.prior.clone(), self.noise.clone(), Resolution::Coarse)
+    }
+
+    fn resolved(prior: Prior, noise: Noise, resolution: Resolution) -> Result<Self, Error> {
         let crowd = (noise.sensors().max(2) as f64 / 2.0).sqrt();
         let narrowest = (0..noise.sensors())
             .map(|n| noise.deviation(n))
             .fold(f64::INFINITY, f64::min);
+        let noise_step = resolution.step() * f64::min(ENTROPY_STEP, PRODUCT_STEP / crowd) * narrowest;
         let (values, weights) = match &prior {
-            Prior::Gaussian { deviation } => {
-                let step = f64::min(PRIOR_STEP * deviation, f64::min(ENTROPY_STEP, PRODUCT_STEP / crowd) * narrowest);
-                let values = grid(PRIOR_REACH * deviation, step)?;
-                let weights = normalised(values.iter().map(|x| normal::pdf(x / deviation)).collect());
-                (values, weights)
+            Prior::Gaussian { mean, deviation } => {
+                let step = f64::min(resolution.step() * PRIOR_STEP * deviation, noise_step);
+                let offsets = grid(resolution.reach() * PRIOR_REACH * deviation, step)?;
+                let weights = normalised(offsets.iter().map(|x| normal::pdf(x / deviation)).collect());
+                (offsets.iter().map(|x| mean + x).collect(), weights)
+            }
+            Prior::Continuous(density) => {
+                let (values, weights) = density.nodes(noise_step, NODE_LIMIT)?;
+                (values, normalised(weights))
             }
             Prior::Discrete { values, probabilities } => (values.clone(), normalised(probabilities.clone())),
         };
@@ -116,7 +159,7 @@ impl Scene {
             weights,
         };
         if !scene.noise.is_independent() {
-            scene.resolve_shared_factor(crowd)?;
+            scene.resolve_shared_factor(crowd, resolution)?;
         }
         let mut mass = vec![0.0; scene.base.len()];
         let mut moment = mass.clone();
@@ -139,28 +182,41 @@ impl Scene {
         Self::new(Prior::gaussian_with_deviation(prior)?, Noise::independent_with_deviations(noise)?)
     }
 
-    fn resolve_shared_factor(&mut self, crowd: f64) -> Result<(), Error> {
+    fn resolve_shared_factor(&mut self, crowd: f64, resolution: Resolution) -> Result<(), Error> {
         let noise = &self.noise;
         let shared = noise.loadings[0];
         let residual = noise.residuals.iter().copied().fold(f64::INFINITY, f64::min);
         let equal = noise.loadings.iter().all(|a| *a == shared);
-        if let (Prior::Gaussian { deviation }, true) = (&self.prior, equal) {
+        if equal && !self.is_discrete() {
             // Everything depends on s = x + a u alone: one axis of nodes instead of two.
-            let step = f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
-            let reach = FACTOR_REACH * shared.abs();
-            let one_axis = 2.0 * (PRIOR_REACH * deviation + reach) / step;
+            let step = resolution.step().min(1.5) * f64::min(PRODUCT_STEP * residual / crowd, 0.5 * shared.abs());
+            let reach = resolution.reach() * FACTOR_REACH * shared.abs();
+            let half_width = match &self.prior {
+                Prior::Continuous(density) => {
+                    let (low, high) = density.support();
+                    (self.mean - low).max(high - self.mean)
+                }
+                _ => resolution.reach() * PRIOR_REACH * self.prior.deviation(),
+            };
+            let one_axis = 2.0 * (half_width + reach) / step;
             let two_axes = self.values.len() as f64 * 4.0 * FACTOR_REACH;
             // A faint shared factor blurs less than the nodes of one axis resolve: two axes need fewer.
             if one_axis > two_axes {
-                return self.resolve_on_two_axes(crowd);
+                return self.resolve_on_two_axes(crowd, resolution);
             }
-            self.base = grid(PRIOR_REACH * deviation + reach, step)?;
+            let offsets = grid(half_width + reach, step)?;
+            self.base = offsets.iter().map(|s| self.mean + s).collect();
             self.factor = vec![0.0; self.base.len()];
-            let base = &self.base;
+            let mean = self.mean;
             let row = |x: &f64| {
-                let start = base.partition_point(|s| *s < x - reach);
-                let end = base.partition_point(|s| *s <= x + reach);
-                let weights = base[start..end].iter().map(|s| normal::pdf((s - x) / shared)).collect();
+                // About the mean, so that an offset costs no digit.
+                let x = x - mean;
+                let start = offsets.partition_point(|s| *s < x - reach);
+                let end = offsets.partition_point(|s| *s <= x + reach);
+                let weights = offsets[start..end]
+                    .iter()
+                    .map(|s| normal::pdf((s - x) / shared))
+                    .collect();
                 Feature {
                     start,
                     weights: normalised(weights),
@@ -169,15 +225,16 @@ impl Scene {
             self.given = self.values.iter().map(row).collect();
             return Ok(());
         }
-        self.resolve_on_two_axes(crowd)
+        self.resolve_on_two_axes(crowd, resolution)
     }
 
-    fn resolve_on_two_axes(&mut self, crowd: f64) -> Result<(), Error> {
+    fn resolve_on_two_axes(&mut self, crowd: f64, resolution: Resolution) -> Result<(), Error> {
         let noise = &self.noise;
         let steepest = (0..noise.sensors())
             .map(|n| noise.residuals[n] / noise.loadings[n].abs())
             .fold(f64::INFINITY, f64::min);
-        let factor = grid(FACTOR_REACH, f64::min(2.0 * PRIOR_STEP, PRODUCT_STEP * steepest / crowd))?;
+        let step = resolution.step() * f64::min(2.0 * PRIOR_STEP, PRODUCT_STEP * steepest / crowd);
+        let factor = grid(resolution.reach() * FACTOR_REACH, step)?;
         let weights = normalised(factor.iter().map(|u| normal::pdf(*u)).collect());
         let nodes = factor.len();
         if self.values.len().saturating_mul(nodes) > NODE_LIMIT {
@@ -221,13 +278,13 @@ impl Scene {
 
     /// Prior variance.
     pub fn prior_variance(&self) -> f64 {
-        let spread = self.prior.spread();
+        let spread = self.prior.deviation();
         spread * spread
     }
 
     /// Standard deviation of sensor `n`'s sample.
     pub fn sample_deviation(&self, n: usize) -> f64 {
-        self.prior.spread().hypot(self.noise.deviation(n))
+        self.prior.deviation().hypot(self.noise.deviation(n))
     }
 
     /// Mean of every sample: the prior's.

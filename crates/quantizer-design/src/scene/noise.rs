@@ -139,6 +139,14 @@ impl Noise {
         self.loadings[n].hypot(self.residuals[n])
     }
 
+    /// `1' Sigma^-1 1`: the inverse of the least variance of a weighted mean of the samples.
+    pub fn precision_of_mean(&self) -> f64 {
+        let pairs = || self.loadings.iter().zip(&self.residuals);
+        let own: f64 = self.residuals.iter().map(|d| 1.0 / (d * d)).sum();
+        let (cross, shared) = pairs().fold((0.0, 1.0), |(c, s), (a, d)| (c + a / (d * d), s + (a / d) * (a / d)));
+        own - cross * (cross / shared)
+    }
+
     /// The noise of some of the sensors, in the given order.
     ///
     /// # Errors

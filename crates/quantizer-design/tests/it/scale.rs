@@ -1,7 +1,7 @@
 //! Nothing depends on the unit: the design of a scaled scene is the scaled design.
 
 use fewbits_quantizer_design::decoder::MmseDecoder;
-use fewbits_quantizer_design::design::{self, AllowedCells, Alternating, Design, Discovery, Separation, Words};
+use fewbits_quantizer_design::design::{self, AllowedCells, Alternating, Design, Discovery, Scope, Separation, Words};
 use fewbits_quantizer_design::{
     Certificate, Channel, Criterion, JointTable, Newton, Noise, Prior, Quantizer, Scene, System, lloyd_max,
 };
@@ -195,13 +195,13 @@ fn strong_signals_have_designs_too() {
 
 #[test]
 fn a_design_is_stored_rescaled_and_restored() {
-    let best = design::design(&pair(0.2, 1.0), 2).unwrap();
+    let best = design::estimation(&pair(0.2, 1.0), 2).unwrap();
     let json = serde_json::to_string(&best).unwrap();
     assert_eq!(serde_json::from_str::<Design>(&json).unwrap(), best);
     let rescaled = best.rescaled(1e4, MSE).unwrap();
     agree(&best, &rescaled, 1e4, MSE, 1e-12);
     assert!((rescaled.system.value(MSE).unwrap() / rescaled.value - 1.0).abs() < 1e-11);
-    let again = design::design(&pair(0.2, 1e4), 2).unwrap();
+    let again = design::estimation(&pair(0.2, 1e4), 2).unwrap();
     assert!((again.value / rescaled.value - 1.0).abs() < 1e-10);
 }
 
@@ -228,7 +228,7 @@ fn what_a_user_reaches_for_agrees_with_what_he_built_by_hand() {
     assert!(lloyd.symbol_distribution(2).is_err());
     assert!((design::bhattacharyya_coefficient(&[0.5, 0.5], &[0.9, 0.1]).unwrap() - 0.894_427_19).abs() < 1e-8);
     assert!(design::bhattacharyya_coefficient(&[0.5, 0.5], &[1.0]).is_err());
-    let report = design::design(&Scene::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap(), 1)
+    let report = design::estimation(&Scene::gaussian_with_deviations(1.0, &[1.0, 1.0]).unwrap(), 1)
         .unwrap()
         .report()
         .unwrap();
@@ -236,9 +236,56 @@ fn what_a_user_reaches_for_agrees_with_what_he_built_by_hand() {
     assert!((bound - 0.444_444).abs() < 1e-5 && report.mean_squared_error > bound && report.excess().unwrap() > 1.0);
     let detection =
         Scene::new(Prior::binary(2.0, 0.5).unwrap(), Noise::independent_with_deviations(&[1.0; 5]).unwrap()).unwrap();
-    let found = design::design(&detection, 2).unwrap();
+    let found = design::detection(&detection, 2).unwrap();
     assert!((found.value - 1.660_803_0e-2).abs() < 1e-8, "{}", found.value);
-    assert!(design::design(&detection, 0).is_err() && design::design(&detection, 7).is_err());
+    assert!(design::detection(&detection, 0).is_err() && design::detection(&detection, 7).is_err());
     let decoder = MmseDecoder::new(&lloyd, 16).unwrap();
     assert_eq!(decoder.len(), 16);
+}
+
+/// Two equal sensors with correlated noise are best with different quantizers. The Hessian over the breakpoints that they share
+/// does not show it.
+#[test]
+fn identical_sensors_leave_the_saddle_of_equal_quantizers() {
+    let shared = |scale: f64| {
+        let q = Quantizer::symmetric(1.1 * scale).unwrap();
+        System::identical(equal_pair(0.85, scale), q).unwrap()
+    };
+    for scale in [1e-4, 1.0, 1e4] {
+        let found = design::joint(&shared(scale), MI, &Newton::default()).unwrap();
+        assert!((found.value - 0.331_123_01).abs() < 1e-8, "{}", found.value);
+        assert_eq!((found.certificate, found.scope), (Certificate::LocalOptimum, Scope::EverySensor));
+        let stay = design::joint(&shared(scale), MSE, &Newton::to_nearest_stationary_point()).unwrap();
+        assert!(stay.is_saddle());
+    }
+    // Independent noise: equal quantizers are an optimum, also over the breakpoints of every sensor.
+    let equal = System::identical(equal_pair(0.0, 1.0), Quantizer::symmetric(1.3).unwrap()).unwrap();
+    let found = design::joint(&equal, MI, &Newton::default()).unwrap();
+    assert_eq!((found.certificate, found.system.groups().len()), (Certificate::LocalOptimum, 1));
+}
+
+/// What is not checked is said: two sensors told apart would take more outcomes than allowed.
+#[test]
+fn an_unchecked_certificate_names_its_scope() {
+    let q = Quantizer::symmetric(1.1).unwrap();
+    let shared = System::identical(equal_pair(0.85, 1.0), q).unwrap();
+    // 10 counts, 15 with one symbol more; 16 outcomes apart.
+    let narrow = design::joint(&shared.with_outcome_limit(15), MI, &Newton::default()).unwrap();
+    assert_eq!((narrow.scope, narrow.certificate), (Scope::SharedBreakpoints, Certificate::LocalOptimum));
+}
+
+/// The nodes of a density are not hypotheses: the caller says whether to estimate or to decide.
+#[test]
+fn nodes_of_a_density_are_estimated_not_guessed() {
+    let values: Vec<f64> = (0..64).map(|k| (f64::from(k) + 0.5) / 64.0).collect();
+    let noise = || Noise::independent_with_deviations(&[0.3, 0.3]).unwrap();
+    let nodes = Scene::new(Prior::discrete(values, vec![1.0 / 64.0; 64]).unwrap(), noise()).unwrap();
+    let density = Scene::new(Prior::uniform(0.0, 1.0).unwrap(), noise()).unwrap();
+    let [estimated, exact] = [&nodes, &density].map(|scene| design::estimation(scene, 1).unwrap());
+    assert!((estimated.value / exact.value - 1.0).abs() < 1e-3, "{} {}", estimated.value, exact.value);
+    let guessed = design::detection(&nodes, 1).unwrap();
+    assert!(estimated.value < guessed.system.value(MSE).unwrap());
+    assert!(guessed.value < estimated.system.value(Criterion::BayesError).unwrap());
+    let gaussian = Scene::gaussian_with_deviations(1.0, &[1.0]).unwrap();
+    assert!(design::detection(&gaussian, 1).is_err());
 }

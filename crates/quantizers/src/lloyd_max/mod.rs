@@ -17,6 +17,10 @@
 //! until the step is so small against the narrowest cell that the next one is below rounding
 //! ```
 //!
+//! Only a density whose logarithm is concave has a single solution. Any other one is also solved from the best partition on a
+//! fine grid (dynamic programming), and the solution of less error is returned. Every answer is a local optimum without empty
+//! cells: that is checked.
+//!
 //! Everything is measured from the density's centre and moved in the end, so that a density far from zero has the same
 //! quantizer as one at zero.
 //!
@@ -29,6 +33,7 @@
 //! ```
 
 mod newton;
+mod partition;
 mod table;
 
 pub use table::LloydMax;
@@ -45,15 +50,31 @@ pub const MAX_LEVELS: usize = 4096;
 ///
 /// # Errors
 /// [`Error::Argument`] unless `levels` is in `2..=MAX_LEVELS`, or if the density lies so far from zero that breakpoints
-/// coincide; [`Error::NotConverged`] if the density is too rough for a unique optimum to be found.
+/// coincide; [`Error::NotConverged`] if the density is too rough for an optimum to be found; [`Error::NotOptimal`] if the density
+/// has no use for so many levels.
 pub fn design(density: &impl Density, levels: usize) -> Result<LloydMax, Error> {
     checked_levels(levels)?;
-    let table = density.normal_deviation().filter(|_| levels <= KEPT_LEVELS);
-    let start = match table {
-        Some(deviation) => kept(levels)?.breakpoints.iter().map(|b| deviation * b).collect(),
-        None => density.companding(levels),
+    if let Some(deviation) = density.normal_deviation() {
+        let start = if levels <= KEPT_LEVELS {
+            kept(levels)?.breakpoints.iter().map(|b| deviation * b).collect()
+        } else {
+            density.companding(levels)
+        };
+        return newton::solve(density, start);
+    }
+    let found = newton::solve(density, density.companding(levels));
+    let Some(start) = partition::best_on_grid(density, levels) else {
+        return found;
     };
-    newton::solve(density, start)
+    match (found, newton::solve(density, start)) {
+        (Ok(a), Ok(b)) => Ok(if b.mean_squared_error() < a.mean_squared_error() {
+            b
+        } else {
+            a
+        }),
+        (Ok(found), Err(_)) | (Err(_), Ok(found)) => Ok(found),
+        (Err(error), Err(_)) => Err(error),
+    }
 }
 
 /// Quantizers of the standard normal density up to this many levels are designed once and kept.
@@ -71,7 +92,8 @@ pub fn gaussian(levels: usize) -> Result<LloydMax, Error> {
     }
 }
 
-/// As [`design`], from breakpoints of the caller's: those of a similar density, or of a design stored before.
+/// As [`design`], from breakpoints of the caller's: those of a similar density, or of a design stored before. The answer is the
+/// local optimum that they lead to. If they lead to none (a cell runs empty), it is that of [`design`].
 ///
 /// # Errors
 /// As [`design`]; also if the breakpoints are not finite and strictly increasing.
@@ -81,7 +103,11 @@ pub fn design_from(density: &impl Density, breakpoints: &[f64]) -> Result<LloydM
     let centre = density.centre();
     let start: Vec<f64> = breakpoints.iter().map(|b| b - centre).collect();
     check_increasing(&start)?;
-    newton::solve(density, start)
+    let levels = start.len() + 1;
+    match newton::solve(density, start) {
+        Err(Error::NotOptimal { .. }) => design(density, levels),
+        found => found,
+    }
 }
 
 fn checked_levels(levels: usize) -> Result<usize, Error> {
@@ -259,6 +285,24 @@ mod tests {
         assert!(design_from(&density, &[]).is_err());
         assert!(design_from(&density, &[1.0, 1.0]).is_err());
         assert!(design_from(&density, &[f64::NAN]).is_err());
+    }
+
+    /// Two bells: {-5, 5} is stationary with an empty middle cell. The optimum splits one bell at its centre.
+    #[test]
+    fn two_bells_with_three_levels_split_one_bell() {
+        let bell = |x: f64| normal::pdf((x - 10.0) / 0.1) / 0.1 + normal::pdf((x + 10.0) / 0.1) / 0.1;
+        let density = SmoothDensity::new(bell, -12.0, 12.0, 400).unwrap();
+        let exact = 0.01 * (0.5 + 0.5 * (1.0 - std::f64::consts::FRAC_2_PI));
+        for found in [
+            design(&density, 3).unwrap(),
+            design_from(&density, &[-5.0, 5.0]).unwrap(),
+        ] {
+            assert!((found.mean_squared_error() / exact - 1.0).abs() < 1e-9, "{}", found.mean_squared_error());
+            assert!(found.probabilities().iter().all(|p| *p > 0.2));
+        }
+        // Two levels a bell: the quantizer of each bell by itself.
+        let four = design(&density, 4).unwrap().mean_squared_error();
+        assert!((four / (0.01 * (1.0 - std::f64::consts::FRAC_2_PI)) - 1.0).abs() < 1e-9);
     }
 
     #[test]

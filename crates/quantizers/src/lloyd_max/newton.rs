@@ -12,10 +12,15 @@ const LAST_STEP: f64 = 3e-8;
 const ROUNDING_STEP: f64 = 1e-5;
 /// Residuals below this share of the density's extent count as no worse than any other.
 const RESIDUAL_TOLERANCE: f64 = 1e-13;
+/// A cell of less probability holds nothing: the 4096 cells of a normal density hold 1e-10 and more.
+const EMPTY_CELL: f64 = 1e-15;
+/// A pivot of the Hessian below the negative of this marks a saddle; rounding leaves 1e-13 where it is zero.
+const FLAT_PIVOT: f64 = 1e-9;
 /// Newton needs 4 to 15 steps; what needs more is not a density with a unique optimum.
 const MAX_ITERATIONS: usize = 200;
 
-/// The quantizer of least squared error near the increasing breakpoints `b`, which are measured from the density's centre.
+/// The quantizer of least squared error near the increasing breakpoints `b`, which are measured from the density's centre: a
+/// local optimum without empty cells, or an error.
 pub(super) fn solve(density: &impl Density, mut b: Vec<f64>) -> Result<LloydMax, Error> {
     let (low, high) = density.extent();
     let negligible = RESIDUAL_TOLERANCE * (high - low);
@@ -61,6 +66,7 @@ pub(super) fn solve(density: &impl Density, mut b: Vec<f64>) -> Result<LloydMax,
         let quadratic = share == 1.0 && change <= LAST_STEP * narrowest;
         let at_rounding = change <= ROUNDING_STEP * narrowest && change >= 0.5 * last;
         if quadratic || at_rounding || change <= negligible {
+            solver.certify(density, &b)?;
             return finish(density, &b, &solver.cells);
         }
     }
@@ -107,8 +113,42 @@ impl Solver {
         largest
     }
 
+    /// Refuses empty cells and saddles at the stationary point `b`.
+    ///
+    /// The Hessian of the error is the Jacobian with its rows scaled by positive numbers, so that it is positive semidefinite
+    /// exactly if no pivot of the Jacobian is negative.
+    fn certify(&self, density: &impl Density, b: &[f64]) -> Result<(), Error> {
+        let masses = self.cells.iter().map(|c| c.mass).enumerate();
+        let (cell, probability) = masses.min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((0, 0.0));
+        let (below, diagonal, above) = self.jacobian(density, b);
+        let mut pivot = diagonal[0];
+        let mut is_saddle = pivot < -FLAT_PIVOT;
+        for i in 1..diagonal.len() {
+            pivot = diagonal[i] - below[i - 1] * above[i - 1] / pivot.max(FLAT_PIVOT);
+            is_saddle |= pivot < -FLAT_PIVOT;
+        }
+        if probability > EMPTY_CELL && !is_saddle {
+            return Ok(());
+        }
+        Err(Error::NotOptimal {
+            algorithm: "Lloyd-Max",
+            cell,
+            levels: self.cells.len(),
+            probability,
+        })
+    }
+
     /// Solves the tridiagonal Newton system at `b`; where it is singular the step is a sweep of the fixed point.
     fn newton_step(&mut self, density: &impl Density, b: &[f64]) {
+        let (below, diagonal, above) = self.jacobian(density, b);
+        match tridiagonal::solve(&below, &diagonal, &above, &self.residual) {
+            Ok(step) => self.step = step,
+            Err(_) => self.step.copy_from_slice(&self.residual),
+        }
+    }
+
+    /// The Jacobian of the midpoint equations: below, on and above the diagonal.
+    fn jacobian(&self, density: &impl Density, b: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let n = b.len();
         let densities: Vec<f64> = b.iter().map(|b| density.pdf(*b)).collect();
         // Influence of an edge on the centroid of a cell, at the given distance from each other.
@@ -124,10 +164,7 @@ impl Solver {
         let below: Vec<f64> = (1..n).map(|i| -of_lower(i)).collect();
         let diagonal: Vec<f64> = (0..n).map(|i| 1.0 - of_upper(i) - of_lower(i + 1)).collect();
         let above: Vec<f64> = (1..n).map(|i| -of_upper(i)).collect();
-        match tridiagonal::solve(&below, &diagonal, &above, &self.residual) {
-            Ok(step) => self.step = step,
-            Err(_) => self.step.copy_from_slice(&self.residual),
-        }
+        (below, diagonal, above)
     }
 }
 

@@ -10,8 +10,8 @@ use plotters::element::{Rectangle, Text};
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-/// Width of a sample of a layer.
-const SAMPLE: i32 = 190;
+/// Width of a sample of a layer: room for the longest pattern of dashes and a dash more.
+const SAMPLE: i32 = 300;
 const MARGIN: i32 = 60;
 
 /// A named layer of a panel, with the marks on it.

@@ -17,7 +17,7 @@ use plotters::chart::ChartBuilder;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
-use plotters::element::Text;
+use plotters::element::{PathElement, Text};
 use plotters::style::ShapeStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use scale::Scaled;
@@ -75,7 +75,22 @@ pub fn to_svg(id: &str, plot: &Plot) -> Result<String, Error> {
             reason,
         })?;
     }
-    Ok(svg)
+    Ok(scaled(&svg))
+}
+
+/// The picture as large as its window allows, instead of one pixel per unit.
+fn scaled(svg: &str) -> String {
+    let fixed = svg
+        .find("<svg ")
+        .and_then(|start| Some((start, start + svg[start..].find('>')?)));
+    let Some((start, end)) = fixed else {
+        return svg.to_owned();
+    };
+    let kept = svg[start..end]
+        .split(' ')
+        .filter(|word| !word.starts_with("width=") && !word.starts_with("height="));
+    let head = kept.collect::<Vec<_>>().join(" ");
+    format!("{}{head} style=\"width:100%;height:auto;max-height:100vh\"{}", &svg[..start], &svg[end..])
 }
 
 fn why(error: impl std::fmt::Display) -> String {
@@ -109,6 +124,28 @@ fn tick(axis: &Scaled, value: f64) -> String {
     } else {
         String::new()
     }
+}
+
+/// Draws the small ticks of logarithmic axes, inside the frame.
+fn small_ticks(frame: &Frame<'_, '_>) -> Result<(), String> {
+    const LENGTH: f64 = 16.0;
+    let pen = ShapeStyle::from(&INK).stroke_width(3);
+    let draw = |from: (f64, f64), to: (f64, f64)| {
+        let round = |(x, y): (f64, f64)| (x.round() as i32, y.round() as i32);
+        frame
+            .area
+            .draw(&PathElement::new(vec![round(from), round(to)], pen))
+            .map_err(why)
+    };
+    for value in frame.x.small_ticks() {
+        let across = frame.across(value);
+        draw((across, frame.bottom), (across, frame.bottom - LENGTH))?;
+    }
+    for value in frame.y.small_ticks() {
+        let down = frame.down(value);
+        draw((frame.left, down), (frame.left + LENGTH, down))?;
+    }
+    Ok(())
 }
 
 fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> Result<(), String> {
@@ -168,6 +205,7 @@ fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> R
         top,
         bottom,
     };
+    small_ticks(&frame)?;
     below_names.draw_below(&frame)?;
     left_names.draw_left(&frame)?;
     let (start, _) = area.get_base_pixel();

@@ -46,6 +46,27 @@ impl Scaled {
         }
     }
 
+    /// Values of the small ticks of a logarithmic axis: 2 to 9 times each power of ten, if the powers stand far enough apart.
+    pub(super) fn small_ticks(&self) -> Vec<f64> {
+        const MOST_DECADES: f64 = 8.0;
+        if self.scale == Scale::Linear || (self.high / self.low).log10() > MOST_DECADES {
+            return Vec::new();
+        }
+        let exponents = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
+        exponents
+            .flat_map(|exponent| (2..=9).map(move |digit| f64::from(digit) * 10_f64.powi(exponent)))
+            .filter(|value| (self.low..=self.high).contains(value))
+            .collect()
+    }
+
+    /// Whether the numbers of this axis are written as powers of ten: all of them, or none.
+    fn in_powers(&self) -> bool {
+        match self.scale {
+            Scale::Log => self.low < 1e-3 || self.high > 1e5,
+            Scale::Linear => !(1e-3..=1e5).contains(&self.low.abs().max(self.high.abs())),
+        }
+    }
+
     pub(super) fn names(&self) -> &[(f64, String)] {
         &self.names
     }
@@ -159,7 +180,7 @@ impl ValueFormatter<f64> for Scaled {
         if *value == 0.0 {
             return "0".to_owned();
         }
-        if !(1e-3..1e5).contains(&value.abs()) {
+        if self.in_powers() {
             return power(*value);
         }
         let text = format!("{value:.6}");
@@ -188,5 +209,25 @@ mod tests {
     #[test]
     fn powers_are_raised() {
         assert_eq!([1e-4, 2.5e-4, -1e6, 3e12].map(power), ["10⁻⁴", "2.5·10⁻⁴", "-10⁶", "3·10¹²"]);
+    }
+
+    #[test]
+    fn numbers_of_an_axis_share_a_style() {
+        let wide = Scaled::new(&Axis::log("").between(1e-6, 10.0), std::iter::empty(), false);
+        assert_eq!([1e-6, 0.1, 1.0].map(|v| wide.format_ext(&v)), ["10⁻⁶", "10⁻¹", "10⁰"]);
+        let near = Scaled::new(&Axis::log("").between(0.01, 100.0), std::iter::empty(), false);
+        assert_eq!([0.01, 1.0, 100.0].map(|v| near.format_ext(&v)), ["0.01", "1", "100"]);
+        let large = Scaled::new(&Axis::linear("").between(0.0, 2e5), std::iter::empty(), false);
+        assert_eq!([0.0, 5e4, 1e5].map(|v| large.format_ext(&v)), ["0", "5·10⁴", "10⁵"]);
+    }
+
+    #[test]
+    fn small_ticks_divide_decades_of_logarithmic_axes_only() {
+        let near = Scaled::new(&Axis::log("").between(0.5, 12.0), std::iter::empty(), false);
+        let small = near.small_ticks();
+        assert_eq!(small.len(), 13);
+        assert!(small.contains(&9.0) && !small.contains(&10.0));
+        let linear = Scaled::new(&Axis::linear("").between(0.5, 12.0), std::iter::empty(), false);
+        assert!(linear.small_ticks().is_empty());
     }
 }

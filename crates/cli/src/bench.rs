@@ -1,0 +1,181 @@
+//! `fewbits bench`: sizes and speeds of several codecs on a table, in one run.
+//!
+//! Lossy columns are compared at equal guaranteed error: pco gets the indices of a lattice of `2 delta`. zstd has no bound and is
+//! given the doubles.
+
+use crate::arguments::BenchOptions;
+use crate::error::Error;
+use crate::pack::{Counted, schema};
+use crate::{Ending, output};
+use fewbits_record::{Bound, Playback, Recorder, Schema};
+use pco::ChunkConfig;
+use pco::standalone::{simple_compress, simple_decompress};
+use serde::Serialize;
+use std::io::Cursor;
+use std::time::Instant;
+
+/// The table's finite samples in doubles.
+const RAW_BITS: f64 = 64.0;
+
+#[derive(Serialize)]
+struct Line {
+    codec: &'static str,
+    /// What its restored values promise.
+    promise: &'static str,
+    bytes: usize,
+    bits_per_sample: f64,
+    encode_samples_per_second: f64,
+    decode_samples_per_second: f64,
+}
+
+fn line(codec: &'static str, promise: &'static str, bytes: usize, samples: usize, encode: f64, decode: f64) -> Line {
+    Line {
+        codec,
+        promise,
+        bytes,
+        bits_per_sample: 8.0 * bytes as f64 / samples as f64,
+        encode_samples_per_second: samples as f64 / encode,
+        decode_samples_per_second: samples as f64 / decode,
+    }
+}
+
+type Cells = Vec<Vec<Option<f64>>>;
+
+fn ours(codec: &'static str, schema: Schema, ticks: &[i64], columns: &Cells) -> Result<Line, fewbits_record::Error> {
+    let samples = columns.len() * ticks.len();
+    let start = Instant::now();
+    let sink = Counted {
+        sink: Vec::new(),
+        bytes: 0,
+    };
+    let mut recorder = Recorder::new(sink, schema);
+    let mut row = Vec::with_capacity(columns.len());
+    for (i, tick) in ticks.iter().enumerate() {
+        row.clear();
+        row.extend(columns.iter().map(|column| column[i]));
+        recorder.push(*tick, &row)?;
+    }
+    let bytes = recorder.finish()?.sink;
+    let encode = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let mut rows = 0;
+    for block in Playback::new(Cursor::new(&bytes))?.blocks() {
+        rows += block?.rows();
+    }
+    debug_assert_eq!(rows, ticks.len());
+    Ok(line(codec, "as asked", bytes.len(), samples, encode, start.elapsed().as_secs_f64()))
+}
+
+fn failed(_: pco::errors::PcoError) -> Error {
+    Error::Option {
+        option: "bench",
+        value: "pco".to_owned(),
+        expected: "samples that pco takes",
+    }
+}
+
+fn packed<T: pco::data_types::Number>(columns: &[Vec<T>]) -> Result<(usize, f64, f64), Error> {
+    let (mut bytes, mut encode, mut decode) = (0, 0.0, 0.0);
+    for column in columns {
+        let start = Instant::now();
+        let packed = simple_compress(column, &ChunkConfig::default()).map_err(failed)?;
+        encode += start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let restored: Vec<T> = simple_decompress(&packed).map_err(failed)?;
+        decode += start.elapsed().as_secs_f64();
+        debug_assert_eq!(restored.len(), column.len());
+        bytes += packed.len();
+    }
+    Ok((bytes, encode, decode))
+}
+
+/// Indices on a lattice of `2 delta` for lossy columns; `None` if a column has another kind of bound.
+fn indices(schema: &Schema, finite: &[Vec<f64>]) -> Option<Vec<Vec<i64>>> {
+    let column = |(column, samples): (&fewbits_record::Column, &Vec<f64>)| {
+        let ends = samples
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
+        let step = match column.bound() {
+            Bound::Absolute(delta) => 2.0 * delta,
+            Bound::ShareOfRange(share) => 2.0 * share * column.period().unwrap_or(ends.1 - ends.0),
+            Bound::Decimals(places) => 10_f64.powi(-i32::from(places)),
+            _ => return None,
+        };
+        Some(samples.iter().map(|x| (x / step).round() as i64).collect())
+    };
+    schema.columns().iter().zip(finite).map(column).collect()
+}
+
+/// Runs the task.
+pub(crate) fn run(options: &BenchOptions) -> Result<Ending, Error> {
+    let (mut table, schema) = schema(&options.table, &options.bounds)?;
+    let (mut ticks, mut columns): (Vec<i64>, Cells) = (Vec::new(), vec![Vec::new(); table.names.len()]);
+    while let Some((tick, cells)) = table.next(schema.time())? {
+        ticks.push(tick.unwrap_or(ticks.len() as i64));
+        columns
+            .iter_mut()
+            .zip(cells)
+            .for_each(|(column, cell)| column.push(cell));
+    }
+    if ticks.is_empty() {
+        return Err(Error::Empty {
+            file: table.file().to_owned(),
+            what: "rows",
+        });
+    }
+    let file = table.file().to_owned();
+    let samples = columns.len() * ticks.len();
+    let finite: Vec<Vec<f64>> = columns
+        .iter()
+        .map(|cells| cells.iter().flatten().copied().filter(|x| x.is_finite()).collect())
+        .collect();
+    let mut lines = vec![ours("fewbits", schema.clone(), &ticks, &columns).map_err(Error::recording(&file))?];
+    if let Ok(one) = schema.clone().with_rows_per_block(ticks.len()) {
+        lines.push(ours("fewbits, one block", one, &ticks, &columns).map_err(Error::recording(&file))?);
+    }
+    if let Some(indices) = indices(&schema, &finite) {
+        let (bytes, encode, decode) = packed(&indices)?;
+        lines.push(line("lattice + pco", "as asked, no gaps, no time", bytes, samples, encode, decode));
+    }
+    let (bytes, encode, decode) = packed(&finite)?;
+    lines.push(line("pco", "lossless, no gaps, no time", bytes, samples, encode, decode));
+    #[cfg(feature = "zstd")]
+    lines.push(zstandard(&finite, samples).map_err(Error::file("zstd", "compress"))?);
+    if options.json {
+        output::json(&lines)?;
+        return Ok(Ending::Good);
+    }
+    println!("{} rows of {} columns, {} bytes as doubles", ticks.len(), columns.len(), 8 * samples);
+    println!(
+        "{:<20} {:>12} {:>10} {:>8} {:>12} {:>12}  promise",
+        "codec", "bytes", "bits each", "ratio", "M/s encode", "M/s decode"
+    );
+    for line in &lines {
+        println!(
+            "{:<20} {:>12} {:>10.3} {:>8.1} {:>12.2} {:>12.2}  {}",
+            line.codec,
+            line.bytes,
+            line.bits_per_sample,
+            RAW_BITS / line.bits_per_sample,
+            1e-6 * line.encode_samples_per_second,
+            1e-6 * line.decode_samples_per_second,
+            line.promise
+        );
+    }
+    Ok(Ending::Good)
+}
+
+#[cfg(feature = "zstd")]
+fn zstandard(columns: &[Vec<f64>], samples: usize) -> std::io::Result<Line> {
+    /// The level of the references in `docs/record.md`.
+    const LEVEL: i32 = 19;
+    let raw: Vec<u8> = columns.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+    let start = Instant::now();
+    let packed = zstd::encode_all(&raw[..], LEVEL)?;
+    let encode = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let restored = zstd::decode_all(&packed[..])?;
+    debug_assert_eq!(restored.len(), raw.len());
+    let decode = start.elapsed().as_secs_f64();
+    Ok(line("zstd 19", "lossless, no gaps, no time", packed.len(), samples, encode, decode))
+}

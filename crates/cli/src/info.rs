@@ -1,0 +1,143 @@
+//! `fewbits info`: what a recording holds.
+
+use crate::arguments::InfoOptions;
+use crate::error::Error;
+use crate::{Ending, bounds, clock, output};
+use fewbits_record::{Playback, TimeBase};
+use serde::Serialize;
+
+#[derive(Serialize)]
+struct Info {
+    file: String,
+    bytes: u64,
+    rows: u64,
+    blocks: u64,
+    rows_per_block: usize,
+    bits_per_sample: f64,
+    index: bool,
+    damaged: u64,
+    time: String,
+    from: Option<String>,
+    to: Option<String>,
+    columns: Vec<ColumnInfo>,
+}
+
+#[derive(Serialize)]
+struct ColumnInfo {
+    name: String,
+    unit: String,
+    bound: String,
+    min: Option<f64>,
+    max: Option<f64>,
+    gaps: u64,
+}
+
+/// Runs the task: decodes everything once, so that what it says was seen.
+pub(crate) fn run(options: &InfoOptions) -> Result<Ending, Error> {
+    let file = options.file.display().to_string();
+    let mut playback = Playback::open(&options.file).map_err(Error::recording(&file))?;
+    let schema = playback.schema().clone();
+    let time = schema.time();
+    let mut columns: Vec<ColumnInfo> = schema
+        .columns()
+        .iter()
+        .map(|column| ColumnInfo {
+            name: column.name().to_owned(),
+            unit: column.unit().to_owned(),
+            bound: bounds::shown(column.bound(), column.period()),
+            min: None,
+            max: None,
+            gaps: 0,
+        })
+        .collect();
+    let (mut rows, mut blocks, mut damaged) = (0, 0, 0);
+    let mut span: Option<(i64, i64)> = None;
+    for block in playback.blocks() {
+        let block = match block {
+            Ok(block) => block,
+            Err(fewbits_record::Error::Block { .. }) => {
+                damaged += 1;
+                continue;
+            }
+            Err(error) => return Err(Error::recording(&file)(error)),
+        };
+        rows += block.rows() as u64;
+        blocks += 1;
+        for tick in &block.ticks {
+            let (from, to) = span.unwrap_or((*tick, *tick));
+            span = Some((from.min(*tick), to.max(*tick)));
+        }
+        for (info, cells) in columns.iter_mut().zip(&block.columns) {
+            info.gaps += cells.iter().filter(|cell| cell.is_none()).count() as u64;
+            for value in cells.iter().flatten().filter(|value| value.is_finite()) {
+                info.min = Some(info.min.map_or(*value, |min| min.min(*value)));
+                info.max = Some(info.max.map_or(*value, |max| max.max(*value)));
+            }
+        }
+    }
+    let samples = (rows * columns.len() as u64).max(1);
+    let info = Info {
+        bytes: playback.bytes(),
+        bits_per_sample: 8.0 * playback.bytes() as f64 / samples as f64,
+        rows,
+        blocks,
+        rows_per_block: schema.rows_per_block(),
+        index: playback.has_index(),
+        damaged,
+        time: match time {
+            TimeBase::Clock { tolerance: 0, .. } => "exact".to_owned(),
+            TimeBase::Clock {
+                tolerance, decimals, ..
+            } => {
+                let seconds = tolerance as f64 / 10_f64.powi(i32::from(decimals));
+                format!("±{seconds} s")
+            }
+            _ => "numbered".to_owned(),
+        },
+        from: span.map(|span| clock::shown(span.0, time)),
+        to: span.map(|span| clock::shown(span.1, time)),
+        columns,
+        file,
+    };
+    if options.json {
+        output::json(&info)?;
+    } else {
+        print(&info);
+    }
+    Ok(if damaged == 0 { Ending::Good } else { Ending::Failed })
+}
+
+fn print(info: &Info) {
+    println!(
+        "{}: {} rows, {} columns, {} bytes, {:.3} bits per sample",
+        info.file,
+        info.rows,
+        info.columns.len(),
+        info.bytes,
+        info.bits_per_sample
+    );
+    let index = if info.index {
+        "with index"
+    } else {
+        "without index (not finished, or cut off)"
+    };
+    println!("{} blocks of up to {} rows, {index}", info.blocks, info.rows_per_block);
+    if info.damaged > 0 {
+        println!("{} damaged parts", info.damaged);
+    }
+    if let (Some(from), Some(to)) = (&info.from, &info.to) {
+        println!("time {}: {from} to {to}", info.time);
+    }
+    for column in &info.columns {
+        let unit = if column.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {}", column.unit)
+        };
+        let ends = match (column.min, column.max) {
+            (Some(min), Some(max)) => format!("{min} to {max}{unit}"),
+            _ => "no values".to_owned(),
+        };
+        println!("  {}: {}, {ends}, {} gaps", column.name, column.bound, column.gaps);
+    }
+}

@@ -1,0 +1,246 @@
+//! Tables: CSV from a file or standard input, row by row.
+
+use crate::arguments::TableOptions;
+use crate::clock;
+use crate::error::Error;
+use fewbits_record::{TimeBase, TimeFormat};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::fs::File;
+use std::io::{IsTerminal, Read};
+
+/// A row: its tick, or `None` where rows are numbered, and its cells.
+pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
+
+/// Cells that mean that there is no sample.
+const GAPS: [&str; 8] = ["", "NA", "N/A", "n/a", "null", "NULL", "None", "?"];
+/// Whole numbers up to this size are doubles.
+const MAX_WHOLE: u64 = 1 << 53;
+
+/// An open table.
+pub(crate) struct Table {
+    file: String,
+    reader: csv::Reader<Box<dyn Read + Send>>,
+    record: csv::StringRecord,
+    /// Index of the time's column and of the columns of values.
+    time_column: Option<usize>,
+    columns: Vec<usize>,
+    pub(crate) names: Vec<String>,
+    all_names: Vec<String>,
+    rows: u64,
+    /// The first row, if it was looked at.
+    peeked: bool,
+}
+
+/// What one reading of a whole table tells.
+pub(crate) struct Survey {
+    /// Ends of each column's finite values.
+    pub(crate) ends: Vec<Option<(f64, f64)>>,
+    /// Most decimals of a time.
+    pub(crate) decimals: u8,
+}
+
+/// A bar that counts bytes, on a terminal only.
+pub(crate) fn progress(bytes: Option<u64>) -> ProgressBar {
+    match bytes {
+        Some(bytes) if std::io::stderr().is_terminal() => {
+            let style = ProgressStyle::with_template("{bar:40} {bytes} of {total_bytes}, {eta} left");
+            ProgressBar::new(bytes).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        }
+        _ => ProgressBar::hidden(),
+    }
+}
+
+impl Table {
+    /// Opens the table and reads the names.
+    pub(crate) fn open(options: &TableOptions) -> Result<Self, Error> {
+        let (file, source): (String, Box<dyn Read + Send>) = match options.file.as_str() {
+            "-" => ("standard input".to_owned(), Box::new(std::io::stdin())),
+            name => {
+                let opened = File::open(name).map_err(Error::file(name, "open"))?;
+                let bar = progress(opened.metadata().ok().map(|data| data.len()));
+                (name.to_owned(), Box::new(bar.wrap_read(opened)))
+            }
+        };
+        let delimiter = u8::try_from(options.delimiter).map_err(|_| Error::Option {
+            option: "--delimiter",
+            value: options.delimiter.to_string(),
+            expected: "one character of ASCII",
+        })?;
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(delimiter)
+            .trim(csv::Trim::All)
+            .from_reader(source);
+        let names: Vec<String> = reader
+            .headers()
+            .map_err(Error::table(&file))?
+            .iter()
+            .map(str::to_owned)
+            .collect();
+        if names.is_empty() {
+            return Err(Error::Empty { file, what: "columns" });
+        }
+        let position = |name: &String| {
+            names
+                .iter()
+                .position(|known| known == name)
+                .ok_or_else(|| Error::NoColumn {
+                    file: file.clone(),
+                    column: name.clone(),
+                    existing: names.join(", "),
+                })
+        };
+        let time_column = match (&options.time_column, &options.time) {
+            (Some(name), _) => Some(position(name)?),
+            (None, Some(_)) => Some(0),
+            (None, None) => None,
+        };
+        let columns: Vec<usize> = if options.columns.is_empty() {
+            (0..names.len()).filter(|i| Some(*i) != time_column).collect()
+        } else {
+            options.columns.iter().map(position).collect::<Result<_, _>>()?
+        };
+        Ok(Self {
+            names: columns.iter().map(|i| names[*i].clone()).collect(),
+            all_names: names,
+            file,
+            reader,
+            record: csv::StringRecord::new(),
+            time_column,
+            columns,
+            rows: 0,
+            peeked: false,
+        })
+    }
+
+    /// What messages call the table.
+    pub(crate) fn file(&self) -> &str {
+        &self.file
+    }
+
+    fn read_record(&mut self) -> Result<bool, Error> {
+        if std::mem::take(&mut self.peeked) {
+            return Ok(true);
+        }
+        let more = self
+            .reader
+            .read_record(&mut self.record)
+            .map_err(Error::table(&self.file))?;
+        self.rows += u64::from(more);
+        Ok(more)
+    }
+
+    fn cell_error(&self, column: usize, (problem, mend): (&'static str, &'static str)) -> Error {
+        Error::Cell {
+            file: self.file.clone(),
+            row: self.rows,
+            column: self.all_names[column].clone(),
+            cell: self.record.get(column).unwrap_or_default().to_owned(),
+            problem,
+            mend,
+        }
+    }
+
+    /// How times of the table are kept: looks at the first row.
+    pub(crate) fn time_base(&mut self, options: &TableOptions, survey: Option<&Survey>) -> Result<TimeBase, Error> {
+        let Some(column) = self.time_column else {
+            return Ok(TimeBase::Numbered);
+        };
+        if !self.read_record()? {
+            return Err(Error::Empty {
+                file: self.file.clone(),
+                what: "rows",
+            });
+        }
+        self.peeked = true;
+        let first = self.record.get(column).unwrap_or_default();
+        let Some(format) = clock::format_of(first) else {
+            return Err(self.cell_error(
+                column,
+                (
+                    "is not a time",
+                    "write seconds, or UTC as 2026-01-31T12:00:00.5Z, or name another column with --time-column",
+                ),
+            ));
+        };
+        let nanoseconds = clock::tolerance(options.time.as_deref().unwrap_or("exact"))?;
+        let decimals = match (format, survey) {
+            (TimeFormat::Seconds, Some(survey)) if nanoseconds == 0 => survey.decimals,
+            // Times in milliseconds or microseconds since 1970 are too large for nanoseconds.
+            (TimeFormat::Seconds, _) if first.parse::<f64>().is_ok_and(|first| first.abs() > 4e9) => 0,
+            _ => clock::NANOSECONDS,
+        };
+        let scale = 10_u64.pow(u32::from(clock::NANOSECONDS.saturating_sub(decimals)));
+        Ok(TimeBase::Clock {
+            decimals,
+            // One tick of it is kept for decimals beyond a tick, which are cut off.
+            tolerance: (nanoseconds / scale).saturating_sub(1),
+            format,
+        })
+    }
+
+    /// The next row; `None` behind the last.
+    pub(crate) fn next(&mut self, time: TimeBase) -> Result<Option<Row>, Error> {
+        if !self.read_record()? {
+            return Ok(None);
+        }
+        let tick = match self.time_column {
+            Some(column) => {
+                let text = self.record.get(column).unwrap_or_default();
+                Some(clock::tick(text, time).map_err(|problem| self.cell_error(column, problem))?)
+            }
+            None => None,
+        };
+        let cells = self
+            .columns
+            .iter()
+            .map(|column| self.cell(*column))
+            .collect::<Result<_, _>>()?;
+        Ok(Some((tick, cells)))
+    }
+
+    fn cell(&self, column: usize) -> Result<Option<f64>, Error> {
+        let text = self.record.get(column).unwrap_or_default();
+        if GAPS.contains(&text) {
+            return Ok(None);
+        }
+        let Ok(value) = text.parse::<f64>() else {
+            return Err(self.cell_error(
+                column,
+                ("is not a number", "mend the cell, leave it empty for a gap, or choose columns with --columns"),
+            ));
+        };
+        let size = text.trim_start_matches(['-', '+']);
+        if size.len() > 15 && size.bytes().all(|byte| byte.is_ascii_digit()) {
+            let is_double = size.parse::<u64>().is_ok_and(|whole| whole <= MAX_WHOLE);
+            if !is_double {
+                return Err(self.cell_error(
+                    column,
+                    ("is a whole number of more than 53 bits", "split the column, or leave it out with --columns"),
+                ));
+            }
+        }
+        Ok(Some(value))
+    }
+
+    /// Reads the whole table once.
+    pub(crate) fn survey(options: &TableOptions) -> Result<Survey, Error> {
+        let mut table = Self::open(options)?;
+        let mut survey = Survey {
+            ends: vec![None; table.columns.len()],
+            decimals: 0,
+        };
+        while table.read_record()? {
+            for (i, column) in table.columns.iter().enumerate() {
+                if let Some(value) = table.cell(*column)?.filter(|value| value.is_finite()) {
+                    let (low, high) = survey.ends[i].unwrap_or((value, value));
+                    survey.ends[i] = Some((low.min(value), high.max(value)));
+                }
+            }
+            if let Some(column) = table.time_column {
+                let text = table.record.get(column).unwrap_or_default();
+                survey.decimals = survey.decimals.max(clock::decimals_of(text).unwrap_or(0).min(18));
+            }
+        }
+        Ok(survey)
+    }
+}

@@ -1,0 +1,233 @@
+//! `fewbits send` and `fewbits receive`: rows as frames over a stream or UDP, and back.
+
+use crate::arguments::{ReceiveOptions, SendOptions};
+use crate::error::Error;
+use crate::input::Row;
+use crate::output::{Shape, Writer};
+use crate::unpack::{all_columns, write_blocks};
+use crate::{Ending, output, pack};
+use fewbits_record::{BlockReader, FrameReader, FrameWriter};
+use std::fs::File;
+use std::io::{Read, Write};
+use std::net::UdpSocket;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::time::Instant;
+
+/// Rows that are read ahead.
+const AHEAD: usize = 1024;
+/// The largest datagram.
+const MAX_DATAGRAM: usize = 1 << 16;
+
+/// Where frames go.
+enum Way {
+    /// A stream that keeps order and loses nothing: the header once, then frames. It is a recording without an index.
+    Stream {
+        sink: Box<dyn Write>,
+        name: String,
+        begun: bool,
+    },
+    /// Datagrams: the header in pieces before every so many frames.
+    Datagrams {
+        socket: UdpSocket,
+        address: String,
+        header_every: u64,
+        sent: u64,
+    },
+}
+
+impl Way {
+    fn send(&mut self, writer: &FrameWriter, frames: &[Vec<u8>]) -> Result<(), Error> {
+        for frame in frames {
+            match self {
+                Self::Stream { sink, name, begun } => {
+                    let failed = Error::file(name, "write");
+                    if !std::mem::replace(begun, true) {
+                        sink.write_all(&writer.header().unwrap_or_default()).map_err(&failed)?;
+                    }
+                    sink.write_all(frame).and_then(|()| sink.flush()).map_err(failed)?;
+                }
+                Self::Datagrams {
+                    socket,
+                    address,
+                    header_every,
+                    sent,
+                } => {
+                    let post = |frame: &[u8]| match socket.send(frame) {
+                        // Nobody listens yet: as lost as any other datagram.
+                        Err(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => Ok(()),
+                        outcome => outcome.map(drop),
+                    };
+                    let pieces = if sent.is_multiple_of(*header_every) {
+                        writer.header_frames()
+                    } else {
+                        Vec::new()
+                    };
+                    let outcome = pieces
+                        .iter()
+                        .try_for_each(|piece| post(piece))
+                        .and_then(|()| post(frame));
+                    outcome.map_err(socket_error(address, "send"))?;
+                    *sent += 1;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn socket_error(address: &str, action: &'static str) -> impl Fn(std::io::Error) -> Error + use<> {
+    let address = address.to_owned();
+    move |source| Error::Socket {
+        address: address.clone(),
+        action,
+        source,
+    }
+}
+
+fn way(options: &SendOptions) -> Result<Way, Error> {
+    let Some(address) = &options.udp else {
+        let (sink, name) = output::open_binary(options.output.as_deref())?;
+        return Ok(Way::Stream {
+            sink,
+            name,
+            begun: false,
+        });
+    };
+    let local = if address.starts_with('[') {
+        "[::]:0"
+    } else {
+        "0.0.0.0:0"
+    };
+    let socket = UdpSocket::bind(local).and_then(|socket| socket.connect(address).map(|()| socket));
+    Ok(Way::Datagrams {
+        socket: socket.map_err(socket_error(address, "connect"))?,
+        address: address.clone(),
+        header_every: options.header_every,
+        sent: 0,
+    })
+}
+
+/// Runs `send`.
+pub(crate) fn send(options: &SendOptions) -> Result<Ending, Error> {
+    let (mut table, schema) = pack::schema(&options.table, &options.bounds)?;
+    let (time, file) = (schema.time(), table.file().to_owned());
+    let failed = Error::recording(&file);
+    let mut writer = FrameWriter::new(schema, options.max_bytes).map_err(&failed)?;
+    let mut way = way(options)?;
+    let (sender, rows) = sync_channel::<Result<Row, Error>>(AHEAD);
+    // Reading blocks, and the deadline does not wait for it: a thread of its own reads.
+    let reader = std::thread::spawn(move || {
+        loop {
+            let row = match table.next(time) {
+                Ok(Some(row)) => Ok(row),
+                Ok(None) => return,
+                Err(error) => Err(error),
+            };
+            let is_last = row.is_err();
+            if sender.send(row).is_err() || is_last {
+                return;
+            }
+        }
+    });
+    let (mut next, mut oldest) = (0_i64, None::<Instant>);
+    loop {
+        let row = match wait(&rows, options, oldest) {
+            Ok(row) => row?,
+            Err(RecvTimeoutError::Disconnected) => break,
+            Err(RecvTimeoutError::Timeout) => {
+                let frames = writer.flush().map_err(&failed)?;
+                way.send(&writer, &frames)?;
+                oldest = None;
+                continue;
+            }
+        };
+        let tick = row.0.unwrap_or(next);
+        next = tick.wrapping_add(1);
+        let before = writer.waiting();
+        let frames = writer.push(tick, &row.1).map_err(&failed)?;
+        way.send(&writer, &frames)?;
+        if before == 0 || !frames.is_empty() {
+            oldest = (writer.waiting() > 0).then(Instant::now);
+        }
+    }
+    let frames = writer.flush().map_err(&failed)?;
+    way.send(&writer, &frames)?;
+    // The thread has sent its last row and ends by itself.
+    drop(reader);
+    Ok(Ending::Good)
+}
+
+/// The next row, or a timeout when the oldest waiting row must go.
+fn wait(
+    rows: &Receiver<Result<Row, Error>>,
+    options: &SendOptions,
+    oldest: Option<Instant>,
+) -> Result<Result<Row, Error>, RecvTimeoutError> {
+    match (options.deadline, oldest) {
+        (Some(deadline), Some(oldest)) => rows.recv_timeout(deadline.saturating_sub(oldest.elapsed())),
+        _ => rows.recv().map_err(|_| RecvTimeoutError::Disconnected),
+    }
+}
+
+/// Runs `receive`.
+pub(crate) fn receive(options: &ReceiveOptions) -> Result<Ending, Error> {
+    match &options.udp {
+        Some(address) => receive_datagrams(options, address),
+        None => receive_stream(options),
+    }
+}
+
+fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
+    let (source, name): (Box<dyn Read>, &str) = match options.file.as_str() {
+        "-" => (Box::new(std::io::stdin()), "standard input"),
+        file => (Box::new(File::open(file).map_err(Error::file(file, "open"))?), file),
+    };
+    let blocks = BlockReader::new(source).map_err(Error::recording(name))?;
+    let (columns, names) = all_columns(blocks.schema());
+    let mut writer = Writer::new(options.output.as_deref(), Shape::Csv, blocks.schema(), &names)?;
+    let mut ending = Ending::Good;
+    // One block at a time, so that rows are out as soon as they are in.
+    for block in blocks {
+        let one = write_blocks(std::iter::once(block), &mut writer, (i64::MIN, i64::MAX), &columns, name)?;
+        if one == Ending::Failed {
+            ending = Ending::Failed;
+        }
+    }
+    Ok(ending)
+}
+
+fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, Error> {
+    let socket = UdpSocket::bind(address).map_err(socket_error(address, "listen"))?;
+    socket
+        .set_read_timeout(options.timeout)
+        .map_err(socket_error(address, "set the timeout"))?;
+    if let Ok(local) = socket.local_addr() {
+        eprintln!("listening at {local}");
+    }
+    let (mut reader, mut writer) = (FrameReader::new(), None::<(Writer, Vec<usize>)>);
+    let mut datagram = vec![0; MAX_DATAGRAM];
+    loop {
+        let length = match socket.recv(&mut datagram) {
+            Ok(length) => length,
+            Err(error) if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {
+                return Ok(Ending::Good);
+            }
+            Err(error) => return Err(socket_error(address, "receive")(error)),
+        };
+        let blocks = match reader.handle(&datagram[..length]) {
+            Ok(blocks) => blocks,
+            Err(error) => {
+                eprintln!("warning: {address}: a datagram was refused: {error}");
+                continue;
+            }
+        };
+        let Some(schema) = reader.schema() else { continue };
+        if writer.is_none() {
+            let (columns, names) = all_columns(schema);
+            writer = Some((Writer::new(options.output.as_deref(), Shape::Csv, schema, &names)?, columns));
+        }
+        if let Some((writer, columns)) = &mut writer {
+            write_blocks(blocks.into_iter().map(Ok), writer, (i64::MIN, i64::MAX), columns, address)?;
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! The command `fewbits`: recordings and telemetry within guaranteed errors.
+//!
+//! Each task is a module with a function `run`. Results go to `--output` or standard output, everything else to standard error.
+//! Exit codes: 0 done, 1 a promise failed or a part was damaged, 2 refused.
+
+mod arguments;
+mod bench;
+mod bounds;
+mod clock;
+mod error;
+mod info;
+mod input;
+mod link;
+mod output;
+mod pack;
+mod plan;
+mod unpack;
+mod verify;
+
+use arguments::{Cli, Task};
+use clap::Parser;
+use std::error::Error as _;
+use std::process::ExitCode;
+
+/// How a task ended that was not refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ending {
+    Good,
+    /// A promise does not hold, or a part could not be read.
+    Failed,
+}
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().task {
+        Task::Plan(options) => plan::run(&options),
+        Task::Pack(options) => pack::run(&options),
+        Task::Unpack(options) => unpack::run(&options.whole()),
+        Task::Cat(options) => unpack::run(&options),
+        Task::Info(options) => info::run(&options),
+        Task::Verify(options) => verify::run(&options),
+        Task::Bench(options) => bench::run(&options),
+        Task::Send(options) => link::send(&options),
+        Task::Receive(options) => link::receive(&options),
+        Task::Generate(options) => arguments::generate(&options),
+    };
+    match done {
+        Ok(Ending::Good) => ExitCode::SUCCESS,
+        Ok(Ending::Failed) => ExitCode::FAILURE,
+        // Who reads the other end of the pipe has seen enough.
+        Err(error) if error.is_closed_pipe() => ExitCode::SUCCESS,
+        Err(error) => {
+            eprint!("error: {error}");
+            let mut source = error.source();
+            while let Some(cause) = source {
+                eprint!(": {cause}");
+                source = cause.source();
+            }
+            eprintln!();
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! `fewbits unpack` and `fewbits cat`: a recording as CSV or JSON lines.
+
+use crate::arguments::CatOptions;
+use crate::error::Error;
+use crate::output::{Shape, Writer};
+use crate::{Ending, clock};
+use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase};
+
+/// Which rows, which columns.
+struct Selection {
+    from: i64,
+    to: i64,
+    columns: Vec<usize>,
+    names: Vec<String>,
+}
+
+fn end(text: Option<&String>, option: &'static str, time: TimeBase, otherwise: i64) -> Result<i64, Error> {
+    let Some(text) = text else { return Ok(otherwise) };
+    clock::tick(text, time).map_err(|_| Error::Option {
+        option,
+        value: text.clone(),
+        expected: match time {
+            TimeBase::Numbered => "a row number, since this recording has no times",
+            _ => "a time as the recording writes it",
+        },
+    })
+}
+
+fn selection(options: &CatOptions, schema: &Schema) -> Result<Selection, Error> {
+    let all = || schema.columns().iter().map(|column| column.name().to_owned()).collect();
+    let names: Vec<String> = if options.columns.is_empty() {
+        all()
+    } else {
+        options.columns.clone()
+    };
+    let columns = names.iter().map(|name| schema.position(name)).collect::<Result<_, _>>();
+    Ok(Selection {
+        from: end(options.from.as_ref(), "--from", schema.time(), i64::MIN)?,
+        to: end(options.to.as_ref(), "--to", schema.time(), i64::MAX)?,
+        columns: columns.map_err(Error::recording(&options.file))?,
+        names,
+    })
+}
+
+/// Writes the rows; damaged parts are told on standard error.
+pub(crate) fn write_blocks(
+    blocks: impl Iterator<Item = Result<Block, fewbits_record::Error>>,
+    writer: &mut Writer,
+    ticks: (i64, i64),
+    columns: &[usize],
+    file: &str,
+) -> Result<Ending, Error> {
+    let mut ending = Ending::Good;
+    for block in blocks {
+        let block = match block {
+            Ok(block) => block,
+            Err(error @ fewbits_record::Error::Block { .. }) => {
+                eprintln!("warning: {file}: {error}; the rest is read");
+                ending = Ending::Failed;
+                continue;
+            }
+            Err(error) => return Err(Error::recording(file)(error)),
+        };
+        let mut values = Vec::with_capacity(columns.len());
+        for (row, tick) in block.ticks.iter().enumerate() {
+            if *tick < ticks.0 || *tick > ticks.1 {
+                continue;
+            }
+            values.clear();
+            values.extend(columns.iter().map(|column| block.columns[*column][row]));
+            writer.write(*tick, &values)?;
+        }
+    }
+    writer.flush()?;
+    Ok(ending)
+}
+
+/// Runs the task.
+pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
+    let file = options.file.as_str();
+    let shape = if options.json { Shape::Json } else { Shape::Csv };
+    if file == "-" {
+        let blocks = BlockReader::new(std::io::stdin().lock()).map_err(Error::recording("standard input"))?;
+        let selection = selection(options, blocks.schema())?;
+        let mut writer = Writer::new(options.output.as_deref(), shape, blocks.schema(), &selection.names)?;
+        let ticks = (selection.from, selection.to);
+        return write_blocks(blocks, &mut writer, ticks, &selection.columns, "standard input");
+    }
+    let mut playback = Playback::open(file).map_err(Error::recording(file))?;
+    let selection = selection(options, playback.schema())?;
+    let mut writer = Writer::new(options.output.as_deref(), shape, playback.schema(), &selection.names)?;
+    let names: Vec<&str> = selection.names.iter().map(String::as_str).collect();
+    playback.columns(&names).map_err(Error::recording(file))?;
+    let ticks = (selection.from, selection.to);
+    let blocks = playback.blocks_between(ticks.0, ticks.1);
+    write_blocks(blocks, &mut writer, ticks, &selection.columns, file)
+}
+
+/// All columns of a schema.
+pub(crate) fn all_columns(schema: &Schema) -> (Vec<usize>, Vec<String>) {
+    let names = schema.columns().iter().map(Column::name).map(str::to_owned);
+    ((0..schema.columns().len()).collect(), names.collect())
+}

@@ -1,0 +1,277 @@
+//! The tests of the command run the binary.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use tempfile::TempDir;
+
+/// Runs the command in a folder.
+fn fewbits(folder: &Path, words: &[&str], input: &[u8]) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_fewbits"))
+        .args(words)
+        .current_dir(folder)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    let input = input.to_vec();
+    let feeder = std::thread::spawn(move || {
+        // A task that refuses early closes its input.
+        let _ = stdin.write_all(&input);
+    });
+    let output = child.wait_with_output().unwrap();
+    feeder.join().unwrap();
+    output
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+fn good(folder: &Path, words: &[&str], input: &[u8]) -> Vec<u8> {
+    let output = fewbits(folder, words, input);
+    assert!(output.status.success(), "{words:?}: {}", text(&output.stderr));
+    output.stdout
+}
+
+/// The message of a refusal.
+fn refused(folder: &Path, words: &[&str], input: &[u8]) -> String {
+    let output = fewbits(folder, words, input);
+    assert_eq!(output.status.code(), Some(2), "{words:?}: {}", text(&output.stderr));
+    text(&output.stderr)
+}
+
+/// 1000 rows: time, a wave, a flow with gaps, decimals, a direction.
+fn table() -> String {
+    let mut table = "time,temp,flow,price,direction\n".to_owned();
+    for i in 0..1000 {
+        let x = f64::from(i);
+        let flow = if i % 97 == 5 {
+            String::new()
+        } else {
+            format!("{}", 40.0 + 9.0 * (0.01 * x).cos())
+        };
+        let price = (1e5 + 300.0 * (0.02 * x).cos()).round() / 1000.0;
+        let direction = (350.0 + 0.3 * x) % 360.0;
+        let time = 1_700_000_000.0 + 2.0 * x + 0.001 * f64::from(i * 7 % 5);
+        table += &format!("{time:.3},{},{flow},{price},{direction}\n", 20.0 + (0.03 * x).sin());
+    }
+    table
+}
+
+const BOUND: &str = "temp=±0.1,flow=1%,direction=±2@360,*=decimals:3";
+
+fn folder() -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.csv"), table()).unwrap();
+    let path = folder.path().to_owned();
+    (folder, path)
+}
+
+#[test]
+fn packed_table_verifies_and_unpacks() {
+    let (_kept, folder) = folder();
+    for time in ["exact", "±10ms"] {
+        good(&folder, &["pack", "a.csv", "--bound", BOUND, "--time", time, "--output", "a.fewb"], b"");
+        let verdict = good(&folder, &["verify", "a.csv", "a.fewb"], b"");
+        assert!(text(&verdict).contains("all promises hold"));
+        let size = std::fs::metadata(folder.join("a.fewb")).unwrap().len();
+        assert!(size < table().len() as u64 / 12, "{size}");
+        let unpacked = text(&good(&folder, &["unpack", "a.fewb"], b""));
+        assert_eq!(unpacked.lines().count(), 1001);
+        assert!(unpacked.starts_with("time,temp,flow,price,direction\n"));
+        if time == "exact" {
+            let times = |table: &str| -> Vec<f64> {
+                table
+                    .lines()
+                    .skip(1)
+                    .map(|line| line.split(',').next().unwrap().parse().unwrap())
+                    .collect()
+            };
+            assert_eq!(times(&unpacked), times(&table()));
+        }
+    }
+}
+
+#[test]
+fn altered_table_fails_verification() {
+    let (_kept, folder) = folder();
+    good(&folder, &["pack", "a.csv", "--bound", "*=±0.01", "--time", "exact", "-o", "a.fewb"], b"");
+    let altered = table().replacen(",20,", ",20.5,", 1);
+    assert_ne!(altered, table());
+    std::fs::write(folder.join("b.csv"), altered).unwrap();
+    let output = fewbits(&folder, &["verify", "b.csv", "a.fewb", "--json"], b"");
+    assert_eq!(output.status.code(), Some(1));
+    let verdict: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&verdict["holds"], &verdict["columns"][0]["failed"]), (&false.into(), &1.into()));
+}
+
+#[test]
+fn pipes_and_ranges_agree() {
+    let (_kept, folder) = folder();
+    let packed = good(&folder, &["pack", "-", "--bound", "*=1%", "--rows-per-block", "64"], table().as_bytes());
+    let whole = text(&good(&folder, &["unpack", "-"], &packed));
+    assert_eq!(whole.lines().count(), 1001);
+    std::fs::write(folder.join("a.fewb"), &packed).unwrap();
+    let words = [
+        "cat",
+        "a.fewb",
+        "--from",
+        "100",
+        "--to",
+        "199",
+        "--columns",
+        "price,temp",
+    ];
+    let part = text(&good(&folder, &words, b""));
+    let lines: Vec<&str> = part.lines().collect();
+    assert_eq!((lines.len(), lines[0]), (101, "price,temp"));
+    let cells: Vec<&str> = whole.lines().nth(101).unwrap().split(',').collect();
+    assert_eq!(lines[1], format!("{},{}", cells[3], cells[1]));
+    let json = text(&good(&folder, &["cat", "a.fewb", "--from", "999", "--json"], b""));
+    let row: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(row["row"], 999);
+}
+
+#[test]
+fn info_and_plan_speak_of_columns() {
+    let (_kept, folder) = folder();
+    good(&folder, &["pack", "a.csv", "--bound", BOUND, "--time", "exact", "-o", "a.fewb"], b"");
+    let info: serde_json::Value = serde_json::from_slice(&good(&folder, &["info", "a.fewb", "--json"], b"")).unwrap();
+    assert_eq!(
+        (&info["rows"], &info["index"], &info["columns"][1]["gaps"]),
+        (&1000.into(), &true.into(), &11.into())
+    );
+    assert!(text(&good(&folder, &["info", "a.fewb"], b"")).contains("direction: ±2@360"));
+    let plan = good(&folder, &["plan", "a.csv", "--time", "exact", "--json"], b"");
+    let plan: serde_json::Value = serde_json::from_slice(&plan).unwrap();
+    assert_eq!(plan["columns"][2]["name"], "price");
+    assert!((plan["columns"][2]["steps"][0].as_f64().unwrap() - 0.001).abs() < 1e-9);
+    assert!(plan["columns"][0]["bounds"][4][2].as_f64().unwrap() < 2.0);
+    assert!(text(&good(&folder, &["bench", "a.csv", "--bound", "*=1%"], b"")).contains("lattice + pco"));
+}
+
+#[test]
+fn damaged_recording_is_read_around_the_damage() {
+    let (_kept, folder) = folder();
+    good(
+        &folder,
+        &[
+            "pack",
+            "a.csv",
+            "--rows-per-block",
+            "100",
+            "-o",
+            "a.fewb",
+            "--columns",
+            "price",
+        ],
+        b"",
+    );
+    let mut bytes = std::fs::read(folder.join("a.fewb")).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    std::fs::write(folder.join("b.fewb"), bytes).unwrap();
+    let output = fewbits(&folder, &["unpack", "b.fewb"], b"");
+    assert_eq!((output.status.code(), text(&output.stdout).lines().count()), (Some(1), 901));
+    assert!(text(&output.stderr).contains("b.fewb: ") && text(&output.stderr).contains("damaged"));
+}
+
+#[test]
+fn appended_rows_follow() {
+    let (_kept, folder) = folder();
+    let options = ["pack", "a.csv", "-o", "a.fewb", "--columns", "price,temp"];
+    good(&folder, &[&options[..], &["--bound", "*=±0.01"]].concat(), b"");
+    good(&folder, &[&options[..], &["--append"]].concat(), b"");
+    let unpacked = text(&good(&folder, &["unpack", "a.fewb"], b""));
+    assert_eq!(unpacked.lines().count(), 2001);
+    let message = refused(&folder, &["pack", "a.csv", "-o", "a.fewb", "--append"], b"");
+    assert!(message.contains("--columns"), "{message}");
+}
+
+#[test]
+fn refusals_name_file_row_column_and_mend() {
+    let (_kept, folder) = folder();
+    std::fs::write(folder.join("bad.csv"), "t,x\n1,2\n2,abc\n").unwrap();
+    let message = refused(&folder, &["pack", "bad.csv", "-o", "x"], b"");
+    assert_eq!(
+        message,
+        "error: bad.csv: row 2, column `x`: `abc` is not a number: mend the cell, leave it empty for a gap, or choose columns with \
+         --columns\n"
+    );
+    let message = refused(&folder, &["pack", "a.csv", "--bound", "x=1%", "-o", "x"], b"");
+    assert_eq!(message, "error: a.csv: no column `x`: there are time, temp, flow, price, direction\n");
+    for (bound, part) in [
+        ("temp=-1", "-1"),
+        ("temp=warm", "warm"),
+        ("temp", "column=bound"),
+        ("temp=200%", "share"),
+    ] {
+        let message = refused(&folder, &["pack", "a.csv", "--bound", bound, "-o", "x"], b"");
+        assert!(message.contains(part), "{message}");
+    }
+    let message = refused(&folder, &["pack", "none.csv", "-o", "x"], b"");
+    assert!(message.starts_with("error: none.csv: cannot open: "), "{message}");
+    let message = refused(&folder, &["unpack", "a.csv"], b"");
+    assert!(message.contains("a.csv: not a recording"), "{message}");
+    let message = refused(&folder, &["pack", "bad.csv", "--time", "exact", "--time-column", "x", "-o", "x"], b"");
+    assert!(message.contains("row 2, column `x`") && message.contains("is not a time"), "{message}");
+    let message = refused(&folder, &["pack", "-", "-o", "x"], b"n\n18014398509481985\n");
+    assert!(message.contains("more than 53 bits"), "{message}");
+}
+
+#[test]
+fn sent_stream_is_received() {
+    let (_kept, folder) = folder();
+    let words = ["send", "-", "--bound", BOUND, "--time", "exact", "--max-bytes", "80"];
+    let stream = good(&folder, &words, table().as_bytes());
+    let received = text(&good(&folder, &["receive"], &stream));
+    assert_eq!(received.lines().count(), 1001);
+    // It is a recording too.
+    std::fs::write(folder.join("a.fewb"), &stream).unwrap();
+    good(&folder, &["verify", "a.csv", "a.fewb"], b"");
+}
+
+#[test]
+fn datagrams_are_received() {
+    let (_kept, folder) = folder();
+    // A free port; the listener takes it a moment later.
+    let address = {
+        let socket = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.local_addr().unwrap().to_string()
+    };
+    let receiver = {
+        let (folder, address) = (folder.clone(), address.clone());
+        std::thread::spawn(move || good(&folder, &["receive", "--udp", &address, "--timeout", "3s"], b""))
+    };
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    let words = [
+        "send",
+        "a.csv",
+        "--bound",
+        BOUND,
+        "--max-bytes",
+        "400",
+        "--udp",
+        &address,
+        "--header-every",
+        "1",
+    ];
+    good(&folder, &words, b"");
+    let received = text(&receiver.join().unwrap());
+    // Datagrams may be lost, but hardly any between two sockets of one machine.
+    assert!(received.lines().count() > 800, "{} lines", received.lines().count());
+}
+
+#[test]
+fn completions_and_manual_are_generated() {
+    let (_kept, folder) = folder();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        assert!(text(&good(&folder, &["generate", shell], b"")).contains("rows-per-block"));
+    }
+    assert!(text(&good(&folder, &["generate", "man"], b"")).starts_with(".ie"));
+}

@@ -1,0 +1,283 @@
+//! State of a running simulation that nodes cannot read directly: time, event queue, ledger of bits and joules, log, and which nodes work.
+//!
+//! [`Simulator`](super::Simulator) takes events from here; [`Context`](super::Context) is the part that a protocol may use. What is sent is in
+//! `transmission`.
+
+use super::ledger::{Account, Ledger};
+use super::log::{Detail, Entry, Log, Reception};
+use super::queue::{Arrival, Event, EventKind, Queue};
+use super::setup::{FaultKind, Setup};
+use crate::error::Error;
+use crate::medium::loss::BurstState;
+use crate::medium::{Check, Field, Kind, ReceivedCopy, Stored};
+use crate::note::Note;
+use crate::units::{Instant, Joules, Seconds, SensorId};
+use fewbits_monte_carlo::Stream;
+use fewbits_numerics::ArgumentError;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, VecDeque};
+
+/// Names a frame that a node sent, for [`Protocol::on_ack`](super::Protocol::on_ack) and
+/// [`Protocol::on_give_up`](super::Protocol::on_give_up). No two frames of a run have the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Ticket(pub(super) u64);
+
+/// Frames to one receiver that wait for others.
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Batch {
+    /// The timer of the batch names this number. A batch that is full is sent before its timer fires, and the next batch has another number.
+    pub(super) number: u32,
+    pub(super) frames: Vec<Stored>,
+    pub(super) tickets: Vec<Ticket>,
+}
+
+/// Frames that wait for the air or for an acknowledgement.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Outgoing {
+    pub(super) from: SensorId,
+    pub(super) to: Option<SensorId>,
+    pub(super) frames: Vec<Stored>,
+    pub(super) tickets: Vec<Ticket>,
+    /// Attempts so far.
+    pub(super) attempts: u32,
+    /// The sender is awake from the attempt before.
+    pub(super) sender_awake: bool,
+    /// The receiver is awake from the attempt before.
+    pub(super) receiver_awake: bool,
+}
+
+/// What a snapshot holds besides the nodes.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct State {
+    pub(super) now: Instant,
+    pub(super) queue: Queue,
+    /// For each node whether it lives. Every event asks for it; the ledger says the same, spread over more memory.
+    pub(super) alive: Vec<bool>,
+    /// For each node the end of its last outage.
+    pub(super) out_until: Vec<Instant>,
+    /// For each node until when the air about it is taken.
+    pub(super) busy_until: Vec<Instant>,
+    pub(super) batches: BTreeMap<(SensorId, Option<SensorId>), Batch>,
+    pub(super) outgoing: BTreeMap<u32, Outgoing>,
+    /// Batches and outgoing frames are numbered together.
+    pub(super) next_number: u32,
+    pub(super) next_ticket: u64,
+    pub(super) bursts: BTreeMap<(SensorId, SensorId), BurstState>,
+    /// Transmissions and acknowledgements so far.
+    pub(super) transmissions: usize,
+    pub(super) ledger: Ledger,
+    pub(super) log: Log,
+}
+
+/// Memory of transmissions that are over, used again.
+#[derive(Debug, Default)]
+pub(super) struct BufferPool {
+    pub(super) receptions: Vec<Reception>,
+    pub(super) copies: Vec<Vec<ReceivedCopy>>,
+}
+
+#[derive(Debug)]
+pub(super) struct SimulatorCore {
+    pub(super) field: Field,
+    pub(super) setup: Setup,
+    pub(super) air: Stream,
+    pub(super) state: State,
+    /// What happened on air in the run that is replayed.
+    pub(super) recorded: Option<VecDeque<Entry>>,
+    pub(super) pool: BufferPool,
+}
+
+impl SimulatorCore {
+    pub(super) fn new(field: Field, setup: Setup) -> Result<Self, Error> {
+        setup.check(&field)?;
+        let nodes = field.len();
+        let mut core = Self {
+            air: setup.stream.named("air"),
+            state: State {
+                now: Instant::default(),
+                queue: Queue::default(),
+                alive: vec![true; nodes],
+                out_until: vec![Instant::default(); nodes],
+                busy_until: vec![Instant::default(); nodes],
+                batches: BTreeMap::new(),
+                outgoing: BTreeMap::new(),
+                next_number: 0,
+                next_ticket: 0,
+                bursts: BTreeMap::new(),
+                transmissions: 0,
+                ledger: Ledger::new(nodes),
+                log: Log::default(),
+            },
+            field,
+            setup,
+            recorded: None,
+            pool: BufferPool::default(),
+        };
+        for index in 0..core.setup.faults.len() {
+            let fault = core.setup.faults[index];
+            let index = u32::try_from(index)
+                .map_err(|_| ArgumentError::new("faults", core.setup.faults.len(), "fewer than 2^32"))?;
+            core.schedule(Instant::default().after(fault.at), fault.node, EventKind::Fault(index));
+        }
+        Ok(core)
+    }
+
+    /// Goes on with a stored state.
+    pub(super) fn resume(&mut self, state: State) -> Result<(), Error> {
+        let nodes = self.field.len();
+        let known = |id: SensorId| id.index() < nodes;
+        let reached = |from: SensorId, to: Option<SensorId>| match to {
+            Some(to) => self.field.check_link(from, to).is_ok(),
+            None => known(from),
+        };
+        let consistent = state.ledger.accounts.len() == nodes
+            && state.alive.len() == nodes
+            && (0..nodes).all(|node| state.alive[node] == state.ledger.accounts[node].died.is_none())
+            && state.out_until.len() == nodes
+            && state.busy_until.len() == nodes
+            && state.queue.is_consistent(known)
+            && state.batches.keys().all(|(from, to)| reached(*from, *to))
+            && state.outgoing.values().all(|frame| reached(frame.from, frame.to))
+            && state.bursts.keys().all(|(from, to)| known(*from) && known(*to));
+        if !consistent {
+            return Err(Error::SnapshotOfOtherNetwork {
+                found: state.ledger.accounts.len(),
+                expected: nodes,
+            });
+        }
+        self.state = state;
+        Ok(())
+    }
+
+    #[inline]
+    pub(super) fn schedule(&mut self, time: Instant, node: SensorId, kind: EventKind) {
+        self.state.queue.push(time.max(self.state.now), node, kind);
+    }
+
+    /// The next event up to `end`; time moves on to it.
+    #[inline]
+    pub(super) fn next(&mut self, end: Instant) -> Option<Event> {
+        let event = self.state.queue.pop(end)?;
+        self.state.now = event.time;
+        Some(event)
+    }
+
+    #[inline]
+    pub(super) fn is_alive(&self, node: SensorId) -> bool {
+        self.state.alive[node.index()]
+    }
+
+    /// Whether a node's radio sends and receives.
+    pub(super) fn listens(&self, node: SensorId) -> bool {
+        self.is_alive(node) && self.state.out_until[node.index()] <= self.state.now
+    }
+
+    pub(super) fn check_of(&self, kind: Kind) -> Check {
+        match kind {
+            Kind::Report => self.setup.report_check,
+            _ => Check::Whole,
+        }
+    }
+
+    pub(super) fn note(&mut self, node: SensorId, note: Note) {
+        let faults = &mut self.state.ledger.faults;
+        match note {
+            Note::Damaged | Note::Malformed => faults.damaged += 1,
+            Note::Duplicate => faults.duplicates += 1,
+            Note::Late => faults.late += 1,
+            Note::Disagreement { .. } => faults.disagreements += 1,
+            Note::Resynchronised { .. } => faults.resynchronisations += 1,
+            Note::TakenAsLost { .. } => faults.taken_as_lost += 1,
+            Note::Failed { .. } => faults.failures += 1,
+            _ => {}
+        }
+        if self.setup.detail >= Detail::Notes {
+            let at = self.state.now;
+            self.state.log.entries.push(Entry::Noted { at, node, note });
+        }
+    }
+
+    /// Lets a fault happen. True if the node begins anew.
+    pub(super) fn fault(&mut self, index: usize) -> bool {
+        let Some(fault) = self.setup.faults.get(index).copied() else {
+            return false;
+        };
+        if !self.is_alive(fault.node) {
+            return false;
+        }
+        match fault.kind {
+            FaultKind::Death => self.kill(fault.node, self.state.now),
+            FaultKind::Outage(duration) => {
+                let until = self.state.now.after(duration);
+                let out = &mut self.state.out_until[fault.node.index()];
+                *out = until.max(*out);
+            }
+            FaultKind::Restart => {
+                self.forget(fault.node);
+                self.note(fault.node, Note::Restarted);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Drops all frames that a node's radio has not sent, or not been acknowledged.
+    fn forget(&mut self, node: SensorId) {
+        self.state.batches.retain(|(from, _), _| *from != node);
+        self.state.outgoing.retain(|_, frame| frame.from != node);
+    }
+
+    fn kill(&mut self, node: SensorId, at: Instant) {
+        self.state.alive[node.index()] = false;
+        self.state.ledger.accounts[node.index()].died = Some(at);
+        self.forget(node);
+        self.note(node, Note::Died);
+    }
+
+    pub(super) fn deliver(&mut self, at: Instant, to: SensorId, arrival: Arrival) {
+        self.state.queue.deliver(at.max(self.state.now), to, arrival);
+    }
+
+    /// A node whose batteries are empty dies. If it has only idled since, it died when they were.
+    #[inline]
+    pub(super) fn drain(&mut self, node: SensorId) {
+        let radio = self.setup.radio_of(node);
+        let Some(battery) = radio.battery else { return };
+        let account = &self.state.ledger.accounts[node.index()];
+        let spent = account.total(radio, self.state.now);
+        if account.died.is_none() && spent >= battery {
+            self.exhaust(node, spent - battery);
+        }
+    }
+
+    #[cold]
+    fn exhaust(&mut self, node: SensorId, overspent: Joules) {
+        let radio = self.setup.radio_of(node);
+        let idle = (radio.baseline + radio.sleep).value();
+        let since = if idle > 0.0 { overspent.value() / idle } else { 0.0 };
+        let now = self.state.now.since_start().value();
+        self.kill(node, Instant::default().after(Seconds::trusted((now - since).max(0.0))));
+    }
+
+    /// All nodes whose batteries are empty die.
+    pub(super) fn drain_all(&mut self) {
+        (0..self.field.len() as u32).for_each(|node| self.drain(SensorId(node)));
+    }
+
+    pub(super) fn memory(&self) -> usize {
+        let (state, nodes) = (&self.state, self.field.len());
+        let graph = (nodes + 1) * size_of::<usize>() + 2 * self.field.graph().edges() * size_of::<u32>();
+        nodes * size_of::<[f64; 2]>()
+            + graph
+            + state.queue.memory()
+            + state.alive.capacity()
+            + (state.out_until.capacity() + state.busy_until.capacity()) * size_of::<Instant>()
+            + state.outgoing.len() * size_of::<Outgoing>()
+            + state.ledger.accounts.capacity() * size_of::<Account>()
+            + state.log.entries.capacity() * size_of::<Entry>()
+    }
+}

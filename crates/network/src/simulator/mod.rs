@@ -1,0 +1,308 @@
+//! The event-driven simulator: what nodes may do, and the run itself.
+//!
+//! `core` has the state that nodes cannot read, `transmission` puts frames on air.
+
+mod attempt;
+mod context;
+mod core;
+mod ledger;
+mod log;
+mod queue;
+mod setup;
+mod summary;
+pub(crate) mod transmission;
+
+pub use self::core::Ticket;
+pub use context::{Context, Protocol};
+pub use ledger::{Account, Faults, Ledger, Totals};
+pub use log::{Acknowledgement, Detail, Entry, Log, Reception, Transmission};
+pub use setup::{Batching, Fault, FaultKind, Setup};
+pub use summary::{EstimateError, Summary};
+
+use self::core::{SimulatorCore, State};
+use crate::error::Error;
+use crate::medium::{Check, Field, Frame, Kind};
+use crate::note::Note;
+use crate::units::{Instant, Joules, Seconds, SensorId};
+use fewbits_core::BitString;
+use fewbits_numerics::ArgumentError;
+use log::{unreadable, unwritable};
+use queue::{Arrival, Event, EventKind};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::io::{Read, Write};
+
+/// A network at some instant.
+///
+/// The air is divided by an ideal schedule: a transmission begins when the air is free about its sender and about all nodes that hear it. Requests are
+/// served in the order in which they were made, and who waits sleeps. Acknowledgements follow their frames after a turnaround.
+#[derive(Debug)]
+pub struct Simulator<P: Protocol> {
+    protocol: P,
+    nodes: Vec<P::Node>,
+    core: SimulatorCore,
+}
+
+impl<P: Protocol> Simulator<P> {
+    /// A network of one node state for each node of the field; nothing has happened yet and no timer is set.
+    ///
+    /// # Errors
+    /// If numbers of the setup are out of range, a fault befalls a node that does not exist, or there is not one state for each
+    /// node.
+    pub fn new(protocol: P, nodes: Vec<P::Node>, field: Field, setup: Setup) -> Result<Self, Error> {
+        if nodes.len() != field.len() {
+            let expected = format!("{}, one per node of the field", field.len());
+            return Err(ArgumentError::new("nodes", nodes.len(), expected).into());
+        }
+        Ok(Self {
+            core: SimulatorCore::new(field, setup)?,
+            protocol,
+            nodes,
+        })
+    }
+
+    /// Starts a node's first timer.
+    ///
+    /// # Errors
+    /// [`Error::UnknownNode`]; [`Error::Unheard`] if there are other nodes and none is in range.
+    pub fn start(&mut self, node: SensorId, at: Instant, token: u32) -> Result<(), Error> {
+        self.core.field.check_heard(node)?;
+        self.core.schedule(at, node, EventKind::Timer(token));
+        Ok(())
+    }
+
+    /// Lets arbitrary bits arrive at a node, as if `from` had sent them: what a stranger's radio does. Nothing is charged.
+    ///
+    /// # Errors
+    /// [`Error::UnknownNode`].
+    pub fn inject(&mut self, at: Instant, from: SensorId, to: SensorId, bits: BitString) -> Result<(), Error> {
+        self.core.field.check(from)?;
+        self.core.field.check(to)?;
+        let answer = None;
+        self.core.deliver(at, to, Arrival { from, answer, bits });
+        Ok(())
+    }
+
+    /// Takes what happens to each transmission from a log instead of the channel.
+    #[must_use]
+    pub fn replaying(mut self, log: &Log) -> Self {
+        let on_air = |entry: &&Entry| !matches!(entry, Entry::Noted { .. });
+        self.core.recorded = Some(log.entries.iter().filter(on_air).cloned().collect());
+        self
+    }
+
+    /// Handles all events up to and including `end`, in the order of their times; of one time, in the order in which they were
+    /// scheduled. Returns how many there were.
+    ///
+    /// # Errors
+    /// Those of the protocol.
+    pub fn run_until(&mut self, end: Instant) -> Result<u64, Error> {
+        let mut events = 0;
+        while let Some(event) = self.core.next(end) {
+            self.handle(event)?;
+            events += 1;
+        }
+        self.core.state.now = self.core.state.now.max(end);
+        self.core.drain_all();
+        Ok(events)
+    }
+
+    /// Handles the next `count` events, or all that there are; returns how many there were.
+    ///
+    /// # Errors
+    /// Those of the protocol.
+    pub fn run_events(&mut self, count: u64) -> Result<u64, Error> {
+        for handled in 0..count {
+            match self.core.next(Instant(u64::MAX)) {
+                Some(event) => self.handle(event)?,
+                None => return Ok(handled),
+            }
+        }
+        Ok(count)
+    }
+
+    fn handle(&mut self, event: Event) -> Result<(), Error> {
+        let id = event.node;
+        match event.kind() {
+            EventKind::Timer(token) => {
+                if !self.core.is_alive(id) {
+                    return Ok(());
+                }
+                let mut context = Context {
+                    core: &mut self.core,
+                    node: id,
+                };
+                self.protocol.on_timer(&mut self.nodes[id.index()], &mut context, token)
+            }
+            EventKind::Arrival(place) => match self.core.state.queue.take(place) {
+                Some(arrival) => self.arrive(id, arrival),
+                None => Ok(()),
+            },
+            EventKind::Fault(index) => {
+                if self.core.fault(index as usize) {
+                    let mut context = Context {
+                        core: &mut self.core,
+                        node: id,
+                    };
+                    self.protocol.on_restart(&mut self.nodes[id.index()], &mut context)?;
+                }
+                Ok(())
+            }
+            EventKind::Flush(batch) => self.core.flush(id, batch),
+            EventKind::Transmit(frame) => self.core.transmit(frame),
+            EventKind::Acknowledged(frame) => {
+                let tickets = self.core.acknowledged(id, frame);
+                self.tell(id, &tickets, P::on_ack)
+            }
+            EventKind::AckTimeout(frame) => {
+                let tickets = self.core.ack_timeout(frame)?;
+                self.tell(id, &tickets, P::on_give_up)
+            }
+        }
+    }
+
+    /// Bits have arrived. The receiver's radio acknowledges them by itself, before the node handles them.
+    fn arrive(&mut self, id: SensorId, arrival: Arrival) -> Result<(), Error> {
+        let Arrival { from, answer, bits } = arrival;
+        self.core.drain(id);
+        if !self.core.listens(id) {
+            self.core.state.ledger.faults.lost += 1;
+            return Ok(());
+        }
+        if let Some(frame) = answer {
+            self.core.answer(frame, id, from)?;
+        }
+        let check = match Frame::kind_of(&bits) {
+            Some(Kind::Report) => self.core.setup.report_check,
+            _ => Check::Whole,
+        };
+        let frame = Frame::from_bits(&bits, check);
+        let mut context = Context {
+            core: &mut self.core,
+            node: id,
+        };
+        let node = &mut self.nodes[id.index()];
+        if let Ok(frame) = frame {
+            self.protocol.on_frame(node, &mut context, from, &frame)
+        } else {
+            context.note(Note::Damaged);
+            self.protocol.on_damaged(node, &mut context, from)
+        }
+    }
+
+    /// Tells a node that lives what became of its frames.
+    fn tell(
+        &mut self,
+        id: SensorId,
+        tickets: &[Ticket],
+        handler: fn(&P, &mut P::Node, &mut Context<'_>, Ticket) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        for ticket in tickets {
+            if self.core.is_alive(id) {
+                let mut context = Context {
+                    core: &mut self.core,
+                    node: id,
+                };
+                handler(&self.protocol, &mut self.nodes[id.index()], &mut context, *ticket)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The protocol.
+    pub fn protocol(&self) -> &P {
+        &self.protocol
+    }
+
+    /// The nodes.
+    pub fn nodes(&self) -> &[P::Node] {
+        &self.nodes
+    }
+
+    /// The time.
+    pub fn now(&self) -> Instant {
+        self.core.state.now
+    }
+
+    /// Bits, joules and faults, counted.
+    pub fn ledger(&self) -> &Ledger {
+        &self.core.state.ledger
+    }
+
+    /// The log.
+    pub fn log(&self) -> &Log {
+        &self.core.state.log
+    }
+
+    /// All energy of a node until now.
+    ///
+    /// # Errors
+    /// [`Error::UnknownNode`].
+    pub fn energy(&self, node: SensorId) -> Result<Joules, Error> {
+        self.core.field.check(node)?;
+        let account: &Account = &self.ledger().accounts()[node.index()];
+        Ok(account.total(self.core.setup.radio_of(node), self.now()))
+    }
+
+    /// Whether a node is alive.
+    pub fn is_alive(&self, node: SensorId) -> bool {
+        node.index() < self.nodes.len() && self.core.is_alive(node)
+    }
+
+    /// Whether an outage keeps a node from sending and receiving.
+    pub fn is_out(&self, node: SensorId) -> bool {
+        self.is_alive(node) && !self.core.listens(node)
+    }
+
+    /// Cost, lifetime and faults until now. [`Summary::with_errors`] adds the estimation error.
+    pub fn summary(&self) -> Summary {
+        let now = self.now();
+        let lives = (0..self.nodes.len() as u32).filter_map(|node| {
+            let (radio, account) = (self.core.setup.radio_of(SensorId(node)), &self.ledger().accounts()[node as usize]);
+            let power = account.total(radio, now).value() / now.since_start().value();
+            let life = match account.died {
+                Some(died) => died.since_start().value(),
+                None => radio.battery?.value() / power,
+            };
+            Seconds::new(life).ok().map(|life| (life, SensorId(node)))
+        });
+        let first = lives.min_by(|a, b| a.0.value().total_cmp(&b.0.value()));
+        let energy = (0..self.nodes.len() as u32)
+            .map(|node| {
+                let account = &self.ledger().accounts()[node as usize];
+                account.total(self.core.setup.radio_of(SensorId(node)), now)
+            })
+            .sum();
+        Summary::new(now.since_start(), self.ledger(), energy, first)
+    }
+
+    /// Bytes that the network holds: nodes (their own heap memory not counted), queue, frames on air, books, field.
+    pub fn memory(&self) -> usize {
+        self.nodes.capacity() * size_of::<P::Node>() + self.core.memory()
+    }
+
+    /// Writes the whole run as CBOR: nodes, queue, frames on air, books, log. Protocol, field and setup are not part of it.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`].
+    pub fn snapshot(&self, to: impl Write) -> Result<(), Error>
+    where
+        P::Node: Serialize,
+    {
+        ciborium::into_writer(&(&self.nodes, &self.core.state), to).map_err(unwritable)
+    }
+
+    /// A run as it was when the snapshot was taken, under the same protocol, field and setup.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] if it is no snapshot; [`Error::SnapshotOfOtherNetwork`]; as [`Simulator::new`].
+    pub fn restore(protocol: P, field: Field, setup: Setup, from: impl Read) -> Result<Self, Error>
+    where
+        P::Node: DeserializeOwned,
+    {
+        let (nodes, state): (Vec<P::Node>, State) = ciborium::from_reader(from).map_err(unreadable)?;
+        let mut restored = Self::new(protocol, nodes, field, setup)?;
+        restored.core.resume(state)?;
+        Ok(restored)
+    }
+}

@@ -1,0 +1,334 @@
+//! Puts frames on air: batches, waiting for free air, attempts, acknowledgements, and what each of them costs.
+//!
+//! ```text
+//! submit:        frame -> batch -> (full, or its hold time is over) -> dispatch
+//! dispatch:      book the air; Transmit when it is free
+//! Transmit:      one attempt: draw what arrives, charge, schedule arrivals; with acknowledgements also AckTimeout
+//! arrival:       the receiver's radio answers an intact frame after a turnaround; Acknowledged when the answer is back
+//! AckTimeout:    dispatch again, or give up after the last repetition
+//! ```
+//! The air is divided by an ideal schedule: a transmission begins when the air about the sender and about all nodes that hear it is free. Requests are
+//! served in the order in which they were made. Who waits sleeps.
+
+use super::attempt::{Attempt, LENGTH_BITS};
+use super::core::{Batch, Outgoing, SimulatorCore, Ticket};
+use super::log::{Acknowledgement, Detail, Entry};
+use super::queue::EventKind;
+use crate::error::Error;
+use crate::medium::{Frame, Radio, Stored};
+use crate::units::{Bits, Instant, Seconds, SensorId};
+
+impl SimulatorCore {
+    /// Sends a frame, perhaps later in a batch.
+    pub(super) fn submit(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame) -> Result<Ticket, Error> {
+        let batching = self.setup.batching;
+        if batching.max_frames <= 1 {
+            return self.send(from, to, frame);
+        }
+        let bits = Stored(frame.to_bits(self.check_of(frame.kind))?);
+        let radio = self.setup.radio_of(from);
+        if let Some(waiting) = self.state.batches.get(&(from, to)) {
+            let together: u64 = waiting
+                .frames
+                .iter()
+                .chain([&bits])
+                .map(|f| f.0.bits() as u64 + LENGTH_BITS)
+                .sum();
+            if radio.link_frames(Bits(together)) > 1 {
+                self.send_batch(from, to)?;
+            }
+        }
+        let ticket = self.next_ticket();
+        if !self.state.batches.contains_key(&(from, to)) {
+            let number = self.next_number();
+            let batch = Batch {
+                number,
+                ..Batch::default()
+            };
+            self.state.batches.insert((from, to), batch);
+            let at = self.state.now.after(batching.hold);
+            self.schedule(at, from, EventKind::Flush(number));
+        }
+        let batch = self.state.batches.entry((from, to)).or_default();
+        batch.frames.push(bits);
+        batch.tickets.push(ticket);
+        if batch.frames.len() >= batching.max_frames {
+            self.send_batch(from, to)?;
+        }
+        Ok(ticket)
+    }
+
+    /// Sends a frame as soon as the air is free, alone.
+    pub(super) fn send(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame) -> Result<Ticket, Error> {
+        let bits = Stored(frame.to_bits(self.check_of(frame.kind))?);
+        let ticket = self.next_ticket();
+        self.dispatch(from, to, std::slice::from_ref(&bits), &[ticket])?;
+        Ok(ticket)
+    }
+
+    /// The hold time of a batch is over. A batch that was sent before has another number than the one that waits now.
+    pub(super) fn flush(&mut self, from: SensorId, number: u32) -> Result<(), Error> {
+        let mut own = self
+            .state
+            .batches
+            .range((from, None)..)
+            .take_while(|((node, _), _)| *node == from);
+        match own.find(|(_, batch)| batch.number == number).map(|((_, to), _)| *to) {
+            Some(to) => self.send_batch(from, to),
+            None => Ok(()),
+        }
+    }
+
+    fn send_batch(&mut self, from: SensorId, to: Option<SensorId>) -> Result<(), Error> {
+        match self.state.batches.remove(&(from, to)) {
+            Some(batch) => self.dispatch(from, to, &batch.frames, &batch.tickets),
+            None => Ok(()),
+        }
+    }
+
+    /// Books the air for frames and sends them when it is free.
+    fn dispatch(
+        &mut self,
+        from: SensorId,
+        to: Option<SensorId>,
+        frames: &[Stored],
+        tickets: &[Ticket],
+    ) -> Result<(), Error> {
+        self.drain(from);
+        let acknowledged = self.is_acknowledged(to);
+        if !self.is_alive(from) || (!acknowledged && !self.listens(from)) {
+            self.state.ledger.faults.lost += 1;
+            return Ok(());
+        }
+        let size = self.size(from, frames);
+        let start = self.book(from, size.air, acknowledged);
+        if !acknowledged && start == self.state.now {
+            self.attempt(&Attempt {
+                from,
+                to,
+                frames,
+                size,
+                before: 0,
+                sender_awake: false,
+                receiver_awake: false,
+                answer: None,
+            })?;
+            return Ok(());
+        }
+        let number = self.next_number();
+        let outgoing = Outgoing {
+            from,
+            to,
+            frames: frames.to_vec(),
+            tickets: tickets.to_vec(),
+            attempts: 0,
+            sender_awake: false,
+            receiver_awake: false,
+        };
+        self.state.outgoing.insert(number, outgoing);
+        self.transmit_at(start, from, number)
+    }
+
+    fn transmit_at(&mut self, start: Instant, from: SensorId, number: u32) -> Result<(), Error> {
+        if start <= self.state.now {
+            return self.transmit(number);
+        }
+        self.schedule(start, from, EventKind::Transmit(number));
+        Ok(())
+    }
+
+    /// The air is free for an outgoing frame.
+    pub(super) fn transmit(&mut self, number: u32) -> Result<(), Error> {
+        let Some(mut outgoing) = self.state.outgoing.remove(&number) else {
+            return Ok(());
+        };
+        let (from, to) = (outgoing.from, outgoing.to);
+        self.drain(from);
+        let acknowledged = self.is_acknowledged(to);
+        let size = self.size(from, &outgoing.frames);
+        let sends = self.listens(from);
+        let mut listened = false;
+        if sends {
+            listened = self.attempt(&Attempt {
+                from,
+                to,
+                frames: &outgoing.frames,
+                size,
+                before: outgoing.attempts,
+                sender_awake: outgoing.sender_awake,
+                receiver_awake: outgoing.receiver_awake,
+                answer: acknowledged.then_some(number),
+            })?;
+        } else {
+            self.state.ledger.faults.lost += 1;
+        }
+        // The attempt may have taken the last of the batteries.
+        if acknowledged && self.is_alive(from) {
+            let at = self.ack_deadline(from, size.air);
+            self.schedule(at, from, EventKind::AckTimeout(number));
+            outgoing.attempts += 1;
+            (outgoing.sender_awake, outgoing.receiver_awake) = (sends, listened);
+            self.state.outgoing.insert(number, outgoing);
+        }
+        Ok(())
+    }
+
+    /// The acknowledgement of an outgoing frame is back. Returns the frames that it acknowledges: none if the sender does not hear it, or if an
+    /// acknowledgement came before.
+    pub(super) fn acknowledged(&mut self, sender: SensorId, number: u32) -> Vec<Ticket> {
+        self.drain(sender);
+        if !self.listens(sender) {
+            self.state.ledger.faults.lost += 1;
+            return Vec::new();
+        }
+        self.state
+            .outgoing
+            .remove(&number)
+            .map_or_else(Vec::new, |frame| frame.tickets)
+    }
+
+    /// No acknowledgement came in time: repeats the frame, or returns the frames that are given up.
+    pub(super) fn ack_timeout(&mut self, number: u32) -> Result<Vec<Ticket>, Error> {
+        let Some(outgoing) = self.state.outgoing.get(&number) else {
+            return Ok(Vec::new());
+        };
+        let (from, attempts) = (outgoing.from, outgoing.attempts);
+        if self.setup.retries.is_none_or(|retries| attempts > retries) {
+            self.state.ledger.faults.given_up += 1;
+            return Ok(self
+                .state
+                .outgoing
+                .remove(&number)
+                .map_or_else(Vec::new, |frame| frame.tickets));
+        }
+        let air = self.size(from, &outgoing.frames).air;
+        let start = self.book(from, air, true);
+        // Who must wait for the air sleeps until then.
+        if start > self.state.now
+            && let Some(outgoing) = self.state.outgoing.get_mut(&number)
+        {
+            (outgoing.sender_awake, outgoing.receiver_awake) = (false, false);
+        }
+        self.transmit_at(start, from, number)?;
+        Ok(Vec::new())
+    }
+
+    /// The radio of `by` acknowledges what arrived intact from `to`.
+    pub(super) fn answer(&mut self, number: u32, by: SensorId, to: SensorId) -> Result<(), Error> {
+        let radio = *self.setup.radio_of(by);
+        let mut copies = Vec::new();
+        match &mut self.recorded {
+            None => {
+                let sent = u64::from(self.state.ledger.accounts[by.index()].acknowledgements);
+                let bits = usize::try_from(radio.acknowledgement.0).unwrap_or(usize::MAX);
+                // The last index tells these streams from those of frames.
+                self.receive(by, to, sent, 1, bits, 1, &mut copies);
+            }
+            Some(recorded) => {
+                let left = |difference| Error::LeftLog {
+                    transmission: self.state.transmissions,
+                    difference,
+                };
+                match recorded.pop_front() {
+                    Some(Entry::Answered(answer)) if (answer.from, answer.to) == (by, to) => copies = answer.copies,
+                    Some(_) => return Err(left("no acknowledgement, or between other nodes")),
+                    None => return Err(left("the log has ended")),
+                }
+            }
+        }
+        self.state.transmissions += 1;
+        let sending = radio.turn() + radio.transmit(radio.acknowledgement, self.field.distance(by.0, to.0));
+        let account = &mut self.state.ledger.accounts[by.index()];
+        account.acknowledgements = account.acknowledgements.wrapping_add(1);
+        account.sending += sending;
+        account.air += radio.acknowledgement;
+        account.awake += radio.answer_time();
+        let messages = &mut self.state.ledger.messages;
+        messages.air += radio.acknowledgement;
+        messages.sending += sending;
+        let intact = copies.iter().filter(|copy| copy.flipped.is_empty());
+        match intact
+            .map(|copy| copy.delay)
+            .min_by(|a, b| a.value().total_cmp(&b.value()))
+        {
+            Some(delay) => {
+                let sent = self
+                    .state
+                    .now
+                    .after(radio.turnaround)
+                    .after(radio.duration(radio.acknowledgement));
+                self.schedule(sent.after(delay), to, EventKind::Acknowledged(number));
+            }
+            None => self.state.ledger.faults.lost += 1,
+        }
+        if self.setup.detail >= Detail::Everything {
+            self.state.log.entries.push(Entry::Answered(Acknowledgement {
+                at: self.state.now,
+                from: by,
+                to,
+                air: radio.acknowledgement.0,
+                copies,
+                sending,
+            }));
+        }
+        self.drain(by);
+        Ok(())
+    }
+
+    fn is_acknowledged(&self, to: Option<SensorId>) -> bool {
+        to.is_some() && self.setup.retries.is_some()
+    }
+
+    fn next_ticket(&mut self) -> Ticket {
+        let ticket = Ticket(self.state.next_ticket);
+        self.state.next_ticket += 1;
+        ticket
+    }
+
+    fn next_number(&mut self) -> u32 {
+        let number = self.state.next_number;
+        self.state.next_number = number.wrapping_add(1);
+        number
+    }
+
+    /// Takes the air about the sender and all nodes that hear it, from when it is free there. Returns that instant.
+    fn book(&mut self, from: SensorId, air: Bits, acknowledged: bool) -> Instant {
+        let radio = self.setup.radio_of(from);
+        let neighbours = self.field.graph().neighbours(from.index());
+        let busy = &mut self.state.busy_until;
+        let own = busy[from.index()].max(self.state.now);
+        let start = neighbours
+            .iter()
+            .map(|node| busy[*node as usize])
+            .fold(own, Instant::max);
+        let mut end = start.after(radio.duration(air));
+        if acknowledged {
+            end = end.after(radio.turnaround).after(radio.duration(radio.acknowledgement));
+        }
+        busy[from.index()] = end;
+        neighbours.iter().for_each(|node| busy[*node as usize] = end);
+        start
+    }
+
+    /// Until when the sender of a frame that begins now waits for its acknowledgement.
+    fn ack_deadline(&self, from: SensorId, air: Bits) -> Instant {
+        let (radio, delay) = (self.setup.radio_of(from), self.setup.channel.delay);
+        let end = self.state.now.after(radio.duration(air));
+        match self.setup.ack_timeout {
+            Some(timeout) => end.after(timeout),
+            // The same roundings as on the way of the acknowledgement, and a nanosecond more: it is in time.
+            None => {
+                let answered = end
+                    .after(delay)
+                    .after(radio.turnaround)
+                    .after(radio.duration(radio.acknowledgement));
+                Instant(answered.after(delay).0.saturating_add(1))
+            }
+        }
+    }
+}
+
+/// Time on air of frames of the given lengths, one after the other, with what every one of them needs besides.
+pub(crate) fn air_time(radio: &Radio, bodies: impl IntoIterator<Item = Bits>) -> Seconds {
+    bodies.into_iter().map(|body| radio.duration(radio.on_air(body))).sum()
+}

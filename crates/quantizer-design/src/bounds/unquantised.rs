@@ -1,0 +1,58 @@
+//! What could be had from the samples themselves.
+
+use crate::criterion::Criterion;
+use crate::error::Error;
+use crate::scene::Scene;
+
+/// Step of the sum over the sufficient statistic, in standard deviations of its noise.
+const STEP: f64 = 0.25;
+/// Reach beyond the values of the unknown.
+const REACH: f64 = 8.0;
+/// Most terms of the double sum.
+const MAX_TERMS: f64 = 2e7;
+
+/// The value of a criterion if all samples arrived unquantised: no design of any number of bits is better.
+///
+/// The samples of all sensors tell of the unknown what one sample in noise of variance `1 / 1' Sigma^-1 1` tells. `None` if
+/// that noise is so small against the prior that the sum would be too long.
+///
+/// # Errors
+/// As [`Scene::new`].
+pub fn unquantised(scene: &Scene, criterion: Criterion) -> Result<Option<f64>, Error> {
+    let deviation = 1.0 / scene.noise().precision_of_mean().sqrt();
+    let values = scene.values();
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let count = ((high - low) / deviation + 2.0 * REACH) / STEP;
+    if !(deviation > 0.0 && count * values.len() as f64 <= MAX_TERMS) {
+        return Ok(None);
+    }
+    let (step, mean) = (STEP * deviation, scene.sample_mean());
+    let (mut explained, mut information, mut correct) = (0.0, 0.0, 0.0);
+    for i in 0..=count as usize {
+        let s = low - REACH * deviation + i as f64 * step;
+        let (mut mass, mut moment, mut largest, mut logs) = (0.0, 0.0, 0.0_f64, 0.0);
+        for (x, w) in values.iter().zip(scene.weights()) {
+            let u = (s - x) / deviation;
+            let density = (-0.5 * u * u).exp() * STEP / std::f64::consts::TAU.sqrt();
+            let joint = w * density;
+            mass += joint;
+            moment += joint * (x - mean);
+            largest = largest.max(joint);
+            if joint > 0.0 {
+                logs += joint * density.ln();
+            }
+        }
+        if mass > 0.0 {
+            explained += moment * (moment / mass);
+            information += logs - mass * mass.ln();
+            correct += largest;
+        }
+    }
+    Ok(Some(match criterion {
+        Criterion::MeanSquaredError => (scene.variance - explained).max(0.0),
+        Criterion::MutualInformation => information,
+        Criterion::BayesError => 1.0 - correct,
+    }))
+}

@@ -1,0 +1,123 @@
+//! Thresholds as codes of an analogue-to-digital converter.
+
+use super::search::WordedCells;
+use super::solution::Solution;
+use crate::error::{Error, refuse};
+use fewbits_numerics::error::finite;
+use std::ops::RangeInclusive;
+
+/// Most bits of a converter.
+const MAX_CONVERTER_BITS: u32 = 24;
+
+/// A converter of evenly spaced codes: code `k` stands for the samples from `low + k step` up to the next code. Samples outside
+/// the range saturate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Adc {
+    bits: u32,
+    low: f64,
+    high: f64,
+}
+
+impl Adc {
+    /// A converter of so many bits over a range, in the unit of the unknown.
+    ///
+    /// # Errors
+    /// If `bits` is not in `1..=24`, or the range is empty or not finite.
+    pub fn new(bits: u32, range: RangeInclusive<f64>) -> Result<Self, Error> {
+        if !(1..=MAX_CONVERTER_BITS).contains(&bits) {
+            return refuse("bits", bits, format!("1 to {MAX_CONVERTER_BITS} bits"));
+        }
+        let (low, high) = (finite("low", *range.start())?, finite("high", *range.end())?);
+        if low >= high || !(high - low).is_finite() {
+            return refuse("high", high, format!("a number above low = {low}"));
+        }
+        Ok(Self { bits, low, high })
+    }
+
+    /// Bits of a code.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// Width of a code, in the unit of the unknown.
+    pub fn step(&self) -> f64 {
+        (self.high - self.low) / f64::from(1u32 << self.bits)
+    }
+
+    /// The code of a sample; NaN is code 0.
+    pub fn code(&self, sample: f64) -> u32 {
+        let largest = (1u32 << self.bits) - 1;
+        // The conversion saturates.
+        (((sample - self.low) / self.step()).floor() as u32).min(largest)
+    }
+
+    /// The smallest sample of a code above 0.
+    pub fn threshold(&self, code: u32) -> f64 {
+        self.low + f64::from(code) * self.step()
+    }
+
+    /// The code at whose edge a breakpoint is nearest.
+    fn nearest(&self, breakpoint: f64) -> u32 {
+        let largest = (1u32 << self.bits) - 1;
+        (((breakpoint - self.low) / self.step()).round() as u32).clamp(1, largest)
+    }
+}
+
+/// A design whose breakpoints are codes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rounded {
+    /// The converter of each sensor.
+    pub adcs: Vec<Adc>,
+    /// Thresholds of each sensor: a sample belongs to the cell whose number is how many thresholds its code reaches.
+    pub thresholds: Vec<Vec<u32>>,
+    /// The design with these breakpoints, its value and its decoder. Its certificate is void.
+    pub solution: Solution,
+}
+
+impl Rounded {
+    /// The word of a sensor for a code, or `None` if there is no such sensor.
+    pub fn encode(&self, sensor: usize, code: u32) -> Option<usize> {
+        let cell = self.thresholds.get(sensor)?.partition_point(|t| *t <= code);
+        self.solution.sensors().get(sensor)?.words.get(cell).copied()
+    }
+}
+
+impl Solution {
+    /// The design with every breakpoint moved to the nearest edge of a code, one converter per sensor. Breakpoints that meet there
+    /// are one, and the cell between them is gone.
+    ///
+    /// The value of the result is exact: the cells are those of the codes.
+    ///
+    /// # Errors
+    /// If there is not one converter per sensor.
+    pub fn rounded(&self, adcs: &[Adc]) -> Result<Rounded, Error> {
+        if adcs.len() != self.sensors().len() {
+            let expected = format!("one per sensor, {}", self.sensors().len());
+            return refuse("adcs", format!("{} converters", adcs.len()), expected);
+        }
+        let (mut thresholds, mut cells) = (Vec::new(), Vec::new());
+        for (sensor, adc) in self.sensors().iter().zip(adcs) {
+            let (mut codes, mut words): (Vec<u32>, Vec<usize>) = (Vec::new(), vec![sensor.words[0]]);
+            for (breakpoint, word) in sensor.breakpoints.iter().zip(&sensor.words[1..]) {
+                let code = adc.nearest(*breakpoint);
+                if codes.last() == Some(&code) {
+                    // The cell before has no code left: the next word takes its place.
+                    words.pop();
+                } else {
+                    codes.push(code);
+                }
+                words.push(*word);
+            }
+            cells.push(WordedCells {
+                breakpoints: codes.iter().map(|code| adc.threshold(*code)).collect(),
+                words,
+            });
+            thresholds.push(codes);
+        }
+        Ok(Rounded {
+            adcs: adcs.to_vec(),
+            thresholds,
+            solution: self.with_cells(cells)?,
+        })
+    }
+}

@@ -1,0 +1,110 @@
+//! A decoder that takes little memory: one number per symbol of each sensor, added up.
+
+use super::solution::Solution;
+use crate::error::{Error, refuse};
+use crate::law::Active;
+use crate::moments::{Table, dot, moments};
+use nalgebra::{DMatrix, DVector};
+
+/// Singular values below this share of the largest count as zero: the symbols' indicators sum to one for every sensor.
+const RANK_TOLERANCE: f64 = 1e-12;
+
+/// The best estimate of the form `offset + sum_n weight_n[symbol_n]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdditiveDecoder {
+    /// Mean of the unknown.
+    pub offset: f64,
+    /// A number per symbol, for every sensor.
+    pub weights: Vec<Vec<f64>>,
+    /// Mean squared error of these estimates, in squared units.
+    pub mean_squared_error: f64,
+}
+
+impl AdditiveDecoder {
+    /// The estimate from one symbol per sensor.
+    ///
+    /// # Errors
+    /// If there is not one symbol per sensor, or a symbol is out of range.
+    pub fn decode(&self, symbols: &[usize]) -> Result<f64, Error> {
+        if symbols.len() != self.weights.len() {
+            return refuse(
+                "symbols",
+                format!("{} symbols", symbols.len()),
+                format!("one per sensor, {}", self.weights.len()),
+            );
+        }
+        symbols
+            .iter()
+            .zip(&self.weights)
+            .try_fold(self.offset, |sum, (symbol, weights)| match weights.get(*symbol) {
+                Some(weight) => Ok(sum + weight),
+                None => refuse("symbol", symbol, format!("a number below {}", weights.len())),
+            })
+    }
+}
+
+impl Solution {
+    /// The additive decoder of least mean squared error: normal equations from the joint probabilities of pairs of symbols.
+    ///
+    /// # Errors
+    /// If a symbol table cannot be formed; cannot happen for a design that has a value.
+    pub fn additive_decoder(&self) -> Result<AdditiveDecoder, Error> {
+        let (system, scene) = (self.system(), self.system().scene());
+        let mut tables: Vec<Table> = vec![Table::default(); scene.sensors()];
+        for g in 0..system.groups().len() {
+            let entry = Active::new(system, g)?;
+            let symbols = Table::new(entry.symbols(entry.group.quantizer().breakpoints()), scene.nodes());
+            entry.group.sensors().iter().for_each(|n| tables[*n] = symbols.clone());
+        }
+        let firsts: Vec<usize> = tables
+            .iter()
+            .scan(0, |at, t| {
+                let first = *at;
+                *at += t.rows();
+                Some(first)
+            })
+            .collect();
+        let size = tables.iter().map(Table::rows).sum();
+        let (mut gram, mut moment) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        for (m, first) in tables.iter().zip(&firsts) {
+            for t in 0..m.rows() {
+                moment[first + t] = dot(&scene.moment.weights, m.row(t));
+            }
+        }
+        for m in 0..tables.len() {
+            for n in m..tables.len() {
+                let joint = moments(&[&tables[m], &tables[n]], std::slice::from_ref(&scene.mass));
+                for (at, p) in joint.iter().enumerate() {
+                    let (i, j) = (at / tables[n].rows(), at % tables[n].rows());
+                    let (row, column) = (firsts[m] + i, firsts[n] + j);
+                    if m == n {
+                        // A sensor sends one symbol.
+                        if i == j {
+                            gram[(row, row)] = dot(&scene.mass.weights, tables[m].row(i));
+                        }
+                    } else {
+                        gram[(row, column)] = *p;
+                        gram[(column, row)] = *p;
+                    }
+                }
+            }
+        }
+        let svd = gram.svd(true, true);
+        let cut = RANK_TOLERANCE * svd.singular_values.max();
+        let stalled = Error::NotConverged {
+            algorithm: "additive decoder",
+            iterations: 0,
+            change: cut,
+        };
+        let weights = svd.solve(&moment, cut).map_err(|_| stalled)?;
+        Ok(AdditiveDecoder {
+            offset: scene.mean,
+            mean_squared_error: (scene.variance - weights.dot(&moment)).max(0.0),
+            weights: tables
+                .iter()
+                .zip(&firsts)
+                .map(|(t, first)| weights.rows(*first, t.rows()).iter().copied().collect())
+                .collect(),
+        })
+    }
+}

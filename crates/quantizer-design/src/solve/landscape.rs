@@ -1,0 +1,378 @@
+//! A criterion as a function of which word each cell of a grid is sent as.
+//!
+//! The sample axis of every sensor is cut into a few dozen grid cells. Given the symbols of the other sensors, the moments of
+//! each grid cell are a table, the *block* of that sensor. With the block at hand neither the breakpoints nor the words of the
+//! sensor need the quadrature nodes again: a change costs a few thousand multiplications.
+
+use crate::criterion::{Criterion, Scored};
+use crate::error::Error;
+use crate::law::negative_entropy;
+use crate::moments::{Table, dot, moments};
+use crate::scene::{Feature, Scene};
+use fewbits_numerics::kernels;
+
+/// Reach of the table of a sample, in its standard deviations.
+pub(super) const REACH: f64 = 4.5;
+/// Steps of that table.
+const PLACES: usize = 400;
+/// Sweeps over the cells of a sensor that a block serves, about.
+const SWEEPS: f64 = 5.0;
+/// Below this a probability is taken as zero in a logarithm.
+const LOG_FLOOR: f64 = 1e-300;
+
+/// What arrives of a word: outputs by words.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct WordLaw {
+    pub(super) words: usize,
+    pub(super) outputs: usize,
+    pub(super) transition: Vec<f64>,
+}
+
+impl WordLaw {
+    fn probability(&self, output: usize, word: usize) -> f64 {
+        self.transition[output * self.words + word]
+    }
+}
+
+/// One way the world may be, on coarse nodes.
+#[derive(Debug, Clone)]
+struct Scenario {
+    weight: f64,
+    scene: Scene,
+    features: Vec<Feature>,
+}
+
+/// The grid of one sensor: edges, and the probability of each cell at each node, scenario by scenario.
+#[derive(Debug, Clone)]
+pub(super) struct Grid {
+    pub(super) edges: Vec<f64>,
+    cells: Vec<Table>,
+}
+
+/// Which word each grid cell is sent as.
+pub(super) type Words = Vec<usize>;
+
+/// The criterion of a scene, or of a mixture of scenes, and the words' laws.
+#[derive(Debug, Clone)]
+pub(super) struct Landscape {
+    scenarios: Vec<Scenario>,
+    scored: Scored,
+    pub(super) laws: Vec<WordLaw>,
+    samples: Vec<Sample>,
+}
+
+/// The distribution of a sensor's sample under the first scenario, tabulated.
+#[derive(Debug, Clone)]
+pub(super) struct Sample {
+    pub(super) mean: f64,
+    pub(super) deviation: f64,
+    places: Vec<f64>,
+    below: Vec<f64>,
+}
+
+impl Sample {
+    fn of(scene: &Scene, sensor: usize) -> Self {
+        let (mean, deviation) = (scene.sample_mean(), scene.sample_deviation(sensor));
+        let place = |i: usize| mean + REACH * deviation * (2.0 * i as f64 / PLACES as f64 - 1.0);
+        let places: Vec<f64> = (0..=PLACES).map(place).collect();
+        let noise = scene.noise().deviation(sensor);
+        let at = |y: &f64| {
+            let mut below = vec![f64::NEG_INFINITY; scene.values.len()];
+            let upper: Vec<f64> = scene.values.iter().map(|x| (y - x) / noise).collect();
+            kernels::interval(&mut below, &upper);
+            dot(&below, &scene.weights)
+        };
+        Self {
+            mean,
+            deviation,
+            below: places.iter().map(at).collect(),
+            places,
+        }
+    }
+
+    /// The `parts - 1` inner quantiles.
+    pub(super) fn quantiles(&self, parts: usize) -> Vec<f64> {
+        (1..parts)
+            .map(|i| {
+                let target = i as f64 / parts as f64;
+                let at = self.below.partition_point(|p| *p < target).clamp(1, PLACES);
+                let (low, high) = (self.below[at - 1], self.below[at]);
+                let share = if high > low {
+                    ((target - low) / (high - low)).clamp(0.0, 1.0)
+                } else {
+                    0.5
+                };
+                self.places[at - 1] + share * (self.places[at] - self.places[at - 1])
+            })
+            .collect()
+    }
+}
+
+/// Moments of every grid cell of one sensor for every joint symbol of the others: `[other][cell][feature]`.
+pub(super) struct Block {
+    moments: Vec<f64>,
+    pub(super) others: usize,
+    cells: usize,
+    pub(super) sensor: usize,
+}
+
+impl Landscape {
+    /// `scenes` are weighted; more than one only for squared error. Each becomes coarse here.
+    pub(super) fn new(scenes: &[(f64, &Scene)], criterion: Criterion, laws: Vec<WordLaw>) -> Result<Self, Error> {
+        let coarse = scenes.iter().map(|(_, s)| s.coarse()).collect::<Result<Vec<_>, _>>()?;
+        let scored = Scored::new(criterion, &coarse[0])?;
+        let reference = coarse[0].mean;
+        let scenarios = coarse
+            .into_iter()
+            .zip(scenes)
+            .map(|(scene, (weight, _))| {
+                let features = if criterion == Criterion::MeanSquaredError {
+                    // Moments of all scenarios are about one point.
+                    let offset = scene.mean - reference;
+                    let mass = scene.mass.weights.clone();
+                    let moment = scene
+                        .moment
+                        .weights
+                        .iter()
+                        .zip(&mass)
+                        .map(|(m, w)| m + offset * w)
+                        .collect();
+                    [mass, moment].map(|weights| Feature { start: 0, weights }).to_vec()
+                } else {
+                    scored.features().to_vec()
+                };
+                Scenario {
+                    weight: *weight,
+                    scene,
+                    features,
+                }
+            })
+            .collect();
+        Ok(Self {
+            samples: (0..laws.len()).map(|n| Sample::of(scenes[0].1, n)).collect(),
+            scenarios,
+            scored,
+            laws,
+        })
+    }
+
+    /// Changes the weights of the scenes.
+    pub(super) fn set_weights(&mut self, weights: &[f64]) {
+        self.scenarios.iter_mut().zip(weights).for_each(|(s, w)| s.weight = *w);
+    }
+
+    /// Moments of an outcome.
+    pub(super) fn width(&self) -> usize {
+        self.scenarios[0].features.len()
+    }
+
+    /// Multiplications that one round over the sensors takes: their blocks, and the sweeps over cells and words with each.
+    pub(super) fn work(&self, grid: usize) -> f64 {
+        let outcomes: f64 = self.laws.iter().map(|l| l.outputs as f64).product();
+        let nodes: f64 = self
+            .scenarios
+            .iter()
+            .map(|s| s.features.iter().map(|f| f.weights.len() as f64).sum::<f64>())
+            .sum();
+        let sweeps = |l: &WordLaw| SWEEPS * (l.outputs * self.width()) as f64;
+        let block = |l: &WordLaw| outcomes / l.outputs as f64 * grid as f64 * (nodes + sweeps(l));
+        self.laws.iter().map(block).sum()
+    }
+
+    /// Tabulates a grid for one sensor.
+    pub(super) fn grid(&self, sensor: usize, edges: Vec<f64>) -> Grid {
+        let cells = self.scenarios.iter().map(|scenario| {
+            let (means, sd) = scenario.scene.sample_law(sensor);
+            let mut cells = Vec::with_capacity((edges.len() + 1) * means.len());
+            for c in 0..=edges.len() {
+                let lower = if c == 0 { f64::NEG_INFINITY } else { edges[c - 1] };
+                let upper = edges.get(c).copied().unwrap_or(f64::INFINITY);
+                let mut inside: Vec<f64> = means.iter().map(|m| (lower - m) / sd).collect();
+                let above: Vec<f64> = means.iter().map(|m| (upper - m) / sd).collect();
+                kernels::interval(&mut inside, &above);
+                cells.extend(inside);
+            }
+            Table::new(cells, means.len())
+        });
+        Grid {
+            cells: cells.collect(),
+            edges,
+        }
+    }
+
+    /// A sensor's sample under the first scenario.
+    pub(super) fn sample(&self, sensor: usize) -> &Sample {
+        &self.samples[sensor]
+    }
+
+    /// Probability of each symbol of a sensor at each node, scenario by scenario.
+    pub(super) fn symbols(&self, sensor: usize, grid: &Grid, words: &[usize]) -> Vec<Table> {
+        (0..self.scenarios.len())
+            .map(|s| self.symbols_in(s, sensor, grid, words))
+            .collect()
+    }
+
+    fn symbols_in(&self, scenario: usize, sensor: usize, grid: &Grid, words: &[usize]) -> Table {
+        let law = &self.laws[sensor];
+        let cells = &grid.cells[scenario];
+        let nodes = cells.nodes;
+        let mut levels = vec![0.0; law.words * nodes];
+        for (c, word) in words.iter().enumerate() {
+            add_scaled(&mut levels[word * nodes..(word + 1) * nodes], 1.0, cells.row(c));
+        }
+        let mut symbols = vec![0.0; law.outputs * nodes];
+        for (t, row) in symbols.chunks_exact_mut(nodes).enumerate() {
+            for (w, level) in levels.chunks_exact(nodes).enumerate() {
+                add_scaled(row, law.probability(t, w), level);
+            }
+        }
+        Table::new(symbols, nodes)
+    }
+
+    /// The block of a sensor, given the symbols of all (its own are not used).
+    pub(super) fn block(&self, sensor: usize, grid: &Grid, symbols: &[Vec<Table>]) -> Block {
+        let mut total: Vec<f64> = Vec::new();
+        for (s, scenario) in self.scenarios.iter().enumerate() {
+            let others = symbols
+                .iter()
+                .enumerate()
+                .filter(|(n, _)| *n != sensor)
+                .map(|(_, t)| &t[s]);
+            let tables: Vec<&Table> = others.chain([&grid.cells[s]]).collect();
+            let sums = moments(&tables, &scenario.features);
+            total.resize(sums.len(), 0.0);
+            add_scaled(&mut total, scenario.weight, &sums);
+        }
+        let cells = grid.edges.len() + 1;
+        Block {
+            others: total.len() / (cells * self.width()),
+            moments: total,
+            cells,
+            sensor,
+        }
+    }
+
+    /// The signed criterion without constants, and without what the other sensors add to a conditional entropy.
+    pub(super) fn value(&self, block: &Block, grid: &Grid, words: &[usize]) -> f64 {
+        let levels = self.levels(block, words);
+        let identity: Vec<usize> = (0..self.laws[block.sensor].words).collect();
+        self.value_of_levels(block, grid, &levels, words, &identity)
+    }
+
+    /// Moments of each word: `[other][word][feature]`.
+    pub(super) fn levels(&self, block: &Block, words: &[usize]) -> Vec<f64> {
+        let (width, count) = (self.width(), self.laws[block.sensor].words);
+        let mut levels = vec![0.0; block.others * count * width];
+        for other in 0..block.others {
+            for (c, word) in words.iter().enumerate() {
+                let from = (other * block.cells + c) * width;
+                let to = (other * count + word) * width;
+                add_scaled(&mut levels[to..to + width], 1.0, &block.moments[from..from + width]);
+            }
+        }
+        levels
+    }
+
+    /// The value if word `w` of the table is sent as `renamed[w]`.
+    pub(super) fn value_of_levels(
+        &self,
+        block: &Block,
+        grid: &Grid,
+        levels: &[f64],
+        words: &[usize],
+        renamed: &[usize],
+    ) -> f64 {
+        let law = &self.laws[block.sensor];
+        let (width, count) = (self.width(), law.words);
+        let mut outcome = vec![0.0; width];
+        let mut value = 0.0;
+        for other in levels.chunks_exact(count * width) {
+            for t in 0..law.outputs {
+                outcome.fill(0.0);
+                for (w, level) in other.chunks_exact(width).enumerate() {
+                    add_scaled(&mut outcome, law.probability(t, renamed[w]), level);
+                }
+                value += self.scored.value(&outcome, 0.0);
+            }
+        }
+        if self.scored.has_separable_entropy() {
+            let renamed: Words = words.iter().map(|w| renamed[*w]).collect();
+            value += self.own_entropy(&self.symbols_in(0, block.sensor, grid, &renamed));
+        }
+        value
+    }
+
+    /// What a sensor's symbols add to the conditional entropy.
+    fn own_entropy(&self, symbols: &Table) -> f64 {
+        negative_entropy(&symbols.values, &self.scenarios[0].scene.mass.weights)
+    }
+
+    /// The value of a whole design.
+    pub(super) fn total(&self, grids: &[Grid], words: &[Words], symbols: &[Vec<Table>]) -> f64 {
+        let last = grids.len() - 1;
+        let block = self.block(last, &grids[last], symbols);
+        let mut value = self.value(&block, &grids[last], &words[last]);
+        if self.scored.has_separable_entropy() {
+            value += symbols[..last].iter().map(|s| self.own_entropy(&s[0])).sum::<f64>();
+        }
+        value
+    }
+
+    /// Size against which a change of a value counts.
+    pub(super) fn unit(&self, value: f64) -> f64 {
+        self.scored.unit(value, &self.scenarios[0].scene)
+    }
+
+    /// What it is worth to send each grid cell as each word while the decoder stays: `[cell][word]`.
+    pub(super) fn worth(&self, block: &Block, grid: &Grid, words: &[usize]) -> Vec<f64> {
+        let law = &self.laws[block.sensor];
+        let (width, count, outputs) = (self.width(), law.words, law.outputs);
+        let levels = self.levels(block, words);
+        let mut per_symbol = vec![0.0; block.cells * outputs];
+        let (mut outcome, mut slopes) = (vec![0.0; width], vec![0.0; outputs * width]);
+        for other in 0..block.others {
+            let own = &levels[other * count * width..(other + 1) * count * width];
+            for (t, slope) in slopes.chunks_exact_mut(width).enumerate() {
+                outcome.fill(0.0);
+                for (w, level) in own.chunks_exact(width).enumerate() {
+                    add_scaled(&mut outcome, law.probability(t, w), level);
+                }
+                self.scored.slope(&outcome, 0.0, slope);
+            }
+            let cells = &block.moments[other * block.cells * width..(other + 1) * block.cells * width];
+            for (cell, out) in cells.chunks_exact(width).zip(per_symbol.chunks_exact_mut(outputs)) {
+                for (slope, out) in slopes.chunks_exact(width).zip(out) {
+                    *out += slope.iter().zip(cell).map(|(s, m)| s * m).sum::<f64>();
+                }
+            }
+        }
+        if self.scored.has_separable_entropy() {
+            let symbols = self.symbols_in(0, block.sensor, grid, words);
+            let mass = &self.scenarios[0].scene.mass.weights;
+            for t in 0..outputs {
+                let logs = symbols.row(t).iter().zip(mass).map(|(p, w)| w * p.max(LOG_FLOOR).ln());
+                let logs: Vec<f64> = logs.collect();
+                for c in 0..block.cells {
+                    per_symbol[c * outputs + t] += dot(&logs, grid.cells[0].row(c));
+                }
+            }
+        }
+        let mut worth = vec![0.0; block.cells * count];
+        for (out, per_symbol) in worth.chunks_exact_mut(count).zip(per_symbol.chunks_exact(outputs)) {
+            for (w, out) in out.iter_mut().enumerate() {
+                *out = per_symbol
+                    .iter()
+                    .enumerate()
+                    .map(|(t, r)| law.probability(t, w) * r)
+                    .sum();
+            }
+        }
+        worth
+    }
+}
+
+fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
+    if factor != 0.0 {
+        to.iter_mut().zip(from).for_each(|(t, f)| *t += factor * f);
+    }
+}

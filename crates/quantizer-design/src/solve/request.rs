@@ -1,0 +1,236 @@
+//! What is asked of a design.
+
+use super::solution::{Solution, Solutions};
+use super::{pipeline, share};
+use crate::criterion::Criterion;
+use crate::design::AllowedCells;
+use crate::error::{Error, refuse};
+use crate::scene::{Prior, Scene};
+use fewbits_core::Link;
+use std::time::{Duration, Instant};
+
+/// Longest word of a sensor. More bits need no joint design: a Lloyd-Max quantizer loses next to nothing.
+pub const MAX_BITS: u32 = 6;
+/// Most bits that are shared out.
+const MAX_TOTAL: u32 = 40;
+
+/// How many bits the sensors may send.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Bits {
+    /// Every sensor this many.
+    Each(u32),
+    /// Every sensor its own number, zero for a sensor that is not used.
+    PerSensor(Vec<u32>),
+    /// All sensors together this many; who sends how many is part of the design.
+    Total(u32),
+}
+
+/// How far a design has come, for a display.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// What is being done.
+    pub stage: Stage,
+    /// Parts of the stage that are done.
+    pub done: usize,
+    /// Parts of the stage.
+    pub parts: usize,
+    /// Time since the start.
+    pub elapsed: Duration,
+}
+
+/// A part of a design.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Each sensor by itself.
+    SingleSensors,
+    /// All sensors together, from several starts.
+    AllSensors,
+    /// Finer breakpoints for the best few results.
+    Refinement,
+    /// Newton's method on the best few, with the certificate.
+    Certificate,
+}
+
+/// A design to be made: who measures what, how many bits each may send, over which links, and to what end.
+///
+/// ```
+/// use fewbits_core::Link;
+/// use fewbits_quantizer_design::solve::{Bits, Request};
+/// use fewbits_quantizer_design::{Noise, Prior, Scene};
+///
+/// let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.5], 0.5)?;
+/// let scene = Scene::new(Prior::normal(20.0, 4.0)?, noise)?;
+/// let solutions = Request::estimation(scene, Bits::Each(2), Link::flipping(0.02)?).run()?;
+/// let best = solutions.best();
+/// println!("{}", best.table());
+/// let estimate = best.decoder(100)?.decode_symbols(&best.encode(&[21.3, 22.0])?)?;
+/// assert!((estimate.mean - 21.0).abs() < 2.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Request<'a> {
+    pub(super) scene: Scene,
+    pub(super) bits: Bits,
+    pub(super) links: Vec<Link>,
+    pub(super) criterion: Criterion,
+    pub(super) cells: AllowedCells,
+    pub(super) starts: usize,
+    pub(super) time_limit: Option<Duration>,
+    pub(super) progress: Option<&'a mut dyn FnMut(Progress)>,
+}
+
+impl<'a> Request<'a> {
+    /// Quantizers, words and decoder for the estimate of least mean squared error. The prior may be any, discrete ones included:
+    /// their values are taken as numbers to be estimated, not as hypotheses.
+    pub fn estimation(scene: Scene, bits: Bits, link: Link) -> Self {
+        Self {
+            links: vec![link; scene.sensors()],
+            scene,
+            bits,
+            criterion: Criterion::MeanSquaredError,
+            cells: AllowedCells::Intervals,
+            starts: 60,
+            time_limit: None,
+            progress: None,
+        }
+    }
+
+    /// Quantizers, words and decoder for the decision between the values of a discrete prior with the least error probability.
+    ///
+    /// # Errors
+    /// If the prior is not discrete.
+    pub fn detection(scene: Scene, bits: Bits, link: Link) -> Result<Self, Error> {
+        if !matches!(scene.prior(), Prior::Discrete { .. }) {
+            return refuse("prior", "a continuous prior", "a discrete prior: the hypotheses");
+        }
+        Ok(Self {
+            criterion: Criterion::BayesError,
+            ..Self::estimation(scene, bits, link)
+        })
+    }
+
+    /// Asks for the most information between the unknown and the symbols instead.
+    #[must_use]
+    pub fn by_information(mut self) -> Self {
+        self.criterion = Criterion::MutualInformation;
+        self
+    }
+
+    /// A link for each sensor.
+    ///
+    /// # Errors
+    /// If their number is not that of the sensors.
+    pub fn with_links(mut self, links: Vec<Link>) -> Result<Self, Error> {
+        if links.len() != self.scene.sensors() {
+            return refuse(
+                "links",
+                format!("{} links", links.len()),
+                format!("one per sensor, {}", self.scene.sensors()),
+            );
+        }
+        self.links = links;
+        Ok(self)
+    }
+
+    /// Whether a word may stand for several intervals (default: one interval per word). Folded cells pay where noise is shared or
+    /// small; they are harder to explain.
+    #[must_use]
+    pub fn with_cells(mut self, cells: AllowedCells) -> Self {
+        self.cells = cells;
+        self
+    }
+
+    /// Starts of the search over all sensors (default 60); fewer where a start is expensive. The result depends on nothing else
+    /// unless a time limit is met.
+    #[must_use]
+    pub fn with_starts(mut self, starts: usize) -> Self {
+        self.starts = starts.max(1);
+        self
+    }
+
+    /// Ends the search after this time with the best design so far. The certificate of that design comes on top.
+    #[must_use]
+    pub fn with_time_limit(mut self, limit: Duration) -> Self {
+        self.time_limit = Some(limit);
+        self
+    }
+
+    /// Calls `progress` between the parts of the design.
+    #[must_use]
+    pub fn with_progress(mut self, progress: &'a mut dyn FnMut(Progress)) -> Self {
+        self.progress = Some(progress);
+        self
+    }
+
+    /// Makes the design: several, best first.
+    ///
+    /// # Errors
+    /// If a number of bits is above [`MAX_BITS`], all are zero, their number is not that of the sensors, or more bits are to be
+    /// shared out than the sensors can send; [`Error::TooLarge`] if the sensors have more joint symbols than can be enumerated.
+    pub fn run(mut self) -> Result<Solutions, Error> {
+        let sensors = self.scene.sensors();
+        let mut control = Control::new(self.time_limit, self.progress.take());
+        let bits = match &self.bits {
+            Bits::Each(bits) => vec![*bits; sensors],
+            Bits::PerSensor(bits) => bits.clone(),
+            Bits::Total(total) => {
+                let most = (MAX_BITS * sensors as u32).min(MAX_TOTAL);
+                if !(1..=most).contains(total) {
+                    return refuse("bits", total, format!("1 to {most} bits in all"));
+                }
+                share::shared_out(&self, *total, &mut control)?
+            }
+        };
+        if bits.len() != sensors {
+            return refuse("bits", format!("{} numbers", bits.len()), format!("one per sensor, {sensors}"));
+        }
+        if let Some(bits) = bits.iter().find(|b| **b > MAX_BITS) {
+            return refuse("bits", bits, format!("at most {MAX_BITS} bits per sensor"));
+        }
+        if bits.iter().all(|b| *b == 0) {
+            return refuse("bits", "0 for every sensor", "at least one bit");
+        }
+        let mut found: Vec<Solution> = pipeline::solve(&self, &bits, &mut control)?;
+        let sense = self.criterion.sense();
+        found.sort_by(|a, b| (sense * b.value()).total_cmp(&(sense * a.value())));
+        Ok(Solutions::new(found, control.stopped))
+    }
+}
+
+/// Time limit and progress of a running design.
+pub(super) struct Control<'a> {
+    started: Instant,
+    limit: Option<Duration>,
+    progress: Option<&'a mut dyn FnMut(Progress)>,
+    pub(super) stopped: bool,
+}
+
+impl<'a> Control<'a> {
+    pub(super) fn new(limit: Option<Duration>, progress: Option<&'a mut dyn FnMut(Progress)>) -> Self {
+        Self {
+            started: Instant::now(),
+            limit,
+            progress,
+            stopped: false,
+        }
+    }
+
+    /// Whether there is time left.
+    pub(super) fn go_on(&mut self) -> bool {
+        if self.limit.is_some_and(|limit| self.started.elapsed() >= limit) {
+            self.stopped = true;
+        }
+        !self.stopped
+    }
+
+    pub(super) fn report(&mut self, stage: Stage, done: usize, parts: usize) {
+        let elapsed = self.started.elapsed();
+        if let Some(progress) = &mut self.progress {
+            progress(Progress {
+                stage,
+                done,
+                parts,
+                elapsed,
+            });
+        }
+    }
+}

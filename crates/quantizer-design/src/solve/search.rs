@@ -1,0 +1,341 @@
+//! Search for cells and words together, on grids.
+//!
+//! ```text
+//! for each start
+//!     repeat
+//!         for each sensor
+//!             block <- moments of its grid cells, the other sensors as they are
+//!             repeat
+//!                 words of the cells <- best for the decoder as it is          # cells merge where they should
+//!                 an unused word enters wherever it is worth it
+//!                 two words are exchanged if that is better
+//!     until a round over the sensors gains nothing
+//! for the best few results: finer grids about their breakpoints, and again
+//! ```
+//!
+//! Every step raises the criterion or is not taken, and a word that no cell is best sent as is simply not used: nothing can
+//! fail to converge.
+
+use super::landscape::{Block, Grid, Landscape, REACH, Words};
+use crate::moments::Table;
+use fewbits_monte_carlo::Stream;
+use rand::RngExt;
+
+/// A gain below this share of the criterion's size ends a loop.
+const GAIN: f64 = 1e-10;
+/// A round over the sensors that gains less than this share ends a descent.
+const ROUND_GAIN: f64 = 1e-7;
+/// Share of the reach of a sample's table that the evenly spread edges cover.
+const EVEN_SHARE: f64 = 0.75;
+/// Grid cells on either side of a breakpoint on a finer grid.
+const FINER: i32 = 3;
+/// Exchanges of words are left out if trying all of them once takes more multiplications than this.
+const MAX_EXCHANGE_WORK: f64 = 3e8;
+
+/// Rounds over the sensors, or over cells and words of one sensor, after which a climb ends.
+const MAX_ROUNDS: usize = 60;
+/// Sweeps after which a loop over cells or words ends.
+const MAX_SWEEPS: usize = 40;
+
+/// Whether each word belongs to one interval or to any cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shape {
+    Intervals,
+    Any,
+}
+
+/// A point of the search: a grid and its words for every sensor.
+#[derive(Debug, Clone)]
+pub(super) struct Point {
+    pub(super) grids: Vec<Grid>,
+    pub(super) words: Vec<Words>,
+    pub(super) value: f64,
+}
+
+/// Breakpoints of the cells of a sensor, and the word of each.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct WordedCells {
+    pub(super) breakpoints: Vec<f64>,
+    pub(super) words: Vec<usize>,
+}
+
+impl WordedCells {
+    /// Runs of equal words on a grid.
+    pub(super) fn of(edges: &[f64], words: &[usize]) -> Self {
+        let changes: Vec<usize> = (1..words.len()).filter(|c| words[*c] != words[c - 1]).collect();
+        Self {
+            breakpoints: changes.iter().map(|c| edges[c - 1]).collect(),
+            words: std::iter::once(words[0])
+                .chain(changes.iter().map(|c| words[*c]))
+                .collect(),
+        }
+    }
+
+    /// The words of the cells of a grid, each that of its middle.
+    pub(super) fn on(&self, edges: &[f64]) -> Words {
+        (0..=edges.len())
+            .map(|c| {
+                let middle = match (c.checked_sub(1).map(|i| edges[i]), edges.get(c)) {
+                    (Some(low), Some(high)) => 0.5 * (low + high),
+                    (Some(low), None) => low.next_up(),
+                    (None, Some(high)) => high.next_down(),
+                    (None, None) => 0.0,
+                };
+                self.words[self.breakpoints.partition_point(|b| *b <= middle)]
+            })
+            .collect()
+    }
+}
+
+/// Edges spread half evenly and half by probability over a sensor's sample.
+pub(super) fn first_edges(landscape: &Landscape, sensor: usize, cells: usize) -> Vec<f64> {
+    let sample = landscape.sample(sensor);
+    let (even, reach) = (cells / 2, EVEN_SHARE * REACH * sample.deviation);
+    let mut edges: Vec<f64> = (1..even)
+        .map(|i| sample.mean + reach * (2.0 * i as f64 / even as f64 - 1.0))
+        .collect();
+    edges.extend(sample.quantiles(cells - even));
+    edges.sort_by(f64::total_cmp);
+    edges.dedup_by(|b, a| *b - *a < 1e-6 * sample.deviation);
+    edges
+}
+
+/// Starting words on a grid: `cells` intervals of equal probability with the given words.
+pub(super) fn start(landscape: &Landscape, sensor: usize, grid: &Grid, words: &[usize]) -> Words {
+    let worded = WordedCells {
+        breakpoints: landscape.sample(sensor).quantiles(words.len()),
+        words: words.to_vec(),
+    };
+    worded.on(&grid.edges)
+}
+
+/// Starting words of random cells: a random number of them, at random places, in random order.
+pub(super) fn random_start(landscape: &Landscape, sensor: usize, grid: &Grid, stream: Stream) -> Words {
+    let mut rng = stream.rng();
+    let all = landscape.laws[sensor].words;
+    let count = rng.random_range((all / 2).max(2)..=all);
+    let mut words: Vec<usize> = (0..all).collect();
+    for i in (1..all).rev() {
+        words.swap(i, rng.random_range(0..=i));
+    }
+    words.truncate(count);
+    let fine = landscape.sample(sensor).quantiles(200);
+    let mut breakpoints: Vec<f64> = (1..count).map(|_| fine[rng.random_range(0..fine.len())]).collect();
+    breakpoints.sort_by(f64::total_cmp);
+    WordedCells { breakpoints, words }.on(&grid.edges)
+}
+
+/// Climbs from the words of a point until a round over the sensors gains nothing. `go_on` is asked before each sensor.
+pub(super) fn climb(
+    landscape: &Landscape,
+    grids: Vec<Grid>,
+    mut words: Vec<Words>,
+    shape: Shape,
+    go_on: &mut dyn FnMut() -> bool,
+) -> Point {
+    let mut symbols: Vec<Vec<Table>> = (0..grids.len())
+        .map(|n| landscape.symbols(n, &grids[n], &words[n]))
+        .collect();
+    let mut value = landscape.total(&grids, &words, &symbols);
+    for _ in 0..MAX_ROUNDS {
+        let before = value;
+        for n in 0..grids.len() {
+            if !go_on() {
+                return Point { grids, words, value };
+            }
+            let block = landscape.block(n, &grids[n], &symbols);
+            let mut sensor = Sensor {
+                landscape,
+                grid: &grids[n],
+                block: &block,
+                shape,
+                value: landscape.value(&block, &grids[n], &words[n]),
+                words: std::mem::take(&mut words[n]),
+            };
+            let first = sensor.value;
+            sensor.climb();
+            value += sensor.value - first;
+            words[n] = sensor.words;
+            symbols[n] = landscape.symbols(n, &grids[n], &words[n]);
+        }
+        if grids.len() == 1 || value - before <= ROUND_GAIN * landscape.unit(value) {
+            break;
+        }
+    }
+    Point { grids, words, value }
+}
+
+/// The point on finer grids about its breakpoints, a third as wide as `spacing`, climbed again.
+pub(super) fn refine(
+    landscape: &Landscape,
+    point: Point,
+    spacings: &mut [f64],
+    shape: Shape,
+    go_on: &mut dyn FnMut() -> bool,
+) -> Point {
+    let (mut grids, mut words) = (Vec::new(), Vec::new());
+    for (n, spacing) in spacings.iter_mut().enumerate() {
+        let cells = WordedCells::of(&point.grids[n].edges, &point.words[n]);
+        let mut edges = Vec::new();
+        for b in &cells.breakpoints {
+            edges.extend((-FINER..=FINER).map(|i| b + *spacing * f64::from(i) / f64::from(FINER)));
+        }
+        edges.sort_by(f64::total_cmp);
+        edges.dedup_by(|b, a| *b - *a < 1e-3 * *spacing);
+        if edges.is_empty() {
+            edges.push(landscape.sample(n).mean);
+        }
+        words.push(cells.on(&edges));
+        grids.push(landscape.grid(n, edges));
+        *spacing /= f64::from(FINER);
+    }
+    climb(landscape, grids, words, shape, go_on)
+}
+
+/// The largest distance between neighbouring breakpoint candidates that matter: how far a breakpoint may be off.
+pub(super) fn spacing(landscape: &Landscape, sensor: usize, cells: usize) -> f64 {
+    2.0 * EVEN_SHARE * REACH * landscape.sample(sensor).deviation / (cells / 2) as f64
+}
+
+/// One sensor, the others as they are.
+struct Sensor<'a> {
+    landscape: &'a Landscape,
+    grid: &'a Grid,
+    block: &'a Block,
+    shape: Shape,
+    words: Words,
+    value: f64,
+}
+
+impl Sensor<'_> {
+    fn climb(&mut self) {
+        for _ in 0..MAX_ROUNDS {
+            let before = self.value;
+            self.move_cells();
+            if self.exchange_work() <= MAX_EXCHANGE_WORK {
+                self.exchange_words();
+            }
+            if self.value - before <= GAIN * self.landscape.unit(before) {
+                return;
+            }
+        }
+    }
+
+    /// Takes `words` if they are better.
+    fn accept(&mut self, words: Words) -> bool {
+        if words == self.words {
+            return false;
+        }
+        let value = self.landscape.value(self.block, self.grid, &words);
+        let better = value - self.value > GAIN * self.landscape.unit(self.value);
+        if better {
+            (self.words, self.value) = (words, value);
+        }
+        better
+    }
+
+    /// Sends each grid cell as its best word, the decoder as it is, and repeats with the new decoder.
+    fn move_cells(&mut self) {
+        for _ in 0..MAX_SWEEPS {
+            let worth = self.landscape.worth(self.block, self.grid, &self.words);
+            let next = match self.shape {
+                Shape::Any => self.best_words(&worth),
+                Shape::Intervals => self.best_intervals(&worth),
+            };
+            if !self.accept(next) {
+                return;
+            }
+        }
+    }
+
+    fn best_words(&self, worth: &[f64]) -> Words {
+        let count = self.landscape.laws[self.block.sensor].words;
+        let rows = worth.chunks_exact(count).zip(&self.words);
+        rows.map(|(row, own)| (0..count).fold(*own, |best, w| if row[w] > row[best] { w } else { best }))
+            .collect()
+    }
+
+    /// The best intervals whose words stand in their present order, with at most one unused word put in.
+    fn best_intervals(&self, worth: &[f64]) -> Words {
+        let count = self.landscape.laws[self.block.sensor].words;
+        let order = WordedCells::of(&self.grid.edges, &self.words).words;
+        let (mut best, mut words) = in_order(worth, count, &order);
+        for unused in (0..count).filter(|w| !order.contains(w)) {
+            for at in 0..=order.len() {
+                let mut longer = order.clone();
+                longer.insert(at, unused);
+                let (value, found) = in_order(worth, count, &longer);
+                if value > best + GAIN * best.abs() {
+                    (best, words) = (value, found);
+                }
+            }
+        }
+        words
+    }
+
+    fn exchange_work(&self) -> f64 {
+        let law = &self.landscape.laws[self.block.sensor];
+        let pairs = (law.words * law.words) as f64 / 2.0;
+        pairs * (law.outputs * law.words) as f64 * (self.block.others * self.landscape.width()) as f64
+    }
+
+    /// Exchanges two words wherever that is better.
+    fn exchange_words(&mut self) {
+        let count = self.landscape.laws[self.block.sensor].words;
+        for _ in 0..MAX_SWEEPS {
+            let levels = self.landscape.levels(self.block, &self.words);
+            let used: Vec<bool> = (0..count).map(|w| self.words.contains(&w)).collect();
+            let mut renamed: Vec<usize> = (0..count).collect();
+            let mut changed = false;
+            for a in 0..count {
+                for b in a + 1..count {
+                    if !used[a] && !used[b] {
+                        continue;
+                    }
+                    renamed.swap(a, b);
+                    let value = self
+                        .landscape
+                        .value_of_levels(self.block, self.grid, &levels, &self.words, &renamed);
+                    if value - self.value > GAIN * self.landscape.unit(self.value) {
+                        self.value = value;
+                        changed = true;
+                    } else {
+                        renamed.swap(a, b);
+                    }
+                }
+            }
+            if !changed {
+                return;
+            }
+            self.words.iter_mut().for_each(|w| *w = renamed[*w]);
+        }
+    }
+}
+
+/// Dynamic programme over the cells of a grid: intervals with words in this order, any of which may be left out.
+fn in_order(worth: &[f64], count: usize, order: &[usize]) -> (f64, Words) {
+    let cells = worth.len() / count;
+    let mut best = vec![0.0; order.len()];
+    let mut from = Vec::with_capacity(cells);
+    for row in worth.chunks_exact(count) {
+        let (mut leader, mut next) = (0, vec![0.0; order.len()]);
+        let mut came = vec![0; order.len()];
+        for (j, word) in order.iter().enumerate() {
+            // On ties the later word, which is the one that went on.
+            if best[j] >= best[leader] {
+                leader = j;
+            }
+            (next[j], came[j]) = (best[leader] + row[*word], leader);
+        }
+        best = next;
+        from.push(came);
+    }
+    let mut at = (0..order.len()).fold(0, |a, j| if best[j] > best[a] { j } else { a });
+    let value = best[at];
+    let mut words = vec![0; cells];
+    for c in (0..cells).rev() {
+        words[c] = order[at];
+        at = from[c][at];
+    }
+    (value, words)
+}

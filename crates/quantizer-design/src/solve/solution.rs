@@ -1,0 +1,372 @@
+//! What a design is: cells and words of every sensor, what they are worth, and how sure that is.
+
+use super::pipeline::{Participant, missing};
+use super::request::Request;
+use super::search::WordedCells;
+use crate::bounds;
+use crate::criterion::Criterion;
+use crate::decoder::MmseDecoder;
+use crate::design::Scope;
+use crate::error::{Error, refuse};
+use crate::newton::Certificate;
+use crate::scene::{Prior, Scene};
+use crate::system::System;
+use fewbits_core::Link;
+use fewbits_quantizers::quantizer::cell_of;
+use std::fmt::Write;
+
+/// The designs that a request found, best first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solutions {
+    all: Vec<Solution>,
+    is_cut_short: bool,
+}
+
+impl Solutions {
+    pub(super) fn new(all: Vec<Solution>, is_cut_short: bool) -> Self {
+        Self { all, is_cut_short }
+    }
+
+    /// The best design.
+    pub fn best(&self) -> &Solution {
+        // A request that runs returns one design at least.
+        &self.all[0]
+    }
+
+    /// All designs, best first.
+    pub fn all(&self) -> &[Solution] {
+        &self.all
+    }
+
+    /// Whether the time limit ended the search.
+    pub fn is_cut_short(&self) -> bool {
+        self.is_cut_short
+    }
+}
+
+/// Cells and words of one sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorDesign {
+    /// Number of the sensor in the request.
+    pub sensor: usize,
+    /// Bits of a word.
+    pub bits: u32,
+    /// Breakpoints between the cells, increasing.
+    pub breakpoints: Vec<f64>,
+    /// Word of each cell, one more than breakpoints.
+    pub words: Vec<usize>,
+    /// The link that the words cross.
+    pub link: Link,
+}
+
+impl SensorDesign {
+    /// The word for a sample.
+    ///
+    /// # Errors
+    /// If the sample is NaN.
+    pub fn encode(&self, sample: f64) -> Result<usize, Error> {
+        Ok(self.words[cell_of(&self.breakpoints, sample)?])
+    }
+
+    /// Symbols that can be received: all words, and one more behind them, "nothing", if a word may be missing.
+    pub fn symbols(&self) -> usize {
+        (1 << self.bits) + usize::from(missing(&self.link) > 0.0)
+    }
+}
+
+/// What no design of as many bits can pass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bound {
+    /// In the unit of the criterion: a lower bound on an error, an upper bound on information.
+    pub value: f64,
+    /// How it is known.
+    pub kind: BoundKind,
+}
+
+/// Where a bound comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BoundKind {
+    /// Quadratic Gaussian CEO problem: codes of any length at separate sensors, links at their capacity.
+    Ceo,
+    /// All sensors encoded together, links at their capacity.
+    Together,
+    /// The samples themselves.
+    Unquantised,
+    /// The links' capacity.
+    Capacity,
+}
+
+/// One design: the whole answer to a request.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    system: System,
+    sensors: Vec<SensorDesign>,
+    criterion: Criterion,
+    value: f64,
+    bound: Option<Bound>,
+    certificate: Certificate,
+    scope: Scope,
+}
+
+impl Solution {
+    pub(super) fn new(
+        request: &Request<'_>,
+        participants: &[Participant],
+        system: System,
+        cells: Vec<WordedCells>,
+        certificate: Certificate,
+        scope: Scope,
+    ) -> Result<Self, Error> {
+        let sensors = participants.iter().zip(cells).map(|(p, cells)| SensorDesign {
+            sensor: p.sensor,
+            bits: p.bits,
+            breakpoints: cells.breakpoints,
+            words: cells.words,
+            link: p.link,
+        });
+        Self::assembled(request.criterion, system, sensors.collect(), certificate, scope)
+    }
+
+    pub(super) fn assembled(
+        criterion: Criterion,
+        system: System,
+        sensors: Vec<SensorDesign>,
+        certificate: Certificate,
+        scope: Scope,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            value: system.value(criterion)?,
+            bound: tightest_bound(&system, &sensors, criterion)?,
+            system,
+            sensors,
+            criterion,
+            certificate,
+            scope,
+        })
+    }
+
+    /// The sensors that take part.
+    pub fn sensors(&self) -> &[SensorDesign] {
+        &self.sensors
+    }
+
+    /// The sensors with their quantizers and channels, as the other tools of this crate take them. Symbol `t` is the received word
+    /// `t`; the last symbol is "nothing received" if a word may be missing. Sensors without bits are not in it.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// What was optimised.
+    pub fn criterion(&self) -> Criterion {
+        self.criterion
+    }
+
+    /// Value of the criterion: squared units, nats, or a probability.
+    pub fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// `E (X - E[X | T])^2`, in squared units.
+    ///
+    /// # Errors
+    /// As [`System::value`].
+    pub fn mean_squared_error(&self) -> Result<f64, Error> {
+        self.system.value(Criterion::MeanSquaredError)
+    }
+
+    /// What no design can pass, if a bound is known.
+    pub fn bound(&self) -> Option<Bound> {
+        self.bound
+    }
+
+    /// How far the value is from the bound, relative to the bound: 0 would be perfect.
+    pub fn gap(&self) -> Option<f64> {
+        self.bound.map(|b| (self.value - b.value).abs() / b.value)
+    }
+
+    /// What the second derivatives with respect to the breakpoints prove. Words, the number of cells and their order were
+    /// searched; nothing is proved about them.
+    pub fn certificate(&self) -> Certificate {
+        self.certificate
+    }
+
+    /// The breakpoints over which the certificate holds.
+    pub fn scope(&self) -> Scope {
+        self.scope
+    }
+
+    /// The word of each sensor for one sample per sensor, in the order of [`Solution::sensors`].
+    ///
+    /// # Errors
+    /// If there is not one sample per sensor, or one is NaN.
+    pub fn encode(&self, samples: &[f64]) -> Result<Vec<usize>, Error> {
+        if samples.len() != self.sensors.len() {
+            let expected = format!("one per sensor, {}", self.sensors.len());
+            return refuse("samples", format!("{} samples", samples.len()), expected);
+        }
+        self.sensors
+            .iter()
+            .zip(samples)
+            .map(|(sensor, y)| sensor.encode(*y))
+            .collect()
+    }
+
+    /// The decoder of least squared error, as a table of at most `limit` entries.
+    ///
+    /// # Errors
+    /// As [`MmseDecoder::new`].
+    pub fn decoder(&self, limit: usize) -> Result<MmseDecoder, Error> {
+        MmseDecoder::new(&self.system, limit)
+    }
+
+    /// The same sensors with other breakpoints; the certificate is void.
+    ///
+    /// # Errors
+    /// If there is not one list per sensor, or a list has another length or is not increasing.
+    pub fn with_breakpoints(&self, breakpoints: Vec<Vec<f64>>) -> Result<Self, Error> {
+        if breakpoints.len() != self.sensors.len() {
+            let expected = format!("one per sensor, {}", self.sensors.len());
+            return refuse("breakpoints", format!("{} lists", breakpoints.len()), expected);
+        }
+        let cells: Vec<WordedCells> = self
+            .sensors
+            .iter()
+            .zip(breakpoints)
+            .map(|(sensor, breakpoints)| WordedCells {
+                breakpoints,
+                words: sensor.words.clone(),
+            })
+            .collect();
+        self.with_cells(cells)
+    }
+
+    pub(super) fn with_cells(&self, cells: Vec<WordedCells>) -> Result<Self, Error> {
+        for (sensor, cells) in self.sensors.iter().zip(&cells) {
+            fewbits_quantizers::quantizer::check_increasing(&cells.breakpoints)?;
+            if cells.words.len() != cells.breakpoints.len() + 1 {
+                let expected = format!("{} for sensor {}", cells.words.len() - 1, sensor.sensor);
+                return refuse("breakpoints", format!("{} breakpoints", cells.breakpoints.len()), expected);
+            }
+        }
+        let participants = self.participants();
+        let apart = self.system.groups().len() == self.sensors.len();
+        let system = super::polish::system_of(self.system.scene(), &participants, &cells, apart)?;
+        let sensors = self.sensors.iter().zip(cells).map(|(s, c)| SensorDesign {
+            breakpoints: c.breakpoints,
+            words: c.words,
+            ..s.clone()
+        });
+        Self::assembled(self.criterion, system, sensors.collect(), Certificate::Unproved, self.scope)
+    }
+
+    pub(super) fn participants(&self) -> Vec<Participant> {
+        let parts = self.sensors.iter().map(|s| Participant {
+            sensor: s.sensor,
+            bits: s.bits,
+            link: s.link,
+        });
+        parts.collect()
+    }
+
+    /// The system of these cells and words in another scene of as many sensors.
+    pub(super) fn system_in(&self, scene: &Scene) -> Result<System, Error> {
+        if scene.sensors() != self.sensors.len() {
+            let expected = format!("{}, those that take part", self.sensors.len());
+            return refuse("scene", format!("{} sensors", scene.sensors()), expected);
+        }
+        let cells: Vec<WordedCells> = self
+            .sensors
+            .iter()
+            .map(|s| WordedCells {
+                breakpoints: s.breakpoints.clone(),
+                words: s.words.clone(),
+            })
+            .collect();
+        super::polish::system_of(scene, &self.participants(), &cells, true)
+    }
+
+    /// The design as a table for reading: sensors, cells, words, value, bound and certificate.
+    pub fn table(&self) -> String {
+        let mut text = String::new();
+        let unit = match self.criterion {
+            Criterion::MeanSquaredError => "mean squared error",
+            Criterion::MutualInformation => "information (nats)",
+            Criterion::BayesError => "error probability",
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{unit:<20} {:.9}", self.value);
+        if let (Some(bound), Some(gap)) = (self.bound, self.gap()) {
+            let _ = writeln!(text, "bound ({:?})    {:.9}   gap {:.2} %", bound.kind, bound.value, 100.0 * gap);
+        }
+        let _ = writeln!(
+            text,
+            "certificate          {:?} over {:?}; words and cells were searched",
+            self.certificate, self.scope
+        );
+        for sensor in &self.sensors {
+            let _ = writeln!(text, "sensor {}: {} bits, {} cells", sensor.sensor, sensor.bits, sensor.words.len());
+            let _ = writeln!(text, "  {:>16} {:>16}  word", "from", "to");
+            for (cell, word) in sensor.words.iter().enumerate() {
+                let edge = |i: Option<usize>, open: &str| {
+                    i.and_then(|i| sensor.breakpoints.get(i))
+                        .map_or(open.to_owned(), |b| format!("{b:.9}"))
+                };
+                let (from, to) = (edge(cell.checked_sub(1), "-inf"), edge(Some(cell), "inf"));
+                let _ = writeln!(text, "  {from:>16} {to:>16}  {word:0width$b}", width = sensor.bits as usize);
+            }
+        }
+        text
+    }
+}
+
+/// The tightest of the bounds that hold for a system.
+fn tightest_bound(system: &System, sensors: &[SensorDesign], criterion: Criterion) -> Result<Option<Bound>, Error> {
+    let scene = system.scene();
+    let capacities: Vec<f64> = sensors.iter().map(|s| capacity(&s.link, s.bits)).collect();
+    let total: f64 = capacities.iter().sum();
+    let mut found = Vec::new();
+    if let Some(value) = bounds::unquantised(scene, criterion)? {
+        found.push(Bound {
+            value,
+            kind: BoundKind::Unquantised,
+        });
+    }
+    match criterion {
+        Criterion::MutualInformation => {
+            found.push(Bound {
+                value: total * std::f64::consts::LN_2,
+                kind: BoundKind::Capacity,
+            });
+        }
+        Criterion::MeanSquaredError if matches!(scene.prior(), Prior::Gaussian { .. }) => {
+            let prior = scene.prior_variance();
+            let left = 1.0 / (1.0 / prior + scene.noise().precision_of_mean());
+            let value = left + (prior - left) * (-2.0 * total).exp2();
+            found.push(Bound {
+                value,
+                kind: BoundKind::Together,
+            });
+            if scene.is_independent() && sensors.len() <= bounds::CEO_MAX_SENSORS {
+                // A bound that does not converge is no bound.
+                if let Ok(ceo) = bounds::ceo(scene.prior(), scene.noise(), &capacities) {
+                    found.push(Bound {
+                        value: ceo.lower(),
+                        kind: BoundKind::Ceo,
+                    });
+                }
+            }
+        }
+        _ => {}
+    }
+    let sense = criterion.sense();
+    Ok(found
+        .into_iter()
+        .min_by(|a, b| (sense * a.value).total_cmp(&(sense * b.value))))
+}
+
+/// Bits per word that a link can carry: words arrive with their bits inverted, or not at all.
+fn capacity(link: &Link, bits: u32) -> f64 {
+    let share = |p: f64| if p > 0.0 { -p * p.log2() } else { 0.0 };
+    let flips = share(link.crossover()) + share(1.0 - link.crossover());
+    f64::from(bits) * (1.0 - flips) * (1.0 - missing(link))
+}

@@ -1,0 +1,114 @@
+//! The C header, compiled and run.
+
+use fewbits_core::Link;
+use fewbits_monte_carlo::Stream;
+use fewbits_quantizer_design::solve::{Adc, Bits, Export, Request};
+use fewbits_quantizer_design::{Noise, Prior, Scene};
+use rand::RngExt;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+const WORDS: usize = 100_000;
+
+const PROGRAM: &str = r#"
+#include <stdio.h>
+#include "plant.h"
+int main(void)
+{
+    unsigned w[PLANT_SENSORS];
+    double y;
+    unsigned long code;
+    while (scanf("%u %u %lf %lu", &w[0], &w[1], &y, &code) == 4)
+        printf("%.17g %u %u %u\n", plant_decode(w), plant_encode_0(y), plant_encode_1(y), plant_encode_code_1(code));
+    return 0;
+}
+"#;
+
+/// A directory of this test, removed when dropped.
+struct Directory(PathBuf);
+
+impl Drop for Directory {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// What the compiled header answers to lines of two symbols, a sample and a code; `None` without a compiler.
+fn answers(export: &Export, name: &str, input: String) -> Option<String> {
+    if Command::new("cc").arg("--version").output().is_err() {
+        eprintln!("no `cc` here: the C header is not compiled");
+        return None;
+    }
+    let directory = Directory(std::env::temp_dir().join(format!("fewbits-{name}-{}", std::process::id())));
+    let path = |file: &str| directory.0.join(file);
+    std::fs::create_dir_all(&directory.0).unwrap();
+    std::fs::write(path("plant.h"), export.to_c_header()).unwrap();
+    std::fs::write(path("main.c"), PROGRAM).unwrap();
+    let flags = [
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-Wno-unused-function",
+        "-Wno-unused-const-variable",
+        "-Werror",
+        "-O1",
+    ];
+    let built = Command::new("cc")
+        .args(flags)
+        .arg("-o")
+        .arg(path("main"))
+        .arg(path("main.c"))
+        .output()
+        .unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let mut child = Command::new(path("main"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || stdin.write_all(input.as_bytes()).unwrap());
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap();
+    Some(String::from_utf8(output.stdout).unwrap())
+}
+
+#[test]
+fn the_c_header_decodes_as_the_library() {
+    let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
+    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let link = Link::new(0.05, 0.02).unwrap();
+    let request = Request::estimation(scene, Bits::PerSensor(vec![3, 2]), link).with_starts(3);
+    let adc = Adc::new(12, 0.0..=40.0).unwrap();
+    let rounded = request.run().unwrap().best().rounded(&[adc, adc]).unwrap();
+    let mut rng = Stream::new(9).named("words").rng();
+    let lines: Vec<([usize; 2], f64, u32)> = (0..WORDS)
+        .map(|_| {
+            (
+                [rng.random_range(0..=8), rng.random_range(0..=4)],
+                rng.random_range(0.0..40.0),
+                rng.random_range(0..4096),
+            )
+        })
+        .collect();
+    let input: String = lines
+        .iter()
+        .map(|([a, b], y, code)| format!("{a} {b} {y:?} {code}\n"))
+        .collect();
+    // The table, and the additive decoder that a smaller memory asks for.
+    for (name, bytes) in [("joint", 4096), ("additive", 200)] {
+        let export = rounded.export("plant", bytes).unwrap();
+        let Some(output) = answers(&export, name, input.clone()) else {
+            return;
+        };
+        assert_eq!(output.lines().count(), WORDS);
+        for (line, (symbols, y, code)) in output.lines().zip(&lines) {
+            let numbers: Vec<f64> = line.split(' ').map(|s| s.parse().unwrap()).collect();
+            let words = rounded.solution.encode(&[*y, *y]).unwrap();
+            let expected = [words[0], words[1], rounded.encode(1, *code).unwrap()].map(|w| w as f64);
+            assert_eq!(numbers[0].to_bits(), export.decode(symbols).unwrap().to_bits(), "{line}");
+            assert_eq!(numbers[1..], expected, "{line}");
+        }
+    }
+}

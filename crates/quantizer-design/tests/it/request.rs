@@ -1,0 +1,297 @@
+//! The front door: requests and solutions.
+
+use super::scenes;
+use fewbits_core::Link;
+use fewbits_monte_carlo::Stream;
+use fewbits_quantizer_design::design::{AllowedCells, Scope};
+use fewbits_quantizer_design::solve::{Adc, Bits, Request, Solution, minimax};
+use fewbits_quantizer_design::{Certificate, Noise, Prior, Scene};
+use rand::RngExt;
+use std::time::{Duration, Instant};
+
+fn pair(scale: f64) -> Scene {
+    let noise = Noise::equicorrelated_with_deviations(&[scale; 2], 0.5).unwrap();
+    Scene::new(Prior::normal(20.0 * scale, 4.0 * scale).unwrap(), noise).unwrap()
+}
+
+fn unit_pair(rho: f64) -> Scene {
+    let noise = Noise::equicorrelated_with_deviations(&[1.0; 2], rho).unwrap();
+    Scene::new(Prior::normal(0.0, 1.0).unwrap(), noise).unwrap()
+}
+
+fn best(scene: Scene, bits: Bits, link: Link) -> Solution {
+    Request::estimation(scene, bits, link)
+        .with_starts(8)
+        .run()
+        .unwrap()
+        .best()
+        .clone()
+}
+
+/// Squared error of encoder, link and decoder on simulated samples, with its standard error.
+fn simulated(solution: &Solution, deviations: &[f64], rho: f64, draws: u64) -> (f64, f64) {
+    let mut rng = Stream::new(5).named("simulated").rng();
+    let decoder = solution.decoder(10_000).unwrap();
+    let (prior, mean) = (solution.system().scene().prior().deviation(), solution.system().scene().prior().mean());
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for _ in 0..draws {
+        let mut normal = || fewbits_numerics::normal::quantile(rng.random_range(1e-12..1.0));
+        let (x, shared) = (mean + prior * normal(), normal());
+        let samples: Vec<f64> = deviations
+            .iter()
+            .map(|s| x + s * (rho.sqrt() * shared + (1.0 - rho).sqrt() * normal()))
+            .collect();
+        let mut symbols = solution.encode(&samples).unwrap();
+        for (symbol, sensor) in symbols.iter_mut().zip(solution.sensors()) {
+            for bit in 0..sensor.bits {
+                if rng.random_range(0.0..1.0) < sensor.link.crossover() {
+                    *symbol ^= 1 << bit;
+                }
+            }
+            if rng.random_range(0.0..1.0) < sensor.link.loss() {
+                *symbol = 1 << sensor.bits;
+            }
+        }
+        let error = (decoder.decode_symbols(&symbols).unwrap().mean - x).powi(2);
+        sum += error;
+        squares += error * error;
+    }
+    let n = draws as f64;
+    (sum / n, ((squares / n - (sum / n).powi(2)) / n).sqrt())
+}
+
+/// The job of the guide, in ten lines: two correlated sensors of three bits over a link that flips 2 % of the bits.
+#[test]
+fn two_correlated_sensors_over_a_flipping_link() {
+    let started = Instant::now();
+    let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
+    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let link = Link::flipping(0.02).unwrap();
+    let solutions = Request::estimation(scene, Bits::Each(3), link).run().unwrap();
+    let solution = solutions.best();
+    let adc = Adc::new(12, 0.0..=40.0).unwrap();
+    let header = solution
+        .rounded(&[adc, adc])
+        .unwrap()
+        .export("plant", 4096)
+        .unwrap()
+        .to_c_header();
+    assert!(header.contains("plant_thresholds_0") && header.contains("plant_decode"));
+    assert!(started.elapsed() < Duration::from_secs(10) || cfg!(debug_assertions));
+    // 400 starts find no better intervals than these.
+    assert!(solution.value() < 1.365_94, "{}", solution.value());
+    assert_eq!((solution.certificate(), solution.scope()), (Certificate::LocalOptimum, Scope::EverySensor));
+    assert!(solution.gap().unwrap() > 0.0);
+    let (error, standard_error) = simulated(solution, &[1.0, 1.0], 0.5, 100_000);
+    assert!(
+        (error - solution.value()).abs() < 4.0 * standard_error,
+        "{error} {standard_error} {}",
+        solution.value()
+    );
+}
+
+#[test]
+fn folded_cells_beat_intervals_where_noise_is_small() {
+    let intervals = best(pair(1.0), Bits::Each(2), Link::PERFECT);
+    let folded = Request::estimation(pair(1.0), Bits::Each(2), Link::PERFECT)
+        .with_cells(AllowedCells::Any)
+        .with_starts(8);
+    let folded = folded.run().unwrap().best().clone();
+    assert!(folded.value() < 0.95 * intervals.value(), "{} {}", folded.value(), intervals.value());
+}
+
+/// `E[X | Y]` is linear, so one sensor's optimum is the Lloyd-Max quantizer of its sample.
+#[test]
+fn one_sensor_over_a_clear_link_is_lloyd_max() {
+    for (bits, distortion) in [(2, 0.117_481_847_829), (3, 0.034_547_760_778)] {
+        let scene = Scene::gaussian_with_deviations(2.0, &[1.0]).unwrap();
+        let found = best(scene, Bits::Each(bits), Link::PERFECT).value();
+        let exact = 4.0 - 16.0 / 5.0 * (1.0 - distortion);
+        assert!((found - exact).abs() < 1e-7, "{found} {exact}");
+    }
+}
+
+#[test]
+fn printed_optima_are_found() {
+    for (rho, value) in [(0.0, 0.388_403_07), (0.85, 0.516_272_61)] {
+        let found = best(unit_pair(rho), Bits::Each(2), Link::PERFECT).value();
+        assert!((found - value).abs() < 1e-7, "{rho}: {found}");
+    }
+    let informed = Request::estimation(unit_pair(0.85), Bits::Each(2), Link::PERFECT)
+        .by_information()
+        .run()
+        .unwrap();
+    assert!((informed.best().value() - 0.331_123_01).abs() < 1e-7);
+}
+
+#[test]
+fn detection_reaches_the_printed_error_probability() {
+    let noise = Noise::independent_with_deviations(&[1.0; 5]).unwrap();
+    let scene = Scene::new(Prior::binary(2.0, 0.5).unwrap(), noise).unwrap();
+    let found = Request::detection(scene, Bits::Each(2), Link::PERFECT)
+        .unwrap()
+        .run()
+        .unwrap();
+    assert!(found.best().value() < 1.660_803_1e-2, "{}", found.best().value());
+    assert!(Request::detection(unit_pair(0.0), Bits::Each(2), Link::PERFECT).is_err());
+}
+
+#[test]
+fn designs_scale_with_the_unit() {
+    let link = Link::new(0.05, 0.03).unwrap();
+    let one = best(pair(1.0), Bits::PerSensor(vec![2, 1]), link);
+    for scale in [1e-4, 1e4] {
+        let other = best(pair(scale), Bits::PerSensor(vec![2, 1]), link);
+        assert!((other.value() / (scale * scale) / one.value() - 1.0).abs() < 1e-9, "{scale}");
+        // Rounding decides between a design and its mirror image about the mean.
+        let distance = |mirror: bool| {
+            let pairs = one.sensors().iter().zip(other.sensors()).flat_map(|(a, b)| {
+                assert_eq!(a.words.len(), b.words.len());
+                let mut own: Vec<f64> = b.breakpoints.iter().map(|b| b / scale).collect();
+                if mirror {
+                    own = own.iter().rev().map(|b| 40.0 - b).collect();
+                }
+                a.breakpoints.clone().into_iter().zip(own)
+            });
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        assert!(distance(false).min(distance(true)) < 1e-6, "{scale}: {} {}", distance(false), distance(true));
+    }
+}
+
+/// A symbol that is lost and known to be leaves the prior.
+#[test]
+fn losses_of_one_sensor_mix_prior_and_posterior() {
+    let scene = || Scene::gaussian_with_deviations(1.0, &[0.5]).unwrap();
+    let clear = best(scene(), Bits::Each(2), Link::PERFECT).value();
+    let lossy = best(scene(), Bits::Each(2), Link::lossy(0.3).unwrap()).value();
+    assert!((lossy - (0.3 + 0.7 * clear)).abs() < 1e-9);
+}
+
+#[test]
+fn a_useless_link_leaves_the_prior() {
+    let found = best(unit_pair(0.3), Bits::Each(3), Link::flipping(0.5).unwrap());
+    assert!((found.value() - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn shared_out_bits_are_the_best_of_all_shares() {
+    let scene = || Scene::gaussian_with_deviations(1.0, &[0.2, 1.5]).unwrap();
+    let link = Link::flipping(0.01).unwrap();
+    let shared = best(scene(), Bits::Total(4), link);
+    let all = (0..=4).map(|first| best(scene(), Bits::PerSensor(vec![first, 4 - first]), link).value());
+    let least = all.fold(f64::INFINITY, f64::min);
+    assert!((shared.value() / least - 1.0).abs() < 1e-6, "{} {least}", shared.value());
+    assert!(Request::estimation(scene(), Bits::Total(0), link).run().is_err());
+    assert!(Request::estimation(scene(), Bits::Each(7), link).run().is_err());
+    assert!(
+        Request::estimation(scene(), Bits::PerSensor(vec![1]), link)
+            .run()
+            .is_err()
+    );
+}
+
+#[test]
+fn random_scenes_are_no_worse_than_nelder_mead() {
+    for i in 0..5 {
+        let task = scenes::task(i, [1e-4, 1.0, 1e4][i as usize % 3], 3, 2).unwrap();
+        let (found, _) = task.solve(None).unwrap();
+        let reference = task.nelder_mead(Duration::from_millis(150)).unwrap();
+        assert!(found.value() <= reference * (1.0 + 1e-9), "{}: {} {reference}", task.what, found.value());
+    }
+}
+
+#[test]
+fn a_time_limit_still_gives_a_design() {
+    let mut calls = 0;
+    let mut count = |_| calls += 1;
+    let request = Request::estimation(pair(1.0), Bits::Each(3), Link::PERFECT)
+        .with_time_limit(Duration::ZERO)
+        .with_progress(&mut count);
+    let found = request.run().unwrap();
+    assert!(found.is_cut_short() && found.best().value() < 16.0);
+    assert!(calls > 0);
+}
+
+#[test]
+fn codes_of_a_converter_are_the_cells() {
+    let solution = best(pair(1.0), Bits::Each(2), Link::flipping(0.02).unwrap());
+    let adc = Adc::new(10, 4.0..=36.0).unwrap();
+    let rounded = solution.rounded(&[adc, adc]).unwrap();
+    for i in 0..4000 {
+        let y = -1.0 + 42.0 * f64::from(i) / 4000.0;
+        let words = rounded.solution.encode(&[y, y]).unwrap();
+        assert_eq!([0, 1].map(|n| rounded.encode(n, adc.code(y)).unwrap()).to_vec(), words, "{y}");
+    }
+    // At an optimum the loss is of second order in the step.
+    assert!(rounded.solution.value() >= solution.value() * (1.0 - 1e-12));
+    assert!(rounded.solution.value() < solution.value() * 1.0001);
+    let coarse = solution.rounded(&[Adc::new(2, 4.0..=36.0).unwrap(); 2]).unwrap();
+    assert!(coarse.thresholds.iter().all(|t| t.windows(2).all(|w| w[0] < w[1])));
+    assert!(coarse.solution.value() > solution.value());
+}
+
+#[test]
+fn additive_decoders_have_their_stated_error() {
+    let solution = best(pair(1.0), Bits::Each(2), Link::flipping(0.02).unwrap());
+    let additive = solution.additive_decoder().unwrap();
+    assert!(additive.mean_squared_error >= solution.value());
+    let export = solution.export("small", 64).unwrap();
+    assert_eq!(export.mean_squared_error().unwrap(), additive.mean_squared_error);
+    assert!(solution.export("small", 63).is_err() && solution.export("1", 4096).is_err());
+    // E (X - estimate)^2 over the joint symbols, from the exact posterior.
+    let decoder = solution.decoder(100).unwrap();
+    let table = fewbits_quantizer_design::JointTable::new(solution.system()).unwrap();
+    let mut error = 0.0;
+    for a in 0..4 {
+        for b in 0..4 {
+            let posterior = decoder.decode_symbols(&[a, b]).unwrap();
+            let off = additive.decode(&[a, b]).unwrap() - posterior.mean;
+            error += table.probability(4 * a + b) * (posterior.variance + off * off);
+        }
+    }
+    assert!((error - additive.mean_squared_error).abs() < 1e-9, "{error}");
+}
+
+#[test]
+fn json_follows_its_schema() {
+    let solution = best(pair(1.0), Bits::PerSensor(vec![2, 1]), Link::new(0.1, 0.02).unwrap());
+    let export = solution.export("plant", 4096).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&export.to_json().unwrap()).unwrap();
+    let schema: serde_json::Value = serde_json::from_str(fewbits_quantizer_design::solve::JSON_SCHEMA).unwrap();
+    let keys = |v: &serde_json::Value| v.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    let required: Vec<String> = serde_json::from_value(schema["required"].clone()).unwrap();
+    assert_eq!(keys(&json), required);
+    let of_sensors = &schema["properties"]["sensors"]["items"]["required"];
+    assert_eq!(keys(&json["sensors"][0]), serde_json::from_value::<Vec<String>>(of_sensors.clone()).unwrap());
+    // The table holds every joint symbol, missing words included: 5 by 3.
+    assert_eq!(json["decoder"]["shape"], serde_json::json!([5, 3]));
+    let means: Vec<f64> = serde_json::from_value(json["decoder"]["means"].clone()).unwrap();
+    for a in 0..5 {
+        for b in 0..3 {
+            assert_eq!(means[3 * a + b], export.decode(&[a, b]).unwrap());
+        }
+    }
+}
+
+#[test]
+fn sensitivity_is_zero_without_a_change() {
+    let solution = best(unit_pair(0.3), Bits::Each(2), Link::flipping(0.02).unwrap());
+    for row in solution.sensitivity(0.0).unwrap() {
+        assert!((row.mismatch.mean_squared_error - solution.value()).abs() < 1e-12, "{row:?}");
+    }
+    for row in solution.sensitivity(0.2).unwrap() {
+        let mismatch = row.mismatch;
+        assert!(mismatch.mean_squared_error >= mismatch.with_best_decoder - 1e-12, "{row:?}");
+    }
+    assert!(solution.sensitivity(1.0).is_err());
+}
+
+#[test]
+fn minimax_lowers_the_worst_case() {
+    let request = Request::estimation(unit_pair(0.0), Bits::Each(2), Link::PERFECT).with_starts(4);
+    let found = minimax(request, 0.5, 0.3, 0.3).unwrap();
+    assert!(found.worst_case < found.nominal_worst_case, "{found:?}");
+    assert!(found.bound <= found.worst_case && found.bound > 0.9 * found.worst_case, "{found:?}");
+    assert_eq!(found.weights.len(), 9);
+}

@@ -1,0 +1,129 @@
+//! Bits per sample of recordings on real series, beside the references of other programs.
+//!
+//! `cargo run --release -p fewbits-record --example measure -- FOLDER [KEY]` reads `manifest.csv` (key, ..., period, range),
+//! `baselines.csv` (key, bound in percent of the range, codec, bits per sample) and for each key `KEY.f64`, little-endian doubles. It
+//! prints one line for each series, bound and size of blocks, then the summary. Every restored sample is checked.
+
+use fewbits_record::{Bound, Column, Playback, Recorder, Schema, TimeBase};
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+
+type Failure = Box<dyn std::error::Error>;
+
+const PERCENTS: [&str; 7] = ["0.0", "0.0001", "0.01", "0.25", "0.5", "1.0", "2.0"];
+
+/// Bits of the blocks alone, and of the whole recording.
+struct Cost {
+    blocks: f64,
+    whole: f64,
+}
+
+fn measure(samples: &[f64], column: &Column, rows: usize) -> Result<Cost, Failure> {
+    let schema = Schema::new(vec![column.clone()], TimeBase::Numbered)?.with_rows_per_block(rows)?;
+    let mut recorder = Recorder::new(Vec::new(), schema);
+    for sample in samples {
+        recorder.push_next(&[(!sample.is_nan()).then_some(*sample)])?;
+    }
+    let bytes = recorder.finish()?;
+    let mut playback = Playback::new(Cursor::new(&bytes))?;
+    let blocks: u64 = playback.index()?.iter().map(|block| block.bytes).sum();
+    let mut read = 0;
+    for block in playback.blocks() {
+        let block = block?;
+        for (tick, cell) in block.ticks.iter().zip(&block.columns[0]) {
+            let sample = Some(samples[*tick as usize]).filter(|sample| !sample.is_nan());
+            if !column.keeps(sample, *cell, block.share_bounds[0]) {
+                return Err(format!("row {tick}: {sample:?} restored as {cell:?}").into());
+            }
+            read += 1;
+        }
+    }
+    assert_eq!(read, samples.len());
+    let bits = |bytes: f64| 8.0 * bytes / samples.len() as f64;
+    Ok(Cost {
+        blocks: bits(blocks as f64),
+        whole: bits(bytes.len() as f64),
+    })
+}
+
+fn main() -> Result<(), Failure> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().ok_or("which folder?")?;
+    let chosen = arguments.next();
+    let folder = Path::new(&folder);
+    let mut references: BTreeMap<(String, String), BTreeMap<String, f64>> = BTreeMap::new();
+    for record in csv::Reader::from_path(folder.join("baselines.csv"))?.records() {
+        let record = record?;
+        let key = (record[0].to_owned(), record[1].to_owned());
+        references
+            .entry(key)
+            .or_default()
+            .insert(record[2].to_owned(), record[3].parse()?);
+    }
+    let mut costs: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
+    let mut ratios: BTreeMap<(&str, String), Vec<f64>> = BTreeMap::new();
+    for record in csv::Reader::from_path(folder.join("manifest.csv"))?.records() {
+        let record = record?;
+        let (key, period, range): (&str, f64, f64) = (&record[0], record[5].parse()?, record[6].parse()?);
+        if chosen.as_ref().is_some_and(|chosen| chosen != key) {
+            continue;
+        }
+        let bytes = std::fs::read(folder.join(format!("{key}.f64")))?;
+        let samples: Vec<f64> = bytes
+            .as_chunks::<8>()
+            .0
+            .iter()
+            .map(|chunk| f64::from_le_bytes(*chunk))
+            .collect();
+        for percent in PERCENTS {
+            let delta = 0.01 * percent.parse::<f64>()? * range;
+            let bound = if delta > 0.0 {
+                Bound::Absolute(delta)
+            } else {
+                Bound::Lossless
+            };
+            let mut column = Column::new("x", bound)?;
+            if period > 0.0 {
+                column = column.with_period(period)?;
+            }
+            let one = measure(&samples, &column, samples.len())?;
+            let large = measure(&samples, &column, 512)?;
+            let small = measure(&samples, &column, 128)?;
+            println!("{key},{percent},{:.4},{:.4},{:.4},{:.4}", one.blocks, large.blocks, large.whole, small.blocks);
+            for (kind, bits) in [
+                ("one block", one.blocks),
+                ("512 rows", large.blocks),
+                ("512 rows, file", large.whole),
+                ("128 rows", small.blocks),
+            ] {
+                costs.entry((percent, kind)).or_default().push(bits);
+            }
+            for (codec, bits) in references
+                .get(&(key.to_owned(), percent.to_owned()))
+                .into_iter()
+                .flatten()
+            {
+                ratios
+                    .entry((percent, codec.clone()))
+                    .or_default()
+                    .push(one.blocks / bits);
+            }
+        }
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    for ((percent, kind), bits) in &costs {
+        println!("bound {percent} %, {kind}: mean {:.4} bits", mean(bits));
+    }
+    for ((percent, codec), ratio) in &ratios {
+        let logs: Vec<f64> = ratio.iter().map(|ratio| ratio.ln()).collect();
+        let larger = ratio.iter().filter(|ratio| **ratio > 1.0).count();
+        let worst = ratio.iter().fold(0.0, |worst: f64, ratio| worst.max(*ratio));
+        println!(
+            "bound {percent} %, one block / {codec}: geometric mean {:.3}, worst {worst:.3}, larger on {larger} of {}",
+            mean(&logs).exp(),
+            ratio.len()
+        );
+    }
+    Ok(())
+}

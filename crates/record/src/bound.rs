@@ -1,0 +1,153 @@
+//! What a column promises, and the test whether a restored value keeps the promise.
+//!
+//! The test is exact. `|a - b| <= delta` in rounded arithmetic accepts differences that are larger than `delta` by half an ulp; here
+//! the rounding error of the difference decides where the rounded difference equals `delta`.
+
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::positive;
+
+/// The promise of a column for every finite sample. Gaps, NaN and infinities always return as they were.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Bound {
+    /// The same 64 bits.
+    Lossless,
+    /// At most this far from the sample, in units of the column.
+    Absolute(f64),
+    /// At most this share of the column's range. The range is that of the rows up to the sample's block, unless
+    /// [`Column::with_range`](crate::Column::with_range) fixes it: it only grows, so the promise holds for the whole range too.
+    ShareOfRange(f64),
+    /// Numbers of at most this many decimals (up to 15) return exactly; others within half a unit of the last decimal.
+    Decimals(u8),
+}
+
+/// Most decimals of [`Bound::Decimals`].
+pub const MAX_DECIMALS: u8 = 15;
+
+impl Bound {
+    pub(crate) fn checked(self) -> Result<Self, ArgumentError> {
+        match self {
+            Self::Absolute(delta) => {
+                positive("bound", delta)?;
+                if !(2.0 * delta).is_finite() {
+                    return Err(ArgumentError::new("bound", delta, "a number whose double is finite"));
+                }
+            }
+            Self::ShareOfRange(share) => {
+                positive("bound", share)?;
+                if share > 1.0 {
+                    return Err(ArgumentError::new("bound", share, "a share of the range, at most 1"));
+                }
+            }
+            Self::Decimals(places) if places > MAX_DECIMALS => {
+                return Err(ArgumentError::new("bound", places, "at most 15 decimals"));
+            }
+            Self::Lossless | Self::Decimals(_) => {}
+        }
+        Ok(self)
+    }
+}
+
+/// The promise for one block, with numbers in place of shares.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Promise {
+    /// The same 64 bits.
+    Exact,
+    /// Within this distance, around the circle if there is one.
+    Within(f64),
+    /// Decimals of so many places exactly, others within half a unit of the last.
+    Decimals(u8),
+}
+
+/// Powers of ten that are whole doubles.
+pub(crate) const TENS: [f64; 16] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+];
+
+/// The whole number `j` with `j / 10^places == value`, if there is one below 2^53.
+pub(crate) fn decimal(value: f64, places: u8) -> Option<i64> {
+    let ten = *TENS.get(usize::from(places))?;
+    let scaled = (value * ten).round();
+    (scaled.abs() < 9e15 && scaled / ten == value).then_some(scaled as i64)
+}
+
+impl Promise {
+    /// Whether `restored` is what was promised for `sample`; both are finite.
+    pub(crate) fn holds(self, sample: f64, restored: f64, period: Option<f64>) -> bool {
+        match self {
+            Self::Exact => sample.to_bits() == restored.to_bits(),
+            Self::Within(delta) => match period {
+                None => is_within(sample, restored, delta),
+                Some(period) => is_within_on_circle(sample, restored, delta, period),
+            },
+            Self::Decimals(places) => {
+                let half = 0.5 / TENS.get(usize::from(places)).copied().unwrap_or(1.0);
+                match decimal(sample, places) {
+                    Some(_) => sample == restored,
+                    None => is_within(sample, restored, half),
+                }
+            }
+        }
+    }
+}
+
+/// `a - b` as a rounded difference and its rounding error, whose sum is exact (Knuth's two-sum) unless the difference overflows.
+fn difference(a: f64, b: f64) -> (f64, f64) {
+    let rounded = a - b;
+    let of_b = a - rounded;
+    let of_a = rounded + of_b;
+    (rounded, (a - of_a) + (of_b - b))
+}
+
+/// Whether `|a - b| <= delta` for the real numbers that the doubles stand for.
+pub fn is_within(a: f64, b: f64, delta: f64) -> bool {
+    let (rounded, error) = difference(a, b);
+    let distance = rounded.abs();
+    // The error's sign relative to the difference tells whether the real distance is beyond the rounded one.
+    distance < delta || (distance == delta && error * rounded.signum() <= 0.0)
+}
+
+/// Whether some `a - b + k period` with whole `k` is at most `delta` in size; `b` lies in `[0, period)`.
+///
+/// Refuses where rounding could matter, so `true` is certain.
+pub fn is_within_on_circle(a: f64, b: f64, delta: f64, period: f64) -> bool {
+    // The remainder of a division is exact.
+    let reduced = a % period;
+    if is_within(reduced, b, delta) {
+        return true;
+    }
+    let (rounded, error) = difference(reduced, b);
+    [-2.0, -1.0, 1.0].into_iter().any(|turns| {
+        let (sum, rest) = difference(rounded, turns * period);
+        (sum + (rest + error)).abs().next_up() <= delta
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distance_test_sees_half_an_ulp() {
+        // 1 + 2^-54 rounds to 1.
+        let tiny = 2.0_f64.powi(-54);
+        assert_eq!(1.0 - (-tiny), 1.0);
+        assert!(!is_within(1.0, -tiny, 1.0) && !is_within(-1.0, tiny, 1.0));
+        assert!(is_within(1.0, tiny, 1.0) && is_within(1.0, 0.0, 1.0) && is_within(0.0, -0.0, 5e-324));
+        assert!(!is_within(f64::MAX, f64::MIN, f64::MAX) && !is_within(5e-324, -5e-324, 5e-324));
+    }
+
+    #[test]
+    fn circles_close() {
+        for (a, b) in [(359.9, 0.05), (-0.1, 359.95), (720.1, 0.0), (0.05, 359.9)] {
+            assert!(is_within_on_circle(a, b, 0.16, 360.0), "{a} {b}");
+            assert!(!is_within_on_circle(a, b, 0.04, 360.0), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn decimals_are_found() {
+        assert_eq!((decimal(22.482, 3), decimal(22.482, 2), decimal(-0.1, 1)), (Some(22_482), None, Some(-1)));
+        assert!(Promise::Decimals(1).holds(0.26, 0.3, None) && !Promise::Decimals(1).holds(0.2, 0.21, None));
+    }
+}

@@ -1,0 +1,313 @@
+//! Frames on a link that loses, repeats and reorders them: each is one block, or a piece of the header.
+//!
+//! [`FrameWriter`] and [`FrameReader`] know no socket and no clock: rows go in and frames come out, or the other way round. The reader
+//! needs the header's pieces once, in any order; the writer hands them out as often as it is asked to. Frames that arrive before the
+//! header is whole are kept, up to a limit.
+//!
+//! ```text
+//! frame    := block | piece
+//! piece    := 0, kind `H`, length varint, content, CRC-32 of 0, 0, 0, 0 and all of it
+//! content  := header's checksum (4 bytes), number of pieces - 1, number of this piece, bytes
+//! ```
+
+use crate::block::{self, Block, Cells};
+use crate::bound::Bound;
+use crate::error::{Damage, Error};
+use crate::header::Header;
+use crate::schema::Schema;
+use crate::wire::{Bytes, CHECK_BYTES, checksum};
+use fewbits_numerics::ArgumentError;
+use std::collections::VecDeque;
+
+/// The smallest limit of a frame: a piece has 26 bytes of the header then.
+pub const MIN_FRAME_BYTES: usize = 40;
+/// Bytes of a piece besides its part of the header.
+const PIECE_OVERHEAD: usize = 14;
+const PIECE: u8 = b'H';
+const MAX_PIECES: usize = 256;
+/// Frames that are kept while the header is not whole.
+const MAX_WAITING: usize = 256;
+/// Share of a frame that is aimed at when the number of rows for the next trial is guessed.
+const FILLED: f64 = 0.95;
+
+/// Makes frames of rows, each as long as the link takes.
+#[derive(Debug)]
+pub struct FrameWriter {
+    schema: Schema,
+    header: Option<Header>,
+    max_bytes: usize,
+    ticks: Vec<i64>,
+    columns: Vec<Cells>,
+    ends: Vec<Option<(f64, f64)>>,
+    /// The most rows that are known to fit, and how many are tried next.
+    fits: usize,
+    next_trial: usize,
+}
+
+impl FrameWriter {
+    /// Frames of at most `max_bytes` bytes and at most the schema's rows per block.
+    ///
+    /// # Errors
+    /// If `max_bytes` is below [`MIN_FRAME_BYTES`], or the header needs more than 256 pieces.
+    pub fn new(schema: Schema, max_bytes: usize) -> Result<Self, Error> {
+        let header = Header::new(schema.clone(), &[], vec![0.0; schema.columns.len()])
+            .to_bytes()
+            .len()
+            + 32;
+        let least = (header.div_ceil(MAX_PIECES) + PIECE_OVERHEAD).max(MIN_FRAME_BYTES);
+        if max_bytes < least {
+            return Err(ArgumentError::new("max_bytes", max_bytes, format!("at least {least} for this header")).into());
+        }
+        Ok(Self {
+            header: None,
+            max_bytes,
+            ticks: Vec::new(),
+            columns: vec![Vec::new(); schema.columns.len()],
+            ends: vec![None; schema.columns.len()],
+            fits: 0,
+            next_trial: 1,
+            schema,
+        })
+    }
+
+    /// Rows that no frame holds yet.
+    pub fn waiting(&self) -> usize {
+        self.ticks.len()
+    }
+
+    /// The header as a recording begins with it, for links that lose nothing; `None` before the first frame.
+    pub fn header(&self) -> Option<Vec<u8>> {
+        self.header.as_ref().map(Header::to_bytes)
+    }
+
+    /// The header's pieces; none before the first frame.
+    pub fn header_frames(&self) -> Vec<Vec<u8>> {
+        let Some(header) = &self.header else { return Vec::new() };
+        let bytes = header.to_bytes();
+        let room = self.max_bytes - PIECE_OVERHEAD;
+        let pieces = bytes.chunks(room);
+        let last = (pieces.len() - 1) as u8;
+        let frame = |(i, piece): (usize, &[u8])| {
+            let mut content = header.check.to_le_bytes().to_vec();
+            content.extend([last, i as u8]);
+            content.extend_from_slice(piece);
+            crate::index::special(0, PIECE, &content)
+        };
+        pieces.enumerate().map(frame).collect()
+    }
+
+    /// One row; returns the frames that became full. A row that does not fit waits for the next frame.
+    ///
+    /// # Errors
+    /// If the row has another number of cells than there are columns, or does not fit into a frame alone.
+    pub fn push(&mut self, tick: i64, row: &[Option<f64>]) -> Result<Vec<Vec<u8>>, Error> {
+        if row.len() != self.columns.len() {
+            let expected = format!("{} cells, one per column", self.columns.len());
+            return Err(ArgumentError::new("row", format!("{} cells", row.len()), expected).into());
+        }
+        self.ticks.push(tick);
+        for ((cells, cell), ends) in self.columns.iter_mut().zip(row).zip(&mut self.ends) {
+            cells.push(*cell);
+            if let Some(value) = cell.filter(|value| value.is_finite()) {
+                let (low, high) = ends.unwrap_or((value, value));
+                *ends = Some((low.min(value), high.max(value)));
+            }
+        }
+        let mut frames = Vec::new();
+        while self.ticks.len() >= self.next_trial.min(self.schema.rows_per_block) && !self.ticks.is_empty() {
+            let rows = self.ticks.len().min(self.schema.rows_per_block);
+            let bytes = self.encode(rows)?;
+            if bytes.len() > self.max_bytes {
+                frames.push(self.largest(rows)?);
+            } else if rows == self.schema.rows_per_block {
+                frames.push(bytes);
+                self.forget(rows);
+            } else {
+                self.fits = rows;
+                let guess = rows as f64 * FILLED * self.max_bytes as f64 / bytes.len() as f64;
+                self.next_trial = (guess as usize).max(rows + 1);
+                break;
+            }
+        }
+        Ok(frames)
+    }
+
+    /// The frames of all rows that wait, however few.
+    ///
+    /// # Errors
+    /// If a row does not fit into a frame alone.
+    pub fn flush(&mut self) -> Result<Vec<Vec<u8>>, Error> {
+        let mut frames = Vec::new();
+        while !self.ticks.is_empty() {
+            let rows = self.ticks.len().min(self.schema.rows_per_block);
+            let bytes = self.encode(rows)?;
+            if bytes.len() > self.max_bytes {
+                frames.push(self.largest(rows)?);
+            } else {
+                frames.push(bytes);
+                self.forget(rows);
+            }
+        }
+        Ok(frames)
+    }
+
+    /// The frame of the most rows that fit, fewer than `too_many`; those rows are done.
+    fn largest(&mut self, too_many: usize) -> Result<Vec<u8>, Error> {
+        let (mut fits, mut too_many) = (self.fits.min(too_many - 1), too_many);
+        let mut best = None;
+        while too_many - fits > 1 || best.is_none() {
+            // Known to fit, but its bytes are not at hand: encode it once more.
+            let rows = if too_many - fits > 1 {
+                fits.midpoint(too_many)
+            } else {
+                fits
+            };
+            if rows == 0 {
+                let expected = "enough for one row: allow longer frames, wider bounds or fewer columns";
+                return Err(ArgumentError::new("max_bytes", self.max_bytes, expected).into());
+            }
+            let bytes = self.encode(rows)?;
+            if bytes.len() <= self.max_bytes {
+                (fits, best) = (rows, Some(bytes));
+            } else if rows == fits {
+                // Encoding more rows may make fewer of them longer, where a share's bound changed: search from the start.
+                (fits, too_many) = (0, rows);
+            } else {
+                too_many = rows;
+            }
+        }
+        self.forget(fits);
+        Ok(best.unwrap_or_default())
+    }
+
+    fn forget(&mut self, rows: usize) {
+        self.ticks.drain(..rows);
+        self.columns.iter_mut().for_each(|cells| drop(cells.drain(..rows)));
+        (self.fits, self.next_trial) = (0, rows.max(1));
+    }
+
+    fn share_bound(&self, column: usize) -> Option<f64> {
+        let spec = &self.schema.columns[column];
+        let Bound::ShareOfRange(share) = spec.bound else {
+            return None;
+        };
+        let range = spec
+            .known_range()
+            .or_else(|| self.ends[column].map(|(low, high)| high - low));
+        Some(crate::recorder::share_of(share, range.unwrap_or(0.0)))
+    }
+
+    fn encode(&mut self, rows: usize) -> Result<Vec<u8>, Error> {
+        let columns = 0..self.columns.len();
+        if self.header.is_none() {
+            let bounds = columns.clone().map(|i| self.share_bound(i).unwrap_or(0.0)).collect();
+            self.header = Some(Header::new(self.schema.clone(), &self.ticks[..rows], bounds));
+        }
+        let Some(header) = &self.header else {
+            return Err(Error::Broken);
+        };
+        let own: Vec<Option<f64>> = columns
+            .map(|i| crate::recorder::own_bound(self.share_bound(i)?, header.share_bounds[i]))
+            .collect();
+        let cells: Vec<Cells> = self.columns.iter().map(|cells| cells[..rows].to_vec()).collect();
+        Ok(block::encode(header, &self.ticks[..rows], &cells, &own)?.0)
+    }
+}
+
+/// Makes rows of frames. Total: any bytes give rows, nothing, or an error.
+#[derive(Debug, Default)]
+pub struct FrameReader {
+    header: Option<Header>,
+    /// The header that is being put together: its checksum and pieces.
+    pieces: Option<(u32, Vec<Option<Vec<u8>>>)>,
+    waiting: VecDeque<Vec<u8>>,
+}
+
+impl FrameReader {
+    /// A reader that knows no header yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// What the sender sends, once the header is whole.
+    pub fn schema(&self) -> Option<&Schema> {
+        self.header.as_ref().map(|header| &header.schema)
+    }
+
+    /// One frame as it arrived. Returns the blocks that it made readable: its own, or, with the last piece of the header, those that
+    /// arrived before and can be read now.
+    ///
+    /// # Errors
+    /// If the frame is damaged or belongs to another header. The reader is then as it was.
+    pub fn handle(&mut self, frame: &[u8]) -> Result<Vec<Block>, Error> {
+        let damaged = |damage| Error::Block {
+            offset: 0,
+            bytes: frame.len() as u64,
+            damage,
+        };
+        if frame.first() == Some(&0) {
+            return self.piece(frame).map_err(damaged);
+        }
+        let Some(header) = &self.header else {
+            if self.waiting.len() == MAX_WAITING {
+                self.waiting.pop_front();
+            }
+            self.waiting.push_back(frame.to_vec());
+            return Ok(Vec::new());
+        };
+        Ok(vec![read_block(header, frame).map_err(damaged)?])
+    }
+
+    fn piece(&mut self, frame: &[u8]) -> Result<Vec<Block>, Damage> {
+        let mut reader = Bytes(&frame[1..]);
+        if reader.byte()? != PIECE {
+            return Err(Damage::NoBlock);
+        }
+        let length = reader.count(frame.len(), "length")?;
+        let mut content = Bytes(reader.take(length)?);
+        let end = frame.len() - reader.0.len();
+        let sum = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
+        reader.finish()?;
+        if sum != checksum(&[&[0; 4], &frame[..end]]) {
+            return Err(Damage::Checksum);
+        }
+        let check = u32::from_le_bytes(content.array()?);
+        let [last, number] = content.array()?;
+        if number > last {
+            return Err(Damage::Content("number of a piece"));
+        }
+        if self.header.as_ref().is_some_and(|header| header.check == check) {
+            return Ok(Vec::new());
+        }
+        let count = usize::from(last) + 1;
+        let known = self
+            .pieces
+            .take()
+            .filter(|(known, pieces)| *known == check && pieces.len() == count);
+        let (_, mut pieces) = known.unwrap_or_else(|| (check, vec![None; count]));
+        pieces[usize::from(number)] = Some(content.0.to_vec());
+        if pieces.iter().any(Option::is_none) {
+            self.pieces = Some((check, pieces));
+            return Ok(Vec::new());
+        }
+        let bytes: Vec<u8> = pieces.into_iter().flatten().flatten().collect();
+        let header = match Header::read(&bytes) {
+            Ok(Some((header, length))) if length == bytes.len() && header.check == check => header,
+            _ => return Err(Damage::Content("header")),
+        };
+        let waiting = std::mem::take(&mut self.waiting);
+        let blocks = waiting
+            .iter()
+            .filter_map(|frame| read_block(&header, frame).ok())
+            .collect();
+        self.header = Some(header);
+        Ok(blocks)
+    }
+}
+
+fn read_block(header: &Header, frame: &[u8]) -> Result<Block, Damage> {
+    if block::length(header, frame)? != frame.len() {
+        return Err(Damage::Content("length"));
+    }
+    block::decode(header, frame, |_| true)
+}

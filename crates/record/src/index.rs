@@ -1,0 +1,323 @@
+//! The index: where blocks are, when, and between which values. A recording is read without it too, only not as fast.
+//!
+//! ```text
+//! special  := 0, kind byte, length varint, content, CRC-32 of header's checksum and all of it
+//! segment  := kind `I`: number of blocks, per column two f32 (low and high end of all its blocks), per block: length in bytes, rows,
+//!             first tick after the last block's last, span, per column two bytes (low and high in 255ths between the ends, outwards)
+//! footer   := kind `F`: number of segments, per segment: bytes of its blocks, its own bytes, rows, least and largest tick
+//!             then behind the checksum: length of the footer (4 bytes, little-endian), "fEnd"
+//! ```
+//!
+//! A segment follows its blocks, every 1024 blocks and at the end; so a recorder holds no more than that many entries. An entry without
+//! rows stands for damaged bytes that `resume` left in place.
+
+use crate::block::Cells;
+use crate::error::Damage;
+use crate::header::Header;
+use crate::wire::{Bytes, CHECK_BYTES, checksum, push_varint, zigzag};
+
+/// Blocks of one segment.
+pub(crate) const BLOCKS_PER_SEGMENT: usize = 1024;
+pub(crate) const SEGMENT: u8 = b'I';
+pub(crate) const FOOTER: u8 = b'F';
+/// The last bytes of a finished recording.
+pub(crate) const END: [u8; 4] = *b"fEnd";
+/// Bytes behind the footer's checksum.
+pub(crate) const TRAILER_BYTES: usize = 8;
+/// No footer is longer.
+const MAX_FOOTER: usize = 1 << 22;
+
+/// One block in the index.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Entry {
+    /// Bytes of the whole block.
+    pub(crate) length: u64,
+    /// 0 for damaged bytes.
+    pub(crate) rows: u64,
+    pub(crate) ticks: (i64, i64),
+    /// Least and largest finite value of each column, or something beyond them; `None` without any.
+    pub(crate) ends: Vec<Option<(f64, f64)>>,
+}
+
+impl Entry {
+    pub(crate) fn damaged(length: u64, columns: usize) -> Self {
+        Self {
+            length,
+            rows: 0,
+            ticks: (0, 0),
+            ends: vec![None; columns],
+        }
+    }
+
+    pub(crate) fn of(length: u64, ticks: &[i64], columns: &[Cells]) -> Self {
+        let ends = columns.iter().map(|cells| {
+            let finite = cells.iter().flatten().filter(|value| value.is_finite());
+            finite.fold(None, |ends, value| {
+                let (low, high) = ends.unwrap_or((*value, *value));
+                Some((value.min(low), value.max(high)))
+            })
+        });
+        let ticks = ticks
+            .iter()
+            .fold((i64::MAX, i64::MIN), |(l, h), tick| (l.min(*tick), h.max(*tick)));
+        Self {
+            length,
+            rows: columns.first().map_or(0, |cells| cells.len() as u64),
+            ticks,
+            ends: ends.collect(),
+        }
+    }
+}
+
+/// One segment in the footer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Segment {
+    /// Where its first block begins.
+    pub(crate) start: u64,
+    /// Bytes of its blocks, behind which it stands itself.
+    pub(crate) blocks: u64,
+    /// Its own bytes.
+    pub(crate) length: u64,
+    pub(crate) rows: u64,
+    pub(crate) ticks: (i64, i64),
+}
+
+impl Segment {
+    pub(crate) fn new(start: u64, length: u64, entries: &[Entry]) -> Self {
+        let filled = || entries.iter().filter(|entry| entry.rows > 0);
+        Self {
+            start,
+            blocks: entries.iter().map(|entry| entry.length).sum(),
+            length,
+            rows: entries.iter().map(|entry| entry.rows).sum(),
+            ticks: (
+                filled().map(|entry| entry.ticks.0).min().unwrap_or(0),
+                filled().map(|entry| entry.ticks.1).max().unwrap_or(0),
+            ),
+        }
+    }
+
+    /// Where the next segment's blocks begin.
+    pub(crate) fn end(&self) -> u64 {
+        self.start.saturating_add(self.blocks).saturating_add(self.length)
+    }
+}
+
+/// A special record: kind and content between mark and checksum.
+pub(crate) fn special(check: u32, kind: u8, content: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0, kind];
+    push_varint(&mut bytes, content.len() as u64);
+    bytes.extend_from_slice(content);
+    let sum = checksum(&[&check.to_le_bytes(), &bytes]);
+    bytes.extend(sum.to_le_bytes());
+    bytes
+}
+
+/// The longest content of a special record of a recording.
+fn max_content(kind: u8, columns: usize) -> usize {
+    match kind {
+        SEGMENT => 16 + 8 * columns + BLOCKS_PER_SEGMENT * (40 + 2 * columns),
+        FOOTER => MAX_FOOTER,
+        _ => 0,
+    }
+}
+
+/// Kind, content and whole length of the special record at the front, which begins with 0.
+pub(crate) fn read_special<'a>(header: &Header, bytes: &'a [u8]) -> Result<(u8, &'a [u8], usize), Damage> {
+    let mut reader = Bytes(bytes);
+    if reader.byte()? != 0 {
+        return Err(Damage::NoBlock);
+    }
+    let kind = reader.byte()?;
+    let length = reader.varint().map_err(|damage| match damage {
+        Damage::CutOff => damage,
+        _ => Damage::NoBlock,
+    })?;
+    if length > max_content(kind, header.schema.columns.len()) as u64 {
+        return Err(Damage::NoBlock);
+    }
+    let content = reader.take(length as usize)?;
+    let end = bytes.len() - reader.0.len();
+    let sum = u32::from_le_bytes(reader.array::<CHECK_BYTES>()?);
+    if sum != checksum(&[&header.check.to_le_bytes(), &bytes[..end]]) {
+        return Err(Damage::Checksum);
+    }
+    Ok((kind, content, end + CHECK_BYTES))
+}
+
+/// The nearest `f32` that is not above.
+fn f32_below(value: f64) -> f32 {
+    let near = value as f32;
+    if f64::from(near) > value {
+        near.next_down()
+    } else {
+        near
+    }
+}
+
+fn f32_above(value: f64) -> f32 {
+    -f32_below(-value)
+}
+
+/// Levels between a column's ends.
+const LEVELS: f64 = 255.0;
+
+/// A value between two ends, in 255ths, rounded down; `ends` may be infinite.
+fn level_below(value: f64, ends: (f64, f64)) -> u8 {
+    let share = (value - ends.0) / (ends.1 - ends.0);
+    let level = (LEVELS * share).floor().clamp(0.0, LEVELS) as u8;
+    // Rounding may put the level's value above.
+    if level > 0 && level_value(level, ends) > value {
+        level - 1
+    } else {
+        level
+    }
+}
+
+fn level_above(value: f64, ends: (f64, f64)) -> u8 {
+    let level = level_below(value, ends);
+    if level_value(level, ends) < value {
+        level.saturating_add(1)
+    } else {
+        level
+    }
+}
+
+fn level_value(level: u8, ends: (f64, f64)) -> f64 {
+    match level {
+        0 => ends.0,
+        u8::MAX => ends.1,
+        // Ends beyond the numbers of 32 bits are infinite: nothing lies between them.
+        _ if !(ends.1 - ends.0).is_finite() => ends.1,
+        level => ends.0 + (ends.1 - ends.0) * (f64::from(level) / LEVELS),
+    }
+}
+
+/// The content of a segment.
+pub(crate) fn push_segment(entries: &[Entry], columns: usize) -> Vec<u8> {
+    let mut content = Vec::new();
+    push_varint(&mut content, entries.len() as u64);
+    let mut scales = Vec::with_capacity(columns);
+    for column in 0..columns {
+        let ends = entries.iter().filter_map(|entry| entry.ends[column]);
+        let all = ends.reduce(|(l, h), (low, high)| (l.min(low), h.max(high)));
+        // Without values the low end is above the high one.
+        let (low, high) = all.map_or((1.0, 0.0), |(low, high)| (f32_below(low), f32_above(high)));
+        content.extend(low.to_le_bytes());
+        content.extend(high.to_le_bytes());
+        scales.push((f64::from(low), f64::from(high)));
+    }
+    let mut last = 0_i64;
+    for entry in entries {
+        push_varint(&mut content, entry.length);
+        push_varint(&mut content, entry.rows);
+        if entry.rows == 0 {
+            continue;
+        }
+        push_varint(&mut content, zigzag(entry.ticks.0.wrapping_sub(last)));
+        push_varint(&mut content, entry.ticks.1.wrapping_sub(entry.ticks.0) as u64);
+        last = entry.ticks.1;
+        for (ends, scale) in entry.ends.iter().zip(&scales) {
+            let levels = ends.map_or([1, 0], |(low, high)| [level_below(low, *scale), level_above(high, *scale)]);
+            content.extend(levels);
+        }
+    }
+    content
+}
+
+/// Reads what [`push_segment`] wrote.
+pub(crate) fn read_segment(content: &[u8], columns: usize) -> Result<Vec<Entry>, Damage> {
+    let mut reader = Bytes(content);
+    let count = reader.count(BLOCKS_PER_SEGMENT, "number of blocks")?;
+    let mut scales = Vec::with_capacity(columns);
+    for _ in 0..columns {
+        let low = f64::from(f32::from_le_bytes(reader.array()?));
+        let high = f64::from(f32::from_le_bytes(reader.array()?));
+        scales.push((low, high));
+    }
+    let (mut entries, mut last) = (Vec::with_capacity(count), 0_i64);
+    for _ in 0..count {
+        let mut entry = Entry::damaged(reader.varint()?, columns);
+        entry.rows = reader.varint()?;
+        if entry.rows > 0 {
+            let first = last.wrapping_add(reader.signed()?);
+            entry.ticks = (first, first.wrapping_add(reader.varint()? as i64));
+            last = entry.ticks.1;
+            for (ends, scale) in entry.ends.iter_mut().zip(&scales) {
+                let [low, high] = reader.array()?;
+                *ends = (low <= high).then(|| (level_value(low, *scale), level_value(high, *scale)));
+            }
+        }
+        entries.push(entry);
+    }
+    reader.finish()?;
+    Ok(entries)
+}
+
+/// The footer with its trailer.
+pub(crate) fn push_footer(check: u32, segments: &[Segment]) -> Vec<u8> {
+    let mut content = Vec::new();
+    push_varint(&mut content, segments.len() as u64);
+    for segment in segments {
+        push_varint(&mut content, segment.blocks);
+        push_varint(&mut content, segment.length);
+        push_varint(&mut content, segment.rows);
+        push_varint(&mut content, zigzag(segment.ticks.0));
+        push_varint(&mut content, segment.ticks.1.wrapping_sub(segment.ticks.0) as u64);
+    }
+    let mut bytes = special(check, FOOTER, &content);
+    let length = bytes.len() as u32;
+    bytes.extend(length.to_le_bytes());
+    bytes.extend(END);
+    bytes
+}
+
+/// Reads what [`push_footer`] wrote; the first block begins at `start`.
+pub(crate) fn read_footer(content: &[u8], start: u64) -> Result<Vec<Segment>, Damage> {
+    let mut reader = Bytes(content);
+    let count = reader.count(content.len(), "number of segments")?;
+    let (mut segments, mut start) = (Vec::new(), start);
+    for _ in 0..count {
+        let (blocks, length, rows) = (reader.varint()?, reader.varint()?, reader.varint()?);
+        let first = reader.signed()?;
+        let segment = Segment {
+            start,
+            blocks,
+            length,
+            rows,
+            ticks: (first, first.wrapping_add(reader.varint()? as i64)),
+        };
+        start = segment.end();
+        segments.push(segment);
+    }
+    reader.finish()?;
+    Ok(segments)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn ends_are_outside_the_values() {
+        let values = [(-3.7, 12.25), (0.1, 0.3), (1e-9, 1e300), (-1e308, 1.6e308), (5.0, 5.0)];
+        let entries: Vec<Entry> = values
+            .iter()
+            .map(|ends| Entry {
+                length: 9,
+                rows: 4,
+                ticks: (-5, 7),
+                ends: vec![Some(*ends), None, Some((0.3, 0.3))],
+            })
+            .collect();
+        let read = read_segment(&push_segment(&entries, 3), 3).unwrap();
+        for (entry, (low, high)) in read.iter().zip(values) {
+            let (l, h) = entry.ends[0].unwrap();
+            assert!(l <= low && h >= high, "{l} {low} {high} {h}");
+            let (l, h) = entry.ends[2].unwrap();
+            assert!(l <= 0.3 && h >= 0.3 && h - l < 1e-6);
+            assert_eq!((entry.ends[1], entry.ticks), (None, (-5, 7)));
+        }
+    }
+}

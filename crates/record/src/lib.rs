@@ -1,0 +1,79 @@
+//! Recordings of many columns, each within a bound that it states, in blocks that are read alone.
+//!
+//! ```
+//! use fewbits_record::{Bound, Column, Playback, Recorder, Schema, TimeBase};
+//! use std::io::Cursor;
+//!
+//! let columns = vec![
+//!     Column::new("temp", Bound::Absolute(0.1))?.with_unit("degC")?,
+//!     Column::new("flow", Bound::ShareOfRange(0.01))?,
+//!     Column::new("count", Bound::Lossless)?,
+//! ];
+//! let mut recorder = Recorder::new(Vec::new(), Schema::new(columns, TimeBase::Numbered)?);
+//! for i in 0..2000 {
+//!     let angle = 0.01 * f64::from(i);
+//!     let flow = (i % 100 != 17).then(|| 40.0 + 9.0 * angle.cos()); // now and then a gap
+//!     recorder.push_next(&[Some(20.0 + angle.sin()), flow, Some(f64::from(i / 7))])?;
+//! }
+//! let bytes = recorder.finish()?;
+//! assert!(bytes.len() < 2000 * 24 / 20);
+//!
+//! let mut playback = Playback::new(Cursor::new(bytes))?;
+//! for row in playback.columns(&["count", "temp"])?.range(1000, 1099) {
+//!     let row = row?;
+//!     let i = row.tick as f64;
+//!     assert_eq!(row.values[0], Some((i / 7.0).floor()));
+//!     assert!(row.values[1].is_some_and(|temp| (temp - 20.0 - (0.01 * i).sin()).abs() <= 0.1));
+//! }
+//! # Ok::<(), fewbits_record::Error>(())
+//! ```
+//!
+//! The central choice: **a block is a frame.** A block holds rows, 512 of them unless another number is chosen, needs nothing but
+//! the header to be decoded, and carries a checksum that covers the header's too. So a file that was cut off, flipped bits, blocks
+//! of another recording and lost frames on a link are one case: what cannot be read is an error of its own, everything else is
+//! read. The cost is that each block learns the signal anew.
+//!
+//! The second choice: **the promise is checked, not trusted.** The recorder decodes every block that it writes and compares each
+//! sample with its restored value in exact arithmetic ([`is_within`]). A sample whose restored value is too far off is stored as it
+//! is. So the bound holds for huge and tiny numbers too, whatever a codec does.
+//!
+//! | part | where |
+//! |---|---|
+//! | columns, promises, time | [`Schema`], [`Column`], [`Bound`], [`TimeBase`] |
+//! | writing | [`Recorder`] |
+//! | reading at any place | [`Playback`] |
+//! | reading from front to end, from a pipe | [`BlockReader`] |
+//! | frames on a link that loses some | [`FrameWriter`], [`FrameReader`] |
+//!
+//! Not here: how values are predicted and coded (`fewbits-adaptive`), text formats and the command line (`fewbits-cli`). The format
+//! is described byte by byte in `docs/record.md`.
+
+mod block;
+mod bound;
+mod codec;
+mod error;
+mod frames;
+mod header;
+mod index;
+mod playback;
+mod recorder;
+mod resume;
+mod runs;
+mod scan;
+mod schema;
+mod time;
+mod wire;
+
+pub use block::{Block, Cells};
+pub use bound::{Bound, MAX_DECIMALS, is_within, is_within_on_circle};
+pub use error::{Damage, Error};
+pub use frames::{FrameReader, FrameWriter, MIN_FRAME_BYTES};
+pub use playback::{BlockInfo, Blocks, Playback, Row, Rows};
+pub use recorder::Recorder;
+pub use scan::BlockReader;
+pub use schema::{Column, MAX_CELLS, ROWS_PER_BLOCK, Schema, TimeBase, TimeFormat};
+
+/// The programs of the page, kept running.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/record.md")]
+mod page {}

@@ -1,0 +1,206 @@
+//! The ticks of a block's rows.
+//!
+//! | kind | stored | ticks |
+//! |---|---|---|
+//! | 0 grid | block number `b` | `origin + step (rows_per_block b + i)`, origin and step from the header |
+//! | 1 even | start, span | `start + round(i span / (n - 1))` |
+//! | 2 coded | start, mean step, scale, numbers `k_i` | `start + i step + scale k_i` |
+//! | 3 raw | 64 bits each | as they are |
+//!
+//! The first kind that is within the tolerance is taken. All arithmetic is exact in 128 bits.
+
+use crate::bound::Promise;
+use crate::codec::greatest_common_divisor;
+use crate::codec::{self, CodecId, Target};
+use crate::error::Damage;
+use crate::wire::{Bytes, push_varint, zigzag};
+
+/// How the ticks of a block are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TimeKind {
+    Grid = 0,
+    Even = 1,
+    Coded = 2,
+    Raw = 3,
+}
+
+impl TimeKind {
+    pub(crate) fn from_bits(bits: u64) -> Self {
+        match bits & 3 {
+            0 => Self::Grid,
+            1 => Self::Even,
+            2 => Self::Coded,
+            _ => Self::Raw,
+        }
+    }
+}
+
+/// Where rows are expected: every `step` ticks from `origin` on; no grid if `step` is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Grid {
+    pub(crate) origin: i64,
+    pub(crate) step: i64,
+    pub(crate) rows_per_block: usize,
+    pub(crate) tolerance: u64,
+}
+
+/// Block numbers are smaller, so that a varint with one more bit holds them.
+const MAX_BLOCK: i128 = 1 << 60;
+
+const INTEGERS: Target = Target {
+    promise: Promise::Exact,
+    period: None,
+};
+
+impl Grid {
+    /// The grid that the first rows suggest.
+    pub(crate) fn of(ticks: &[i64], rows_per_block: usize, tolerance: u64) -> Self {
+        let even = even(ticks, tolerance).filter(|_| ticks.len() > 1);
+        let step = even.and_then(|(_, span)| {
+            let steps = ticks.len() as i64 - 1;
+            let step = (i128::from(span) + i128::from(steps) / 2).div_euclid(i128::from(steps));
+            i64::try_from(step).ok()
+        });
+        Self {
+            origin: ticks.first().copied().unwrap_or(0),
+            step: step.unwrap_or(0),
+            rows_per_block,
+            tolerance,
+        }
+    }
+
+    fn tick(&self, block: u64, row: usize) -> Option<i64> {
+        let rows = i128::from(block) * self.rows_per_block as i128 + row as i128;
+        i64::try_from(i128::from(self.origin) + i128::from(self.step) * rows).ok()
+    }
+
+    /// The block number, if the rows are where the grid has them.
+    fn block(&self, ticks: &[i64]) -> Option<u64> {
+        let first = i128::from(*ticks.first()?) - i128::from(self.origin);
+        let size = i128::from(self.step) * self.rows_per_block as i128;
+        if size == 0 {
+            return None;
+        }
+        let block = (first + size.abs() / 2 * size.signum()).div_euclid(size);
+        let block = u64::try_from(block).ok().filter(|b| i128::from(*b) < MAX_BLOCK)?;
+        let fits = |(row, tick): (usize, &i64)| {
+            self.tick(block, row)
+                .is_some_and(|on_grid| on_grid.abs_diff(*tick) <= self.tolerance)
+        };
+        ticks.iter().enumerate().all(fits).then_some(block)
+    }
+}
+
+fn even_tick(start: i64, span: i64, row: usize, rows: usize) -> Option<i64> {
+    let steps = (rows as i128 - 1).max(1);
+    let ahead = (2 * i128::from(span) * row as i128 + steps).div_euclid(2 * steps);
+    i64::try_from(i128::from(start) + ahead).ok()
+}
+
+/// Start and span of evenly spaced ticks.
+fn even(ticks: &[i64], tolerance: u64) -> Option<(i64, i64)> {
+    let (first, last) = (*ticks.first()?, *ticks.last()?);
+    let span = last.checked_sub(first)?;
+    let fits = |(row, tick): (usize, &i64)| {
+        even_tick(first, span, row, ticks.len()).is_some_and(|even| even.abs_diff(*tick) <= tolerance)
+    };
+    ticks.iter().enumerate().all(fits).then_some((first, span))
+}
+
+/// The stored form of at least one tick: its kind and what follows it.
+pub(crate) fn encode(ticks: &[i64], grid: &Grid) -> (TimeKind, Vec<u8>) {
+    let mut bytes = Vec::new();
+    if let Some(block) = grid.block(ticks) {
+        push_varint(&mut bytes, block);
+        return (TimeKind::Grid, bytes);
+    }
+    if let Some((start, span)) = even(ticks, grid.tolerance) {
+        push_varint(&mut bytes, zigzag(start.wrapping_sub(grid.origin)));
+        push_varint(&mut bytes, zigzag(span));
+        return (TimeKind::Even, bytes);
+    }
+    if let Some(bytes) = coded(ticks, grid) {
+        return (TimeKind::Coded, bytes);
+    }
+    bytes.extend(ticks.iter().flat_map(|tick| tick.to_le_bytes()));
+    (TimeKind::Raw, bytes)
+}
+
+fn coded(ticks: &[i64], grid: &Grid) -> Option<Vec<u8>> {
+    let (start, last) = (*ticks.first()?, *ticks.last()?);
+    let steps = ticks.len() as i128 - 1;
+    // Exact times share a divisor; others may move by the tolerance either way.
+    let scale = match grid.tolerance {
+        0 => ticks
+            .iter()
+            .fold(0, |d, tick| greatest_common_divisor(d, tick.abs_diff(start)))
+            .max(1),
+        tolerance => 2 * tolerance + 1,
+    };
+    let unit = if grid.tolerance == 0 { i128::from(scale) } else { 1 };
+    let mean = (i128::from(last) - i128::from(start)) / (steps.max(1) * unit) * unit;
+    let numbers = ticks.iter().enumerate().map(|(row, tick)| {
+        let rest = i128::from(*tick) - i128::from(start) - mean * row as i128;
+        let scale = i128::from(scale);
+        let number = (2 * rest + scale).div_euclid(2 * scale);
+        (number.abs() < 1 << 52).then_some(number as f64)
+    });
+    let numbers: Vec<f64> = numbers.collect::<Option<_>>()?;
+    let coded = codec::encode(&numbers, &INTEGERS);
+    if coded.broken > 0 || coded.bytes.len() >= 8 * ticks.len() {
+        return None;
+    }
+    let mut bytes = Vec::new();
+    push_varint(&mut bytes, zigzag(start.wrapping_sub(grid.origin)));
+    push_varint(&mut bytes, zigzag(i64::try_from(mean).ok()?));
+    push_varint(&mut bytes, scale);
+    bytes.push(coded.id as u8);
+    push_varint(&mut bytes, coded.bytes.len() as u64);
+    bytes.extend(coded.bytes);
+    Some(bytes)
+}
+
+/// Reads what [`encode`] wrote of `rows` ticks.
+pub(crate) fn decode(kind: TimeKind, bytes: &mut Bytes<'_>, rows: usize, grid: &Grid) -> Result<Vec<i64>, Damage> {
+    let beyond = Damage::Content("ticks");
+    match kind {
+        TimeKind::Grid => {
+            let block = bytes.varint()?;
+            (0..rows).map(|row| grid.tick(block, row).ok_or(beyond)).collect()
+        }
+        TimeKind::Even => {
+            let start = grid.origin.wrapping_add(bytes.signed()?);
+            let span = bytes.signed()?;
+            (0..rows)
+                .map(|row| even_tick(start, span, row, rows).ok_or(beyond))
+                .collect()
+        }
+        TimeKind::Coded => {
+            let start = i128::from(grid.origin.wrapping_add(bytes.signed()?));
+            let mean = i128::from(bytes.signed()?);
+            let scale = i128::from(bytes.varint()?);
+            let id = CodecId::from_byte(bytes.byte()?)?;
+            let length = bytes.count(bytes.0.len(), "length of ticks")?;
+            let numbers = codec::decode(id, bytes.take(length)?, rows, &INTEGERS)?;
+            let tick = |(row, number): (usize, f64)| {
+                // Whole numbers below 2^63, by saturation; the product stays below 2^127.
+                let ahead = (scale * i128::from(number as i64)).checked_add(mean * row as i128)?;
+                i64::try_from(start.checked_add(ahead)?).ok()
+            };
+            numbers
+                .into_iter()
+                .enumerate()
+                .map(|pair| tick(pair).ok_or(beyond))
+                .collect()
+        }
+        TimeKind::Raw => {
+            let all = bytes.take(rows.checked_mul(8).ok_or(beyond)?)?;
+            Ok(all
+                .as_chunks::<8>()
+                .0
+                .iter()
+                .map(|chunk| i64::from_le_bytes(*chunk))
+                .collect())
+        }
+    }
+}
