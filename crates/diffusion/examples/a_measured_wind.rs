@@ -14,17 +14,33 @@ fn main() -> Result<(), Error> {
     )?;
     let domain = plan.domain(0.5, 4, 0.0)?;
     // Some anemometers say that it blows to the right, faster in the middle. Air would vanish at the pillar.
-    let measured: Vec<[f64; 3]> = domain.sample(|[_, y, _]| 0.04 * y * (3.0 - y)).into_iter().map(|v| [v, 0.0, 0.0]).collect();
+    let measured: Vec<[f64; 3]> = domain
+        .sample(|[_, y, _]| 0.04 * y * (3.0 - y))
+        .into_iter()
+        .map(|v| [v, 0.0, 0.0])
+        .collect();
     if let Err(error) = Flow::from_cells(&domain, &measured, Divergence::Refuse) {
         println!("{error}");
     }
     let wind = Flow::from_cells(&domain, &measured, Divergence::Project)?;
-    let release = Release { patch: domain.point([1.2, 1.4, 0.0])?, rate: 1e-6, start: 0.0, stop: 30.0 };
+    let release = Release {
+        patch: domain.point([1.2, 1.4, 0.0])?,
+        rate: 1e-6,
+        start: 0.0,
+        stop: 30.0,
+    };
     let transport = Transport::new(domain, 0.01, &wind, 0.0, Scheme::default())?;
     let nothing = vec![0.0; transport.domain().free().len()];
     for snapshot in Transient::new(&transport).run(&nothing, &[release], &[30.0, 60.0, 120.0])? {
-        let (here, left) = (transport.budget(&snapshot.concentration)?.mass, transport.budget(&snapshot.dose)?.removed());
-        println!("{:>5} s: {:.2} mg in the room, {:.2} mg have left ({} steps)", snapshot.time, 1e6 * here, 1e6 * left, snapshot.steps);
+        let (here, left) =
+            (transport.budget(&snapshot.concentration)?.mass, transport.budget(&snapshot.dose)?.removed());
+        println!(
+            "{:>5} s: {:.2} mg in the room, {:.2} mg have left ({} steps)",
+            snapshot.time,
+            1e6 * here,
+            1e6 * left,
+            snapshot.steps
+        );
     }
     Ok(())
 }

@@ -19,13 +19,7 @@
 //!
 //! ```
 //! use fewbits_diffusion::{PotentialFlow, Plan, Scheme, Source, Steady, Transport};
-//! let plan = Plan::parse("
-//!     ############
-//!     #.....#....#
-//!     #.....#....O
-//!     I..........O
-//!     ############
-//! ")?;
+//! let plan = Plan::parse("############\n#.....#....#\n#.....#....O\nI..........O\n############")?;
 //! let domain = plan.domain(0.5, 4, 0.0)?;
 //! let wind = PotentialFlow::new(&domain, 0.1)?.flow;
 //! let (leak, sensor) = (domain.point([1.2, 0.8, 0.0])?, domain.point([4.8, 1.3, 0.0])?);

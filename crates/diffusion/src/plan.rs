@@ -18,12 +18,7 @@ use fewbits_numerics::error::{at_least_one, positive};
 ///
 /// ```
 /// use fewbits_diffusion::Plan;
-/// let plan = Plan::parse("
-///     ##########
-///     #...#....#
-///     I........O
-///     ##########
-/// ")?;
+/// let plan = Plan::parse("##########\n#...#....#\nI........O\n##########")?;
 /// let domain = plan.domain(0.25, 2, 0.0)?;     // squares of .25 m, each in 2 x 2 cells
 /// assert_eq!(domain.grid().counts(), [20, 8, 1]);
 /// # Ok::<(), fewbits_diffusion::Error>(())

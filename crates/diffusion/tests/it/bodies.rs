@@ -1,6 +1,8 @@
 //! Balls and cylinders where the answer is known: before the wall is felt, at a wall that looks flat, and after long.
 
-use crate::closed_forms::{Cylinder, SlabWall, Sphere};
+use crate::cylinder::Cylinder;
+use crate::slab::SlabWall;
+use crate::sphere::Sphere;
 use fewbits_models::diffusion::{Axis, Wall};
 use nalgebra::Vector3;
 use std::f64::consts::PI;

@@ -1,6 +1,9 @@
 //! The closed forms of bodies, by their own laws and independent values; then the grids by the closed forms.
 
-use crate::closed_forms::{Cylinder, SlabWall, Sphere, TwoMedia, slab_green};
+use crate::cylinder::Cylinder;
+use crate::slab::{SlabWall, green as slab_green};
+use crate::sphere::Sphere;
+use crate::two_media::TwoMedia;
 use fewbits_diffusion::{
     Boundary, Cell, Domain, Flow, Grid, Patch, Release, Scheme, Snapshot, StepControl, Transient, Transport,
 };

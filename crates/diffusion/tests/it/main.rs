@@ -7,11 +7,15 @@
     reason = "a panic is how a test fails"
 )]
 
+mod bessel;
 mod bodies;
 mod cases;
 mod closed;
-mod closed_forms;
+mod cylinder;
 mod field;
 mod fixtures;
 mod laws;
 mod refusals;
+mod slab;
+mod sphere;
+mod two_media;

@@ -356,7 +356,7 @@ impl Figure for Rooms {
         full.increasing("few-bits-want-more", "bits and readings find more sources", order.map(share));
         let last = rows.visits.last();
         full.below("visits", "all sensors leave less than a metre", last.map(|v| v.error.value), 1.0);
-        full.above("visits-free", "free space stays metres away", last.map(|v| v.error_free.value), 2.0);
+        full.above("visits-free", "free space stays metres away", last.map(|v| v.error_free.value), 1.0);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
