@@ -333,7 +333,7 @@ pub fn track(recording: &Recording, travel: Travel) -> Result<Track, Failure> {
             observed: Observed::new(sensor, factor),
             log_outlier,
         };
-        let updated = filter.update(&prediction, &observed, &mut workspace)?.0;
+        let updated = filter.update(&prediction, [0, 1, 2], &observed, &mut workspace)?.0;
         let mean = updated.mean();
         track.estimates.push((*t, Vector2::new(mean[0], mean[1]), mean[2]));
         belief = Some(updated);

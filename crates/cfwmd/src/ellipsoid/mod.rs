@@ -3,7 +3,6 @@
 mod inside;
 mod quadrature;
 
-pub(crate) use inside::symmetric_eigen;
 pub use inside::{EllipsoidMoments, GaussianInEllipsoid};
 
 use fewbits_numerics::ArgumentError;
