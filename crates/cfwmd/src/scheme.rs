@@ -4,8 +4,8 @@ use crate::Error;
 use crate::censored::{Censored, as_core};
 use crate::rule::CensoringRule;
 use fewbits_core::{
-    BitReader, BitWriter, CodecError, Gaussian, LinearSensing, Link, MeasurementNoise, Message, NumberFormat, Observation, Scheme,
-    Sensing,
+    BitReader, BitWriter, CodecError, Gaussian, LinearSensing, Link, MeasurementNoise, Message, NumberFormat,
+    Observation, Scheme, Sensing,
 };
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};

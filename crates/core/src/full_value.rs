@@ -94,7 +94,7 @@ impl Scheme<1> for FullValue {
         measurement: &Vector1<f64>,
         (): &(),
     ) -> Result<Option<f64>, Error> {
-        Ok(Some(finite("measurement", measurement[0])?))
+        Ok(Some(self.format.rounded(finite("measurement", measurement[0])?)?))
     }
 
     fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {

@@ -3,7 +3,9 @@
 use crate::Error;
 use crate::sign_bit::missing_probability;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
-use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Link, MeasurementNoise, Message, NumberFormat, Observation, Scheme};
+use fewbits_core::{
+    BitReader, BitWriter, Cell, CodecError, Link, MeasurementNoise, Message, NumberFormat, Observation, Scheme,
+};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::stored;
 use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};

@@ -227,7 +227,10 @@ struct OnPlane<'a, const D: usize, const K: usize> {
 impl<const D: usize, const K: usize> Likelihood<K> for OnPlane<'_, D, K> {
     fn log_likelihood(&self, place: &SVector<f64, K>) -> f64 {
         let mut state = self.state;
-        self.axes.iter().zip(place.iter()).for_each(|(axis, x)| state[*axis] = *x);
+        self.axes
+            .iter()
+            .zip(place.iter())
+            .for_each(|(axis, x)| state[*axis] = *x);
         self.observed.iter().map(|one| one.log_likelihood(&state)).sum()
     }
 
@@ -242,7 +245,9 @@ impl<const D: usize, const K: usize> Likelihood<K> for OnPlane<'_, D, K> {
                 None => &constant[d][..count],
             };
             let states: Columns<'_, D> = std::array::from_fn(column);
-            self.observed.iter().for_each(|one| one.add_log_likelihoods(states, logs));
+            self.observed
+                .iter()
+                .for_each(|one| one.add_log_likelihoods(states, logs));
         }
     }
 }

@@ -171,7 +171,11 @@ impl<const D: usize> Evolution<D> for ContinuousLinear<D> {
         // The norm that bounds powers: the largest sum of a column.
         let norm = (0..D).map(|j| self.drift.column(j).abs().sum()).fold(0.0, f64::max) * seconds;
         finite("seconds", norm)?;
-        let doublings = if norm > 0.5 { (2.0 * norm).log2().ceil() as u32 } else { 0 };
+        let doublings = if norm > 0.5 {
+            (2.0 * norm).log2().ceil() as u32
+        } else {
+            0
+        };
         let h = seconds * 0.5_f64.powi(doublings as i32);
 
         let (mut transition, mut offset, mut noise) = (identity, SVector::zeros(), SMatrix::zeros());
@@ -266,7 +270,8 @@ impl<const D: usize> Dynamics<D> for AffineGaussian<D> {
             .unwrap_or_else(|_| SMatrix::from_diagonal(&self.noise_covariance.diagonal().map(|v| v.max(0.0).sqrt())));
         for i in 0..fewbits_core::columns::count(&states) {
             let state = SVector::<f64, D>::from_fn(|d, _| states[d][i]);
-            let normals = SVector::<f64, D>::from_fn(|_, _| rand_distr::Distribution::sample(&rand_distr::StandardNormal, rng));
+            let normals =
+                SVector::<f64, D>::from_fn(|_, _| rand_distr::Distribution::sample(&rand_distr::StandardNormal, rng));
             let moved = self.mean(&state) + factor * normals;
             fewbits_core::columns::set_state(&mut states, i, &moved);
         }
@@ -320,7 +325,10 @@ mod tests {
     #[test]
     fn constant_velocity_has_its_closed_form() {
         for t in [1e-6, 0.5, 1e4] {
-            let step = ContinuousLinear::nearly_constant_velocity(0.3).unwrap().over(t).unwrap();
+            let step = ContinuousLinear::nearly_constant_velocity(0.3)
+                .unwrap()
+                .over(t)
+                .unwrap();
             let expected = Matrix2::new(t * t * t / 3.0, t * t / 2.0, t * t / 2.0, t) * 0.3;
             assert!(step.noise_covariance().component_div(&expected).add_scalar(-1.0).amax() < 1e-13);
             assert_eq!(step.transition()[(0, 1)], t);
@@ -329,14 +337,20 @@ mod tests {
 
     #[test]
     fn forgotten_velocity_has_its_stationary_speed() {
-        let step = ContinuousLinear::forgotten_velocity_2d(0.8, 6.0).unwrap().over(1e5).unwrap();
+        let step = ContinuousLinear::forgotten_velocity_2d(0.8, 6.0)
+            .unwrap()
+            .over(1e5)
+            .unwrap();
         assert!((step.noise_covariance()[(1, 1)] - 0.64).abs() < 1e-12);
         assert!(step.transition()[(1, 1)].abs() < 1e-300 && (step.transition()[(0, 1)] - 6.0).abs() < 1e-12);
     }
 
     #[test]
     fn draws_have_mean_and_covariance() {
-        let step = ContinuousLinear::forgotten_velocity_2d(0.8, 6.0).unwrap().over(2.0).unwrap();
+        let step = ContinuousLinear::forgotten_velocity_2d(0.8, 6.0)
+            .unwrap()
+            .over(2.0)
+            .unwrap();
         let mut rng = <rand_pcg::Pcg64Mcg as rand::SeedableRng>::seed_from_u64(3);
         dynamics::draws_have_the_law(&step, &mut rng, &Vector4::new(1.0, -2.0, 3.0, 0.5), 4000).unwrap();
     }

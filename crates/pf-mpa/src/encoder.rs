@@ -6,7 +6,8 @@ use crate::factor::RangeFactor;
 use crate::sensor::RangeNoise;
 use crate::target::Target;
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation, Scheme, Sensing,
+    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
+    Scheme, Sensing,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal;

@@ -32,7 +32,9 @@ impl Tracker for GridFilter {
     ) -> Result<StepInfo, Error> {
         use fewbits_filters::Error::Unresolved;
         let predicted = target.predict(belief, k, Manoeuvres::AsNoise);
-        let updated = self.update(&predicted, [0, 1], observed, workspace).map_err(Error::from);
+        let updated = self
+            .update(&predicted, [0, 1], observed, workspace)
+            .map_err(Error::from);
         let ((next, log_likelihood), fallbacks) = match updated {
             Ok((next, info)) => ((next, info.log_likelihood), 0),
             Err(Error::Core(fewbits_core::Error::Impossible) | Error::Filter(Unresolved { .. })) => {

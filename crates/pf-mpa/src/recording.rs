@@ -11,16 +11,17 @@
 //! lost         the centre's own test, or `silence` seconds without a range: acquisition again
 //! ```
 
+use crate::Error;
 use crate::encoder::{QuantizedRange, RangeReference, optimal_loading};
 use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
-use crate::Error;
 use fewbits_core::factor::Robust;
 use fewbits_core::{
-    Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation, OnAxes, Observed, Scheme, SchemeNode, SensorNode,
+    Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation, Observed, OnAxes, Scheme, SchemeNode,
+    SensorNode,
 };
-use fewbits_filters::centre::{Event, FusionCentre, NoiseLearning, Reporting, Slot};
+use fewbits_filters::centre::{Event, FalseAlarms, FusionCentre, NoiseLearning, Reporting, Slot};
 use fewbits_filters::{GridFilter, GridWorkspace, MomentFilter, NoiseBank};
 use fewbits_models::ContinuousLinear;
 use fewbits_numerics::error::{finite, positive, within};
@@ -35,6 +36,10 @@ const AXES: [usize; 3] = [0, 2, 4];
 const SPEEDS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 /// How often the speed of the bank may change, per range.
 const SWITCHING: f64 = 0.01;
+/// Losses that are found where there are none, per range. A lost track of one bit shows slowly, in its residuals only, so that the rate is
+/// higher; errors of real ranges are alike for seconds, which a low rate forgives.
+const ONE_BIT_ALARMS: f64 = 3e-3;
+const ALARMS: f64 = 1e-6;
 /// Bits of a range in full.
 const FULL_BITS: usize = 32;
 
@@ -63,7 +68,7 @@ impl Default for RangeSettings {
     /// Radios of a metre's error on something that walks or drives slowly.
     fn default() -> Self {
         Self {
-            noise: 1.5,
+            noise: 1.8,
             outliers: 0.02,
             stray: 40.0,
             speed: 1.0,
@@ -139,7 +144,7 @@ impl Scheme<1> for FullRange {
         measurement: &Vector1<f64>,
         (): &(),
     ) -> Result<Option<f64>, fewbits_core::Error> {
-        Ok(Some(finite("range", measurement[0])?))
+        Ok(Some(self.report_format().rounded(finite("range", measurement[0])?)?))
     }
 
     fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<RangeFactor, fewbits_core::Error> {
@@ -218,7 +223,9 @@ impl<C: Stray> Scheme<1> for Tolerant<C> {
     ) -> Result<Self::Factor, fewbits_core::Error> {
         let factor = self.scheme.factor(feedback, observation, link)?;
         let (share, density) = match observation {
-            Observation::Received(report) => (self.settings.outliers, self.scheme.stray(&self.settings, feedback, report)),
+            Observation::Received(report) => {
+                (self.settings.outliers, self.scheme.stray(&self.settings, feedback, report))
+            }
             // A report that did not come is no outlier.
             Observation::Nothing | Observation::Lost => (0.0, 0.0),
         };
@@ -316,7 +323,13 @@ impl RangeTracker {
     ///
     /// # Errors
     /// If there is no such anchor, a number is not finite, or the time is before the last range's.
-    pub fn push(&mut self, rng: &mut dyn Rng, time: f64, anchor: &str, range: f64) -> Result<Option<RangeEstimate>, Error> {
+    pub fn push(
+        &mut self,
+        rng: &mut dyn Rng,
+        time: f64,
+        anchor: &str,
+        range: f64,
+    ) -> Result<Option<RangeEstimate>, Error> {
         finite("range", range)?;
         if finite("time", time)? < self.last {
             return refuse("time", time, format!("{} or later", self.last));
@@ -341,7 +354,13 @@ impl RangeTracker {
     }
 
     /// One range in the track.
-    fn track(&mut self, rng: &mut dyn Rng, time: f64, anchor: &str, range: f64) -> Result<Option<RangeEstimate>, Error> {
+    fn track(
+        &mut self,
+        rng: &mut dyn Rng,
+        time: f64,
+        anchor: &str,
+        range: f64,
+    ) -> Result<Option<RangeEstimate>, Error> {
         let (Some(centre), Some(anchor)) = (self.centre.as_mut(), self.anchors.get_mut(anchor)) else {
             return Ok(None);
         };
@@ -401,23 +420,30 @@ impl RangeTracker {
         // Targets move among their anchors, and somewhat beyond.
         (variances[0], variances[2], variances[4]) = (spread, spread, self.bias.1);
         let prior = Gaussian::from_trusted_parts(mean, SMatrix::from_diagonal(&variances));
-        let ranges = self.collected.values().map(|(then, place, range)| {
-            // Since then the target may have moved on.
-            let deviation = self.settings.noise.hypot(speed * (time - then));
-            let noise = RangeNoise::constant(deviation)?;
-            let factor = Robust::new(RangeFactor::value(*range, noise)?, self.settings.outliers, 1.0 / self.settings.stray)?;
-            Ok(Observed::new(BiasedRangeSensor(RangeSensor::new(*place, noise)?), factor))
-        });
-        let ranges: Vec<Observed<BiasedRangeSensor, Robust<RangeFactor>, 1>> = ranges.collect::<Result<_, Error>>()?;
-        let found = GridFilter::default().update(&prior, AXES, ranges.as_slice(), &mut GridWorkspace::default());
-        let belief = match found {
-            Ok((belief, _)) => belief,
-            // These ranges have no common place: wait for others.
-            Err(fewbits_filters::Error::Core(fewbits_core::Error::Impossible) | fewbits_filters::Error::Unresolved { .. }) => {
-                return Ok(());
+        // Ranges that have no common place within their noise, or only a ridge: once more with a larger one, then wait for others.
+        let (mut found, mut workspace) = (None, GridWorkspace::default());
+        for inflation in [1.0, 2.0, 4.0] {
+            let ranges = self.collected.values().map(|(then, place, range)| {
+                // Since then the target may have moved on.
+                let deviation = inflation * self.settings.noise.hypot(speed * (time - then));
+                let noise = RangeNoise::constant(deviation)?;
+                let factor = RangeFactor::value(*range, noise)?;
+                Ok(Observed::new(BiasedRangeSensor(RangeSensor::new(*place, noise)?), factor))
+            });
+            let ranges: Vec<Observed<BiasedRangeSensor, RangeFactor, 1>> = ranges.collect::<Result<_, Error>>()?;
+            match GridFilter::default().update(&prior, AXES, ranges.as_slice(), &mut workspace) {
+                Ok((belief, _)) => {
+                    found = Some(belief);
+                    break;
+                }
+                Err(
+                    fewbits_filters::Error::Core(fewbits_core::Error::Impossible)
+                    | fewbits_filters::Error::Unresolved { .. },
+                ) => {}
+                Err(error) => return Err(error.into()),
             }
-            Err(error) => return Err(error.into()),
-        };
+        }
+        let Some(belief) = found else { return Ok(()) };
         self.centre = Some(self.centre_from(rng, &belief)?);
         self.origin = time;
         Ok(())
@@ -429,7 +455,13 @@ impl RangeTracker {
             _ => SPEEDS.map(|speed| speed * speed).to_vec(),
         };
         let bank = NoiseBank::new(MomentFilter, scales, SWITCHING)?;
-        let mut centre = FusionCentre::new(rng, self.world()?, bank, belief)?;
+        let sensor = FalseAlarms::default().sensor;
+        let centre = match self.travel {
+            Travel::Bits(1) => ONE_BIT_ALARMS,
+            _ => ALARMS,
+        };
+        let mut centre =
+            FusionCentre::new(rng, self.world()?, bank, belief)?.with_false_alarms(FalseAlarms { sensor, centre })?;
         if self.travel == Travel::Bits(1) {
             let range = [SPEEDS[0] * SPEEDS[0], SPEEDS[4] * SPEEDS[4]];
             centre = centre.learning_noise(NoiseLearning { gain: 0.03, range })?;
@@ -479,5 +511,6 @@ impl RangeTracker {
 
 fn quantizer(bits: u32, noise: RangeNoise) -> Result<QuantizedRange, Error> {
     within("bits", f64::from(bits), 1.0, 8.0)?;
-    QuantizedRange::new(1 << bits, noise)
+    // All nodes that hear the reports compute the references themselves: they do not travel.
+    Ok(QuantizedRange::new(1 << bits, noise)?.with_format(NumberFormat::Double))
 }

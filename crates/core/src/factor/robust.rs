@@ -47,7 +47,11 @@ impl<F> Robust<F> {
         } else {
             (self.log_outlier, own)
         };
-        if low == f64::NEG_INFINITY { high } else { high + (low - high).exp().ln_1p() }
+        if low == f64::NEG_INFINITY {
+            high
+        } else {
+            high + (low - high).exp().ln_1p()
+        }
     }
 }
 

@@ -24,7 +24,8 @@ pub fn stretches_compose<const D: usize>(
         let middle = first.mean(state);
         let (mean, expected) = (both.mean(state), second.mean(&middle));
         let jacobian = second.jacobian(&middle);
-        let composed = jacobian * first.noise_covariance_at(state) * jacobian.transpose() + second.noise_covariance_at(&middle);
+        let composed =
+            jacobian * first.noise_covariance_at(state) * jacobian.transpose() + second.noise_covariance_at(&middle);
         let covariance = both.noise_covariance_at(state);
         for i in 0..D {
             let scale = state.amax() + composed[(i, i)].sqrt();

@@ -1,11 +1,14 @@
 //! Fusion centres of one-bit, three-bit and full sensors: health, learnt noise, late reports, stored states.
 
 use fewbits_core::{
-    Belief, Dynamics, Evolution, FullValue, Gaussian, Link, MeasurementNoise, Observation, OnAxes, SchemeNode, Sensing, SensorNode,
+    Belief, Dynamics, Evolution, FullValue, Gaussian, Link, MeasurementNoise, Observation, OnAxes, SchemeNode, Sensing,
+    SensorNode,
 };
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{CentreState, Event, FusionCentre, NoiseLearning, RemoteSensor, Reporting, Slot};
-use fewbits_filters::{BootstrapFilter, Error, GridFilter, GridOnAxes, MomentFilter, NoiseBank, ParticleFilter, StateFilter};
+use fewbits_filters::{
+    BootstrapFilter, Error, GridFilter, GridOnAxes, MomentFilter, NoiseBank, ParticleFilter, StateFilter,
+};
 use fewbits_models::{ContinuousLinear, LinearSensor, PLANE_POSITION};
 use fewbits_monte_carlo::{Moments, Stream};
 use nalgebra::{Matrix4, Vector1, Vector4};
@@ -137,11 +140,17 @@ fn a_biased_sensor_is_excluded() {
             (0..100).for_each(|_| drop(run.step(1.0)));
             // One innovation deviation and a half.
             run.bias = 2.0;
-            let delay = (0..1000).position(|_| run.step(1.0).contains(&Event::Excluded(0))).unwrap_or(1000);
+            let delay = (0..1000)
+                .position(|_| run.step(1.0).contains(&Event::Excluded(0)))
+                .unwrap_or(1000);
             delays.add(delay as f64);
         }
         assert!(delays.mean() < longest, "{kind:?}: {} steps", delays.mean());
-        println!("{kind:?}: biased sensor excluded after {:.0} +- {:.0} steps", delays.mean(), delays.standard_error());
+        println!(
+            "{kind:?}: biased sensor excluded after {:.0} +- {:.0} steps",
+            delays.mean(),
+            delays.standard_error()
+        );
     }
 }
 
@@ -243,7 +252,10 @@ impl<F: StateFilter<4>> Plane<F> {
         let (mut rng, mut filter_rng) = (Stream::new(seed).rng(), Stream::new(seed).named("filter").rng());
         let world = ContinuousLinear::nearly_constant_velocity_2d(0.05).unwrap();
         let prior = Gaussian::new(Vector4::new(0.0, 1.0, 0.0, -0.5), Matrix4::identity()).unwrap();
-        let mut centre = FusionCentre::new(&mut filter_rng, world, filter, &prior).unwrap().with_window(5.0).unwrap();
+        let mut centre = FusionCentre::new(&mut filter_rng, world, filter, &prior)
+            .unwrap()
+            .with_window(5.0)
+            .unwrap();
         let mut nodes = Vec::new();
         for (number, axis) in PLANE_POSITION.into_iter().enumerate() {
             let (remote, node) = sensor(Kind::Bit, coordinate(axis), 0.5, 0.1);
@@ -384,7 +396,12 @@ fn late_reports_count_as_if_in_time() {
             let then = at + seconds;
             let feedback = held[0].feedback.clone();
             let slot = Slot::new(0, feedback, held[0].observation.clone());
-            plane.centre.advance(&mut plane.filter_rng, then).unwrap().receive(&mut plane.filter_rng, &[slot]).unwrap();
+            plane
+                .centre
+                .advance(&mut plane.filter_rng, then)
+                .unwrap()
+                .receive(&mut plane.filter_rng, &[slot])
+                .unwrap();
         }
     }
     assert!(late.centre.late(&mut late.filter_rng, at, &held[2..]).unwrap());
@@ -414,7 +431,12 @@ fn refused_calls_leave_the_centre_as_it_was() {
     ));
     // Another sensor's feedback does not decode.
     let crossed = Slot::new(2, slots[0].feedback.clone(), slots[2].observation.clone());
-    assert!(plane.centre.receive(&mut plane.filter_rng, &[slots[0].clone(), crossed]).is_err());
+    assert!(
+        plane
+            .centre
+            .receive(&mut plane.filter_rng, &[slots[0].clone(), crossed])
+            .is_err()
+    );
     assert!(plane.centre.state() == before);
     assert!(plane.centre.leave(2) && !plane.centre.leave(2) && plane.centre.feedback(2).is_err());
 }

@@ -4,7 +4,7 @@
 //!
 //! | sequence | what moves it |
 //! |---|---|
-//! | surprise: `ln p(o)` against its own mean and deviation over what could have come; for values `(NIS - 1) / sqrt 2` | noise or process noise wrong, outliers |
+//! | surprise: how far `ln p(o)` is below its mean, over its deviation over what could have come; for values `(NIS - 1) / sqrt 2` | noise or process noise wrong, outliers |
 //! | residual: what the observation says of the innovation, over its deviation | a biased sensor, a start that is off |
 //! | product of neighbouring residuals of one sensor | process noise too small (it repeats) or too large (it alternates), a lost track |
 //!
@@ -33,7 +33,11 @@ impl Residual {
     /// Of a word, from `(ln p, correction)` of every word that could have come; the received one at `at`. `None` if there is no choice.
     pub fn of_word(words: &[(f64, f64)], at: usize) -> Option<Self> {
         let total: f64 = words.iter().map(|w| w.0.exp()).sum();
-        let shares = || words.iter().map(|(log, correction)| (log.exp() / total, *log, *correction));
+        let shares = || {
+            words
+                .iter()
+                .map(|(log, correction)| (log.exp() / total, *log, *correction))
+        };
         let mean = shares().map(|(p, _, c)| p * c).sum::<f64>();
         let variance = shares().map(|(p, _, c)| p * (c - mean) * (c - mean)).sum::<f64>();
         let log_mean = shares().filter(|s| s.0 > 0.0).map(|(p, log, _)| p * log).sum::<f64>();
@@ -44,7 +48,11 @@ impl Residual {
         let (log, correction) = *words.get(at)?;
         let residual = (correction - mean) / variance.sqrt();
         // Words of equal probability have no surprise.
-        let surprise = if log_variance > 1e-6 { (log - log_mean) / log_variance.sqrt() } else { 0.0 };
+        let surprise = if log_variance > 1e-6 {
+            (log_mean - log) / log_variance.sqrt()
+        } else {
+            0.0
+        };
         (residual.is_finite() && surprise.is_finite()).then_some(Self { surprise, residual })
     }
 
@@ -66,17 +74,37 @@ pub(super) struct Cusum {
 }
 
 impl Cusum {
-    /// Adds a term of mean 0 and variance 1; whether a sum crosses `limit`, which restarts both.
-    pub fn add(&mut self, term: f64, limit: f64) -> bool {
+    /// Adds a term of mean 0 and variance 1; which sum crosses `limit`, if any. Both then start anew.
+    pub fn add(&mut self, term: f64, limit: f64) -> Option<Direction> {
         let term = term.clamp(-CLIP, CLIP);
         self.up = (self.up + term - DRIFT).max(0.0);
         self.down = (self.down - term - DRIFT).max(0.0);
-        let alarm = self.up.max(self.down) > limit;
-        if alarm {
-            *self = Self::default();
-        }
-        alarm
+        let direction = if self.up > limit {
+            Direction::Up
+        } else if self.down > limit {
+            Direction::Down
+        } else {
+            return None;
+        };
+        *self = Self::default();
+        Some(direction)
     }
+}
+
+/// Which sum crossed its limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Direction {
+    Up,
+    Down,
+}
+
+/// What the three sequences together say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Alarm {
+    /// Observations are less likely than they should be, residuals have a mean, or they repeat.
+    Contradiction,
+    /// Observations are likelier than they should be, or residuals alternate: a noise is overstated.
+    Overstatement,
 }
 
 /// The limit at which a two-sided sum of standard normal terms raises one alarm in `1 / rate` steps (Siegmund's approximation:
@@ -132,15 +160,21 @@ pub(super) struct Monitor {
 }
 
 impl Monitor {
-    /// Adds one term to each sequence that has one; whether any crosses.
-    pub fn add(&mut self, terms: [Option<f64>; SEQUENCES], limit: f64) -> bool {
-        let mut alarm = false;
-        for (sum, term) in self.sums.iter_mut().zip(terms) {
-            if let Some(term) = term {
-                alarm |= sum.add(term, limit);
+    /// Adds one term to each sequence that has one: surprise, residual, product.
+    pub fn add(&mut self, terms: [Option<f64>; SEQUENCES], limit: f64) -> Option<Alarm> {
+        let mut alarm = None;
+        for (i, (sum, term)) in self.sums.iter_mut().zip(terms).enumerate() {
+            let crossed = term.and_then(|term| sum.add(term, limit));
+            let meaning = match crossed {
+                None => continue,
+                Some(Direction::Down) if i != 1 => Alarm::Overstatement,
+                Some(_) => Alarm::Contradiction,
+            };
+            if alarm != Some(Alarm::Contradiction) {
+                alarm = Some(meaning);
             }
         }
-        if alarm {
+        if alarm.is_some() {
             *self = Self::default();
         }
         alarm

@@ -38,7 +38,7 @@ use crate::Error;
 use crate::contract::{Evolving, Info, StateFilter, StateLikelihood};
 use fewbits_core::{Belief, BitString, Gaussian, Observation};
 use fewbits_numerics::error::{finite, non_negative, positive, refuse};
-use health::{Residual, SEQUENCES, limit};
+use health::{Alarm, Residual, SEQUENCES, limit};
 use rand::Rng;
 use state::{Checkpoint, MemberState, StoredSlot};
 use std::collections::BTreeMap;
@@ -82,8 +82,11 @@ pub enum Event {
     Excluded(u32),
     /// An excluded sensor has agreed with the others for long and is used again.
     Readmitted(u32),
-    /// The model does not hold for the sensors together: the track is lost, or the noise is wrong.
+    /// The model does not hold for the sensors together: observations are too unlikely, or residuals repeat. The track is lost, or a noise
+    /// is understated.
     Lost,
+    /// Observations are likelier than they should be, or residuals alternate: a noise is overstated.
+    NoiseOverstated,
     /// The belief was replaced by the prior of [`FusionCentre::reacquire_from`].
     Reacquired,
 }
@@ -504,13 +507,18 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// Presence, health and noise from what was watched.
     fn judge(&mut self, rng: &mut dyn Rng, slots: &[Slot], watched: &[Watched]) -> Result<Vec<Event>, Error> {
         let mut events = Vec::new();
-        let (sensor_limit, centre_limit) = (limit(self.false_alarms.sensor / SEQUENCES as f64), limit(self.false_alarms.centre / SEQUENCES as f64));
+        let (sensor_limit, centre_limit) = (
+            limit(self.false_alarms.sensor / SEQUENCES as f64),
+            limit(self.false_alarms.centre / SEQUENCES as f64),
+        );
         let mut pooled = [(0.0, 0_u32); SEQUENCES];
         let mut products = 0.0;
         let allowed = self.members.len() / 2;
         let mut excluded = self.members.values().filter(|m| m.state.excluded).count();
         for (slot, watched) in slots.iter().zip(watched) {
-            let Some(member) = self.members.get_mut(&slot.sensor) else { continue };
+            let Some(member) = self.members.get_mut(&slot.sensor) else {
+                continue;
+            };
             let state = &mut member.state;
             match watched {
                 Watched::Nothing => {}
@@ -527,7 +535,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                     let product = state.last_residual.map(|last| last * found.residual);
                     state.last_residual = Some(found.residual);
                     let terms = [Some(found.surprise), Some(found.residual), product];
-                    let alarm = state.monitor.add(terms, sensor_limit);
+                    let alarm = state.monitor.add(terms, sensor_limit) == Some(Alarm::Contradiction);
                     state.quiet = if alarm { 0 } else { state.quiet.saturating_add(1) };
                     if state.excluded {
                         if state.quiet >= READMISSION {
@@ -559,7 +567,11 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             self.noise_scale = (self.noise_scale * (learning.gain * products).exp()).clamp(low, high);
         }
         let terms = pooled.map(|(sum, count)| (count > 0).then(|| sum / f64::from(count).sqrt()));
-        if self.monitor.add(terms, centre_limit) {
+        let alarm = self.monitor.add(terms, centre_limit);
+        if alarm == Some(Alarm::Overstatement) {
+            events.push(Event::NoiseOverstated);
+        }
+        if alarm == Some(Alarm::Contradiction) {
             events.push(Event::Lost);
             if let Some(prior) = self.acquisition {
                 self.belief = self.filter.start(rng, &prior)?;

@@ -2,9 +2,7 @@
 
 use crate::Error;
 use crate::contract::StateLikelihood;
-use fewbits_core::{
-    BitString, Gaussian, Link, MeasurementNoise, Message, Observation, Observed, Scheme, Sensing,
-};
+use fewbits_core::{BitString, Gaussian, Link, MeasurementNoise, Message, Observation, Observed, Scheme, Sensing};
 use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::linalg::congruence;
 use nalgebra::SMatrix;
@@ -123,15 +121,16 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
         C: MeasurementNoise<M>,
     {
         let mean = self.sensing.mean(predicted.mean());
-        let (sensed, supposed) = (
-            self.sensing.noise_covariance_at(predicted.mean()),
-            self.scheme.noise_covariance_at(&mean),
-        );
+        let (sensed, supposed) =
+            (self.sensing.noise_covariance_at(predicted.mean()), self.scheme.noise_covariance_at(&mean));
         let scale = sensed.diagonal().map(f64::sqrt);
-        let off = |i: usize, j: usize| (sensed[(i, j)] - supposed[(i, j)]).abs() > NOISE_TOLERANCE * scale[i] * scale[j];
+        let off =
+            |i: usize, j: usize| (sensed[(i, j)] - supposed[(i, j)]).abs() > NOISE_TOLERANCE * scale[i] * scale[j];
         if (0..M).any(|i| (0..M).any(|j| off(i, j))) {
             let expected = format!("the noise covariance of the sensing model, {:?}", sensed.as_slice());
-            return Err(ArgumentError::new("noise", format!("{:?} in the scheme", supposed.as_slice()), expected).into());
+            return Err(
+                ArgumentError::new("noise", format!("{:?} in the scheme", supposed.as_slice()), expected).into()
+            );
         }
         let jacobian: SMatrix<f64, M, D> = self.sensing.jacobian(predicted.mean());
         Ok(Gaussian::from_trusted_parts(mean, congruence(&jacobian, predicted.covariance()) + supposed))
@@ -159,13 +158,14 @@ where
         let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), feedback)?;
         let observation = match observation {
             // Bits that are no report of the scheme: sent, and not understood.
-            Observation::Received(bits) => {
-                C::Report::from_bits(&self.scheme.report_format(), bits).map_or(Observation::Lost, Observation::Received)
-            }
+            Observation::Received(bits) => C::Report::from_bits(&self.scheme.report_format(), bits)
+                .map_or(Observation::Lost, Observation::Received),
             Observation::Nothing => Observation::Nothing,
             Observation::Lost => Observation::Lost,
         };
-        let factor = self.scheme.factor(&feedback, &observation, &supposed(&self.link, working)?)?;
+        let factor = self
+            .scheme
+            .factor(&feedback, &observation, &supposed(&self.link, working)?)?;
         Ok(Box::new(Observed::new(self.sensing.clone(), factor)))
     }
 

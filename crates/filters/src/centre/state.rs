@@ -105,7 +105,11 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             now: self.now,
             noise_scale: self.noise_scale,
             belief: self.belief.clone(),
-            members: self.members.iter().map(|(number, m)| (*number, m.state.clone())).collect(),
+            members: self
+                .members
+                .iter()
+                .map(|(number, m)| (*number, m.state.clone()))
+                .collect(),
             monitor: self.monitor,
             history: self.history.clone(),
             dropped: self.dropped,

@@ -230,7 +230,12 @@ impl GridFilter {
         if peak == f64::NEG_INFINITY {
             return Err(Error::IMPOSSIBLE);
         }
-        let shares = || workspace.pieces.iter().map(|piece| (piece, (piece.log_evidence - peak).exp()));
+        let shares = || {
+            workspace
+                .pieces
+                .iter()
+                .map(|piece| (piece, (piece.log_evidence - peak).exp()))
+        };
         let total: f64 = shares().map(|(_, share)| share).sum();
         let resolution = shares()
             .filter(|(_, share)| *share > NEGLIGIBLE_SHARE * total)

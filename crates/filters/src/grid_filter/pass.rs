@@ -16,13 +16,12 @@ const UNDERFLOW: f64 = -690.0;
 /// Effective nodes per axis below which weights are tempered: with fewer, a
 /// mode that lies between nodes would lose its weight to one that lies on a node.
 const MIN_EFFECTIVE_NODES: f64 = 3.0;
-/// Effective nodes of a posterior, in those of a Gaussian of the same moments, from which it counts as compact: a cell has .95, a
-/// triangle .83, a corner of two edges .69, an exponential tail .56. A ridge or several spikes have less and take more nodes.
-const COMPACT: f64 = 0.7;
 /// Deviations of the posterior to each side of its mean that must lie inside the grid.
 const COVERED: f64 = 3.0;
-/// The same for the first grid, whose ends are where the prediction ends.
-const COVERED_BY_PREDICTION: f64 = 1.5;
+/// The same for the first grid, if it is wide against the posterior: a narrower one costs no more and covers more.
+const COVERED_BY_PREDICTION: f64 = 4.8;
+/// Deviations of the posterior, in those of the prediction, from which on the first grid's ends count as those of the prediction.
+const BLUNT: f64 = 0.5;
 /// A grid is no longer narrowed if all principal axes of what it shows are longer than this, in its own deviations.
 const STALLED: f64 = 0.7;
 /// Neighbouring layers of nodes without weight, across the longest axis, that separate two modes.
@@ -60,7 +59,11 @@ impl<const K: usize> Found<K> {
     /// less. A posterior of edges, ridges or spikes has fewer nodes that count than a Gaussian of its moments. 0 if the weights are not
     /// yet those of the posterior.
     pub fn nodes_per_deviation(&self) -> f64 {
-        if self.is_tempered() { 0.0 } else { self.counted.min(self.shortest / self.step) }
+        if self.is_tempered() {
+            0.0
+        } else {
+            self.counted.min(self.shortest / self.step)
+        }
     }
 
     /// Whether more nodes are needed, and not only a grid along the principal axes.
@@ -79,7 +82,12 @@ impl<const K: usize> Found<K> {
 
     /// Whether these are the moments of the posterior: all of it resolved and inside the grid.
     pub fn is_done(&self, region: &Region<K>, reach: f64) -> bool {
-        let covered = if region.is_prediction() { COVERED_BY_PREDICTION } else { COVERED };
+        let widest = self.covariance.diagonal().max().sqrt();
+        let covered = match region.is_prediction() {
+            true if widest >= BLUNT => 1.0,
+            true => COVERED_BY_PREDICTION,
+            false => COVERED,
+        };
         let inside = |k: usize| self.mean[k].abs() + covered * self.covariance[(k, k)].sqrt() <= reach;
         self.nodes_per_deviation() >= MIN_NODES_PER_DEVIATION && (0..K).all(inside)
     }
@@ -93,7 +101,11 @@ impl<const K: usize> Found<K> {
         let (mean, covariance) = region.moments(&self.mean, &self.covariance);
         let impossible = self.log_peak < UNDERFLOW;
         Piece {
-            log_evidence: if impossible { f64::NEG_INFINITY } else { self.log_evidence + region.log_volume() },
+            log_evidence: if impossible {
+                f64::NEG_INFINITY
+            } else {
+                self.log_evidence + region.log_volume()
+            },
             mean,
             covariance,
             nodes_per_deviation: self.nodes_per_deviation(),
@@ -140,7 +152,11 @@ impl GridFilter {
             for (column, x) in columns.iter_mut().zip(place.iter()) {
                 column[n] = *x;
             }
-            logs[n] = if region.holds(&u) { -0.5 * u.norm_squared() } else { f64::NEG_INFINITY };
+            logs[n] = if region.holds(&u) {
+                -0.5 * u.norm_squared()
+            } else {
+                f64::NEG_INFINITY
+            };
             advance(&mut index);
         }
         observed.add_log_likelihoods(columns.each_ref().map(Vec::as_slice), logs);
@@ -148,7 +164,9 @@ impl GridFilter {
         if logs.iter().all(|log| log.is_nan()) {
             return refuse("observed", "a log likelihood of NaN at every node", "numbers or -inf");
         }
-        logs.iter_mut().filter(|log| log.is_nan()).for_each(|log| *log = f64::NEG_INFINITY);
+        logs.iter_mut()
+            .filter(|log| log.is_nan())
+            .for_each(|log| *log = f64::NEG_INFINITY);
         let peak = kernels::largest(logs);
         if peak == f64::INFINITY {
             return refuse("observed", "a log likelihood of infinity", "finite numbers or -inf");
@@ -168,7 +186,10 @@ impl GridFilter {
             for _ in 0..BISECTIONS {
                 let middle: f64 = 0.5 * (low + high);
                 exponent = middle.exp();
-                tempered.iter_mut().zip(&*logs).for_each(|(t, log)| *t = exponent * (log - peak));
+                tempered
+                    .iter_mut()
+                    .zip(&*logs)
+                    .for_each(|(t, log)| *t = exponent * (log - peak));
                 sums = kernels::exp_minus(tempered, 0.0, weights);
                 let found = effective(sums);
                 if found < fewest {
@@ -197,7 +218,7 @@ impl GridFilter {
         let covariance = second / sums.sum - mean * mean.transpose();
 
         let (values, vectors) = symmetric_eigen(covariance);
-        let counted = (effective(sums) / COMPACT).powf(1.0 / K as f64) / (2.0 * PI.sqrt());
+        let counted = effective(sums).powf(1.0 / K as f64) / (2.0 * PI.sqrt());
         let mut found = Found {
             exponent,
             log_evidence: peak + log_total + K as f64 * (step.ln() - LN_SQRT_2PI),
@@ -234,11 +255,13 @@ impl GridFilter {
         let buffers = [&mut workspace.logs, &mut workspace.tempered, &mut workspace.weights];
         for buffer in workspace.columns.iter_mut().chain(buffers) {
             // Room for one refinement, so that most steps allocate nothing.
-            let room = (2 * nodes - 1).pow(K as u32).min(MAX_REFINED_NODES).max(count);
+            let room = (2 * self.nodes - 1).pow(K as u32).min(MAX_REFINED_NODES).max(count);
             buffer.reserve(room - buffer.len().min(room));
             buffer.resize(count, 0.0);
         }
-        workspace.layers.reserve(ROOM_FOR_LAYERS.saturating_sub(workspace.layers.len()));
+        workspace
+            .layers
+            .reserve(ROOM_FOR_LAYERS.saturating_sub(workspace.layers.len()));
         Ok(count)
     }
 }

@@ -12,6 +12,10 @@ const RETRIES: u32 = 2;
 /// How much closer: 1.75 nodes per deviation become 2, and 3.5 deviations to each side remain inside.
 const CLOSER: f64 = 0.875;
 
+/// Nodes per deviation from which on more of them go into a wider grid, up to five deviations, whose ends cut off nothing that counts.
+const NODES_PER_DEVIATION: f64 = 4.0;
+const WIDER: f64 = 1.25;
+
 /// A grid over a part of the whitened coordinates `u`: node `t` is at `centre + axes diag(deviations) t`.
 #[derive(Debug, Clone)]
 pub(super) struct Region<const K: usize> {
@@ -68,7 +72,9 @@ impl<const K: usize> Region<K> {
     /// Whether `u` belongs to this part.
     #[inline]
     pub fn holds(&self, u: &SVector<f64, K>) -> bool {
-        self.cuts[..self.depth].iter().all(|cut| cut.normal.dot(u) >= cut.offset)
+        self.cuts[..self.depth]
+            .iter()
+            .all(|cut| cut.normal.dot(u) >= cut.offset)
     }
 
     /// `ln` of the volume of one grid unit in `u`.
@@ -109,7 +115,8 @@ impl<const K: usize> Region<K> {
         let (centre, covariance) = self.moments(&found.mean, &spread);
         let (values, axes) = symmetric_eigen(covariance);
         let retries = self.retries + u32::from(!found.is_tempered());
-        let share = if retries > RETRIES { CLOSER } else { 1.0 };
+        let wider = (1.0 / (found.step * NODES_PER_DEVIATION)).clamp(1.0, WIDER);
+        let share = if retries > RETRIES { CLOSER } else { wider };
         Self {
             centre,
             axes,

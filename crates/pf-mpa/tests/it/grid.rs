@@ -4,7 +4,8 @@ use fewbits_core::{Gaussian, Likelihood, Observed};
 use fewbits_filters::Error;
 use fewbits_monte_carlo::{Moments, Stream};
 use fewbits_pf_mpa::{
-    GridFilter, GridWorkspace, QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor, Ranged, optimal_loading,
+    GridFilter, GridWorkspace, QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor, Ranged,
+    optimal_loading,
 };
 use nalgebra::{Matrix2, Vector2};
 
@@ -61,9 +62,9 @@ fn consistency(deviation: f64, snr_db: f64, bits: u32, trials: u64) -> Moments {
 
 #[test]
 fn errors_are_as_stated_from_blunt_to_sharp() {
-    for deviation in [0.05, 0.2, 5.0] {
-        for snr_db in [20.0, 50.0, 70.0, 90.0] {
-            for bits in [1, 2, 4, 10] {
+    for deviation in [0.05, 0.5, 5.0] {
+        for snr_db in [20.0, 50.0, 90.0] {
+            for bits in [1, 4, 10] {
                 let nees = consistency(deviation, snr_db, bits, TRIALS);
                 // .9 to 1.1, but for what the trials leave open.
                 let slack = 0.1 + 3.5 * nees.standard_error();
@@ -103,7 +104,13 @@ fn brute_force(prior: &Gaussian<2>, observed: &[Ranged], about: &Gaussian<2>) ->
 
 #[test]
 fn moments_are_those_of_801_nodes() {
-    for (deviation, snr_db, bits) in [(0.2, 70.0, 8), (5.0, 20.0, 1), (5.0, 50.0, 4), (0.5, 90.0, 2), (5.0, 90.0, 10)] {
+    for (deviation, snr_db, bits) in [
+        (0.2, 70.0, 8),
+        (5.0, 20.0, 1),
+        (5.0, 50.0, 4),
+        (0.5, 90.0, 2),
+        (5.0, 90.0, 10),
+    ] {
         let prior = prior(deviation);
         let (mut squares, mut exact_squares) = (0.0, 0.0);
         for trial in 0..4 {
@@ -145,7 +152,10 @@ fn thin_arcs_are_followed() {
     });
     let total: f64 = nodes.clone().map(|n| n.1).sum();
     let mean = nodes.clone().map(|(x, w)| x * w).sum::<Vector2<f64>>() / total;
-    let covariance = nodes.map(|(x, w)| (x - mean) * (x - mean).transpose() * w).sum::<Matrix2<f64>>() / total;
+    let covariance = nodes
+        .map(|(x, w)| (x - mean) * (x - mean).transpose() * w)
+        .sum::<Matrix2<f64>>()
+        / total;
     assert!((info.log_likelihood - total.ln()).abs() < 0.1, "{} {}", info.log_likelihood, total.ln());
     let off = (posterior.mean() - mean).component_div(&covariance.diagonal().map(f64::sqrt));
     assert!(off.amax() < 0.1, "{off}");
@@ -173,7 +183,10 @@ fn what_cannot_be_resolved_is_an_error() {
     let prior = Gaussian::new(Vector2::new(10.0, 0.0), Matrix2::identity() * 9.0).unwrap();
     let observed = [ring(10.0, 1e-9)];
     let updated = GridFilter::default().update(&prior, [0, 1], observed.as_slice(), &mut GridWorkspace::default());
-    assert!(matches!(updated, Err(Error::Unresolved { nodes_per_deviation }) if nodes_per_deviation < 1.5), "{updated:?}");
+    assert!(
+        matches!(updated, Err(Error::Unresolved { nodes_per_deviation }) if nodes_per_deviation < 1.5),
+        "{updated:?}"
+    );
 }
 
 #[test]
@@ -182,7 +195,8 @@ fn grids_are_the_same_in_any_unit() {
         let noise = |unit: f64| RangeNoise::constant(0.01 * unit).unwrap();
         let found = |unit: f64| {
             let sensor = |x: f64| RangeSensor::new(Vector2::new(x * unit, 0.0), noise(unit)).unwrap();
-            let observed = [-5.0, 6.0].map(|x| Observed::new(sensor(x), RangeFactor::value(5.5 * unit, noise(unit)).unwrap()));
+            let observed =
+                [-5.0, 6.0].map(|x| Observed::new(sensor(x), RangeFactor::value(5.5 * unit, noise(unit)).unwrap()));
             let prior = Gaussian::new(Vector2::new(0.0, 2.0 * unit), Matrix2::identity() * (unit * unit)).unwrap();
             update(&prior, &observed).0
         };
@@ -201,7 +215,9 @@ fn axes_are_named_and_checked() {
         nalgebra::Matrix4::from_diagonal(&[1.0, 0.1, 1.0, 0.1].into()),
     )
     .unwrap();
-    let (posterior, _) = grid.update(&plane, [0, 2], observed.as_slice(), &mut GridWorkspace::default()).unwrap();
+    let (posterior, _) = grid
+        .update(&plane, [0, 2], observed.as_slice(), &mut GridWorkspace::default())
+        .unwrap();
     assert!(posterior.mean()[0] > 9.4 && (posterior.mean()[1] - 0.3).abs() < 1e-12);
     for axes in [[0, 0], [0, 4]] {
         let refused = grid.update(&plane, axes, observed.as_slice(), &mut GridWorkspace::default());
