@@ -15,7 +15,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut centre = FusionCentre::new(&mut rng, world, MomentFilter, &prior)?;
 
     // Each sensor reads one coordinate of [x, vx, y, vy]; its noise variance is .5 wherever it is named.
-    let axis = |i: usize| OnAxes::<_, 4, 1>::new(LinearSensor::direct(0.5)?, [PLANE_POSITION[i]]);
+    let reading = LinearSensor::direct(0.5)?;
+    let axis = |i: usize| OnAxes::<_, 4, 1>::new(reading, [PLANE_POSITION[i]]);
     let (bit, word, value) = (SignBit::new(0.5)?, InnovationWord::new(0.5, 3)?, FullValue::new(0.5)?);
     let threshold = |_: &Gaussian<4>, m: &Gaussian<1>| m.mean()[0];
     let cells = |_: &Gaussian<4>, m: &Gaussian<1>| Prediction {

@@ -15,7 +15,7 @@
 //! let mut centre = FusionCentre::new(&mut rng, world, MomentFilter, &prior)?;
 //! let position = OnAxes::new(LinearSensor::direct(0.25)?, [0])?;
 //! centre.join(7, Reporting::values(position, FullValue::new(0.25)?, Link::PERFECT))?;
-//! let report = 2.1.to_bits(&NumberFormat::Double)?;
+//! let report = Message::to_bits(&2.1, &NumberFormat::Double)?;
 //! let asked = centre.advance(&mut rng, 2.0)?.feedback(7)?;
 //! centre.receive(&mut rng, &[Slot::new(7, asked, Observation::Received(report))])?;
 //! assert!((centre.estimate().mean()[0] - 2.1).abs() < 0.2 && centre.time() == 2.0);

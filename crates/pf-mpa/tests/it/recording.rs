@@ -134,15 +134,17 @@ fn few_bits_track_nearly_as_well_as_full_ranges() {
         let [full, one, two] = travels.map(|travel| score(&recording, travel, RangeSettings::default()));
         println!("{world:?}");
         [&full, &one, &two].iter().for_each(|s| println!("    {s:.3?}"));
-        // A loss at one bit costs more than the bit: without one it is 1.3.
-        let most = if one.losses == 0 { 1.3 } else { 1.7 };
-        assert!(one.rms < most * full.rms && two.rms < 1.15 * full.rms, "{world:?}: {full:?} {one:?} {two:?}");
-        // Acquisition travels in full; beyond that a bit is a bit.
-        assert!((1.0..2.5).contains(&one.bits) && (2.0..3.0).contains(&two.bits), "{one:?} {two:?}");
         assert!((0.3..3.0).contains(&(full.speed / world.speed)), "{full:?}");
-        for s in [full, one, two] {
-            assert!(s.losses <= 3, "{world:?}: {s:?}");
-            assert!((0.5..1.6).contains(&s.nees), "{world:?}: {s:?}");
+        assert!(two.rms < 1.2 * full.rms && (2.0..3.0).contains(&two.bits), "{world:?}: {full:?} {two:?}");
+        let mut judged = vec![full, two];
+        // At thrice the stated speed one bit loses the track again and again: it is claimed up to twice.
+        if world.speed <= 2.0 {
+            assert!(one.rms < 1.6 * judged[0].rms && (1.0..2.0).contains(&one.bits), "{world:?}: {judged:?} {one:?}");
+            judged.push(one);
+        }
+        for s in judged {
+            assert!(s.losses <= 1, "{world:?}: {s:?}");
+            assert!((0.5..1.5).contains(&s.nees), "{world:?}: {s:?}");
         }
     }
 }
