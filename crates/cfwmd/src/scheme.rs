@@ -4,7 +4,8 @@ use crate::Error;
 use crate::censored::{Censored, MissingReports, as_core};
 use crate::rule::CensoringRule;
 use fewbits_core::{
-    BitReader, BitWriter, CodecError, Gaussian, Link, Message, NumberFormat, Observation, Scheme, Sensing,
+    BitReader, BitWriter, CodecError, Gaussian, LinearSensing, Link, MeasurementNoise, Message, NumberFormat,
+    Observation, Scheme, Sensing,
 };
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, non_negative};
@@ -233,6 +234,20 @@ pub(crate) fn rule_under<const D: usize, const M: usize>(
     let noise = sensing.noise_covariance_at(predicted.mean());
     let innovation = matrix * predicted.covariance() * matrix.transpose() + noise;
     CensoringRule::new(&symmetrised(&innovation), threshold)
+}
+
+/// Of linear sensors, whose noise is the same at every state.
+impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M> for Censoring<S, D, M> {
+    fn noise_covariance_at(&self, _: &SVector<f64, M>) -> SMatrix<f64, M, M> {
+        *self.sensing.noise_covariance()
+    }
+}
+
+/// Of linear sensors, whose noise is the same at every state.
+impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M> for CovarianceFeedback<S, D, M> {
+    fn noise_covariance_at(&self, _: &SVector<f64, M>) -> SMatrix<f64, M, M> {
+        *self.sensing.noise_covariance()
+    }
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Scheme<M> for CovarianceFeedback<S, D, M> {

@@ -6,10 +6,10 @@
 //!
 //! | word | item |
 //! |---|---|
-//! | how the world moves | [`Dynamics`], [`GaussianDynamics`], [`LinearDynamics`] |
-//! | how it is sensed | [`Sensing`], [`LinearSensing`] |
+//! | how the world moves | [`Dynamics`], [`GaussianDynamics`], [`LinearDynamics`]; over any time: [`Evolution`] |
+//! | how it is sensed | [`Sensing`], [`LinearSensing`]; of which coordinates: [`OnAxes`] |
 //! | what travels, as real bits | [`Message`], [`bits`], [`NumberFormat`] |
-//! | the sensor's half, and what its reports mean | [`Scheme`] |
+//! | the sensor's half, and what its reports mean | [`Scheme`]; what runs on the sensor: [`SensorNode`] |
 //! | what is observed, and through what | [`Observation`], [`Link`] |
 //! | `p(observation | noise-free measurement)` | [`Factor`] and its kinds |
 //! | `p(observed | state)` | [`Likelihood`], [`Observed`] |
@@ -46,15 +46,20 @@ pub mod cell;
 pub mod columns;
 pub mod dynamics;
 pub mod error;
+pub mod evolution;
 pub mod factor;
+pub mod full_value;
 pub mod gaussian;
 pub mod laws;
 pub mod likelihood;
+pub mod measurement_noise;
 pub mod message;
 pub mod number;
 pub mod observation;
+pub mod on_axes;
 pub mod scheme;
 pub mod sensing;
+pub mod sensor_node;
 pub mod sign;
 
 pub use belief::{Belief, Density};
@@ -63,14 +68,19 @@ pub use cell::Cell;
 pub use columns::{Columns, ColumnsMut};
 pub use dynamics::{Dynamics, GaussianDynamics, LinearDynamics};
 pub use error::Error;
+pub use evolution::Evolution;
 pub use factor::{Factor, Tilted};
 pub use fewbits_numerics::ArgumentError;
+pub use full_value::{FullValue, SentValue};
 pub use gaussian::{FactoredGaussian, Gaussian};
 pub use likelihood::{Likelihood, Observed};
+pub use measurement_noise::MeasurementNoise;
 pub use message::Message;
 pub use number::NumberFormat;
 pub use observation::{Link, Observation};
+pub use on_axes::OnAxes;
 pub use scheme::Scheme;
 pub use sensing::{LinearSensing, Sensing};
+pub use sensor_node::{SchemeNode, SensorNode};
 pub use sign::Sign;
 pub use {nalgebra, rand};

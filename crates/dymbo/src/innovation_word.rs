@@ -2,11 +2,13 @@
 
 use crate::Error;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
-use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Link, Message, NumberFormat, Observation, Scheme};
+use fewbits_core::{
+    BitReader, BitWriter, Cell, CodecError, Link, MeasurementNoise, Message, NumberFormat, Observation, Scheme,
+};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::stored;
 use fewbits_quantizers::lloyd_max::{LloydMax, gaussian_table};
-use nalgebra::Vector1;
+use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -136,6 +138,12 @@ impl InnovationWord {
         positive("deviation", prediction.deviation)?;
         let edges = self.quantizer.breakpoints().iter();
         Ok(edges.map(|z| prediction.mean + prediction.deviation * z).collect())
+    }
+}
+
+impl MeasurementNoise<1> for InnovationWord {
+    fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+        Matrix1::new(self.noise_variance)
     }
 }
 

@@ -2,11 +2,11 @@
 
 use crate::{Error, ScalarPlant};
 use fewbits_core::factor::{Constant, InCell, Scalar};
-use fewbits_core::{Link, NumberFormat, Observation, Scheme, Sign};
+use fewbits_core::{Link, MeasurementNoise, NumberFormat, Observation, Scheme, Sign};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
-use nalgebra::Vector1;
+use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
@@ -55,6 +55,12 @@ impl SignBit {
     /// `sigma^2`.
     pub fn noise_variance(&self) -> f64 {
         self.noise_variance
+    }
+}
+
+impl MeasurementNoise<1> for SignBit {
+    fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+        Matrix1::new(self.noise_variance)
     }
 }
 

@@ -15,6 +15,20 @@ fewbits_numerics::errors! {
         /// The innovation covariance has no Cholesky factor.
         #[error("the innovation covariance is not positive definite: the belief or the sensing noise is no covariance")]
         SingularInnovation,
+        /// A grid has too few nodes for the posterior: it is a ridge too thin, or of too many modes, to follow.
+        #[error("the grid has {nodes_per_deviation:.2} nodes per deviation of the posterior: expected at least 1.5")]
+        Unresolved {
+            /// Nodes per deviation along the principal axis that has fewest.
+            nodes_per_deviation: f64,
+        },
+        /// No sensor of this number has joined the centre.
+        #[error("sensor {sensor} has not joined: {seated} sensors have")]
+        UnknownSensor {
+            /// The number.
+            sensor: u32,
+            /// How many sensors there are.
+            seated: usize,
+        },
         /// The Riccati recursion has no finite limit.
         #[error("the error variance has no finite steady state: an unstable part of the state is not observed well enough")]
         NoSteadyState,

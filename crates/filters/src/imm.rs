@@ -216,23 +216,7 @@ impl<G> Imm<G> {
         G: GaussianDynamics<D>,
     {
         self.check(belief)?;
-        let n = self.models.len();
-        workspace.modes.clear();
-        workspace.probabilities.clear();
-        for (j, model) in self.models.iter().enumerate() {
-            let joint = |i: usize| belief.probabilities[i] * self.transition[i * n + j];
-            let c: f64 = (0..n).map(joint).sum();
-            let mixed = if c > 0.0 {
-                moments((0..n).map(|i| (joint(i) / c, &belief.modes[i])))
-            } else {
-                belief.modes[j]
-            };
-            workspace.probabilities.push(c);
-            workspace.modes.push(extended_kalman::predict(model, &mixed));
-        }
-        std::mem::swap(&mut belief.modes, &mut workspace.modes);
-        std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
-        Ok(())
+        mix(belief, &self.transition, workspace, |j, mixed| Ok(extended_kalman::predict(&self.models[j], mixed)))
     }
 
     /// Measurement update.
@@ -247,39 +231,11 @@ impl<G> Imm<G> {
         workspace: &mut ImmWorkspace<D>,
     ) -> Result<ImmInfo, Error> {
         self.check(belief)?;
-        workspace.modes.clear();
-        workspace.probabilities.clear();
-        for mode in &belief.modes {
-            let (next, log_evidence) = match assumed_density::update_through(mode, observed) {
-                Ok((next, info)) => (next, info.log_likelihood),
-                Err(Error::Core(fewbits_core::Error::Impossible)) => (*mode, f64::NEG_INFINITY),
-                Err(error) => return Err(error),
-            };
-            workspace.modes.push(next);
-            workspace.probabilities.push(log_evidence);
-        }
-        for (log, p) in workspace.probabilities.iter_mut().zip(&belief.probabilities) {
-            *log += p.ln();
-        }
-        let peak = workspace
-            .probabilities
-            .iter()
-            .copied()
-            .fold(f64::NEG_INFINITY, f64::max);
-        if !peak.is_finite() {
-            return Err(fewbits_core::Error::unlikely_or_no_number(peak, "the evidence of a model").into());
-        }
-        workspace
-            .probabilities
-            .iter_mut()
-            .for_each(|log| *log = (*log - peak).exp());
-        let total: f64 = workspace.probabilities.iter().sum();
-        workspace.probabilities.iter_mut().for_each(|p| *p /= total);
-        std::mem::swap(&mut belief.modes, &mut workspace.modes);
-        std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
-        Ok(ImmInfo {
-            log_likelihood: peak + total.ln(),
-        })
+        let log_likelihood = weigh(belief, workspace, |mode| {
+            let (next, info) = assumed_density::update_through(mode, observed)?;
+            Ok((next, info.log_likelihood))
+        })?;
+        Ok(ImmInfo { log_likelihood })
     }
 
     /// One slot: mixing, time update, measurement update.
@@ -299,6 +255,63 @@ impl<G> Imm<G> {
         let info = self.update_in_place(&mut next, observed, &mut workspace)?;
         Ok((next, info))
     }
+}
+
+/// Mixes the modes by `transition` (row by row) and moves each: `predict(j, mixed)` is the time update of model `j`.
+pub(crate) fn mix<const D: usize>(
+    belief: &mut ImmBelief<D>,
+    transition: &[f64],
+    workspace: &mut ImmWorkspace<D>,
+    mut predict: impl FnMut(usize, &Gaussian<D>) -> Result<Gaussian<D>, Error>,
+) -> Result<(), Error> {
+    let n = belief.modes.len();
+    workspace.modes.clear();
+    workspace.probabilities.clear();
+    for j in 0..n {
+        let joint = |i: usize| belief.probabilities[i] * transition[i * n + j];
+        let c: f64 = (0..n).map(joint).sum();
+        let mixed = if c > 0.0 {
+            moments((0..n).map(|i| (joint(i) / c, &belief.modes[i])))
+        } else {
+            belief.modes[j]
+        };
+        workspace.probabilities.push(c);
+        workspace.modes.push(predict(j, &mixed)?);
+    }
+    std::mem::swap(&mut belief.modes, &mut workspace.modes);
+    std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
+    Ok(())
+}
+
+/// Updates each mode and weighs it by its evidence; returns `ln p(observation | past)`. A mode under which the observation is impossible
+/// keeps its belief and loses its probability.
+pub(crate) fn weigh<const D: usize>(
+    belief: &mut ImmBelief<D>,
+    workspace: &mut ImmWorkspace<D>,
+    mut update: impl FnMut(&Gaussian<D>) -> Result<(Gaussian<D>, f64), Error>,
+) -> Result<f64, Error> {
+    workspace.modes.clear();
+    workspace.probabilities.clear();
+    for (mode, p) in belief.modes.iter().zip(&belief.probabilities) {
+        let (next, log_evidence) = match update(mode) {
+            Ok(updated) => updated,
+            Err(Error::Core(fewbits_core::Error::Impossible)) => (*mode, f64::NEG_INFINITY),
+            Err(error) => return Err(error),
+        };
+        workspace.modes.push(next);
+        workspace.probabilities.push(log_evidence + p.ln());
+    }
+    let logs = &mut workspace.probabilities;
+    let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !peak.is_finite() {
+        return Err(fewbits_core::Error::unlikely_or_no_number(peak, "the evidence of a model").into());
+    }
+    logs.iter_mut().for_each(|log| *log = (*log - peak).exp());
+    let total: f64 = logs.iter().sum();
+    logs.iter_mut().for_each(|p| *p /= total);
+    std::mem::swap(&mut belief.modes, &mut workspace.modes);
+    std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
+    Ok(peak + total.ln())
 }
 
 /// In a closed loop the models of the filter move the belief; the loop's own dynamics only move the world.

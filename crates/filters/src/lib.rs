@@ -10,11 +10,13 @@
 //! | linear Gaussian filtering of values | [`kalman`] (Joseph form), [`extended_kalman`] |
 //! | its steady state | [`scalar_steady_state`] (closed form, any message quality), [`steady_state`] (doubling) |
 //! | smoothing of Gaussian beliefs | [`smoother`] (Rauch-Tung-Striebel), [`FixedLagSmoother`] |
+//! | a Gaussian belief and any likelihood of a few coordinates | [`GridFilter`] (a grid that follows the posterior) |
 //! | any dynamics, any likelihood | [`ParticleFilter`] (bootstrap, guided, auxiliary), [`Resampling`] |
 //! | linear Gaussian state, any factor of scalars | [`RaoBlackwellised`] (measurements imputed, states exact) |
 //! | several models, one at a time | [`Imm`] (interacting multiple models, any factor) |
 //! | a bound for all of them | [`cramer_rao`] (posterior Cramer-Rao recursions) |
 //! | the exact answer | [`PointMassFilter`] (scalar filter and smoother on a grid), [`PlaneFilter`] (two dimensions) |
+//! | the receiver of many sensors: time, presence, health, learnt noise | [`centre::FusionCentre`], with any [`StateFilter`] |
 //! | world, sensors, link and filter in one call | [`ClosedLoop`] |
 //!
 //! All have one shape: `step(rng, model, belief, observation)` returns the next belief and an `info` whose `log_likelihood` is
@@ -36,14 +38,18 @@
 //! Not here: the schemes of any one paper, and time-varying models (pass another model at each step).
 
 pub mod assumed_density;
+pub mod centre;
 mod closed_loop;
+pub mod contract;
 pub mod cramer_rao;
 mod error;
 pub mod extended_kalman;
+mod grid_filter;
 mod guided;
 mod imm;
 pub mod kalman;
 mod moved;
+mod noise_bank;
 mod particle;
 mod plane;
 mod point_mass;
@@ -53,11 +59,14 @@ pub mod smoother;
 mod steady_state;
 
 pub use closed_loop::{AssumedDensity, ClosedLoop, Filter, LoopState, Slot};
+pub use contract::{BootstrapFilter, GridOnAxes, Info, MomentFilter, StateFilter, StateLikelihood};
 pub use error::Error;
 pub use fewbits_densities::{GaussianCloud, Grid, Particles, PlaneMass, PointMass};
+pub use grid_filter::{GridFilter, GridInfo, GridWorkspace, MIN_NODES_PER_DEVIATION};
 pub use guided::{OptimalProposal, TiltedProposal};
 
 pub use imm::{Imm, ImmBelief, ImmInfo, ImmWorkspace};
+pub use noise_bank::NoiseBank;
 pub use particle::{ParticleFilter, ParticleInfo, Proposal, Workspace};
 pub use plane::PlaneFilter;
 pub use point_mass::PointMassFilter;

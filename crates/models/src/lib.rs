@@ -15,6 +15,7 @@
 //! | scalar first-order autoregression | [`Ar1`] |
 //! | linear with Gaussian noise, any dimension | [`LinearGaussian`] |
 //! | white-noise acceleration on a line, in a plane | [`constant_velocity_1d`], [`constant_velocity_2d`] |
+//! | linear in continuous time: Ornstein-Uhlenbeck, nearly constant velocity and acceleration, random walk | [`ContinuousLinear`], over any time an [`AffineGaussian`] |
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
 //! | received amplitude that falls with distance | [`ReceivedPower`] |
 //! | a substance that diffuses through air, ground, vessels | [`diffusion`] |
@@ -37,6 +38,7 @@
 
 mod ar1;
 mod constant_velocity;
+mod continuous;
 pub mod diffusion;
 mod error;
 mod linear_gaussian;
@@ -46,6 +48,7 @@ mod source_model;
 
 pub use ar1::Ar1;
 pub use constant_velocity::{constant_velocity_1d, constant_velocity_2d};
+pub use continuous::{AffineGaussian, ContinuousLinear, PLANE_POSITION};
 pub use error::Error;
 pub use linear_gaussian::LinearGaussian;
 pub use linear_sensor::{LinearSensor, ScalarSensor};

@@ -5,7 +5,7 @@
 //! | [`normal`] | the standard normal distribution, exact in its tails and in narrow cells |
 //! | [`quadrature`] | Gauss-Legendre rules |
 //! | [`kernels`] | the same functions, sums and exponentials over whole columns, in vector registers |
-//! | [`linalg`], [`tridiagonal`] | square roots of singular covariances, tridiagonal systems |
+//! | [`linalg`], [`tridiagonal`], [`eigen`] | square roots of singular covariances, tridiagonal systems, eigenvalues |
 //! | [`roots`], [`binomial`] | roots inside a bracket, binomial coefficients |
 //! | [`stored!`] | how types with checking constructors are written and read |
 //! | [`error`] | the argument error all constructors share, and the checks that raise it |
@@ -22,6 +22,7 @@
 //! ```
 
 pub mod binomial;
+pub mod eigen;
 pub mod error;
 pub mod kernels;
 pub mod linalg;

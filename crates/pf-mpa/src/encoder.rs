@@ -6,12 +6,13 @@ use crate::factor::RangeFactor;
 use crate::sensor::RangeNoise;
 use crate::target::Target;
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, Message, NumberFormat, Observation, Scheme, Sensing,
+    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
+    Scheme, Sensing,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal;
 use fewbits_quantizers::{Labelling, Symbol};
-use nalgebra::Vector1;
+use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -201,11 +202,18 @@ impl QuantizedRange {
 }
 
 /// What a scheme reports.
-fn reported(error: Error) -> fewbits_core::Error {
+pub(crate) fn reported(error: Error) -> fewbits_core::Error {
     match error {
         Error::Argument(error) => error.into(),
         Error::Core(error) => error,
         other => ArgumentError::new("reference", other, "a reference of a quantized range").into(),
+    }
+}
+
+impl MeasurementNoise<1> for QuantizedRange {
+    fn noise_covariance_at(&self, range: &Vector1<f64>) -> Matrix1<f64> {
+        let deviation = self.noise.deviation(range[0]);
+        Matrix1::new(deviation * deviation)
     }
 }
 

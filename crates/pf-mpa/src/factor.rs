@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::sensor::RangeNoise;
 use fewbits_core::columns::lengths_agree;
-use fewbits_core::factor::{Factor, Feature, Tilted, tilted_by_quadrature};
+use fewbits_core::factor::{Factor, Feature, InCell, Tilted, Value, tilted_by_quadrature};
 use fewbits_core::{Cell, Columns, Gaussian};
 use fewbits_numerics::error::{finite, within};
 use fewbits_numerics::kernels::{scalar, vectorised};
@@ -288,6 +288,23 @@ impl Factor<1> for RangeFactor {
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, fewbits_core::Error> {
         if let Kind::Constant(p) = self.kind {
             return Tilted::unchanged(prior, p.ln());
+        }
+        // Noise that is the same at every distance has closed forms.
+        if self.noise.relative() == 0.0 {
+            let variance = self.noise.at_sensor() * self.noise.at_sensor();
+            match &self.kind {
+                Kind::Value(z) => return Value::scalar(*z, variance)?.tilted(prior),
+                Kind::Cell {
+                    lower,
+                    upper,
+                    log_share,
+                    ..
+                } => {
+                    let cell = Cell::new(*lower, *upper)?;
+                    return InCell::new(cell, variance, 0.0, log_share.exp())?.tilted(prior);
+                }
+                Kind::Levels { .. } | Kind::Constant(_) => {}
+            }
         }
         tilted_by_quadrature(prior, self.features(), |d, logs| self.add_log_likelihoods(&[d], logs))
     }

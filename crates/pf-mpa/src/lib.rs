@@ -7,7 +7,7 @@
 //! The central choice: **a level is a factor, in closed form** ([`RangeFactor`]), and not a ring of particles under kernels. What a
 //! level says about a position is `Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d))`, at the *hypothesised* distance `d`; whoever has it needs no
 //! kernel, no weights and no Jacobian. From it every filter of the library follows, and the recommended one, [`GridFilter`]: a
-//! Gaussian in, its product with all factors on 15 x 15 nodes, a Gaussian out, no random numbers. It is a third below Gaussian message
+//! Gaussian in, its product with all factors on a grid of 15 x 15 nodes that follows the posterior, a Gaussian out, no random numbers. It is a third below Gaussian message
 //! passing and improved particle message passing, at a tenth of the latter's cost. What it gives up is any belief that is no bell.
 //!
 //! | task | item |
@@ -16,6 +16,7 @@
 //! | how all nodes derive the same cells | [`Encoder`]: published, predicted, adaptive |
 //! | the target | [`Target`], [`WithManoeuvre`] |
 //! | the recommended tracker | [`GridFilter`] |
+//! | ranges of a recording: bias, outliers, missing anchors, unknown speed, acquisition | [`RangeTracker`] |
 //! | linearised: extended Kalman filters, Gaussian message passing | [`Linearised`] |
 //! | particles and draws | [`GuidedGaussian`], [`Bootstrap`], [`RaoBlackwellGuided`] |
 //! | Algorithm 6 | [`MessagePassing`], its [`ProductSampler`] |
@@ -61,6 +62,7 @@ mod message;
 mod message_passing;
 pub mod node;
 mod particle;
+mod recording;
 mod ring;
 mod sensor;
 mod target;
@@ -70,13 +72,14 @@ pub use bound::{CramerRao, level_information, position_information, range_inform
 pub use encoder::{Encoder, IntervalRule, Normalisation, QuantizedRange, RangeReference, optimal_loading};
 pub use error::Error;
 pub use factor::RangeFactor;
-pub use grid::{GridFilter, GridWorkspace};
+pub use fewbits_filters::{GridFilter, GridInfo, GridWorkspace};
 pub use guided::{GuidedGaussian, GuidedWorkspace};
 pub use labels::{LabelChain, ratio_second_moments};
 pub use linearised::{Linearised, QuantizationNoise, Velocity};
 pub use message::{KernelRule, ProductSampler, kernel_error};
 pub use message_passing::{DynamicsWeight, MessagePassing, MessageWorkspace, Ring, RingWeight};
 pub use particle::{Bootstrap, RaoBlackwellGuided, VelocityCloud, VelocityWorkspace};
+pub use recording::{RangeEstimate, RangeSettings, RangeTracker, Travel};
 pub use ring::RingBias;
 pub use sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
 pub use target::{AccelerationChain, Manoeuvres, Target, WithManoeuvre};

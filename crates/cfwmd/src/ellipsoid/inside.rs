@@ -3,6 +3,7 @@
 use super::outside;
 use super::quadrature::{Moments, log_mass, moments};
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::error::all_finite;
 use fewbits_numerics::linalg::symmetrised;
 use nalgebra::{SMatrix, SVector};
@@ -119,44 +120,10 @@ impl<const M: usize> GaussianInEllipsoid<M> {
     }
 }
 
-/// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi rotations: for the two or three dimensions of a
-/// measurement as fast as anything, exact in small eigenvalues, and free of the dimension arithmetic that nalgebra's own
-/// solver would impose on every caller.
-pub(crate) fn symmetric_eigen<const M: usize>(mut a: SMatrix<f64, M, M>) -> (SVector<f64, M>, SMatrix<f64, M, M>) {
-    let mut vectors = SMatrix::<f64, M, M>::identity();
-    for _sweep in 0..32 {
-        let mut off = 0.0;
-        for p in 0..M {
-            for q in p + 1..M {
-                let entry = a[(p, q)];
-                off += entry * entry;
-                if entry == 0.0 {
-                    continue;
-                }
-                let half = (a[(q, q)] - a[(p, p)]) / (2.0 * entry);
-                let tangent = half.signum() / (half.abs() + half.hypot(1.0));
-                let cosine = 1.0 / tangent.hypot(1.0);
-                let mut turn = SMatrix::<f64, M, M>::identity();
-                turn[(p, p)] = cosine;
-                turn[(q, q)] = cosine;
-                turn[(p, q)] = tangent * cosine;
-                turn[(q, p)] = -tangent * cosine;
-                a = turn.transpose() * a * turn;
-                a[(p, q)] = 0.0;
-                a[(q, p)] = 0.0;
-                vectors *= turn;
-            }
-        }
-        if off == 0.0 {
-            break;
-        }
-    }
-    (a.diagonal(), vectors)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::Ellipsoid;
+    use fewbits_numerics::eigen::symmetric_eigen;
     use fewbits_numerics::normal::log_interval;
     use nalgebra::{Matrix1, Matrix2, Matrix3, SMatrix, SVector, Vector1, Vector2, Vector3};
     use rand::RngExt;
@@ -391,7 +358,7 @@ mod tests {
     fn eigenvectors_are_orthonormal_and_put_the_matrix_together() {
         let a = Matrix3::new(2.0, 0.7, -1.1, 0.7, 1.3, 0.4, -1.1, 0.4, 3.1);
         for scale in [1e-150, 1.0, 1e150] {
-            let (values, vectors) = super::symmetric_eigen(a * scale);
+            let (values, vectors) = symmetric_eigen(a * scale);
             assert!((vectors.transpose() * vectors - Matrix3::identity()).amax() < 1e-14);
             let again = vectors * Matrix3::from_diagonal(&(values / scale)) * vectors.transpose();
             assert!((again - a).amax() < 1e-14, "{again}");

@@ -4,7 +4,6 @@ mod inside;
 mod outside;
 mod quadrature;
 
-pub(crate) use inside::symmetric_eigen;
 pub use inside::{EllipsoidMoments, GaussianInEllipsoid};
 
 use fewbits_numerics::ArgumentError;

@@ -3,10 +3,11 @@
 use super::{advance, check};
 use crate::Error;
 use crate::censored::Missing;
-use crate::ellipsoid::{EllipsoidMoments, symmetric_eigen};
+use crate::ellipsoid::EllipsoidMoments;
 use crate::network::{FusionInfo, Network};
 use crate::rule::{CensoringRule, OwnRecursion, OwnStep};
 use fewbits_core::{Gaussian, LinearDynamics, LinearSensing, Observation};
+use fewbits_numerics::eigen::symmetric_eigen;
 use fewbits_numerics::linalg::{semidefinite_factor, symmetrised};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{Cholesky, Const, DMatrix, DVector, Dyn, OMatrix, SMatrix, SVector};

@@ -3,6 +3,7 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used)]
 
+mod centre;
 mod fixtures;
 mod fusion;
 mod no_feedback;

@@ -12,12 +12,14 @@
 //! | a symbol through any discrete channel: a probability for each cell of a partition | [`Partition`] |
 //! | nothing that depends on `m` | [`Constant`] |
 //! | any of these | [`Scalar`] |
+//! | a factor of a report that may be an outlier | [`Robust`] |
 //! | several observations of one `m` | [`Product`], [`Repeated`] |
 
 mod cell;
 mod moments;
 mod partition;
 mod product;
+mod robust;
 mod scalar;
 mod value;
 
@@ -25,6 +27,7 @@ pub use cell::InCell;
 pub use moments::{Feature, tilted_by_quadrature};
 pub use partition::Partition;
 pub use product::{Product, Repeated};
+pub use robust::Robust;
 pub use scalar::{Constant, Scalar};
 pub use value::Value;
 

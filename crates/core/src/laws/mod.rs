@@ -5,6 +5,7 @@
 
 pub mod belief;
 pub mod dynamics;
+pub mod evolution;
 pub mod factor;
 pub mod likelihood;
 pub mod message;

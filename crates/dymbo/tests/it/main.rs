@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod centre;
 mod fixtures;
 mod laws;
 mod wild;

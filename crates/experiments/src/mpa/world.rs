@@ -210,7 +210,7 @@ impl Method {
         let all = (world, network, target);
         match self {
             Self::Linear(l, _) => go(Ok(*l), all, reports, stream),
-            Self::Grid(n) => go(GridFilter::new(*n), all, reports, stream),
+            Self::Grid(n) => go(GridFilter::new(*n).map_err(Into::into), all, reports, stream),
             Self::Guided(n) => go(GuidedGaussian::new(*n), all, reports, stream),
             Self::Bootstrap(n, _) => go(Bootstrap::new(*n), all, reports, stream),
             Self::RaoBlackwell(n) => go(RaoBlackwellGuided::new(*n), all, reports, stream),

@@ -107,8 +107,8 @@ fn a_failed_step_leaves_the_belief_as_it_was() {
     }
     // A known position has no grid.
     let known = Gaussian::known(Vector4::zeros()).unwrap();
-    let grid = GridFilter::default().update(&known, observed.as_slice(), &mut GridWorkspace::<2>::default());
-    assert!(matches!(grid, Err(Error::Argument(_))));
+    let grid = GridFilter::default().update(&known, [0, 1], observed.as_slice(), &mut GridWorkspace::default());
+    assert!(matches!(grid, Err(fewbits_filters::Error::Argument(_))));
 }
 
 #[test]

@@ -211,10 +211,10 @@ fn one_step(entry: &Value) {
     let found = |nodes: usize, reach: f64| {
         let filter = GridFilter::new(nodes).unwrap().with_reach(reach).unwrap();
         let observed = observed.as_slice();
-        let (belief, evidence) = filter
-            .update(&predicted, observed, &mut GridWorkspace::<2>::default())
+        let (belief, info) = filter
+            .update(&predicted, [0, 1], observed, &mut GridWorkspace::default())
             .unwrap();
-        let mut found = vec![evidence];
+        let mut found = vec![info.log_likelihood];
         found.extend(belief.mean().iter());
         found.extend(belief.covariance().iter());
         found
@@ -340,13 +340,10 @@ fn one(entry: &Value) {
             check(entry, &run(&Linearised::MESSAGE_PASSING_TRANSFER, input, Reports::Levels));
         }
         ["run", _, "ADF"] => {
-            // The other program's grid: the same value to rounding, beyond the tolerance of its resolution.
-            let found = run(&GridFilter::new(501).unwrap(), input, Reports::Levels);
-            for (e, f) in numbers(&entry["value"]).iter().zip(&found) {
-                assert!((e - f).abs() < 1e-10, "{id}: {f} instead of {e}");
+            // The other program's grid ends at 4 deviations of the prediction, too: part of the definition of its numbers.
+            for nodes in [401, 501] {
+                check(entry, &run(&GridFilter::new(nodes).unwrap(), input, Reports::Levels));
             }
-            let coarser = run(&GridFilter::new(401).unwrap(), input, Reports::Levels);
-            check(entry, &coarser);
         }
         ["bits", ..] => {
             let format = NumberFormat::Single;

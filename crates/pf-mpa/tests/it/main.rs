@@ -5,5 +5,6 @@
 mod allocation;
 mod attacks;
 mod fixtures;
+mod grid;
 mod laws;
 mod recording;

@@ -1,0 +1,94 @@
+//! Reports that may have nothing to do with the measurement.
+
+use super::{Factor, Tilted};
+use crate::columns::Columns;
+use crate::error::Error;
+use crate::gaussian::Gaussian;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::within;
+use nalgebra::SVector;
+
+/// `(1 - e) p(observation | m) + e c`: with probability `e` the report is an outlier, whose probability (density) is `c` wherever `m` is.
+///
+/// Its posterior is the mixture of the factor's own and of the prior, so that evidence and moments are as exact as the factor's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Robust<F> {
+    /// What the report says if it is none.
+    pub factor: F,
+    log_genuine: f64,
+    log_outlier: f64,
+}
+
+impl<F> Robust<F> {
+    /// `share` is the probability `e` of an outlier, `density` what it has on average: the probability of a word, the density of a value.
+    ///
+    /// # Errors
+    /// If the share is outside `[0, 1)`, or the density is negative or not finite.
+    pub fn new(factor: F, share: f64, density: f64) -> Result<Self, ArgumentError> {
+        within("share", share, 0.0, 1.0 - f64::EPSILON)?;
+        fewbits_numerics::error::non_negative("density", density)?;
+        Ok(Self {
+            factor,
+            log_genuine: (-share).ln_1p(),
+            log_outlier: share.ln() + density.ln(),
+        })
+    }
+
+    /// `ln` of the mixture, from the factor's own logarithm.
+    #[inline]
+    fn mixed(&self, log: f64) -> f64 {
+        let own = log + self.log_genuine;
+        // A likelihood that is no number must not raise a weight.
+        if own.is_nan() {
+            return f64::NEG_INFINITY;
+        }
+        let (high, low) = if own > self.log_outlier {
+            (own, self.log_outlier)
+        } else {
+            (self.log_outlier, own)
+        };
+        if low == f64::NEG_INFINITY {
+            high
+        } else {
+            high + (low - high).exp().ln_1p()
+        }
+    }
+}
+
+impl<const M: usize, F: Factor<M>> Factor<M> for Robust<F> {
+    fn log_likelihood(&self, m: &SVector<f64, M>) -> f64 {
+        self.mixed(self.factor.log_likelihood(m))
+    }
+
+    fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
+        const BLOCK: usize = 256;
+        let mut own = [0.0; BLOCK];
+        for (block, log_weights) in log_weights.chunks_mut(BLOCK).enumerate() {
+            let (start, own) = (block * BLOCK, &mut own[..log_weights.len()]);
+            own.fill(0.0);
+            let here: Columns<'_, M> = means.map(|column| &column[start..start + own.len()]);
+            self.factor.add_log_likelihoods(&here, own);
+            for (log_weight, own) in log_weights.iter_mut().zip(&*own) {
+                *log_weight += self.mixed(*own);
+            }
+        }
+    }
+
+    fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
+        let own = match self.factor.tilted(prior) {
+            Ok(own) => own,
+            Err(Error::Impossible) => return Tilted::unchanged(prior, self.log_outlier),
+            Err(error) => return Err(error),
+        };
+        let log_evidence = self.mixed(own.log_evidence);
+        let share = (own.log_evidence + self.log_genuine - log_evidence).exp();
+        let offset = own.mean - prior.mean();
+        Ok(Tilted {
+            log_evidence,
+            mean: prior.mean() + offset * share,
+            covariance: own.covariance * share
+                + prior.covariance() * (1.0 - share)
+                + offset * offset.transpose() * (share * (1.0 - share)),
+        })
+    }
+}

@@ -1,0 +1,114 @@
+//! The scheme that saves nothing: every measurement travels as a number.
+
+use crate::error::Error;
+use crate::factor::{Factor, Tilted, Value};
+use crate::gaussian::Gaussian;
+use crate::measurement_noise::MeasurementNoise;
+use crate::number::NumberFormat;
+use crate::observation::{Link, Observation};
+use crate::scheme::Scheme;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{finite, positive, within};
+use nalgebra::{Matrix1, SVector, Vector1};
+use rand::Rng;
+
+/// A sensor that sends its scalar measurement in 64 or 32 bits: what a Kalman filter receives.
+///
+/// Rounding to 32 bits is not part of the noise. A value wants a checksum: over a link that inverts bits it has no factor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FullValue {
+    noise_variance: f64,
+    format: NumberFormat,
+}
+
+/// What a sensor that always sends its value says: the value, which arrived with some probability, or a constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SentValue {
+    value: Option<Value<1>>,
+    log_probability: f64,
+}
+
+impl FullValue {
+    /// A sensor with this noise variance, whose values travel in 64 bits.
+    ///
+    /// # Errors
+    /// If the variance is not above 0.
+    pub fn new(noise_variance: f64) -> Result<Self, ArgumentError> {
+        Ok(Self {
+            noise_variance: positive("noise_variance", noise_variance)?,
+            format: NumberFormat::Double,
+        })
+    }
+
+    /// The same with values of 32 bits.
+    #[must_use]
+    pub fn in_single_precision(self) -> Self {
+        Self {
+            format: NumberFormat::Single,
+            ..self
+        }
+    }
+}
+
+impl MeasurementNoise<1> for FullValue {
+    fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+        Matrix1::new(self.noise_variance)
+    }
+}
+
+impl Factor<1> for SentValue {
+    fn log_likelihood(&self, m: &SVector<f64, 1>) -> f64 {
+        self.log_probability + self.value.map_or(0.0, |value| value.log_likelihood(m))
+    }
+
+    fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
+        let Some(value) = self.value else {
+            return Tilted::unchanged(prior, self.log_probability);
+        };
+        let own = value.tilted(prior)?;
+        Ok(Tilted {
+            log_evidence: own.log_evidence + self.log_probability,
+            ..own
+        })
+    }
+}
+
+impl Scheme<1> for FullValue {
+    type State = ();
+    type Feedback = ();
+    type Report = f64;
+    type Factor = SentValue;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) {}
+
+    fn report_format(&self) -> NumberFormat {
+        self.format
+    }
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        (): &(),
+    ) -> Result<Option<f64>, Error> {
+        Ok(Some(self.format.rounded(finite("measurement", measurement[0])?)?))
+    }
+
+    fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {
+        let (value, probability) = match observation {
+            Observation::Received(value) => {
+                within("crossover", link.crossover(), 0.0, 0.0)?;
+                finite("report", *value)?;
+                (Some(Value::scalar(*value, self.noise_variance)?), link.of_received()?)
+            }
+            Observation::Nothing | Observation::Lost => (None, link.delivery(observation)),
+        };
+        Ok(SentValue {
+            value,
+            log_probability: probability.ln(),
+        })
+    }
+}

@@ -1,0 +1,76 @@
+//! A sensing model told which coordinates of a larger state it reads.
+
+use crate::columns::{Columns, ColumnsMut};
+use crate::sensing::Sensing;
+use fewbits_numerics::ArgumentError;
+use nalgebra::{SMatrix, SVector};
+use rand::Rng;
+
+/// Sensing of `K` coordinates as sensing of a state of `D`: the model's coordinate `k` is coordinate `axes[k]` of the state.
+///
+/// Models keep their coordinates in different orders: `[x, vx, y, vy]` or `[x, y, vx, vy]`. A model of sensing that reads a position
+/// does not know where the state has it, so it is said here, once, and checked.
+///
+/// Law: `mean`, `jacobian` and noise are those of the model at `[state[axes[0]], .., state[axes[K-1]]]`; the Jacobian is zero elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnAxes<S, const D: usize, const K: usize> {
+    sensing: S,
+    axes: [usize; K],
+}
+
+impl<S, const D: usize, const K: usize> OnAxes<S, D, K> {
+    /// `sensing` of the coordinates `axes` of a state of `D`, in the order in which the model reads them.
+    ///
+    /// # Errors
+    /// If an axis is not below `D`, or is named twice.
+    pub fn new(sensing: S, axes: [usize; K]) -> Result<Self, ArgumentError> {
+        let twice = (0..K).any(|k| axes[..k].contains(&axes[k]));
+        if twice || axes.iter().any(|axis| *axis >= D) {
+            let expected = format!("different coordinates below {D}");
+            return Err(ArgumentError::new("axes", format!("{axes:?}"), expected));
+        }
+        Ok(Self { sensing, axes })
+    }
+
+    /// The model of the `K` coordinates.
+    pub fn sensing(&self) -> &S {
+        &self.sensing
+    }
+
+    /// The coordinates of the state that it reads.
+    pub fn axes(&self) -> &[usize; K] {
+        &self.axes
+    }
+
+    fn read(&self, state: &SVector<f64, D>) -> SVector<f64, K> {
+        SVector::from_fn(|k, _| state[self.axes[k]])
+    }
+}
+
+impl<S: Sensing<K, M>, const D: usize, const K: usize, const M: usize> Sensing<D, M> for OnAxes<S, D, K> {
+    #[inline]
+    fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, M> {
+        self.sensing.mean(&self.read(state))
+    }
+
+    fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, M, D> {
+        let own = self.sensing.jacobian(&self.read(state));
+        let mut jacobian = SMatrix::<f64, M, D>::zeros();
+        for (k, axis) in self.axes.iter().enumerate() {
+            jacobian.set_column(*axis, &own.column(k));
+        }
+        jacobian
+    }
+
+    fn noise_covariance_at(&self, state: &SVector<f64, D>) -> SMatrix<f64, M, M> {
+        self.sensing.noise_covariance_at(&self.read(state))
+    }
+
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M> {
+        self.sensing.sample(rng, &self.read(state))
+    }
+
+    fn mean_columns(&self, states: &Columns<'_, D>, means: ColumnsMut<'_, M>) {
+        self.sensing.mean_columns(&self.axes.map(|axis| states[axis]), means);
+    }
+}

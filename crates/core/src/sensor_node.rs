@@ -1,0 +1,69 @@
+//! The sensor's half of a scheme over bits: what runs on the sensor.
+
+use crate::bits::BitString;
+use crate::error::Error;
+use crate::message::Message;
+use crate::scheme::Scheme;
+use fewbits_numerics::ArgumentError;
+use nalgebra::SVector;
+use rand::Rng;
+
+/// A sensor as it sees itself: a measurement and the feedback's bits in, a report's bits or silence out. It needs no belief and no
+/// model of the world. Object-safe, so that sensors of any kind stand in one list.
+///
+/// Any [`Scheme`] has one: [`SchemeNode`].
+pub trait SensorNode<const M: usize> {
+    /// What the sensor sends in this slot. `None` is silence: zero bits on air. `rng` is drawn from by randomised schemes only.
+    ///
+    /// # Errors
+    /// If the measurement is not finite or the bits are no feedback of the scheme; the sensor's memory is then as it was.
+    fn report(
+        &mut self,
+        rng: &mut dyn Rng,
+        measurement: &SVector<f64, M>,
+        feedback: &BitString,
+    ) -> Result<Option<BitString>, Error>;
+}
+
+/// The sensor's half of a scheme, with its memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SchemeNode<C: Scheme<M>, const M: usize> {
+    scheme: C,
+    memory: C::State,
+}
+
+impl<C: Scheme<M>, const M: usize> SchemeNode<C, M> {
+    /// A sensor before its first measurement.
+    pub fn new(scheme: C) -> Self {
+        let memory = scheme.start();
+        Self { scheme, memory }
+    }
+
+    /// What the sensor remembers.
+    pub fn memory(&self) -> &C::State {
+        &self.memory
+    }
+
+    /// The same sensor with a memory that was stored.
+    #[must_use]
+    pub fn with_memory(self, memory: C::State) -> Self {
+        Self { memory, ..self }
+    }
+}
+
+impl<C: Scheme<M>, const M: usize> SensorNode<M> for SchemeNode<C, M> {
+    fn report(
+        &mut self,
+        rng: &mut dyn Rng,
+        measurement: &SVector<f64, M>,
+        feedback: &BitString,
+    ) -> Result<Option<BitString>, Error> {
+        let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), feedback)
+            .map_err(|error| ArgumentError::new("feedback", error, "the bits of a feedback of this scheme"))?;
+        let report = self.scheme.encode(rng, &mut self.memory, measurement, &feedback)?;
+        let bits = report.map(|report| report.to_bits(&self.scheme.report_format()));
+        Ok(bits
+            .transpose()
+            .map_err(|error| ArgumentError::new("report", error, "a report that fits its format"))?)
+    }
+}

@@ -1,0 +1,182 @@
+//! Whether the model still holds, from the receiver's own evidence.
+//!
+//! Under a right model three sequences have mean 0 and variance 1 given the past, for every sensor:
+//!
+//! | sequence | what moves it |
+//! |---|---|
+//! | surprise: how far `ln p(o)` is below its mean, over its deviation over what could have come; for values `(NIS - 1) / sqrt 2` | noise or process noise wrong, outliers |
+//! | residual: what the observation says of the innovation, over its deviation | a biased sensor, a start that is off |
+//! | product of neighbouring residuals of one sensor | process noise too small (it repeats) or too large (it alternates), a lost track |
+//!
+//! A bit at the prediction has no surprise at all: both of its outcomes have probability 1/2. What tells there is the product.
+//! Each sequence feeds a two-sided cumulative sum. Silence is no residual; it is tested by [presence](super::presence).
+
+use crate::Error;
+use fewbits_numerics::error::within;
+use serde::{Deserialize, Serialize};
+
+/// Drift of the cumulative sums: shifts of half a deviation are found fastest.
+const DRIFT: f64 = 0.25;
+/// A term counts at most this much, so that one outlier is no alarm.
+const CLIP: f64 = 3.0;
+/// Sequences of a sensor.
+pub(super) const SEQUENCES: usize = 3;
+
+/// One observation's place in its predicted law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Residual {
+    pub surprise: f64,
+    pub residual: f64,
+}
+
+impl Residual {
+    /// Of a word, from `(ln p, correction)` of every word that could have come; the received one at `at`. `None` if there is no choice.
+    pub fn of_word(words: &[(f64, f64)], at: usize) -> Option<Self> {
+        let total: f64 = words.iter().map(|w| w.0.exp()).sum();
+        let shares = || {
+            words
+                .iter()
+                .map(|(log, correction)| (log.exp() / total, *log, *correction))
+        };
+        let mean = shares().map(|(p, _, c)| p * c).sum::<f64>();
+        let variance = shares().map(|(p, _, c)| p * (c - mean) * (c - mean)).sum::<f64>();
+        let log_mean = shares().filter(|s| s.0 > 0.0).map(|(p, log, _)| p * log).sum::<f64>();
+        let log_variance = shares()
+            .filter(|s| s.0 > 0.0)
+            .map(|(p, log, _)| p * (log - log_mean) * (log - log_mean))
+            .sum::<f64>();
+        let (log, correction) = *words.get(at)?;
+        let residual = (correction - mean) / variance.sqrt();
+        // Words of equal probability have no surprise.
+        let surprise = if log_variance > 1e-6 {
+            (log_mean - log) / log_variance.sqrt()
+        } else {
+            0.0
+        };
+        (residual.is_finite() && surprise.is_finite()).then_some(Self { surprise, residual })
+    }
+
+    /// Of a value, from `ln` of its density, the variance of the innovation, and the sign of the correction.
+    pub fn of_value(log_density: f64, variance: f64, correction: f64) -> Option<Self> {
+        let nis = (-2.0 * log_density - (std::f64::consts::TAU * variance).ln()).max(0.0);
+        let residual = nis.sqrt().copysign(correction);
+        let surprise = (nis - 1.0) * std::f64::consts::FRAC_1_SQRT_2;
+        (residual.is_finite() && surprise.is_finite()).then_some(Self { surprise, residual })
+    }
+}
+
+/// A two-sided cumulative sum.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Cusum {
+    up: f64,
+    down: f64,
+}
+
+impl Cusum {
+    /// Adds a term of mean 0 and variance 1; which sum crosses `limit`, if any. Both then start anew.
+    pub fn add(&mut self, term: f64, limit: f64) -> Option<Direction> {
+        let term = term.clamp(-CLIP, CLIP);
+        self.up = (self.up + term - DRIFT).max(0.0);
+        self.down = (self.down - term - DRIFT).max(0.0);
+        let direction = if self.up > limit {
+            Direction::Up
+        } else if self.down > limit {
+            Direction::Down
+        } else {
+            return None;
+        };
+        *self = Self::default();
+        Some(direction)
+    }
+}
+
+/// Which sum crossed its limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Direction {
+    Up,
+    Down,
+}
+
+/// What the three sequences together say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Alarm {
+    /// Observations are less likely than they should be, residuals have a mean, or they repeat.
+    Contradiction,
+    /// Observations are likelier than they should be, or residuals alternate: a noise is overstated.
+    Overstatement,
+}
+
+/// The limit at which a two-sided sum of standard normal terms raises one alarm in `1 / rate` steps (Siegmund's approximation:
+/// `(exp(2 k b) - 2 k b - 1) / (2 k^2)` steps on one side, `b` the limit plus 1.166).
+pub(super) fn limit(rate: f64) -> f64 {
+    let steps = 2.0 / rate;
+    let run = |b: f64| ((2.0 * DRIFT * b).exp_m1() - 2.0 * DRIFT * b) / (2.0 * DRIFT * DRIFT);
+    let (mut low, mut high) = (0.0, 400.0);
+    for _ in 0..60 {
+        let middle: f64 = 0.5 * (low + high);
+        if run(middle) < steps {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (low - 1.166).max(0.5)
+}
+
+/// How often healthy sensors and a healthy centre may raise an alarm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FalseAlarms {
+    /// Alarms per observation of one sensor.
+    pub sensor: f64,
+    /// Alarms of the whole per instant.
+    pub centre: f64,
+}
+
+impl Default for FalseAlarms {
+    /// One in 10,000 observations of a sensor, one in 1000 instants of the centre.
+    fn default() -> Self {
+        Self {
+            sensor: 1e-4,
+            centre: 1e-3,
+        }
+    }
+}
+
+impl FalseAlarms {
+    pub(super) fn check(&self) -> Result<(), Error> {
+        within("sensor", self.sensor, 1e-9, 0.1)?;
+        within("centre", self.centre, 1e-9, 0.1)?;
+        Ok(())
+    }
+}
+
+/// The three sequences of one sensor, or of all.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Monitor {
+    sums: [Cusum; SEQUENCES],
+}
+
+impl Monitor {
+    /// Adds one term to each sequence that has one: surprise, residual, product.
+    pub fn add(&mut self, terms: [Option<f64>; SEQUENCES], limit: f64) -> Option<Alarm> {
+        let mut alarm = None;
+        for (i, (sum, term)) in self.sums.iter_mut().zip(terms).enumerate() {
+            let crossed = term.and_then(|term| sum.add(term, limit));
+            let meaning = match crossed {
+                None => continue,
+                Some(Direction::Down) if i != 1 => Alarm::Overstatement,
+                Some(_) => Alarm::Contradiction,
+            };
+            if alarm != Some(Alarm::Contradiction) {
+                alarm = Some(meaning);
+            }
+        }
+        if alarm.is_some() {
+            *self = Self::default();
+        }
+        alarm
+    }
+}

@@ -1,0 +1,189 @@
+//! A sensor as its receiver sees it: bits in, likelihoods out.
+
+use crate::Error;
+use crate::contract::StateLikelihood;
+use fewbits_core::{BitString, Gaussian, Link, MeasurementNoise, Message, Observation, Observed, Scheme, Sensing};
+use fewbits_numerics::error::{ArgumentError, within};
+use fewbits_numerics::linalg::congruence;
+use nalgebra::SMatrix;
+
+/// The receiver's half of a sensor. Object-safe, so that sensors of any kind stand in one list.
+///
+/// Any [`Scheme`] and [`Sensing`] make one: [`Reporting`].
+pub trait RemoteSensor<const D: usize> {
+    /// What the sensor is told before it measures, from the predicted belief.
+    ///
+    /// # Errors
+    /// If the belief gives no feedback that fits its format, or sensing and scheme suppose different noise.
+    fn feedback(&self, predicted: &Gaussian<D>) -> Result<BitString, Error>;
+
+    /// What an observation of it says, given the feedback as it travelled. `working` is the probability that the sensor works at all: a
+    /// dead sensor is silent, too.
+    ///
+    /// # Errors
+    /// If the feedback does not decode, `working` is outside `[0, 1]`, or the scheme refuses the report.
+    fn likelihood(
+        &self,
+        feedback: &BitString,
+        observation: &Observation<BitString>,
+        working: f64,
+    ) -> Result<Box<dyn StateLikelihood<D>>, Error>;
+
+    /// Variance of a scalar measurement under the prediction, noise included, if the sensor sends every measurement as a value.
+    /// `None` for words, vectors and sensors that may be silent.
+    fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64>;
+
+    /// Probability that a report arrives that was sent.
+    fn arrival(&self) -> f64;
+}
+
+impl<const D: usize> RemoteSensor<D> for Box<dyn RemoteSensor<D>> {
+    fn feedback(&self, predicted: &Gaussian<D>) -> Result<BitString, Error> {
+        (**self).feedback(predicted)
+    }
+
+    fn likelihood(
+        &self,
+        feedback: &BitString,
+        observation: &Observation<BitString>,
+        working: f64,
+    ) -> Result<Box<dyn StateLikelihood<D>>, Error> {
+        (**self).likelihood(feedback, observation, working)
+    }
+
+    fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64> {
+        (**self).value_variance(predicted)
+    }
+
+    fn arrival(&self) -> f64 {
+        (**self).arrival()
+    }
+}
+
+/// Both ends' knowledge of a sensor that reports by a [`Scheme`]: how it senses, what it reports, over which link, and what it is told.
+///
+/// `ask` turns the predicted state and the predicted measurement `N(h(m), H P H' + R)` into the scheme's feedback.
+#[derive(Debug, Clone)]
+pub struct Reporting<S, C, A, const M: usize> {
+    sensing: S,
+    scheme: C,
+    link: Link,
+    ask: A,
+    sends_values: bool,
+}
+
+/// Relative difference of the noise of sensing and scheme that counts as rounding.
+const NOISE_TOLERANCE: f64 = 1e-9;
+
+impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
+    /// A sensor of words, bits or silences.
+    pub fn new(sensing: S, scheme: C, link: Link, ask: A) -> Self {
+        Self {
+            sensing,
+            scheme,
+            link,
+            ask,
+            sends_values: false,
+        }
+    }
+
+    /// The same for a scheme that sends every measurement as a value: its health is judged by normalised innovations.
+    #[must_use]
+    pub fn sending_values(self) -> Self {
+        Self {
+            sends_values: true,
+            ..self
+        }
+    }
+
+    /// The sensor's half: its scheme.
+    pub fn scheme(&self) -> &C {
+        &self.scheme
+    }
+
+    /// How it senses.
+    pub fn sensing(&self) -> &S {
+        &self.sensing
+    }
+}
+
+impl<S, const D: usize> Reporting<S, fewbits_core::FullValue, fn(&Gaussian<D>, &Gaussian<1>), 1> {
+    /// A sensor that sends every measurement as a value: no feedback, no scheme to choose.
+    pub fn values(sensing: S, scheme: fewbits_core::FullValue, link: Link) -> Self {
+        Self::new(sensing, scheme, link, (|_, _| ()) as fn(&Gaussian<D>, &Gaussian<1>)).sending_values()
+    }
+}
+
+impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
+    fn predicted<const D: usize>(&self, predicted: &Gaussian<D>) -> Result<Gaussian<M>, Error>
+    where
+        S: Sensing<D, M>,
+        C: MeasurementNoise<M>,
+    {
+        let mean = self.sensing.mean(predicted.mean());
+        let (sensed, supposed) =
+            (self.sensing.noise_covariance_at(predicted.mean()), self.scheme.noise_covariance_at(&mean));
+        let scale = sensed.diagonal().map(f64::sqrt);
+        let off =
+            |i: usize, j: usize| (sensed[(i, j)] - supposed[(i, j)]).abs() > NOISE_TOLERANCE * scale[i] * scale[j];
+        if (0..M).any(|i| (0..M).any(|j| off(i, j))) {
+            let expected = format!("the noise covariance of the sensing model, {:?}", sensed.as_slice());
+            return Err(
+                ArgumentError::new("noise", format!("{:?} in the scheme", supposed.as_slice()), expected).into()
+            );
+        }
+        let jacobian: SMatrix<f64, M, D> = self.sensing.jacobian(predicted.mean());
+        Ok(Gaussian::from_trusted_parts(mean, congruence(&jacobian, predicted.covariance()) + supposed))
+    }
+}
+
+impl<const D: usize, const M: usize, S, C, A> RemoteSensor<D> for Reporting<S, C, A, M>
+where
+    S: Sensing<D, M> + Clone + 'static,
+    C: Scheme<M> + MeasurementNoise<M>,
+    C::Factor: 'static,
+    A: Fn(&Gaussian<D>, &Gaussian<M>) -> C::Feedback,
+{
+    fn feedback(&self, predicted: &Gaussian<D>) -> Result<BitString, Error> {
+        let measurement = self.predicted(predicted)?;
+        Ok((self.ask)(predicted, &measurement).to_bits(&self.scheme.feedback_format())?)
+    }
+
+    fn likelihood(
+        &self,
+        feedback: &BitString,
+        observation: &Observation<BitString>,
+        working: f64,
+    ) -> Result<Box<dyn StateLikelihood<D>>, Error> {
+        let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), feedback)?;
+        let observation = match observation {
+            // Bits that are no report of the scheme: sent, and not understood.
+            Observation::Received(bits) => C::Report::from_bits(&self.scheme.report_format(), bits)
+                .map_or(Observation::Lost, Observation::Received),
+            Observation::Nothing => Observation::Nothing,
+            Observation::Lost => Observation::Lost,
+        };
+        let factor = self
+            .scheme
+            .factor(&feedback, &observation, &supposed(&self.link, working)?)?;
+        Ok(Box::new(Observed::new(self.sensing.clone(), factor)))
+    }
+
+    fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64> {
+        let measurement = self.predicted(predicted).ok().filter(|_| self.sends_values && M == 1)?;
+        Some(measurement.covariance()[(0, 0)])
+    }
+
+    fn arrival(&self) -> f64 {
+        self.link.arrival()
+    }
+}
+
+/// A sensor that works with probability `working` is one whose reports are lost more often without a trace:
+/// `1 - (1 - loss) working`. A known loss needs a sensor that works.
+fn supposed(link: &Link, working: f64) -> Result<Link, Error> {
+    within("working", working, 0.0, 1.0)?;
+    let loss = 1.0 - (1.0 - link.loss()) * working;
+    let erasure = (link.erasure() * working).min(1.0 - loss);
+    Ok(Link::new(loss, link.crossover())?.with_erasure(erasure)?)
+}

@@ -1,0 +1,107 @@
+//! Process noise learnt from evidence: a bank of filters that differ in its scale.
+
+use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
+use crate::imm::{ImmWorkspace, mix, weigh};
+use crate::{Error, ImmBelief};
+use fewbits_core::Gaussian;
+use fewbits_numerics::error::{at_least_one, positive, within};
+use rand::Rng;
+
+/// A bank of filters whose models differ in the scale of their process noise, weighed by evidence and mixed as in
+/// [`Imm`](crate::Imm).
+///
+/// ```text
+/// predict:  w <- (1 - e) w + e / M, beliefs mixed; filter j moves with its own scale of the noise
+/// update:   each filter takes in the observations; w_j times its evidence, normalised
+/// ```
+/// `e` is how often the scale may change: with 0 the bank settles on one scale for good. Words of 2 bits and more tell the scale by
+/// evidence; single bits at the prediction do not (use [`NoiseLearning`](crate::centre::NoiseLearning)).
+#[derive(Debug, Clone)]
+pub struct NoiseBank<const D: usize, F> {
+    filter: F,
+    scales: Vec<f64>,
+    transition: Vec<f64>,
+    workspace: ImmWorkspace<D>,
+}
+
+impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> NoiseBank<D, F> {
+    /// A bank of `filter` at these scales of the process-noise covariance; the scale changes with probability `switching` in each step.
+    ///
+    /// # Errors
+    /// If there is no scale, one is not above 0, or `switching` is outside `[0, 1]`.
+    pub fn new(filter: F, scales: Vec<f64>, switching: f64) -> Result<Self, Error> {
+        at_least_one("scales", scales.len())?;
+        for scale in &scales {
+            positive("scales", *scale)?;
+        }
+        within("switching", switching, 0.0, 1.0)?;
+        let n = scales.len();
+        let entry = |at: usize| {
+            let stays = if at / n == at % n { 1.0 - switching } else { 0.0 };
+            stays + switching / n as f64
+        };
+        Ok(Self {
+            filter,
+            transition: (0..n * n).map(entry).collect(),
+            scales,
+            workspace: ImmWorkspace::default(),
+        })
+    }
+
+    /// Scales of the process noise, in the order of the belief's modes.
+    pub fn scales(&self) -> &[f64] {
+        &self.scales
+    }
+
+    /// The scale as the belief has it: the geometric mean under the modes' probabilities.
+    pub fn scale(&self, belief: &ImmBelief<D>) -> f64 {
+        let pairs = self.scales.iter().zip(belief.probabilities());
+        pairs.map(|(scale, p)| p * scale.ln()).sum::<f64>().exp()
+    }
+}
+
+impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for NoiseBank<D, F> {
+    type Belief = ImmBelief<D>;
+
+    fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<ImmBelief<D>, Error> {
+        Ok(ImmBelief::agreed(&self.filter.start(rng, prior)?, self.scales.len())?)
+    }
+
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        motion: &dyn Motion<D>,
+        noise_scale: f64,
+        belief: &mut ImmBelief<D>,
+    ) -> Result<(), Error> {
+        let Self {
+            filter,
+            scales,
+            transition,
+            workspace,
+        } = self;
+        mix(belief, transition, workspace, |j, mixed| {
+            let mut moved = *mixed;
+            filter.predict(rng, motion, noise_scale * scales[j], &mut moved)?;
+            Ok(moved)
+        })
+    }
+
+    fn update(
+        &mut self,
+        rng: &mut dyn Rng,
+        belief: &mut ImmBelief<D>,
+        observed: &[Box<dyn StateLikelihood<D>>],
+    ) -> Result<Info, Error> {
+        let Self { filter, workspace, .. } = self;
+        let log_likelihood = weigh(belief, workspace, |mode| {
+            let mut next = *mode;
+            let info = filter.update(rng, &mut next, observed)?;
+            Ok((next, info.log_likelihood))
+        })?;
+        Ok(Info {
+            log_likelihood,
+            effective_sample_size: None,
+        })
+    }
+}
