@@ -120,7 +120,13 @@ impl<M: SourceModel> Record<M> {
         let downwind = homogeneous.wind.try_normalize(0.0).unwrap_or_else(Vector2::x);
         let table = |end: f64, width: f64| {
             Profile::new(end, width, |distance| {
-                let rho = distance.max(homogeneous.closest);
+                // With a height between them sensor and source are never closest: a kink would spoil the first panel.
+                let apart = self.sensor.drop() > 0.0;
+                let rho = if apart {
+                    distance
+                } else {
+                    distance.max(homogeneous.closest)
+                };
                 let [a, b] = self.sums_by_model(&(-downwind * rho));
                 let r = rho.hypot(self.sensor.drop());
                 [r * r * a, r * b]
