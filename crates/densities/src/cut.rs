@@ -132,7 +132,8 @@ impl Cut {
 /// Splits the worst node again and again while at most `components` nodes result, and returns the best cut on the way
 /// (Algorithm 1 with errata: the budget is tested before the split is made, and the weight stands inside the maximum).
 ///
-/// The bound is not monotone under splitting, so the best cut may have fewer nodes than allowed.
+/// The bound is not monotone under splitting, so the best cut may have fewer nodes than allowed. Where every leaf is allowed, all
+/// leaves are returned: their error is 0.
 ///
 /// # Errors
 /// If `components` is 0 or the errors are not of this tree.
@@ -142,7 +143,7 @@ pub fn greedy<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: u
 }
 
 /// [`greedy`] with an additive price per node (a code length in bits, say) and a limit on the total. Children together must
-/// cost more than their parent.
+/// cost more than their parent. Where the leaves together are within the limit, they are the answer.
 ///
 /// # Errors
 /// If the root alone is above the limit, or the errors are not of this tree.
@@ -156,6 +157,11 @@ pub fn greedy_within<const D: usize>(
     let mut total = price(ROOT);
     if !matches!(total.partial_cmp(&limit), Some(std::cmp::Ordering::Less | std::cmp::Ordering::Equal)) {
         return Err(ArgumentError::new("limit", limit, format!("at least {total}, the price of the root")).into());
+    }
+    // Plug-in errors of inner nodes may be 0 or below by chance: a stop at the worst node would come too early.
+    let leaves = leaves(tree);
+    if leaves.nodes.iter().map(|leaf| price(*leaf)).sum::<f64>() <= limit {
+        return Ok(leaves);
     }
     let mut cut = vec![ROOT];
     let mut best = Cut {
@@ -190,7 +196,8 @@ pub fn greedy_within<const D: usize>(
 }
 
 /// The cut of smallest bound among all with at most `components` nodes, by dynamic programming from the leaves up:
-/// `B(s, m) = min(e(s), min_a B(s_L, a) (+ or max) B(s_R, m - a))`. `O(n m^2)`.
+/// `B(s, m) = min(e(s), min_a B(s_L, a) (+ or max) B(s_R, m - a))`. `O(n m^2)`. Where every leaf is allowed, all leaves are
+/// returned.
 ///
 /// # Errors
 /// If `components` is 0 or the errors are not of this tree.
@@ -198,6 +205,9 @@ pub fn optimal<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: 
     at_least_one("components", components)?;
     check(tree, errors)?;
     let nodes = tree.nodes();
+    if components >= nodes[ROOT].range.len() {
+        return Ok(leaves(tree));
+    }
     // For each node: the best bound with at most 1, 2, ... nodes, and how many of them go to the left child (0: no split).
     let mut tables: Vec<Vec<(f64, usize)>> = vec![Vec::new(); nodes.len()];
     for (index, node) in nodes.iter().enumerate().rev() {
@@ -241,6 +251,17 @@ pub fn optimal<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: 
         bound: errors.bound(&cut),
         nodes: cut,
     })
+}
+
+/// The cut of all leaves, left to right: the estimate itself.
+fn leaves<const D: usize>(tree: &Tree<D>) -> Cut {
+    let nodes = tree.nodes();
+    let mut leaves: Vec<usize> = (0..nodes.len()).filter(|s| nodes[*s].children.is_none()).collect();
+    leaves.sort_by_key(|s| nodes[*s].range.start);
+    Cut {
+        nodes: leaves,
+        bound: 0.0,
+    }
 }
 
 fn check<const D: usize>(tree: &Tree<D>, errors: &NodeErrors) -> Result<(), Error> {

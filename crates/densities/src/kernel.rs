@@ -134,7 +134,8 @@ impl<const D: usize> KernelEstimate<D> {
         );
     }
 
-    /// `ln p` at every centre. Half the kernels of [`log_pdf_columns`](Self::log_pdf_columns): they are symmetric.
+    /// `ln p` at every centre, exact in the tails: a centre of weight zero may be far from all others. Half the kernels of
+    /// [`log_pdf_columns`](Self::log_pdf_columns): they are symmetric.
     pub fn log_pdf_at_centres(&self) -> Vec<f64> {
         let weights = self.particles.weights();
         let mut sums = weights.to_vec();
@@ -159,7 +160,14 @@ impl<const D: usize> KernelEstimate<D> {
             start = end;
         }
         let offset = self.factor.half_log_det + D as f64 * LN_SQRT_2PI;
-        sums.iter().map(|s| s.ln() - offset).collect()
+        let log = |(i, sum): (usize, &f64)| {
+            if *sum > TINY {
+                sum.ln() - offset
+            } else {
+                log_far_sum(&white, weights, &std::array::from_fn(|d| white[d][i])) - offset
+            }
+        };
+        sums.iter().enumerate().map(log).collect()
     }
 
     /// The same density as a mixture, one component per particle of positive weight.

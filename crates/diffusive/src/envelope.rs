@@ -1,22 +1,27 @@
 //! Where the concentration exceeds a threshold, with the certainty that the belief gives.
 
 use crate::posterior::Posterior;
-use crate::{Error, RateModel, SourceLikelihood};
-use fewbits_models::diffusion::{Air, Ground, ImpulseResponse};
+use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
+use fewbits_models::diffusion::Air;
+use fewbits_models::{Homogeneous, Receptor, SourceModel};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{finite, positive, within};
+use fewbits_numerics::error::{all_finite, finite, positive, within};
 use fewbits_numerics::normal::interval;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 
 /// Cells that stand for the posterior; more add nothing to quantiles.
 const MOST: usize = 1500;
 /// Bisections of a quantile.
 const BISECTIONS: usize = 60;
 
-/// A posterior over position and rate, asked about concentrations on impermeable ground.
+/// Distances at which the highest concentration along a ray is looked for, and steps of its refinement.
+const DISTANCES: usize = 128;
+const REFINEMENTS: usize = 80;
+
+/// A posterior over position and rate, asked about concentrations at the height of the sensors, in their medium.
 #[derive(Debug, Clone)]
-pub struct Envelope {
-    air: Air,
+pub struct Envelope<M = Air> {
+    sensor: SourceSensor<M>,
     points: Vec<Point>,
 }
 
@@ -65,17 +70,16 @@ impl Rate {
     }
 }
 
-impl Envelope {
+impl<M: SourceModel + Clone> Envelope<M> {
     /// The envelope of a posterior; `likelihood` holds the records that it was formed from, and what was assumed of the rate.
     ///
     /// # Errors
     /// If the rate was redrawn for each node or sample: it then has no posterior.
-    pub fn new(posterior: &Posterior, likelihood: &SourceLikelihood) -> Result<Self, Error> {
+    pub fn new(posterior: &Posterior, likelihood: &SourceLikelihood<M>) -> Result<Self, Error> {
         let sensor = likelihood.records().first().map(|r| r.sensor().clone());
         let Some(sensor) = sensor else {
             return Err(ArgumentError::new("records", "empty", "at least one").into());
         };
-        let air = Air::new(sensor.air().diffusivity(), *sensor.air().wind(), Ground::Impermeable)?;
         let [x, y] = posterior.cells.columns();
         let weights = posterior.cells.weights();
         // Cells at equal steps of the cumulative weight, along the order in which the cells were split: near ones stand together.
@@ -119,70 +123,73 @@ impl Envelope {
                 rate,
             });
         }
-        Ok(Self { air, points })
+        Ok(Self { sensor, points })
     }
 
-    /// `P(c > threshold)` (kg/m^3) at a place on the ground, `age` seconds after the release began: the posterior average of the
-    /// probability that the rate exceeds what that concentration takes.
+    /// The same at another height above the ground, m.
     ///
     /// # Errors
-    /// If `threshold` is not a positive number.
+    /// If it is negative or not finite.
+    pub fn at_height(self, height: f64) -> Result<Self, Error> {
+        Ok(Self {
+            sensor: self.sensor.clone().with_heights(self.sensor.source_height(), height)?,
+            ..self
+        })
+    }
+
+    /// `P(c > threshold)` (kg/m^3) at a place, `age` seconds after the release began: the posterior average of the probability that
+    /// the rate exceeds what that concentration takes.
+    ///
+    /// # Errors
+    /// If `threshold` is not a positive number, `age` is NaN, or the model has no concentrations at the place.
     pub fn exceedance(&self, place: &Vector2<f64>, age: f64, threshold: f64) -> Result<f64, Error> {
         positive("threshold", threshold)?;
-        let field = Vector3::new(place.x, place.y, 0.0);
+        number("age", age)?;
+        let receptor = self.sensor.receptor(place)?;
         let at = |p: &Point| {
-            let response = self
-                .air
-                .concentration(&field, &Vector3::new(p.position.x, p.position.y, 0.0), age);
-            p.weight
-                * if response > 0.0 {
-                    p.rate.exceeds(threshold / response)
-                } else {
-                    0.0
-                }
+            let source = self.sensor.source_at(&p.position);
+            p.exceeds(self.sensor.model().concentration(&receptor, &source, age), threshold)
         };
         Ok(self.points.iter().map(at).sum())
     }
 
     /// Quantile of how far the area above the threshold reaches from `origin` along the direction (radians from the x axis), m:
-    /// of `(source - origin) . e + R`, with `R` the distance along `e` from the source at which the threshold is crossed.
+    /// of `(source - origin) . e + R`, with `R` the largest distance along `e` from the source at which the threshold is exceeded.
+    /// `None` if it is exceeded nowhere on that ray with probability `level` or more.
     ///
     /// # Errors
-    /// If `threshold` is not a positive number, `angle` is not finite or `level` is outside `[0, 1]`.
-    pub fn reach(&self, origin: &Vector2<f64>, angle: f64, age: f64, threshold: f64, level: f64) -> Result<f64, Error> {
+    /// If `threshold` is not a positive number, `angle` is not finite, `age` is NaN, `level` is outside `[0, 1]`, or
+    /// [`Error::NotHomogeneous`].
+    pub fn reach(
+        &self,
+        origin: &Vector2<f64>,
+        angle: f64,
+        age: f64,
+        threshold: f64,
+        level: f64,
+    ) -> Result<Option<f64>, Error> {
         positive("threshold", threshold)?;
         finite("angle", angle)?;
+        number("age", age)?;
         within("level", level, 0.0, 1.0)?;
+        all_finite("origin", origin.as_slice())?;
+        let Some(medium) = self.sensor.model().homogeneous() else {
+            return Err(Error::NotHomogeneous);
+        };
         let ray = Vector2::new(angle.cos(), angle.sin());
-        let start = Vector3::zeros();
-        // Beyond `reach` with probability: sum of those whose threshold is crossed farther out.
+        let along = |p: &Point| (p.position - origin).dot(&ray);
+        let widest = self.widest(&medium, threshold);
+        let along_ray = AlongRay::new(&self.sensor, &ray, age, widest)?;
+        // Beyond `reach` with probability: sum of those whose threshold is exceeded at or beyond it.
         let beyond = |reach: f64| -> f64 {
-            let at = |p: &Point| {
-                let radius = reach - (p.position - origin).dot(&ray);
-                if radius <= 0.0 {
-                    return p.weight;
-                }
-                let response = self
-                    .air
-                    .concentration(&Vector3::new(ray.x * radius, ray.y * radius, 0.0), &start, age);
-                p.weight
-                    * if response > 0.0 {
-                        p.rate.exceeds(threshold / response)
-                    } else {
-                        0.0
-                    }
-            };
+            let at = |p: &Point| p.exceeds(along_ray.highest_beyond(reach - along(p)), threshold);
             self.points.iter().map(at).sum()
         };
-        let along = |p: &Point| (p.position - origin).dot(&ray);
         let mut low = self.points.iter().map(along).fold(f64::INFINITY, f64::min);
-        let farthest = self.points.iter().map(along).fold(f64::NEG_INFINITY, f64::max);
-        let largest = self.points.iter().map(|p| match p.rate {
-            Rate::Known(rate) => rate,
-            Rate::Cut { high, .. } => high,
-        });
-        let widest = largest.fold(0.0, f64::max) / (std::f64::consts::TAU * self.air.diffusivity() * threshold);
-        let mut high = farthest + widest;
+        let mut high = self.points.iter().map(along).fold(f64::NEG_INFINITY, f64::max) + widest;
+        if beyond(low) <= 1.0 - level {
+            return Ok(None);
+        }
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
             if beyond(middle) > 1.0 - level {
@@ -194,6 +201,99 @@ impl Envelope {
                 break;
             }
         }
-        Ok(0.5 * (low + high))
+        Ok(Some(0.5 * (low + high)))
     }
+
+    /// No concentration exceeds the threshold farther from the source: in the steady state over impermeable ground it is
+    /// `mu / (2 pi kappa R)`.
+    fn widest(&self, medium: &Homogeneous, threshold: f64) -> f64 {
+        let largest = self.points.iter().map(|p| match p.rate {
+            Rate::Known(rate) => rate,
+            Rate::Cut { high, .. } => high,
+        });
+        largest.fold(0.0, f64::max) / (std::f64::consts::TAU * medium.diffusivity * threshold)
+    }
+}
+
+impl Point {
+    /// Share of this point's weight with which the rate makes a concentration per unit rate exceed the threshold.
+    fn exceeds(&self, response: f64, threshold: f64) -> f64 {
+        if response > 0.0 {
+            self.weight * self.rate.exceeds(threshold / response)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Concentration per unit rate along a horizontal ray from the source.
+struct AlongRay<'a, M> {
+    sensor: &'a SourceSensor<M>,
+    receptor: Receptor,
+    ray: &'a Vector2<f64>,
+    age: f64,
+    /// Where it is highest, and how high. At the source unless sensor and source stand at different heights: a plume comes down.
+    peak: (f64, f64),
+}
+
+impl<'a, M: SourceModel> AlongRay<'a, M> {
+    fn new(sensor: &'a SourceSensor<M>, ray: &'a Vector2<f64>, age: f64, widest: f64) -> Result<Self, Error> {
+        let mut along = Self {
+            receptor: sensor.receptor(&Vector2::zeros())?,
+            sensor,
+            ray,
+            age,
+            peak: (0.0, 0.0),
+        };
+        along.peak = (0.0, along.at(0.0));
+        if sensor.drop() == 0.0 {
+            return Ok(along);
+        }
+        // Distances in even ratios over six decades; then the golden section between the neighbours of the best.
+        let distance = |i: usize| widest * 1e-6_f64.powf(1.0 - i as f64 / (DISTANCES - 1) as f64);
+        let mut best = 0;
+        for i in 0..DISTANCES {
+            let value = along.at(distance(i));
+            if value > along.peak.1 {
+                (best, along.peak) = (i, (distance(i), value));
+            }
+        }
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let (mut low, mut high) = (distance(best.saturating_sub(1)), distance((best + 1).min(DISTANCES - 1)));
+        for _ in 0..REFINEMENTS {
+            let (left, right) = (high - golden * (high - low), low + golden * (high - low));
+            if along.at(left) > along.at(right) {
+                high = right
+            } else {
+                low = left
+            }
+        }
+        let value = along.at(0.5 * (low + high));
+        if value > along.peak.1 {
+            along.peak = (0.5 * (low + high), value);
+        }
+        Ok(along)
+    }
+
+    fn at(&self, radius: f64) -> f64 {
+        let source = self.sensor.source_at(&(self.ray * -radius));
+        self.sensor.model().concentration(&self.receptor, &source, self.age)
+    }
+
+    /// The highest concentration at this distance from the source or farther.
+    fn highest_beyond(&self, radius: f64) -> f64 {
+        if radius <= self.peak.0 {
+            self.peak.1
+        } else {
+            self.at(radius)
+        }
+    }
+}
+
+/// Any number, infinities included.
+fn number(name: &'static str, value: f64) -> Result<f64, ArgumentError> {
+    if value.is_nan() {
+        return Err(ArgumentError::new(name, value, "a number"));
+    }
+    Ok(value)
 }

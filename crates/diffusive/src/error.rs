@@ -18,5 +18,11 @@ fewbits_numerics::errors! {
             /// Start of the release, s.
             start: f64,
         },
+        /// The diffusivity was to be unknown, but the model has not one diffusivity.
+        #[error("the model has not one diffusivity that could change: expected a model with `diffusivity_slope`")]
+        NoDiffusivity,
+        /// Concentrations were asked for everywhere along a ray, but the model has them only at its receptors.
+        #[error("the model changes along the ground: expected one that is homogeneous")]
+        NotHomogeneous,
     }
 }

@@ -1,6 +1,7 @@
 //! How much the samples of a node would tell: mutual information, bounds of it, and Fisher information.
 
 use crate::{Error, SourceSensor};
+use fewbits_models::{Receptor, SourceModel};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, probabilities};
 use fewbits_numerics::quadrature::gauss_legendre;
@@ -172,16 +173,28 @@ pub(crate) fn half_log_det_plus_one(m: DMatrix<f64>) -> f64 {
 
 /// Fisher information that the samples of a node hold about (x, y, rate) of a source at `source` with release rate `rate`:
 /// `sum_j grad(mu a_j) grad(mu a_j)' / sigma^2`.
-pub fn fisher_information(
-    sensor: &SourceSensor,
+///
+/// # Errors
+/// If the model has no concentrations at `node`.
+pub fn fisher_information<M: SourceModel>(
+    sensor: &SourceSensor<M>,
     node: &Vector2<f64>,
+    source: &Vector2<f64>,
+    rate: f64,
+) -> Result<Matrix3<f64>, Error> {
+    Ok(information_at(sensor, &sensor.receptor(node)?, source, rate))
+}
+
+pub(crate) fn information_at<M: SourceModel>(
+    sensor: &SourceSensor<M>,
+    receptor: &Receptor,
     source: &Vector2<f64>,
     rate: f64,
 ) -> Matrix3<f64> {
     let mut information = Matrix3::zeros();
     for j in 0..sensor.instants().len() {
-        let (a, gradient) = sensor.response_gradient(j, node, source);
-        let slope = Vector3::new(rate * gradient.x, rate * gradient.y, a) / sensor.noise();
+        let at = sensor.response_gradient_at(j, receptor, source);
+        let slope = Vector3::new(rate * at.gradient.x, rate * at.gradient.y, at.value) / sensor.noise();
         information += slope * slope.transpose();
     }
     information
@@ -204,53 +217,47 @@ pub enum Unknown {
     Bias,
 }
 
-/// Fisher information that nodes together hold about any of the parameters, by central differences of relative step 1e-5 where no
-/// closed form is at hand.
+/// Fisher information that nodes together hold about any of the parameters, in the order of `unknowns`. The start is differenced
+/// with a step of 1e-5 of the shortest age.
 ///
 /// # Errors
-/// If a perturbed sensor cannot be formed.
-pub fn fisher_information_of(
+/// If the model has no concentrations at a node, or [`Error::NoDiffusivity`].
+pub fn fisher_information_of<M: SourceModel + Clone>(
     unknowns: &[Unknown],
-    sensor: &SourceSensor,
+    sensor: &SourceSensor<M>,
     nodes: &[Vector2<f64>],
     source: &Vector2<f64>,
     rate: f64,
 ) -> Result<DMatrix<f64>, Error> {
-    use fewbits_models::diffusion::{Air, Ground, ImpulseResponse};
-    let step = 1e-5;
-    let diffusivity = sensor.air().diffusivity();
-    let shortest = sensor
-        .instants()
-        .iter()
-        .map(|t| t - sensor.start())
-        .filter(|age| *age > 0.0)
-        .fold(f64::INFINITY, f64::min);
-    let with_diffusivity = |k: f64| -> Result<SourceSensor, Error> {
-        let air = Air::new(k, *sensor.air().wind(), Ground::Impermeable)?;
-        SourceSensor::new(air, sensor.instants().to_vec(), sensor.noise())?.with_start(sensor.start())
-    };
-    let slower = with_diffusivity(diffusivity * (1.0 - step))?;
-    let faster = with_diffusivity(diffusivity * (1.0 + step))?;
-    let earlier = sensor.clone().with_start(sensor.start() - step * shortest)?;
-    let later = sensor.clone().with_start(sensor.start() + step * shortest)?;
+    let step = 1e-5 * sensor.shortest_age();
+    let earlier = sensor.clone().with_start(sensor.start() - step)?;
+    let later = sensor.clone().with_start(sensor.start() + step)?;
+    let place = sensor.source_at(source);
     let mut information = DMatrix::zeros(unknowns.len(), unknowns.len());
     for node in nodes {
-        let moved = [slower.responses(node, source), faster.responses(node, source)];
-        let shifted = [earlier.responses(node, source), later.responses(node, source)];
-        for j in 0..sensor.instants().len() {
-            let (a, gradient) = sensor.response_gradient(j, node, source);
-            let slope = DVector::from_iterator(
-                unknowns.len(),
-                unknowns.iter().map(|unknown| match unknown {
-                    Unknown::X => rate * gradient.x,
-                    Unknown::Y => rate * gradient.y,
-                    Unknown::Rate => a,
-                    Unknown::Diffusivity => rate * (moved[1][j] - moved[0][j]) / (2.0 * step * diffusivity),
-                    Unknown::Start => rate * (shifted[1][j] - shifted[0][j]) / (2.0 * step * shortest),
+        let receptor = sensor.receptor(node)?;
+        let shifted = [
+            earlier.responses_at(&receptor, source),
+            later.responses_at(&receptor, source),
+        ];
+        for (j, age) in sensor.ages().iter().enumerate() {
+            let at = sensor.response_gradient_at(j, &receptor, source);
+            let slope = |unknown: &Unknown| {
+                Ok(match unknown {
+                    Unknown::X => rate * at.gradient.x,
+                    Unknown::Y => rate * at.gradient.y,
+                    Unknown::Rate => at.value,
+                    Unknown::Diffusivity => {
+                        let slope = sensor.model().diffusivity_slope(&receptor, &place, *age);
+                        rate * slope.ok_or(Error::NoDiffusivity)?
+                    }
+                    Unknown::Start => rate * (shifted[1][j] - shifted[0][j]) / (2.0 * step),
                     Unknown::Bias => 1.0,
-                }),
-            ) / sensor.noise();
-            information += &slope * slope.transpose();
+                } / sensor.noise())
+            };
+            let slopes = unknowns.iter().map(slope).collect::<Result<Vec<f64>, Error>>()?;
+            let slopes = DVector::from_vec(slopes);
+            information += &slopes * slopes.transpose();
         }
     }
     Ok(information)

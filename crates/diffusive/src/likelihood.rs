@@ -3,22 +3,24 @@
 use crate::rate::{Intervals, RateModel, RateSums};
 use crate::{Error, Record};
 use fewbits_core::{Columns, Likelihood};
+use fewbits_models::SourceModel;
+use fewbits_models::diffusion::Air;
 use fewbits_numerics::ArgumentError;
 use nalgebra::{SVector, Vector2};
 
 /// `ln p(samples of all nodes | position)` under a model of the release rate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SourceLikelihood {
-    records: Vec<Record>,
+pub struct SourceLikelihood<M = Air> {
+    records: Vec<Record<M>>,
     rate: RateModel,
 }
 
-impl SourceLikelihood {
+impl<M: SourceModel> SourceLikelihood<M> {
     /// The likelihood of the given records.
     ///
     /// # Errors
     /// If there is none, or a known rate is not positive.
-    pub fn new(records: Vec<Record>, rate: RateModel) -> Result<Self, Error> {
+    pub fn new(records: Vec<Record<M>>, rate: RateModel) -> Result<Self, Error> {
         rate.check()?;
         if records.is_empty() {
             return Err(ArgumentError::new("records", "empty", "at least one").into());
@@ -27,7 +29,7 @@ impl SourceLikelihood {
     }
 
     /// The records.
-    pub fn records(&self) -> &[Record] {
+    pub fn records(&self) -> &[Record<M>] {
         &self.records
     }
 
@@ -44,6 +46,48 @@ impl SourceLikelihood {
             .fold(RateSums::default(), |sum, record| sum.plus(&record.sums(position)))
     }
 
+    /// Whether a source can be in the square of the given half width about `position`.
+    pub(crate) fn admits(&self, position: &Vector2<f64>, half_width: f64) -> bool {
+        self.records
+            .iter()
+            .all(|record| record.sensor().admits(position, half_width))
+    }
+
+    /// Whether [`admits`](Self::admits) depends on the position.
+    pub(crate) fn has_walls(&self) -> bool {
+        self.records
+            .iter()
+            .any(|record| record.sensor().homogeneous().is_none())
+    }
+
+    /// Expected sum over all samples of the squared residual over the noise variance, with the source at `position`, over the rate
+    /// given the position and these records.
+    pub fn chi_squared(&self, position: &Vector2<f64>) -> f64 {
+        let sums = || self.records.iter().map(|record| record.sums(position));
+        match &self.rate {
+            RateModel::Known(rate) => sums().map(|sums| sums.chi_squared((*rate, 0.0))).sum(),
+            RateModel::Joint(range) => {
+                let sums = self.sums(position);
+                sums.chi_squared(sums.rate_given_position(range))
+            }
+            RateModel::NodeWise(range) => sums()
+                .map(|sums| sums.chi_squared(sums.rate_given_position(range)))
+                .sum(),
+            RateModel::SampleWise(range) => {
+                let each = self
+                    .records
+                    .iter()
+                    .map(|record| record.chi_squared_sample_wise(position, range));
+                each.sum()
+            }
+        }
+    }
+
+    /// Number of samples of all records.
+    pub fn samples(&self) -> usize {
+        self.records.iter().map(|record| record.samples().len()).sum()
+    }
+
     /// Over a run of cells of the given half width: writes the log likelihood blurred over each cell to `blurred`. Where that plus
     /// `priors` exceeds `floor`, or the largest of them less `dropped`, writes the log likelihood itself to `logs`; elsewhere the
     /// blurred one stands for both.
@@ -57,6 +101,7 @@ impl SourceLikelihood {
     ) {
         let at = |i: usize| Vector2::new(centres[0][i], centres[1][i]);
         let mut intervals = [Intervals::default(), Intervals::default()];
+        let largest = self.rate.largest();
         logs.fill(0.0);
         blurred.fill(0.0);
         if let RateModel::Joint(range) = &self.rate {
@@ -64,7 +109,7 @@ impl SourceLikelihood {
             for i in 0..logs.len() {
                 let mut less = RateSums::default();
                 for record in &self.records {
-                    let (sums, share) = record.blurred_sums(&at(i), half_width);
+                    let (sums, share) = record.blurred_sums(&at(i), half_width, largest);
                     // The normalisation of the noise is not discounted: it would favour cells where the response is steep.
                     less = less.plus(&sums.discounted(share));
                     all[i] = all[i].plus(&sums);
@@ -95,7 +140,7 @@ impl SourceLikelihood {
             let [plain_cuts, blurred_cuts] = &mut intervals;
             for i in 0..logs.len() {
                 let position = at(i);
-                let (sums, share) = record.blurred_sums(&position, half_width);
+                let (sums, share) = record.blurred_sums(&position, half_width, largest);
                 let less = sums.discounted(share);
                 match &self.rate {
                     RateModel::Known(rate) => {
@@ -124,8 +169,11 @@ impl SourceLikelihood {
     }
 }
 
-impl Likelihood<2> for SourceLikelihood {
+impl<M: SourceModel> Likelihood<2> for SourceLikelihood<M> {
     fn log_likelihood(&self, position: &SVector<f64, 2>) -> f64 {
+        if !self.admits(position, 0.0) {
+            return f64::NEG_INFINITY;
+        }
         match &self.rate {
             RateModel::Known(rate) => self.sums(position).log_given_rate(*rate),
             RateModel::Joint(range) => self.sums(position).log_marginal(range),
@@ -137,20 +185,23 @@ impl Likelihood<2> for SourceLikelihood {
 
 /// `ln p(samples | position, rate)`: the state is (x, y, rate).
 #[derive(Debug, Clone, PartialEq)]
-pub struct RateLikelihood {
-    records: Vec<Record>,
+pub struct RateLikelihood<M = Air> {
+    records: Vec<Record<M>>,
 }
 
-impl RateLikelihood {
+impl<M: SourceModel> RateLikelihood<M> {
     /// The likelihood of the given records.
-    pub fn new(records: Vec<Record>) -> Self {
+    pub fn new(records: Vec<Record<M>>) -> Self {
         Self { records }
     }
 }
 
-impl Likelihood<3> for RateLikelihood {
+impl<M: SourceModel> Likelihood<3> for RateLikelihood<M> {
     fn log_likelihood(&self, state: &SVector<f64, 3>) -> f64 {
         let position = Vector2::new(state[0], state[1]);
+        if !self.records.iter().all(|record| record.sensor().admits(&position, 0.0)) {
+            return f64::NEG_INFINITY;
+        }
         self.records
             .iter()
             .map(|record| record.sums(&position).log_given_rate(state[2]))

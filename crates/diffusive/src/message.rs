@@ -1,12 +1,14 @@
 //! What travels, as bits.
 
 use crate::belief::{JointBelief, PositionBelief};
+use crate::fit::Fit;
 use crate::project::{Travelling, lpg_scalars};
 use crate::{Error, Record};
 use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
 use fewbits_densities::{Component, Lpg, Mixture};
+use fewbits_models::SourceModel;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::within;
+use fewbits_numerics::error::{non_negative, within};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +68,7 @@ impl Wire {
     ///
     /// # Errors
     /// As [`Wire::sample_format`].
-    pub fn quantised(&self, record: Record) -> Result<Record, Error> {
+    pub fn quantised<M: SourceModel + Clone>(&self, record: Record<M>) -> Result<Record<M>, Error> {
         let Some(code) = self.samples else { return Ok(record) };
         let format = self.sample_format(record.noise())?;
         let samples = record
@@ -99,6 +101,10 @@ pub enum Packet {
         with_rate: bool,
         /// The numbers.
         numbers: Vec<f64>,
+        /// The sum of squared residuals so far, in single precision.
+        chi_squared: f64,
+        /// The samples in that sum.
+        samples: usize,
     },
 }
 
@@ -106,25 +112,29 @@ pub enum Packet {
 const COUNT_BITS: u32 = 5;
 /// The most records of a message.
 const RECORD_COUNT_BITS: u32 = 10;
+/// Samples of all nodes so far fit into this many bits; more are sent as the most.
+const SAMPLE_COUNT_BITS: u32 = 16;
 
 impl Packet {
-    /// The message that carries a belief, or all records if there is none.
+    /// The message of raw records: the nodes' indices and samples.
+    pub fn raw<M: SourceModel>(records: &[Record<M>], nodes: &[usize]) -> Self {
+        Self::Raw {
+            records: nodes
+                .iter()
+                .zip(records)
+                .map(|(node, r)| (*node, r.samples().to_vec()))
+                .collect(),
+            noise: records.first().map_or(1.0, |r| r.sensor().noise()),
+        }
+    }
+
+    /// The message that carries a belief and how the samples fitted so far.
     ///
     /// # Errors
     /// If a number does not fit the format.
-    pub fn new(belief: Option<&Travelling>, records: &[Record], nodes: &[usize], wire: &Wire) -> Result<Self, Error> {
+    pub fn belief_of(belief: &Travelling, fit: &Fit, wire: &Wire) -> Result<Self, Error> {
         let round = |numbers: Vec<f64>| -> Result<Vec<f64>, ArgumentError> {
             numbers.into_iter().map(|x| wire.numbers.rounded(x)).collect()
-        };
-        let Some(belief) = belief else {
-            return Ok(Self::Raw {
-                records: nodes
-                    .iter()
-                    .zip(records)
-                    .map(|(node, r)| (*node, r.samples().to_vec()))
-                    .collect(),
-                noise: records.first().map_or(1.0, |r| r.sensor().noise()),
-            });
         };
         let (components, degree, numbers) = match belief {
             Travelling::Position(PositionBelief::Mixture(mixture)) => numbers_of(mixture.components()),
@@ -137,29 +147,39 @@ impl Packet {
             degree,
             with_rate: matches!(belief, Travelling::WithRate(_)),
             numbers: round(numbers)?,
+            // A sum beyond single precision is refused as well as the largest number is.
+            chi_squared: NumberFormat::Single.rounded(fit.chi_squared.min(f64::from(f32::MAX)))?,
+            samples: fit.samples.min((1 << SAMPLE_COUNT_BITS) - 1),
         })
     }
 
-    /// The belief that a packet of numbers holds; `None` for raw records.
+    /// The belief that a packet of numbers holds, and the fit so far; `None` for raw records.
     ///
     /// # Errors
     /// If the numbers are no belief.
-    pub fn belief(&self) -> Result<Option<Travelling>, Error> {
+    pub fn belief(&self) -> Result<Option<(Travelling, Fit)>, Error> {
         let Self::Belief {
             components,
             degree,
             with_rate,
             numbers,
+            chi_squared,
+            samples,
         } = self
         else {
             return Ok(None);
         };
-        Ok(Some(match (*with_rate, *degree) {
+        let belief = match (*with_rate, *degree) {
             (false, None) => Travelling::Position(PositionBelief::Mixture(mixture_of(*components, numbers)?)),
             (false, Some(degree)) => Travelling::Position(PositionBelief::Lpg(lpg_of(*components, degree, numbers)?)),
             (true, None) => Travelling::WithRate(JointBelief::Mixture(mixture_of(*components, numbers)?)),
             (true, Some(degree)) => Travelling::WithRate(JointBelief::Lpg(lpg_of(*components, degree, numbers)?)),
-        }))
+        };
+        let fit = Fit {
+            chi_squared: non_negative("chi_squared", *chi_squared)?,
+            samples: *samples,
+        };
+        Ok(Some((belief, fit)))
     }
 
     /// Length of the message in bits.
@@ -206,7 +226,7 @@ impl Message for Packet {
     type Format = Contract;
 
     /// One bit for the kind. Raw: the number of records (10 bits), and of each its index and samples. Belief: components and degree
-    /// (5 bits each, 31 for none), one bit for the rate, and the numbers.
+    /// (5 bits each, 31 for none), one bit for the rate, the numbers, and the fit so far (32 bits for the sum, 16 for the samples).
     fn encode(&self, format: &Contract, writer: &mut BitWriter) -> Result<(), CodecError> {
         match self {
             Self::Raw { records, .. } => {
@@ -225,6 +245,8 @@ impl Message for Packet {
                 degree,
                 with_rate,
                 numbers,
+                chi_squared,
+                samples,
             } => {
                 writer.write_bit(true);
                 writer.write(*components as u64, COUNT_BITS)?;
@@ -233,6 +255,8 @@ impl Message for Packet {
                 for number in numbers {
                     format.wire.numbers.write(*number, writer)?;
                 }
+                NumberFormat::Single.write(*chi_squared, writer)?;
+                writer.write(*samples as u64, SAMPLE_COUNT_BITS)?;
             }
         }
         Ok(())
@@ -271,6 +295,8 @@ impl Message for Packet {
             degree,
             with_rate,
             numbers,
+            chi_squared: NumberFormat::Single.read(reader)?,
+            samples: reader.read(SAMPLE_COUNT_BITS)? as usize,
         })
     }
 }

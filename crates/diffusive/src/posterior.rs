@@ -1,10 +1,12 @@
 //! The exact posterior of one update, over cells.
 
 use crate::belief::{Prior, SearchBox};
+use crate::fit::Fit;
 use crate::target::Target;
 use crate::{Error, SourceLikelihood};
 use fewbits_core::{Belief, Gaussian};
 use fewbits_densities::{CellOptions, Cells, Clumps};
+use fewbits_models::SourceModel;
 use nalgebra::{Vector2, Vector3};
 
 /// Posterior over cells, with the rate given each cell where it is unknown and carried.
@@ -14,6 +16,8 @@ pub struct Posterior {
     pub cells: Cells<2>,
     /// Mean and variance of the rate in each cell.
     pub rates: Option<(Vec<f64>, Vec<f64>)>,
+    /// How the samples of the update fit.
+    pub fit: Fit,
 }
 
 /// Cells along the longer side of the box for a wide prior, and for a belief that was sent on.
@@ -26,9 +30,9 @@ impl Posterior {
     ///
     /// # Errors
     /// As [`Cells::cover`]; a belief that excludes the records is [`fewbits_core::Error::Impossible`].
-    pub fn new(
+    pub fn new<M: SourceModel>(
         prior: &Prior,
-        likelihood: &SourceLikelihood,
+        likelihood: &SourceLikelihood<M>,
         search: &SearchBox,
         near: Option<SearchBox>,
         options: &CellOptions,
@@ -44,8 +48,12 @@ impl Posterior {
         let per_axis = if wide { WIDE } else { per_axis };
         let target = Target::new(prior, likelihood)?;
         let cells = Cells::cover(&target, around.lower, around.upper, per_axis, options)?;
-        let rates = target.rates(&cells);
-        Ok(Self { cells, rates })
+        let (rates, chi_squared) = target.rates_and_fit(&cells);
+        let fit = Fit {
+            chi_squared,
+            samples: likelihood.samples(),
+        };
+        Ok(Self { cells, rates, fit })
     }
 
     /// Mean and covariance of the position.

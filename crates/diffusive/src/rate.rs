@@ -82,6 +82,14 @@ impl RateModel {
         }
     }
 
+    /// The largest rate that is possible, kg/s.
+    pub(crate) fn largest(&self) -> f64 {
+        match self {
+            Self::Known(rate) => *rate,
+            Self::Joint(range) | Self::NodeWise(range) | Self::SampleWise(range) => range.high,
+        }
+    }
+
     /// A rate to start from.
     pub(crate) fn typical(&self) -> f64 {
         match self {
@@ -184,6 +192,12 @@ impl RateSums {
         let log =
             -0.5 * (self.energy - b * best) + LN_SQRT_2PI - root.ln() - (range.high - range.low).ln() - self.log_noise;
         (log, ends((range.low - best) * root, (range.high - best) * root))
+    }
+
+    /// Expected sum of squared residuals over the noise variance, `C - 2 m B + (m^2 + v) A`, for a rate of mean `m` and variance
+    /// `v`.
+    pub fn chi_squared(&self, (mean, variance): (f64, f64)) -> f64 {
+        (self.energy - mean * (2.0 * self.correlation - mean * self.response) + variance * self.response).max(0.0)
     }
 
     /// Mean and variance of the rate given the position: `N(B/A, 1/A)` cut to the range.

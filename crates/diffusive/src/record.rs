@@ -2,88 +2,150 @@
 
 use crate::rate::{Intervals, RateRange, RateSums, log_sample_marginal, log_sample_uncut};
 use crate::{Error, SourceSensor};
-use fewbits_models::diffusion::{ImpulseResponse, Profile};
+use fewbits_models::diffusion::{Air, Profile};
+use fewbits_models::{Homogeneous, Receptor, SourceModel};
 use fewbits_numerics::error::positive;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::Vector2;
 
 /// More panels than this are not tabulated.
 const MOST_PANELS: f64 = 2000.0;
+/// Panels of a finer table.
+const PANELS: f64 = 32.0;
+/// The finest panels are this share of the widest. Heights below a hundred-thousandth of a diffusion length bend nothing that is
+/// above the rounding of the widest panels.
+const MOST_HALVINGS: f64 = 1e-5;
+/// Instants whose concentrations are asked for together.
+const TOGETHER: usize = 16;
 
 /// The samples of one node, bias removed, with what is needed to say how likely they are for each position of the source.
 ///
-/// Nothing changes along the ground, so the responses depend on the horizontal distance alone, times
-/// `exp((v . d - V rho) / 2 kappa)` with wind. The sums over the instants are tabulated over the distance once: every look-up
-/// costs two polynomials however many samples there are.
+/// Where nothing changes along the ground, the responses depend on the horizontal distance alone, times
+/// `exp((v . d - V rho) / 2 kappa)` with wind. The sums over the instants are then tabulated over the distance once: every look-up
+/// costs two polynomials however many samples there are. Other models are asked for every position.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Record {
-    sensor: SourceSensor,
+pub struct Record<M = Air> {
+    sensor: SourceSensor<M>,
+    /// The receptor that the model is asked about, and where its coordinates begin. Where nothing changes along the ground the
+    /// sensor is at the origin: offsets keep their digits.
+    receptor: Receptor,
+    origin: Vector2<f64>,
     node: Vector2<f64>,
     samples: Vec<f64>,
     noise: f64,
     energy: f64,
     log_noise: f64,
-    /// `rho^2 sum f_j^2 / sigma^2` and `rho sum f_j y_j / sigma^2` straight downwind.
-    table: Option<Profile<2>>,
+    /// Set if nothing changes along the ground.
+    along: Option<Along>,
+}
+
+/// What a record of a homogeneous model keeps.
+#[derive(Debug, Clone, PartialEq)]
+struct Along {
+    wind: Vector2<f64>,
+    /// `wind` is not zero.
+    tilted: bool,
+    diffusivity: f64,
+    closest: f64,
+    /// `r^2 sum f_j^2 / sigma^2` and `r sum f_j y_j / sigma^2` straight downwind over the horizontal distance, with `r` the distance
+    /// in space; by finer to coarser tables: each serves where the one before has ended.
+    tables: Vec<Profile<2>>,
     /// Largest `|y|` (at least the noise), and largest `|y| 2 / (4 kappa t)`, both over the noise: how fast the response changes.
     steepness: [f64; 2],
     /// Wind speed over diffusivity, 1/m.
     drift: f64,
 }
 
-impl Record {
+impl<M: SourceModel> Record<M> {
     pub(crate) fn new(
-        sensor: &SourceSensor,
+        sensor: &SourceSensor<M>,
         node: &Vector2<f64>,
         samples: Vec<f64>,
         noise: f64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, Error>
+    where
+        M: Clone,
+    {
         positive("noise", noise)?;
-        let mut steepness = [0.0_f64; 2];
-        for (y, t) in samples.iter().zip(sensor.instants()) {
-            let size = y.abs().max(noise) / noise;
-            let age = t - sensor.start();
-            if age > 0.0 {
-                steepness[0] = steepness[0].max(size);
-                steepness[1] = steepness[1].max(size * 2.0 / (4.0 * sensor.air().diffusivity() * age));
-            }
-        }
+        let homogeneous = sensor.homogeneous();
+        let receptor = sensor.receptor(node)?;
+        let (receptor, origin) = match homogeneous {
+            Some(_) => (sensor.receptor(&Vector2::zeros())?, *node),
+            None => (receptor, Vector2::zeros()),
+        };
         let mut record = Self {
+            receptor,
+            origin,
             sensor: sensor.clone(),
             node: *node,
             energy: samples.iter().map(|y| (y / noise) * (y / noise)).sum(),
             log_noise: samples.len() as f64 * (noise.ln() + LN_SQRT_2PI),
             samples,
             noise,
-            table: None,
-            steepness,
-            drift: sensor.air().wind().norm() / sensor.air().diffusivity(),
+            along: None,
         };
-        record.table = record.tabulate()?;
+        if let Some(homogeneous) = homogeneous {
+            record.along = Some(record.along(&homogeneous)?);
+        }
         Ok(record)
     }
 
-    fn tabulate(&self) -> Result<Option<Profile<2>>, Error> {
-        let drop = self.sensor.drop();
-        let width = 0.25 * self.sensor.shortest_length();
-        let width = if drop > 0.0 { width.min(0.5 * drop) } else { width };
-        if self.sensor.reach() / width > MOST_PANELS {
-            return Ok(None);
-        }
-        let wind = self.sensor.air().wind();
-        let speed = wind.xy().norm();
-        let downwind = if speed > 0.0 { wind.xy() / speed } else { Vector2::x() };
-        let profile = Profile::new(self.sensor.reach(), width, |distance| {
-            let rho = distance.max(self.sensor.air().closest());
-            let (mut a, mut b) = (0.0, 0.0);
-            for (j, y) in self.samples.iter().enumerate() {
-                let f = rho * self.sensor.response(j, &(downwind * rho)) / self.noise;
-                a += f * f;
-                b += f * y / self.noise;
+    fn along(&self, homogeneous: &Homogeneous) -> Result<Along, Error> {
+        let diffusivity = homogeneous.diffusivity;
+        let mut steepness = [0.0_f64; 2];
+        for (y, age) in self.samples.iter().zip(self.sensor.ages()) {
+            let size = y.abs().max(self.noise) / self.noise;
+            if *age > 0.0 {
+                steepness[0] = steepness[0].max(size);
+                steepness[1] = steepness[1].max(size * 2.0 / (4.0 * diffusivity * age));
             }
-            [a, b]
-        })?;
-        Ok(Some(profile))
+        }
+        Ok(Along {
+            wind: homogeneous.wind,
+            tilted: homogeneous.wind != Vector2::zeros(),
+            diffusivity,
+            closest: homogeneous.closest,
+            tables: self.tabulate(homogeneous)?,
+            steepness,
+            drift: homogeneous.speed / diffusivity,
+        })
+    }
+
+    fn tabulate(&self, homogeneous: &Homogeneous) -> Result<Vec<Profile<2>>, Error> {
+        // A quarter of the shortest diffusion length.
+        let widest = 0.25 * (4.0 * homogeneous.diffusivity * self.sensor.shortest_age()).sqrt();
+        if self.sensor.reach() / widest > MOST_PANELS {
+            return Ok(Vec::new());
+        }
+        let downwind = homogeneous.wind.try_normalize(0.0).unwrap_or_else(Vector2::x);
+        let table = |end: f64, width: f64| {
+            Profile::new(end, width, |distance| {
+                // With a height between them sensor and source are never closest: a kink would spoil the first panel.
+                let apart = self.sensor.drop() > 0.0;
+                let rho = if apart {
+                    distance
+                } else {
+                    distance.max(homogeneous.closest)
+                };
+                let [a, b] = self.sums_by_model(&(-downwind * rho));
+                let r = rho.hypot(self.sensor.drop());
+                [r * r * a, r * b]
+            })
+        };
+        // Source and image lie at these heights from the sensor: the responses bend over such distances.
+        let heights = [
+            self.sensor.drop(),
+            self.sensor.source_height() + self.sensor.sensor_height(),
+        ];
+        let least = heights.into_iter().filter(|h| *h > 0.0).fold(f64::INFINITY, f64::min);
+        let (mut tables, mut width) = (Vec::new(), (0.25 * least).max(MOST_HALVINGS * widest));
+        // Beyond some panels of a width the distance itself is the scale: wider panels serve.
+        while width < widest && PANELS * width < self.sensor.reach() {
+            tables.push(table(PANELS * width, width)?);
+            width *= 2.0;
+        }
+        tables.push(table(self.sensor.reach(), width.min(widest))?);
+        Ok(tables)
     }
 
     /// Where the node stands, m.
@@ -102,14 +164,22 @@ impl Record {
     }
 
     /// The sensor that sampled.
-    pub fn sensor(&self) -> &SourceSensor {
+    pub fn sensor(&self) -> &SourceSensor<M> {
         &self.sensor
     }
 
     /// The sums that say how likely the samples are with the source at `position`.
     #[inline]
     pub fn sums(&self, position: &Vector2<f64>) -> RateSums {
-        let [response, correlation] = self.response_sums(&(self.node - position));
+        let [response, correlation] = match &self.along {
+            Some(along) => self.sums_along(along, &(self.node - position)),
+            None => self.sums_by_model(&(position - self.origin)),
+        };
+        self.with_constants(response, correlation)
+    }
+
+    #[inline]
+    fn with_constants(&self, response: f64, correlation: f64) -> RateSums {
         RateSums {
             response,
             correlation,
@@ -119,63 +189,92 @@ impl Record {
     }
 
     #[inline]
-    fn response_sums(&self, offset: &Vector2<f64>) -> [f64; 2] {
-        let rho = offset.norm().max(self.sensor.air().closest());
-        match &self.table {
-            Some(table) if rho <= table.end() => {
+    fn sums_along(&self, along: &Along, offset: &Vector2<f64>) -> [f64; 2] {
+        let rho = offset.norm().max(along.closest);
+        match along.tables.iter().find(|table| rho <= table.end()) {
+            Some(table) => {
                 let [a, b] = table.at(rho);
-                let wind = self.sensor.air().wind();
-                let inverse = rho.recip();
-                if wind.x == 0.0 && wind.y == 0.0 {
+                let drop = self.sensor.drop();
+                let inverse = if drop > 0.0 { rho.hypot(drop) } else { rho }.recip();
+                if !along.tilted {
                     return [a.max(0.0) * inverse * inverse, b * inverse];
                 }
+                let wind = along.wind;
                 let speed = wind.x.hypot(wind.y);
-                let lag = (wind.x * offset.x + wind.y * offset.y - speed * offset.norm())
-                    / (2.0 * self.sensor.air().diffusivity());
+                let lag = (wind.x * offset.x + wind.y * offset.y - speed * offset.norm()) / (2.0 * along.diffusivity);
                 let scale = lag.exp() * inverse;
                 [a.max(0.0) * scale * scale, b * scale]
             }
-            _ => {
-                let (mut a, mut b) = (0.0, 0.0);
-                for (j, y) in self.samples.iter().enumerate() {
-                    let f = self.sensor.response(j, offset) / self.noise;
-                    a += f * f;
-                    b += f * y / self.noise;
-                }
-                [a, b]
-            }
+            None => self.sums_by_model(&-offset),
         }
     }
 
+    /// Calls `f` with every sample and its response, for a source at `position` less the origin.
+    fn each_response(&self, position: &Vector2<f64>, mut f: impl FnMut(f64, f64)) {
+        let source = self.sensor.source_at(position);
+        let mut responses = [0.0; TOGETHER];
+        for (ages, samples) in self.sensor.ages().chunks(TOGETHER).zip(self.samples.chunks(TOGETHER)) {
+            let responses = &mut responses[..ages.len()];
+            self.sensor
+                .model()
+                .concentrations(&self.receptor, &source, ages, responses);
+            samples.iter().zip(responses).for_each(|(y, a)| f(*y, *a));
+        }
+    }
+
+    fn sums_by_model(&self, position: &Vector2<f64>) -> [f64; 2] {
+        let (mut a, mut b) = (0.0, 0.0);
+        self.each_response(position, |y, response| {
+            let f = response / self.noise;
+            a += f * f;
+            b += f * y / self.noise;
+        });
+        [a, b]
+    }
+
     /// The sums, and by which share the information of the samples is discounted over a cell of the given half width: the noise
-    /// variance is raised by the square of the change of the response across the cell.
+    /// variance is raised by the square of the change of the response across the cell. `rate` is the largest that is possible.
     #[inline]
-    pub(crate) fn blurred_sums(&self, position: &Vector2<f64>, half_width: f64) -> (RateSums, f64) {
-        let air = self.sensor.air();
+    pub(crate) fn blurred_sums(&self, position: &Vector2<f64>, half_width: f64, rate: f64) -> (RateSums, f64) {
+        let Some(along) = &self.along else {
+            let source = self.sensor.source_at(position);
+            let change = |age: &f64| self.sensor.model().variation(&self.receptor, &source, half_width, *age);
+            let largest = self.sensor.ages().iter().map(change).fold(0.0, f64::max);
+            let change = rate * largest / self.noise;
+            return (self.sums(position), (1.0 + change * change).recip());
+        };
         let offset = self.node - position;
         let drop = self.sensor.drop();
         let rho = (offset.norm_squared() + drop * drop).sqrt();
-        let near = (rho - 1.4 * half_width).max(0.6 * half_width).max(air.closest());
-        let change = half_width * (self.steepness[0] * (near.recip() + self.drift) + self.steepness[1] * rho);
-        let [response, correlation] = self.response_sums(&offset);
-        let sums = RateSums {
-            response,
-            correlation,
-            energy: self.energy,
-            log_noise: self.log_noise,
-        };
-        (sums, (1.0 + change * change).recip())
+        let near = (rho - 1.4 * half_width).max(0.6 * half_width).max(along.closest);
+        let change = half_width * (along.steepness[0] * (near.recip() + along.drift) + along.steepness[1] * rho);
+        let [response, correlation] = self.sums_along(along, &offset);
+        (self.with_constants(response, correlation), (1.0 + change * change).recip())
     }
 
     /// The log likelihood with a new rate for every sample.
     pub(crate) fn log_sample_wise(&self, position: &Vector2<f64>, range: &RateRange) -> f64 {
-        let offset = self.node - position;
-        let terms = self
-            .samples
-            .iter()
-            .enumerate()
-            .map(|(j, y)| log_sample_marginal(*y, self.sensor.response(j, &offset), self.noise, range));
-        terms.sum()
+        let mut log = 0.0;
+        self.each_response(&(position - self.origin), |y, response| {
+            log += log_sample_marginal(y, response, self.noise, range)
+        });
+        log
+    }
+
+    /// Expected squares of the residuals over the noise variance, summed, with a new rate for every sample.
+    pub(crate) fn chi_squared_sample_wise(&self, position: &Vector2<f64>, range: &RateRange) -> f64 {
+        let mut total = 0.0;
+        self.each_response(&(position - self.origin), |y, response| {
+            let (y, a) = (y / self.noise, response / self.noise);
+            let sums = RateSums {
+                response: a * a,
+                correlation: a * y,
+                energy: y * y,
+                log_noise: 0.0,
+            };
+            total += sums.chi_squared(sums.rate_given_position(range));
+        });
+        total
     }
 
     /// Adds the same to the numbers at `place` of two lists, to the second with the noise variance raised by `1 / share` but not
@@ -188,16 +287,14 @@ impl Record {
         place: usize,
         [plain, blurred]: [(&mut f64, &mut Intervals); 2],
     ) {
-        let offset = self.node - position;
         let wider = self.noise / share.sqrt();
-        for (j, y) in self.samples.iter().enumerate() {
-            let response = self.sensor.response(j, &offset);
-            let (log, cut) = log_sample_uncut(*y, response, self.noise, range);
+        self.each_response(&(position - self.origin), |y, response| {
+            let (log, cut) = log_sample_uncut(y, response, self.noise, range);
             *plain.0 += log;
             plain.1.push(place, cut);
-            let (log, cut) = log_sample_uncut(*y, response, wider, range);
+            let (log, cut) = log_sample_uncut(y, response, wider, range);
             *blurred.0 += log - 0.5 * share.ln();
             blurred.1.push(place, cut);
-        }
+        });
     }
 }

@@ -1,10 +1,11 @@
 //! Which node is asked next.
 
-use crate::information::{Predictions, fisher_information, half_log_det_plus_one};
+use crate::information::{Predictions, half_log_det_plus_one, information_at};
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceSensor};
 use fewbits_core::Gaussian;
 use fewbits_densities::{Clump, Clumps};
+use fewbits_models::{Receptor, SourceModel};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -64,7 +65,11 @@ impl Selector {
     }
 
     /// The best of the candidates, the first among equals; `None` of none.
-    pub fn best(&self, sensor: &SourceSensor, candidates: &[(usize, Vector2<f64>)]) -> Option<usize> {
+    pub fn best<M: SourceModel>(
+        &self,
+        sensor: &SourceSensor<M>,
+        candidates: &[(usize, Vector2<f64>)],
+    ) -> Option<usize> {
         let mut best: Option<(f64, usize)> = None;
         for (index, node) in candidates {
             let score = self.score(sensor, node);
@@ -75,27 +80,30 @@ impl Selector {
         best.map(|(_, index)| index)
     }
 
-    /// How good a node is: the larger the better.
-    pub fn score(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
+    /// How good a node is: the larger the better. `-inf` where the model has no concentrations.
+    pub fn score<M: SourceModel>(&self, sensor: &SourceSensor<M>, node: &Vector2<f64>) -> f64 {
+        let Ok(receptor) = sensor.receptor(node) else {
+            return f64::NEG_INFINITY;
+        };
         match self.rule {
             Rule::Mahalanobis => {
                 let d = node - self.estimate.mean();
                 -d.dot(&(self.precision * d))
             }
-            Rule::MutualInformation => self.information(sensor, node),
-            Rule::PairwiseInformation => self.predictions(sensor, node).pairwise_bounds().lower,
-            Rule::ExactInformation => self.predictions(sensor, node).exact(),
-            Rule::CramerRao => self.cramer_rao(sensor, node),
-            Rule::Covariance => -self.covariance(sensor, node).ln(),
+            Rule::MutualInformation => self.information(sensor, &receptor),
+            Rule::PairwiseInformation => self.predictions(sensor, &receptor).pairwise_bounds().lower,
+            Rule::ExactInformation => self.predictions(sensor, &receptor).exact(),
+            Rule::CramerRao => self.cramer_rao(sensor, &receptor),
+            Rule::Covariance => -self.covariance(sensor, &receptor).ln(),
         }
     }
 
-    fn information(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
+    fn information<M: SourceModel>(&self, sensor: &SourceSensor<M>, receptor: &Receptor) -> f64 {
         let samples = sensor.instants().len();
         let mut mean = DVector::zeros(samples);
         let mut second = DMatrix::zeros(samples, samples);
         for clump in self.clumps.clumps() {
-            let a = self.predicted(sensor, node, clump);
+            let a = self.predicted(sensor, receptor, &place(clump));
             let rate = clump.mean[2];
             mean.axpy(clump.weight * rate, &a, 1.0);
             second.ger(clump.weight * (rate * rate + clump.covariance[(2, 2)]), &a, &a, 1.0);
@@ -105,10 +113,10 @@ impl Selector {
     }
 
     /// The samples that clumps predict; a clump of uncertain rate is two points, one deviation on either side.
-    fn predictions(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> Predictions {
+    fn predictions<M: SourceModel>(&self, sensor: &SourceSensor<M>, receptor: &Receptor) -> Predictions {
         let (mut means, mut weights) = (Vec::new(), Vec::new());
         for clump in self.clumps.clumps() {
-            let a = self.predicted(sensor, node, clump);
+            let a = self.predicted(sensor, receptor, &place(clump));
             let (rate, variance) = (clump.mean[2], clump.covariance[(2, 2)]);
             if variance * a.norm_squared() > SPLIT {
                 for rate in [rate - variance.sqrt(), rate + variance.sqrt()] {
@@ -124,20 +132,19 @@ impl Selector {
     }
 
     /// Responses in units of the noise.
-    fn predicted(&self, sensor: &SourceSensor, node: &Vector2<f64>, clump: &Clump<3>) -> DVector<f64> {
-        let offset = node - Vector2::new(clump.mean[0], clump.mean[1]);
-        let noise = sensor.noise();
-        DVector::from_iterator(
-            sensor.instants().len(),
-            (0..sensor.instants().len()).map(|j| sensor.response(j, &offset) / noise),
-        )
+    fn predicted<M: SourceModel>(
+        &self,
+        sensor: &SourceSensor<M>,
+        receptor: &Receptor,
+        source: &Vector2<f64>,
+    ) -> DVector<f64> {
+        DVector::from_vec(sensor.responses_at(receptor, source)) / sensor.noise()
     }
 
-    fn cramer_rao(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
+    fn cramer_rao<M: SourceModel>(&self, sensor: &SourceSensor<M>, receptor: &Receptor) -> f64 {
         let mut information = Matrix3::zeros();
         for clump in self.clumps.clumps() {
-            let at = Vector2::new(clump.mean[0], clump.mean[1]);
-            information += fisher_information(sensor, node, &at, clump.mean[2]) * clump.weight;
+            information += information_at(sensor, receptor, &place(clump), clump.mean[2]) * clump.weight;
         }
         let covariance = self.clumps.covariance();
         if covariance[(2, 2)] > 0.0 {
@@ -156,15 +163,11 @@ impl Selector {
     }
 
     /// Determinant of the covariance of the position after the samples that the estimate predicts.
-    fn covariance(&self, sensor: &SourceSensor, node: &Vector2<f64>) -> f64 {
-        let samples = sensor.instants().len();
-        let offset = node - self.estimate.mean();
-        let rate = self.clumps.mean()[2];
-        let predicted =
-            DVector::from_iterator(samples, (0..samples).map(|j| rate * sensor.response(j, &offset) / sensor.noise()));
+    fn covariance<M: SourceModel>(&self, sensor: &SourceSensor<M>, receptor: &Receptor) -> f64 {
+        let predicted = self.predicted(sensor, receptor, self.estimate.mean()) * self.clumps.mean()[2];
         let mut logs = Vec::with_capacity(self.clumps.clumps().len());
         for clump in self.clumps.clumps() {
-            let a = self.predicted(sensor, node, clump);
+            let a = self.predicted(sensor, receptor, &place(clump));
             let residual = &predicted - &a * clump.mean[2];
             let along = a.dot(&residual);
             let spread = 1.0 + clump.covariance[(2, 2)] * a.norm_squared();
@@ -174,7 +177,7 @@ impl Selector {
         let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = logs.iter().map(|log| (log - best).exp()).collect();
         let total: f64 = weights.iter().sum();
-        let position = |clump: &Clump<3>| Vector2::new(clump.mean[0], clump.mean[1]) - self.estimate.mean();
+        let position = |clump: &Clump<3>| place(clump) - self.estimate.mean();
         let parts = || self.clumps.clumps().iter().zip(&weights);
         let mean: Vector2<f64> = parts().map(|(c, w)| position(c) * (*w / total)).sum();
         let covariance: Matrix2<f64> = parts()
@@ -185,4 +188,9 @@ impl Selector {
             .sum();
         covariance.determinant().max(f64::MIN_POSITIVE)
     }
+}
+
+/// Where a clump is.
+fn place(clump: &Clump<3>) -> Vector2<f64> {
+    Vector2::new(clump.mean[0], clump.mean[1])
 }

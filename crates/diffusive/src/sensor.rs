@@ -2,6 +2,7 @@
 
 use crate::{Error, Record};
 use fewbits_models::diffusion::Air;
+use fewbits_models::{Homogeneous, Receptor, SourceGradient, SourceModel};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, finite, non_negative, positive};
 use nalgebra::{Vector2, Vector3};
@@ -11,11 +12,15 @@ use rand_distr::StandardNormal;
 /// The sensors of a network, all of one kind, and the medium between them and the source:
 /// `y_j = mu a_j(theta) + bias + e_j`, `e_j ~ N(0, sigma^2)`, with `a_j` the concentration per unit rate at instant `t_j`.
 ///
-/// Sensors and source stand at known heights; the position searched for is horizontal.
+/// Sensors and source stand at known heights; the position searched for is horizontal. `M` says how the substance spreads: [`Air`]
+/// has closed forms, any other [`SourceModel`] serves as well. Every record holds a copy of its sensor, so wrap a large model in an
+/// [`std::sync::Arc`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct SourceSensor {
-    air: Air,
+pub struct SourceSensor<M = Air> {
+    model: M,
     instants: Vec<f64>,
+    /// `instants` less `start`.
+    ages: Vec<f64>,
     start: f64,
     noise: f64,
     bias: f64,
@@ -24,18 +29,19 @@ pub struct SourceSensor {
     reach: f64,
 }
 
-impl SourceSensor {
+impl<M: SourceModel> SourceSensor<M> {
     /// Sensors on the ground that sample at the given instants (s) with noise of the given standard deviation (kg/m^3); a source
     /// on the ground that began at time 0, no bias.
     ///
     /// # Errors
     /// If there is no instant, one is not finite or none is after 0, or `noise` is not a positive number.
-    pub fn new(air: Air, instants: Vec<f64>, noise: f64) -> Result<Self, Error> {
+    pub fn new(model: M, instants: Vec<f64>, noise: f64) -> Result<Self, Error> {
         at_least_one("instants", instants.len())?;
         all_finite("instants", &instants)?;
         positive("noise", noise)?;
         let sensor = Self {
-            air,
+            model,
+            ages: instants.clone(),
             instants,
             start: 0.0,
             noise,
@@ -65,7 +71,8 @@ impl SourceSensor {
         if self.instants.iter().all(|t| *t <= start) {
             return Err(Error::NothingReleased { start });
         }
-        Ok(Self { start, ..self })
+        let ages = self.instants.iter().map(|t| t - start).collect();
+        Ok(Self { ages, start, ..self })
     }
 
     /// With source and sensors at the given heights, m.
@@ -82,7 +89,8 @@ impl SourceSensor {
         })
     }
 
-    /// With responses tabulated up to `reach` metres from a sensor (250 unless told); beyond, the closed form is evaluated.
+    /// With responses tabulated up to `reach` metres from a sensor (250 unless told); beyond, the model is evaluated. Without
+    /// effect on a model that is not [`Homogeneous`].
     ///
     /// # Errors
     /// If it is not a positive number.
@@ -91,9 +99,9 @@ impl SourceSensor {
         Ok(Self { reach, ..self })
     }
 
-    /// The medium.
-    pub fn air(&self) -> &Air {
-        &self.air
+    /// How the substance spreads.
+    pub fn model(&self) -> &M {
+        &self.model
     }
 
     /// Instants of sampling, s.
@@ -116,8 +124,23 @@ impl SourceSensor {
         self.start
     }
 
+    /// Height of the sensors, m.
+    pub fn sensor_height(&self) -> f64 {
+        self.sensor_height
+    }
+
+    /// Height of the source, m.
+    pub fn source_height(&self) -> f64 {
+        self.source_height
+    }
+
     pub(crate) fn reach(&self) -> f64 {
         self.reach
+    }
+
+    /// Seconds from the start of the release to each instant.
+    pub(crate) fn ages(&self) -> &[f64] {
+        &self.ages
     }
 
     /// Height difference of source and sensor, m.
@@ -125,33 +148,99 @@ impl SourceSensor {
         (self.source_height - self.sensor_height).abs()
     }
 
-    /// The shortest diffusion length `sqrt(4 kappa age)` of the instants, m.
-    pub(crate) fn shortest_length(&self) -> f64 {
-        use fewbits_models::diffusion::ImpulseResponse;
-        let ages = self.instants.iter().map(|t| t - self.start).filter(|age| *age > 0.0);
-        (4.0 * self.air.diffusivity() * ages.fold(f64::INFINITY, f64::min)).sqrt()
+    /// The shortest time from the start to an instant, s.
+    pub(crate) fn shortest_age(&self) -> f64 {
+        let ages = self.ages.iter().copied().filter(|age| *age > 0.0);
+        ages.fold(f64::INFINITY, f64::min)
     }
 
-    /// Concentration per unit rate at instant `j` at horizontal offset `node - source`.
-    pub(crate) fn response(&self, j: usize, offset: &Vector2<f64>) -> f64 {
-        let field = Vector3::new(offset.x, offset.y, self.sensor_height);
-        let source = Vector3::new(0.0, 0.0, self.source_height);
-        self.air.concentration(&field, &source, self.instants[j] - self.start)
+    /// The place of a source, m.
+    pub(crate) fn source_at(&self, position: &Vector2<f64>) -> Vector3<f64> {
+        Vector3::new(position.x, position.y, self.source_height)
+    }
+
+    /// Whether a source can be in the square of the given half width about `position`.
+    pub(crate) fn admits(&self, position: &Vector2<f64>, half_width: f64) -> bool {
+        self.model.admits(&self.source_at(position), half_width)
+    }
+
+    pub(crate) fn homogeneous(&self) -> Option<Homogeneous> {
+        self.model.homogeneous()
+    }
+
+    /// The receptor of a sensor at `node`, m.
+    ///
+    /// # Errors
+    /// If `node` is not finite, or the model has no concentrations there.
+    pub fn receptor(&self, node: &Vector2<f64>) -> Result<Receptor, Error> {
+        all_finite("node", node.as_slice())?;
+        Ok(self.model.receptor(&Vector3::new(node.x, node.y, self.sensor_height))?)
+    }
+
+    /// Concentrations per unit rate at a receptor, one for each instant: kg/m^3 per kg/s.
+    pub fn responses_at(&self, receptor: &Receptor, source: &Vector2<f64>) -> Vec<f64> {
+        let mut out = vec![0.0; self.ages.len()];
+        self.model
+            .concentrations(receptor, &self.source_at(source), &self.ages, &mut out);
+        out
+    }
+
+    /// The response at instant `j` and its gradient with respect to the position of the source; at no instant zero.
+    pub fn response_gradient_at(&self, j: usize, receptor: &Receptor, source: &Vector2<f64>) -> SourceGradient {
+        let age = self.ages.get(j).copied().unwrap_or(0.0);
+        self.model.source_gradient(receptor, &self.source_at(source), age)
+    }
+
+    /// Draws what a sensor at a receptor samples of a source that releases at `rate`, kg/s.
+    pub fn sample_at<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        receptor: &Receptor,
+        source: &Vector2<f64>,
+        rate: f64,
+    ) -> Vec<f64> {
+        let clean = self.responses_at(receptor, source);
+        clean
+            .into_iter()
+            .map(|a| rate * a + self.bias + self.noise * rng.sample::<f64, _>(StandardNormal))
+            .collect()
+    }
+
+    /// What was sampled at a node, ready for likelihoods.
+    ///
+    /// # Errors
+    /// If the number of samples is not that of the instants, one is not finite, or the model has no concentrations at `node`.
+    pub fn record(&self, node: &Vector2<f64>, samples: &[f64]) -> Result<Record<M>, Error>
+    where
+        M: Clone,
+    {
+        if samples.len() != self.instants.len() {
+            let expected = format!("{}, one for each instant", self.instants.len());
+            return Err(ArgumentError::new("samples", samples.len(), expected).into());
+        }
+        all_finite("samples", samples)?;
+        Record::new(self, node, samples.iter().map(|y| y - self.bias).collect(), self.noise)
+    }
+}
+
+/// Air has concentrations everywhere: no receptor is needed.
+impl SourceSensor<Air> {
+    fn anywhere(&self, node: &Vector2<f64>) -> Receptor {
+        Receptor {
+            place: Vector3::new(node.x, node.y, self.sensor_height),
+            index: 0,
+        }
     }
 
     /// Concentrations per unit rate at a node, one for each instant: kg/m^3 per kg/s.
     pub fn responses(&self, node: &Vector2<f64>, source: &Vector2<f64>) -> Vec<f64> {
-        let offset = node - source;
-        (0..self.instants.len()).map(|j| self.response(j, &offset)).collect()
+        self.responses_at(&self.anywhere(node), source)
     }
 
-    /// Gradient of the response at instant `j` with respect to the horizontal position of the source, and the response.
+    /// The response at instant `j` and its gradient with respect to the horizontal position of the source.
     pub fn response_gradient(&self, j: usize, node: &Vector2<f64>, source: &Vector2<f64>) -> (f64, Vector2<f64>) {
-        let field = Vector3::new(node.x, node.y, self.sensor_height);
-        let at = Vector3::new(source.x, source.y, self.source_height);
-        let age = self.instants.get(j).map_or(0.0, |t| t - self.start);
-        let g = self.air.source_gradient(&field, &at, age);
-        (g.value, Vector2::new(g.gradient.x, g.gradient.y))
+        let g = self.response_gradient_at(j, &self.anywhere(node), source);
+        (g.value, g.gradient.xy())
     }
 
     /// Draws what a node samples of a source that releases at `rate`, kg/s.
@@ -162,24 +251,6 @@ impl SourceSensor {
         source: &Vector2<f64>,
         rate: f64,
     ) -> Vec<f64> {
-        let clean = self.responses(node, source);
-        clean
-            .into_iter()
-            .map(|a| rate * a + self.bias + self.noise * rng.sample::<f64, _>(StandardNormal))
-            .collect()
-    }
-
-    /// What was sampled at a node, ready for likelihoods.
-    ///
-    /// # Errors
-    /// If the number of samples is not that of the instants, or one is not finite.
-    pub fn record(&self, node: &Vector2<f64>, samples: &[f64]) -> Result<Record, Error> {
-        if samples.len() != self.instants.len() {
-            let expected = format!("{}, one for each instant", self.instants.len());
-            return Err(ArgumentError::new("samples", samples.len(), expected).into());
-        }
-        all_finite("samples", samples)?;
-        all_finite("node", node.as_slice())?;
-        Record::new(self, node, samples.iter().map(|y| y - self.bias).collect(), self.noise)
+        self.sample_at(rng, &self.anywhere(node), source, rate)
     }
 }

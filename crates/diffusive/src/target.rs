@@ -1,11 +1,12 @@
 //! A belief times the likelihood of records, cell by cell.
 
 use crate::belief::{JointBelief, PositionBelief, Prior};
-use crate::rate::{Intervals, RateModel, RateRange, cut_normal, ends_about};
+use crate::rate::{Intervals, RateModel, RateRange, RateSums, cut_normal, ends_about};
 use crate::{Error, SourceLikelihood};
 use fewbits_core::Columns;
 use fewbits_densities::lpg::Slice;
 use fewbits_densities::{CellTarget, Cells};
+use fewbits_models::SourceModel;
 use fewbits_numerics::kernels::largest;
 use fewbits_numerics::normal::log_interval;
 use nalgebra::{Matrix2, Vector2};
@@ -49,15 +50,15 @@ struct Conditional {
     variance: f64,
 }
 
-pub(crate) struct Target<'a> {
+pub(crate) struct Target<'a, M> {
     prior: &'a Prior,
-    likelihood: &'a SourceLikelihood,
+    likelihood: &'a SourceLikelihood<M>,
     lobes: Vec<Lobe>,
     conditionals: Vec<Conditional>,
 }
 
-impl<'a> Target<'a> {
-    pub(crate) fn new(prior: &'a Prior, likelihood: &'a SourceLikelihood) -> Result<Self, Error> {
+impl<'a, M: SourceModel> Target<'a, M> {
+    pub(crate) fn new(prior: &'a Prior, likelihood: &'a SourceLikelihood<M>) -> Result<Self, Error> {
         let (mut lobes, mut conditionals) = (Vec::new(), Vec::new());
         match prior {
             Prior::Exact(gaussian) => lobes.push(Lobe::new(1.0, *gaussian.mean(), *gaussian.covariance())),
@@ -97,32 +98,46 @@ impl<'a> Target<'a> {
         })
     }
 
-    /// Mean and variance of the rate at every cell.
-    pub(crate) fn rates(&self, cells: &Cells<2>) -> Option<(Vec<f64>, Vec<f64>)> {
+    /// Mean and variance of the rate at every cell, where it is unknown and shared, and the expected sum of squared residuals over
+    /// the noise variance.
+    pub(crate) fn rates_and_fit(&self, cells: &Cells<2>) -> (Option<(Vec<f64>, Vec<f64>)>, f64) {
         let [x, y] = cells.columns();
-        let positions = x.iter().zip(y).map(|(x, y)| Vector2::new(*x, *y));
-        match (self.prior, self.likelihood.rate()) {
+        let mut chi_squared = 0.0;
+        let positions = x.iter().zip(y).map(|(x, y)| Vector2::new(*x, *y)).zip(cells.weights());
+        let mut slice = Slice::default();
+        let mut rate_at = |at: &Vector2<f64>, sums: &RateSums| match (self.prior, self.likelihood.rate()) {
             (Prior::WithRate(JointBelief::Lpg(lpg), range), _) => {
-                let mut slice = Slice::default();
-                let moments = positions.map(|at| {
-                    let sums = self.likelihood.sums(&at);
-                    lpg.slice(&at, 0.0, &mut slice);
-                    slice.tilted([sums.response, sums.correlation, sums.energy], [range.low(), range.high()])
-                });
-                Some(moments.map(|m| (m.mean, m.variance)).unzip())
+                lpg.slice(at, 0.0, &mut slice);
+                let sums = [sums.response, sums.correlation, sums.energy];
+                let moments = slice.tilted(sums, [range.low(), range.high()]);
+                Some((moments.mean, moments.variance))
             }
-            (Prior::WithRate(_, range), _) => Some(positions.map(|at| self.rate_of_mixture(&at, range)).unzip()),
-            (Prior::Exact(_), RateModel::Joint(range)) => Some(
-                positions
-                    .map(|at| self.likelihood.sums(&at).rate_given_position(range))
-                    .unzip(),
-            ),
+            (Prior::WithRate(_, range), _) => Some(self.rate_of_mixture(at, sums, range)),
+            (Prior::Exact(_), RateModel::Joint(range)) => Some(sums.rate_given_position(range)),
             _ => None,
+        };
+        let carried = matches!(
+            (self.prior, self.likelihood.rate()),
+            (Prior::WithRate(..), _) | (Prior::Exact(_), RateModel::Joint(_))
+        );
+        let (mut means, mut variances) = (Vec::new(), Vec::new());
+        for (at, weight) in positions {
+            let own = if carried {
+                let sums = self.likelihood.sums(&at);
+                rate_at(&at, &sums).map(|rate| {
+                    means.push(rate.0);
+                    variances.push(rate.1);
+                    sums.chi_squared(rate)
+                })
+            } else {
+                None
+            };
+            chi_squared += weight * own.unwrap_or_else(|| self.likelihood.chi_squared(&at));
         }
+        (carried.then_some((means, variances)), chi_squared)
     }
 
-    fn rate_of_mixture(&self, at: &Vector2<f64>, range: &RateRange) -> (f64, f64) {
-        let sums = self.likelihood.sums(at);
+    fn rate_of_mixture(&self, at: &Vector2<f64>, sums: &RateSums, range: &RateRange) -> (f64, f64) {
         let (mut total, mut first, mut second, mut best) = (0.0, 0.0, 0.0, f64::NEG_INFINITY);
         let middle = range.middle();
         for (lobe, given) in self.lobes.iter().zip(&self.conditionals) {
@@ -177,7 +192,7 @@ fn updated(given: &Conditional, d: &Vector2<f64>, [a, b, c]: [f64; 3]) -> (f64, 
 /// Cells of a run: their numbers stay in the nearest caches.
 const RUN: usize = 1024;
 
-impl CellTarget<2> for Target<'_> {
+impl<M: SourceModel> CellTarget<2> for Target<'_, M> {
     fn evaluate(&self, centres: &Columns<'_, 2>, half_width: f64, logs: &mut [f64], scores: &mut [f64]) {
         let extra = half_width * half_width;
         let precisions: Vec<[[f64; 3]; 2]> = self
@@ -188,6 +203,7 @@ impl CellTarget<2> for Target<'_> {
         // Cells that score far below the best so far will be dropped: their log density need not be exact.
         let mut floor = f64::NEG_INFINITY;
         let mut scratch = Vec::new();
+        let walls = self.likelihood.has_walls();
         let mut room = [vec![0.0; RUN], vec![0.0; RUN]];
         for (run, (logs, scores)) in logs.chunks_mut(RUN).zip(scores.chunks_mut(RUN)).enumerate() {
             let count = logs.len();
@@ -216,6 +232,9 @@ impl CellTarget<2> for Target<'_> {
                     .zip(wide.iter())
                     .for_each(|(score, wide)| *score += wide);
             }
+            if walls {
+                self.exclude_walls(&centres, half_width, logs, scores);
+            }
             floor = floor.max(largest(scores) - DROPPED);
         }
     }
@@ -226,7 +245,20 @@ const DROPPED: f64 = 26.0;
 /// Lobes this far below another, in nats, do not count.
 const FAINT: f64 = 30.0;
 
-impl Target<'_> {
+impl<M: SourceModel> Target<'_, M> {
+    /// Excludes cells in which no source can be, and centres at which none can be.
+    fn exclude_walls(&self, centres: &[&[f64]; 2], half: f64, logs: &mut [f64], scores: &mut [f64]) {
+        for (i, (log, score)) in logs.iter_mut().zip(scores).enumerate() {
+            let at = Vector2::new(centres[0][i], centres[1][i]);
+            if !self.likelihood.admits(&at, 0.0) {
+                *log = f64::NEG_INFINITY;
+                if !self.likelihood.admits(&at, half) {
+                    *score = f64::NEG_INFINITY;
+                }
+            }
+        }
+    }
+
     /// Log density and score of a run of cells under a belief over position and rate.
     fn with_rate(
         &self,
@@ -241,9 +273,10 @@ impl Target<'_> {
         let (mut plain, mut blurred) = (vec![[0.0; 3]; count], vec![[0.0; 3]; count]);
         let at = |i: usize| Vector2::new(centres[0][i], centres[1][i]);
         let log_noise: f64 = self.likelihood.records().iter().map(|r| r.sums(&at(0)).log_noise).sum();
+        let rate = self.likelihood.rate().largest();
         for record in self.likelihood.records() {
             for i in 0..count {
-                let (sums, share) = record.blurred_sums(&at(i), half);
+                let (sums, share) = record.blurred_sums(&at(i), half, rate);
                 for (k, value) in [sums.response, sums.correlation, sums.energy].into_iter().enumerate() {
                     plain[i][k] += value;
                     blurred[i][k] += share * value;

@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             truth = walk.propagate(&mut world, &truth);
             let measured = Value::new(sensor.sample(&mut world, &truth), *sensor.noise_covariance())?;
             let (handover, info) = leader.step(&mut rng, &known, &walk, &Observed::new(sensor, measured))?;
-            known = handover.mixture;
+            known = handover.into_mixture();
             squares += (known.mean()[0] - truth[0]).powi(2);
             log_likelihood += info.log_likelihood;
         }

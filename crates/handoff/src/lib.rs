@@ -25,7 +25,7 @@
 //! for z in [0.4, 0.7, 0.2] {
 //!     let measured = Value::new(Vector1::new(z), [[0.2]].into())?;
 //!     let (handover, _) = leader.step(&mut rng, &known, &walk, &Observed::new(sensor, measured))?;
-//!     known = handover.mixture;
+//!     known = handover.into_mixture();
 //! }
 //! assert!(known.len() <= 3 && known.mean()[0].abs() < 1.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

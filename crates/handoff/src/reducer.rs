@@ -1,22 +1,67 @@
 //! What is sent: a belief made small enough to travel.
 
 use crate::Error;
-use fewbits_core::Message;
+use fewbits_core::{BitString, CodecError, Message};
 use fewbits_densities::wire::{CodedMixture, RateControl, WireFormat};
 use fewbits_densities::{KernelEstimate, Mixture, Reduction};
 
-/// A belief as the next leader receives it, and its price.
+/// A belief as the next leader receives it, and the message that it was received in.
+///
+/// A belief that travels as bits is decoded from these bits: there is no way to hand over anything else.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Handover<const D: usize> {
+    mixture: Mixture<D>,
+    message: Option<BitString>,
+}
+
+impl<const D: usize> Handover<D> {
+    /// A mixture that is handed over as real numbers: no bits are counted.
+    pub fn real(mixture: Mixture<D>) -> Self {
+        Self { mixture, message: None }
+    }
+
+    /// What a receiver of the message decodes.
+    ///
+    /// # Errors
+    /// If `decode` fails.
+    pub fn received<E>(
+        message: BitString,
+        decode: impl FnOnce(&BitString) -> Result<Mixture<D>, E>,
+    ) -> Result<Self, E> {
+        Ok(Self {
+            mixture: decode(&message)?,
+            message: Some(message),
+        })
+    }
+
+    fn coded(message: &CodedMixture<D>, format: &WireFormat<D>) -> Result<Self, Error> {
+        let bits = message.to_bits(format).map_err(fewbits_densities::Error::from)?;
+        let decode = |bits: &BitString| Ok::<_, CodecError>(CodedMixture::from_bits(format, bits)?.into_mixture());
+        Ok(Self::received(bits, decode).map_err(fewbits_densities::Error::from)?)
+    }
+
     /// What the next leader knows.
-    pub mixture: Mixture<D>,
-    /// Length of the message in bits; `None` where the mixture is handed over as real numbers.
-    pub bits: Option<usize>,
+    pub fn mixture(&self) -> &Mixture<D> {
+        &self.mixture
+    }
+
+    /// What the next leader knows.
+    pub fn into_mixture(self) -> Mixture<D> {
+        self.mixture
+    }
+
+    /// The message; `None` if the mixture is handed over as real numbers.
+    pub fn message(&self) -> Option<&BitString> {
+        self.message.as_ref()
+    }
+
+    /// Length of the message in bits; `None` if the mixture is handed over as real numbers.
+    pub fn bits(&self) -> Option<usize> {
+        self.message.as_ref().map(BitString::bits)
+    }
 }
 
 /// A way to make a belief small enough to travel.
-///
-/// Law: the mixture is what a receiver can know from the message alone.
 pub trait Reducer<const D: usize> {
     /// Reduces the estimate to what is sent.
     ///
@@ -43,10 +88,7 @@ pub struct Whole;
 
 impl<const D: usize> Reducer<D> for Whole {
     fn reduce(&self, estimate: &KernelEstimate<D>) -> Result<Handover<D>, Error> {
-        Ok(Handover {
-            mixture: estimate.to_mixture()?,
-            bits: None,
-        })
+        Ok(Handover::real(estimate.to_mixture()?))
     }
 }
 
@@ -71,10 +113,7 @@ impl Components {
 
 impl<const D: usize> Reducer<D> for Components {
     fn reduce(&self, estimate: &KernelEstimate<D>) -> Result<Handover<D>, Error> {
-        Ok(Handover {
-            mixture: self.reduction.reduce(estimate, self.components)?,
-            bits: None,
-        })
+        Ok(Handover::real(self.reduction.reduce(estimate, self.components)?))
     }
 }
 
@@ -95,14 +134,7 @@ impl<const D: usize> Reducer<D> for Coded<D> {
     fn reduce(&self, estimate: &KernelEstimate<D>) -> Result<Handover<D>, Error> {
         let mixture = self.reduction.reduce(estimate, self.components)?;
         let message = CodedMixture::new(&mixture, &self.format, self.resolution)?;
-        let bits = message
-            .to_bits(&self.format)
-            .map_err(fewbits_densities::Error::from)?
-            .bits();
-        Ok(Handover {
-            mixture: message.into_mixture(),
-            bits: Some(bits),
-        })
+        Handover::coded(&message, &self.format)
     }
 }
 
@@ -120,9 +152,6 @@ pub struct RateLimited<const D: usize> {
 impl<const D: usize> Reducer<D> for RateLimited<D> {
     fn reduce(&self, estimate: &KernelEstimate<D>) -> Result<Handover<D>, Error> {
         let rated = self.control.fit(estimate, &self.format, self.budget)?;
-        Ok(Handover {
-            bits: Some(rated.bits),
-            mixture: rated.message.into_mixture(),
-        })
+        Handover::coded(&rated.message, &self.format)
     }
 }

@@ -80,6 +80,24 @@ fn an_estimate_is_its_mixture() {
     assert!(at_centres.iter().zip(&direct).all(|(a, b)| (a - b).abs() < 1e-12));
 }
 
+/// A centre of weight zero far from all others, where the plain sum of kernels is zero.
+#[test]
+fn log_density_at_centres_is_exact_in_the_tails() {
+    let particles = fewbits_densities::Particles::new(
+        [vec![0.0, 0.5, 1000.0, 40.0], vec![0.0, 0.2, 0.0, 3.0]],
+        &[0.0, -1.0, f64::NEG_INFINITY, f64::NEG_INFINITY],
+    )
+    .unwrap();
+    let estimate = KernelEstimate::new(particles, Matrix2::identity()).unwrap();
+    let at_centres = estimate.log_pdf_at_centres();
+    for (i, log) in at_centres.iter().enumerate() {
+        let [x, y] = estimate.particles().columns();
+        let direct = estimate.log_pdf(&Vector2::new(x[i], y[i]));
+        assert!((log - direct).abs() < 1e-12 * direct.abs().max(1.0), "{i}: {log} {direct}");
+    }
+    assert!(at_centres[2] < -499_000.0, "{}", at_centres[2]);
+}
+
 /// Sums over kernels run in lanes, blocks and pairs: every remainder, against the plain sum.
 #[test]
 fn estimates_of_every_size_are_plain_sums() {

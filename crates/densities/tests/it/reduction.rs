@@ -177,6 +177,36 @@ fn sums_over_a_cut_bound_the_true_errors() {
     }
 }
 
+/// Plug-in errors of inner nodes may be zero by chance: with room for every leaf nothing is merged.
+#[test]
+fn paper_reduction_with_room_for_all_keeps_all() {
+    let mut rng = Stream::new(11).rng();
+    for n in [1, 2, 30, 300] {
+        let column = |rng: &mut _| -> Vec<f64> {
+            (0..n)
+                .map(|_| RngExt::sample::<f64, _>(rng, rand_distr::StandardNormal))
+                .collect()
+        };
+        let particles = Particles::uniform([column(&mut rng), column(&mut rng)]).unwrap();
+        let estimate = KernelEstimate::new(particles, Matrix2::identity() * 0.3).unwrap();
+        let whole = estimate.to_mixture().unwrap();
+        for criterion in [Criterion::Ml, Criterion::Kl, Criterion::L1] {
+            for components in [n, n + 7] {
+                let optimal = Reduction::Optimal {
+                    split: Split::KD,
+                    criterion,
+                };
+                for reduction in [Reduction::paper(criterion), optimal] {
+                    let mixture = reduction.reduce(&estimate, components).unwrap();
+                    assert_eq!(mixture.len(), n, "{criterion:?} {components}");
+                    let point = nalgebra::Vector2::new(0.3, -0.7);
+                    assert!((mixture.log_pdf(&point) - whole.log_pdf(&point)).abs() < 1e-12);
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn a_price_in_bits_is_kept() {
     let estimate = crescent(3, 64, 1.0);

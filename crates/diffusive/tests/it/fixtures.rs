@@ -197,7 +197,8 @@ fn fisher() {
         let air = Air::new(number(&e, "kappa"), Vector3::zeros(), Ground::Impermeable).unwrap();
         let sensor = SourceSensor::new(air, list(&e["inputs"]["t"]), number(&e, "sigma")).unwrap();
         let got =
-            fisher_information(&sensor, &point(&e["inputs"]["node"]), &point(&e["inputs"]["source"]), number(&e, "mu"));
+            fisher_information(&sensor, &point(&e["inputs"]["node"]), &point(&e["inputs"]["source"]), number(&e, "mu"))
+                .unwrap();
         check(&e, got.as_slice());
     }
 }

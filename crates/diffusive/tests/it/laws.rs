@@ -6,8 +6,9 @@ use fewbits_core::{Belief, Density, Gaussian, Likelihood, laws};
 use fewbits_densities::{CellOptions, Lpg};
 use fewbits_diffusive::{
     Form, JointBelief, PositionBelief, Posterior, Prior, RateLikelihood, RateModel, RateRange, RateSums,
-    SourceLikelihood, Travelling, project,
+    SourceLikelihood, SourceSensor, Travelling, project,
 };
+use fewbits_models::diffusion::{Air, Ground, Wall};
 use fewbits_numerics::quadrature::Rule;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use proptest::prelude::*;
@@ -71,6 +72,14 @@ fn likelihoods_are_numbers_everywhere() {
     }
 }
 
+fn open_air(sensor: &SourceSensor, node: &Vector2<f64>, position: &Vector2<f64>) -> Vec<f64> {
+    let air = Air::new(40.0, *sensor.model().wind(), Ground::None).unwrap();
+    let open = SourceSensor::new(air, sensor.instants().to_vec(), sensor.noise()).unwrap();
+    open.with_heights(sensor.source_height(), sensor.sensor_height())
+        .unwrap()
+        .responses(node, position)
+}
+
 proptest! {
     // One case in 5 of `PROPTEST_CASES`: they are dear.
     #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(5), ..ProptestConfig::default() })]
@@ -88,6 +97,27 @@ proptest! {
             prop_assert!((table.correlation - direct.correlation).abs() <= 1e-9 * (direct.response * direct.energy).sqrt() + 1e-12);
             prop_assert!((table.log_marginal(&RateRange::new(0.5, 1.5).unwrap()) - direct.log_marginal(&RateRange::new(0.5, 1.5).unwrap())).abs() < 1e-5);
         }
+    }
+
+    /// At every height over every ground, near the source and far from it.
+    #[test]
+    fn tables_are_the_closed_form_at_any_height(
+        ground in 0_usize..3, scale in 0.03..1.0f64, ratio in 0.0..1.0f64, rho in -2.0..2.0f64, angle in 0.0..6.3f64,
+    ) {
+        let ground = [Ground::None, Ground::Impermeable, Ground::Wall(Wall::ABSORBING)][ground];
+        let air = Air::new(40.0, Vector3::new(3.0, 1.0, 0.0), ground).unwrap();
+        let sensor = SourceSensor::new(air, vec![5.0, 25.0], 1e-9).unwrap();
+        let sensor = sensor.with_heights(20.0 * scale * scale, 20.0 * scale * scale * ratio).unwrap();
+        let node = Vector2::new(50.0, 54.0);
+        let position = node + Vector2::new(angle.cos(), angle.sin()) * 10.0_f64.powf(rho);
+        let a = sensor.responses(&node, &position);
+        let record = sensor.record(&node, &[3e-5, 2e-5]).unwrap();
+        let direct = RateSums::of(record.samples(), &a, record.noise()).unwrap();
+        let table = record.sums(&position);
+        // Over absorbing ground the response is the difference of source and image.
+        let open = RateSums::of(record.samples(), &open_air(&sensor, &node, &position), record.noise()).unwrap();
+        prop_assert!((table.response - direct.response).abs() <= 1e-8 * open.response, "{} {}", table.response, direct.response);
+        prop_assert!((table.correlation - direct.correlation).abs() <= 1e-8 * (open.response * direct.energy).sqrt());
     }
 
     /// The marginal over the rate is the integral of the likelihood given the rate.

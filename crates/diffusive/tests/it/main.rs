@@ -7,13 +7,17 @@
     reason = "a panic is how a test fails"
 )]
 
+mod any_model;
 mod attacks;
 #[path = "../../../models/tests/it/diffusion_entries.rs"]
 mod diffusion_entries;
+mod envelopes;
+mod fit;
 mod fixtures;
 mod laws;
 mod messages;
 mod searches;
+mod unknown_models;
 
 use fewbits_diffusive::{RateModel, RateRange, Rule, SearchBox, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};

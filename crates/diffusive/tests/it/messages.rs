@@ -2,10 +2,10 @@
 
 use super::{field, joint, sensor};
 use fewbits_core::laws::message::{decoding_is_total, round_trip};
-use fewbits_core::{BitString, Gaussian, NumberFormat};
+use fewbits_core::{BitString, Gaussian, Message, NumberFormat};
 use fewbits_densities::CellOptions;
 use fewbits_diffusive::message::{Contract, Packet, SampleCode, Wire};
-use fewbits_diffusive::{Form, Posterior, Prior, RateModel, SourceLikelihood, project};
+use fewbits_diffusive::{Fit, Form, Posterior, Prior, RateModel, SourceLikelihood, project};
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
 
@@ -61,16 +61,22 @@ fn beliefs_arrive_as_they_were_sent() {
         ] {
             let (posterior, likelihood) = posterior(rate);
             let sent = project(&posterior, form, &rate).unwrap().unwrap();
-            let packet = Packet::new(Some(&sent), likelihood.records(), &[1, 2], &format.wire).unwrap();
+            let fit = Fit {
+                chi_squared: 7.25,
+                samples: likelihood.samples(),
+            };
+            let packet = Packet::belief_of(&sent, &fit, &format.wire).unwrap();
             let bits = round_trip(&packet, &format).unwrap();
             assert_eq!(bits, packet.bits(&format.wire).unwrap());
-            let received = packet.belief().unwrap().unwrap().gaussian();
+            let (received, arrived) = packet.belief().unwrap().unwrap();
+            assert_eq!(arrived, fit);
+            let received = received.gaussian();
             let tolerance = if numbers == NumberFormat::Double { 1e-9 } else { 1e-4 };
             assert!((received.mean() - sent.gaussian().mean()).amax() < 100.0 * tolerance);
             let off = (received.covariance() - sent.gaussian().covariance()).amax();
             assert!(off < 10.0 * tolerance * sent.gaussian().covariance().amax(), "{form:?} {off}");
-            // Kind, components, degree, rate: 12 bits before the numbers.
-            let count = (bits - 12) / numbers.bits() as usize;
+            // Kind, components, degree, rate: 12 bits before the numbers; the fit: 48 after them.
+            let count = (bits - 60) / numbers.bits() as usize;
             match form {
                 Form::Gaussian => assert_eq!(count, 9),
                 // Mean, covariance and polynomials, norm included: one component may be all there is.
@@ -99,10 +105,13 @@ fn raw_records_cost_what_they_should() {
             assert!((a - b).abs() <= 0.5 * 8e-6 + 1e-15);
         }
     }
-    let packet = Packet::new(None, &quantised, &[17, 301], &format.wire).unwrap();
+    let packet = Packet::raw(&quantised, &[17, 301]);
     // One bit, a count of ten bits, and 54 bits a node.
     assert_eq!(round_trip(&packet, &format).unwrap(), 11 + 2 * 54);
     assert_eq!(packet.belief().unwrap(), None);
+    // What arrives is what was quantised, to the bit.
+    let bits = packet.to_bits(&format).unwrap();
+    assert_eq!(Packet::from_bits(&format, &bits).unwrap(), packet);
 }
 
 proptest! {
@@ -112,7 +121,7 @@ proptest! {
         let string = BitString::from_bytes(bytes, bits).unwrap();
         for numbers in [NumberFormat::Double, NumberFormat::Single] {
             prop_assert!(decoding_is_total::<Packet>(&string, &contract(numbers)));
-            if let Ok(packet) = <Packet as fewbits_core::Message>::decode(&contract(numbers), &mut fewbits_core::BitReader::new(&string)) {
+            if let Ok(packet) = Packet::decode(&contract(numbers), &mut fewbits_core::BitReader::new(&string)) {
                 // A belief or an error, never a panic.
                 let _ = packet.belief();
             }

@@ -115,7 +115,12 @@ fn a_source_outside_the_box_ends_with_a_status() {
     });
     let told = matches!(
         outcome.status,
-        Status::OutsideField | Status::BeliefMiss | Status::NodeLimit | Status::Exhausted | Status::Unresolved
+        Status::OutsideField
+            | Status::BeliefMiss
+            | Status::Misfit
+            | Status::NodeLimit
+            | Status::Exhausted
+            | Status::Unresolved
     );
     assert!(told, "{:?}", outcome.status);
 }
@@ -144,9 +149,15 @@ fn envelopes_are_between_certainties() {
     let area = Envelope::new(outcome.posterior.as_ref().unwrap(), &likelihood).unwrap();
     let radius = fewbits_models::diffusion::contour_radius(1.0, 1e-4, 100.0, 40.0).unwrap();
     let (low, middle, high) = (
-        area.reach(&Vector2::from(SOURCE), 0.0, 100.0, 1e-4, 0.001).unwrap(),
-        area.reach(&Vector2::from(SOURCE), 0.0, 100.0, 1e-4, 0.5).unwrap(),
-        area.reach(&Vector2::from(SOURCE), 0.0, 100.0, 1e-4, 0.999).unwrap(),
+        area.reach(&Vector2::from(SOURCE), 0.0, 100.0, 1e-4, 0.001)
+            .unwrap()
+            .unwrap(),
+        area.reach(&Vector2::from(SOURCE), 0.0, 100.0, 1e-4, 0.5)
+            .unwrap()
+            .unwrap(),
+        area.reach(&Vector2::from(SOURCE), 0.0, 100.0, 1e-4, 0.999)
+            .unwrap()
+            .unwrap(),
     );
     assert!(low < middle && middle < high && low < radius && radius < high, "{low} {middle} {high} {radius}");
     let inside = area.exceedance(&Vector2::new(62.0, 55.0), 100.0, 1e-4).unwrap();

@@ -201,6 +201,8 @@ impl Scheme {
         search.rule = self.rule;
         search.most_nodes = self.most_nodes;
         search.wire = self.wire;
+        // The figures count the searches that reach the threshold, as the paper does, and those of them that are wrong.
+        search.refusal = None;
         if self.form != Form::Raw {
             // What is projected need not be exact to seven digits.
             search.cells.keep = 14.0;

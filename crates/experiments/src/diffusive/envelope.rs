@@ -4,6 +4,7 @@ use super::common::{ALARM, B, DIFFUSIVITY, RATE, Scheme, Settings, fraction, med
 use crate::prelude::*;
 use fewbits_diffusive::{Envelope as Area, SourceLikelihood};
 use fewbits_models::diffusion::contour_radius;
+use fewbits_numerics::ArgumentError;
 use nalgebra::Vector2;
 
 parameters! {
@@ -87,6 +88,13 @@ impl Parameters {
         let likelihood = SourceLikelihood::new(outcome.records, settings.joint()?)?;
         Ok(Area::new(&posterior, &likelihood).map(Some)?)
     }
+
+    /// A quantile of the reach. On the ground the threshold is exceeded next to the source, so that there is one.
+    fn reach(&self, area: &Area, origin: &Vector2<f64>, angle: f64, level: f64) -> Result<f64, Error> {
+        let reach = area.reach(origin, angle, self.time, self.threshold, level)?;
+        let expected = "a threshold that is exceeded somewhere";
+        reach.ok_or_else(|| Error::failed(ArgumentError::new("threshold", self.threshold, expected)))
+    }
 }
 
 const GRID: usize = 50;
@@ -107,12 +115,9 @@ impl Figure for Envelope {
         let edges = [("east", 0.0), ("north", 90.0_f64)];
         let all = trials(context, "diffusive-chains", p.trials, |trial| {
             let Some(area) = p.area(trial)? else { return Ok(None) };
-            let quantile =
-                |angle: f64, level| area.reach(&Vector2::zeros(), angle.to_radians(), p.time, p.threshold, level);
+            let quantile = |angle: f64, level| p.reach(&area, &Vector2::zeros(), angle.to_radians(), level);
             let bands = edges.map(|(_, angle)| Ok((quantile(angle, 0.05)?, quantile(angle, 0.95)?)));
-            let bands = bands
-                .into_iter()
-                .collect::<Result<Vec<_>, fewbits_diffusive::Error>>()?;
+            let bands = bands.into_iter().collect::<Result<Vec<_>, Error>>()?;
             Ok(Some(bands))
         })?;
         let known: Vec<&Vec<(f64, f64)>> = all.iter().flatten().collect();
@@ -135,10 +140,7 @@ impl Figure for Envelope {
             for direction in (0..360).step_by(15) {
                 context.check()?;
                 let angle = f64::from(direction).to_radians();
-                let at = |level| {
-                    area.reach(&origin, angle, p.time, p.threshold, level)
-                        .map_err(Error::failed)
-                };
+                let at = |level| p.reach(&area, &origin, angle, level);
                 band.push(Band {
                     t: p.time,
                     c_star: p.threshold,

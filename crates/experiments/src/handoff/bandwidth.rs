@@ -153,7 +153,7 @@ impl Figure for Widths {
                     match &setup.reducer {
                         Some(reducer) => {
                             let (particles, _) = filter.posterior(&mut rng, &known, &Walk, reading)?;
-                            known = reducer.reduce(&filter.estimate(&particles)?)?.mixture;
+                            known = reducer.reduce(&filter.estimate(&particles)?)?.into_mixture();
                             known.log_pdf_columns(columns, &mut log_q);
                         }
                         None => {

@@ -1,10 +1,10 @@
 //! The filter against the Kalman filter, and what it refuses.
 
 use fewbits_core::factor::Value;
-use fewbits_core::{Gaussian, Likelihood, Observed};
-use fewbits_densities::wire::{RateControl, WireFormat};
+use fewbits_core::{BitString, CodecError, Gaussian, Likelihood, Message, Observed};
+use fewbits_densities::wire::{CodedMixture, RateControl, WireFormat};
 use fewbits_densities::{Bandwidth, Mixture, Particles, Reduction};
-use fewbits_handoff::{Coded, Components, HandoffFilter, RateLimited, Reducer, StepError, Whole, trimmed};
+use fewbits_handoff::{Coded, Components, HandoffFilter, Handover, RateLimited, Reducer, StepError, Whole, trimmed};
 use fewbits_models::{Ar1, ScalarSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{SVector, Vector1};
@@ -28,7 +28,7 @@ fn follows_kalman(reducer: &dyn Reducer<1>, slack: f64) {
         let seen = Observed::new(sensor, Value::new(Vector1::new(z), [[r]].into()).unwrap());
         let (handover, info) = filter.step(&mut rng, &known, &walk, &seen).unwrap();
         assert!(info.kept <= 4000 && info.effective_sample_size > 100.0 && info.log_likelihood.is_finite());
-        known = handover.mixture;
+        known = handover.into_mixture();
         assert!((known.mean()[0] - truth.0).abs() < slack, "{} {}", known.mean()[0], truth.0);
         assert!((known.covariance()[(0, 0)] / truth.1 - 1.0).abs() < 3.0 * slack);
         let error = StepError::plug_in(&info.estimate, &known);
@@ -69,6 +69,47 @@ fn a_linear_world_is_tracked_as_by_kalman_whatever_travels() {
         },
         0.12,
     );
+}
+
+/// What is handed on is what the message holds: decoded again by another receiver it is the same mixture, and a message that is
+/// changed on the way changes it.
+#[test]
+fn handover_is_decoded_from_its_message() {
+    let x: Vec<f64> = (0..100).map(|i| (f64::from(i) * 0.77).sin()).collect();
+    let estimate = HandoffFilter::new(100, Whole)
+        .unwrap()
+        .estimate(&Particles::uniform([x]).unwrap())
+        .unwrap();
+    let format = WireFormat::around_origin(1.0, 0.25).unwrap();
+    let coded = Coded {
+        components: 3,
+        reduction: Reduction::default(),
+        format: format.clone(),
+        resolution: 0,
+    };
+    let limited = RateLimited {
+        control: RateControl::default(),
+        format: format.clone(),
+        budget: 60,
+    };
+    let reducers: [&dyn Reducer<1>; 2] = [&coded, &limited];
+    for reducer in reducers {
+        let handover = reducer.reduce(&estimate).unwrap();
+        let message = handover.message().unwrap();
+        assert_eq!(handover.bits(), Some(message.bits()));
+        let decoded = CodedMixture::from_bits(&format, message).unwrap().into_mixture();
+        assert_eq!(handover.mixture(), &decoded);
+        // The message is coarser than the estimate that it stands for.
+        assert_ne!(decoded.mean(), estimate.mean());
+    }
+    let whole = Whole.reduce(&estimate).unwrap();
+    assert_eq!((whole.bits(), whole.message()), (None, None));
+    let lost =
+        Handover::<1>::received(
+            BitString::default(),
+            |bits| Ok(CodedMixture::from_bits(&format, bits)?.into_mixture()),
+        );
+    assert!(lost.map_err(|error: CodecError| error).is_err());
 }
 
 #[test]

@@ -1,0 +1,149 @@
+//! Several models of the medium, of which one is right: winds or diffusivities on a small grid.
+
+use crate::belief::{Prior, SearchBox};
+use crate::posterior::Posterior;
+use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
+use fewbits_core::Gaussian;
+use fewbits_densities::CellOptions;
+use fewbits_models::SourceModel;
+use fewbits_models::diffusion::Air;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::probabilities;
+use nalgebra::Vector2;
+
+/// Sensors in several models of the medium, with the models' prior probabilities.
+///
+/// ```
+/// use fewbits_diffusive::{ModelGrid, SourceSensor};
+/// use fewbits_models::diffusion::{Air, Ground};
+/// use nalgebra::Vector3;
+/// // A wind of 2 m/s from one of eight directions.
+/// let winds = (0..8).map(|i| {
+///     let angle = std::f64::consts::FRAC_PI_4 * f64::from(i);
+///     let air = Air::new(40.0, Vector3::new(angle.cos(), angle.sin(), 0.0) * 2.0, Ground::Impermeable)?;
+///     Ok(SourceSensor::new(air, vec![5.0, 10.0], 8e-6)?)
+/// });
+/// let grid = ModelGrid::uniform(winds.collect::<Result<_, fewbits_diffusive::Error>>()?)?;
+/// assert_eq!(grid.len(), 8);
+/// # Ok::<(), fewbits_diffusive::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelGrid<M = Air> {
+    sensors: Vec<SourceSensor<M>>,
+    weights: Vec<f64>,
+}
+
+/// What samples say about one model.
+#[derive(Debug, Clone)]
+pub struct ModelPosterior {
+    /// Posterior probability of the model.
+    pub probability: f64,
+    /// Logarithm of the integral of prior times likelihood; `-inf` if the model excludes the samples.
+    pub log_evidence: f64,
+    /// The position under this model; `None` if it excludes the samples.
+    pub posterior: Option<Posterior>,
+}
+
+impl<M: SourceModel> ModelGrid<M> {
+    /// The models of the given prior probabilities. The sensors differ in the model of the medium (and what follows from it), and
+    /// sample at the same instants.
+    ///
+    /// # Errors
+    /// If there is none, the weights are no probabilities or not one for each, or the sensors sample at different instants.
+    pub fn new(sensors: Vec<SourceSensor<M>>, weights: &[f64]) -> Result<Self, Error> {
+        probabilities("weights", weights)?;
+        if sensors.len() != weights.len() {
+            let expected = format!("{}, one for each model", sensors.len());
+            return Err(ArgumentError::new("weights", weights.len(), expected).into());
+        }
+        if let Some(other) = sensors.iter().find(|s| s.instants() != sensors[0].instants()) {
+            let expected = format!("{:?}, those of the first model", sensors[0].instants());
+            return Err(ArgumentError::new("instants", format!("{:?}", other.instants()), expected).into());
+        }
+        Ok(Self {
+            sensors,
+            weights: weights.to_vec(),
+        })
+    }
+
+    /// Equally probable models.
+    ///
+    /// # Errors
+    /// As [`ModelGrid::new`].
+    pub fn uniform(sensors: Vec<SourceSensor<M>>) -> Result<Self, Error> {
+        let weights = vec![(sensors.len().max(1) as f64).recip(); sensors.len()];
+        Self::new(sensors, &weights)
+    }
+
+    /// One model alone.
+    pub fn single(sensor: SourceSensor<M>) -> Self {
+        Self {
+            sensors: vec![sensor],
+            weights: vec![1.0],
+        }
+    }
+
+    /// Number of models.
+    pub fn len(&self) -> usize {
+        self.sensors.len()
+    }
+
+    /// Never true: there is at least one model.
+    pub fn is_empty(&self) -> bool {
+        self.sensors.is_empty()
+    }
+
+    /// The models with their prior probabilities.
+    pub fn iter(&self) -> impl Iterator<Item = (&SourceSensor<M>, f64)> {
+        self.sensors.iter().zip(self.weights.iter().copied())
+    }
+
+    /// What samples of several nodes say about every model and the position under it.
+    ///
+    /// * `taken`: the place of each node and its samples, kg/m^3.
+    ///
+    /// # Errors
+    /// As [`SourceSensor::record`] and [`Posterior::new`]; [`fewbits_core::Error::Impossible`] if every model excludes the samples.
+    pub fn posterior(
+        &self,
+        prior: &Gaussian<2>,
+        taken: &[(Vector2<f64>, Vec<f64>)],
+        rate: RateModel,
+        search: &SearchBox,
+        options: &CellOptions,
+    ) -> Result<Vec<ModelPosterior>, Error>
+    where
+        M: Clone,
+    {
+        let mut all = Vec::with_capacity(self.len());
+        for sensor in &self.sensors {
+            let records = taken.iter().map(|(node, samples)| sensor.record(node, samples));
+            let likelihood = SourceLikelihood::new(records.collect::<Result<_, _>>()?, rate)?;
+            let posterior = match Posterior::new(&Prior::Exact(*prior), &likelihood, search, None, options) {
+                Ok(posterior) => Some(posterior),
+                Err(Error::Density(fewbits_densities::Error::Core(fewbits_core::Error::Impossible))) => None,
+                Err(other) => return Err(other),
+            };
+            all.push(ModelPosterior {
+                probability: 0.0,
+                log_evidence: posterior.as_ref().map_or(f64::NEG_INFINITY, |p| p.cells.log_evidence()),
+                posterior,
+            });
+        }
+        let logs = || {
+            all.iter()
+                .zip(&self.weights)
+                .map(|(model, prior)| prior.ln() + model.log_evidence)
+        };
+        let largest = logs().fold(f64::NEG_INFINITY, f64::max);
+        if largest == f64::NEG_INFINITY {
+            return Err(fewbits_densities::Error::from(fewbits_core::Error::Impossible).into());
+        }
+        let weights: Vec<f64> = logs().map(|log| (log - largest).exp()).collect();
+        let total: f64 = weights.iter().sum();
+        all.iter_mut()
+            .zip(weights)
+            .for_each(|(model, weight)| model.probability = weight / total);
+        Ok(all)
+    }
+}

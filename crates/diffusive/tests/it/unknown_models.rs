@@ -1,0 +1,116 @@
+//! Wind and diffusivity known up to a few models.
+
+use super::{field, joint, sensor};
+use fewbits_core::Gaussian;
+use fewbits_densities::CellOptions;
+use fewbits_diffusive::{Form, ModelGrid, Posterior, Prior, Search, SourceLikelihood, SourceSensor, Status};
+use fewbits_models::diffusion::{Air, Ground};
+use fewbits_monte_carlo::Stream;
+use fewbits_topology::{Deployment, Graph};
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+const SOURCE: [f64; 2] = [62.0, 50.0];
+
+fn with(diffusivity: f64, wind: f64) -> SourceSensor {
+    let air = Air::new(diffusivity, Vector3::new(wind, 0.0, 0.0), Ground::Impermeable).unwrap();
+    SourceSensor::new(air, vec![5.0, 10.0, 15.0, 20.0, 25.0], 8e-6).unwrap()
+}
+
+fn candidates() -> ModelGrid {
+    let models = [(40.0, 0.0), (40.0, 3.0), (40.0, -3.0), (60.0, 0.0), (27.0, 0.0)];
+    ModelGrid::uniform(models.map(|(k, v)| with(k, v)).to_vec()).unwrap()
+}
+
+#[test]
+fn evidence_of_the_grid_is_bayes() {
+    let mut rng = Stream::new(7).rng();
+    let prior = Gaussian::new(Vector2::new(50.0, 54.0), Matrix2::identity() * 2500.0).unwrap();
+    let taken: Vec<(Vector2<f64>, Vec<f64>)> = [[50.0, 54.0], [40.0, 40.0]]
+        .map(|node| {
+            let node = Vector2::from(node);
+            (node, with(40.0, 3.0).sample(&mut rng, &node, &Vector2::from(SOURCE), 1.0))
+        })
+        .to_vec();
+    let weights = [0.1, 0.2, 0.3, 0.2, 0.2];
+    let sensors: Vec<SourceSensor> = candidates().iter().map(|(s, _)| s.clone()).collect();
+    let grid = ModelGrid::new(sensors.clone(), &weights).unwrap();
+    let options = CellOptions::default();
+    let found = grid.posterior(&prior, &taken, joint(), &field(1.0), &options).unwrap();
+    let evidences: Vec<f64> = sensors
+        .iter()
+        .map(|sensor| {
+            let records = taken
+                .iter()
+                .map(|(node, samples)| sensor.record(node, samples).unwrap());
+            let likelihood = SourceLikelihood::new(records.collect(), joint()).unwrap();
+            Posterior::new(&Prior::Exact(prior), &likelihood, &field(1.0), None, &options)
+                .unwrap()
+                .cells
+                .log_evidence()
+        })
+        .collect();
+    let total: f64 = (0..5).map(|i| weights[i] * (evidences[i] - evidences[1]).exp()).sum();
+    for i in 0..5 {
+        let expected = weights[i] * (evidences[i] - evidences[1]).exp() / total;
+        assert!((found[i].probability - expected).abs() < 1e-9, "{i}: {} {expected}", found[i].probability);
+    }
+    assert!((found.iter().map(|m| m.probability).sum::<f64>() - 1.0).abs() < 1e-12);
+}
+
+fn search(
+    truth: &SourceSensor,
+    models: &ModelGrid,
+    form: Form,
+) -> Result<(Status, Vec<f64>, f64), fewbits_diffusive::Error> {
+    let mut rng = Stream::new(4).rng();
+    let alarm = Vector2::new(44.396, 52.042);
+    let deployed = Deployment::uniform(&mut rng, [0.0; 2], [100.0; 2], 300).unwrap();
+    let start = deployed.nearest_to(&alarm);
+    let graph = Graph::within(deployed.positions(), 15.0).unwrap();
+    let mut search = Search::new(&alarm, 50.0, field(1.0), joint(), 1e-5)?;
+    search.form = form;
+    let source = Vector2::from(SOURCE);
+    let outcome = search.run_models(models, &deployed, &graph, start, |node| {
+        truth.sample(&mut rng, &deployed.positions()[node], &source, 1.0)
+    })?;
+    let error = outcome.estimate().map_or(f64::NAN, |e| (e.mean() - source).norm());
+    Ok((outcome.status, outcome.models, error))
+}
+
+#[test]
+fn search_finds_source_and_model() {
+    for (truth, index) in [(with(40.0, 0.0), 0), (with(40.0, -3.0), 2), (with(60.0, 0.0), 3)] {
+        let (status, models, error) = search(&truth, &candidates(), Form::Raw).unwrap();
+        assert_eq!(status, Status::Converged);
+        assert!(models[index] > 0.95 && error < 0.5, "{models:?} {error}");
+    }
+}
+
+#[test]
+fn model_that_is_not_among_them_is_a_misfit() {
+    let others = ModelGrid::uniform(vec![with(40.0, 0.0), with(60.0, 0.0)]).unwrap();
+    let (status, ..) = search(&with(40.0, -8.0), &others, Form::Raw).unwrap();
+    assert_eq!(status, Status::Misfit);
+}
+
+/// One model is the plain search, to the bit.
+#[test]
+fn grid_of_one_model_is_the_plain_search() {
+    let alone = ModelGrid::single(with(40.0, 0.0));
+    let (status, models, error) = search(&with(40.0, 0.0), &alone, Form::Raw).unwrap();
+    assert_eq!((status, models), (Status::Converged, vec![1.0]));
+    assert!(error < 0.5);
+}
+
+#[test]
+fn grids_refuse_bad_parts() {
+    assert!(ModelGrid::<Air>::uniform(Vec::new()).is_err());
+    assert!(ModelGrid::new(vec![sensor(1.0, false)], &[0.5, 0.5]).is_err());
+    assert!(ModelGrid::new(vec![sensor(1.0, false)], &[0.7]).is_err());
+    let later = SourceSensor::new(*with(40.0, 0.0).model(), vec![9.0], 8e-6).unwrap();
+    assert!(ModelGrid::uniform(vec![with(40.0, 0.0), later]).is_err());
+    let refusal = search(&with(40.0, 0.0), &candidates(), Form::Mixture(4))
+        .unwrap_err()
+        .to_string();
+    assert!(refusal.contains("Raw"), "{refusal}");
+}
