@@ -271,7 +271,8 @@ mod tests {
 
     #[test]
     fn relative_links_are_found_without_anchors() {
-        let page = "[a](one.md) ![b](images/two.svg) [c](three.md#part) [d](https://example.org/x) [e](#here) `f[0](x, y)`";
+        let page =
+            "[a](one.md) ![b](images/two.svg) [c](three.md#part) [d](https://example.org/x) [e](#here) `f[0](x, y)`";
         assert_eq!(links(page), ["one.md", "images/two.svg", "three.md"]);
     }
 

@@ -57,6 +57,9 @@ pub(crate) struct Target<'a, M> {
     conditionals: Vec<Conditional>,
 }
 
+/// Means and variances of the rate, one of each per cell.
+type RateMoments = (Vec<f64>, Vec<f64>);
+
 impl<'a, M: SourceModel> Target<'a, M> {
     pub(crate) fn new(prior: &'a Prior, likelihood: &'a SourceLikelihood<M>) -> Result<Self, Error> {
         let (mut lobes, mut conditionals) = (Vec::new(), Vec::new());
@@ -100,7 +103,7 @@ impl<'a, M: SourceModel> Target<'a, M> {
 
     /// Mean and variance of the rate at every cell, where it is unknown and shared, and the expected sum of squared residuals over
     /// the noise variance.
-    pub(crate) fn rates_and_fit(&self, cells: &Cells<2>) -> (Option<(Vec<f64>, Vec<f64>)>, f64) {
+    pub(crate) fn rates_and_fit(&self, cells: &Cells<2>) -> (Option<RateMoments>, f64) {
         let [x, y] = cells.columns();
         let mut chi_squared = 0.0;
         let positions = x.iter().zip(y).map(|(x, y)| Vector2::new(*x, *y)).zip(cells.weights());

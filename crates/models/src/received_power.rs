@@ -120,8 +120,9 @@ impl<const D: usize> ReceivedPower<D> {
     /// At the sensor itself it is zero for `n > 1` (the limit); for `n = 1` it has no limit and zero is returned.
     pub fn slope_at(&self, x: f64, y: f64) -> Vector2<f64> {
         let offset = Vector2::new(x, y) - self.position;
-        let distance = offset.norm();
-        if distance == 0.0 {
+        let distance = offset[0].hypot(offset[1]);
+        // Beyond the largest double the slope has vanished.
+        if distance == 0.0 || distance == f64::INFINITY {
             return Vector2::zeros();
         }
         // `-(n/2) h(d) u/d` with `u = alpha d^n / (1 + alpha d^n)`, in which only bounded numbers meet: `d^n` may overflow.

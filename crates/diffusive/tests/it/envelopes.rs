@@ -80,8 +80,7 @@ fn reach_is_where_the_plume_falls_below_the_threshold() {
         let walked = |threshold: f64| {
             (0..40_000)
                 .map(|i| 0.01 * f64::from(i))
-                .filter(|r| at(*r) > threshold)
-                .last()
+                .rfind(|r| at(*r) > threshold)
         };
         for threshold in [1e-4, 1e-3] {
             let reach = area.reach(&Vector2::from(SOURCE), 0.0, 60.0, threshold, 0.5).unwrap();

@@ -26,6 +26,8 @@ pub const MIN_NODES_PER_DEVIATION: f64 = 1.5;
 /// Nodes per deviation that a grid over `+- reach` deviations must have, so that the next grid, built for deviations that were
 /// measured on this one, is still fine enough.
 const NOMINAL_NODES_PER_DEVIATION: f64 = 1.6;
+/// Smallest number of nodes on an axis that may be asked for.
+const MIN_NODES: usize = 5;
 /// Largest number of nodes of one grid.
 const MAX_NODES: usize = 2_000_000;
 /// Nodes of one grid up to which a posterior is followed that a grid of the default number does not resolve: 241^2, 38^3.
@@ -114,16 +116,20 @@ pub struct GridInfo {
 impl GridFilter {
     /// A filter with `nodes` nodes on each axis, over 4 deviations to each side.
     ///
+    /// Fewer than 14 are laid as 14: they would have less than 1.6 nodes per deviation, too few for moments of a posterior with edges.
+    ///
     /// # Errors
-    /// Unless there are 14 to 1001: fewer than 14 have less than 1.6 nodes per deviation.
+    /// Unless there are 5 to 1001.
     pub fn new(nodes: usize) -> Result<Self, Error> {
         Self::with_nodes_and_reach(nodes, REACH)
     }
 
     /// The same over `reach` deviations to each side: with many nodes, seven leave the moments exact.
     ///
+    /// A grid of fewer than 1.6 nodes per deviation is laid with so many.
+    ///
     /// # Errors
-    /// If it is outside 2 to 10, or the nodes are fewer than 1.6 per deviation.
+    /// If it is outside 2 to 10.
     pub fn with_reach(self, reach: f64) -> Result<Self, Error> {
         Self::with_nodes_and_reach(self.nodes, reach)
     }
@@ -131,11 +137,13 @@ impl GridFilter {
     fn with_nodes_and_reach(nodes: usize, reach: f64) -> Result<Self, Error> {
         within("reach", reach, 2.0, 10.0)?;
         let fewest = (2.0 * reach * NOMINAL_NODES_PER_DEVIATION + 1.0).ceil() as usize;
-        if !(fewest..=1001).contains(&nodes) {
-            let expected = format!("{fewest} to 1001 nodes on each axis, for a reach of {reach} deviations");
-            return refuse("nodes", nodes, expected);
+        if !(MIN_NODES..=1001).contains(&nodes) {
+            return refuse("nodes", nodes, format!("{MIN_NODES} to 1001 nodes on each axis"));
         }
-        Ok(Self { nodes, reach })
+        Ok(Self {
+            nodes: nodes.max(fewest),
+            reach,
+        })
     }
 
     /// Nodes on each axis.

@@ -194,6 +194,13 @@ mod tests {
         assert!((link.loss() - (1.0 - 0.64 * 0.95_f64.powi(8))).abs() < 1e-12);
         assert_eq!(link.crossover(), 0.05);
         assert_eq!(channel.link(10.0, None, Check::Whole).unwrap().crossover(), 0.0);
-        assert_eq!(Channel::lossy(1.0).unwrap().link(1.0, None, Check::Whole).unwrap().arrival(), 0.0);
+        assert_eq!(
+            Channel::lossy(1.0)
+                .unwrap()
+                .link(1.0, None, Check::Whole)
+                .unwrap()
+                .arrival(),
+            0.0
+        );
     }
 }

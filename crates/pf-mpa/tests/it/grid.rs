@@ -223,5 +223,8 @@ fn axes_are_named_and_checked() {
         let refused = grid.update(&plane, axes, observed.as_slice(), &mut GridWorkspace::default());
         assert!(matches!(refused, Err(Error::Argument(e)) if e.name == "axes"));
     }
-    assert!(GridFilter::new(13).is_err() && grid.with_reach(7.0).is_err() && GridFilter::new(14).is_ok());
+    assert!(GridFilter::new(4).is_err() && grid.with_reach(10.5).is_err());
+    // Too few nodes for their reach are raised to what resolves a Gaussian.
+    assert_eq!(GridFilter::new(9).unwrap(), GridFilter::new(14).unwrap());
+    assert_ne!(GridFilter::new(14).unwrap(), GridFilter::new(15).unwrap());
 }
