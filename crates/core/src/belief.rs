@@ -15,7 +15,7 @@ pub trait Belief<const D: usize> {
     fn covariance(&self) -> SMatrix<f64, D, D>;
 
     /// Fills the columns with independent draws; with NaN where columns differ in length
-    /// ([`columns_agree`](crate::columns::columns_agree)).
+    /// ([`crate::columns::columns_agree`]).
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>);
 
     /// One draw.

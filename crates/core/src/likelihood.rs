@@ -11,7 +11,7 @@ use nalgebra::SVector;
 ///
 /// Laws ([`crate::laws::likelihood`]): finite or `-inf`, never NaN for a finite state; where the state is NaN it is NaN, or no more than
 /// at any state of numbers; `add_log_likelihoods` adds what `log_likelihood` returns, to rounding, and where lengths differ all of
-/// `log_weights` becomes NaN ([`lengths_agree`](crate::columns::lengths_agree)).
+/// `log_weights` becomes NaN ([`crate::columns::lengths_agree`]).
 pub trait Likelihood<const D: usize> {
     /// `ln p(observed | state)`.
     fn log_likelihood(&self, state: &SVector<f64, D>) -> f64;

@@ -22,7 +22,7 @@ pub trait Sensing<const D: usize, const M: usize> {
     fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> SVector<f64, M>;
 
     /// Writes the noise-free measurement of every state to `means`; NaN where lengths differ
-    /// ([`measurements_agree`](crate::columns::measurements_agree)). Override where a loop over columns is faster.
+    /// ([`crate::columns::measurements_agree`]). Override where a loop over columns is faster.
     fn mean_columns(&self, states: &Columns<'_, D>, mut means: ColumnsMut<'_, M>) {
         if measurements_agree(states, &mut means) {
             for i in 0..count(&means) {

@@ -42,7 +42,7 @@ use nalgebra::{SMatrix, SVector};
 /// 1. `log_likelihood` is finite or `-inf` for every finite `m`; where `m` is NaN it is NaN, or no more than at any number, so that a
 ///    NaN never raises a weight;
 /// 2. `add_log_likelihoods` adds what `log_likelihood` returns, to rounding; where lengths differ all of `log_weights` becomes NaN
-///    ([`lengths_agree`](crate::columns::lengths_agree));
+///    ([`crate::columns::lengths_agree`]);
 /// 3. `tilted` agrees with quadrature of `log_likelihood` against the prior.
 pub trait Factor<const M: usize> {
     /// `ln p(observation | h(x) = m)`.

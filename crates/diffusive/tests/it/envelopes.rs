@@ -77,11 +77,7 @@ fn reach_is_where_the_plume_falls_below_the_threshold() {
         let sensor = sensor.with_heights(heights.0, heights.1).unwrap();
         let area = sharp(&sensor, RateModel::Known(1.0));
         let at = |r: f64| air.concentration(&Vector3::new(r, 0.0, heights.1), &Vector3::new(0.0, 0.0, heights.0), 60.0);
-        let walked = |threshold: f64| {
-            (0..40_000)
-                .map(|i| 0.01 * f64::from(i))
-                .rfind(|r| at(*r) > threshold)
-        };
+        let walked = |threshold: f64| (0..40_000).map(|i| 0.01 * f64::from(i)).rfind(|r| at(*r) > threshold);
         for threshold in [1e-4, 1e-3] {
             let reach = area.reach(&Vector2::from(SOURCE), 0.0, 60.0, threshold, 0.5).unwrap();
             match (reach, walked(threshold)) {
