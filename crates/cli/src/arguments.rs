@@ -90,7 +90,7 @@ pub(crate) struct PackOptions {
     /// The recording. Without it standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
-    /// Some ten times faster, at about 1.2 times the bits.
+    /// Some ten times faster, at 1.3 to 1.8 times the bits.
     #[arg(long)]
     pub(crate) fast: bool,
     /// Go on with the recording in `--output`, with its columns and bounds.

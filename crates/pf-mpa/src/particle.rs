@@ -9,6 +9,7 @@ use fewbits_core::{Gaussian, Likelihood};
 use fewbits_densities::Particles;
 use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};
 use fewbits_numerics::stored;
 use nalgebra::{Cholesky, Matrix2, Matrix4, SMatrix, Vector2, Vector4, Vector6};
 use rand::{Rng, RngExt};
@@ -159,12 +160,14 @@ impl Tracker for RaoBlackwellGuided {
 
     fn start<R: Rng + ?Sized>(&self, rng: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<VelocityCloud, Error> {
         let covariance = prior.covariance();
-        let velocity_variance = 0.5 * (covariance[(2, 2)] + covariance[(3, 3)]);
-        // Positions are drawn, velocities start at their mean given the position.
+        let positions: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        let across: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 2).into_owned();
+        // Positions are drawn, velocities start at their mean given the position: what the position explains of them is drawn with it.
+        let explained = symmetrised(&(across.transpose() * solve_semidefinite(&positions, &across)?));
         let mut known = *covariance;
-        known.fixed_view_mut::<2, 2>(2, 2).fill(0.0);
-        known.fixed_view_mut::<2, 2>(0, 2).fill(0.0);
-        known.fixed_view_mut::<2, 2>(2, 0).fill(0.0);
+        known.fixed_view_mut::<2, 2>(2, 2).copy_from(&explained);
+        let velocities = covariance[(2, 2)] + covariance[(3, 3)];
+        let velocity_variance = (0.5 * (velocities - explained.trace())).max(0.0);
         let positions = Gaussian::new(*prior.mean(), known)?;
         Ok(VelocityCloud {
             particles: start(rng, &positions, self.particles)?,
@@ -253,4 +256,29 @@ fn propose<R: Rng + ?Sized>(rng: &mut R, mean: &Vector2<f64>, spread: f64, obser
     let log_proposal = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>() - 0.5 * normals.norm_squared();
     let log_likelihood = Likelihood::<2>::log_likelihood(observed, &place);
     (place, log_prior - log_proposal + log_likelihood)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn start_keeps_the_correlation_of_the_prior() {
+        // Position and velocity along x with correlation 0.9; y independent.
+        let mut covariance = Matrix4::from_diagonal(&Vector4::new(4.0, 1.0, 0.25, 0.25));
+        covariance[(0, 2)] = 0.9 * 2.0 * 0.5;
+        covariance[(2, 0)] = covariance[(0, 2)];
+        let prior = Gaussian::new(Vector4::new(10.0, -3.0, 1.0, 0.5), covariance).unwrap();
+        let target = Target::printed().unwrap();
+        let mut rng = fewbits_monte_carlo::Stream::new(11).rng();
+        let cloud = RaoBlackwellGuided::new(20_000)
+            .unwrap()
+            .start(&mut rng, &target, &prior)
+            .unwrap();
+        // `(0.25 (1 - 0.81) + 0.25) / 2`.
+        assert!((cloud.velocity_variance() - 0.14875).abs() < 1e-12);
+        let found = cloud.particles().covariance();
+        assert!((found[(0, 2)] - 0.9).abs() < 0.04, "{found}");
+        assert!((found[(2, 2)] - 0.81 * 0.25).abs() < 0.01 && found[(3, 3)].abs() < 1e-6, "{found}");
+    }
 }
