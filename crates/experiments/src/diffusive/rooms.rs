@@ -375,15 +375,15 @@ impl Figure for Rooms {
             let half = 0.5 * CELL;
             let boxes = walls
                 .into_iter()
-                .map(|(x, y)| (x - half, y - half, x + half, y + half))
+                .map(|(x, y)| (x - half, x + half, y - half, y + half))
                 .collect();
-            Panel::new(title, Axis::linear("x (m)").between(0.0, 15.0), Axis::linear("y (m)").between(0.0, 10.0))
+            Panel::new(title, Axis::linear("x / m").between(0.0, 15.0), Axis::linear("y / m").between(0.0, 10.0))
                 .with(Layer::heat("share of the largest", centres(columns), centres(lines), values))
                 .with(Layer::boxes("wall", boxes).coloured(7))
                 .with(Layer::points("sensors", places(|s| s.sensor)).styled(1, Marker::Circle))
                 .with(Layer::points("source", places(|s| s.source)).styled(3, Marker::Triangle))
         };
-        let visits = Panel::new("Distance to the source", Axis::log("sensors visited"), Axis::linear("median (m)"))
+        let visits = Panel::new("Distance to the source", Axis::log("sensors visited"), Axis::linear("median distance / m"))
             .with(Layer::measured("true geometry", &rows.visits, |v| (v.sensors as f64, v.error)))
             .with(Layer::measured("free space", &rows.visits, |v| (v.sensors as f64, v.error_free)));
         let names = Axis::categories("case", rows.found.iter().map(|row| row.case));
