@@ -1,17 +1,18 @@
 //! What a centre knows, as a value that is stored and goes on to the bit.
 
 use super::health::Monitor;
-use super::presence::Presence;
+use super::presence::{Outage, Presence};
 use super::{FusionCentre, Slot};
 use crate::Error;
 use crate::contract::StateFilter;
 use fewbits_core::{BitString, Observation};
 use fewbits_numerics::error::{finite, positive, refuse};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The version of the stored form.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// What is known of one sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -82,7 +83,8 @@ impl StoredSlot {
 
 /// What a centre knows: everything but its models, its filter and its settings, which the program states again.
 ///
-/// Stored as JSON by `serde_json` with its feature `float_roundtrip`, or by any format that keeps every bit of a double, a centre that
+/// Stored as bytes ([`to_bytes`](Self::to_bytes)), as JSON by `serde_json` with its feature `float_roundtrip`, or by any format that keeps
+/// every bit of a double, a centre that
 /// is restored goes on with the same bits, given the same random stream.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -92,9 +94,40 @@ pub struct CentreState<B> {
     noise_scale: f64,
     belief: B,
     members: BTreeMap<u32, MemberState>,
+    outage: Outage,
     monitor: Monitor,
     history: Vec<Checkpoint<B>>,
     dropped: u64,
+}
+
+impl<B: Serialize> CentreState<B> {
+    /// The compact binary form: every double in 8 bytes, small numbers in one or two. It begins with its version.
+    ///
+    /// # Errors
+    /// If the belief has no binary form.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
+        postcard::to_stdvec(self).or_else(|error| refuse("belief", error, "a belief of a binary form"))
+    }
+}
+
+impl<B: DeserializeOwned> CentreState<B> {
+    /// Reads [`to_bytes`](Self::to_bytes).
+    ///
+    /// # Errors
+    /// If the bytes are of another version, or no state of this kind of belief.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        let expected = format!("the bytes of a centre's state of version {VERSION}");
+        match postcard::take_from_bytes::<u32>(bytes) {
+            Ok((VERSION, _)) => {}
+            Ok((version, _)) => return refuse("version", version, expected),
+            Err(error) => return refuse("bytes", error, expected),
+        }
+        match postcard::take_from_bytes(bytes) {
+            Ok((state, [])) => Ok(state),
+            Ok((_, rest)) => refuse("bytes", format!("{} bytes too many", rest.len()), expected),
+            Err(error) => refuse("bytes", error, expected),
+        }
+    }
 }
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
@@ -110,6 +143,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 .iter()
                 .map(|(number, m)| (*number, m.state.clone()))
                 .collect(),
+            outage: self.outage,
             monitor: self.monitor,
             history: self.history.clone(),
             dropped: self.dropped,
@@ -136,6 +170,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         self.now = state.now;
         self.noise_scale = state.noise_scale;
         self.belief = state.belief;
+        self.outage = state.outage;
         self.monitor = state.monitor;
         self.history = state.history;
         self.dropped = state.dropped;
