@@ -12,18 +12,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let prior = Gaussian::new([0.0, 1.0, 0.0, -0.5].into(), nalgebra::Matrix4::identity())?;
     let mut centre = FusionCentre::new(&mut rng, world, MomentFilter, &prior)?;
     let (direct, [x, y]) = (LinearSensor::direct(0.5)?, PLANE_POSITION);
-    let sensing = [
-        OnAxes::<_, 4, 1>::new(direct, [x])?,
-        OnAxes::new(direct, [y])?,
-        OnAxes::new(direct, [x])?,
-    ];
+    let on = |axis| OnAxes::<_, 4, 1>::new(direct, [axis]);
+    let sensing = [on(x)?, on(y)?, on(x)?];
     let (bit, word, value) = (SignBit::new(0.5)?, InnovationWord::new(0.5, 3)?, FullValue::new(0.5)?);
     let threshold = |_: &Gaussian<4>, m: &Gaussian<1>| m.mean()[0];
     centre.join(0, Reporting::new(sensing[0], bit, Link::lossy(0.1)?, threshold))?;
     let cells = |_: &Gaussian<4>, m: &Gaussian<1>| Prediction::from(m);
     centre.join(1, Reporting::new(sensing[1], word, Link::PERFECT, cells))?;
     let (mut bit, mut word, mut value) = (SchemeNode::new(bit), SchemeNode::new(word), SchemeNode::new(value));
-    let mut nodes: [&mut dyn SensorNode<1>; 3] = [&mut bit, &mut word, &mut value];
+    let nodes: [&mut dyn SensorNode<1>; 3] = [&mut bit, &mut word, &mut value];
     let mut truth = prior.sample(&mut rng);
     for k in 0..200_u32 {
         if k == 100 {
