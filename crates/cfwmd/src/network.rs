@@ -7,7 +7,7 @@ use crate::scheme::{Censoring, rule_under};
 use fewbits_core::{Gaussian, LinearSensing, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, at_least_one, non_negative};
+use fewbits_numerics::error::{at_least_one, non_negative};
 use nalgebra::SVector;
 use rand::Rng;
 
@@ -271,26 +271,4 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         }
         Ok((belief, info))
     }
-}
-
-/// Sorts the reports of one step by sensor: from whoever is not among them nothing arrived.
-///
-/// # Errors
-/// [`Error::UnknownSensor`], [`Error::ReportedTwice`]; if a value is not finite.
-pub fn gather<const M: usize>(
-    sensors: usize,
-    reports: impl IntoIterator<Item = (usize, SVector<f64, M>)>,
-) -> Result<Vec<Observation<SVector<f64, M>>>, Error> {
-    let mut observations = vec![Observation::Nothing; sensors];
-    for (sensor, value) in reports {
-        let slot = observations
-            .get_mut(sensor)
-            .ok_or(Error::UnknownSensor { sensor, sensors })?;
-        if slot.received().is_some() {
-            return Err(Error::ReportedTwice { sensor });
-        }
-        all_finite("report", value.as_slice())?;
-        *slot = Observation::Received(value);
-    }
-    Ok(observations)
 }

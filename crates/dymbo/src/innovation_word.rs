@@ -3,7 +3,8 @@
 use crate::Error;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Link, MeasurementNoise, Message, NumberFormat, Observation, Scheme,
+    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
+    Scheme,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::stored;
@@ -20,6 +21,16 @@ pub struct Prediction {
     pub mean: f64,
     /// Standard deviation of the innovation, `sqrt(P + sigma^2)`.
     pub deviation: f64,
+}
+
+/// Of the predicted measurement, noise included.
+impl From<&Gaussian<1>> for Prediction {
+    fn from(measurement: &Gaussian<1>) -> Self {
+        Self {
+            mean: measurement.mean()[0],
+            deviation: measurement.covariance()[0].sqrt(),
+        }
+    }
 }
 
 impl Message for Prediction {

@@ -113,7 +113,6 @@ proptest! {
         let filter = SignFilter::new(dynamics, [one, two]).with_link(link);
         for after in [
             filter.update(&belief, which % 3, &observation(which)),
-            filter.update_at(&belief, 0, x[13], &observation(which)),
             filter.update_parallel(&belief, &[observation(which), observation(which + 1)]),
         ]
         .into_iter()

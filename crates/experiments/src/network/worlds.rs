@@ -12,7 +12,7 @@ use fewbits_core::{Belief, Gaussian, LinearDynamics, Link, NumberFormat, Observe
 use fewbits_densities::wire::WireFormat;
 use fewbits_densities::{Mixture, Reduction};
 use fewbits_dymbo::{CountFusion, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarPlant};
-use fewbits_filters::{AssumedDensity, kalman};
+use fewbits_filters::{MomentFilter, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_network::estimators::{
@@ -215,7 +215,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
             sensors: self.sensors.clone(),
             scheme: InnovationWord::new(1.0, bits)?,
             link: Link::PERFECT,
-            filter: AssumedDensity,
+            filter: MomentFilter,
             broadcast: asked as fn(&Gaussian<1>) -> Prediction,
             start: self.start,
         })
@@ -289,7 +289,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
                     sensors: self.sensors.clone(),
                     scheme: SendAll::new(1.0, if coarse { self.coarse } else { self.fine })?,
                     link: Link::PERFECT,
-                    filter: AssumedDensity,
+                    filter: MomentFilter,
                     broadcast: nothing as fn(&Gaussian<1>),
                     start: self.start,
                 };
@@ -336,7 +336,7 @@ impl World<4, LinearGaussian<4, 2>> {
             sensors: sensors.clone(),
             scheme: QuantizedRange::new(1 << bits, noise)?,
             link: Link::PERFECT,
-            filter: AssumedDensity,
+            filter: MomentFilter,
             // In single precision, as it travels.
             broadcast: move |expected: &Gaussian<1>| RangeReference {
                 centre: f64::from(expected.mean()[0] as f32),
@@ -427,7 +427,7 @@ impl World<1, Ar1> {
                     sensors: self.sensors.clone(),
                     scheme: QuantizingSensor::with_variance(quantizer, labels, 1.0)?,
                     link: Link::PERFECT,
-                    filter: AssumedDensity,
+                    filter: MomentFilter,
                     broadcast: nothing as fn(&Gaussian<1>),
                     start,
                 };

@@ -3,7 +3,7 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used)]
 
-mod closed_loop;
+mod contract;
 mod failure;
 mod imm;
 mod particle;

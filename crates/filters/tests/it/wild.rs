@@ -6,7 +6,7 @@ use fewbits_filters::{
     CloudWorkspace, GaussianCloud, Grid, ParticleFilter, Particles, PointMass, PointMassFilter, RaoBlackwellised,
     Workspace,
 };
-use fewbits_filters::{assumed_density, extended_kalman, kalman};
+use fewbits_filters::{assumed_density, kalman};
 use fewbits_models::{Ar1, LinearSensor, ReceivedPower};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, SVector, Vector1, Vector2};
@@ -76,7 +76,8 @@ proptest! {
                 }
             }
             if let Ok(power) = ReceivedPower::<2>::new(Vector2::new(x[5], x[6]), [0, 1], x[7], x[12], x[13], x[14])
-                && let Ok((after, info)) = extended_kalman::update(&power, &belief, &Vector1::new(x[8]))
+                && let Ok(value) = Value::scalar(x[8], x[14])
+                && let Ok((after, info)) = assumed_density::update_through(&belief, &Observed::new(power, value))
             {
                 prop_assert!(finite(&after) && info.log_likelihood.is_finite(), "{:?} {:?}: {:?}", belief, power, after);
             }
@@ -116,7 +117,7 @@ proptest! {
                 Err(_) => prop_assert_eq!(&belief, &before),
             }
             let mut cloud = cloud_before.clone();
-            match RaoBlackwellised::default().step_in_place(&mut rng, &dynamics, &mut cloud, &observed, &mut CloudWorkspace::default()) {
+            match RaoBlackwellised::default().update(&mut rng, &mut cloud, &observed, &mut CloudWorkspace::default()) {
                 Ok(info) => prop_assert!(info.log_likelihood.is_finite() && cloud.gaussian().is_finite(), "{:?} {:?}", dynamics, observed),
                 Err(_) => prop_assert_eq!(&cloud, &cloud_before),
             }

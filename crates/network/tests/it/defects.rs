@@ -7,7 +7,7 @@ use fewbits_core::{
     BitReader, BitString, BitWriter, CodecError, Gaussian, Link, Message, NumberFormat, Observation, Sign,
 };
 use fewbits_dymbo::{CountFusion, ParallelFilter};
-use fewbits_filters::AssumedDensity;
+use fewbits_filters::MomentFilter;
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::estimators::{Followers, ParallelDymboEstimator, Patterns, Reporting, SendAll};
@@ -25,7 +25,7 @@ fn all_send(link: Link) -> impl Replicable<Measurement = Vector1<f64>, Belief = 
         sensors: vec![LinearSensor::<1, 1>::direct(1.0).unwrap(); 3],
         scheme: SendAll::new(1.0, NumberFormat::Double).unwrap(),
         link,
-        filter: AssumedDensity,
+        filter: MomentFilter,
         broadcast: (|_: &Gaussian<1>| ()) as fn(&Gaussian<1>),
         start: start(),
     }

@@ -15,7 +15,7 @@ use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SourceSensor, S
 use fewbits_dymbo::{
     CountFusion, DymboFilter, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarFilter,
 };
-use fewbits_filters::{AssumedDensity, PointMassFilter, assumed_density, kalman};
+use fewbits_filters::{MomentFilter, PointMassFilter, PointMasses, assumed_density, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
@@ -258,7 +258,7 @@ fn words_in_the_plane() {
         sensors: plane_sensors(),
         scheme,
         link: Link::PERFECT,
-        filter: AssumedDensity,
+        filter: MomentFilter,
         broadcast,
         start: plane_start(),
     };
@@ -300,7 +300,7 @@ fn a_strangers_scheme_with_an_exact_filter() {
         sensors: vec![sensor; 3],
         scheme,
         link: Link::PERFECT,
-        filter,
+        filter: PointMasses::new(grid),
         broadcast: |m: &Gaussian<1>| m.mean()[0],
         start: prior,
     };
@@ -576,7 +576,7 @@ fn quantized_ranges_in_the_plane() {
         sensors,
         scheme,
         link: Link::PERFECT,
-        filter: AssumedDensity,
+        filter: MomentFilter,
         broadcast,
         start,
     };
