@@ -3,6 +3,7 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used)]
 
+mod stored;
 mod closed_loop;
 mod failure;
 mod imm;
