@@ -20,10 +20,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct StochasticTrigger {
+    #[serde(with = "fewbits_numerics::stored")]
     precision: f64,
 }
 
-stored! { StochasticTrigger as Numbers { precision: f64 } => StochasticTrigger::new(precision), Error }
+stored! { StochasticTrigger as Numbers { #[serde(with = "fewbits_numerics::stored")] precision: f64 } => StochasticTrigger::new(precision), Error }
 
 impl StochasticTrigger {
     /// The trigger with precision `Y > 0` (inverse measurement units squared).

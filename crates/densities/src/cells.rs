@@ -251,7 +251,10 @@ impl<const D: usize> Belief<D> for Cells<D> {
     }
 
     /// Draws are centres of cells, for the same reason.
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
         let count = states.first().map_or(0, |column| column.len());
         let mut cumulative = Vec::with_capacity(self.len());
         let mut total = 0.0;

@@ -91,6 +91,9 @@ impl TabulatedEstimate {
 
     /// Writes the density (not its logarithm) of every point to `out`; 0 outside the table.
     pub fn pdf_columns(&self, columns: Columns<'_, 2>, out: &mut [f64]) {
+        if !fewbits_core::columns::lengths_agree(&columns, out) {
+            return;
+        }
         for (k, out) in out.iter_mut().enumerate() {
             let gap = SVector::<f64, 2>::new(columns[0][k] - self.origin[0], columns[1][k] - self.origin[1]);
             let z = self.white.whitener * gap;

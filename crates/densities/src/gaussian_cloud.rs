@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "Stored<D>")]
 pub struct GaussianCloud<const D: usize> {
     means: Particles<D>,
+    #[serde(with = "fewbits_numerics::stored")]
     covariance: SMatrix<f64, D, D>,
 }
 
@@ -22,6 +23,7 @@ pub struct GaussianCloud<const D: usize> {
 #[serde(rename = "GaussianCloud", deny_unknown_fields)]
 struct Stored<const D: usize> {
     means: Particles<D>,
+    #[serde(with = "fewbits_numerics::stored")]
     covariance: SMatrix<f64, D, D>,
 }
 

@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored")]
 pub struct Grid {
+    #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     spacing: f64,
     points: usize,
 }
@@ -17,7 +19,9 @@ pub struct Grid {
 #[derive(Deserialize)]
 #[serde(rename = "Grid", deny_unknown_fields)]
 struct Stored {
+    #[serde(with = "fewbits_numerics::stored")]
     lower: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     spacing: f64,
     points: usize,
 }

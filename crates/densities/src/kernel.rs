@@ -113,6 +113,9 @@ impl<const D: usize> KernelEstimate<D> {
     /// Writes `ln p` of every point of `columns` to `out`, in the log domain: exact in the tails. One kernel per particle and
     /// point.
     pub fn log_pdf_columns(&self, columns: Columns<'_, D>, out: &mut [f64]) {
+        if !fewbits_core::columns::lengths_agree(&columns, out) {
+            return;
+        }
         let points = whitened(&self.factor, &self.origin, &columns, 0..out.len());
         let weights = self.particles.weights();
         let offset = self.factor.half_log_det + D as f64 * LN_SQRT_2PI;
@@ -468,6 +471,7 @@ fn cross_block<const D: usize, const P: usize>(
 #[serde(bound = "")]
 struct Stored<const D: usize> {
     particles: Particles<D>,
+    #[serde(with = "fewbits_numerics::stored")]
     kernel: Vec<Vec<f64>>,
 }
 

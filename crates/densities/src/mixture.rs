@@ -198,6 +198,9 @@ impl<const D: usize> Mixture<D> {
 
     /// Writes `ln p` of every point of `columns` to `out`; points beyond the end of `out` are passed over.
     pub fn log_pdf_columns(&self, columns: Columns<'_, D>, out: &mut [f64]) {
+        if !fewbits_core::columns::lengths_agree(&columns, out) {
+            return;
+        }
         let kept: Vec<&Component<D>> = self.components.iter().filter(|c| c.weight > 0.0).collect();
         let mut terms = vec![0.0; kept.len() * BLOCK];
         for (block, out) in out.chunks_mut(BLOCK).enumerate() {
@@ -332,8 +335,11 @@ impl Mixture<1> {
 /// The plain form in which a mixture is stored.
 #[derive(Serialize, Deserialize)]
 struct Stored {
+    #[serde(with = "fewbits_numerics::stored")]
     weights: Vec<f64>,
+    #[serde(with = "fewbits_numerics::stored")]
     means: Vec<Vec<f64>>,
+    #[serde(with = "fewbits_numerics::stored")]
     covariances: Vec<Vec<Vec<f64>>>,
 }
 

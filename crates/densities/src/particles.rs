@@ -350,7 +350,10 @@ impl<const D: usize> Belief<D> for Particles<D> {
     }
 
     /// Each draw is a particle, chosen by its weight.
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
         let cumulative = Cumulative::new(&self.weights);
         let count = fewbits_core::columns::count(&states);
         let chosen: Vec<usize> = (0..count).map(|_| cumulative.draw(rng)).collect();

@@ -20,11 +20,13 @@ const MOST_NODES: usize = 1_000_000;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored")]
 pub struct PlaneMass {
+    #[serde(with = "fewbits_numerics::stored")]
     basis: Matrix2<f64>,
     /// Whole numbers of the first node.
     first: [i64; 2],
     /// Nodes along each axis; the second runs fastest.
     size: [usize; 2],
+    #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
 }
 
@@ -32,9 +34,11 @@ pub struct PlaneMass {
 #[derive(Deserialize)]
 #[serde(rename = "PlaneMass", deny_unknown_fields)]
 struct Stored {
+    #[serde(with = "fewbits_numerics::stored")]
     basis: Matrix2<f64>,
     first: [i64; 2],
     size: [usize; 2],
+    #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
 }
 
@@ -223,6 +227,9 @@ impl Belief<2> for PlaneMass {
 
     /// Draws of the bilinear interpolant, drawn towards the mean by what interpolation adds to the covariance.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, 2>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
         let cumulative = Cumulative::new(&self.density);
         let (mean, covariance) = self.lattice_moments();
         let widened = covariance + Matrix2::identity() * TRIANGULAR_VARIANCE;

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 #[serde(try_from = "Stored")]
 pub struct PointMass {
     grid: Grid,
+    #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
 }
 
@@ -23,6 +24,7 @@ pub struct PointMass {
 #[serde(rename = "PointMass", deny_unknown_fields)]
 struct Stored {
     grid: Grid,
+    #[serde(with = "fewbits_numerics::stored")]
     density: Vec<f64>,
 }
 

@@ -8,14 +8,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename = "Particles", deny_unknown_fields)]
 pub(crate) struct StoredParticles {
+    #[serde(with = "fewbits_numerics::stored")]
     columns: Vec<Vec<f64>>,
+    #[serde(with = "fewbits_numerics::stored")]
     weights: Vec<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(with = "fewbits_numerics::stored")]
     log_weights: Vec<Option<f64>>,
     /// As it was summed, so that a filter resumes to the last bit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(with = "fewbits_numerics::stored")]
     effective_sample_size: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(with = "fewbits_numerics::stored")]
     side: Vec<f64>,
 }
 

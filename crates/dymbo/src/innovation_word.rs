@@ -18,8 +18,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Prediction {
     /// Predicted measurement.
+    #[serde(with = "fewbits_numerics::stored")]
     pub mean: f64,
     /// Standard deviation of the innovation, `sqrt(P + sigma^2)`.
+    #[serde(with = "fewbits_numerics::stored")]
     pub deviation: f64,
 }
 
@@ -83,6 +85,7 @@ pub struct InnovationWord {
 }
 
 stored! { InnovationWord as Numbers |word| {
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64 = word.noise_variance,
     bits: u32 = word.bits,
 } => InnovationWord::new(noise_variance, bits as usize), Error }

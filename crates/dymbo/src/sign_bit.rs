@@ -29,10 +29,11 @@ use std::f64::consts::FRAC_2_PI;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct SignBit {
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
 }
 
-stored! { SignBit as Numbers { noise_variance: f64 } => SignBit::new(noise_variance), Error }
+stored! { SignBit as Numbers { #[serde(with = "fewbits_numerics::stored")] noise_variance: f64 } => SignBit::new(noise_variance), Error }
 
 impl SignBit {
     /// A sensor with measurement variance `sigma^2 > 0`.

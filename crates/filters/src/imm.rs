@@ -32,6 +32,7 @@ pub struct Imm<G> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored<D>")]
 pub struct ImmBelief<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     probabilities: Vec<f64>,
     modes: Vec<Gaussian<D>>,
 }
@@ -39,6 +40,7 @@ pub struct ImmBelief<const D: usize> {
 #[derive(Deserialize)]
 #[serde(rename = "ImmBelief", deny_unknown_fields)]
 struct Stored<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     probabilities: Vec<f64>,
     modes: Vec<Gaussian<D>>,
 }
@@ -115,7 +117,10 @@ impl<const D: usize> Belief<D> for ImmBelief<D> {
         *self.moment_matched().covariance()
     }
 
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
         let count = states.first().map_or(0, |column| column.len());
         for i in 0..count {
             let mut left: f64 = rng.random();

@@ -150,10 +150,18 @@ impl ParticleFilter {
 }
 
 /// Edits the log weights and says what that tells.
+///
+/// # Errors
+/// [`fewbits_core::Error::NotANumber`] if a particle left the range of numbers, whatever its weight: zero times infinity is NaN in every
+/// moment. The belief is then as it was, as if [`Particles::reweigh`] fails.
 pub(crate) fn weigh<const D: usize>(
     belief: &mut Particles<D>,
     change: impl FnOnce(Columns<'_, D>, &mut [f64]),
 ) -> Result<ParticleInfo, Error> {
+    let finite = |column: &&[f64]| column.iter().fold(true, |finite, x| finite & x.is_finite());
+    if !belief.columns().iter().all(finite) {
+        return Err(fewbits_core::Error::NotANumber { what: "a particle" }.into());
+    }
     let log_likelihood = belief.reweigh(change)?;
     Ok(ParticleInfo {
         log_likelihood,

@@ -53,7 +53,8 @@ impl RaoBlackwellised {
     /// Resamples if due and moves every mean by the dynamics. Side rows stay as they are.
     ///
     /// # Errors
-    /// As [`ParticleFilter::resample`].
+    /// As [`ParticleFilter::resample`]; [`fewbits_core::Error::NotANumber`] if the covariance leaves the range of numbers, before anything has
+    /// changed.
     pub fn predict<const D: usize, R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -61,6 +62,14 @@ impl RaoBlackwellised {
         belief: &mut GaussianCloud<D>,
         workspace: &mut CloudWorkspace<D>,
     ) -> Result<(), Error> {
+        let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
+        let shared = kalman::predict(dynamics, &shared);
+        if !shared.is_finite() {
+            return Err(fewbits_core::Error::NotANumber {
+                what: "the predicted covariance",
+            }
+            .into());
+        }
         self.filter
             .resample(rng, belief.means_mut(), &mut workspace.particles)?;
         let mut columns = belief.means_mut().columns_mut();
@@ -68,8 +77,7 @@ impl RaoBlackwellised {
             let mean = dynamics.transition() * SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
             set_state(&mut columns, i, &mean);
         }
-        let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
-        belief.set_shared_covariance(*kalman::predict(dynamics, &shared).covariance());
+        belief.set_shared_covariance(*shared.covariance());
         Ok(())
     }
 

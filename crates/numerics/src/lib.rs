@@ -8,6 +8,7 @@
 //! | [`linalg`], [`tridiagonal`], [`eigen`] | square roots of singular covariances, tridiagonal systems, eigenvalues |
 //! | [`roots`], [`binomial`] | roots inside a bracket, binomial coefficients |
 //! | [`stored!`] | how types with checking constructors are written and read |
+//! | [`wild`] | numbers to test with: no numbers, infinities, the ends of the range |
 //! | [`error`] | the argument error all constructors share, and the checks that raise it |
 //!
 //! The central choice: **probabilities of intervals live in the log domain, and nowhere else is one formed.** It costs an
@@ -32,5 +33,6 @@ pub mod quadrature;
 pub mod roots;
 pub mod stored;
 pub mod tridiagonal;
+pub mod wild;
 
 pub use error::ArgumentError;

@@ -149,7 +149,7 @@ impl Scheme<1> for FullRange {
 
     fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<RangeFactor, fewbits_core::Error> {
         match observation {
-            Observation::Received(range) => RangeFactor::value(*range, self.0),
+            Observation::Received(range) => RangeFactor::received(*range, link.of_received()?, self.0),
             Observation::Nothing | Observation::Lost => RangeFactor::constant(link.delivery(observation), self.0),
         }
         .map_err(crate::encoder::reported)
@@ -512,4 +512,30 @@ fn quantizer(bits: u32, noise: RangeNoise) -> Result<QuantizedRange, Error> {
     within("bits", f64::from(bits), 1.0, 8.0)?;
     // All nodes that hear the reports compute the references themselves: they do not travel.
     Ok(QuantizedRange::new(1 << bits, noise)?.with_format(NumberFormat::Double))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fewbits_core::factor::Factor;
+    use fewbits_core::laws::scheme::total_probability_with;
+
+    #[test]
+    fn full_ranges_have_total_probability_one_over_any_link() {
+        let noise = RangeNoise::constant(1.8).unwrap();
+        for (loss, erasure) in [(0.0, 0.0), (0.2, 0.0), (0.2, 0.3)] {
+            let link = Link::lossy(loss).and_then(|link| link.with_erasure(erasure)).unwrap();
+            let received = |m: &Vector1<f64>| {
+                let step = 0.05;
+                let at = |i: i32| m[0] + step * f64::from(i);
+                let density = |z: f64| {
+                    let factor = FullRange(noise).factor(&(), &Observation::Received(z), &link).unwrap();
+                    factor.log_likelihood(m).exp()
+                };
+                (-400..=400).map(|i| step * density(at(i))).sum()
+            };
+            let at = [0.5, 20.0].map(Vector1::new);
+            total_probability_with(&FullRange(noise), &(), &link, received, &at, 1e-9).unwrap();
+        }
+    }
 }

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(transparent))]
 pub struct Constant {
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     probability: f64,
 }
 

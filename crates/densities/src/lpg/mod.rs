@@ -378,7 +378,10 @@ impl<const D: usize> Belief<D> for Lpg<D> {
 
     /// Rejection from a widened mixture of the Gaussians with a bound found on 1000 trial points times three; a point above the
     /// bound is accepted as it is.
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
         let count = states.first().map_or(0, |column| column.len());
         let widened = |rng: &mut R| {
             let term = &self.terms[rng.random_range(0..self.terms.len())];
@@ -427,6 +430,9 @@ impl<const D: usize> Density<D> for Lpg<D> {
     }
 
     fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
+        if !fewbits_core::columns::lengths_agree(states, logs) {
+            return;
+        }
         let mut values = vec![0.0; self.indices.len()];
         for (i, log) in logs.iter_mut().enumerate() {
             *log += 2.0 * self.log_root(&state_at(states, i), &mut values);

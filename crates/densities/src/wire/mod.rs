@@ -202,9 +202,13 @@ impl<const D: usize> Message for CodedMixture<D> {
 /// The plain form in which a format is stored.
 #[derive(Serialize, Deserialize)]
 struct StoredFormat {
+    #[serde(with = "fewbits_numerics::stored")]
     centre: Vec<f64>,
+    #[serde(with = "fewbits_numerics::stored")]
     half_width: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     unit: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     resolutions: Vec<f64>,
 }
 

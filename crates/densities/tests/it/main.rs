@@ -16,4 +16,5 @@ mod products;
 mod quadrature;
 mod reduction;
 mod series;
+mod wild;
 mod wire;

@@ -18,6 +18,7 @@ mod laws;
 mod messages;
 mod searches;
 mod unknown_models;
+mod wild;
 
 use fewbits_diffusive::{RateModel, RateRange, Rule, SearchBox, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};

@@ -53,9 +53,13 @@ impl Failures {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Presence {
+    #[serde(with = "fewbits_numerics::stored")]
     pub working: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     alone: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     struck: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     statistic: f64,
     pub named_dead: bool,
 }

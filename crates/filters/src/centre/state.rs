@@ -20,6 +20,7 @@ const VERSION: u32 = 2;
 pub(super) struct MemberState {
     pub presence: Presence,
     pub monitor: Monitor,
+    #[serde(default, with = "fewbits_numerics::stored")]
     pub last_residual: Option<f64>,
     pub excluded: bool,
     /// Observations since the last alarm.
@@ -42,6 +43,7 @@ impl MemberState {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Checkpoint<B> {
+    #[serde(with = "fewbits_numerics::stored")]
     pub time: f64,
     pub belief: B,
     pub slots: Vec<StoredSlot>,
@@ -54,6 +56,7 @@ pub(super) struct StoredSlot {
     pub sensor: u32,
     feedback: (Vec<u8>, usize),
     observation: Observation<(Vec<u8>, usize)>,
+    #[serde(with = "fewbits_numerics::stored")]
     pub working: f64,
     pub used: bool,
 }
@@ -83,14 +86,15 @@ impl StoredSlot {
 
 /// What a centre knows: everything but its models, its filter and its settings, which the program states again.
 ///
-/// Stored as bytes ([`to_bytes`](Self::to_bytes)), as JSON by `serde_json` with its feature `float_roundtrip`, or by any format that keeps
-/// every bit of a double, a centre that
-/// is restored goes on with the same bits, given the same random stream.
+/// Stored as bytes ([`to_bytes`](Self::to_bytes)) or by any format of serde, a centre that is restored goes on with the same bits, given the
+/// same random stream: floats are stored exactly whatever the format does ([`fewbits_numerics::stored`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CentreState<B> {
     version: u32,
+    #[serde(with = "fewbits_numerics::stored")]
     now: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     noise_scale: f64,
     belief: B,
     members: BTreeMap<u32, MemberState>,

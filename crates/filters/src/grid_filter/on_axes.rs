@@ -50,6 +50,9 @@ impl<const D: usize, const K: usize> Likelihood<K> for OnPlane<'_, D, K> {
 
     fn add_log_likelihoods(&self, places: Columns<'_, K>, logs: &mut [f64]) {
         const BLOCK: usize = 256;
+        if !fewbits_core::columns::lengths_agree(&places, logs) {
+            return;
+        }
         // Coordinates that nothing reads.
         let constant: [[f64; BLOCK]; D] = std::array::from_fn(|d| [self.state[d]; BLOCK]);
         for (block, logs) in logs.chunks_mut(BLOCK).enumerate() {

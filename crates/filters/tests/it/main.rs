@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod contract;
+mod stored;
 mod failure;
 mod imm;
 mod particle;

@@ -94,11 +94,12 @@ where
         rng: &mut Pcg64Dxsm,
         slot: u32,
         predicted: &F::Belief,
-        observations: &[Observation<C::Report>],
+        observations: &[Option<Observation<C::Report>>],
     ) -> Result<F::Belief, Error> {
         let (mut belief, mut filter) = (predicted.clone(), self.filter.clone());
         let format = self.scheme.feedback_format();
         for (i, (sensor, observation)) in self.sensors.iter().zip(observations).enumerate() {
+            let Some(observation) = observation else { continue };
             // The feedback as it travelled.
             let feedback = C::Feedback::from_bits(&format, &self.question(slot, predicted, i)?.to_bits(&format)?)?;
             let factor = self.scheme.factor(&feedback, observation, &self.link)?;

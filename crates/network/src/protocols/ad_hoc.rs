@@ -213,12 +213,12 @@ impl<E: Replicable> AdHoc<E> {
                 if anchor || i == ANCHOR.index() {
                     differs = Some(SensorId(i as u32));
                 }
-                Arrived::Lost
+                Arrived::Foreign
             }
             Heard::Digest(_) => Arrived::Nothing,
             Heard::Frame { report, .. } => Arrived::Report(report.clone()),
         });
-        let mut arrived: Vec<Arrived> = arrived.collect();
+        let arrived: Vec<Arrived> = arrived.collect();
         if let Some(with) = differs {
             context.note(Note::Disagreement { with, slot });
             if anchor {
@@ -229,7 +229,7 @@ impl<E: Replicable> AdHoc<E> {
         }
         let mut note = None;
         if let Some(predicted) = peer.predicted.take() {
-            let after = update_or_discard(&self.estimator, self.stream, slot, &predicted, &mut arrived);
+            let after = update_or_discard(&self.estimator, self.stream, slot, &predicted, &arrived);
             (peer.belief, note) = after;
         }
         peer.estimates.resize(slot as usize - 1, Vec::new());

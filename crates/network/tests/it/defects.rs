@@ -337,9 +337,15 @@ impl Estimator for OneIsTold {
         _: &mut Pcg64Dxsm,
         _: u32,
         predicted: &Vec<f64>,
-        observations: &[Observation<Sign>],
+        observations: &[Option<Observation<Sign>>],
     ) -> Result<Vec<f64>, Error> {
-        let came = |o: &Observation<Sign>| if o.received().is_some() { 1.0 } else { 0.0 };
+        let came = |o: &Option<Observation<Sign>>| {
+            if let Some(Observation::Received(_)) = o {
+                1.0
+            } else {
+                0.0
+            }
+        };
         Ok(predicted.iter().zip(observations).map(|(n, o)| n + came(o)).collect())
     }
 
@@ -438,7 +444,7 @@ impl Estimator for Mistaken {
         rng: &mut Pcg64Dxsm,
         slot: u32,
         predicted: &Self::Belief,
-        observations: &[Observation<Self::Report>],
+        observations: &[Option<Observation<Self::Report>>],
     ) -> Result<Self::Belief, Error> {
         self.0.update(rng, slot, predicted, observations)
     }

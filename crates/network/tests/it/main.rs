@@ -14,4 +14,5 @@ mod defects;
 mod faults;
 mod lossless;
 mod stored;
+mod wild;
 mod worlds;

@@ -1,5 +1,7 @@
 //! Deployments and graphs against brute force.
 
+mod wild;
+
 use fewbits_topology::{Deployment, Error, Graph};
 use nalgebra::Vector2;
 use proptest::prelude::*;
