@@ -2,9 +2,9 @@
 
 use fewbits_core::factor::Factor;
 use fewbits_core::laws::{factor, likelihood, message, scheme};
-use fewbits_core::{Gaussian, Link, NumberFormat, Observation, Observed, Scheme};
+use fewbits_core::{Gaussian, Link, NumberFormat, Observation, Observed, OnAxes, Scheme};
 use fewbits_filters::{AssumedDensity, ClosedLoop, Filter, ParticleFilter, Particles};
-use fewbits_models::constant_velocity_2d;
+use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizers::{Labelling, Symbol};
@@ -83,6 +83,7 @@ fn factors_obey_their_laws() {
                 let prior = Gaussian::scalar(5.0 * scale, 0.4 * scale * scale).unwrap();
                 factor::tilted_is_quadrature(&own, &prior, 4.9 * scale, 60_001, 1e-8).unwrap();
                 let sensor = RangeSensor::new(Vector2::new(scale, -scale), noise).unwrap();
+                let sensor = sensor.on_axes::<4>([0, 2]).unwrap();
                 let states = [Vector4::zeros(), Vector4::new(3.0, 2.0, 1.0, 1.0) * scale];
                 likelihood::sweep_is_scalar(&Observed::new(sensor, own), &states).unwrap();
             }
@@ -103,11 +104,16 @@ fn references_travel_as_two_numbers() {
 /// Tracks by the library's own loop; the root mean squared position error of the last slots.
 fn loop_error<F>(filter: &F, belief: F::Belief) -> f64
 where
-    F: Filter<4, fewbits_models::LinearGaussian<4, 2>, Observed<Planar, RangeFactor, 1>>,
+    F: Filter<4, fewbits_models::LinearGaussian<4, 2>, Observed<OnAxes<RangeSensor, 4, 2>, RangeFactor, 1>>,
 {
     let noise = RangeNoise::from_snr_db(30.0).unwrap();
     let places = [[4.0, 4.0], [16.0, 4.0], [10.0, 10.0], [4.0, 16.0], [16.0, 16.0]];
-    let sensors = places.map(|p| Planar(RangeSensor::new(p.into(), noise).unwrap()));
+    let sensors = places.map(|p| {
+        RangeSensor::new(p.into(), noise)
+            .unwrap()
+            .on_axes(PLANE_POSITION)
+            .unwrap()
+    });
     let dynamics = constant_velocity_2d(1.0, 0.02).unwrap();
     let network = ClosedLoop {
         dynamics: &dynamics,
@@ -134,29 +140,6 @@ where
         squares += (error[0] * error[0] + error[2] * error[2]) / 20.0;
     }
     squares.sqrt()
-}
-
-/// The library's constant-velocity state is `[x, vx, y, vy]`.
-#[derive(Debug, Clone, Copy)]
-struct Planar(RangeSensor);
-
-impl fewbits_core::Sensing<4, 1> for Planar {
-    fn mean(&self, x: &Vector4<f64>) -> Vector1<f64> {
-        Vector1::new(self.0.distance(x[0], x[2]))
-    }
-
-    fn jacobian(&self, x: &Vector4<f64>) -> nalgebra::RowVector4<f64> {
-        let u = self.0.direction(x[0], x[2]);
-        nalgebra::RowVector4::new(u[0], 0.0, u[1], 0.0)
-    }
-
-    fn noise_covariance_at(&self, x: &Vector4<f64>) -> nalgebra::Matrix1<f64> {
-        nalgebra::Matrix1::new(self.0.noise().deviation(self.mean(x)[0]).powi(2))
-    }
-
-    fn sample<R: rand::Rng + ?Sized>(&self, rng: &mut R, x: &Vector4<f64>) -> Vector1<f64> {
-        Vector1::new(self.0.measure(rng, self.mean(x)[0]))
-    }
 }
 
 #[test]
