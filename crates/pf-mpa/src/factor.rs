@@ -16,7 +16,7 @@ use nalgebra::SVector;
 /// |---|---|
 /// | the cell `[lower, upper)` of `z` | `share (Phi((upper - d)/sigma(d)) - Phi((lower - d)/sigma(d)))` |
 /// | a symbol over a link that inverts bits | `sum_q p_q P(z in cell q)` |
-/// | `z` itself | `share N(z; d, sigma(d)^2)` |
+/// | `z` itself | `N(z; d, sigma(d)^2)` |
 /// | nothing | a constant |
 ///
 /// In closed form and in logarithms everywhere: no tail surrogate, no underflow. The first and the last cell are half-infinite,
@@ -54,16 +54,17 @@ impl RangeFactor {
     /// # Errors
     /// If it is not finite.
     pub fn value(range: f64, noise: RangeNoise) -> Result<Self, Error> {
-        Self::received(range, 1.0, noise)
+        Self::arrived(range, 1.0, noise)
     }
 
-    /// The range itself, in a report that arrives with probability `share`.
+    /// The range itself, of a report that arrives with probability `share`.
     ///
     /// # Errors
-    /// If the range is not finite, or `share` is outside `(0, 1]`.
-    pub fn received(range: f64, share: f64, noise: RangeNoise) -> Result<Self, Error> {
+    /// If it is not finite, or `share` is outside `(0, 1]`.
+    pub fn arrived(range: f64, share: f64, noise: RangeNoise) -> Result<Self, Error> {
         finite("range", range)?;
-        let log_share = within("share", share, f64::MIN_POSITIVE, 1.0)?.ln();
+        within("share", share, f64::MIN_POSITIVE, 1.0)?;
+        let log_share = share.ln();
         Ok(Self {
             noise,
             kind: Kind::Value { range, log_share },
@@ -240,7 +241,7 @@ impl Factor<1> for RangeFactor {
                     for (log_weight, d) in pairs {
                         let deviation = noise.deviation(*d);
                         let t = (range - d) / deviation;
-                        *log_weight += log_share - 0.5 * t * t - normal::LN_SQRT_2PI - scalar::ln(deviation);
+                        *log_weight += log_share - (0.5 * t * t + normal::LN_SQRT_2PI + scalar::ln(deviation));
                     }
                 },
             ),

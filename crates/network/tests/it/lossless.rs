@@ -524,7 +524,12 @@ fn followed_signals() {
 fn quantized_ranges_in_the_plane() {
     let noise = RangeNoise::from_snr_db(40.0).unwrap();
     let sensors: Vec<_> = [[4.0, 4.0], [16.0, 4.0], [10.0, 16.0]]
-        .map(|place| RangeSensor::new(place.into(), noise).unwrap())
+        .map(|place| {
+            RangeSensor::new(place.into(), noise)
+                .unwrap()
+                .on_axes::<4>([0, 1])
+                .unwrap()
+        })
         .to_vec();
     let scheme = QuantizedRange::new(4, noise).unwrap();
     // As it travels: in single precision.

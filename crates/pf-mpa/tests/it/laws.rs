@@ -2,9 +2,9 @@
 
 use fewbits_core::factor::Factor;
 use fewbits_core::laws::{factor, likelihood, message, scheme};
-use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
+use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Observed, OnAxes, Scheme, Sensing};
 use fewbits_filters::{BootstrapFilter, MomentFilter, ParticleFilter, StateFilter, StateLikelihood};
-use fewbits_models::constant_velocity_2d;
+use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizers::{Labelling, Symbol};
@@ -83,6 +83,7 @@ fn factors_obey_their_laws() {
                 let prior = Gaussian::scalar(5.0 * scale, 0.4 * scale * scale).unwrap();
                 factor::tilted_is_quadrature(&own, &prior, 4.9 * scale, 60_001, 1e-8).unwrap();
                 let sensor = RangeSensor::new(Vector2::new(scale, -scale), noise).unwrap();
+                let sensor = sensor.on_axes::<4>([0, 2]).unwrap();
                 let states = [Vector4::zeros(), Vector4::new(3.0, 2.0, 1.0, 1.0) * scale];
                 likelihood::sweep_is_scalar(&Observed::new(sensor, own), &states).unwrap();
             }
@@ -114,7 +115,7 @@ fn tracking_error<F: StateFilter<4>>(mut filter: F, start: &Gaussian<4>) -> f64 
         filter.predict(&mut rng, &dynamics, 1.0, &mut belief).unwrap();
         let (mean, covariance) = (belief.mean(), belief.covariance());
         let observed = places.map(|place| {
-            let sensor = Planar(RangeSensor::new(place.into(), noise).unwrap());
+            let sensor = RangeSensor::new(place.into(), noise).unwrap().on_axes(PLANE_POSITION).unwrap();
             let (range, jacobian) = (sensor.mean(&mean)[0], sensor.jacobian(&mean));
             let spread = (jacobian * covariance * jacobian.transpose())[0]
                 .sqrt()
@@ -133,29 +134,6 @@ fn tracking_error<F: StateFilter<4>>(mut filter: F, start: &Gaussian<4>) -> f64 
         squares += (error[0] * error[0] + error[2] * error[2]) / 20.0;
     }
     squares.sqrt()
-}
-
-/// The library's constant-velocity state is `[x, vx, y, vy]`.
-#[derive(Debug, Clone, Copy)]
-struct Planar(RangeSensor);
-
-impl Sensing<4, 1> for Planar {
-    fn mean(&self, x: &Vector4<f64>) -> Vector1<f64> {
-        Vector1::new(self.0.distance(x[0], x[2]))
-    }
-
-    fn jacobian(&self, x: &Vector4<f64>) -> nalgebra::RowVector4<f64> {
-        let u = self.0.direction(x[0], x[2]);
-        nalgebra::RowVector4::new(u[0], 0.0, u[1], 0.0)
-    }
-
-    fn noise_covariance_at(&self, x: &Vector4<f64>) -> nalgebra::Matrix1<f64> {
-        nalgebra::Matrix1::new(self.0.noise().deviation(self.mean(x)[0]).powi(2))
-    }
-
-    fn sample<R: rand::Rng + ?Sized>(&self, rng: &mut R, x: &Vector4<f64>) -> Vector1<f64> {
-        Vector1::new(self.0.measure(rng, self.mean(x)[0]))
-    }
 }
 
 #[test]

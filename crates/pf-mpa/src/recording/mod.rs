@@ -1,84 +1,46 @@
 //! Tracking from ranges that come one at a time, at any time, from any anchor: recordings, and live radios of the kind.
 //!
-//! Real ranges are all too long by a common bias, some are nonsense, anchors fall silent, nobody knows the speed, and the first position
+//! Real ranges are all too long by a common bias, some are outliers, anchors fall silent, nobody knows the speed, and the first position
 //! has to be found. [`RangeTracker`] does all of it, on a [`FusionCentre`]:
 //!
 //! ```text
 //! state        [x, vx, y, vy, bias]; velocities that are forgotten within `persistence`, a bias that hardly moves
 //! acquisition  the first range of each anchor travels in full; three anchors or more give a position by the adaptive grid
-//! tracking     each range travels as the level of its innovation, or in full; with probability `outliers` it is nonsense
-//! speed        2 bits and more: a bank over speeds, by evidence; 1 bit: neighbouring residuals of each anchor
+//! tracking     each range travels as the level of its innovation, or in full; with probability `outliers` it says nothing
+//! speed        a bank of filters over speeds, weighed by evidence: also with 1 bit, since each filter predicts the other's bits
 //! lost         the centre's own test, or `silence` seconds without a range: acquisition again
 //! ```
 
+mod scheme;
+mod settings;
+
+pub use settings::RangeSettings;
+
 use crate::Error;
-use crate::encoder::{QuantizedRange, RangeReference, optimal_loading};
+use crate::encoder::optimal_loading;
 use crate::error::refuse;
 use crate::factor::RangeFactor;
+use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
-use fewbits_core::factor::Robust;
-use fewbits_core::{
-    Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation, Observed, OnAxes, Scheme, SchemeNode,
-    SensorNode,
-};
-use fewbits_filters::centre::{Event, FalseAlarms, FusionCentre, NoiseLearning, Reporting, Slot};
+use fewbits_core::{Gaussian, Link, NumberFormat, Observed, SchemeNode, SensorNode};
+use fewbits_filters::centre::{Event, FalseAlarms, FusionCentre, Reporting, Slot};
 use fewbits_filters::{GridFilter, GridWorkspace, MomentFilter, NoiseBank};
-use fewbits_models::ContinuousLinear;
-use fewbits_numerics::error::{finite, positive, within};
-use fewbits_quantizers::Symbol;
-use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};
+use fewbits_numerics::error::{finite, within};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector1, Vector2};
 use rand::Rng;
+use scheme::{FullRange, Tolerant};
 use std::collections::BTreeMap;
 
 /// Coordinates of position and bias in the state.
 const AXES: [usize; 3] = [0, 2, 4];
-/// Speeds of the bank, in multiples of the stated one: a factor of two either way costs a few percent.
-const SPEEDS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
-/// How often the speed of the bank may change, per range.
-const SWITCHING: f64 = 0.01;
+/// How often the speed may change, per range: once in a few minutes.
+const SWITCHING: f64 = 0.003;
 /// Losses that are found where there are none, per range. A lost track of one bit shows slowly, in its residuals only, so that the rate is
 /// higher; errors of real ranges are alike for seconds, which a low rate forgives.
 const ONE_BIT_ALARMS: f64 = 3e-3;
 const ALARMS: f64 = 1e-6;
 /// Bits of a range in full.
 const FULL_BITS: usize = 32;
-
-/// What is known of the ranges before the first one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RangeSettings {
-    /// Deviation of a range's error, in metres. Errors of neighbouring ranges are alike, so take it above their spread.
-    pub noise: f64,
-    /// Share of ranges that have nothing to do with the distance, and the width of where they lie, in metres.
-    pub outliers: f64,
-    /// See `outliers`.
-    pub stray: f64,
-    /// Deviation of the velocity along each axis, in metres per second, to a factor of four.
-    pub speed: f64,
-    /// How long a velocity lasts, in seconds.
-    pub persistence: f64,
-    /// Deviation of the bias before the first range, in metres, and the growth of its variance, in square metres per second.
-    pub bias: f64,
-    /// See `bias`.
-    pub drift: f64,
-    /// Seconds without a range after which the position is looked for anew.
-    pub silence: f64,
-}
-
-impl Default for RangeSettings {
-    /// Radios of a metre's error on something that walks or drives slowly.
-    fn default() -> Self {
-        Self {
-            noise: 1.8,
-            outliers: 0.02,
-            stray: 40.0,
-            speed: 1.0,
-            persistence: 6.0,
-            bias: 5.0,
-            drift: 1e-4,
-            silence: 30.0,
-        }
-    }
-}
 
 /// How a range travels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,130 +67,12 @@ pub struct RangeEstimate {
     pub lost: bool,
 }
 
-/// A range that may be nonsense: `(1 - e) p + e c`. `density` is `c`, what a stray report has on average.
-#[derive(Clone)]
-struct Tolerant<C> {
-    scheme: C,
-    settings: RangeSettings,
-}
-
-/// A range in full.
-#[derive(Clone, Copy)]
-struct FullRange(RangeNoise);
-
-impl MeasurementNoise<1> for FullRange {
-    fn noise_covariance_at(&self, range: &Vector1<f64>) -> Matrix1<f64> {
-        let deviation = self.0.deviation(range[0]);
-        Matrix1::new(deviation * deviation)
-    }
-}
-
-impl Scheme<1> for FullRange {
-    type State = ();
-    type Feedback = ();
-    type Report = f64;
-    type Factor = RangeFactor;
-
-    fn start(&self) {}
-
-    fn feedback_format(&self) {}
-
-    fn report_format(&self) -> NumberFormat {
-        NumberFormat::Single
-    }
-
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        (): &(),
-    ) -> Result<Option<f64>, fewbits_core::Error> {
-        Ok(Some(self.report_format().rounded(finite("range", measurement[0])?)?))
-    }
-
-    fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<RangeFactor, fewbits_core::Error> {
-        match observation {
-            Observation::Received(range) => RangeFactor::received(*range, link.of_received()?, self.0),
-            Observation::Nothing | Observation::Lost => RangeFactor::constant(link.delivery(observation), self.0),
-        }
-        .map_err(crate::encoder::reported)
-    }
-}
-
-/// What a stray report of a scheme has on average.
-trait Stray: Scheme<1> {
-    fn stray(&self, settings: &RangeSettings, feedback: &Self::Feedback, report: &Self::Report) -> f64;
-}
-
-impl Stray for FullRange {
-    fn stray(&self, settings: &RangeSettings, (): &(), _: &f64) -> f64 {
-        1.0 / settings.stray
-    }
-}
-
-impl Stray for QuantizedRange {
-    /// A stray range seldom falls into an inner cell.
-    fn stray(&self, settings: &RangeSettings, reference: &RangeReference, level: &Symbol) -> f64 {
-        let levels = self.levels();
-        let inner = (2.0 * reference.half_width / settings.stray).min(1.0) / levels as f64;
-        if level.0 == 0 || level.0 + 1 == levels {
-            0.5 * (1.0 - (levels - 2) as f64 * inner)
-        } else {
-            inner
-        }
-    }
-}
-
-impl<C: MeasurementNoise<1>> MeasurementNoise<1> for Tolerant<C> {
-    fn noise_covariance_at(&self, range: &Vector1<f64>) -> Matrix1<f64> {
-        self.scheme.noise_covariance_at(range)
-    }
-}
-
-impl<C: Stray> Scheme<1> for Tolerant<C> {
-    type State = C::State;
-    type Feedback = C::Feedback;
-    type Report = C::Report;
-    type Factor = Robust<C::Factor>;
-
-    fn start(&self) -> C::State {
-        self.scheme.start()
-    }
-
-    fn feedback_format(&self) -> <C::Feedback as Message>::Format {
-        self.scheme.feedback_format()
-    }
-
-    fn report_format(&self) -> <C::Report as Message>::Format {
-        self.scheme.report_format()
-    }
-
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        state: &mut C::State,
-        measurement: &Vector1<f64>,
-        feedback: &C::Feedback,
-    ) -> Result<Option<C::Report>, fewbits_core::Error> {
-        self.scheme.encode(rng, state, measurement, feedback)
-    }
-
-    fn factor(
-        &self,
-        feedback: &C::Feedback,
-        observation: &Observation<C::Report>,
-        link: &Link,
-    ) -> Result<Self::Factor, fewbits_core::Error> {
-        let factor = self.scheme.factor(feedback, observation, link)?;
-        let (share, density) = match observation {
-            Observation::Received(report) => {
-                (self.settings.outliers, self.scheme.stray(&self.settings, feedback, report))
-            }
-            // A report that did not come is no outlier.
-            Observation::Nothing | Observation::Lost => (0.0, 0.0),
-        };
-        Ok(Robust::new(factor, share, density * link.arrival())?)
+impl RangeEstimate {
+    /// Squared error of the position in units of its covariance, per coordinate: 1 on average if the covariance is right. `None` if the
+    /// covariance is singular.
+    pub fn normalised_error(&self, truth: &Vector2<f64>) -> Option<f64> {
+        let error = self.position - truth;
+        Some(0.5 * error.dot(&self.covariance.cholesky()?.solve(&error)))
     }
 }
 
@@ -268,17 +112,7 @@ impl RangeTracker {
         travel: Travel,
         settings: RangeSettings,
     ) -> Result<Self, Error> {
-        within("outliers", settings.outliers, 0.0, 0.5)?;
-        for (name, value) in [
-            ("stray", settings.stray),
-            ("speed", settings.speed),
-            ("persistence", settings.persistence),
-            ("bias", settings.bias),
-            ("drift", settings.drift),
-            ("silence", settings.silence),
-        ] {
-            positive(name, value)?;
-        }
+        settings.check()?;
         let noise = RangeNoise::constant(settings.noise)?;
         let mut seated = BTreeMap::new();
         for (name, place) in anchors {
@@ -384,7 +218,7 @@ impl RangeTracker {
     fn estimate(&self, centre: &FusionCentre<5, Filter>, lost: bool) -> RangeEstimate {
         let belief = centre.estimate();
         let (m, p) = (belief.mean(), belief.covariance());
-        let scale = centre.noise_scale() * centre.filter().scale(centre.belief());
+        let scale = centre.filter().scale(centre.belief());
         RangeEstimate {
             position: Vector2::new(m[0], m[2]),
             covariance: Matrix2::new(p[(0, 0)], p[(0, 2)], p[(2, 0)], p[(2, 2)]),
@@ -449,24 +283,16 @@ impl RangeTracker {
     }
 
     fn centre_from(&self, rng: &mut dyn Rng, belief: &Gaussian<5>) -> Result<FusionCentre<5, Filter>, Error> {
-        let scales = match self.travel {
-            Travel::Bits(1) => vec![1.0],
-            _ => SPEEDS.map(|speed| speed * speed).to_vec(),
-        };
-        let bank = NoiseBank::new(MomentFilter, scales, SWITCHING)?;
+        let bank = NoiseBank::new(MomentFilter, self.settings.scales(), SWITCHING)?;
         let sensor = FalseAlarms::default().sensor;
         let centre = match self.travel {
             Travel::Bits(1) => ONE_BIT_ALARMS,
             _ => ALARMS,
         };
-        let mut centre =
-            FusionCentre::new(rng, self.world()?, bank, belief)?.with_false_alarms(FalseAlarms { sensor, centre })?;
-        if self.travel == Travel::Bits(1) {
-            let range = [SPEEDS[0] * SPEEDS[0], SPEEDS[4] * SPEEDS[4]];
-            centre = centre.learning_noise(NoiseLearning { gain: 0.03, range })?;
-        }
+        let mut centre = FusionCentre::new(rng, self.settings.world()?, bank, belief)?
+            .with_false_alarms(FalseAlarms { sensor, centre })?;
         for anchor in self.anchors.values() {
-            let sensing = OnAxes::<_, 5, 3>::new(BiasedRangeSensor(anchor.sensor), AXES)?;
+            let sensing = BiasedRangeSensor(anchor.sensor).on_axes::<5>(AXES)?;
             let settings = self.settings;
             match self.travel {
                 Travel::Full => {
@@ -493,49 +319,10 @@ impl RangeTracker {
         }
         Ok(centre)
     }
-
-    /// `[x, vx, y, vy, bias]`.
-    fn world(&self) -> Result<ContinuousLinear<5>, Error> {
-        let (rate, speed) = (1.0 / self.settings.persistence, self.settings.speed);
-        let (mut drift, mut density) = (SMatrix::<f64, 5, 5>::zeros(), SMatrix::<f64, 5, 5>::zeros());
-        for position in [0, 2] {
-            drift[(position, position + 1)] = 1.0;
-            drift[(position + 1, position + 1)] = -rate;
-            density[(position + 1, position + 1)] = 2.0 * rate * speed * speed;
-        }
-        density[(4, 4)] = self.settings.drift;
-        Ok(ContinuousLinear::new(drift, SVector::zeros(), density)?)
-    }
 }
 
 fn quantizer(bits: u32, noise: RangeNoise) -> Result<QuantizedRange, Error> {
     within("bits", f64::from(bits), 1.0, 8.0)?;
     // All nodes that hear the reports compute the references themselves: they do not travel.
     Ok(QuantizedRange::new(1 << bits, noise)?.with_format(NumberFormat::Double))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use fewbits_core::factor::Factor;
-    use fewbits_core::laws::scheme::total_probability_with;
-
-    #[test]
-    fn full_ranges_have_total_probability_one_over_any_link() {
-        let noise = RangeNoise::constant(1.8).unwrap();
-        for (loss, erasure) in [(0.0, 0.0), (0.2, 0.0), (0.2, 0.3)] {
-            let link = Link::lossy(loss).and_then(|link| link.with_erasure(erasure)).unwrap();
-            let received = |m: &Vector1<f64>| {
-                let step = 0.05;
-                let at = |i: i32| m[0] + step * f64::from(i);
-                let density = |z: f64| {
-                    let factor = FullRange(noise).factor(&(), &Observation::Received(z), &link).unwrap();
-                    factor.log_likelihood(m).exp()
-                };
-                (-400..=400).map(|i| step * density(at(i))).sum()
-            };
-            let at = [0.5, 20.0].map(Vector1::new);
-            total_probability_with(&FullRange(noise), &(), &link, received, &at, 1e-9).unwrap();
-        }
-    }
 }

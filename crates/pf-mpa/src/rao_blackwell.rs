@@ -1,4 +1,4 @@
-//! Particle trackers: the bootstrap filter of the library, and one whose particles know their velocity exactly.
+//! Particles that know their velocity exactly.
 
 use crate::Error;
 use crate::error::refuse;
@@ -11,18 +11,10 @@ use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};
 use fewbits_numerics::stored;
-use nalgebra::{Cholesky, Matrix2, Matrix4, SMatrix, Vector2, Vector4, Vector6};
+use nalgebra::{Cholesky, Matrix2, SMatrix, Vector2, Vector6};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
-
-/// The library's bootstrap filter on the target with its manoeuvre, `[x, y, vx, vy, ax, ay]`; systematic resampling below half
-/// the sample size. With few particles it loses the target at high signal-to-noise ratios: a cell is then a box with sharp edges.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored")]
-pub struct Bootstrap {
-    particles: usize,
-}
 
 /// Particles that hold a position, and the velocity as a Gaussian with a common variance. Drawn from linearised cells.
 ///
@@ -39,26 +31,7 @@ pub struct RaoBlackwellGuided {
     particles: usize,
 }
 
-stored! { Bootstrap as Stored { particles: usize } => Bootstrap::new(particles), Error }
-
-fn checked(particles: usize) -> Result<usize, Error> {
-    if u32::try_from(particles).is_err() {
-        return refuse("particles", particles, "fewer than 2^32 particles");
-    }
-    Ok(at_least_one("particles", particles)?)
-}
-
-impl Bootstrap {
-    /// A filter with this many particles.
-    ///
-    /// # Errors
-    /// If there is none.
-    pub fn new(particles: usize) -> Result<Self, Error> {
-        Ok(Self {
-            particles: checked(particles)?,
-        })
-    }
-}
+stored! { RaoBlackwellGuided as Stored { particles: usize } => RaoBlackwellGuided::new(particles), Error }
 
 impl RaoBlackwellGuided {
     /// A filter with this many particles.
@@ -66,63 +39,11 @@ impl RaoBlackwellGuided {
     /// # Errors
     /// If there is none.
     pub fn new(particles: usize) -> Result<Self, Error> {
+        if u32::try_from(particles).is_err() {
+            return refuse("particles", particles, "fewer than 2^32 particles");
+        }
         Ok(Self {
-            particles: checked(particles)?,
-        })
-    }
-}
-
-impl TryFrom<Stored> for RaoBlackwellGuided {
-    type Error = Error;
-
-    fn try_from(stored: Stored) -> Result<Self, Error> {
-        Self::new(stored.particles)
-    }
-}
-
-/// Position and velocity of particles that know more.
-fn estimate(particles: &Particles<6>) -> Gaussian<4> {
-    let (mean, covariance) = (particles.mean(), particles.covariance());
-    Gaussian::from_trusted_parts(Vector4::from_fn(|i, _| mean[i]), Matrix4::from_fn(|i, j| covariance[(i, j)]))
-}
-
-fn start<R: Rng + ?Sized>(rng: &mut R, prior: &Gaussian<4>, count: usize) -> Result<Particles<6>, Error> {
-    let states: Particles<4> = Particles::from_belief(rng, prior, count)?;
-    let mut i = 0;
-    Ok(Particles::from_draws(count, || {
-        let state = states.point(i).unwrap_or_else(|| *prior.mean());
-        i += 1;
-        WithManoeuvre::start(&state)
-    })?)
-}
-
-impl Tracker for Bootstrap {
-    type Belief = Particles<6>;
-    type Workspace = Workspace<6>;
-
-    fn start<R: Rng + ?Sized>(&self, rng: &mut R, _: &Target, prior: &Gaussian<4>) -> Result<Particles<6>, Error> {
-        start(rng, prior, self.particles)
-    }
-
-    fn estimate(&self, belief: &Particles<6>) -> Gaussian<4> {
-        estimate(belief)
-    }
-
-    fn step_in_place<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        target: &Target,
-        k: usize,
-        belief: &mut Particles<6>,
-        observed: &[Ranged],
-        workspace: &mut Workspace<6>,
-    ) -> Result<StepInfo, Error> {
-        let filter = ParticleFilter::default();
-        let info = filter.step_in_place(rng, &WithManoeuvre::at(*target, k), belief, observed, workspace)?;
-        Ok(StepInfo {
-            log_likelihood: Some(info.log_likelihood),
-            effective_sample_size: Some(info.effective_sample_size),
-            fallbacks: 0,
+            particles: at_least_one("particles", particles)?,
         })
     }
 }
@@ -170,13 +91,13 @@ impl Tracker for RaoBlackwellGuided {
         let velocity_variance = (0.5 * (velocities - explained.trace())).max(0.0);
         let positions = Gaussian::new(*prior.mean(), known)?;
         Ok(VelocityCloud {
-            particles: start(rng, &positions, self.particles)?,
+            particles: WithManoeuvre::cloud(rng, &positions, self.particles)?,
             velocity_variance,
         })
     }
 
     fn estimate(&self, belief: &VelocityCloud) -> Gaussian<4> {
-        let known = estimate(&belief.particles);
+        let known = WithManoeuvre::estimate(&belief.particles);
         let mut covariance = *known.covariance();
         covariance[(2, 2)] += belief.velocity_variance;
         covariance[(3, 3)] += belief.velocity_variance;
@@ -254,13 +175,14 @@ fn propose<R: Rng + ?Sized>(rng: &mut R, mean: &Vector2<f64>, spread: f64, obser
     // ln N(place; mean, spread I) - ln proposal(place), the constants of pi gone.
     let log_prior = -0.5 * (place - mean).norm_squared() / spread - spread.ln();
     let log_proposal = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>() - 0.5 * normals.norm_squared();
-    let log_likelihood = Likelihood::<2>::log_likelihood(observed, &place);
+    let log_likelihood = observed.log_likelihood(&place);
     (place, log_prior - log_proposal + log_likelihood)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Matrix4, Vector4};
 
     #[test]
     fn start_keeps_the_correlation_of_the_prior() {
