@@ -28,6 +28,18 @@ pub(crate) enum Error {
         #[source]
         source: csv::Error,
     },
+    /// A Parquet file could not be read or written.
+    #[cfg(feature = "parquet")]
+    #[error("{file}")]
+    Parquet {
+        file: String,
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// Parquet was asked for, and this program was built without it.
+    #[cfg(not(feature = "parquet"))]
+    #[error("{file}: this program was built without Parquet: build it with `--features parquet`, or use CSV")]
+    NoParquet { file: String },
     /// A table without columns or rows.
     #[error("{file}: no {what}: the first line names the columns, rows follow")]
     Empty { file: String, what: &'static str },
@@ -55,6 +67,24 @@ pub(crate) enum Error {
         value: String,
         expected: &'static str,
     },
+    /// A number is missing that cannot be found from the table.
+    #[error("{option} is needed: {reason}")]
+    Needed { option: &'static str, reason: &'static str },
+    /// A row could not be used by what it was given to.
+    #[error("{file}: row {row}")]
+    Row {
+        file: String,
+        row: u64,
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// Options do not make a model, a sensor or a design.
+    #[error("{what}")]
+    Refused {
+        what: &'static str,
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// Binary data would go to a terminal.
     #[error("standard output is a terminal: name a file with --output, or redirect")]
     Terminal,
@@ -81,6 +111,21 @@ impl Error {
             file: file.clone(),
             action,
             source,
+        }
+    }
+
+    pub(crate) fn refused<E: std::error::Error + Send + Sync + 'static>(what: &'static str) -> impl Fn(E) -> Self {
+        move |source| Self::Refused {
+            what,
+            source: Box::new(source),
+        }
+    }
+
+    pub(crate) fn option(option: &'static str, value: &str, expected: &'static str) -> Self {
+        Self::Option {
+            option,
+            value: value.to_owned(),
+            expected,
         }
     }
 
