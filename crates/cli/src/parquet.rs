@@ -87,7 +87,10 @@ fn texts(batch: &RecordBatch) -> Vec<Vec<String>> {
             return texts.iter().map(|text| text.unwrap_or_default().to_owned()).collect();
         }
         // Ticks of seconds say how many decimals they have.
-        let decimals = field.metadata().get("decimals").and_then(|decimals| decimals.parse().ok());
+        let decimals = field
+            .metadata()
+            .get("decimals")
+            .and_then(|decimals| decimals.parse().ok());
         let time = decimals.map_or(NANOSECONDS, |decimals| TimeBase::Clock {
             decimals,
             tolerance: 0,

@@ -17,7 +17,11 @@ fn design_is_written_in_every_form() {
     let value = json["value"].as_f64().unwrap();
     // More than without flips could be reached, less than the prior.
     assert!(value > 0.5 && value < 16.0, "{json}");
-    assert!(std::fs::read_to_string(here.join("cells.svg")).unwrap().contains("<rect"));
+    assert!(
+        std::fs::read_to_string(here.join("cells.svg"))
+            .unwrap()
+            .contains("<rect")
+    );
     assert!(text(&good(here, &job(&["--form", "rust"]), b"")).contains("pub const BREAKPOINTS_1"));
     good(here, &job(&["--form", "c", "--name", "plant", "-o", "plant.h"]), b"");
     std::fs::write(
@@ -27,20 +31,30 @@ fn design_is_written_in_every_form() {
     )
     .unwrap();
     // A machine without a compiler skips the rest.
-    let Ok(built) = Command::new("cc").args(["-std=c99", "-o", "a.out", "main.c"]).current_dir(here).output() else {
+    let Ok(built) = Command::new("cc")
+        .args(["-std=c99", "-o", "a.out", "main.c"])
+        .current_dir(here)
+        .output()
+    else {
         return;
     };
     assert!(built.status.success(), "{}", text(&built.stderr));
-    let estimate: f64 = text(&Command::new(here.join("a.out")).output().unwrap().stdout).parse().unwrap();
+    let estimate: f64 = text(&Command::new(here.join("a.out")).output().unwrap().stdout)
+        .parse()
+        .unwrap();
     assert!((estimate - 21.0).abs() < 3.0 * value.sqrt(), "{estimate}");
 }
 
 #[test]
 fn sample_of_a_column_is_a_prior() {
     let folder = tempfile::tempdir().unwrap();
-    let table: String = (0..400).map(|i| format!("{},{}\n", i, 12.0 + 3.0 * (f64::from(i) * 0.37).sin())).collect();
+    let table: String = (0..400)
+        .map(|i| format!("{},{}\n", i, 12.0 + 3.0 * (f64::from(i) * 0.37).sin()))
+        .collect();
     let table = format!("n,flow\n{table}");
-    let words = ["design", "-", "--column", "flow", "--noise", "0.5", "--bits", "2", "--json"];
+    let words = [
+        "design", "-", "--column", "flow", "--noise", "0.5", "--bits", "2", "--json",
+    ];
     let json: serde_json::Value = serde_json::from_slice(&good(folder.path(), &words, table.as_bytes())).unwrap();
     let breakpoints = json["sensors"][0]["breakpoints"].as_array().unwrap();
     assert!(breakpoints.len() == 3 && (breakpoints[1].as_f64().unwrap() - 12.0).abs() < 0.3, "{json}");
@@ -62,7 +76,12 @@ fn refusals_of_design() {
         (vec!["design", "--prior", "20±4", "--noise", "1", "--flips", "2"], "crossover"),
         (vec!["design", "--prior", "20±4", "--noise", "1", "--adc", "12"], "--adc: `12` is not understood"),
         (vec!["design", "--prior", "20±4", "--noise", "1", "--criterion", "decision"], "discrete"),
-        (vec!["design", "--prior", "20±4", "--noise", "1", "--bits", "1", "--form", "c", "--name", "a b"], "name"),
+        (
+            vec![
+                "design", "--prior", "20±4", "--noise", "1", "--bits", "1", "--form", "c", "--name", "a b",
+            ],
+            "name",
+        ),
         (vec!["design", "none.csv", "--noise", "1"], "none.csv: cannot open"),
     ] {
         let message = refused(folder.path(), &words, b"");

@@ -152,7 +152,11 @@ fn info_and_plan_speak_of_columns() {
     );
     assert!(text(&good(&folder, &["info", "a.fewb"], b"")).contains("direction: ±2@360"));
     let plan = good(&folder, &["plan", "a.csv", "--time", "exact", "--json", "--plot", "plan.svg"], b"");
-    assert!(std::fs::read_to_string(folder.join("plan.svg")).unwrap().contains("direction"));
+    assert!(
+        std::fs::read_to_string(folder.join("plan.svg"))
+            .unwrap()
+            .contains("direction")
+    );
     let plan: serde_json::Value = serde_json::from_slice(&plan).unwrap();
     assert_eq!(plan["columns"][2]["name"], "price");
     assert!((plan["columns"][2]["steps"][0].as_f64().unwrap() - 0.001).abs() < 1e-9);
@@ -235,7 +239,9 @@ fn parquet_names_the_missing_feature() {
     let (_kept, folder) = folder();
     good(&folder, &["pack", "a.csv", "-o", "a.fewb"], b"");
     let message = refused(&folder, &["unpack", "a.fewb", "-o", "a.parquet"], b"");
-    assert!(message.contains("a.parquet: this program was built without Parquet") && message.contains("--features parquet"));
+    assert!(
+        message.contains("a.parquet: this program was built without Parquet") && message.contains("--features parquet")
+    );
     std::fs::write(folder.join("table"), b"PAR1....PAR1").unwrap();
     assert!(refused(&folder, &["pack", "table", "-o", "x"], b"").contains("--features parquet"));
 }
@@ -247,9 +253,23 @@ fn parquet_returns_what_it_holds() {
     good(&folder, &["pack", "a.csv", "--time", "exact", "-o", "a.fewb"], b"");
     let csv = text(&good(&folder, &["unpack", "a.fewb"], b""));
     good(&folder, &["unpack", "a.fewb", "-o", "a.parquet"], b"");
-    good(&folder, &["pack", "a.parquet", "--columns", "temp,flow,price,direction", "-o", "b.fewb"], b"");
+    good(
+        &folder,
+        &[
+            "pack",
+            "a.parquet",
+            "--columns",
+            "temp,flow,price,direction",
+            "-o",
+            "b.fewb",
+        ],
+        b"",
+    );
     let values = |text: &str| -> Vec<String> {
-        text.lines().skip(1).map(|line| line.split_once(',').map_or("", |cells| cells.1).to_owned()).collect()
+        text.lines()
+            .skip(1)
+            .map(|line| line.split_once(',').map_or("", |cells| cells.1).to_owned())
+            .collect()
     };
     let again = text(&good(&folder, &["unpack", "b.fewb"], b""));
     assert!(again.lines().skip(1).eq(values(&csv)));
@@ -309,7 +329,12 @@ fn datagrams_are_received() {
 #[test]
 fn serial_line_is_received() {
     let (_kept, folder) = folder();
-    if !Command::new("mkfifo").arg("line").current_dir(&folder).status().is_ok_and(|status| status.success()) {
+    if !Command::new("mkfifo")
+        .arg("line")
+        .current_dir(&folder)
+        .status()
+        .is_ok_and(|status| status.success())
+    {
         return;
     }
     let receiver = Command::new(env!("CARGO_BIN_EXE_fewbits"))
@@ -319,9 +344,23 @@ fn serial_line_is_received() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let mut noise = std::fs::OpenOptions::new().write(true).open(folder.join("line")).unwrap();
+    let mut noise = std::fs::OpenOptions::new()
+        .write(true)
+        .open(folder.join("line"))
+        .unwrap();
     noise.write_all(b"\x07noise\x00\x00\xff").unwrap();
-    let words = ["send", "-", "--bound", BOUND, "--max-bytes", "200", "--serial", "line", "--header-every", "4"];
+    let words = [
+        "send",
+        "-",
+        "--bound",
+        BOUND,
+        "--max-bytes",
+        "200",
+        "--serial",
+        "line",
+        "--header-every",
+        "4",
+    ];
     good(&folder, &words, table().as_bytes());
     let received = text(&receiver.wait_with_output().unwrap().stdout);
     // The noise is one frame with the first piece of the header, which comes again.

@@ -14,7 +14,9 @@ fn listings(page: &str) -> Vec<(Vec<String>, Vec<String>)> {
         } else if is_console {
             match line.strip_prefix("$ ") {
                 Some(command) => {
-                    let words = command.split_whitespace().map(|word| word.trim_matches('\'').to_owned());
+                    let words = command
+                        .split_whitespace()
+                        .map(|word| word.trim_matches('\'').to_owned());
                     found.push((words.collect(), Vec::new()));
                 }
                 None => found.last_mut().unwrap().1.push(line.trim_end().to_owned()),

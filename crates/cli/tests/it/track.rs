@@ -33,7 +33,9 @@ fn walk(rows: usize) -> (String, Vec<f64>) {
         let seconds = 0.5 + numbers.uniform();
         time += seconds;
         level += 0.2 * seconds.sqrt() * numbers.normal();
-        let cells: Vec<String> = (0..3).map(|_| format!("{:.4}", level + 0.5 * numbers.normal())).collect();
+        let cells: Vec<String> = (0..3)
+            .map(|_| format!("{:.4}", level + 0.5 * numbers.normal()))
+            .collect();
         table += &format!("{time:.3},{}\n", cells.join(","));
         truth.push(level);
     }
@@ -43,8 +45,15 @@ fn walk(rows: usize) -> (String, Vec<f64>) {
 /// Columns of a CSV by name, empty cells as NaN.
 fn column(csv: &str, name: &str) -> Vec<f64> {
     let mut lines = csv.lines();
-    let at = lines.next().unwrap().split(',').position(|known| known == name).unwrap();
-    lines.map(|line| line.split(',').nth(at).unwrap().parse().unwrap_or(f64::NAN)).collect()
+    let at = lines
+        .next()
+        .unwrap()
+        .split(',')
+        .position(|known| known == name)
+        .unwrap();
+    lines
+        .map(|line| line.split(',').nth(at).unwrap().parse().unwrap_or(f64::NAN))
+        .collect()
 }
 
 fn rms(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
@@ -61,7 +70,9 @@ fn level_is_found_with_bands_that_hold_it() {
         let out = text(&good(folder.path(), &["track", "-", "--send", send], table.as_bytes()));
         let (level, low, high) = (column(&out, "level"), column(&out, "level_low"), column(&out, "level_high"));
         // The start and what was learnt late count as well: 95 % within five.
-        let inside = (0..600).filter(|i| low[*i] <= truth[*i] && truth[*i] <= high[*i]).count();
+        let inside = (0..600)
+            .filter(|i| low[*i] <= truth[*i] && truth[*i] <= high[*i])
+            .count();
         assert!(inside >= 540, "{send}: {inside} of 600");
         errors.push(rms(level.iter().copied().zip(truth.iter().copied()).skip(20)));
     }
@@ -102,7 +113,18 @@ fn bits_against_fixed_thresholds_are_reports() {
         table += &format!("{},{}\n", u8::from(level >= 2.0), u8::from(level >= 3.0));
     }
     let words = [
-        "track", "-", "--reports", "--send", "bit", "--threshold", "low=2,high=3", "--noise", "0.1", "--change", "0.05", "--prior",
+        "track",
+        "-",
+        "--reports",
+        "--send",
+        "bit",
+        "--threshold",
+        "low=2,high=3",
+        "--noise",
+        "0.1",
+        "--change",
+        "0.05",
+        "--prior",
         "1.5±0.5",
     ];
     let out = text(&good(folder.path(), &words, table.as_bytes()));
@@ -115,26 +137,65 @@ fn bits_against_fixed_thresholds_are_reports() {
 #[test]
 fn dead_sensor_is_named_in_the_summary() {
     let folder = tempfile::tempdir().unwrap();
-    let words = ["track", "rooms.csv", "--align", "60", "--model", "velocity", "--send", "word:2", "--json"];
+    let words = [
+        "track",
+        "rooms.csv",
+        "--align",
+        "60",
+        "--model",
+        "velocity",
+        "--send",
+        "word:2",
+        "--json",
+    ];
     let svg = folder.path().join("rooms.svg");
     let words: Vec<&str> = words.into_iter().chain(["--plot", svg.to_str().unwrap()]).collect();
     let output = fewbits(&fixtures(), &words, b"");
     assert!(output.status.success(), "{}", text(&output.stderr));
     let summary: serde_json::Value = serde_json::from_slice(&output.stderr).unwrap();
-    let of = |name: &str| summary["sensors"].as_array().unwrap().iter().find(|s| s["name"] == name).unwrap().clone();
+    let of = |name: &str| {
+        summary["sensors"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|s| s["name"] == name)
+            .unwrap()
+            .clone()
+    };
     assert_eq!((of("s7")["used"].as_bool(), of("s1")["used"].as_bool()), (Some(false), Some(true)));
-    assert!(summary["events"].as_array().unwrap().iter().any(|e| e["event"] == "dead" && e["sensor"] == "s7"));
+    assert!(
+        summary["events"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|e| e["event"] == "dead" && e["sensor"] == "s7")
+    );
     assert_eq!(summary["bits_per_report"], 2.0);
     let first: serde_json::Value = serde_json::from_str(text(&output.stdout).lines().next().unwrap()).unwrap();
     assert_eq!(first["time"], "2026-01-31T00:09:30Z");
     assert!(first["slope"].is_f64());
     let picture = std::fs::read_to_string(svg).unwrap();
-    assert!(picture.starts_with("<svg") && picture.contains("polygon") && picture.contains("estimate from values in full"));
+    assert!(
+        picture.starts_with("<svg") && picture.contains("polygon") && picture.contains("estimate from values in full")
+    );
 }
 
 #[test]
 fn place_is_found_from_ranges() {
-    let words = ["track", "walk.csv", "--model", "ranges", "--by", "anchor", "--anchors", "anchors.csv", "--noise", "0.7", "--send", "word:2"];
+    let words = [
+        "track",
+        "walk.csv",
+        "--model",
+        "ranges",
+        "--by",
+        "anchor",
+        "--anchors",
+        "anchors.csv",
+        "--noise",
+        "0.7",
+        "--send",
+        "word:2",
+    ];
     let out = text(&good(&fixtures(), &words, b""));
     let (time, x, y) = (column(&out, "time"), column(&out, "x"), column(&out, "y"));
     // The walk of the fixture: a figure of eight in 90 seconds.
@@ -159,18 +220,42 @@ fn refusals_of_track() {
         (vec!["track", "-", "--send", "b=bit"], "time,a\n1,2\n", "no column `b`: there are a"),
         (vec!["track", "-", "--send", "word:9"], "time,a\n1,2\n", "`word:9` is not understood"),
         (vec!["track", "-", "--noise", "-1"], "time,a\n1,2\n", "a value is required"),
-        (vec!["track", "-", "--noise=-1"], "time,a\n1,2\n", "--noise: `-1` is not understood: expected a standard deviation"),
+        (
+            vec!["track", "-", "--noise=-1"],
+            "time,a\n1,2\n",
+            "--noise: `-1` is not understood: expected a standard deviation",
+        ),
         (vec!["track", "-", "--prior", "5"], "time,a\n1,2\n", "as `20±5`"),
         (vec!["track", "-", "--change", "5/never"], "time,a\n1,2\n", "as `0.5/1h`"),
-        (vec!["track", "-", "--reports", "--send", "bit"], "time,a\n1,1\n", "--noise is needed: it cannot be found from reports"),
         (
-            vec!["track", "-", "--reports", "--send", "bit", "--noise", "1", "--change", "1", "--prior", "0±1"],
+            vec!["track", "-", "--reports", "--send", "bit"],
+            "time,a\n1,1\n",
+            "--noise is needed: it cannot be found from reports",
+        ),
+        (
+            vec![
+                "track",
+                "-",
+                "--reports",
+                "--send",
+                "bit",
+                "--noise",
+                "1",
+                "--change",
+                "1",
+                "--prior",
+                "0±1",
+            ],
             "time,a\n1,1\n2,7\n",
             "row 2: argument `report` is 7",
         ),
         (vec!["track", "-", "--by", "b"], "time,a\n1,2\n", "no column `b`: there are time, a"),
         (vec!["track", "-", "--model", "ranges"], "time,a\n1,2\n", "--anchors"),
-        (vec!["track", "-", "--model", "ranges", "--anchors", "none.csv"], "time,a\n1,2\n", "none.csv: cannot open"),
+        (
+            vec!["track", "-", "--model", "ranges", "--anchors", "none.csv"],
+            "time,a\n1,2\n",
+            "none.csv: cannot open",
+        ),
     ] {
         let message = refused(here, &words, input.as_bytes());
         assert!(message.contains(part), "{words:?}: {message}");
