@@ -135,20 +135,6 @@ pub(crate) struct CatOptions {
     pub(crate) output: Option<PathBuf>,
 }
 
-impl UnpackOptions {
-    /// All rows and columns.
-    pub(crate) fn whole(self) -> CatOptions {
-        CatOptions {
-            file: self.file,
-            from: None,
-            to: None,
-            columns: Vec::new(),
-            json: false,
-            output: self.output,
-        }
-    }
-}
-
 #[derive(Args)]
 pub(crate) struct InfoOptions {
     /// Recording.

@@ -13,6 +13,7 @@ mod generate;
 mod info;
 mod input;
 mod link;
+mod numbers;
 mod output;
 mod pack;
 #[cfg(feature = "parquet")]

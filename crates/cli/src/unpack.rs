@@ -1,10 +1,24 @@
 //! `fewbits unpack` and `fewbits cat`: a recording as CSV or JSON lines.
 
-use crate::arguments::CatOptions;
+use crate::arguments::{CatOptions, UnpackOptions};
 use crate::error::Error;
 use crate::output::{Shape, Writer};
 use crate::{Ending, clock};
 use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase};
+
+impl UnpackOptions {
+    /// All rows and columns.
+    pub(crate) fn whole(self) -> CatOptions {
+        CatOptions {
+            file: self.file,
+            from: None,
+            to: None,
+            columns: Vec::new(),
+            json: false,
+            output: self.output,
+        }
+    }
+}
 
 /// Which rows, which columns.
 struct Selection {

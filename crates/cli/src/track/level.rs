@@ -1,16 +1,15 @@
 //! A level that sensors measure: its estimates with bands, row by row.
 
 use super::centre::{Estimator, Failure, Step, Use, centre};
+use super::report::{BAND, first_cell, first_name, summarise};
 use super::rows::{Instant, Instants};
 use super::settings::Settings;
-use super::{BAND, first_cell, first_name, summarise};
 use crate::Ending;
 use crate::arguments::{Model, TrackOptions};
 use crate::error::Error;
 use crate::output::{Cell, Shape, Sheet};
 use crate::plot::{Layer, Picture, Thinned};
 use serde::Serialize;
-use std::path::Path;
 
 /// What was found over the whole table.
 #[derive(Serialize)]
@@ -278,14 +277,10 @@ pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Endi
     sheet.flush()?;
     let (summary, picture) = run.finish(options)?;
     if let Some(path) = &options.plot {
-        save(&picture, path)?;
+        picture.save(path)?;
     }
     summarise(&summary, &lines(&summary), options.json)?;
     Ok(Ending::Good)
-}
-
-fn save(picture: &Picture, path: &Path) -> Result<(), Error> {
-    picture.save(path)
 }
 
 fn lines(summary: &Summary) -> Vec<String> {

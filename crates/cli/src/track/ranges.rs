@@ -1,8 +1,8 @@
 //! A place in the plane from its distances to anchors.
 
+use super::report::{BAND, first_cell, first_name, summarise};
 use super::rows::Instants;
 use super::sensors::Sends;
-use super::{BAND, first_cell, first_name, summarise};
 use crate::Ending;
 use crate::arguments::{TableOptions, TrackOptions};
 use crate::error::Error;

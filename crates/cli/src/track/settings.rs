@@ -6,6 +6,7 @@ use super::sensors::Sends;
 use crate::arguments::{Model, TrackOptions};
 use crate::bounds::PerColumn;
 use crate::error::Error;
+use crate::numbers::{above_zero, mean_and_deviation, number};
 
 /// Rows that are looked at before the first estimate.
 const FIRST_ROWS: usize = 200;
@@ -34,32 +35,6 @@ pub(super) struct Settings {
     /// Per sensor, as far as the first rows go.
     losses: Vec<f64>,
     offsets: Vec<f64>,
-}
-
-fn number(option: &'static str, text: &str, expected: &'static str) -> Result<f64, Error> {
-    let number: Option<f64> = text.trim().parse().ok();
-    number
-        .filter(|number| number.is_finite())
-        .ok_or_else(|| Error::option(option, text, expected))
-}
-
-fn above_zero(option: &'static str, text: &str, expected: &'static str) -> Result<f64, Error> {
-    let found = number(option, text, expected)?;
-    if found > 0.0 {
-        Ok(found)
-    } else {
-        Err(Error::option(option, text, expected))
-    }
-}
-
-/// `20±5`.
-pub(crate) fn mean_and_deviation(option: &'static str, text: &str) -> Result<(f64, f64), Error> {
-    const EXPECTED: &str = "a mean and a standard deviation above 0, as `20±5`";
-    let (mean, deviation) = text
-        .split_once('±')
-        .or(text.split_once("+-"))
-        .ok_or_else(|| Error::option(option, text, EXPECTED))?;
-    Ok((number(option, mean, EXPECTED)?, above_zero(option, deviation, EXPECTED)?))
 }
 
 /// `0.5/1h`; rows that are numbered are a second apart.
