@@ -312,7 +312,7 @@ pub(crate) enum Form {
 #[derive(Args)]
 pub(crate) struct DesignOptions {
     /// CSV file with a sample of the unknown in one column; `-` for standard input. Without it `--prior` says what is known.
-    #[arg(required_unless_present = "prior", conflicts_with = "prior")]
+    #[arg(conflicts_with = "prior")]
     pub(crate) file: Option<String>,
     /// The column of the sample. Without it the only one.
     #[arg(long, value_name = "NAME")]

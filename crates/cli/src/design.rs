@@ -170,7 +170,13 @@ fn solve(options: &DesignOptions, scene: Scene) -> Result<Solution, Error> {
 pub(crate) fn run(options: &DesignOptions) -> Result<Ending, Error> {
     let prior = match (&options.file, &options.prior) {
         (Some(file), _) => sample(options, file)?,
-        (None, text) => prior(text.as_deref().unwrap_or_default())?,
+        (None, Some(text)) => prior(text)?,
+        (None, None) => {
+            return Err(Error::Needed {
+                option: "a FILE or --prior",
+                reason: "a sample of the unknown, or what is known of it",
+            });
+        }
     };
     let noise = if options.correlation == 0.0 {
         Noise::independent_with_deviations(&options.noise)

@@ -40,6 +40,14 @@ pub(crate) enum Error {
     #[cfg(not(feature = "parquet"))]
     #[error("{file}: this program was built without Parquet: build it with `--features parquet`, or use CSV")]
     NoParquet { file: String },
+    /// A row of a table could not be taken apart.
+    #[error("{file}: row {row}: {problem}: {mend}")]
+    Line {
+        file: String,
+        row: u64,
+        problem: String,
+        mend: &'static str,
+    },
     /// A table without columns or rows.
     #[error("{file}: no {what}: the first line names the columns, rows follow")]
     Empty { file: String, what: &'static str },
@@ -139,9 +147,27 @@ impl Error {
 
     pub(crate) fn table(file: &str) -> impl Fn(csv::Error) -> Self + use<> {
         let file = file.to_owned();
-        move |source| Self::Table {
-            file: file.clone(),
-            source,
+        move |source| {
+            let row = source.position().map_or(0, csv::Position::record);
+            let (problem, mend) = match source.kind() {
+                csv::ErrorKind::UnequalLengths { expected_len, len, .. } => (
+                    format!("{len} cells instead of {expected_len}"),
+                    "mend the row, or name what separates cells with --delimiter",
+                ),
+                csv::ErrorKind::Utf8 { .. } => ("not text in UTF-8".to_owned(), "save the table as UTF-8"),
+                _ => {
+                    return Self::Table {
+                        file: file.clone(),
+                        source,
+                    };
+                }
+            };
+            Self::Line {
+                file: file.clone(),
+                row,
+                problem,
+                mend,
+            }
         }
     }
 

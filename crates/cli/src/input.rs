@@ -299,10 +299,12 @@ impl Table {
             return Ok(None);
         }
         let Ok(value) = text.parse::<f64>() else {
-            return Err(self.cell_error(
-                column,
-                ("is not a number", "mend the cell, leave it empty for a gap, or choose columns with --columns"),
-            ));
+            let mend = if self.all_names.len() == 1 && text.contains([';', '\t', '|']) {
+                "name what separates cells with --delimiter"
+            } else {
+                "mend the cell, leave it empty for a gap, or choose columns with --columns"
+            };
+            return Err(self.cell_error(column, ("is not a number", mend)));
         };
         let size = text.trim_start_matches(['-', '+']);
         if size.len() > 15 && size.bytes().all(|byte| byte.is_ascii_digit()) {

@@ -5,10 +5,13 @@ use crate::error::Error;
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, IsTerminal, Read, Write};
 use std::process::Command;
-use std::time::{Duration, Instant};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Duration;
 
 /// Longest frame that is put together; what is longer is noise.
 const MAX_FRAME: usize = 1 << 16;
+/// Chunks that are read ahead.
+const CHUNKS: usize = 64;
 /// Pause before a line without bytes is read again.
 const PAUSE: Duration = Duration::from_millis(20);
 
@@ -45,54 +48,62 @@ pub(crate) fn write(line: &mut File, frame: &[u8]) -> std::io::Result<()> {
 
 /// Frames as they come.
 pub(crate) struct Frames {
-    line: File,
+    chunks: Receiver<std::io::Result<Vec<u8>>>,
     timeout: Option<Duration>,
+    /// Bytes that are no whole frame yet.
     collected: Vec<u8>,
-    /// Bytes that were read and not looked at.
-    read: Vec<u8>,
 }
 
 impl Frames {
-    pub(crate) fn new(line: File, timeout: Option<Duration>) -> Self {
+    pub(crate) fn new(mut line: File, timeout: Option<Duration>) -> Self {
+        let (sender, chunks) = sync_channel(CHUNKS);
+        // Reading blocks, and the timeout does not wait for it. The thread ends with the process.
+        std::thread::spawn(move || {
+            let mut buffer = [0; 4096];
+            loop {
+                let chunk = match line.read(&mut buffer) {
+                    Ok(0) => {
+                        std::thread::sleep(PAUSE);
+                        continue;
+                    }
+                    Ok(count) => Ok(buffer[..count].to_vec()),
+                    Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                    Err(error) => Err(error),
+                };
+                let is_last = chunk.is_err();
+                if sender.send(chunk).is_err() || is_last {
+                    return;
+                }
+            }
+        });
         Self {
-            line,
+            chunks,
             timeout,
             collected: Vec::new(),
-            read: Vec::new(),
         }
     }
 
     /// The next frame; `None` if nothing came for the timeout.
     pub(crate) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
-        let mut silent_since = Instant::now();
         loop {
-            while let Some(end) = self.read.iter().position(|byte| *byte == 0) {
-                let bytes: Vec<u8> = self.read.drain(..=end).collect();
-                self.collected.extend_from_slice(&bytes[..end]);
+            if let Some(end) = self.collected.iter().position(|byte| *byte == 0) {
+                let bytes: Vec<u8> = self.collected.drain(..=end).collect();
                 // Noise is no frame.
-                match cobs::decode_vec(&std::mem::take(&mut self.collected)) {
+                match cobs::decode_vec(&bytes[..end]) {
                     Ok(frame) if !frame.is_empty() => return Ok(Some(frame)),
-                    _ => {}
+                    _ => continue,
                 }
             }
-            self.collected.append(&mut self.read);
             if self.collected.len() > MAX_FRAME {
                 self.collected.clear();
             }
-            let mut buffer = [0; 4096];
-            match self.line.read(&mut buffer) {
-                Ok(0) => {
-                    if self.timeout.is_some_and(|timeout| silent_since.elapsed() >= timeout) {
-                        return Ok(None);
-                    }
-                    std::thread::sleep(PAUSE);
-                }
-                Ok(count) => {
-                    self.read.extend_from_slice(&buffer[..count]);
-                    silent_since = Instant::now();
-                }
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
+            let chunk = match self.timeout {
+                Some(timeout) => self.chunks.recv_timeout(timeout).ok(),
+                None => self.chunks.recv().ok(),
+            };
+            match chunk {
+                Some(chunk) => self.collected.extend(chunk?),
+                None => return Ok(None),
             }
         }
     }

@@ -301,10 +301,12 @@ fn lines(summary: &Summary) -> Vec<String> {
         lines.push(format!("estimates differ by {difference:.4} (root mean square) from those of values in full"));
     }
     for sensor in summary.sensors.iter().filter(|sensor| !sensor.used) {
-        lines.push(format!(
-            "{} is not used any more: it is silent, or contradicts the others (constant offsets: --align ROWS)",
-            sensor.name
-        ));
+        let why = if sensor.working < 0.5 {
+            "it is silent"
+        } else {
+            "it contradicts the others (constant offsets: --align ROWS)"
+        };
+        lines.push(format!("{} is not used any more: {why}", sensor.name));
     }
     for event in summary.events.iter().take(PRINTED_EVENTS) {
         let sensor = event.sensor.as_deref().unwrap_or("all sensors");

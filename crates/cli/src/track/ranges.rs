@@ -213,7 +213,9 @@ pub(super) fn run(options: &TrackOptions, file: &str, mut instants: Instants) ->
 fn unknown(table: &str, name: &str, anchors: &str) -> Error {
     Error::Mismatch {
         file: table.to_owned(),
-        problem: format!("`{name}` is no anchor of {anchors}: add it there, or choose columns with --columns"),
+        problem: format!(
+            "`{name}` is no anchor of {anchors}: add it there, choose columns with --columns, or name the column of anchors with --by"
+        ),
     }
 }
 

@@ -9,7 +9,7 @@ const JOB: [&str; 7] = ["design", "--prior", "20±4", "--noise", "1,1", "--flips
 fn design_is_written_in_every_form() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    let job = |more: &[&str]| [&JOB[..], &["--bits", "2", "--plot", "cells.svg"], more].concat();
+    let job = |more: &[&'static str]| [&JOB[..], &["--bits", "2", "--plot", "cells.svg"], more].concat();
     let table = text(&good(here, &job(&["--adc", "12:0..40"]), b""));
     assert!(table.contains("mean squared error") && table.contains("sensor 1: thresholds in codes"), "{table}");
     let json = good(here, &job(&["--json"]), b"");
