@@ -7,13 +7,21 @@ mod arguments;
 mod bench;
 mod bounds;
 mod clock;
+mod design;
 mod error;
+mod generate;
 mod info;
 mod input;
 mod link;
+mod numbers;
 mod output;
 mod pack;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod plan;
+mod plot;
+mod serial;
+mod track;
 mod unpack;
 mod verify;
 
@@ -39,9 +47,11 @@ fn main() -> ExitCode {
         Task::Info(options) => info::run(&options),
         Task::Verify(options) => verify::run(&options),
         Task::Bench(options) => bench::run(&options),
+        Task::Track(options) => track::run(&options),
+        Task::Design(options) => design::run(&options),
         Task::Send(options) => link::send(&options),
         Task::Receive(options) => link::receive(&options),
-        Task::Generate(options) => arguments::generate(&options),
+        Task::Generate(options) => generate::run(&options),
     };
     match done {
         Ok(Ending::Good) => ExitCode::SUCCESS,
