@@ -2,7 +2,7 @@
 
 use fewbits_core::factor::Factor;
 use fewbits_core::laws::{factor, likelihood, message, scheme};
-use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Observed, OnAxes, Scheme, Sensing};
+use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
 use fewbits_filters::{BootstrapFilter, MomentFilter, ParticleFilter, StateFilter, StateLikelihood};
 use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
