@@ -56,7 +56,7 @@ impl Participant {
         for t in 0..words {
             for w in 0..words {
                 let arrives = self.link.word_probability(w as u64, t as u64, self.bits);
-                transition[t * words + w] = (1.0 - missing) * arrives;
+                transition[t * words + w] = self.link.arrival() * arrives;
             }
         }
         if missing > 0.0 {
@@ -70,9 +70,9 @@ impl Participant {
     }
 }
 
-/// Probability that a word is not received, whether or not that is noticed: these sensors always report.
+/// Probability that a word is not received. Whether that is noticed makes no difference: these sensors always report.
 pub(super) fn missing(link: &Link) -> f64 {
-    link.loss()
+    link.loss() + link.erasure()
 }
 
 pub(super) fn solve(request: &Request<'_>, bits: &[u32], control: &mut Control<'_>) -> Result<Vec<Solution>, Error> {
@@ -201,11 +201,11 @@ pub(super) fn search(
     let mut points: Vec<Point> = Vec::new();
     if let Some(given) = given {
         let words = given.iter().zip(&grids).map(|(c, g)| c.on(&g.edges)).collect();
-        points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.go_on()));
+        points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.step()));
     }
     for i in 0..starts {
         let words = joint_start(&landscape, &grids, participants, &singles, i);
-        points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.go_on()));
+        points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.step()));
         control.report(Stage::AllSensors, i + 1, starts);
         if !control.go_on() {
             break;
@@ -232,7 +232,7 @@ pub(super) fn search(
             if !is_due && !control.go_on() {
                 break;
             }
-            point = refine(&landscape, point, &mut spacings, shape, &mut || is_due || control.go_on());
+            point = refine(&landscape, point, &mut spacings, shape, &mut || control.step() || is_due);
             control.report(Stage::Refinement, p * refinements + r + 1, parts);
         }
         refined.push(point);
@@ -320,7 +320,7 @@ fn single_sensors(
         for i in 0..starts {
             let words = single_start(&landscape, 0, &grid, bits, i);
             // The first starts are run whatever the time.
-            let mut go_on = || i < FIRST_STARTS || control.go_on();
+            let mut go_on = || control.step() || i < FIRST_STARTS;
             points.push(climb(&landscape, vec![grid.clone()], vec![words], shape, &mut go_on));
             if i + 1 >= FIRST_STARTS && !control.go_on() {
                 break;
@@ -334,7 +334,7 @@ fn single_sensors(
         for mut point in best_few(points, SAME * unit) {
             let mut spacings = [spacing(&landscape, 0, cells)];
             for _ in 0..REFINEMENTS {
-                point = refine(&landscape, point, &mut spacings, shape, &mut || control.go_on());
+                point = refine(&landscape, point, &mut spacings, shape, &mut || control.step());
             }
             best.push(point);
         }

@@ -19,12 +19,17 @@ use std::fmt::Write;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solutions {
     all: Vec<Solution>,
+    steps: usize,
     is_cut_short: bool,
 }
 
 impl Solutions {
-    pub(super) fn new(all: Vec<Solution>, is_cut_short: bool) -> Self {
-        Self { all, is_cut_short }
+    pub(super) fn new(all: Vec<Solution>, steps: usize, is_cut_short: bool) -> Self {
+        Self {
+            all,
+            steps,
+            is_cut_short,
+        }
     }
 
     /// The best design.
@@ -36,6 +41,12 @@ impl Solutions {
     /// All designs, best first.
     pub fn all(&self) -> &[Solution] {
         &self.all
+    }
+
+    /// Steps of the search. In each, cells and words of one sensor were improved with the other sensors as they were. The number
+    /// depends on the request alone, unless a time limit ended the search.
+    pub fn steps(&self) -> usize {
+        self.steps
     }
 
     /// Whether the time limit ended the search.

@@ -7,7 +7,7 @@ use fewbits_quantizer_design::design::{AllowedCells, Scope};
 use fewbits_quantizer_design::solve::{Adc, Bits, Request, Solution, minimax};
 use fewbits_quantizer_design::{Certificate, Noise, Prior, Scene};
 use rand::RngExt;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 fn pair(scale: f64) -> Scene {
     let noise = Noise::equicorrelated_with_deviations(&[scale; 2], 0.5).unwrap();
@@ -63,7 +63,6 @@ fn simulated(solution: &Solution, deviations: &[f64], rho: f64, draws: u64) -> (
 /// The job of the guide, in ten lines: two correlated sensors of three bits over a link that flips 2 % of the bits.
 #[test]
 fn two_correlated_sensors_over_a_flipping_link() {
-    let started = Instant::now();
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
     let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let link = Link::flipping(0.02).unwrap();
@@ -77,7 +76,8 @@ fn two_correlated_sensors_over_a_flipping_link() {
         .unwrap()
         .to_c_header();
     assert!(header.contains("plant_thresholds_0") && header.contains("plant_decode"));
-    assert!(started.elapsed() < Duration::from_secs(10) || cfg!(debug_assertions));
+    // A step takes 2 ms at most, so these are far below 10 s.
+    assert!(solutions.steps() < 4000, "{} steps", solutions.steps());
     // 400 starts find no better intervals than these.
     assert!(solution.value() < 1.365_94, "{}", solution.value());
     assert_eq!((solution.certificate(), solution.scope()), (Certificate::LocalOptimum, Scope::EverySensor));
@@ -164,8 +164,17 @@ fn designs_scale_with_the_unit() {
 fn losses_of_one_sensor_mix_prior_and_posterior() {
     let scene = || Scene::gaussian_with_deviations(1.0, &[0.5]).unwrap();
     let clear = best(scene(), Bits::Each(2), Link::PERFECT).value();
-    let lossy = best(scene(), Bits::Each(2), Link::lossy(0.3).unwrap()).value();
-    assert!((lossy - (0.3 + 0.7 * clear)).abs() < 1e-9);
+    // Whether the loss is noticed makes no difference.
+    for link in [
+        Link::lossy(0.3).unwrap(),
+        Link::PERFECT.with_erasure(0.3).unwrap(),
+        Link::lossy(0.1).unwrap().with_erasure(0.2).unwrap(),
+    ] {
+        let lossy = best(scene(), Bits::Each(2), link);
+        assert!((lossy.value() - (0.3 + 0.7 * clear)).abs() < 1e-9, "{link:?}");
+        assert_eq!(lossy.sensors()[0].symbols(), 5);
+        assert!((lossy.decoder(5).unwrap().decode_symbols(&[4]).unwrap().variance - 1.0).abs() < 1e-9);
+    }
 }
 
 #[test]
