@@ -3,8 +3,7 @@
 use super::search::WordedCells;
 use super::solution::{Solution, Solutions};
 use super::{pipeline, share};
-use crate::criterion::Criterion;
-use crate::design::AllowedCells;
+use crate::criterion::{AllowedCells, Criterion};
 use crate::error::{Error, refuse};
 use crate::scene::{Prior, Scene};
 use fewbits_core::Link;

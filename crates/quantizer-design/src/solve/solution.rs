@@ -240,15 +240,11 @@ impl Solution {
             let expected = format!("one per sensor, {}", self.sensors.len());
             return refuse("breakpoints", format!("{} lists", breakpoints.len()), expected);
         }
-        let cells: Vec<WordedCells> = self
-            .sensors
-            .iter()
+        let mut cells = self.cells();
+        cells
+            .iter_mut()
             .zip(breakpoints)
-            .map(|(sensor, breakpoints)| WordedCells {
-                breakpoints,
-                words: sensor.words.clone(),
-            })
-            .collect();
+            .for_each(|(cells, b)| cells.breakpoints = b);
         self.with_cells(cells)
     }
 
@@ -286,15 +282,16 @@ impl Solution {
             let expected = format!("{}, those that take part", self.sensors.len());
             return refuse("scene", format!("{} sensors", scene.sensors()), expected);
         }
-        let cells: Vec<WordedCells> = self
-            .sensors
-            .iter()
-            .map(|s| WordedCells {
-                breakpoints: s.breakpoints.clone(),
-                words: s.words.clone(),
-            })
-            .collect();
-        super::polish::system_of(scene, &self.participants(), &cells, true)
+        super::polish::system_of(scene, &self.participants(), &self.cells(), true)
+    }
+
+    /// Cells and words of every sensor.
+    pub(super) fn cells(&self) -> Vec<WordedCells> {
+        let cells = self.sensors.iter().map(|s| WordedCells {
+            breakpoints: s.breakpoints.clone(),
+            words: s.words.clone(),
+        });
+        cells.collect()
     }
 
     /// The design as a table for reading: sensors, cells, words, value, bound and certificate.
