@@ -11,12 +11,13 @@
 //! ```
 //!
 //! Each half step cannot lower the criterion, so it climbs, linearly: 25 steps to 1e-12 for four levels in unit noise and 85
-//! for eight, where Newton's method ([`joint`](super::joint)) takes five and seven. Its merit is that it finds the cells by
+//! for eight, where Newton's method ([`joint`](crate::design::joint)) takes five and seven. Its merit is that it finds the cells by
 //! itself, contiguous or not. The printed algorithm stops when the *un-normalised* objective `E ln p(x | z)` changes
 //! relatively little; that objective is negative in common cases and depends on the unit of `x`, so mutual information itself
 //! is used here (errata). Edges are found by root search; deciding cell by cell on a fixed grid of `y` stalls up to 10 % short.
 
 use super::cells::{gains_of, level_gains, single_sensor};
+use crate::AllowedCells;
 use crate::criterion::Criterion;
 use crate::error::Error;
 use crate::law::log_likelihoods;
@@ -42,16 +43,6 @@ pub struct Alternating {
     pub max_iterations: usize,
     /// Which cells are accepted.
     pub cells: AllowedCells,
-}
-
-/// Which cells an alternating design may end in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum AllowedCells {
-    /// One interval per level, in increasing order.
-    #[default]
-    Intervals,
-    /// Any.
-    Any,
 }
 
 impl Default for Alternating {
@@ -265,7 +256,7 @@ mod tests {
             ..Alternating::default()
         };
         let slow = alternate(&start, 0, criterion, &rule).unwrap();
-        let fast = super::super::joint(&start, criterion, &crate::Newton::default()).unwrap();
+        let fast = crate::design::joint(&start, criterion, &crate::Newton::default()).unwrap();
         let (a, b) = (slow.system.quantizers(), fast.quantizers());
         assert!((a[0].breakpoints()[2] - b[0].breakpoints()[2]).abs() < 1e-10);
         assert!(slow.iterations > 5 * fast.iterations, "{} {}", slow.iterations, fast.iterations);

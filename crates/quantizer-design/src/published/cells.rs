@@ -1,8 +1,7 @@
 //! What it is worth to report a sample as one level or another, the other sensors and the decoder being as they are.
 //!
 //! With the decoder's scores held fixed every criterion is linear in the sensor's decisions, so the best level at a sample `y`
-//! is the largest of a few functions `D_z(y)`. Both the alternating algorithm and the search for non-contiguous cells rest on
-//! this.
+//! is the largest of a few functions `D_z(y)`, on which the alternating algorithm rests.
 
 use crate::criterion::{Criterion, LOG_FLOOR};
 use crate::error::{Error, refuse};
@@ -27,7 +26,7 @@ pub(super) fn single_sensor(system: &System, group: usize) -> Result<&SensorGrou
 ///
 /// `others` holds the joint report probabilities of the other sensors and `symbols` this sensor's, both a row per report. The
 /// score is `ln p(t', t | x) / p(t', t)`, minus the squared error of the posterior mean, or minus one for a wrong decision.
-pub(crate) fn level_gains(
+pub(super) fn level_gains(
     scene: &Scene,
     criterion: Criterion,
     others: &Table,
@@ -44,7 +43,7 @@ pub(crate) fn level_gains(
 
 /// As [`level_gains`], from the logarithms of the likelihoods: `log_likelihood(i)` is one number per value of the unknown, of
 /// the outcome `i = other * outputs + symbol`. Probabilities may underflow, their logarithms may not.
-pub(crate) fn gains_of<'a>(
+pub(super) fn gains_of<'a>(
     scene: &Scene,
     criterion: Criterion,
     others: &Table,

@@ -5,8 +5,8 @@
 //! one more), so they are all designed and compared. Fewer cells than words is an assignment too: behind a poor channel it is
 //! the best one, and the design of the full number of cells squeezes cells out.
 
-use super::joint::{Design, joint};
 use crate::criterion::Criterion;
+use crate::design::{Design, joint};
 use crate::error::{Error, refuse};
 use crate::newton::Newton;
 use crate::scene::Scene;
@@ -20,7 +20,7 @@ use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 /// Longest word whose assignments are enumerated: `8! / 48` of them.
-pub const MAX_BITS: u32 = 3;
+const MAX_BITS: u32 = 3;
 /// Largest number of classes combined over sensors.
 const MAX_COMBINATIONS: usize = 20_000;
 
@@ -46,7 +46,7 @@ pub enum Words {
 ///
 /// # Errors
 /// If `bits` is not in `1..=3` or `cells` is not in `2..=2^bits`.
-pub fn word_classes(bits: u32, cells: usize) -> Result<Vec<Vec<u32>>, Error> {
+fn word_classes(bits: u32, cells: usize) -> Result<Vec<Vec<u32>>, Error> {
     if !(1..=MAX_BITS).contains(&bits) {
         return refuse("bits", bits, format!("a word length from 1 to {MAX_BITS}"));
     }
@@ -105,7 +105,7 @@ fn representative(bits: u32, words: &[u32]) -> Vec<u32> {
 /// are left out, since one with fewer cells stands for them.
 ///
 /// # Errors
-/// [`Error::Argument`] for what [`word_classes`] and [`Channel::binary_symmetric`] refuse; [`Error::TooLarge`] for more than
+/// [`Error::Argument`] if `bits` is not in `1..=3`, `cells` not in `2..=2^bits`, or the crossover no probability up to 1/2; [`Error::TooLarge`] for more than
 /// 20000 combinations of mixed assignments.
 pub fn assign_words(
     scene: &Scene,

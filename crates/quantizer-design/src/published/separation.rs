@@ -22,19 +22,7 @@ pub enum Separation {
     JDivergence,
 }
 
-/// Bhattacharyya coefficient `sum sqrt(p0 p1)` of two distributions: 1 if they are equal, 0 if they never meet.
-///
-/// # Errors
-/// If either is no distribution or they differ in length.
-pub fn bhattacharyya_coefficient(p0: &[f64], p1: &[f64]) -> Result<f64, Error> {
-    fewbits_numerics::error::probabilities("p0", p0)?;
-    fewbits_numerics::error::probabilities("p1", p1)?;
-    if p0.len() != p1.len() {
-        return refuse("p1", format!("{} probabilities", p1.len()), format!("{} probabilities", p0.len()));
-    }
-    Ok(affinity(p0, p1))
-}
-
+/// Bhattacharyya coefficient: 1 if the distributions are equal, 0 if they never meet.
 fn affinity(p0: &[f64], p1: &[f64]) -> f64 {
     p0.iter().zip(p1).map(|(a, b)| (a * b).sqrt()).sum()
 }
