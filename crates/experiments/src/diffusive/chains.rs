@@ -168,6 +168,10 @@ impl Figure for Chains {
         )
     }
 
+    fn world(&self) -> Option<&'static str> {
+        Some("diffusive-chains")
+    }
+
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Rows, Error> {
         let schemes = (self.schemes)();
         // One name for all: every figure sees the same deployments and noise.
