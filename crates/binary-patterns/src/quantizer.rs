@@ -5,7 +5,7 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::kernels;
 use fewbits_numerics::normal::{interval, log_interval, pdf};
 use fewbits_quantizers::Quantizer;
-use fewbits_quantizers::quantizer::{cell_of, check_increasing};
+use fewbits_quantizers::quantizer::check_increasing;
 use serde::{Deserialize, Serialize};
 
 /// Beyond this many standard deviations a normal tail is below the smallest double.
@@ -47,7 +47,7 @@ impl BinaryQuantizer {
     /// # Errors
     /// If the measurement is NaN.
     pub fn encode(&self, measurement: f64) -> Result<bool, Error> {
-        Ok(cell_of(&self.breakpoints, measurement)? % 2 == 1)
+        Ok(fewbits_node::pattern_bit(&self.breakpoints, measurement).map_err(ArgumentError::from)?)
     }
 
     /// `[P(0|x), P(1|x)]` for the measurement `Y = x + N(0, noise_std^2)`.

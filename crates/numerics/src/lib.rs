@@ -21,18 +21,35 @@
 //! assert_eq!(normal::cdf(-40.0), 0.0);
 //! assert!((normal::log_cdf(-40.0) + 804.608_442_013_754).abs() < 1e-9);
 //! ```
+//!
+//! Without the default feature `std` only the functions of [`kernels::scalar`] that need neither a library nor memory are left, `exp`
+//! and `ln`, and [`kernels::vectorised`]: what a sensor's half needs. They give the same bits either way.
 
+#![cfg_attr(not(feature = "std"), no_std)]
+
+#[cfg(feature = "std")]
 pub mod binomial;
+#[cfg(feature = "std")]
 pub mod eigen;
+#[cfg(feature = "std")]
 pub mod error;
 pub mod kernels;
+#[cfg(feature = "std")]
 pub mod linalg;
+#[cfg(feature = "std")]
 pub mod newton;
+#[cfg(feature = "std")]
 pub mod normal;
+#[cfg(feature = "std")]
 pub mod quadrature;
+#[cfg(feature = "std")]
 pub mod roots;
+#[cfg(feature = "std")]
 pub mod stored;
+#[cfg(feature = "std")]
 pub mod tridiagonal;
+#[cfg(feature = "std")]
 pub mod wild;
 
+#[cfg(feature = "std")]
 pub use error::ArgumentError;

@@ -1,35 +1,39 @@
 //! Where reconstructions lie: a lattice through the first sample.
 
-use crate::Config;
+use super::Config;
+use crate::math::{ceil, rem_euclid, round};
 use crate::packet::TENS;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Indices beyond this size are no longer exact sums: such samples travel whole.
-pub(crate) const LARGEST: i64 = 1 << 40;
+pub(super) const LARGEST: i64 = 1 << 40;
 /// The step is this much shorter than `2 delta`, so that rounding never takes a reconstruction out of its bound.
 const SLACK: f64 = 1.0 / (1_u64 << 30) as f64;
 
 /// Points `anchor + step j` with whole `j`; around the circle there are `cells` of them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Lattice {
-    #[serde(with = "fewbits_numerics::stored")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+pub struct Lattice {
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     anchor: f64,
-    #[serde(with = "fewbits_numerics::stored")]
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     step: f64,
-    #[serde(with = "fewbits_numerics::stored")]
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     delta: f64,
     /// The period, and its number of points.
-    #[serde(with = "fewbits_numerics::stored")]
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     circle: Option<(f64, i64)>,
     decimal: Option<Decimal>,
 }
 
 /// Points that are decimal numbers to the last bit: `(anchor + step j) / ten`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 struct Decimal {
     anchor: i64,
     step: i64,
-    #[serde(with = "fewbits_numerics::stored")]
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     ten: f64,
 }
 
@@ -37,10 +41,10 @@ impl Decimal {
     /// The fewest decimals that write both numbers, if fifteen digits do.
     fn find(step: f64, anchor: f64) -> Option<Self> {
         let whole = |x: f64, ten: f64| {
-            let digits = (x * ten).round();
+            let digits = round(x * ten);
             (digits.abs() < 1e15 && digits / ten == x).then_some(digits as i64)
         };
-        TENS.into_iter().find_map(|ten| {
+        TENS.iter().copied().find_map(|ten| {
             Some(Self {
                 anchor: whole(anchor, ten)?,
                 step: whole(step, ten)?,
@@ -55,7 +59,17 @@ impl Decimal {
 }
 
 impl Lattice {
-    pub(crate) fn new(config: &Config, anchor: f64) -> Self {
+    /// Before the first sample.
+    pub(super) const UNSET: Self = Self {
+        anchor: 0.0,
+        step: 0.0,
+        delta: 0.0,
+        circle: None,
+        decimal: None,
+    };
+
+    /// The lattice of an agreement through `anchor`.
+    pub fn new(config: &Config, anchor: f64) -> Self {
         let longest = 2.0 * config.delta() * (1.0 - SLACK);
         let decimal = config
             .resolution()
@@ -64,7 +78,7 @@ impl Lattice {
         let (step, circle) = match config.period() {
             None => (decimal.map_or(longest, |_| 2.0 * config.delta()), None),
             Some(period) => {
-                let cells = (period / longest).ceil().max(1.0);
+                let cells = ceil(period / longest).max(1.0);
                 (period / cells, Some((period, cells as i64)))
             }
         };
@@ -78,7 +92,7 @@ impl Lattice {
     }
 
     /// The sample as the receiver wants it: on the circle, if there is one.
-    pub(crate) fn reduce(config: &Config, sample: f64) -> f64 {
+    pub fn reduce(config: &Config, sample: f64) -> f64 {
         match config.period() {
             None => sample,
             Some(period) => wrap(sample, period),
@@ -86,17 +100,17 @@ impl Lattice {
     }
 
     /// Points on the circle.
-    pub(crate) fn cells(&self) -> Option<i64> {
+    pub fn cells(&self) -> Option<i64> {
         self.circle.map(|(_, cells)| cells)
     }
 
     /// One name for each point: around the circle, `0..cells`.
-    pub(crate) fn canonical(&self, j: i64) -> i64 {
-        self.cells().map_or(j, |cells| j.rem_euclid(cells))
+    pub fn canonical(&self, j: i64) -> i64 {
+        self.cells().map_or(j, |cells| j.checked_rem_euclid(cells).unwrap_or(0))
     }
 
     /// The reconstruction of an index.
-    pub(crate) fn value(&self, j: i64) -> f64 {
+    pub fn value(&self, j: i64) -> f64 {
         let value = match &self.decimal {
             Some(decimal) => decimal.value(j),
             None => self.anchor + self.step * self.canonical(j) as f64,
@@ -107,34 +121,35 @@ impl Lattice {
     }
 
     /// A difference of indices, the shortest way around the circle.
-    pub(crate) fn shortest(&self, difference: i64) -> i64 {
+    pub fn shortest(&self, difference: i64) -> i64 {
         self.cells().map_or(difference, |cells| {
-            let k = difference.rem_euclid(cells);
+            let k = difference.checked_rem_euclid(cells).unwrap_or(0);
             if 2 * k > cells { k - cells } else { k }
         })
     }
 
     /// The index nearest to a sample (of its names around the circle, the one nearest to `near`); `None` if no point of the
     /// lattice is within `delta` of it or its index is too large.
-    pub(crate) fn index(&self, sample: f64, near: i64) -> Option<i64> {
+    pub fn index(&self, sample: f64, near: i64) -> Option<i64> {
         let offset = (sample - self.anchor) / self.step;
         if !offset.is_finite() || offset.abs() >= LARGEST as f64 {
             return None;
         }
-        let nearest = offset.round() as i64;
+        let nearest = round(offset) as i64;
         let fits = |j: &i64| self.distance(self.value(*j), sample) <= self.delta;
         let j = [nearest, nearest - 1, nearest + 1].into_iter().find(fits)?;
         Some(near + self.shortest(j - near))
     }
 
     /// Distance of two values, around the circle if there is one.
-    pub(crate) fn distance(&self, a: f64, b: f64) -> f64 {
+    pub fn distance(&self, a: f64, b: f64) -> f64 {
         let straight = (a - b).abs();
         self.circle
             .map_or(straight, |(period, _)| straight.min((period - straight).abs()))
     }
 
-    pub(crate) fn is_valid(&self, config: &Config) -> bool {
+    /// Whether numbers that were stored are those of a lattice of this agreement.
+    pub fn is_valid(&self, config: &Config) -> bool {
         let agreed = self.delta == config.delta() && self.circle.map(|circle| circle.0) == config.period();
         let numbers = [self.anchor, self.step].iter().all(|x| x.is_finite());
         let decimal = self.decimal.is_none_or(|d| d.step > 0 && TENS.contains(&d.ten));
@@ -147,7 +162,7 @@ impl Lattice {
 }
 
 fn wrap(value: f64, period: f64) -> f64 {
-    let wrapped = value.rem_euclid(period);
+    let wrapped = rem_euclid(value, period);
     // A tiny negative value rounds up to the period itself.
     if wrapped < period { wrapped } else { 0.0 }
 }
