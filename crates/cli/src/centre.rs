@@ -90,22 +90,24 @@ struct Sensor {
 pub(crate) fn run(options: &CentreOptions) -> Result<Ending, Error> {
     let file = &options.configuration;
     let given: Configuration = configuration(file)?;
-    let bad = configured(file);
     match &given.model {
-        Model::RandomWalk { density } => with(options, &given, ContinuousLinear::random_walk(*density).map_err(&bad)?),
+        Model::RandomWalk { density } => {
+            with(options, &given, ContinuousLinear::random_walk(*density).map_err(configured(file))?)
+        }
         Model::OrnsteinUhlenbeck {
             mean,
             time_constant,
             variance,
         } => {
-            let world = ContinuousLinear::ornstein_uhlenbeck(*mean, *time_constant, *variance).map_err(&bad)?;
+            let world =
+                ContinuousLinear::ornstein_uhlenbeck(*mean, *time_constant, *variance).map_err(configured(file))?;
             with(options, &given, world)
         }
         Model::ConstantVelocity { density } => {
-            with(options, &given, ContinuousLinear::nearly_constant_velocity(*density).map_err(&bad)?)
+            with(options, &given, ContinuousLinear::nearly_constant_velocity(*density).map_err(configured(file))?)
         }
         Model::ConstantVelocity2d { density } => {
-            with(options, &given, ContinuousLinear::nearly_constant_velocity_2d(*density).map_err(&bad)?)
+            with(options, &given, ContinuousLinear::nearly_constant_velocity_2d(*density).map_err(configured(file))?)
         }
     }
 }
@@ -120,14 +122,14 @@ fn with<const D: usize>(
         file: file.display().to_string(),
         reason,
     };
-    let bad = configured(file);
     let expected = || refused(format!("prior: expected {D} means and {D} deviations, one per coordinate of the model"));
     let mean: [f64; D] = given.prior.mean.clone().try_into().map_err(|_| expected())?;
     let deviation: [f64; D] = given.prior.deviation.clone().try_into().map_err(|_| expected())?;
     let variances = SVector::from(deviation.map(|d| d * d));
-    let prior = Gaussian::new(mean.into(), SMatrix::from_diagonal(&variances)).map_err(&bad)?;
+    let prior = Gaussian::new(mean.into(), SMatrix::from_diagonal(&variances)).map_err(configured(file))?;
     let stream = Stream::new(given.seed);
-    let mut centre = FusionCentre::new(&mut stream.named("prior").rng(), world, MomentFilter, &prior).map_err(&bad)?;
+    let mut centre =
+        FusionCentre::new(&mut stream.named("prior").rng(), world, MomentFilter, &prior).map_err(configured(file))?;
     let mut sensors: Vec<&Sensor> = given.sensors.iter().collect();
     sensors.sort_by_key(|sensor| sensor.number);
     let mut peers = Vec::new();
@@ -145,7 +147,8 @@ fn with<const D: usize>(
         });
     }
     let nanoseconds = (given.period * 1e9).round();
-    let period = (nanoseconds >= 1e6 && nanoseconds <= 1e15)
+    let period = (1e6..=1e15)
+        .contains(&nanoseconds)
         .then(|| NonZeroU64::new(nanoseconds as u64))
         .flatten();
     let period =

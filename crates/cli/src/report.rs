@@ -14,7 +14,7 @@ pub(crate) enum Report {
     /// The cell of the innovation, in 2 to 4 bits.
     Word {
         /// Bits of a report.
-        bits: u32,
+        bits: usize,
     },
     /// Every sample, in double precision.
     Value,
