@@ -3,8 +3,8 @@
 use crate::Ending;
 use crate::arguments::CentreOptions;
 use crate::error::Error;
-use crate::report::{Report, configuration, configured};
-use fewbits_core::{FullValue, Gaussian, Link, NumberFormat, OnAxes};
+use crate::report::{Report, censored, configuration, configured, coordinate};
+use fewbits_core::{FullValue, Gaussian, Link, OnAxes};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, Reporting};
 use fewbits_filters::contract::Evolving;
@@ -191,8 +191,8 @@ fn join<const D: usize>(
         }
         Report::Censored { threshold } => {
             let ask = |state: &Gaussian<D>, _: &Gaussian<1>| fewbits_cfwmd::scheme::Prediction(*state);
-            let scheme = fewbits_cfwmd::scheme::CovarianceFeedback::new(sensing, threshold, NumberFormat::Double)?;
-            centre.join(sensor.number, Reporting::new(sensing, scheme, link, ask))?;
+            let scheme = censored::<D>(sensor.reads, variance, threshold)?;
+            centre.join(sensor.number, Reporting::new(coordinate::<D>(sensor.reads, variance)?, scheme, link, ask))?;
         }
     }
     Ok(())

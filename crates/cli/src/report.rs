@@ -1,6 +1,10 @@
 //! How a sensor reports, and configuration files.
 
 use crate::error::Error;
+use fewbits_cfwmd::scheme::CovarianceFeedback;
+use fewbits_core::NumberFormat;
+use fewbits_models::LinearSensor;
+use nalgebra::SVector;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -42,4 +46,26 @@ pub(crate) fn configured<E: std::fmt::Display>(path: &Path) -> impl Fn(E) -> Err
         file: file.clone(),
         reason: error.to_string(),
     }
+}
+
+/// What a sensor of one coordinate of the state measures.
+pub(crate) fn coordinate<const D: usize>(
+    reads: usize,
+    variance: f64,
+) -> Result<LinearSensor<D, 1>, Box<dyn std::error::Error>> {
+    if reads >= D {
+        return Err(format!("reads is {reads}: expected below {D}, the coordinates of the model").into());
+    }
+    let direction = SVector::from_fn(|i, _| if i == reads { 1.0 } else { 0.0 });
+    Ok(LinearSensor::scalar(direction, variance)?)
+}
+
+/// The scheme of a censored report.
+pub(crate) fn censored<const D: usize>(
+    reads: usize,
+    variance: f64,
+    threshold: f64,
+) -> Result<CovarianceFeedback<LinearSensor<D, 1>, D, 1>, Box<dyn std::error::Error>> {
+    let sensing = coordinate::<D>(reads, variance)?;
+    Ok(CovarianceFeedback::new(sensing, threshold, NumberFormat::Double)?)
 }

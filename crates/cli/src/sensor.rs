@@ -3,10 +3,9 @@
 use crate::Ending;
 use crate::arguments::SensorOptions;
 use crate::error::Error;
-use crate::report::{Report, configuration, configured};
-use fewbits_core::{BitString, FullValue, NumberFormat, OnAxes, SchemeNode, SensorNode};
+use crate::report::{Report, censored, configuration, configured};
+use fewbits_core::{BitString, FullValue, SchemeNode, SensorNode};
 use fewbits_link::{Key, SensorLink, Store, udp};
-use fewbits_models::LinearSensor;
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{Feedback, Note, SensorSettings, Slot};
 use nalgebra::Vector1;
@@ -88,18 +87,18 @@ fn node(file: &Path, given: &Configuration) -> Result<Node, Error> {
         }
         Report::Value => Ok(Box::new(SchemeNode::new(FullValue::new(variance).map_err(configured(file))?))),
         Report::Censored { threshold } => match given.coordinates {
-            1 => censored::<1>(given.reads, variance, threshold).map_err(configured(file)),
-            2 => censored::<2>(given.reads, variance, threshold).map_err(configured(file)),
-            4 => censored::<4>(given.reads, variance, threshold).map_err(configured(file)),
+            1 => Ok(Box::new(SchemeNode::new(
+                censored::<1>(given.reads, variance, threshold).map_err(configured(file))?,
+            ))),
+            2 => Ok(Box::new(SchemeNode::new(
+                censored::<2>(given.reads, variance, threshold).map_err(configured(file))?,
+            ))),
+            4 => Ok(Box::new(SchemeNode::new(
+                censored::<4>(given.reads, variance, threshold).map_err(configured(file))?,
+            ))),
             other => Err(configured(file)(format!("coordinates is {other}: expected 1, 2 or 4"))),
         },
     }
-}
-
-fn censored<const D: usize>(reads: usize, variance: f64, threshold: f64) -> Result<Node, Box<dyn std::error::Error>> {
-    let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(variance)?, [reads])?;
-    let scheme = fewbits_cfwmd::scheme::CovarianceFeedback::new(sensing, threshold, NumberFormat::Double)?;
-    Ok(Box::new(SchemeNode::new(scheme)))
 }
 
 /// Samples as they are read, one per line, so that a slot never waits for one.

@@ -18,7 +18,6 @@ use std::collections::BTreeMap;
 /// Slots under faults, and quiet ones after them.
 const FAULTY: u32 = 10;
 const QUIET: u32 = 6;
-/// Slots after which a silent anchor of an ad-hoc network sends its digest.
 
 fn seconds(s: f64) -> Seconds {
     Seconds::new(s).unwrap()
