@@ -2,6 +2,8 @@
 
 use crate::belief::{PositionBelief, Prior, SearchBox};
 use crate::best_fit::best_fit;
+use crate::density::CellOptions;
+use crate::density::laplace::Peak;
 use crate::fit::Fit;
 use crate::message::{Contract, Packet, Wire};
 use crate::model_grid::ModelGrid;
@@ -11,8 +13,7 @@ use crate::select::{Rule, Selector};
 use crate::target::Target;
 use crate::{Error, RateModel, Record, SourceLikelihood, SourceSensor};
 use fewbits_core::{Belief, Gaussian, Message};
-use fewbits_densities::laplace::Peak;
-use fewbits_densities::{CellOptions, Mixture};
+use fewbits_densities::Mixture;
 use fewbits_models::SourceModel;
 use fewbits_models::diffusion::Air;
 use fewbits_numerics::ArgumentError;
@@ -575,9 +576,9 @@ fn log_evidence<M>(alternatives: &[Alternative<M>]) -> f64 {
 /// Failures of a belief that end a search; others are errors.
 fn failure(error: &Error) -> Option<Status> {
     match error {
-        Error::Density(fewbits_densities::Error::Core(fewbits_core::Error::Impossible)) => Some(Status::BeliefMiss),
-        Error::Density(fewbits_densities::Error::Unresolved { .. }) => Some(Status::Unresolved),
-        Error::Density(fewbits_densities::Error::Argument(_)) => Some(Status::BeliefMiss),
+        Error::Density(crate::density::Error::Core(fewbits_core::Error::Impossible)) => Some(Status::BeliefMiss),
+        Error::Density(crate::density::Error::Unresolved { .. }) => Some(Status::Unresolved),
+        Error::Density(crate::density::Error::Argument(_)) => Some(Status::BeliefMiss),
         _ => None,
     }
 }

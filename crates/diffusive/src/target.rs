@@ -1,11 +1,11 @@
 //! A belief times the likelihood of records, cell by cell.
 
 use crate::belief::{JointBelief, PositionBelief, Prior};
+use crate::density::Slice;
+use crate::density::{CellTarget, Cells};
 use crate::rate::{Intervals, RateModel, RateRange, RateSums, cut_normal, ends_about};
 use crate::{Error, SourceLikelihood};
 use fewbits_core::Columns;
-use fewbits_densities::lpg::Slice;
-use fewbits_densities::{CellTarget, Cells};
 use fewbits_models::SourceModel;
 use fewbits_numerics::kernels::largest;
 use fewbits_numerics::normal::log_interval;

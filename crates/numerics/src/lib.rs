@@ -5,6 +5,7 @@
 //! | [`normal`] | the standard normal distribution, exact in its tails and in narrow cells |
 //! | [`quadrature`] | Gauss-Legendre rules |
 //! | [`kernels`] | the same functions, sums and exponentials over whole columns, in vector registers |
+//! | [`factored`] | a covariance factored once, for densities and draws |
 //! | [`linalg`], [`tridiagonal`], [`eigen`] | square roots of singular covariances, tridiagonal systems, eigenvalues |
 //! | [`roots`], [`binomial`] | roots inside a bracket, binomial coefficients |
 //! | [`stored!`] | how types with checking constructors are written and read |
@@ -24,6 +25,7 @@
 pub mod binomial;
 pub mod eigen;
 pub mod error;
+pub mod factored;
 pub mod kernels;
 pub mod linalg;
 pub mod newton;

@@ -62,6 +62,7 @@ mod message;
 mod message_passing;
 pub mod node;
 mod particle;
+pub mod product;
 mod recording;
 mod ring;
 mod sensor;

@@ -2,7 +2,8 @@
 
 use crate::Error;
 use crate::error::refuse;
-use fewbits_densities::{Component, Mixture, product};
+use crate::product;
+use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::kernels::{self, scalar, vectorised};
 use nalgebra::{Cholesky, Matrix2, Vector2};
 use rand::{Rng, RngExt};

@@ -5,7 +5,8 @@
 use crate::Error;
 use crate::error::refuse;
 use crate::message::ProductSampler;
-use fewbits_densities::{Bandwidth, KernelEstimate, Mixture, Particles, product};
+use crate::product;
+use fewbits_densities::{Bandwidth, KernelEstimate, Mixture, Particles};
 use fewbits_filters::Resampling;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::kernels;

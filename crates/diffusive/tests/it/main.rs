@@ -14,9 +14,11 @@ mod diffusion_entries;
 mod envelopes;
 mod fit;
 mod fixtures;
+mod laplace;
 mod laws;
 mod messages;
 mod searches;
+mod series;
 mod unknown_models;
 
 use fewbits_diffusive::{RateModel, RateRange, Rule, SearchBox, SourceSensor};

@@ -40,11 +40,14 @@
 pub(crate) mod cell;
 pub(crate) mod elementary;
 mod normals;
+mod power_of_half;
 mod reduce;
 pub(crate) mod tail;
 
 pub use normals::{StandardNormals, fill_standard_normals};
-pub use reduce::{ExpSums, dot, exp_minus, largest, largest_number, log_sum_exp, sum, weighted_covariance};
+pub use reduce::{
+    ExpSums, LANES, dot, exp_minus, folded, largest, largest_number, log_sum_exp, sum, weighted_covariance,
+};
 
 use pulp::Arch;
 
@@ -53,6 +56,7 @@ use pulp::Arch;
 pub mod scalar {
     pub use super::cell::{WIDE, interval, interval_wide, log_interval, log_interval_wide};
     pub use super::elementary::{exp, ln};
+    pub use super::power_of_half::power_of_half;
     pub use super::tail::{cdf, erfcx, inverse_mills, log_cdf, pdf};
 }
 
