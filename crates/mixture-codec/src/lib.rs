@@ -35,6 +35,7 @@
 
 pub mod divergence;
 mod error;
+pub mod published;
 pub mod reduction;
 pub mod tree;
 pub mod wire;
@@ -44,5 +45,5 @@ pub use divergence::{plug_in, quadrature};
 pub use error::Error;
 pub use reduction::cut::{Criterion, Cut, NodeErrors};
 pub use reduction::merge::MergeCost;
-pub use reduction::{PaperReductions, Reduction, cut, merge, refine};
+pub use reduction::{Reduction, cut, merge, refine};
 pub use tree::{Split, Tree};

@@ -23,11 +23,13 @@
 //! ```
 
 pub mod binomial;
+mod constants;
 pub mod eigen;
 pub mod error;
 pub mod factored;
 pub mod kernels;
 pub mod linalg;
+mod log_sum;
 pub mod newton;
 pub mod normal;
 pub mod quadrature;
@@ -36,3 +38,4 @@ pub mod stored;
 pub mod tridiagonal;
 
 pub use error::ArgumentError;
+pub use log_sum::LogSum;

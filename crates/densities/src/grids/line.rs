@@ -2,7 +2,7 @@
 
 use super::axis::Grid;
 use crate::Error;
-use crate::particles::weights::Cumulative;
+use crate::particles::weights::Categorical;
 use fewbits_core::{Belief, ColumnsMut, Density, Likelihood};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::normal::log_pdf_with;
@@ -214,7 +214,7 @@ impl Belief<1> for PointMass {
 
     /// Draws of the linear interpolant, drawn towards the mean by what interpolation adds to the variance.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, [states]: ColumnsMut<'_, 1>) {
-        let cumulative = Cumulative::new(&self.density);
+        let cumulative = Categorical::new(&self.density);
         let (mean, variance, h) = (self.mean(), self.variance(), self.grid.spacing());
         let shrink = (variance / (variance + TRIANGULAR_VARIANCE * h * h)).sqrt();
         for x in states {

@@ -2,7 +2,7 @@
 
 use super::line::{TRIANGULAR_VARIANCE, absorb, check_density, triangular};
 use crate::Error;
-use crate::particles::weights::Cumulative;
+use crate::particles::weights::Categorical;
 use fewbits_core::columns::{count, set_state};
 use fewbits_core::{Belief, ColumnsMut, Density, Gaussian, Likelihood};
 use fewbits_numerics::error::{ArgumentError, all_finite};
@@ -223,7 +223,7 @@ impl Belief<2> for PlaneMass {
 
     /// Draws of the bilinear interpolant, drawn towards the mean by what interpolation adds to the covariance.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, 2>) {
-        let cumulative = Cumulative::new(&self.density);
+        let cumulative = Categorical::new(&self.density);
         let (mean, covariance) = self.lattice_moments();
         let widened = covariance + Matrix2::identity() * TRIANGULAR_VARIANCE;
         let shrink = match (Cholesky::new(covariance), Cholesky::new(widened)) {

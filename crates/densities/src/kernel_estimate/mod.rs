@@ -9,10 +9,11 @@ pub use sums::add_cross_sums;
 use crate::Error;
 use crate::mixture::{Component, Mixture};
 use crate::particles::Particles;
+use crate::particles::weights::systematic;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::factored::Factored;
-use fewbits_numerics::kernels::{sum, vectorised};
+use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -198,8 +199,7 @@ impl<const D: usize> KernelEstimate<D> {
     /// If `count` is 0.
     pub fn sample_systematic<R: Rng + ?Sized>(&self, rng: &mut R, count: usize) -> Result<Particles<D>, Error> {
         at_least_one("count", count)?;
-        let chosen = systematic(rng, self.particles.weights(), count);
-        let mut chosen = chosen.into_iter();
+        let mut chosen = systematic(rng, self.particles.weights(), count).into_iter();
         let columns = self.particles.columns();
         Particles::from_draws(count, || {
             let i = chosen.next().unwrap_or(0);
@@ -207,24 +207,6 @@ impl<const D: usize> KernelEstimate<D> {
             SVector::from_fn(|d, _| columns[d][i]) + self.factor.lower * z
         })
     }
-}
-
-/// Indices of `count` systematic draws from `weights`: index `i` comes up `count w_i` times, rounded up or down.
-fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<usize> {
-    let offset: f64 = rng.random();
-    let total: f64 = sum(weights);
-    let mut i = 0;
-    let mut cumulative = weights.first().copied().unwrap_or(0.0);
-    (0..count)
-        .map(|k| {
-            let level = (k as f64 + offset) / count as f64 * total;
-            while level >= cumulative && i + 1 < weights.len() {
-                i += 1;
-                cumulative += weights[i];
-            }
-            i
-        })
-        .collect()
 }
 
 /// Coordinates `L^-1 (x - origin)` of the columns' points in `range`.

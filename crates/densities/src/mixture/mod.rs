@@ -1,103 +1,22 @@
 //! Gaussian mixtures with full covariances.
 
+mod component;
 mod ellipse;
 
+pub use component::Component;
 pub use ellipse::ellipse;
 
 use crate::Error;
 use crate::particles::Particles;
+use crate::particles::weights::systematic;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density, Gaussian};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, at_least_one, non_negative};
-use fewbits_numerics::factored::Factored;
+use fewbits_numerics::{ArgumentError, LogSum};
+use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::kernels::{scalar, vectorised};
-use fewbits_numerics::normal::{self, LN_SQRT_2PI};
+use fewbits_numerics::normal;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
-
-/// One weighted Gaussian of a [`Mixture`], with its covariance factored once.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Component<const D: usize> {
-    weight: f64,
-    mean: SVector<f64, D>,
-    covariance: SMatrix<f64, D, D>,
-    factor: Factored<D>,
-}
-
-impl<const D: usize> Component<D> {
-    /// A component of any weight from 0 up: a [`Mixture`] normalises the weights of its components.
-    ///
-    /// # Errors
-    /// If the weight is negative or not finite, the mean is not finite, or the covariance is not symmetric positive definite
-    /// (judged with its diagonal scaled to one, so rows may have very different units).
-    pub fn new(weight: f64, mean: SVector<f64, D>, covariance: SMatrix<f64, D, D>) -> Result<Self, Error> {
-        non_negative("weight", weight)?;
-        all_finite("mean", mean.as_slice())?;
-        let factor = Factored::new("covariance", &covariance)?;
-        Ok(Self {
-            weight,
-            mean,
-            covariance: (covariance + covariance.transpose()) * 0.5,
-            factor,
-        })
-    }
-
-    /// Share of the mixture's mass.
-    pub fn weight(&self) -> f64 {
-        self.weight
-    }
-
-    /// Mean.
-    pub fn mean(&self) -> &SVector<f64, D> {
-        &self.mean
-    }
-
-    /// Covariance, positive definite.
-    pub fn covariance(&self) -> &SMatrix<f64, D, D> {
-        &self.covariance
-    }
-
-    /// Lower Cholesky factor of the covariance.
-    pub fn cholesky_factor(&self) -> &SMatrix<f64, D, D> {
-        &self.factor.lower
-    }
-
-    /// `ln det covariance`.
-    pub fn log_determinant(&self) -> f64 {
-        2.0 * self.factor.half_log_det
-    }
-
-    /// The component as a Gaussian belief, without its weight.
-    pub fn gaussian(&self) -> Gaussian<D> {
-        Gaussian::from_trusted_parts(self.mean, self.covariance)
-    }
-
-    /// The covariance, factored.
-    pub fn factor(&self) -> &Factored<D> {
-        &self.factor
-    }
-
-    /// `ln N(x; mean, covariance)`, without the weight.
-    #[inline]
-    pub fn log_pdf(&self, x: &SVector<f64, D>) -> f64 {
-        -0.5 * self.factor.squared(&(x - self.mean)) - self.factor.half_log_det - D as f64 * LN_SQRT_2PI
-    }
-
-    /// Writes `ln w + ln N(x; mean, covariance)` of every point.
-    fn log_terms(&self, columns: &Columns<'_, D>, out: &mut [f64]) {
-        let offset = self.weight.ln() - self.factor.half_log_det - D as f64 * LN_SQRT_2PI;
-        vectorised(
-            #[inline(always)]
-            || self.factor.log_forms(&self.mean, offset, columns, out),
-        );
-    }
-
-    fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> SVector<f64, D> {
-        self.mean + self.factor.lower * SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal))
-    }
-}
 
 /// A belief `sum_k w_k N(x; m_k, S_k)` over `R^D` with weights that sum to one.
 ///
@@ -162,7 +81,7 @@ impl<const D: usize> Mixture<D> {
 
     /// Mean.
     pub fn mean(&self) -> SVector<f64, D> {
-        self.components.iter().map(|c| c.mean * c.weight).sum()
+        self.components.iter().map(|c| c.mean() * c.weight).sum()
     }
 
     /// Covariance: within the components plus between their means.
@@ -171,8 +90,8 @@ impl<const D: usize> Mixture<D> {
         self.components
             .iter()
             .map(|c| {
-                let d = c.mean - mean;
-                (c.covariance + d * d.transpose()) * c.weight
+                let d = c.mean() - mean;
+                (c.covariance() + d * d.transpose()) * c.weight
             })
             .sum()
     }
@@ -184,22 +103,8 @@ impl<const D: usize> Mixture<D> {
 
     /// `ln p(x)`; finite wherever `x` is finite and not astronomically far away, never NaN.
     pub fn log_pdf(&self, x: &SVector<f64, D>) -> f64 {
-        let mut largest = f64::NEG_INFINITY;
-        let mut sum = 0.0;
-        for c in self.components.iter().filter(|c| c.weight > 0.0) {
-            let term = c.weight.ln() + c.log_pdf(x);
-            if term > largest {
-                sum = sum * (largest - term).exp() + 1.0;
-                largest = term;
-            } else if term > f64::NEG_INFINITY {
-                sum += (term - largest).exp();
-            }
-        }
-        if largest == f64::NEG_INFINITY {
-            largest
-        } else {
-            largest + sum.ln()
-        }
+        let kept = self.components.iter().filter(|c| c.weight > 0.0);
+        kept.map(|c| c.weight.ln() + c.log_pdf(x)).collect::<LogSum>().value()
     }
 
     /// Writes `ln p` of every point of `columns` to `out`; points beyond the end of `out` are passed over.
@@ -214,19 +119,6 @@ impl<const D: usize> Mixture<D> {
             }
             log_sum_rows(&terms, out);
         }
-    }
-
-    /// Posterior probabilities of the components at `x`; `None` where the density underflows for every component.
-    pub fn responsibilities(&self, x: &SVector<f64, D>) -> Option<Vec<f64>> {
-        let logs: Vec<f64> = self.components.iter().map(|c| c.weight.ln() + c.log_pdf(x)).collect();
-        let largest = fewbits_numerics::kernels::largest(&logs);
-        if !largest.is_finite() {
-            return None;
-        }
-        let mut shares: Vec<f64> = logs.iter().map(|l| (l - largest).exp()).collect();
-        let total: f64 = shares.iter().sum();
-        shares.iter_mut().for_each(|s| *s /= total);
-        Some(shares)
     }
 
     /// One draw.
@@ -250,19 +142,9 @@ impl<const D: usize> Mixture<D> {
     /// If `count` is 0.
     pub fn sample_systematic<R: Rng + ?Sized>(&self, rng: &mut R, count: usize) -> Result<Particles<D>, Error> {
         at_least_one("count", count)?;
-        let offset: f64 = rng.random();
-        let mut k = 0;
-        let mut cumulative = self.components[0].weight;
-        let mut drawn = 0;
-        Particles::from_draws(count, || {
-            let level = (drawn as f64 + offset) / count as f64;
-            while level >= cumulative && k + 1 < self.components.len() {
-                k += 1;
-                cumulative += self.components[k].weight;
-            }
-            drawn += 1;
-            self.components[k].draw(rng)
-        })
+        let weights: Vec<f64> = self.components.iter().map(Component::weight).collect();
+        let mut chosen = systematic(rng, &weights, count).into_iter();
+        Particles::from_draws(count, || self.components[chosen.next().unwrap_or(0)].draw(rng))
     }
 
     /// The law of the chosen coordinates, in the given order.
@@ -276,8 +158,8 @@ impl<const D: usize> Mixture<D> {
             }
         }
         let components = self.components.iter().map(|c| {
-            let mean = SVector::from_fn(|i, _| c.mean[axes[i]]);
-            let covariance = SMatrix::from_fn(|i, j| c.covariance[(axes[i], axes[j])]);
+            let mean = SVector::from_fn(|i, _| c.mean()[axes[i]]);
+            let covariance = SMatrix::from_fn(|i, j| c.covariance()[(axes[i], axes[j])]);
             Component::new(c.weight, mean, covariance)
         });
         Mixture::new(components.collect::<Result<_, _>>()?)
@@ -295,7 +177,7 @@ impl<const D: usize> Mixture<D> {
         let components = self
             .components
             .iter()
-            .map(|c| Component::new(c.weight, matrix * c.mean + shift, matrix * c.covariance * matrix.transpose()));
+            .map(|c| Component::new(c.weight, matrix * c.mean() + shift, matrix * c.covariance() * matrix.transpose()));
         Mixture::new(components.collect::<Result<_, _>>()?)
     }
 }
@@ -360,7 +242,7 @@ impl Mixture<1> {
     pub fn cdf(&self, x: f64) -> f64 {
         self.components
             .iter()
-            .map(|c| c.weight * normal::cdf((x - c.mean[0]) / c.factor.lower[(0, 0)]))
+            .map(|c| c.weight * normal::cdf((x - c.mean()[0]) / c.factor().lower[(0, 0)]))
             .sum()
     }
 }
@@ -375,10 +257,10 @@ struct Stored {
 
 impl<const D: usize> From<Mixture<D>> for Stored {
     fn from(mixture: Mixture<D>) -> Self {
-        let rows = |c: &Component<D>| (0..D).map(|i| (0..D).map(|j| c.covariance[(i, j)]).collect()).collect();
+        let rows = |c: &Component<D>| (0..D).map(|i| (0..D).map(|j| c.covariance()[(i, j)]).collect()).collect();
         Self {
             weights: mixture.components.iter().map(Component::weight).collect(),
-            means: mixture.components.iter().map(|c| c.mean.as_slice().to_vec()).collect(),
+            means: mixture.components.iter().map(|c| c.mean().as_slice().to_vec()).collect(),
             covariances: mixture.components.iter().map(rows).collect(),
         }
     }

@@ -1,7 +1,7 @@
 //! Weighted Gaussians that share one covariance.
 
 use super::Particles;
-use super::weights::Cumulative;
+use super::weights::Categorical;
 use crate::Error;
 use fewbits_core::columns::{count, set_state, state_at};
 use fewbits_core::{Belief, ColumnsMut, Gaussian};
@@ -92,7 +92,7 @@ impl<const D: usize> Belief<D> for GaussianCloud<D> {
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
         let spread = Gaussian::from_trusted_parts(SVector::zeros(), self.covariance);
         spread.sample_columns(rng, states.each_mut().map(|column| &mut **column));
-        let cumulative = Cumulative::new(self.means.weights());
+        let cumulative = Categorical::new(self.means.weights());
         for i in 0..count(&states) {
             let mean = state_at(&self.means.columns(), cumulative.draw(rng));
             let offset = SVector::<f64, D>::from_fn(|d, _| states[d][i]);

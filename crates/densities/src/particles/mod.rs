@@ -5,6 +5,7 @@ mod stored;
 pub(crate) mod weights;
 
 pub use gaussian_cloud::GaussianCloud;
+pub use weights::Categorical;
 
 use crate::Error;
 use fewbits_core::{Belief, Columns, ColumnsMut};
@@ -15,7 +16,7 @@ use nalgebra::{SMatrix, SVector};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 use stored::StoredParticles;
-use weights::{Cumulative, gather_rows, normalise};
+use weights::{gather_rows, normalise};
 
 /// A belief `sum_i w_i delta(x - x_i)` over `R^D`, always normalised.
 ///
@@ -247,26 +248,6 @@ impl<const D: usize> Particles<D> {
         Ok(())
     }
 
-    /// Replaces the particles by copies of the chosen ones with the given log weights, which may share any offset: the
-    /// selection of an auxiliary filter, a pruning.
-    ///
-    /// # Errors
-    /// As [`select`](Self::select); if there is not one weight per index; [`fewbits_core::Error::Impossible`] if no weight is
-    /// left. The belief is then as it was.
-    pub fn select_weighted(&mut self, ancestors: &[u32], log_weights: &[f64]) -> Result<(), Error> {
-        self.check(ancestors)?;
-        if log_weights.len() != ancestors.len() {
-            let expected = format!("{}, one per ancestor", ancestors.len());
-            return Err(ArgumentError::new("log_weights", format!("{} numbers", log_weights.len()), expected).into());
-        }
-        let (mut logs, mut weights) = (log_weights.to_vec(), vec![0.0; log_weights.len()]);
-        let (_, effective_sample_size) = normalise(&mut logs, &mut weights)?;
-        self.select(ancestors)?;
-        (self.log_weights, self.weights) = (logs, weights);
-        self.effective_sample_size = effective_sample_size;
-        Ok(())
-    }
-
     fn check(&self, ancestors: &[u32]) -> Result<(), Error> {
         at_least_one("ancestors", ancestors.len())?;
         let count = self.len();
@@ -276,11 +257,6 @@ impl<const D: usize> Particles<D> {
             return Err(ArgumentError::new("ancestors", largest, format!("indices below {count}")).into());
         }
         Ok(())
-    }
-
-    /// Gives all particles the same weight.
-    pub fn equalise_weights(&mut self) {
-        self.equalise(self.len());
     }
 
     pub(crate) fn equalise(&mut self, count: usize) {
@@ -357,7 +333,7 @@ impl<const D: usize> Belief<D> for Particles<D> {
 
     /// Each draw is a particle, chosen by its weight.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
-        let cumulative = Cumulative::new(&self.weights);
+        let cumulative = Categorical::new(&self.weights);
         let count = fewbits_core::columns::count(&states);
         let chosen: Vec<usize> = (0..count).map(|_| cumulative.draw(rng)).collect();
         for (states, column) in states.into_iter().zip(&self.columns) {

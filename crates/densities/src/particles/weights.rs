@@ -1,17 +1,26 @@
 //! Weights of particles: draws in proportion, rows that travel along, normalisation.
 
 use crate::Error;
-use fewbits_numerics::kernels::{exp_minus, largest_number, vectorised};
+use fewbits_numerics::kernels::{exp_minus, largest_number, sum, vectorised};
 use rand::{Rng, RngExt};
 
-/// Running sums of weights, for draws in proportion to them.
-pub(crate) struct Cumulative {
+/// Draws of indices in proportion to weights, by their running sums: `O(n)` to prepare, `O(log n)` a draw.
+///
+/// ```
+/// use fewbits_densities::Categorical;
+/// use rand::SeedableRng;
+/// let weighted = Categorical::new(&[0.0, 2.0, 0.0]);
+/// assert_eq!(weighted.draw(&mut rand_pcg::Pcg64Mcg::seed_from_u64(1)), 1);
+/// ```
+#[derive(Debug, Clone)]
+pub struct Categorical {
     sums: Vec<f64>,
     last: usize,
 }
 
-impl Cumulative {
-    pub(crate) fn new(weights: &[f64]) -> Self {
+impl Categorical {
+    /// Prepares draws from weights of any sum, each zero or positive. If all are zero, every draw is index 0.
+    pub fn new(weights: &[f64]) -> Self {
         let mut total = 0.0;
         let mut sum = |w: &f64| {
             total += w;
@@ -24,10 +33,26 @@ impl Cumulative {
     }
 
     /// An index of positive weight.
-    pub(crate) fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
+    pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
         let point = rng.random::<f64>() * self.sums.last().copied().unwrap_or(0.0);
         self.sums.partition_point(|sum| *sum <= point).min(self.last)
     }
+}
+
+/// Indices of `count` systematic draws from `weights`: index `i` comes up `count w_i / sum w` times, rounded up or down.
+pub(crate) fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<usize> {
+    let offset: f64 = rng.random();
+    let total: f64 = sum(weights);
+    let (mut i, mut cumulative) = (0, weights.first().copied().unwrap_or(0.0));
+    let next = |k: usize| {
+        let level = (k as f64 + offset) / count as f64 * total;
+        while level >= cumulative && i + 1 < weights.len() {
+            i += 1;
+            cumulative += weights[i];
+        }
+        i
+    };
+    (0..count).map(next).collect()
 }
 
 /// Copies the chosen rows.

@@ -9,6 +9,8 @@
 
 mod any_model;
 mod attacks;
+mod cells;
+mod clumps;
 #[path = "../../../models/tests/it/diffusion_entries.rs"]
 mod diffusion_entries;
 mod envelopes;
@@ -19,6 +21,7 @@ mod laws;
 mod messages;
 mod searches;
 mod series;
+mod slices;
 mod unknown_models;
 
 use fewbits_diffusive::{RateModel, RateRange, Rule, SearchBox, SourceSensor};

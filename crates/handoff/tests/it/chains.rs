@@ -1,6 +1,6 @@
 //! The bounds on chains of lossy hand-overs of discrete beliefs, where everything is exact.
 
-use fewbits_handoff::{Accounting, Amplification, StepError};
+use fewbits_handoff::published::{Accounting, Amplification, StepError};
 use fewbits_mixture_codec::divergence::discrete;
 use fewbits_monte_carlo::Stream;
 use rand::{Rng, RngExt};

@@ -1,6 +1,6 @@
 //! The order and the laws of a message's numbers, walked alike by quantiser, encoder and decoder.
 
-use super::WireFormat;
+use super::format::WireFormat;
 use super::range::{LARGEST, Law, Reader, Writer};
 use fewbits_core::CodecError;
 use fewbits_densities::{Component, Mixture};

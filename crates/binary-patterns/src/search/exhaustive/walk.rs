@@ -1,6 +1,6 @@
 //! The tree of all multisets of masks.
 
-use super::{LinearSearch, MaskSet};
+use super::setting::{LinearSearch, MaskSet};
 use crate::bank::{CountTable, IMPOSSIBLE};
 use crate::linear::{Span, flips_under_reflection};
 use crate::search::outcomes::{Outcomes, SEARCH_PANEL};

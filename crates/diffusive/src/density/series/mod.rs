@@ -1,18 +1,22 @@
 //! Linear combinations of polynomial Gaussians.
 
+mod basis;
+mod fit;
 pub mod polynomials;
 mod three_dimensions;
 
+pub use fit::LpgFit;
 pub use three_dimensions::{Slice, SliceMoments};
 
-use super::{Cells, Error};
+use super::Error;
 use fewbits_core::columns::state_at;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_densities::Component;
-use fewbits_numerics::ArgumentError;
+use fewbits_numerics::{ArgumentError, LogSum};
 use fewbits_numerics::error::{all_finite, at_least_one};
 use fewbits_numerics::normal::LN_SQRT_2PI;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
+use basis::{gauss_hermite, polynomials};
 use polynomials::{check_degree, multi_indices};
 use rand::{Rng, RngExt};
 
@@ -38,20 +42,10 @@ pub struct Lpg<const D: usize> {
 #[derive(Debug, Clone, PartialEq)]
 struct Term<const D: usize> {
     gaussian: Component<D>,
-    inverse: SMatrix<f64, D, D>,
     half_log_peak: f64,
     /// Norm of the whitener.
     steepness: f64,
     coefficients: Vec<f64>,
-}
-
-/// A fit and its quality.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LpgFit<const D: usize> {
-    /// The normalised belief.
-    pub belief: Lpg<D>,
-    /// `int sqrt(fit p)`, 1 for a perfect fit; the squared Hellinger distance is one minus this.
-    pub affinity: f64,
 }
 
 impl<const D: usize> Lpg<D> {
@@ -76,91 +70,16 @@ impl<const D: usize> Lpg<D> {
         Ok(belief)
     }
 
-    /// The best approximation of a belief over cells in the span of the given Gaussians with polynomials up to `degree`.
-    ///
-    /// # Errors
-    /// If there is no Gaussian, `degree` exceeds 20, or the basis is singular (two equal Gaussians).
-    pub fn fit(cells: &Cells<D>, gaussians: &[Component<D>], degree: usize) -> Result<LpgFit<D>, Error> {
-        let belief = Self::skeleton(gaussians, degree)?;
-        let gram = belief.gram()?;
-        let size = belief.indices.len();
-        let mut b = DVector::zeros(gram.nrows());
-        let columns = cells.columns();
-        let scale = cells.width().powi(D as i32).sqrt();
-        let mut basis = vec![0.0; size];
-        for (i, weight) in cells.weights().iter().enumerate() {
-            let root = weight.sqrt() * scale;
-            let x = state_at(&columns, i);
-            for (l, term) in belief.terms.iter().enumerate() {
-                let u = term.whitened(&x);
-                let log = term.half_log_peak - 0.25 * u.norm_squared();
-                if log < -80.0 {
-                    continue;
-                }
-                let factor = root * log.exp();
-                polynomials(&belief.indices, degree, &u, &mut basis);
-                for (nu, value) in basis.iter().enumerate() {
-                    b[l * size + nu] += factor * value;
-                }
-            }
-        }
-        belief.project(&gram, &b)
-    }
-
-    /// The smallest degree up to `highest` whose affinity reaches `1 - tolerance`, or the best found.
-    ///
-    /// # Errors
-    /// As [`Lpg::fit`].
-    pub fn fit_within(
-        cells: &Cells<D>,
-        gaussians: &[Component<D>],
-        highest: usize,
-        tolerance: f64,
-    ) -> Result<LpgFit<D>, Error> {
-        let mut best = Self::fit(cells, gaussians, 0)?;
-        for degree in 1..=highest {
-            if 1.0 - best.affinity < tolerance {
-                break;
-            }
-            best = Self::fit(cells, gaussians, degree)?;
-        }
-        Ok(best)
-    }
-
-    /// The belief whose coefficients are the projection `G^-1 b`, normalised.
-    fn project(mut self, gram: &DMatrix<f64>, b: &DVector<f64>) -> Result<LpgFit<D>, Error> {
-        // The basis of each Gaussian is orthonormal: the diagonal is one, and a tiny pivot is rounding.
-        let independent = |factor: &Cholesky<f64, Dyn>| factor.l_dirty().diagonal().min() > DEPENDENT;
-        let Some(factor) = gram.clone().cholesky().filter(independent) else {
-            return Err(ArgumentError::new("gaussians", "a dependent set", "Gaussians that differ").into());
-        };
-        let c = factor.solve(b);
-        for (term, own) in self.terms.iter_mut().zip(c.as_slice().chunks(self.indices.len())) {
-            term.coefficients.copy_from_slice(own);
-        }
-        self.settle()?;
-        Ok(LpgFit {
-            belief: self,
-            // Before it was normalised the projection had the norm of its inner product with what was projected.
-            affinity: b.dot(&c).sqrt(),
-        })
-    }
-
     fn skeleton(gaussians: &[Component<D>], degree: usize) -> Result<Self, Error> {
         at_least_one("components", gaussians.len())?;
         check_degree(degree)?;
         let indices = multi_indices::<D>(degree)?;
         let mut terms = Vec::with_capacity(gaussians.len());
         for gaussian in gaussians {
-            let lower = gaussian.cholesky_factor();
-            let Some(inverse) = lower.solve_lower_triangular(&SMatrix::identity()) else {
-                return Err(ArgumentError::new("covariance", "singular", "a positive definite matrix").into());
-            };
             terms.push(Term {
                 gaussian: *gaussian,
-                inverse,
                 half_log_peak: -0.25 * gaussian.log_determinant() - 0.5 * D as f64 * LN_SQRT_2PI,
-                steepness: inverse.norm(),
+                steepness: gaussian.factor().whitener.norm(),
                 coefficients: vec![0.0; indices.len()],
             });
         }
@@ -197,7 +116,7 @@ impl<const D: usize> Lpg<D> {
     /// Gaussians widened by the cell and polynomials by their absolute values. `scratch` is room for the polynomials.
     pub fn log_density_and_bound(&self, x: &SVector<f64, D>, half_width: f64, scratch: &mut Vec<f64>) -> (f64, f64) {
         scratch.resize(self.indices.len(), 0.0);
-        let mut bound = f64::NEG_INFINITY;
+        let (mut bound, mut highest) = (LogSum::default(), f64::NEG_INFINITY);
         let (mut largest, mut sum) = (f64::NEG_INFINITY, 0.0);
         for term in &self.terms {
             let u = term.whitened(x);
@@ -207,7 +126,7 @@ impl<const D: usize> Lpg<D> {
             let near = (length - reach).max(0.0);
             let peak = term.half_log_peak - 0.25 * near * near;
             let log = term.half_log_peak - 0.25 * length * length;
-            if peak < bound - 60.0 {
+            if peak < highest - 60.0 {
                 continue;
             }
             polynomials(&self.indices, self.degree, &u, scratch);
@@ -221,7 +140,8 @@ impl<const D: usize> Lpg<D> {
             } else {
                 size
             };
-            bound = log_add(bound, peak + size.ln());
+            bound.add(peak + size.ln());
+            highest = bound.value();
             if log > largest {
                 sum *= (largest - log).exp();
                 largest = log;
@@ -234,7 +154,7 @@ impl<const D: usize> Lpg<D> {
         } else {
             f64::NEG_INFINITY
         };
-        (density, 2.0 * bound)
+        (density, 2.0 * highest)
     }
 
     /// Calls `visit(l, m, weight, x, u_l, u_m)` at the nodes of rules that integrate `sqrt(phi_l phi_m)` times polynomials of
@@ -248,12 +168,12 @@ impl<const D: usize> Lpg<D> {
         for l in 0..self.terms.len() {
             for m in l..self.terms.len() {
                 let (a, b) = (&self.terms[l], &self.terms[m]);
-                let precision = (a.inverse.transpose() * a.inverse + b.inverse.transpose() * b.inverse) * 0.5;
+                let (wa, wb) = (&a.gaussian.factor().whitener, &b.gaussian.factor().whitener);
+                let precision = (wa.tr_mul(wa) + wb.tr_mul(wb)) * 0.5;
                 let Some(factor) = precision.cholesky() else {
                     return Err(ArgumentError::new("covariance", "singular", "a positive definite matrix").into());
                 };
-                let pull =
-                    a.inverse.tr_mul(&a.inverse) * a.gaussian.mean() + b.inverse.tr_mul(&b.inverse) * b.gaussian.mean();
+                let pull = wa.tr_mul(wa) * a.gaussian.mean() + wb.tr_mul(wb) * b.gaussian.mean();
                 let mean = factor.solve(&(pull * 0.5));
                 let covariance = factor.inverse();
                 let Some(root) = covariance.cholesky() else {
@@ -282,28 +202,6 @@ impl<const D: usize> Lpg<D> {
             }
         }
         Ok(())
-    }
-
-    fn gram(&self) -> Result<DMatrix<f64>, Error> {
-        let size = self.indices.len();
-        let mut gram = DMatrix::identity(size * self.terms.len(), size * self.terms.len());
-        let (mut of_l, mut of_m) = (vec![0.0; size], vec![0.0; size]);
-        self.pairs(self.degree + 1, |l, m, weight, _, ul, um| {
-            if l == m {
-                // Orthonormal.
-                return;
-            }
-            polynomials(&self.indices, self.degree, ul, &mut of_l);
-            polynomials(&self.indices, self.degree, um, &mut of_m);
-            for (i, a) in of_l.iter().enumerate() {
-                for (j, b) in of_m.iter().enumerate() {
-                    let value = weight * a * b;
-                    gram[(l * size + i, m * size + j)] += value;
-                    gram[(m * size + j, l * size + i)] += value;
-                }
-            }
-        })?;
-        Ok(gram)
     }
 
     /// Normalises, and finds mean and covariance.
@@ -365,7 +263,7 @@ impl<const D: usize> Lpg<D> {
 impl<const D: usize> Term<D> {
     #[inline]
     fn whitened(&self, x: &SVector<f64, D>) -> SVector<f64, D> {
-        self.inverse * (x - self.gaussian.mean())
+        self.gaussian.factor().whitener * (x - self.gaussian.mean())
     }
 }
 
@@ -394,7 +292,7 @@ impl<const D: usize> Belief<D> for Lpg<D> {
                 .terms
                 .iter()
                 .map(|term| 2.0 * term.half_log_peak - 0.5 * term.whitened(x).norm_squared() / (WIDER * WIDER));
-            parts.fold(f64::NEG_INFINITY, log_add)
+            parts.collect::<LogSum>().value()
         };
         let mut bound = f64::NEG_INFINITY;
         for _ in 0..1000 {
@@ -420,9 +318,6 @@ impl<const D: usize> Belief<D> for Lpg<D> {
 
 /// Widening of the proposal of the rejection sampler.
 const WIDER: f64 = 1.6;
-/// Pivots of the Gram matrix below this mean that its Gaussians are too much alike.
-const DEPENDENT: f64 = 1e-6;
-
 impl<const D: usize> Density<D> for Lpg<D> {
     fn log_density(&self, state: &SVector<f64, D>) -> f64 {
         2.0 * self.log_root(state, &mut vec![0.0; self.indices.len()])
@@ -434,52 +329,4 @@ impl<const D: usize> Density<D> for Lpg<D> {
             *log += 2.0 * self.log_root(&state_at(states, i), &mut values);
         }
     }
-}
-
-fn log_add(a: f64, b: f64) -> f64 {
-    let (high, low) = if a > b { (a, b) } else { (b, a) };
-    if high == f64::NEG_INFINITY {
-        high
-    } else {
-        high + (low - high).exp().ln_1p()
-    }
-}
-
-/// Orthonormal Hermite products `prod_d he_nu_d(u_d) / sqrt(nu_d!)` for every index.
-#[inline]
-fn polynomials<const D: usize>(indices: &[[usize; D]], degree: usize, u: &SVector<f64, D>, out: &mut [f64]) {
-    let mut table = [[0.0; polynomials::HIGHEST_DEGREE + 1]; D];
-    for (row, x) in table.iter_mut().zip(u.iter()) {
-        row_of_polynomials(*x, &mut row[..=degree]);
-    }
-    for (value, index) in out.iter_mut().zip(indices) {
-        *value = (0..D).map(|d| table[d][index[d]]).product();
-    }
-}
-
-/// Orthonormal Hermite polynomials `he_n(x) / sqrt(n!)` of increasing degree.
-#[inline]
-fn row_of_polynomials(x: f64, row: &mut [f64]) {
-    for n in 0..row.len() {
-        row[n] = match n {
-            0 => 1.0,
-            1 => x,
-            _ => (x * row[n - 1] - ((n - 1) as f64).sqrt() * row[n - 2]) / (n as f64).sqrt(),
-        };
-    }
-}
-
-/// Nodes and weights of the rule for the standard normal weight, by the eigenvalues of the Jacobi matrix.
-fn gauss_hermite(nodes: usize) -> Vec<(f64, f64)> {
-    let jacobi = DMatrix::from_fn(nodes, nodes, |i, j| {
-        if i.abs_diff(j) == 1 {
-            (i.max(j) as f64).sqrt()
-        } else {
-            0.0
-        }
-    });
-    let eigen = jacobi.symmetric_eigen();
-    (0..nodes)
-        .map(|i| (eigen.eigenvalues[i], eigen.eigenvectors[(0, i)].powi(2)))
-        .collect()
 }

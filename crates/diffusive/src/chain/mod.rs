@@ -1,7 +1,12 @@
 //! The search: a belief travels from node to node until it is sharp.
 
-use crate::belief::{PositionBelief, Prior, SearchBox};
-use crate::best_fit::best_fit;
+mod alternatives;
+mod outcome;
+mod update;
+
+pub use outcome::{Outcome, Status, Step};
+
+use crate::belief::{PositionBelief, SearchBox};
 use crate::density::CellOptions;
 use crate::density::laplace::Peak;
 use crate::fit::Fit;
@@ -10,16 +15,16 @@ use crate::model_grid::ModelGrid;
 use crate::posterior::Posterior;
 use crate::project::{Form, Travelling, project};
 use crate::select::{Rule, Selector};
-use crate::target::Target;
 use crate::{Error, RateModel, Record, SourceLikelihood, SourceSensor};
 use fewbits_core::{Belief, Gaussian, Message};
 use fewbits_densities::Mixture;
 use fewbits_models::SourceModel;
-use fewbits_models::diffusion::Air;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, positive, within};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::Vector2;
+use alternatives::{Alternative, log_evidence, mixed, mixed_fit, most_probable};
+use outcome::failure;
 
 /// Parameters of a search.
 ///
@@ -58,83 +63,6 @@ pub struct Search {
     pub cells: CellOptions,
     /// The probability with which a right model may be refused ([`Status::Misfit`]), 1e-3 unless told. `None`: it is never refused.
     pub refusal: Option<f64>,
-}
-
-/// Why a search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Status {
-    /// The determinant fell below the threshold.
-    Converged,
-    /// No unvisited node can be reached.
-    Exhausted,
-    /// The most nodes were used.
-    NodeLimit,
-    /// A node's samples and the belief that it received exclude each other: a mode was lost on the way, or the model is wrong.
-    BeliefMiss,
-    /// The samples are not what the model says ([`Fit`]): no source at the place and with a rate that are possible causes them in this
-    /// medium. Whatever the belief says, do not trust it.
-    Misfit,
-    /// What was to travel is no belief any more once it is encoded: the wire's numbers are too coarse.
-    Undecodable,
-    /// The posterior leans on the border of the search box: the source is probably outside.
-    OutsideField,
-    /// The posterior is too thin for the cells allowed.
-    Unresolved,
-}
-
-/// One node's part in a search.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Step {
-    /// Which node sampled.
-    pub node: usize,
-    /// Hops from the node before.
-    pub hops: usize,
-    /// Mean and covariance of what travels on (of the posterior, for raw records).
-    pub estimate: Gaussian<2>,
-    /// `log10` of the determinant of that covariance, m^4.
-    pub log10_determinant: f64,
-    /// Bits that arrived with the belief from the node before, over all hops.
-    pub bits: usize,
-    /// Cells that were evaluated.
-    pub evaluations: usize,
-    /// Logarithm of the integral of belief times likelihood.
-    pub log_evidence: f64,
-    /// How the samples fit so far. Raw records: all samples under this posterior. Other forms: of every node its own samples under
-    /// its own posterior, summed; the sum travels with the belief.
-    pub fit: Fit,
-}
-
-/// How a search went.
-#[derive(Debug, Clone)]
-pub struct Outcome<M = Air> {
-    /// Why it ended.
-    pub status: Status,
-    /// Every node that sampled, in order.
-    pub steps: Vec<Step>,
-    /// The last posterior, before projection. With several models that of the most probable one.
-    pub posterior: Option<Posterior>,
-    /// The records that were used. With several models those of the most probable one.
-    pub records: Vec<Record<M>>,
-    /// Probabilities of the models, in their order.
-    pub models: Vec<f64>,
-}
-
-impl<M> Outcome<M> {
-    /// The last estimate.
-    pub fn estimate(&self) -> Option<&Gaussian<2>> {
-        self.steps.last().map(|step| &step.estimate)
-    }
-
-    /// How the samples fit at the last node.
-    pub fn fit(&self) -> Option<Fit> {
-        self.steps.last().map(|step| step.fit)
-    }
-
-    /// All bits that travelled.
-    pub fn bits(&self) -> usize {
-        self.steps.iter().map(|step| step.bits).sum()
-    }
 }
 
 /// Mass at the border above which the source is taken to be outside.
@@ -354,99 +282,6 @@ impl Search {
         Ok(())
     }
 
-    /// Updates the posterior of every model that is left, and the models' probabilities. A status if the search ends here.
-    fn update<M: SourceModel + Clone>(
-        &self,
-        alternatives: &mut [Alternative<M>],
-        received: Option<&Travelling>,
-    ) -> Result<Option<Status>, Error> {
-        let mut end = None;
-        for alternative in alternatives.iter_mut().filter(|a| a.log_weight > f64::NEG_INFINITY) {
-            let (prior, likelihood, near) = self.terms(alternative, received)?;
-            match Posterior::new(&prior, &likelihood, &self.search, near, &self.cells) {
-                Ok(posterior) => {
-                    alternative.log_evidence = posterior.cells.log_evidence();
-                    alternative.posterior = Some(posterior);
-                }
-                Err(error) => {
-                    let status = failure(&error).ok_or(error)?;
-                    let status = self.explained(status, &prior, &likelihood, received.is_some())?;
-                    if status == Status::Unresolved {
-                        // The evidence of this model is not known: no other can be said to be right.
-                        return Ok(Some(status));
-                    }
-                    alternative.log_weight = f64::NEG_INFINITY;
-                    end = Some(status);
-                }
-            }
-        }
-        let largest = alternatives
-            .iter()
-            .map(Alternative::log_posterior)
-            .fold(f64::NEG_INFINITY, f64::max);
-        if largest == f64::NEG_INFINITY {
-            return Ok(Some(end.unwrap_or(Status::Misfit)));
-        }
-        let mut total = 0.0;
-        for alternative in alternatives.iter_mut() {
-            let log = alternative.log_posterior() - largest;
-            if log < -EXCLUDED {
-                alternative.log_weight = f64::NEG_INFINITY;
-            }
-            alternative.probability = log.exp();
-            total += alternative.probability;
-        }
-        alternatives.iter_mut().for_each(|a| a.probability /= total);
-        Ok(None)
-    }
-
-    /// What an update of one model multiplies: the prior, the likelihood, and the box that holds the product.
-    fn terms<M: SourceModel + Clone>(
-        &self,
-        alternative: &Alternative<M>,
-        received: Option<&Travelling>,
-    ) -> Result<(Prior, SourceLikelihood<M>, Option<SearchBox>), Error> {
-        let all = alternative.records.as_slice();
-        let last = &all[all.len() - 1..];
-        let (prior, records) = match (received, &self.rate) {
-            (None, _) => (Prior::Exact(self.prior), all),
-            (Some(Travelling::WithRate(belief)), RateModel::Joint(range)) => {
-                (Prior::WithRate(belief.clone(), *range), last)
-            }
-            (Some(Travelling::WithRate(belief)), _) => {
-                let position = Mixture::single(&belief.position())?;
-                (Prior::Position(PositionBelief::Mixture(position)), last)
-            }
-            (Some(Travelling::Position(position)), _) => (Prior::Position(position.clone()), last),
-        };
-        let near = match (received, &alternative.posterior) {
-            (None, Some(posterior)) => Some(posterior.around(&self.search)),
-            _ => None,
-        };
-        Ok((prior, SourceLikelihood::new(records.to_vec(), self.rate)?, near))
-    }
-
-    /// The status of an update that failed. If not even the best position explains the samples, that is the reason.
-    fn explained<M: SourceModel>(
-        &self,
-        status: Status,
-        prior: &Prior,
-        likelihood: &SourceLikelihood<M>,
-        carried: bool,
-    ) -> Result<Status, Error> {
-        let Some(level) = self.refusal else {
-            return Ok(status);
-        };
-        let fit = best_fit(&Target::new(prior, likelihood)?, likelihood, &self.search);
-        Ok(match (status, fit) {
-            // What excludes a belief that was received may lie in the belief.
-            (Status::BeliefMiss, None) if carried => status,
-            (_, None) => Status::Misfit,
-            (_, Some(fit)) if fit.is_refused(level) => Status::Misfit,
-            _ => status,
-        })
-    }
-
     /// The status of a search that ends here for the given reason.
     fn ending(&self, reason: Status, posterior: &Posterior, fit: &Fit) -> Status {
         if posterior.mass_at_border(&self.search) > LEANING {
@@ -495,90 +330,5 @@ impl Search {
         };
         let now = steps.last().map_or(0.0, |step| step.log10_determinant);
         now > steps[past].log10_determinant - 0.3
-    }
-}
-
-/// Models this many nats below the best are not looked at again.
-const EXCLUDED: f64 = 30.0;
-
-/// One model of the medium along a search.
-struct Alternative<M> {
-    sensor: SourceSensor<M>,
-    /// Logarithm of the prior probability; `-inf` once the model is excluded.
-    log_weight: f64,
-    log_evidence: f64,
-    probability: f64,
-    records: Vec<Record<M>>,
-    posterior: Option<Posterior>,
-}
-
-impl<M: Clone> Alternative<M> {
-    fn new((sensor, prior): (&SourceSensor<M>, f64)) -> Self {
-        Self {
-            sensor: sensor.clone(),
-            log_weight: prior.ln(),
-            log_evidence: 0.0,
-            probability: prior,
-            records: Vec::new(),
-            posterior: None,
-        }
-    }
-}
-
-impl<M> Alternative<M> {
-    fn log_posterior(&self) -> f64 {
-        self.log_weight + self.log_evidence
-    }
-}
-
-/// The first of the most probable.
-fn most_probable<M>(alternatives: &[Alternative<M>]) -> usize {
-    (1..alternatives.len()).fold(0, |best, i| {
-        if alternatives[i].probability > alternatives[best].probability {
-            i
-        } else {
-            best
-        }
-    })
-}
-
-/// Mean and covariance of the position under all models.
-fn mixed<M>(alternatives: &[Alternative<M>]) -> Gaussian<2> {
-    let parts = || {
-        let held = alternatives.iter().filter(|a| a.probability > 0.0);
-        held.filter_map(|a| Some((a.probability, &a.posterior.as_ref()?.cells)))
-    };
-    let mean: Vector2<f64> = parts().map(|(p, cells)| cells.mean() * p).sum();
-    let covariance = parts().map(|(p, cells)| {
-        let d = cells.mean() - mean;
-        (cells.covariance() + d * d.transpose()) * p
-    });
-    Gaussian::from_trusted_parts(mean, covariance.sum())
-}
-
-/// How the samples fit under all models.
-fn mixed_fit<M>(alternatives: &[Alternative<M>], samples: usize) -> Fit {
-    let held = alternatives.iter().filter(|a| a.probability > 0.0);
-    let parts = held.filter_map(|a| Some(a.probability * a.posterior.as_ref()?.fit.chi_squared));
-    Fit {
-        chi_squared: parts.sum(),
-        samples,
-    }
-}
-
-/// Logarithm of the evidence under all models.
-fn log_evidence<M>(alternatives: &[Alternative<M>]) -> f64 {
-    let logs = || alternatives.iter().map(Alternative::log_posterior);
-    let largest = logs().fold(f64::NEG_INFINITY, f64::max);
-    largest + logs().map(|log| (log - largest).exp()).sum::<f64>().ln()
-}
-
-/// Failures of a belief that end a search; others are errors.
-fn failure(error: &Error) -> Option<Status> {
-    match error {
-        Error::Density(crate::density::Error::Core(fewbits_core::Error::Impossible)) => Some(Status::BeliefMiss),
-        Error::Density(crate::density::Error::Unresolved { .. }) => Some(Status::Unresolved),
-        Error::Density(crate::density::Error::Argument(_)) => Some(Status::BeliefMiss),
-        _ => None,
     }
 }

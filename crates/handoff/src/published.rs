@@ -1,6 +1,7 @@
 //! What the losses of all hand-overs say about the error at the end.
 
 use fewbits_densities::{KernelEstimate, Mixture};
+use fewbits_numerics::LogSum;
 use fewbits_mixture_codec::divergence::{kl_from_dr, l1_from_dr};
 use fewbits_mixture_codec::{PlugIn, plug_in};
 
@@ -96,16 +97,16 @@ impl Accounting {
     /// The bounds after the last hand-over; all zero (logarithms `-inf`) before the first.
     pub fn bounds(&self, by: Amplification) -> Bounds {
         let (mut ml, mut dr, mut exponent) = (0.0, 0.0, 0.0);
-        let (mut kl_printed, mut kl_corrected) = (LogSum::new(), LogSum::new());
-        let (mut l1_printed, mut l1_tight) = (LogSum::new(), LogSum::new());
+        let (mut kl_printed, mut kl_corrected) = (LogSum::default(), LogSum::default());
+        let (mut l1_printed, mut l1_tight) = (LogSum::default(), LogSum::default());
         for (i, step) in self.steps.iter().enumerate() {
             let last = i + 1 == self.steps.len();
-            kl_printed.add(exponent, step.kl);
-            kl_corrected.add(exponent, step.kl);
+            kl_printed.add(exponent + step.kl.ln());
+            kl_corrected.add(exponent + step.kl.ln());
             // 2 sinh A = e^A (1 - e^{-2A})
-            kl_corrected.add(exponent, -(-2.0 * exponent).exp_m1() * step.l1);
-            l1_printed.add(exponent, 2.0 * step.l1);
-            l1_tight.add(exponent, if last { step.l1 } else { 2.0 * step.l1 });
+            kl_corrected.add(exponent + (-(-2.0 * exponent).exp_m1() * step.l1).ln());
+            l1_printed.add(exponent + (2.0 * step.l1).ln());
+            l1_tight.add(exponent + (if last { step.l1 } else { 2.0 * step.l1 }).ln());
             ml += step.ml;
             dr += step.dr;
             exponent = 2.0
@@ -117,10 +118,10 @@ impl Accounting {
         Bounds {
             ml_printed: 2.0 * ml,
             ml_from_dr: 2.0 * dr,
-            ln_kl_printed: kl_printed.log(),
-            ln_kl_corrected: kl_corrected.log(),
-            ln_l1_printed: l1_printed.log(),
-            ln_l1_tight: l1_tight.log().min(std::f64::consts::LN_2),
+            ln_kl_printed: kl_printed.value(),
+            ln_kl_corrected: kl_corrected.value(),
+            ln_l1_printed: l1_printed.value(),
+            ln_l1_tight: l1_tight.value().min(std::f64::consts::LN_2),
             kl_from_dr: kl_from_dr(dr),
             l1_from_dr: l1_from_dr(dr),
         }
@@ -131,44 +132,6 @@ impl FromIterator<StepError> for Accounting {
     fn from_iter<I: IntoIterator<Item = StepError>>(steps: I) -> Self {
         Self {
             steps: steps.into_iter().collect(),
-        }
-    }
-}
-
-/// `ln sum exp(a_i) x_i` without overflow.
-struct LogSum {
-    largest: f64,
-    sum: f64,
-}
-
-impl LogSum {
-    fn new() -> Self {
-        Self {
-            largest: f64::NEG_INFINITY,
-            sum: 0.0,
-        }
-    }
-
-    fn add(&mut self, exponent: f64, x: f64) {
-        if x <= 0.0 {
-            return;
-        }
-        let log = exponent + x.ln();
-        if log == f64::INFINITY {
-            (self.largest, self.sum) = (f64::INFINITY, 1.0);
-        } else if log > self.largest {
-            self.sum = self.sum * (self.largest - log).exp() + 1.0;
-            self.largest = log;
-        } else if self.largest < f64::INFINITY {
-            self.sum += (log - self.largest).exp();
-        }
-    }
-
-    fn log(&self) -> f64 {
-        if self.largest.is_finite() {
-            self.largest + self.sum.ln()
-        } else {
-            self.largest
         }
     }
 }
