@@ -1,9 +1,9 @@
 //! What the losses of all hand-overs say about the error at the end.
 
 use fewbits_densities::{KernelEstimate, Mixture};
-use fewbits_numerics::LogSum;
 use fewbits_mixture_codec::divergence::{kl_from_dr, l1_from_dr};
 use fewbits_mixture_codec::{PlugIn, plug_in};
+use fewbits_numerics::LogSum;
 
 /// Errors of one hand-over: of the mixture that was sent against the estimate it stands for.
 ///

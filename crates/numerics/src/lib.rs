@@ -7,7 +7,9 @@
 //! | [`kernels`] | the same functions, sums and exponentials over whole columns, in vector registers |
 //! | [`factored`] | a covariance factored once, for densities and draws |
 //! | [`linalg`], [`tridiagonal`], [`eigen`] | square roots of singular covariances, tridiagonal systems, eigenvalues |
-//! | [`roots`], [`binomial`] | roots inside a bracket, binomial coefficients |
+//! | [`roots`], [`newton`] | roots inside a bracket, without and with a derivative |
+//! | [`golden`] | the maximum of a function with one peak |
+//! | [`binomial`], [`LogSum`] | binomial coefficients, sums of exponentials that arrive one by one |
 //! | [`stored!`] | how types with checking constructors are written and read |
 //! | [`error`] | the argument error all constructors share, and the checks that raise it |
 //!
@@ -27,6 +29,7 @@ mod constants;
 pub mod eigen;
 pub mod error;
 pub mod factored;
+pub mod golden;
 pub mod kernels;
 pub mod linalg;
 mod log_sum;

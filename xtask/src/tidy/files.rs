@@ -69,7 +69,11 @@ pub(super) fn problems(root: &Path, folders: &[PathBuf]) -> Result<Vec<String>, 
     let unneeded = allowed.long.difference(&long).map(|file| format!("long {file}"));
     let unused = allowed.circles.iter().zip(used).filter(|(_, used)| !used);
     let broken = unused.map(|(circle, _)| format!("circle {}", circle.iter().cloned().collect::<Vec<_>>().join(" ")));
-    problems.extend(unneeded.chain(broken).map(|entry| format!("xtask/src/tidy/allowed.txt: `{entry}` is no longer needed")));
+    problems.extend(
+        unneeded
+            .chain(broken)
+            .map(|entry| format!("xtask/src/tidy/allowed.txt: `{entry}` is no longer needed")),
+    );
     Ok(problems)
 }
 
@@ -78,7 +82,11 @@ type Module = Vec<String>;
 
 /// The module that a file below `src` is.
 fn module_of(file: &Path) -> Module {
-    let mut module: Module = file.with_extension("").iter().map(|part| part.to_string_lossy().into_owned()).collect();
+    let mut module: Module = file
+        .with_extension("")
+        .iter()
+        .map(|part| part.to_string_lossy().into_owned())
+        .collect();
     let root = module.len() == 1 && matches!(module[0].as_str(), "lib" | "main");
     if root || module.last().is_some_and(|last| last == "mod") {
         module.pop();
@@ -89,8 +97,14 @@ fn module_of(file: &Path) -> Module {
 /// The text without comments and unit tests.
 fn code(text: &str) -> String {
     let tests = ["#[cfg(test)]\nmod tests", "#[cfg(test)]\n#[allow"];
-    let end = tests.iter().filter_map(|start| text.find(start)).min().unwrap_or(text.len());
-    let lines = text[..end].lines().map(|line| line.split("//").next().unwrap_or_default());
+    let end = tests
+        .iter()
+        .filter_map(|start| text.find(start))
+        .min()
+        .unwrap_or(text.len());
+    let lines = text[..end]
+        .lines()
+        .map(|line| line.split("//").next().unwrap_or_default());
     lines.collect::<Vec<_>>().join("\n")
 }
 
@@ -123,12 +137,20 @@ fn expand(tree: &str, prefix: &mut Module, found: &mut impl FnMut(Module)) {
     let tree = tree.trim();
     let Some(open) = tree.find('{') else {
         let path = tree.split(" as ").next().unwrap_or_default();
-        let parts = path.split("::").map(|part| part.trim().to_owned()).filter(|part| !part.is_empty());
+        let parts = path
+            .split("::")
+            .map(|part| part.trim().to_owned())
+            .filter(|part| !part.is_empty());
         found(prefix.iter().cloned().chain(parts).collect());
         return;
     };
     let depth = prefix.len();
-    prefix.extend(tree[..open].split("::").map(|p| p.trim().to_owned()).filter(|p| !p.is_empty()));
+    prefix.extend(
+        tree[..open]
+            .split("::")
+            .map(|p| p.trim().to_owned())
+            .filter(|p| !p.is_empty()),
+    );
     let inner = tree[open + 1..].rsplit_once('}').map_or("", |(inner, _)| inner);
     let (mut level, mut from) = (0, 0);
     for (at, letter) in inner.char_indices().chain([(inner.len(), ',')]) {
@@ -150,8 +172,12 @@ fn expand(tree: &str, prefix: &mut Module, found: &mut impl FnMut(Module)) {
 /// Paths written out in the code that begin with `crate::` or `super::`.
 fn written(code: &str) -> Vec<Module> {
     let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == ':' || c == '$';
-    let words = code.split(|c| !is_word(c)).filter(|word| word.starts_with("crate::") || word.starts_with("super::"));
-    words.map(|word| word.split("::").filter(|p| !p.is_empty()).map(str::to_owned).collect()).collect()
+    let words = code
+        .split(|c| !is_word(c))
+        .filter(|word| word.starts_with("crate::") || word.starts_with("super::"));
+    words
+        .map(|word| word.split("::").filter(|p| !p.is_empty()).map(str::to_owned).collect())
+        .collect()
 }
 
 /// For each file the files of the crate that it imports from. A `pub use` hands a name on and imports nothing.
@@ -163,7 +189,10 @@ fn imports(files: &BTreeMap<Module, &str>) -> BTreeMap<Module, BTreeSet<Module>>
     }
     let mut graph = BTreeMap::new();
     for (module, code) in &codes {
-        let own = names[*module].iter().filter(|import| !import.is_public).map(|import| import.path.clone());
+        let own = names[*module]
+            .iter()
+            .filter(|import| !import.is_public)
+            .map(|import| import.path.clone());
         let mut targets = BTreeSet::new();
         for path in own.chain(written(code)) {
             targets.extend(defined(&path, module, files, &names, MOST_REEXPORTS));
@@ -230,7 +259,12 @@ fn circles(graph: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<Vec<&Module>> {
     let mut found: Vec<Vec<&Module>> = Vec::new();
     for module in graph.keys().filter(|module| reach[module].contains(*module)) {
         if found.iter().all(|circle| !circle.contains(&module)) {
-            found.push(graph.keys().filter(|o| reach[module].contains(*o) && reach[*o].contains(module)).collect());
+            found.push(
+                graph
+                    .keys()
+                    .filter(|o| reach[module].contains(*o) && reach[*o].contains(module))
+                    .collect(),
+            );
         }
     }
     found
@@ -241,16 +275,25 @@ mod tests {
     use super::*;
 
     fn crate_of(files: &[(&str, &str)]) -> Vec<Vec<String>> {
-        let texts: Vec<(Module, &str)> = files.iter().map(|(file, text)| (module_of(Path::new(file)), *text)).collect();
+        let texts: Vec<(Module, &str)> = files
+            .iter()
+            .map(|(file, text)| (module_of(Path::new(file)), *text))
+            .collect();
         let graph = imports(&texts.into_iter().collect());
-        circles(&graph).iter().map(|circle| circle.iter().map(|m| m.join("/")).collect()).collect()
+        circles(&graph)
+            .iter()
+            .map(|circle| circle.iter().map(|m| m.join("/")).collect())
+            .collect()
     }
 
     #[test]
     fn circles_are_found_through_reexports() {
         let lib = ("lib.rs", "mod a;\nmod b;\npub use a::One;\npub use b::{Two, Three};\n");
         let a = ("a.rs", "use crate::{Three, x::Y};\npub struct One;\n");
-        let straight = ("b.rs", "use std::fmt;\npub struct Two;\npub struct Three;\n#[cfg(test)]\nmod tests { use crate::One; }\n");
+        let straight = (
+            "b.rs",
+            "use std::fmt;\npub struct Two;\npub struct Three;\n#[cfg(test)]\nmod tests { use crate::One; }\n",
+        );
         assert!(crate_of(&[lib, a, straight]).is_empty());
         let round = ("b.rs", "pub struct Two(crate::One);\npub struct Three;\n");
         assert_eq!(crate_of(&[lib, a, round]), [["a", "b"]]);

@@ -10,10 +10,10 @@ use crate::Error;
 use crate::particles::Particles;
 use crate::particles::weights::systematic;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density, Gaussian};
-use fewbits_numerics::{ArgumentError, LogSum};
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::kernels::{scalar, vectorised};
 use fewbits_numerics::normal;
+use fewbits_numerics::{ArgumentError, LogSum};
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -257,10 +257,18 @@ struct Stored {
 
 impl<const D: usize> From<Mixture<D>> for Stored {
     fn from(mixture: Mixture<D>) -> Self {
-        let rows = |c: &Component<D>| (0..D).map(|i| (0..D).map(|j| c.covariance()[(i, j)]).collect()).collect();
+        let rows = |c: &Component<D>| {
+            (0..D)
+                .map(|i| (0..D).map(|j| c.covariance()[(i, j)]).collect())
+                .collect()
+        };
         Self {
             weights: mixture.components.iter().map(Component::weight).collect(),
-            means: mixture.components.iter().map(|c| c.mean().as_slice().to_vec()).collect(),
+            means: mixture
+                .components
+                .iter()
+                .map(|c| c.mean().as_slice().to_vec())
+                .collect(),
             covariances: mixture.components.iter().map(rows).collect(),
         }
     }

@@ -16,6 +16,7 @@ use crate::posterior::Posterior;
 use crate::project::{Form, Travelling, project};
 use crate::select::{Rule, Selector};
 use crate::{Error, RateModel, Record, SourceLikelihood, SourceSensor};
+use alternatives::{Alternative, log_evidence, mixed, mixed_fit, most_probable};
 use fewbits_core::{Belief, Gaussian, Message};
 use fewbits_densities::Mixture;
 use fewbits_models::SourceModel;
@@ -23,7 +24,6 @@ use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, positive, within};
 use fewbits_topology::{Deployment, Graph};
 use nalgebra::Vector2;
-use alternatives::{Alternative, log_evidence, mixed, mixed_fit, most_probable};
 use outcome::failure;
 
 /// Parameters of a search.

@@ -1,8 +1,8 @@
 //! One node's update of the posteriors of all models.
 
+use super::Search;
 use super::alternatives::{Alternative, EXCLUDED};
 use super::outcome::{Status, failure};
-use super::Search;
 use crate::belief::{PositionBelief, Prior, SearchBox};
 use crate::best_fit::best_fit;
 use crate::posterior::Posterior;

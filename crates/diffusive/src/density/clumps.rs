@@ -119,7 +119,6 @@ impl<const D: usize> Clumps<D> {
         }
         Ok(Self { least, ..self })
     }
-
 }
 
 struct Cloud<'a, const D: usize> {

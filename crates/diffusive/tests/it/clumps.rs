@@ -68,8 +68,7 @@ fn what_spreads_most_is_cut_at_its_mean() {
                 .amax()
                 < 1e-12
         );
-        let gap =
-            (clumps.covariance() - whole.covariance()).component_div(&SMatrix::from([[1.0, 1e6], [1e6, 1e12]]));
+        let gap = (clumps.covariance() - whole.covariance()).component_div(&SMatrix::from([[1.0, 1e6], [1e6, 1e12]]));
         assert!(gap.amax() < 1e-10);
         let mut means: Vec<_> = clumps
             .clumps()

@@ -42,11 +42,7 @@ fn slices_are_integrals_of_the_density() {
                 .fold(f64::NEG_INFINITY, |m, (t, _)| m.max(log(t)));
             let moment = |k: i32| rule.composite(range[0], range[1], 500, |t| t.powi(k) * (log(t) - peak).exp());
             let (mass, mean) = (moment(0), moment(1) / moment(0));
-            assert!(
-                (got.log_mass - peak - mass.ln()).abs() < 1e-6,
-                "{place} {sums:?}: {got:?} {}",
-                peak + mass.ln()
-            );
+            assert!((got.log_mass - peak - mass.ln()).abs() < 1e-6, "{place} {sums:?}: {got:?} {}", peak + mass.ln());
             assert!((got.mean - mean).abs() < 1e-6, "{got:?} {mean}");
             assert!((got.variance / (moment(2) / mass - mean * mean) - 1.0).abs() < 1e-4, "{got:?}");
             belief.slice(&(place + Vector2::new(0.2, -0.2)), 0.2, &mut slice);
@@ -93,8 +89,7 @@ fn of_a_gaussian_slices_are_conditionals() {
             let variance = 1.0 / (accuracy + 1.0 / own);
             let mean = variance * (accuracy * at + centre / own);
             let gap = at - centre;
-            let log_mass =
-                log_marginal - 0.5 * (1.0 + own * accuracy).ln() - 0.5 * gap * gap / (own + 1.0 / accuracy);
+            let log_mass = log_marginal - 0.5 * (1.0 + own * accuracy).ln() - 0.5 * gap * gap / (own + 1.0 / accuracy);
             assert!((got.log_mass - log_mass).abs() < 1e-7 * log_mass.abs().max(1.0), "{got:?} {log_mass}");
             assert!((got.mean - mean).abs() < 1e-7 * mean.abs().max(1.0), "{got:?} {mean}");
             assert!((got.variance / variance - 1.0).abs() < 1e-6, "{got:?} {variance}");
@@ -120,16 +115,12 @@ fn of_a_gaussian_slices_are_conditionals() {
             assert!((got.variance / (own + shift * shift) - 1.0).abs() < 1e-7, "{got:?}");
             let widened = 0.5 * ((own + shift * shift) / own).ln();
             let most = |reach: f64| {
-                let grid =
-                    (-10..=10).flat_map(|i| (-10..=10).map(move |j| Vector2::new(f64::from(i), f64::from(j))));
+                let grid = (-10..=10).flat_map(|i| (-10..=10).map(move |j| Vector2::new(f64::from(i), f64::from(j))));
                 let squares = grid.map(|g| d + g * (0.1 * reach)).map(|d| d.dot(&(precision * d)));
                 log_normal(squares.fold(f64::INFINITY, f64::min), std::f64::consts::TAU * plane.determinant())
             };
             let log = got.log_mass - widened;
-            assert!(
-                log > most(half) - 1e-7 && log < most(3.0 * half).max(log_marginal + 1e-7) + 3.0 * half,
-                "{half}"
-            );
+            assert!(log > most(half) - 1e-7 && log < most(3.0 * half).max(log_marginal + 1e-7) + 3.0 * half, "{half}");
         }
     }
 }

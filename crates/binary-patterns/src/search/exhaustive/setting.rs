@@ -1,8 +1,8 @@
 //! What an exhaustive search looks through.
 
-use crate::count::{full_rank_multisets, multisets};
-use crate::linear::{check_mask, grid_bits};
-use crate::source::noise_in_range;
+use crate::observation::source::noise_in_range;
+use crate::patterns::count::{full_rank_multisets, multisets};
+use crate::patterns::linear::{check_mask, grid_bits};
 use crate::{Bank, Error, Grid, Mask, PatternSensor, Source, linear_pattern};
 use fewbits_numerics::error::at_least_one;
 use serde::{Deserialize, Serialize};

@@ -9,14 +9,14 @@ pub use fit::LpgFit;
 pub use three_dimensions::{Slice, SliceMoments};
 
 use super::Error;
+use basis::{gauss_hermite, polynomials};
 use fewbits_core::columns::state_at;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_densities::Component;
-use fewbits_numerics::{ArgumentError, LogSum};
 use fewbits_numerics::error::{all_finite, at_least_one};
 use fewbits_numerics::normal::LN_SQRT_2PI;
+use fewbits_numerics::{ArgumentError, LogSum};
 use nalgebra::{SMatrix, SVector};
-use basis::{gauss_hermite, polynomials};
 use polynomials::{check_degree, multi_indices};
 use rand::{Rng, RngExt};
 

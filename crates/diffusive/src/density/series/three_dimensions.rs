@@ -1,8 +1,8 @@
 //! Polynomial Gaussians over a plane and one more coordinate, beside beliefs that are cells over the plane.
 
-use super::polynomials::HIGHEST_DEGREE;
 use super::basis::{gauss_hermite, row_of_polynomials};
 use super::fit::LpgFit;
+use super::polynomials::HIGHEST_DEGREE;
 use super::{Lpg, Term};
 use crate::density::{Cells, Error};
 use fewbits_core::columns::state_at;

@@ -1,7 +1,7 @@
 //! Division of the measurement axis into cells.
 
 use crate::Error;
-use crate::source::{Kind, Source};
+use crate::observation::source::{Kind, Source};
 use fewbits_numerics::ArgumentError;
 use fewbits_quantizers::quantizer::{cell_of, check_increasing};
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! Exact sizes of the search spaces, in checked 128-bit arithmetic.
 
-use super::grid::bits_in_range;
 use crate::Error;
+use crate::patterns::grid::bits_in_range;
 use fewbits_numerics::binomial::exact as binomial;
 
 fn overflow(what: &'static str) -> Error {
@@ -168,8 +168,8 @@ pub fn bijective_labelings_up_to_reflection(bits: usize) -> Result<u128, Error> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::linear::rank;
     use super::*;
+    use crate::patterns::linear::rank;
 
     /// Counts multisets of masks by listing them.
     fn listed(bits: usize, sensors: usize) -> u128 {

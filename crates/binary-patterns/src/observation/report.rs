@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::PatternSensor;
-use crate::quantizer::BinaryQuantizer;
+use crate::patterns::quantizer::BinaryQuantizer;
 use fewbits_core::bits::{BitReader, BitWriter, CodecError};
 use fewbits_core::factor::{Constant, Scalar};
 use fewbits_core::nalgebra::SVector;

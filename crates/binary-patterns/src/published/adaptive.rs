@@ -2,13 +2,13 @@
 
 use crate::Error;
 use crate::Source;
-use crate::bank::{IMPOSSIBLE, MAX_OUTCOMES};
-use crate::continuous_map::golden;
-use crate::decoder::{moments, squared_error};
-use crate::source::Nodes;
-use crate::source::noise_in_range;
+use crate::decoding::decoder::{moments, squared_error};
+use crate::observation::bank::{IMPOSSIBLE, MAX_OUTCOMES};
+use crate::observation::source::Nodes;
+use crate::observation::source::noise_in_range;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, positive};
+use fewbits_numerics::golden::maximum;
 use fewbits_numerics::newton;
 use fewbits_numerics::normal::{cdf, inverse_mills, log_cdf, log_pdf};
 use fewbits_numerics::quadrature::gauss_legendre;
@@ -19,6 +19,9 @@ const MAX_SENSORS: usize = 20;
 const MLE_STOP: f64 = 1e-14;
 /// Posterior standard deviations within which the variance-minimising threshold is sought.
 const GREEDY_REACH: f64 = 1.5;
+
+/// Relative width at which the search for that threshold stops.
+const THRESHOLD_STOP: f64 = 1e-10;
 
 /// How the next threshold follows from the bits so far. All rules start at 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,7 +148,7 @@ impl Tree<'_> {
             AdaptiveRule::LeastVariance => {
                 let next = self.posterior(w).map_or(threshold, |(mean, variance)| {
                     let spread = GREEDY_REACH * variance.sqrt();
-                    golden(|t| self.explained(w, t), mean - spread, mean + spread)
+                    maximum(|t| self.explained(w, t), mean - spread, mean + spread, THRESHOLD_STOP).0
                 });
                 (next, step)
             }

@@ -1,8 +1,8 @@
 //! Linear patterns: XORs of the natural binary digits of the cell index, named by masks over GF(2).
 
-use super::grid::bits_in_range;
-use super::{Grid, Pattern};
 use crate::Error;
+use crate::patterns::grid::bits_in_range;
+use crate::{Grid, Pattern};
 use fewbits_numerics::ArgumentError;
 
 /// Selects which natural patterns are XORed: the most significant of the `bits` binary digits selects pattern 1.
@@ -123,7 +123,7 @@ pub fn generator_matrix(masks: &[Mask], bits: usize) -> Result<Vec<Vec<bool>>, E
 /// The mask of a pattern over `2^bits` cells, if it is linear.
 pub fn mask_of(pattern: &Pattern) -> Option<Mask> {
     let cells = pattern.cells();
-    if !cells.is_power_of_two() || cells > 1 << super::grid::MAX_BITS {
+    if !cells.is_power_of_two() || cells > 1 << crate::patterns::grid::MAX_BITS {
         return None;
     }
     let bits = cells.trailing_zeros() as usize;
@@ -150,8 +150,8 @@ pub(crate) fn grid_bits(grid: &Grid) -> Result<usize, Error> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::check_separation;
     use super::*;
+    use crate::check_separation;
     use proptest::prelude::*;
 
     fn strings(masks: &[Mask], bits: usize) -> Vec<String> {

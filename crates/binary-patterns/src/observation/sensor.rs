@@ -1,6 +1,6 @@
 //! One sensor with a one-bit quantizer.
 
-use crate::source::noise_in_range;
+use crate::observation::source::noise_in_range;
 use crate::{BinaryQuantizer, Error};
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,8 @@
 //! The maximum of the posterior density, which may have several peaks and plateaus.
 
-use super::bank::Bank;
-use super::source::Kind;
+use crate::observation::bank::Bank;
+use crate::observation::source::Kind;
+use fewbits_numerics::golden::maximum;
 use fewbits_numerics::normal::log_pdf;
 
 /// Fewest points of the scan.
@@ -55,47 +56,7 @@ pub(crate) fn estimates(bank: &Bank, outcomes: usize) -> Vec<f64> {
                     sum + ones as f64 * l1 + (g.count - ones) as f64 * l0
                 })
             };
-            golden(posterior, points[first.saturating_sub(1)], points[(last + 1).min(points.len() - 1)])
+            maximum(posterior, points[first.saturating_sub(1)], points[(last + 1).min(points.len() - 1)], GOLDEN_STOP).0
         })
         .collect()
-}
-
-/// Golden-section search for a maximum of a function with one peak on `[low, high]`.
-pub(crate) fn golden(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    const RATIO: f64 = 0.618_033_988_749_894_9;
-    let stop = GOLDEN_STOP * (high - low);
-    let (mut a, mut b) = (high - RATIO * (high - low), low + RATIO * (high - low));
-    let (mut at_a, mut at_b) = (f(a), f(b));
-    let ends = [(low, f(low)), (high, f(high))];
-    while high - low > stop {
-        if at_a >= at_b {
-            high = b;
-            (b, at_b) = (a, at_a);
-            a = high - RATIO * (high - low);
-            at_a = f(a);
-        } else {
-            low = a;
-            (a, at_a) = (b, at_b);
-            b = low + RATIO * (high - low);
-            at_b = f(b);
-        }
-    }
-    let middle = 0.5 * (low + high);
-    let inside = f(middle);
-    // The maximum over a closed interval may sit at its end.
-    ends.into_iter()
-        .fold((middle, inside), |best, end| if end.1 > best.1 { end } else { best })
-        .0
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn golden_section_finds_inner_and_end_maxima() {
-        assert!((golden(|x| -(x - 0.3) * (x - 0.3), 0.0, 1.0) - 0.3).abs() < 1e-7);
-        assert_eq!(golden(|x| x, 0.0, 1.0), 1.0);
-        assert_eq!(golden(|x| -x, 0.0, 1.0), 0.0);
-    }
 }

@@ -1,9 +1,10 @@
 //! Fusion-centre decoders as look-up tables, and their exact mean squared errors.
 
-use super::bank::{Bank, IMPOSSIBLE};
-use super::source::Nodes;
-use super::{Bit, Grid, LookupTable, continuous_map};
 use crate::Error;
+use crate::decoding::continuous_map;
+use crate::observation::bank::{Bank, IMPOSSIBLE};
+use crate::observation::source::Nodes;
+use crate::{Bit, Grid, LookupTable};
 use fewbits_core::Observation;
 use fewbits_numerics::ArgumentError;
 

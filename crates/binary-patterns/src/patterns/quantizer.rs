@@ -15,7 +15,7 @@ const VANISHED: f64 = 39.0;
 ///
 /// Every one-bit quantizer of a scalar has this form up to the name of its two outputs, whatever [`Pattern`] it came from.
 ///
-/// [`Pattern`]: super::Pattern
+/// [`Pattern`]: crate::Pattern
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct BinaryQuantizer {

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::bounds::mean_information;
-use crate::linear::grid_bits;
+use crate::patterns::linear::grid_bits;
 use crate::{Bank, Grid, PatternSensor, linear_pattern};
 use crate::{Mask, Source};
 use fewbits_numerics::ArgumentError;

@@ -1,6 +1,6 @@
 //! Estimates for all that a bank may report.
 
-use crate::source::Nodes;
+use crate::observation::source::Nodes;
 use crate::{Bank, Bit, Error};
 use fewbits_core::Observation;
 use fewbits_numerics::ArgumentError;

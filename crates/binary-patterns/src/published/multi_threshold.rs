@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::Source;
-use crate::source::Nodes;
+use crate::observation::source::Nodes;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::normal::log_cdf;
 use fewbits_numerics::quadrature::gauss_legendre;

@@ -1,10 +1,10 @@
 //! Luo's universal scheme (2005): half of the sensors quantize the most significant natural bit, a quarter the next, ...
 
 use crate::Error;
-use crate::bank::CountTable;
-use crate::grid::bits_in_range;
-use crate::source::noise_in_range;
-use crate::source::{Blur, Kind, Nodes};
+use crate::observation::bank::CountTable;
+use crate::observation::source::noise_in_range;
+use crate::observation::source::{Blur, Kind, Nodes};
+use crate::patterns::grid::bits_in_range;
 use crate::{Bank, BinaryQuantizer, Decoder, Grid, PatternSensor, Source, linear_pattern, natural_basis};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::quadrature::gauss_legendre;

@@ -1,15 +1,18 @@
-//! What others do with one bit a sensor, all evaluated exactly.
+//! What only reproduces printed comparisons: other schemes that send one bit per sensor, and the thesis's shortcuts around a search. The
+//! recommended designs are in [`search`](crate::search). All errors are exact.
 
 mod adaptive;
 mod luo;
 mod multi_threshold;
+mod strategies;
 
 pub use adaptive::{AdaptiveErrors, AdaptiveRule, adaptive, bounded_mle};
 pub use luo::{Luo, LuoErrors};
 pub use multi_threshold::{MultiThreshold, multi_threshold_bound};
+pub use strategies::{by_information, tile};
 
-use super::{Bank, BinaryQuantizer, Source};
 use crate::Error;
+use crate::{Bank, BinaryQuantizer, Source};
 use fewbits_numerics::error::at_least_one;
 
 /// `sensors` sensors that all send the sign of their measurement.

@@ -1,7 +1,7 @@
 //! Bit patterns over the cells of a grid.
 
-use super::{BinaryQuantizer, Grid};
 use crate::Error;
+use crate::{BinaryQuantizer, Grid};
 use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 use std::fmt;

@@ -1,6 +1,6 @@
 //! A source observed through a bank of one-bit sensors, and the exact enumeration of what they may report.
 
-use crate::source::{Blur, Nodes};
+use crate::observation::source::{Blur, Nodes};
 use crate::{BinaryQuantizer, Error, PatternSensor, Source};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::binomial;
