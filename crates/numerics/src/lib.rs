@@ -26,19 +26,16 @@
 
 pub mod binomial;
 mod constants;
-pub mod eigen;
 pub mod error;
-pub mod factored;
-pub mod golden;
 pub mod kernels;
-pub mod linalg;
+mod linear_algebra;
 mod log_sum;
-pub mod newton;
 pub mod normal;
 pub mod quadrature;
-pub mod roots;
+mod solvers;
 pub mod stored;
-pub mod tridiagonal;
 
 pub use error::ArgumentError;
+pub use linear_algebra::{eigen, factored, linalg, tridiagonal};
 pub use log_sum::LogSum;
+pub use solvers::{golden, newton, roots};
