@@ -1,4 +1,4 @@
-//! Estimation from sensors that may hardly speak: one bit a sample, a message only when it matters.
+//! Estimation from sensors that may send only a few bits: one bit per sample, a message only when it matters.
 //!
 //! This crate only re-exports; depend on the single crates if you need one of them. Each is behind a feature of its name,
 //! all but `diffusion` (which builds a sparse solver) on by default:
@@ -9,14 +9,16 @@
 //! | [`numerics`], [`monte_carlo`] | always | normal-distribution numerics; random streams, Monte Carlo |
 //! | `adaptive` | `adaptive` | any signal within a guaranteed error, in as few bits as it deserves |
 //! | `dymbo` | `dymbo` | Kalman-like filters fed with one sign bit a sample |
-//! | `cfwmd` | `cfwmd` | sensors that censor dull measurements, and fusion that hears their silence |
+//! | `cfwmd` | `cfwmd` | sensors that send only surprising measurements, and fusion that learns from their silence |
 //! | `diffusion` | `diffusion` | concentrations in rooms, walls and wind, by sparse factorisations |
 //! | `diffusive`, `topology` | `diffusive` | a diffusive source, found by a belief that walks the network |
+//! | `handoff` | `handoff` | a particle filter whose belief travels from leader to leader in a few bytes |
 //! | `quantizers` | `quantizers` | the quantizer a sensor holds, its words, Lloyd-Max tables |
 //! | `quantizer_design` | `quantizer-design` | joint design and decoding of distributed scalar quantizers |
 //! | `binary_patterns` | `binary-patterns` | one-bit quantizers with patterned cells |
 //! | `pf_mpa` | `pf-mpa` | tracking from quantized ranges |
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
+//! | `record` | `record` | files and frames of many columns within guaranteed errors |
 //! | `network` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
 
@@ -40,6 +42,8 @@ pub use fewbits_diffusive as diffusive;
 pub use fewbits_dymbo as dymbo;
 #[cfg(feature = "filters")]
 pub use fewbits_filters as filters;
+#[cfg(feature = "handoff")]
+pub use fewbits_handoff as handoff;
 #[cfg(feature = "filters")]
 pub use fewbits_models as models;
 #[cfg(feature = "network")]
@@ -50,6 +54,8 @@ pub use fewbits_pf_mpa as pf_mpa;
 pub use fewbits_quantizer_design as quantizer_design;
 #[cfg(feature = "quantizers")]
 pub use fewbits_quantizers as quantizers;
+#[cfg(feature = "record")]
+pub use fewbits_record as record;
 #[cfg(feature = "sensor-assignment")]
 pub use fewbits_sensor_assignment as sensor_assignment;
 #[cfg(any(feature = "diffusive", feature = "network"))]
