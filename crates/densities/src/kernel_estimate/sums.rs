@@ -51,7 +51,7 @@ fn kernel_sums<const D: usize, const P: usize>(
             lane[p][j] += w * power_of_half((exponent(&chunk, &points[p], j) - offset).max(0.0));
         }
     }
-    lane.map(|lane| folded(lane))
+    lane.map(folded)
 }
 
 /// `ln sum_j w_j exp(-|z - z_j|^2/2)` of each point, exact in the tails: where the plain sum is tiny, it is taken again with the
@@ -148,7 +148,7 @@ fn cross_sums<const D: usize, const P: usize>(
             }
         }
     }
-    lane.map(|lane| folded(lane))
+    lane.map(folded)
 }
 
 /// A short run filled up with zeros.

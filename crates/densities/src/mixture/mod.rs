@@ -293,15 +293,12 @@ impl<const D: usize> TryFrom<Stored> for Mixture<D> {
             let covariance = SMatrix::from_fn(|i, j| stored.covariances[k][i][j]);
             Component::new(stored.weights[k], mean, covariance)
         });
-        let mixture = Self::new(components.collect::<Result<_, _>>()?)?;
+        let mut mixture = Self::new(components.collect::<Result<_, _>>()?)?;
         // Weights that already summed to one are kept to the last bit.
         let total: f64 = stored.weights.iter().sum();
         if (total - 1.0).abs() < 1e-12 {
-            let components = mixture.components.into_iter().zip(stored.weights);
-            let keep = |(c, weight)| Component { weight, ..c };
-            return Ok(Self {
-                components: components.map(keep).collect(),
-            });
+            let kept = mixture.components.iter_mut().zip(stored.weights);
+            kept.for_each(|(component, weight)| component.weight = weight);
         }
         Ok(mixture)
     }

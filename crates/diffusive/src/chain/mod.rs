@@ -17,7 +17,7 @@ use crate::project::{Form, Travelling, project};
 use crate::select::{Rule, Selector};
 use crate::{Error, RateModel, Record, SourceLikelihood, SourceSensor};
 use alternatives::{Alternative, log_evidence, mixed, mixed_fit, most_probable};
-use fewbits_core::{Belief, Gaussian, Message};
+use fewbits_core::{Gaussian, Message};
 use fewbits_densities::Mixture;
 use fewbits_models::SourceModel;
 use fewbits_numerics::ArgumentError;

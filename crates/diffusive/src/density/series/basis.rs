@@ -5,7 +5,12 @@ use nalgebra::{DMatrix, SVector};
 
 /// Orthonormal Hermite products `prod_d he_nu_d(u_d) / sqrt(nu_d!)` for every index.
 #[inline]
-pub(super) fn polynomials<const D: usize>(indices: &[[usize; D]], degree: usize, u: &SVector<f64, D>, out: &mut [f64]) {
+pub(super) fn hermite_products<const D: usize>(
+    indices: &[[usize; D]],
+    degree: usize,
+    u: &SVector<f64, D>,
+    out: &mut [f64],
+) {
     let mut table = [[0.0; HIGHEST_DEGREE + 1]; D];
     for (row, x) in table.iter_mut().zip(u.iter()) {
         row_of_polynomials(*x, &mut row[..=degree]);

@@ -1,7 +1,7 @@
 //! The best series for a belief over cells: the Galerkin projection of the root of its density.
 
 use super::Lpg;
-use super::basis::polynomials;
+use super::basis::hermite_products;
 use crate::density::{Cells, Error};
 use fewbits_core::columns::state_at;
 use fewbits_densities::Component;
@@ -43,7 +43,7 @@ impl<const D: usize> Lpg<D> {
                     continue;
                 }
                 let factor = root * log.exp();
-                polynomials(&belief.indices, degree, &u, &mut basis);
+                hermite_products(&belief.indices, degree, &u, &mut basis);
                 for (nu, value) in basis.iter().enumerate() {
                     b[l * size + nu] += factor * value;
                 }
@@ -80,8 +80,8 @@ impl<const D: usize> Lpg<D> {
                 // Orthonormal.
                 return;
             }
-            polynomials(&self.indices, self.degree, ul, &mut of_l);
-            polynomials(&self.indices, self.degree, um, &mut of_m);
+            hermite_products(&self.indices, self.degree, ul, &mut of_l);
+            hermite_products(&self.indices, self.degree, um, &mut of_m);
             for (i, a) in of_l.iter().enumerate() {
                 for (j, b) in of_m.iter().enumerate() {
                     let value = weight * a * b;

@@ -9,7 +9,7 @@ pub use fit::LpgFit;
 pub use three_dimensions::{Slice, SliceMoments};
 
 use super::Error;
-use basis::{gauss_hermite, polynomials};
+use basis::{gauss_hermite, hermite_products};
 use fewbits_core::columns::state_at;
 use fewbits_core::{Belief, Columns, ColumnsMut, Density};
 use fewbits_densities::Component;
@@ -129,7 +129,7 @@ impl<const D: usize> Lpg<D> {
             if peak < highest - 60.0 {
                 continue;
             }
-            polynomials(&self.indices, self.degree, &u, scratch);
+            hermite_products(&self.indices, self.degree, &u, scratch);
             let parts = scratch
                 .iter()
                 .zip(&term.coefficients)
@@ -212,7 +212,7 @@ impl<const D: usize> Lpg<D> {
         let origin = *self.terms[0].gaussian.mean();
         self.pairs(self.degree + 2, |l, m, weight, x, ul, um| {
             let mut at = |term: &Term<D>, u| {
-                polynomials(&self.indices, self.degree, u, &mut values);
+                hermite_products(&self.indices, self.degree, u, &mut values);
                 values.iter().zip(&term.coefficients).map(|(v, c)| v * c).sum::<f64>()
             };
             let product = at(&self.terms[l], ul) * at(&self.terms[m], um);
@@ -243,7 +243,7 @@ impl<const D: usize> Lpg<D> {
         for term in &self.terms {
             let u = term.whitened(x);
             let log = term.half_log_peak - 0.25 * u.norm_squared();
-            polynomials(&self.indices, self.degree, &u, values);
+            hermite_products(&self.indices, self.degree, &u, values);
             let polynomial: f64 = values.iter().zip(&term.coefficients).map(|(v, c)| v * c).sum();
             if log > largest {
                 sum *= (largest - log).exp();
