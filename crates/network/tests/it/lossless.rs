@@ -9,14 +9,15 @@ use fewbits_core::factor::{InCell, Value};
 use fewbits_core::{
     BitString, Cell, Dynamics, Gaussian, Link, Message, NumberFormat, Observation, Observed, Scheme, Sensing, Sign,
 };
-use fewbits_densities::wire::WireFormat;
-use fewbits_densities::{Grid, Mixture, PointMass, Reduction};
+use fewbits_densities::{Grid, Mixture, PointMass};
 use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SourceSensor, Status};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarFilter,
 };
 use fewbits_filters::{MomentFilter, PointMassFilter, PointMasses, assumed_density, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
+use fewbits_mixture_codec::Reduction;
+use fewbits_mixture_codec::wire::WireFormat;
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;

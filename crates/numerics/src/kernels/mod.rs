@@ -43,6 +43,8 @@ pub(crate) mod elementary;
 #[cfg(feature = "std")]
 mod normals;
 #[cfg(feature = "std")]
+mod power_of_half;
+#[cfg(feature = "std")]
 mod reduce;
 #[cfg(feature = "std")]
 pub(crate) mod tail;
@@ -50,7 +52,9 @@ pub(crate) mod tail;
 #[cfg(feature = "std")]
 pub use normals::{StandardNormals, fill_standard_normals};
 #[cfg(feature = "std")]
-pub use reduce::{ExpSums, dot, exp_minus, largest, largest_number, log_sum_exp, sum, weighted_covariance};
+pub use reduce::{
+    ExpSums, LANES, dot, exp_minus, folded, largest, largest_number, log_sum_exp, sum, weighted_covariance,
+};
 
 /// The functions of the slices one element at a time: no branches, no calls, always inlined. For loops under [`vectorised`];
 /// elsewhere [`normal`](crate::normal) has the same functions under the same names.
@@ -58,6 +62,8 @@ pub mod scalar {
     #[cfg(feature = "std")]
     pub use super::cell::{WIDE, interval, interval_wide, log_interval, log_interval_wide};
     pub use super::elementary::{exp, ln};
+    #[cfg(feature = "std")]
+    pub use super::power_of_half::power_of_half;
     #[cfg(feature = "std")]
     pub use super::tail::{cdf, erfcx, inverse_mills, log_cdf, pdf};
 }
