@@ -5,7 +5,8 @@ use crate::error::refuse;
 use crate::factor::RangeFactor;
 use crate::sensor::RangeNoise;
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Link, MeasurementNoise, Message, NumberFormat, Observation, Scheme,
+    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
+    Scheme,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_quantizers::{Labelling, Symbol};
@@ -25,6 +26,15 @@ pub struct RangeReference {
 }
 
 impl RangeReference {
+    /// The reference about an expected measurement: its mean, and `loading` of its standard deviations to either side
+    /// ([`optimal_loading`](crate::optimal_loading)).
+    pub fn about(expected: &Gaussian<1>, loading: f64) -> Self {
+        Self {
+            centre: expected.mean()[0],
+            half_width: loading * expected.covariance()[0].sqrt(),
+        }
+    }
+
     /// Edge `q` of `levels` cells, of `levels + 1`.
     #[inline]
     fn edge(&self, q: usize, levels: usize) -> f64 {

@@ -1,6 +1,6 @@
 //! Exact marginals of a tree by sum-product.
 
-use super::{FactorGraph, Function};
+use super::FactorGraph;
 use crate::Error;
 use crate::error::refuse;
 
@@ -106,6 +106,7 @@ fn normalised(mut message: Vec<f64>) -> Result<Vec<f64>, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::graph::Function;
     use proptest::prelude::*;
 
     fn random(states: [usize; 5], values: &[f64]) -> FactorGraph {

@@ -309,10 +309,7 @@ impl RangeTracker {
                         scheme: quantizer(bits, self.noise)?,
                         settings,
                     };
-                    let ask = move |_: &Gaussian<5>, m: &Gaussian<1>| RangeReference {
-                        centre: m.mean()[0],
-                        half_width: loading * m.covariance()[0].sqrt(),
-                    };
+                    let ask = move |_: &Gaussian<5>, expected: &Gaussian<1>| RangeReference::about(expected, loading);
                     centre.join(anchor.number, Reporting::new(sensing, scheme, Link::PERFECT, ask))?;
                 }
             }
