@@ -82,7 +82,7 @@ impl<const M: usize> CensoringRule<M> {
     pub fn sends(&self, innovation: &SVector<f64, M>) -> bool {
         if M == 1 {
             // The fusion centre works with this very interval.
-            innovation[0].abs() >= self.half_width
+            fewbits_node::censor::reaches(innovation[0], self.half_width)
         } else {
             self.statistic(innovation) >= self.threshold()
         }

@@ -6,6 +6,7 @@
 mod arguments;
 mod bench;
 mod bounds;
+mod centre;
 mod clock;
 mod design;
 mod error;
@@ -20,6 +21,8 @@ mod pack;
 mod parquet;
 mod plan;
 mod plot;
+mod report;
+mod sensor;
 mod serial;
 mod track;
 mod unpack;
@@ -52,6 +55,8 @@ fn main() -> ExitCode {
         Task::Send(options) => link::send(&options),
         Task::Receive(options) => link::receive(&options),
         Task::Generate(options) => generate::run(&options),
+        Task::Centre(options) => centre::run(&options),
+        Task::Sensor(options) => sensor::run(&options),
     };
     match done {
         Ok(Ending::Good) => ExitCode::SUCCESS,

@@ -119,12 +119,8 @@ impl InnovationWord {
     /// If a number is not finite, or the deviation is not positive.
     #[inline]
     pub fn word(&self, measurement: f64, prediction: &Prediction) -> Result<CellIndex, ArgumentError> {
-        let scale = positive("deviation", prediction.deviation)?;
-        let offset = finite("measurement", measurement)? - finite("prediction", prediction.mean)?;
-        let below = self
-            .quantizer
-            .breakpoints()
-            .partition_point(|edge| *edge <= offset / scale);
+        let thresholds = self.quantizer.breakpoints();
+        let below = fewbits_node::innovation_cell(thresholds, measurement, prediction.mean, prediction.deviation)?;
         Ok(CellIndex(below as u16))
     }
 

@@ -87,7 +87,8 @@ impl Scheme<1> for SignBit {
         measurement: &Vector1<f64>,
         threshold: &f64,
     ) -> Result<Option<Sign>, fewbits_core::Error> {
-        Ok(Some(Sign::of(measurement[0], *threshold)?))
+        let reached = fewbits_node::sign_bit(measurement[0], *threshold).map_err(ArgumentError::from)?;
+        Ok(Some(if reached { Sign::Above } else { Sign::Below }))
     }
 
     fn factor(

@@ -19,6 +19,7 @@
 //! | `pf_mpa` | `pf-mpa` | tracking from quantized ranges |
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
 //! | `record` | `record` | files and frames of many columns within guaranteed errors |
+//! | `link`, `protocol` | `link` | a fusion centre and its sensors as processes: frames, keys, sockets |
 //! | `network` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
 
@@ -46,8 +47,12 @@ pub use fewbits_filters as filters;
 pub use fewbits_handoff as handoff;
 #[cfg(feature = "filters")]
 pub use fewbits_models as models;
+#[cfg(feature = "link")]
+pub use fewbits_link as link;
 #[cfg(feature = "network")]
 pub use fewbits_network as network;
+#[cfg(feature = "link")]
+pub use fewbits_protocol as protocol;
 #[cfg(feature = "pf-mpa")]
 pub use fewbits_pf_mpa as pf_mpa;
 #[cfg(feature = "quantizer-design")]

@@ -5,7 +5,7 @@ use crate::error::refuse;
 use crate::leader::lower_factor;
 use crate::linearised::Velocity;
 use crate::message::{DynamicsWeight, KernelMessage, KernelRule, Ring, RingWeight, kernel_of};
-use crate::product::{Drawn, ProductSampler, ProductWorkspace};
+use crate::product_sampler::{Drawn, ProductSampler, ProductWorkspace};
 use crate::target::Target;
 use crate::tracker::{Ranged, StepInfo, Tracker};
 use fewbits_core::Gaussian;

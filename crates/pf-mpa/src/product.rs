@@ -1,397 +1,283 @@
-//! How the product of several messages is drawn.
+//! Products of mixtures: exact by enumeration, Gibbs sampling over labels, importance sampling.
+//!
+//! The product of `F` mixtures is a mixture of one Gaussian for each choice of labels `b_1 .. b_F`, with
+//! `J = sum S_l^-1`, `h = sum S_l^-1 m_l`, mean `J^-1 h`, covariance `J^-1` and a weight in closed form: exact where the labels can
+//! be enumerated. Where they cannot, Gibbs sweeps draw one label at a time given the others, and importance sampling draws from
+//! one factor and weighs by the rest.
 
 use crate::Error;
-use crate::error::refuse;
-use crate::message::KernelMessage;
-use fewbits_densities::{Mixture, product};
-use fewbits_numerics::kernels::{self, scalar, vectorised};
-use nalgebra::{Cholesky, Matrix2, Vector2};
+use fewbits_densities::{Component, Mixture, Particles};
+use fewbits_filters::Resampling;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::factored::Factored;
+use fewbits_numerics::normal::LN_SQRT_2PI;
+use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
-use serde::{Deserialize, Serialize};
 
-/// How the product of messages at a variable node is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ProductSampler {
-    /// Gibbs sweeps over the labels, one chain per draw.
-    Gibbs {
-        /// Sweeps.
-        sweeps: usize,
-    },
-    /// Draws from the first message, weighed by all others and resampled.
-    MixtureImportance {
-        /// Draws from the first message.
-        draws: usize,
-    },
-    /// Every choice of labels written out; at most a million.
-    Exact,
+/// The most label choices that [`exact`] enumerates.
+pub const MOST_TERMS: usize = 1_000_000;
+
+/// A normalised product and the logarithm of its normaliser `int prod_l p_l(x) dx`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Product<B> {
+    /// The normalised product.
+    pub belief: B,
+    /// `ln int prod_l p_l(x) dx`: exact, or its estimate.
+    pub log_normaliser: f64,
 }
 
-/// What the sampler keeps from step to step.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct ProductWorkspace {
-    logs: Vec<f64>,
-    labels: Vec<usize>,
-    parts: Vec<Part>,
-    draws: [Vec<f64>; 2],
-    chosen: Vec<usize>,
-    log_weights: Vec<f64>,
+/// Information form of one component: `S^-1`, `S^-1 m`, and `ln w + ln N(0; m, S)`.
+#[derive(Clone, Copy)]
+struct Information<const D: usize> {
+    precision: SMatrix<f64, D, D>,
+    shift: SVector<f64, D>,
+    log_weight: f64,
 }
 
-/// What does not change with the labels, of one message.
-#[derive(Debug, Clone)]
-struct Part {
-    /// `S_l^-1`.
-    precision: Matrix2<f64>,
-    /// `(J - S_l^-1)^-1`; zero where the message is alone.
-    rest: Matrix2<f64>,
-    /// Whitens `rest + S_l`.
-    whitener: Matrix2<f64>,
-}
-
-/// Positions drawn from the product of messages, and the label of the first message behind each.
-pub(crate) struct Drawn<'a> {
-    pub(crate) x: &'a mut [f64],
-    pub(crate) y: &'a mut [f64],
-    pub(crate) labels: &'a mut [usize],
-}
-
-impl ProductSampler {
-    /// Fills `out` with draws of the product of `messages`, all finished and with kernels.
-    pub(crate) fn draw<R: Rng + ?Sized>(
-        self,
-        rng: &mut R,
-        messages: &mut [KernelMessage],
-        workspace: &mut ProductWorkspace,
-        out: &mut Drawn<'_>,
-    ) -> Result<(), Error> {
-        match self {
-            Self::Gibbs { sweeps } => gibbs(rng, messages, sweeps, workspace, out),
-            Self::MixtureImportance { draws } => importance(rng, messages, draws, workspace, out),
-            Self::Exact => exact(rng, messages, out),
-        }
-    }
-}
-
-fn inverse(m: &Matrix2<f64>) -> Result<Matrix2<f64>, Error> {
-    match Cholesky::new(*m) {
-        Some(factor) => Ok(factor.inverse()),
-        None => refuse("kernel", format!("{m:?}"), "a positive definite matrix"),
-    }
-}
-
-fn whitener(m: &Matrix2<f64>) -> Result<Matrix2<f64>, Error> {
-    let lower = Cholesky::new(*m).map(|f| f.l());
-    match lower.and_then(|l| l.solve_lower_triangular(&Matrix2::identity())) {
-        Some(w) => Ok(w),
-        None => refuse("kernel", format!("{m:?}"), "a positive definite matrix"),
-    }
-}
-
-/// Gibbs sweeps with what the shared kernels allow: all precisions are the same for every choice of labels, so that a label's
-/// conditional is one sweep over whitened points.
-fn gibbs<R: Rng + ?Sized>(
-    rng: &mut R,
-    messages: &mut [KernelMessage],
-    sweeps: usize,
-    workspace: &mut ProductWorkspace,
-    out: &mut Drawn<'_>,
-) -> Result<(), Error> {
-    let Some(first) = messages.first() else {
-        return refuse("messages", 0, "at least one");
-    };
-    let origin = first.point(0);
-    let ProductWorkspace {
-        logs, labels, parts, ..
-    } = workspace;
-    parts.clear();
-    let mut total = Matrix2::zeros();
-    for message in messages.iter() {
-        let precision = inverse(&message.kernel)?;
-        total += precision;
-        parts.push(Part {
+impl<const D: usize> Information<D> {
+    fn of(c: &Component<D>, origin: &SVector<f64, D>) -> Self {
+        let w = &c.factor().whitener;
+        let precision = w.transpose() * w;
+        let mean = c.mean() - origin;
+        Self {
             precision,
-            rest: Matrix2::zeros(),
-            whitener: Matrix2::zeros(),
-        });
-    }
-    let covariance = inverse(&total)?;
-    let Some(spread) = Cholesky::new(covariance).map(|f| f.l()) else {
-        return refuse("kernel", format!("{covariance:?}"), "a positive definite matrix");
-    };
-    let alone = messages.len() == 1;
-    for (part, message) in parts.iter_mut().zip(messages.iter_mut()) {
-        message.x.iter_mut().for_each(|x| *x -= origin[0]);
-        message.y.iter_mut().for_each(|y| *y -= origin[1]);
-        if alone {
-            continue;
-        }
-        part.rest = inverse(&(total - part.precision))?;
-        part.whitener = whitener(&(part.rest + message.kernel))?;
-        for i in 0..message.x.len() {
-            let white = part.whitener * message.point(i);
-            message.white[0][i] = white[0];
-            message.white[1][i] = white[1];
+            shift: precision * mean,
+            log_weight: c.weight().ln()
+                - 0.5 * c.factor().squared(&mean)
+                - c.factor().half_log_det
+                - D as f64 * LN_SQRT_2PI,
         }
     }
-    for n in 0..out.x.len() {
-        labels.clear();
-        let mut shift = Vector2::zeros();
-        for (message, part) in messages.iter().zip(parts.iter()) {
-            let label = message.label(rng);
-            labels.push(label);
-            shift += part.precision * message.point(label);
-        }
-        for _ in 0..if alone { 0 } else { sweeps } {
-            for (l, (message, part)) in messages.iter().zip(parts.iter()).enumerate() {
-                shift -= part.precision * message.point(labels[l]);
-                let white = part.whitener * (part.rest * shift);
-                labels[l] = conditional(rng, message, &white, logs);
-                shift += part.precision * message.point(labels[l]);
-            }
-        }
-        let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
-        let place = origin + covariance * shift + spread * z;
-        (out.x[n], out.y[n], out.labels[n]) = (place[0], place[1], labels[0]);
-    }
-    for message in messages {
-        message.x.iter_mut().for_each(|x| *x += origin[0]);
-        message.y.iter_mut().for_each(|y| *y += origin[1]);
-    }
-    Ok(())
 }
 
-/// A label given the others: `ln w~_i = ln w_i - |white_i - centre|^2 / 2`.
-#[inline]
-fn conditional<R: Rng + ?Sized>(
-    rng: &mut R,
-    message: &KernelMessage,
-    centre: &Vector2<f64>,
-    logs: &mut Vec<f64>,
-) -> usize {
-    let count = message.x.len();
-    logs.resize(count, 0.0);
-    let (cx, cy) = (centre[0], centre[1]);
-    let (logs, weights) = (&mut logs[..count], &message.log_weights[..count]);
-    let (x, y) = (&message.white[0][..count], &message.white[1][..count]);
-    let total = vectorised(
-        #[inline(always)]
-        || {
-            let mut largest = f64::NEG_INFINITY;
-            for i in 0..count {
-                let (dx, dy) = (x[i] - cx, y[i] - cy);
-                let log = weights[i] - 0.5 * (dx * dx + dy * dy);
-                logs[i] = log;
-                largest = if log > largest { log } else { largest };
-            }
-            for log in logs.iter_mut() {
-                *log = scalar::exp(*log - largest);
-            }
-            let mut total = 0.0;
-            for log in logs.iter() {
-                total += log;
-            }
-            total
-        },
-    );
-    let mut left = rng.random::<f64>() * total;
-    let mut chosen = 0;
-    for (i, w) in logs.iter().enumerate() {
-        if *w > 0.0 {
-            chosen = i;
-            if left < *w {
-                break;
-            }
-            left -= w;
-        }
-    }
-    chosen
+/// A Gaussian from its information form.
+fn gaussian<const D: usize>(
+    precision: &SMatrix<f64, D, D>,
+    shift: &SVector<f64, D>,
+) -> Result<(SVector<f64, D>, SMatrix<f64, D, D>, Factored<D>), Error> {
+    let factor = Factored::new("precision", &((precision + precision.transpose()) * 0.5))?;
+    let covariance = factor.whitener.transpose() * factor.whitener;
+    Ok((factor.whitener.transpose() * (factor.whitener * shift), covariance, factor))
 }
 
-/// Systematic draws from the first message, weighed by the densities of the others, resampled.
-fn importance<R: Rng + ?Sized>(
-    rng: &mut R,
-    messages: &[KernelMessage],
-    draws: usize,
-    workspace: &mut ProductWorkspace,
-    out: &mut Drawn<'_>,
-) -> Result<(), Error> {
-    let Some((first, others)) = messages.split_first() else {
-        return refuse("messages", 0, "at least one");
+fn check<const D: usize>(factors: &[&Mixture<D>]) -> Result<SVector<f64, D>, Error> {
+    at_least_one("factors", factors.len())?;
+    Ok(factors.iter().map(|f| f.mean()).sum::<SVector<f64, D>>() / factors.len() as f64)
+}
+
+/// The product of mixtures with every choice of labels written out.
+///
+/// # Errors
+/// If there is no factor, there are more than [`MOST_TERMS`] choices, or every weight underflows
+/// ([`fewbits_core::Error::Impossible`]: factors that contradict each other astronomically).
+pub fn exact<const D: usize>(factors: &[&Mixture<D>]) -> Result<Product<Mixture<D>>, Error> {
+    let origin = check(factors)?;
+    let terms = factors
+        .iter()
+        .try_fold(1_usize, |n, f| n.checked_mul(f.len()).filter(|n| *n <= MOST_TERMS));
+    if terms.is_none() {
+        let sizes: Vec<usize> = factors.iter().map(|f| f.len()).collect();
+        return Err(ArgumentError::new(
+            "factors",
+            format!("mixtures of {sizes:?} components"),
+            format!("at most {MOST_TERMS} choices of labels"),
+        )
+        .into());
+    }
+    let zero = Information {
+        precision: SMatrix::zeros(),
+        shift: SVector::zeros(),
+        log_weight: 0.0,
     };
-    if draws == 0 {
-        return refuse("draws", 0, "at least 1");
+    let mut products = vec![zero];
+    for factor in factors {
+        let parts: Vec<Information<D>> = factor
+            .components()
+            .iter()
+            .filter(|c| c.weight() > 0.0)
+            .map(|c| Information::of(c, &origin))
+            .collect();
+        products = products
+            .iter()
+            .flat_map(|a| {
+                parts.iter().map(move |b| Information {
+                    precision: a.precision + b.precision,
+                    shift: a.shift + b.shift,
+                    log_weight: a.log_weight + b.log_weight,
+                })
+            })
+            .collect();
     }
-    let ProductWorkspace {
-        logs,
-        draws: places,
-        chosen,
-        log_weights,
-        ..
-    } = workspace;
-    places.iter_mut().for_each(|p| p.resize(draws, 0.0));
-    chosen.resize(draws, 0);
-    log_weights.resize(draws, 0.0);
-    log_weights.fill(0.0);
-    let Some(spread) = Cholesky::new(first.kernel).map(|f| f.l()) else {
-        return refuse("kernel", format!("{:?}", first.kernel), "a positive definite matrix");
-    };
-    let (offset, mut label): (f64, usize) = (rng.random(), 0);
-    for n in 0..draws {
-        let level = (n as f64 + offset) / draws as f64;
-        while label + 1 < first.cumulative.len() && first.cumulative[label] <= level {
-            label += 1;
-        }
-        let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
-        let place = first.point(label) + spread * z;
-        (places[0][n], places[1][n], chosen[n]) = (place[0], place[1], label);
+    let mut gaussians = Vec::with_capacity(products.len());
+    for p in &products {
+        let (mean, covariance, factor) = gaussian(&p.precision, &p.shift)?;
+        // prod_l N(0; m_l, S_l) = N(0; mean, covariance) times the wanted weight.
+        let own = 0.5 * mean.dot(&p.shift) - factor.half_log_det + D as f64 * LN_SQRT_2PI;
+        gaussians.push((p.log_weight + own, mean, covariance));
     }
-    for message in others {
-        let white = whitener(&message.kernel)?;
-        logs.resize(message.x.len(), 0.0);
-        for n in 0..draws {
-            let place = Vector2::new(places[0][n], places[1][n]);
-            for (i, log) in logs.iter_mut().enumerate() {
-                *log = message.log_weights[i] - 0.5 * (white * (message.point(i) - place)).norm_squared();
-            }
-            log_weights[n] += kernels::log_sum_exp(logs);
-        }
-    }
-    let largest = kernels::largest(log_weights);
+    let largest = gaussians.iter().fold(f64::NEG_INFINITY, |m, g| m.max(g.0));
     if !largest.is_finite() {
         return Err(Error::IMPOSSIBLE);
     }
-    let total: f64 = log_weights.iter().map(|l| (l - largest).exp()).sum();
-    let (step, mut cumulative, mut n) = (total / out.x.len() as f64, (log_weights[0] - largest).exp(), 0);
-    let offset: f64 = rng.random();
-    for k in 0..out.x.len() {
-        while cumulative <= (k as f64 + offset) * step && n + 1 < draws {
-            n += 1;
-            cumulative += (log_weights[n] - largest).exp();
-        }
-        (out.x[k], out.y[k], out.labels[k]) = (places[0][n], places[1][n], chosen[n]);
-    }
-    Ok(())
+    let total: f64 = gaussians.iter().map(|g| (g.0 - largest).exp()).sum();
+    let components = gaussians.into_iter().map(|(log, mean, covariance)| {
+        let symmetric = (covariance + covariance.transpose()) * 0.5;
+        Component::new((log - largest).exp(), mean + origin, symmetric)
+    });
+    Ok(Product {
+        belief: Mixture::new(components.collect::<Result<_, _>>()?)?,
+        log_normaliser: largest + total.ln(),
+    })
 }
 
-/// Independent draws of the enumerated product.
-fn exact<R: Rng + ?Sized>(rng: &mut R, messages: &[KernelMessage], out: &mut Drawn<'_>) -> Result<(), Error> {
-    let mixtures: Vec<Mixture<2>> = messages.iter().map(KernelMessage::mixture).collect::<Result<_, _>>()?;
-    let product = product::exact(&mixtures.iter().collect::<Vec<_>>())?.belief;
-    // Labels of the first message vary slowest; those of zero weight are left out.
-    let kept: Vec<usize> = (0..messages[0].x.len())
-        .filter(|i| messages[0].weight(*i) > 0.0)
+/// `count` draws of the product by Gibbs sweeps over the labels, one independent chain per draw: labels start from the weights,
+/// `sweeps` sweeps follow, then one draw of `N(J^-1 h, J^-1)`.
+///
+/// ```text
+/// update of label l: C = (J - S_l^-1)^-1, m = C (h - S_l^-1 m_l)              what the other labels say
+///                    ln w~_i = ln w_l^i + ln N(m_l^i; m, C + S_l^i)          drawn with the maximum taken out
+/// ```
+///
+/// Chains do not mix between well separated modes: the label a chain starts with decides. Five sweeps reach a total variation
+/// of 0.006 in moderately overlapping cases. Cost per draw: `sweeps` times all components.
+///
+/// # Errors
+/// If there is no factor or no draw.
+pub fn gibbs<const D: usize, R: Rng + ?Sized>(
+    rng: &mut R,
+    factors: &[&Mixture<D>],
+    count: usize,
+    sweeps: usize,
+) -> Result<Particles<D>, Error> {
+    let origin = check(factors)?;
+    at_least_one("count", count)?;
+    let parts: Vec<Vec<Information<D>>> = factors
+        .iter()
+        .map(|f| f.components().iter().map(|c| Information::of(c, &origin)).collect())
         .collect();
-    let others = product.len() / kept.len().max(1);
-    let mut cumulative = Vec::with_capacity(product.len());
-    let mut sum = 0.0;
-    for c in product.components() {
-        sum += c.weight();
-        cumulative.push(sum);
+    let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| Vec::with_capacity(count));
+    let mut labels = vec![0; factors.len()];
+    let mut logs = Vec::new();
+    for _ in 0..count {
+        for (label, factor) in labels.iter_mut().zip(factors) {
+            *label = pick(rng, factor.components().iter().map(Component::weight));
+        }
+        if factors.len() > 1 {
+            for _ in 0..sweeps {
+                for l in 0..factors.len() {
+                    labels[l] = draw_label(rng, factors, &parts, &labels, l, &origin, &mut logs)?;
+                }
+            }
+        }
+        let (mut precision, mut shift) = (SMatrix::zeros(), SVector::zeros());
+        for (part, label) in parts.iter().zip(&labels) {
+            precision += part[*label].precision;
+            shift += part[*label].shift;
+        }
+        let (mean, _, factor) = gaussian(&precision, &shift)?;
+        let z = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
+        let draw = origin + mean + factor.whitener.transpose() * z;
+        columns
+            .iter_mut()
+            .zip(draw.iter())
+            .for_each(|(column, x)| column.push(*x));
     }
-    for n in 0..out.x.len() {
-        let u = rng.random::<f64>() * sum;
-        let k = cumulative.partition_point(|c| *c <= u).min(product.len() - 1);
-        let component = &product.components()[k];
-        let z = Vector2::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
-        let place = component.mean() + component.cholesky_factor() * z;
-        let label = kept.get(k / others.max(1)).copied().unwrap_or(0);
-        (out.x[n], out.y[n], out.labels[n]) = (place[0], place[1], label);
-    }
-    Ok(())
+    Ok(Particles::uniform(columns)?)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::message::kernel_of;
-    use fewbits_densities::Component;
-    use fewbits_monte_carlo::{Moments, Stream};
-
-    /// Three messages that overlap moderately, and their exact product.
-    fn messages() -> Vec<KernelMessage> {
-        let mut rng = Stream::new(8).rng();
-        (0..3)
-            .map(|l| {
-                let mut message = KernelMessage::default();
-                message.resize(6);
-                for i in 0..6 {
-                    message.x[i] = 100.0 + 0.2 * f64::from(l) + rng.sample::<f64, _>(StandardNormal);
-                    message.y[i] = -50.0 + rng.sample::<f64, _>(StandardNormal);
-                    message.log_weights[i] = rng.random::<f64>();
-                }
-                message.finish();
-                message.kernel = Matrix2::new(0.5, 0.1, 0.1, 0.4 + 0.1 * f64::from(l));
-                message
-            })
-            .collect()
+/// Draws label `l` given the others.
+fn draw_label<const D: usize, R: Rng + ?Sized>(
+    rng: &mut R,
+    factors: &[&Mixture<D>],
+    parts: &[Vec<Information<D>>],
+    labels: &[usize],
+    l: usize,
+    origin: &SVector<f64, D>,
+    logs: &mut Vec<f64>,
+) -> Result<usize, Error> {
+    let (mut precision, mut shift) = (SMatrix::zeros(), SVector::zeros());
+    for k in (0..parts.len()).filter(|k| *k != l) {
+        precision += parts[k][labels[k]].precision;
+        shift += parts[k][labels[k]].shift;
     }
+    let (mean, covariance, _) = gaussian(&precision, &shift)?;
+    logs.clear();
+    let mut previous: Option<(SMatrix<f64, D, D>, Factored<D>)> = None;
+    for c in factors[l].components() {
+        // Components of one mixture mostly share their covariance; then one factor does for all.
+        let factor = match previous {
+            Some((covariance, factor)) if covariance == *c.covariance() => factor,
+            _ => Factored::new("covariance", &((covariance + covariance.transpose()) * 0.5 + c.covariance()))?,
+        };
+        previous = Some((*c.covariance(), factor));
+        logs.push(c.weight().ln() - 0.5 * factor.squared(&(c.mean() - origin - mean)) - factor.half_log_det);
+    }
+    let largest = fewbits_numerics::kernels::largest(logs);
+    Ok(pick(rng, logs.iter().map(|x| (x - largest).exp())))
+}
 
-    #[test]
-    fn every_sampler_draws_the_product() {
-        let mixtures: Vec<Mixture<2>> = messages().iter().map(|m| m.mixture().unwrap()).collect();
-        let truth = product::exact(&mixtures.iter().collect::<Vec<_>>()).unwrap().belief;
-        let samplers = [
-            ProductSampler::Gibbs { sweeps: 12 },
-            ProductSampler::MixtureImportance { draws: 40_000 },
-            ProductSampler::Exact,
-        ];
-        for sampler in samplers {
-            let mut own = messages();
-            let (mut x, mut y, mut labels) = (vec![0.0; 20_000], vec![0.0; 20_000], vec![0; 20_000]);
-            let mut out = Drawn {
-                x: &mut x,
-                y: &mut y,
-                labels: &mut labels,
-            };
-            let mut rng = Stream::new(9).rng();
-            sampler
-                .draw(&mut rng, &mut own, &mut ProductWorkspace::default(), &mut out)
-                .unwrap();
-            // Importance draws repeat: half the draws are worth counting.
-            let slack = if matches!(sampler, ProductSampler::MixtureImportance { .. }) {
-                1.5
-            } else {
-                1.0
-            };
-            for (column, d) in [(&x, 0), (&y, 1)] {
-                let moments: Moments = column.iter().copied().collect();
-                assert!(moments.estimate().z_score(truth.mean()[d]).abs() < 4.0 * slack, "{sampler:?}");
-                let squares: Moments = column.iter().map(|v| (v - truth.mean()[d]).powi(2)).collect();
-                assert!(squares.estimate().z_score(truth.covariance()[(d, d)]).abs() < 4.0 * slack, "{sampler:?}");
-            }
-            // The product's marginal of the first label.
-            for label in 0..6 {
-                let share = truth.components()[label * 36..(label + 1) * 36]
-                    .iter()
-                    .map(Component::weight)
-                    .sum::<f64>();
-                let seen = labels.iter().filter(|l| **l == label).count() as f64 / 20_000.0;
-                assert!((seen - share).abs() < 5.0 * slack * (share / 20_000.0).sqrt() + 1e-3, "{sampler:?} {label}");
+/// Index drawn with the given weights; the last one of positive weight if rounding leaves a rest.
+fn pick<R: Rng + ?Sized>(rng: &mut R, weights: impl Iterator<Item = f64> + Clone) -> usize {
+    let total: f64 = weights.clone().sum();
+    let level = rng.random::<f64>() * total;
+    let (mut cumulative, mut last) = (0.0, 0);
+    for (i, w) in weights.enumerate() {
+        if w > 0.0 {
+            last = i;
+            cumulative += w;
+            if level < cumulative {
+                return i;
             }
         }
     }
+    last
+}
 
-    #[test]
-    fn one_message_is_its_own_product_and_no_spread_is_refused() {
-        let mut one = messages();
-        one.truncate(1);
-        let (mut x, mut y, mut labels) = (vec![0.0; 5000], vec![0.0; 5000], vec![0; 5000]);
-        let mut out = Drawn {
-            x: &mut x,
-            y: &mut y,
-            labels: &mut labels,
-        };
-        let truth = one[0].mixture().unwrap();
-        let mut rng = Stream::new(10).rng();
-        let sampler = ProductSampler::Gibbs { sweeps: 5 };
-        sampler
-            .draw(&mut rng, &mut one, &mut ProductWorkspace::default(), &mut out)
-            .unwrap();
-        let moments: Moments = x.iter().copied().collect();
-        assert!(moments.estimate().z_score(truth.mean()[0]).abs() < 4.0);
-        assert!(kernel_of(&Matrix2::zeros(), 0.3).is_err());
-        assert_eq!(kernel_of(&Matrix2::new(1.0, 1.0, 1.0, 1.0), 0.3).unwrap().1, 1);
-    }
+/// `count` weighted draws of the product: from factor `proposal`, weighed by all others. The better choice than Gibbs whenever
+/// that factor is as concentrated as the product, as a prediction is; its weights tell when it is not.
+///
+/// # Errors
+/// If there is no factor, no draw, no such factor, or no weight is left ([`fewbits_core::Error::Impossible`]).
+pub fn importance<const D: usize, R: Rng + ?Sized>(
+    rng: &mut R,
+    factors: &[&Mixture<D>],
+    proposal: usize,
+    count: usize,
+) -> Result<Product<Particles<D>>, Error> {
+    check(factors)?;
+    let Some(from) = factors.get(proposal) else {
+        return Err(ArgumentError::new("proposal", proposal, format!("below {}", factors.len())).into());
+    };
+    let mut belief = from.sample_systematic(rng, count)?;
+    let mut log = vec![0.0; count];
+    let log_normaliser = belief.reweigh(|columns, weights| {
+        for (l, factor) in factors.iter().enumerate() {
+            if l != proposal {
+                factor.log_pdf_columns(columns, &mut log);
+                weights.iter_mut().zip(&log).for_each(|(w, x)| *w += x);
+            }
+        }
+    })?;
+    Ok(Product { belief, log_normaliser })
+}
+
+/// [`importance`], resampled to equally weighted draws by systematic selection.
+///
+/// # Errors
+/// As [`importance`].
+pub fn importance_resampled<const D: usize, R: Rng + ?Sized>(
+    rng: &mut R,
+    factors: &[&Mixture<D>],
+    proposal: usize,
+    draws: usize,
+    count: usize,
+) -> Result<Particles<D>, Error> {
+    at_least_one("count", count)?;
+    let mut belief = importance(rng, factors, proposal, draws)?.belief;
+    let mut ancestors = vec![0; count];
+    Resampling::Systematic.ancestors(rng, belief.weights(), &mut ancestors)?;
+    belief.select(&ancestors)?;
+    Ok(belief)
 }

@@ -28,7 +28,7 @@ impl RangeReference {
     /// Edge `q` of `levels` cells, of `levels + 1`.
     #[inline]
     fn edge(&self, q: usize, levels: usize) -> f64 {
-        self.centre + self.half_width * (2.0 * q as f64 / levels as f64 - 1.0)
+        fewbits_node::edge(q as u32, levels as u32, self.centre, self.half_width)
     }
 
     pub(crate) fn check(&self) -> Result<(), ArgumentError> {
@@ -158,19 +158,8 @@ impl QuantizedRange {
     /// # Errors
     /// If the range is not finite, or the reference is none.
     pub fn level(&self, range: f64, reference: &RangeReference) -> Result<Symbol, ArgumentError> {
-        finite("range", range)?;
-        reference.check()?;
-        let levels = self.levels();
-        let share = ((range - reference.centre) / reference.half_width + 1.0) * 0.5 * levels as f64;
-        let mut level = (share.floor().max(0.0) as usize).min(levels - 1);
-        // Rounding must not part the level from the edges that the factor knows.
-        while level + 1 < levels && range >= reference.edge(level + 1, levels) {
-            level += 1;
-        }
-        while level > 0 && range < reference.edge(level, levels) {
-            level -= 1;
-        }
-        Ok(Symbol(level))
+        let level = fewbits_node::range_level(range, reference.centre, reference.half_width, self.levels() as u32)?;
+        Ok(Symbol(level as usize))
     }
 
     /// What a level that arrived unharmed with probability `share` says.

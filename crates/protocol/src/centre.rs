@@ -70,9 +70,8 @@ pub enum Recipient {
     Sensor(usize),
 }
 
-/// What the driver must do, in order.
+/// What the driver must do, in order. A driver that leaves one out is none, so that the list is exhaustive.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub enum Action {
     /// Predict into this slot, and call [`Centre::on_predicted`]. If the prediction fails, do nothing: the slot passes.
     Predict {
@@ -352,17 +351,25 @@ impl Centre {
     }
 }
 
-/// Observations for serde: bits as bytes and their number.
-pub(crate) mod stored {
+/// Observations for serde, by `#[serde(with = "fewbits_protocol::stored")]`: bits as bytes and their number.
+pub mod stored {
     use super::{BitString, Deserialize, Observation, Serialize};
     use serde::{Deserializer, Serializer, de::Error};
 
-    pub(crate) fn serialize<S: Serializer>(observed: &[Observation<BitString>], to: S) -> Result<S::Ok, S::Error> {
+    /// Writes a list.
+    ///
+    /// # Errors
+    /// Those of the format.
+    pub fn serialize<S: Serializer>(observed: &[Observation<BitString>], to: S) -> Result<S::Ok, S::Error> {
         let bytes = |o: &Observation<BitString>| o.clone().map(|bits| (bits.bytes().to_vec(), bits.bits()));
         observed.iter().map(bytes).collect::<Vec<_>>().serialize(to)
     }
 
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Observation<BitString>>, D::Error> {
+    /// Reads a list.
+    ///
+    /// # Errors
+    /// Those of the format; if bits are missing.
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Observation<BitString>>, D::Error> {
         let stored = Vec::<Observation<(Vec<u8>, usize)>>::deserialize(from)?;
         let bits = |observation| {
             Ok(match observation {

@@ -49,7 +49,7 @@ mod sensor;
 mod slot;
 
 #[cfg(feature = "std")]
-pub use centre::{Action, Centre, CentreSettings, CentreTimer, Member, Recipient};
+pub use centre::{Action, Centre, CentreSettings, CentreTimer, Member, Recipient, stored};
 #[cfg(feature = "std")]
 pub use echo::{ReportLength, echo, reports_of};
 pub use frame::{CHECK_BYTES, Check, DESTINATION_BYTES, DecodeError, Frame, HEADER_BYTES, Kind, VERSION, digest};

@@ -66,9 +66,8 @@ pub enum SensorTimer {
     },
 }
 
-/// What the driver must do next.
+/// What the driver must do next. A driver that leaves one out is none, so that the list is exhaustive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Task<'a> {
     /// Nothing.
     Wait,

@@ -5,6 +5,7 @@
 mod design;
 mod pages;
 mod track;
+mod fleet;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

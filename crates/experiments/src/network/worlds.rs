@@ -9,11 +9,12 @@ use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::factor::Value;
 use fewbits_core::{Belief, Gaussian, LinearDynamics, Link, NumberFormat, Observed, Sensing};
-use fewbits_densities::wire::WireFormat;
-use fewbits_densities::{Mixture, Reduction};
+use fewbits_densities::Mixture;
 use fewbits_dymbo::{CountFusion, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarPlant};
 use fewbits_filters::{MomentFilter, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
+use fewbits_mixture_codec::Reduction;
+use fewbits_mixture_codec::wire::WireFormat;
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, PLANE_POSITION, constant_velocity_2d};
 use fewbits_network::estimators::{
     CensoringEstimator, DymboEstimator, Followers, Leaders, LookUp, ParallelDymboEstimator, Patterns, Reporting,

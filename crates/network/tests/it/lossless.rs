@@ -9,21 +9,22 @@ use fewbits_core::factor::{InCell, Value};
 use fewbits_core::{
     BitString, Cell, Dynamics, Gaussian, Link, Message, NumberFormat, Observation, Observed, Scheme, Sensing, Sign,
 };
-use fewbits_densities::wire::WireFormat;
-use fewbits_densities::{Grid, Mixture, PointMass, Reduction};
+use fewbits_densities::{Grid, Mixture, PointMass};
 use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SourceSensor, Status};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarFilter,
 };
 use fewbits_filters::{MomentFilter, PointMassFilter, PointMasses, assumed_density, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
+use fewbits_mixture_codec::Reduction;
+use fewbits_mixture_codec::wire::WireFormat;
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::estimators::{
     CensoringEstimator, DymboEstimator, Followers, Leaders, LookUp, Patterns, Reporting, SourceChain,
 };
-use fewbits_network::{AdHoc, Estimator, Field, Ledger, Replicable, SensorId, Star, Walk};
+use fewbits_network::{Estimator, Field, Ledger, Replicable, SensorId, Star, Walk};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::{Scene, System};
@@ -79,23 +80,6 @@ where
     for sensor in &network.nodes()[1..] {
         let (slot, belief) = sensor.belief().unwrap();
         assert_eq!((slot, estimator.mean(belief)), (slots - 1, alone[slots as usize - 2].clone()));
-    }
-    among_peers(estimator, measurements, alone, up);
-}
-
-/// The same without a centre.
-fn among_peers<E: Replicable + Clone>(estimator: &E, measurements: &[Vec<E::Measurement>], alone: &[Vec<f64>], up: u64)
-where
-    E::Measurement: Clone,
-{
-    let slots = measurements.len() as u32;
-    let peers = AdHoc::new(estimator.clone(), measurements.to_vec(), clock(), 10, Stream::new(9)).unwrap();
-    let mut network = peers.simulate(10.0, setup(3)).unwrap();
-    network.run_until(clock().end(slots)).unwrap();
-    assert_eq!(network.log().entries, []);
-    assert_eq!(network.ledger().messages().payload.0, up);
-    for peer in network.nodes() {
-        assert_eq!(peer.estimates(), alone);
     }
 }
 

@@ -9,6 +9,7 @@
 
 mod acknowledgements;
 mod attacks;
+mod bit_star;
 mod books;
 mod defects;
 mod faults;

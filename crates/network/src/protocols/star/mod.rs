@@ -20,7 +20,7 @@ use fewbits_core::{BitString, Message};
 use fewbits_monte_carlo::Stream;
 use serde::{Deserialize, Serialize};
 
-const CENTRE: SensorId = SensorId(0);
+pub(super) const CENTRE: SensorId = SensorId(0);
 /// Timer: a slot begins.
 const BEGIN: u32 = 0;
 /// Timer: reports of the slot are awaited no longer.

@@ -1,0 +1,270 @@
+//! `fewbits centre`: a fusion centre over UDP. Each slot's estimate is a row on standard output.
+
+use crate::Ending;
+use crate::arguments::CentreOptions;
+use crate::error::Error;
+use crate::report::{Report, censored, configuration, configured, coordinate};
+use fewbits_core::{FullValue, Gaussian, Link, OnAxes};
+use fewbits_filters::MomentFilter;
+use fewbits_filters::centre::{FusionCentre, Reporting};
+use fewbits_filters::contract::Evolving;
+use fewbits_link::{FusionReceiver, Key, Output, Peer, Station, Step, Store, udp};
+use fewbits_models::{ContinuousLinear, LinearSensor};
+use fewbits_monte_carlo::Stream;
+use fewbits_protocol::{CentreSettings, Feedback, Member, Receiver, ReportLength, Schedule};
+use nalgebra::{SMatrix, SVector};
+use serde::Deserialize;
+use std::collections::HashSet;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::num::NonZeroU64;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+/// `centre.toml`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Configuration {
+    /// Address and port.
+    listen: String,
+    /// Seconds of a slot; the same at all sensors that report by the clock.
+    period: f64,
+    /// File in which the state survives the process.
+    state: Option<PathBuf>,
+    /// Wait for the disk at every step.
+    #[serde(default)]
+    durable: bool,
+    #[serde(default)]
+    seed: u64,
+    model: Model,
+    prior: Prior,
+    #[serde(rename = "sensor")]
+    sensors: Vec<Sensor>,
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+enum Model {
+    RandomWalk {
+        density: f64,
+    },
+    OrnsteinUhlenbeck {
+        mean: f64,
+        time_constant: f64,
+        variance: f64,
+    },
+    ConstantVelocity {
+        density: f64,
+    },
+    ConstantVelocity2d {
+        density: f64,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Prior {
+    mean: Vec<f64>,
+    deviation: Vec<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sensor {
+    number: u32,
+    key: String,
+    /// Address, where it is known beforehand.
+    address: Option<std::net::SocketAddr>,
+    /// The coordinate of the state that it reads.
+    #[serde(default)]
+    reads: usize,
+    /// Standard deviation of its measurement noise.
+    deviation: f64,
+    report: Report,
+    /// Probability that a question or its report is lost.
+    #[serde(default)]
+    loss: f64,
+}
+
+/// Runs the task until it is stopped.
+pub(crate) fn run(options: &CentreOptions) -> Result<Ending, Error> {
+    let file = &options.configuration;
+    let given: Configuration = configuration(file)?;
+    match &given.model {
+        Model::RandomWalk { density } => {
+            with(options, &given, ContinuousLinear::random_walk(*density).map_err(configured(file))?)
+        }
+        Model::OrnsteinUhlenbeck {
+            mean,
+            time_constant,
+            variance,
+        } => {
+            let world =
+                ContinuousLinear::ornstein_uhlenbeck(*mean, *time_constant, *variance).map_err(configured(file))?;
+            with(options, &given, world)
+        }
+        Model::ConstantVelocity { density } => {
+            with(options, &given, ContinuousLinear::nearly_constant_velocity(*density).map_err(configured(file))?)
+        }
+        Model::ConstantVelocity2d { density } => {
+            with(options, &given, ContinuousLinear::nearly_constant_velocity_2d(*density).map_err(configured(file))?)
+        }
+    }
+}
+
+fn with<const D: usize>(
+    options: &CentreOptions,
+    given: &Configuration,
+    world: impl Evolving<D> + 'static,
+) -> Result<Ending, Error> {
+    let file = &options.configuration;
+    let refused = |reason: String| Error::Configuration {
+        file: file.display().to_string(),
+        reason,
+    };
+    let expected = || refused(format!("prior: expected {D} means and {D} deviations, one per coordinate of the model"));
+    let mean: [f64; D] = given.prior.mean.clone().try_into().map_err(|_| expected())?;
+    let deviation: [f64; D] = given.prior.deviation.clone().try_into().map_err(|_| expected())?;
+    let variances = SVector::from(deviation.map(|d| d * d));
+    let prior = Gaussian::new(mean.into(), SMatrix::from_diagonal(&variances)).map_err(configured(file))?;
+    let stream = Stream::new(given.seed);
+    let mut centre =
+        FusionCentre::new(&mut stream.named("prior").rng(), world, MomentFilter, &prior).map_err(configured(file))?;
+    let mut sensors: Vec<&Sensor> = given.sensors.iter().collect();
+    sensors.sort_by_key(|sensor| sensor.number);
+    let mut peers = Vec::new();
+    let mut seen = HashSet::new();
+    for sensor in sensors {
+        let number = sensor.number;
+        if !seen.insert(number) {
+            return Err(refused(format!("sensor {number} stands twice")));
+        }
+        join(&mut centre, sensor).map_err(|error| refused(format!("sensor {number}: {error}")))?;
+        peers.push(Peer {
+            number,
+            key: Key::from_hex(&sensor.key).map_err(|error| refused(format!("sensor {number}: {error}")))?,
+            address: sensor.address,
+        });
+    }
+    let nanoseconds = (given.period * 1e9).round();
+    let period = (1e6..=1e15)
+        .contains(&nanoseconds)
+        .then(|| NonZeroU64::new(nanoseconds as u64))
+        .flatten();
+    let period =
+        period.ok_or_else(|| refused(format!("period is {}: expected .001 to 1000000 seconds", given.period)))?;
+    let member = Member {
+        feedback: Feedback::Told,
+        report: ReportLength::Varying,
+    };
+    let settings = CentreSettings::new(vec![member; peers.len()], Schedule::new(period));
+    let store = given.state.clone().map(|path| match given.durable {
+        true => Store::new(path).durable(),
+        false => Store::new(path),
+    });
+    let receiver = FusionReceiver::new(centre, given.period, stream);
+    let mut station = Station::new(settings, receiver, peers, store)?;
+    serve(options, given, &mut station, D)
+}
+
+fn join<const D: usize>(
+    centre: &mut FusionCentre<D, MomentFilter>,
+    sensor: &Sensor,
+) -> Result<(), Box<dyn std::error::Error>> {
+    let (variance, link) = (sensor.deviation * sensor.deviation, Link::lossy(sensor.loss)?);
+    let sensing = OnAxes::<_, D, 1>::new(LinearSensor::direct(variance)?, [sensor.reads])?;
+    match sensor.report {
+        Report::Sign => {
+            let ask = |_: &Gaussian<D>, m: &Gaussian<1>| m.mean()[0];
+            centre.join(sensor.number, Reporting::new(sensing, fewbits_dymbo::SignBit::new(variance)?, link, ask))?;
+        }
+        Report::Word { bits } => {
+            let ask = |_: &Gaussian<D>, m: &Gaussian<1>| fewbits_dymbo::Prediction {
+                mean: m.mean()[0],
+                deviation: m.covariance()[0].sqrt(),
+            };
+            let scheme = fewbits_dymbo::InnovationWord::new(variance, bits)?;
+            centre.join(sensor.number, Reporting::new(sensing, scheme, link, ask))?;
+        }
+        Report::Value => {
+            centre.join(sensor.number, Reporting::values(sensing, FullValue::new(variance)?, link))?;
+        }
+        Report::Censored { threshold } => {
+            let ask = |state: &Gaussian<D>, _: &Gaussian<1>| fewbits_cfwmd::scheme::Prediction(*state);
+            let scheme = censored::<D>(sensor.reads, variance, threshold)?;
+            centre.join(sensor.number, Reporting::new(coordinate::<D>(sensor.reads, variance)?, scheme, link, ask))?;
+        }
+    }
+    Ok(())
+}
+
+fn serve<R: Receiver>(
+    options: &CentreOptions,
+    given: &Configuration,
+    station: &mut Station<R>,
+    coordinates: usize,
+) -> Result<Ending, Error> {
+    let socket = udp::bind(given.listen.as_str())?;
+    let mut sink = std::io::stdout().lock();
+    let failed = Error::file("standard output", "write");
+    let mut head = "slot,reports".to_owned();
+    for i in 0..coordinates {
+        let _ = write!(head, ",mean{i},deviation{i}");
+    }
+    writeln!(sink, "{head}").map_err(&failed)?;
+    // What may not have been written before the process was stopped.
+    if let Some(step) = station.last_step() {
+        writeln!(sink, "{}", row(step)).map_err(&failed)?;
+    }
+    #[cfg(feature = "live")]
+    let page = match options.live {
+        Some(address) => {
+            let mut numbers: Vec<u32> = given.sensors.iter().map(|sensor| sensor.number).collect();
+            numbers.sort_unstable();
+            let page = fewbits_link::LivePage::serve(address, numbers, given.period)?;
+            eprintln!("page at http://{}/", page.address());
+            Some(page)
+        }
+        None => None,
+    };
+    let mut remaining = options.slots;
+    let mut outcome = Ok(());
+    udp::run_station(&socket, station, |_station, outputs| {
+        for output in outputs {
+            match output {
+                Output::Step(step) => {
+                    outcome = writeln!(sink, "{}", row(step))
+                        .and_then(|()| sink.flush())
+                        .map_err(&failed);
+                    #[cfg(feature = "live")]
+                    if let Some(page) = &page {
+                        page.show(step, _station.counts());
+                    }
+                    if let Some(trouble) = &step.trouble {
+                        eprintln!("slot {}: {trouble}", step.slot);
+                    }
+                    if let Some(remaining) = &mut remaining {
+                        *remaining = remaining.saturating_sub(1);
+                    }
+                }
+                Output::Passed { slot, reason } => eprintln!("slot {slot} passed: {reason}"),
+                Output::Note { sensor, note } => eprintln!("sensor {sensor}: {note}"),
+                _ => {}
+            }
+        }
+        match outcome.is_err() || remaining == Some(0) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    })?;
+    outcome.map(|()| Ending::Good)
+}
+
+fn row(step: &Step) -> String {
+    let received = |o: &&fewbits_core::Observation<_>| matches!(o, fewbits_core::Observation::Received(_));
+    let mut row = format!("{},{}", step.slot, step.observed.iter().filter(received).count());
+    for (mean, deviation) in &step.estimate {
+        let _ = write!(row, ",{mean},{deviation}");
+    }
+    row
+}

@@ -1,0 +1,164 @@
+//! `fewbits sensor`: samples from standard input, reports over UDP.
+
+use crate::Ending;
+use crate::arguments::SensorOptions;
+use crate::error::Error;
+use crate::report::{Report, censored, configuration, configured};
+use fewbits_core::{BitString, FullValue, SchemeNode, SensorNode};
+use fewbits_link::{Key, SensorLink, Store, udp};
+use fewbits_monte_carlo::Stream;
+use fewbits_protocol::{Feedback, Note, SensorSettings, Slot};
+use nalgebra::Vector1;
+use serde::Deserialize;
+use std::io::BufRead;
+use std::net::ToSocketAddrs;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+
+/// `sensor.toml`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Configuration {
+    /// Address and port of the centre.
+    centre: String,
+    number: u32,
+    key: String,
+    /// File in which the counter of envelopes survives the process. Without it the centre takes a restarted sensor for a replay.
+    state: Option<PathBuf>,
+    /// Standard deviation of the measurement noise.
+    deviation: f64,
+    report: Report,
+    /// Coordinates of the centre's model, and which is read: for censored reports only.
+    #[serde(default = "one")]
+    coordinates: usize,
+    #[serde(default)]
+    reads: usize,
+    /// After so many silent slots a heartbeat is sent; 0: never.
+    #[serde(default)]
+    heartbeat_after: u32,
+    #[serde(default)]
+    seed: u64,
+}
+
+fn one() -> usize {
+    1
+}
+
+/// Runs the task until the samples end.
+pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
+    let file = &options.configuration;
+    let given: Configuration = configuration(file)?;
+    let node = node(file, &given)?;
+    let mut settings = SensorSettings::new(Feedback::Told);
+    settings.heartbeat_after = given.heartbeat_after;
+    let mut addresses = given.centre.to_socket_addrs().map_err(configured(file))?;
+    let centre = addresses
+        .next()
+        .ok_or_else(|| configured(file)("centre: no address of that name"))?;
+    let key = Key::from_hex(&given.key).map_err(configured(file))?;
+    let mut link = SensorLink::new(settings, given.number, key, given.state.map(Store::new))?;
+    let socket = udp::bind(if centre.is_ipv6() { "[::]:0" } else { "0.0.0.0:0" })?;
+    let mut program = Samples {
+        lines: lines(),
+        node,
+        stream: Stream::new(given.seed).indexed(u64::from(given.number)),
+        refused: None,
+    };
+    udp::run_sensor(&socket, centre, &mut link, &mut program)?;
+    match program.refused {
+        Some(error) => Err(error),
+        None => Ok(Ending::Good),
+    }
+}
+
+type Node = Box<dyn SensorNode<1>>;
+
+fn node(file: &Path, given: &Configuration) -> Result<Node, Error> {
+    let variance = given.deviation * given.deviation;
+    match given.report {
+        Report::Sign => {
+            let scheme = fewbits_dymbo::SignBit::new(variance).map_err(configured(file))?;
+            Ok(Box::new(SchemeNode::new(scheme)))
+        }
+        Report::Word { bits } => {
+            let scheme = fewbits_dymbo::InnovationWord::new(variance, bits).map_err(configured(file))?;
+            Ok(Box::new(SchemeNode::new(scheme)))
+        }
+        Report::Value => Ok(Box::new(SchemeNode::new(FullValue::new(variance).map_err(configured(file))?))),
+        Report::Censored { threshold } => match given.coordinates {
+            1 => Ok(Box::new(SchemeNode::new(
+                censored::<1>(given.reads, variance, threshold).map_err(configured(file))?,
+            ))),
+            2 => Ok(Box::new(SchemeNode::new(
+                censored::<2>(given.reads, variance, threshold).map_err(configured(file))?,
+            ))),
+            4 => Ok(Box::new(SchemeNode::new(
+                censored::<4>(given.reads, variance, threshold).map_err(configured(file))?,
+            ))),
+            other => Err(configured(file)(format!("coordinates is {other}: expected 1, 2 or 4"))),
+        },
+    }
+}
+
+/// Samples as they are read, one per line, so that a slot never waits for one.
+fn lines() -> Receiver<(u64, std::io::Result<String>)> {
+    let (sender, receiver) = sync_channel(1024);
+    std::thread::spawn(move || {
+        for (number, line) in (1..).zip(std::io::stdin().lock().lines()) {
+            if sender.send((number, line)).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+struct Samples {
+    lines: Receiver<(u64, std::io::Result<String>)>,
+    node: Node,
+    stream: Stream,
+    refused: Option<Error>,
+}
+
+impl Samples {
+    fn refuse(&mut self, error: Error) -> ControlFlow<(), Option<BitString>> {
+        self.refused = Some(error);
+        ControlFlow::Break(())
+    }
+}
+
+impl udp::Program for Samples {
+    /// One line per slot. An empty line, or none that is there yet, is no measurement: silence.
+    fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>> {
+        let (number, line) = match self.lines.try_recv() {
+            Ok((number, Ok(line))) => (number, line),
+            Ok((_, Err(source))) => return self.refuse(Error::file("standard input", "read")(source)),
+            Err(TryRecvError::Empty) => return ControlFlow::Continue(None),
+            Err(TryRecvError::Disconnected) => return ControlFlow::Break(()),
+        };
+        let cell = line.trim();
+        let sample = match cell.parse::<f64>() {
+            Ok(sample) if sample.is_finite() => sample,
+            // A line of names may go before.
+            Err(_) if cell.is_empty() || number == 1 => return ControlFlow::Continue(None),
+            _ => {
+                let reason = format!("line {number}: `{cell}` is no finite number");
+                let file = "standard input".to_owned();
+                return self.refuse(Error::Configuration { file, reason });
+            }
+        };
+        let mut rng = self.stream.indexed(u64::from(slot.number())).rng();
+        match self.node.report(&mut rng, &Vector1::new(sample), feedback) {
+            Ok(report) => ControlFlow::Continue(report),
+            Err(error) => {
+                eprintln!("slot {}: {error}", slot.number());
+                ControlFlow::Continue(None)
+            }
+        }
+    }
+
+    fn note(&mut self, note: Note) {
+        eprintln!("{note}");
+    }
+}

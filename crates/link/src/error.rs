@@ -1,0 +1,57 @@
+//! What can go wrong with a link.
+
+use fewbits_protocol::BoxError;
+use std::path::PathBuf;
+
+/// Why a process of a link could not start or go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file could not be read or written.
+    #[error("{path}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A socket failed.
+    #[error("socket {address}")]
+    Socket {
+        /// Its address.
+        address: String,
+        /// Why.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A stored state is none of this program, or not whole.
+    #[error("{path} is no state of this centre: {reason}")]
+    State {
+        /// The file.
+        path: PathBuf,
+        /// What was found.
+        reason: String,
+    },
+    /// A key is too short.
+    #[error("key has {found} bytes: expected {expected} or more")]
+    ShortKey {
+        /// Its bytes.
+        found: usize,
+        /// The least that is taken.
+        expected: usize,
+    },
+    /// An argument is out of range.
+    #[error("{name} is {value}: expected {expected}")]
+    Argument {
+        /// Which.
+        name: &'static str,
+        /// What it is.
+        value: String,
+        /// What it must be.
+        expected: String,
+    },
+    /// The estimator failed before the first slot.
+    #[error("the estimator")]
+    Estimator(#[source] BoxError),
+}

@@ -1,0 +1,101 @@
+//! The mixed fusion centre of `fewbits-filters` as a receiver over bits.
+
+use fewbits_core::{BitString, Observation};
+use fewbits_filters::centre::{CentreState, FusionCentre, Slot};
+use fewbits_filters::contract::StateFilter;
+use fewbits_monte_carlo::Stream;
+use fewbits_protocol::{BoxError, Receiver};
+use serde::{Serialize, de::DeserializeOwned};
+
+/// A [`FusionCentre`] that advances by a period per slot. Sensors are numbered in rising order of their numbers there.
+///
+/// The random stream of a slot is a function of the seed and the slot, so that a stopped centre goes on with the same draws.
+pub struct FusionReceiver<const D: usize, F: StateFilter<D>> {
+    centre: FusionCentre<D, F>,
+    numbers: Vec<u32>,
+    period: f64,
+    stream: Stream,
+    /// The slot of the prior's time: the one before the first that was predicted.
+    origin: Option<u64>,
+    slot: u64,
+}
+
+impl<const D: usize, F: StateFilter<D>> std::fmt::Debug for FusionReceiver<D, F> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FusionReceiver")
+            .field("slot", &self.slot)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<const D: usize, F: StateFilter<D>> FusionReceiver<D, F> {
+    /// The sensors that have joined, with slots of `period` seconds. The prior holds one period before the first slot that is predicted.
+    pub fn new(centre: FusionCentre<D, F>, period: f64, stream: Stream) -> Self {
+        Self {
+            numbers: centre.sensors().collect(),
+            centre,
+            period,
+            stream,
+            origin: None,
+            slot: 0,
+        }
+    }
+
+    /// The centre.
+    pub fn centre(&self) -> &FusionCentre<D, F> {
+        &self.centre
+    }
+}
+
+impl<const D: usize, F: StateFilter<D>> Receiver for FusionReceiver<D, F>
+where
+    F::Belief: Serialize + DeserializeOwned,
+{
+    fn sensors(&self) -> usize {
+        self.numbers.len()
+    }
+
+    fn predict(&mut self, slot: u64) -> Result<(), BoxError> {
+        let origin = self.origin.unwrap_or_else(|| slot.saturating_sub(1));
+        let time = slot.saturating_sub(origin) as f64 * self.period;
+        let mut rng = self.stream.named("predict").indexed(slot).rng();
+        self.centre.advance(&mut rng, time)?;
+        (self.origin, self.slot) = (Some(origin), slot);
+        Ok(())
+    }
+
+    fn feedback(&self, sensor: usize) -> Result<BitString, BoxError> {
+        let number = self.numbers.get(sensor).ok_or("no such sensor")?;
+        Ok(self.centre.feedback(*number)?)
+    }
+
+    fn update(&mut self, observed: &[(usize, Observation<BitString>)]) -> Result<(), BoxError> {
+        let slots = observed.iter().map(|(sensor, observation)| {
+            let number = *self.numbers.get(*sensor).ok_or("no such sensor")?;
+            Ok(Slot::new(number, self.centre.feedback(number)?, observation.clone()))
+        });
+        let slots = slots.collect::<Result<Vec<_>, BoxError>>()?;
+        let mut rng = self.stream.named("update").indexed(self.slot).rng();
+        self.centre.receive(&mut rng, &slots)?;
+        Ok(())
+    }
+
+    fn estimate(&self) -> Vec<(f64, f64)> {
+        let estimate = self.centre.estimate();
+        let deviation = |i: usize| estimate.covariance()[(i, i)].max(0.0).sqrt();
+        (0..D).map(|i| (estimate.mean()[i], deviation(i))).collect()
+    }
+
+    fn state(&self) -> Result<BitString, BoxError> {
+        let bytes = serde_json::to_vec(&(self.origin, self.slot, self.centre.state()))?;
+        let bits = 8 * bytes.len();
+        Ok(BitString::from_bytes(bytes, bits)?)
+    }
+
+    fn restore(&mut self, state: &BitString) -> Result<(), BoxError> {
+        let (origin, slot, state): (_, _, CentreState<F::Belief>) = serde_json::from_slice(state.bytes())?;
+        self.centre.restore(state)?;
+        (self.origin, self.slot) = (origin, slot);
+        Ok(())
+    }
+}

@@ -1,0 +1,362 @@
+//! The centre behind its link: protocol, estimator, keys and store, still without socket and clock.
+
+use crate::envelope::{Direction, Key, Refusal, ReplayWindow, sensor_of};
+use crate::error::Error;
+use crate::store::Store;
+use fewbits_core::{BitString, Observation};
+use fewbits_protocol::{
+    Action, Centre, CentreSettings, CentreTimer, Feedback, Note, Outcome, Receiver, Recipient, update_or_drop,
+};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, HashMap};
+use std::net::SocketAddr;
+
+/// Envelopes of one slot that a centre can send to one sensor.
+const COUNTERS_PER_SLOT: u64 = 1 << 16;
+const STATE_VERSION: u32 = 1;
+
+/// A sensor that a centre takes frames from.
+#[derive(Debug, Clone)]
+pub struct Peer {
+    /// Its number on the wire.
+    pub number: u32,
+    /// The key that it shares with the centre.
+    pub key: Key,
+    /// Where it is, if that is known before it has sent anything.
+    pub address: Option<SocketAddr>,
+}
+
+/// One slot as it ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Step {
+    /// The slot.
+    pub slot: u64,
+    /// What was observed of each sensor.
+    #[serde(with = "fewbits_protocol::stored")]
+    pub observed: Vec<Observation<BitString>>,
+    /// Mean and standard deviation of each coordinate.
+    pub estimate: Vec<(f64, f64)>,
+    /// Why the update did not use all observations.
+    pub trouble: Option<String>,
+}
+
+impl Step {
+    /// A step whose update used all observations.
+    pub fn new(slot: u64, observed: Vec<Observation<BitString>>, estimate: Vec<(f64, f64)>) -> Self {
+        Self {
+            slot,
+            observed,
+            estimate,
+            trouble: None,
+        }
+    }
+}
+
+/// What leaves a station.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Output {
+    /// A datagram.
+    Datagram {
+        /// To where.
+        to: SocketAddr,
+        /// An envelope.
+        bytes: Vec<u8>,
+    },
+    /// A slot has ended, and its outcome is stored.
+    Step(Step),
+    /// A slot passed without prediction.
+    Passed {
+        /// The slot.
+        slot: u64,
+        /// Why.
+        reason: String,
+    },
+    /// Something was noticed of the sensor at this place of the list.
+    Note {
+        /// Place in the list of peers.
+        sensor: usize,
+        /// What was noticed.
+        note: Note,
+    },
+}
+
+/// How many envelopes were taken, and refused for which reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counts {
+    /// Taken.
+    pub taken: u64,
+    /// Too short.
+    pub short: u64,
+    /// Of unknown sensors.
+    pub unknown: u64,
+    /// Forged.
+    pub forged: u64,
+    /// Replayed.
+    pub replayed: u64,
+}
+
+/// What a station stores.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    version: u32,
+    sensors: Vec<u32>,
+    /// The last slot that may have begun.
+    slot: u64,
+    windows: Vec<ReplayWindow>,
+    /// Where sensors were last: a centre that goes on need not wait until they speak.
+    addresses: Vec<Option<SocketAddr>>,
+    receiver: (Vec<u8>, usize),
+    last: Option<Step>,
+}
+
+/// A centre: datagrams and time in, [`Output`]s out.
+///
+/// ```text
+/// slot begins:  store (the slot has begun);  predict;  feedback under each sensor's key
+/// datagram:     known sensor, right code, new counter -> the protocol's machine
+/// deadline:     update;  store;  Step
+/// ```
+/// A step is stored before it is published, and a slot before anything of it is sent. A station that is stopped at any moment and made anew
+/// with the same store goes on from the last stored step, which it publishes again ([`Station::last_step`]); the slot in which it was stopped
+/// passes, and its reports are lost.
+#[derive(Debug)]
+pub struct Station<R> {
+    centre: Centre,
+    receiver: R,
+    peers: Vec<Peer>,
+    places: HashMap<u32, usize>,
+    windows: Vec<ReplayWindow>,
+    /// Envelopes sent to each sensor in this slot.
+    sent: Vec<u64>,
+    timers: BTreeMap<u64, Vec<CentreTimer>>,
+    store: Option<Store>,
+    counts: Counts,
+    last: Option<Step>,
+}
+
+impl<R: Receiver> Station<R> {
+    /// A centre with these sensors, in the order of the receiver's. It goes on from the store if that holds anything.
+    ///
+    /// # Errors
+    /// If the numbers of sensors of settings, receiver and peers differ, a number stands twice, or the store cannot be read or is of another
+    /// centre.
+    pub fn new(
+        settings: CentreSettings,
+        mut receiver: R,
+        mut peers: Vec<Peer>,
+        store: Option<Store>,
+    ) -> Result<Self, Error> {
+        let sensors = receiver.sensors();
+        for (name, found) in [("members", settings.members.len()), ("peers", peers.len())] {
+            if found != sensors {
+                return Err(Error::Argument {
+                    name,
+                    value: format!("{found}"),
+                    expected: format!("{sensors}, as many as the receiver has sensors"),
+                });
+            }
+        }
+        let mut places = HashMap::new();
+        for (place, peer) in peers.iter().enumerate() {
+            if places.insert(peer.number, place).is_some() {
+                return Err(Error::Argument {
+                    name: "sensor number",
+                    value: peer.number.to_string(),
+                    expected: "each number once".to_owned(),
+                });
+            }
+        }
+        let mut centre = Centre::new(settings);
+        let mut windows = vec![ReplayWindow::default(); sensors];
+        let mut last = None;
+        if let Some(store) = &store
+            && let Some(stored) = store.load::<Stored>()?
+        {
+            let refused = |reason: String| Error::State {
+                path: store.path().to_owned(),
+                reason,
+            };
+            if stored.version != STATE_VERSION {
+                return Err(refused(format!("version {}, expected {STATE_VERSION}", stored.version)));
+            }
+            if !stored.sensors.iter().eq(peers.iter().map(|peer| &peer.number)) || stored.windows.len() != sensors {
+                return Err(refused(format!("it knows the sensors {:?}", stored.sensors)));
+            }
+            let (bytes, bits) = stored.receiver;
+            let state = BitString::from_bytes(bytes, bits).map_err(|error| refused(error.to_string()))?;
+            receiver.restore(&state).map_err(|error| refused(error.to_string()))?;
+            centre.resume(stored.slot);
+            windows = stored.windows;
+            for (peer, stored) in peers.iter_mut().zip(stored.addresses) {
+                peer.address = stored.or(peer.address);
+            }
+            last = stored.last;
+        }
+        Ok(Self {
+            centre,
+            receiver,
+            places,
+            windows,
+            sent: vec![0; sensors],
+            timers: BTreeMap::from([(0, vec![CentreTimer::SlotBegins])]),
+            store,
+            counts: Counts::default(),
+            last,
+            peers,
+        })
+    }
+
+    /// The estimator.
+    pub fn receiver(&self) -> &R {
+        &self.receiver
+    }
+
+    /// The protocol's machine.
+    pub fn centre(&self) -> &Centre {
+        &self.centre
+    }
+
+    /// The last step: after a start from a store, the one that may not have been published.
+    pub fn last_step(&self) -> Option<&Step> {
+        self.last.as_ref()
+    }
+
+    /// What was taken and refused.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// When [`on_time`](Self::on_time) must be called next, in nanoseconds.
+    pub fn next_timer(&self) -> Option<u64> {
+        self.timers.keys().next().copied()
+    }
+
+    /// Time has passed. Timers that are due fire.
+    ///
+    /// # Errors
+    /// If the store cannot be written: nothing of the step has left then.
+    pub fn on_time(&mut self, now: u64, outputs: &mut Vec<Output>) -> Result<(), Error> {
+        while let Some(entry) = self.timers.first_entry().filter(|entry| *entry.key() <= now) {
+            for timer in entry.remove() {
+                let mut actions = Vec::new();
+                self.centre.on_timer(now, timer, &mut actions);
+                self.carry_out(actions, outputs)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A datagram has come from `from`.
+    ///
+    /// # Errors
+    /// As [`on_time`](Self::on_time). A datagram that is refused is no error: see [`counts`](Self::counts).
+    pub fn on_datagram(&mut self, from: SocketAddr, bytes: &[u8], outputs: &mut Vec<Output>) -> Result<(), Error> {
+        let opened = sensor_of(bytes).ok_or(Refusal::TooShort).and_then(|number| {
+            let place = *self.places.get(&number).ok_or(Refusal::Unknown)?;
+            let (counter, frame) = self.peers[place].key.open(Direction::ToCentre, bytes)?;
+            self.windows[place].take(counter)?;
+            Ok((place, frame))
+        });
+        let (place, frame) = match opened {
+            Ok(opened) => opened,
+            Err(refusal) => {
+                *match refusal {
+                    Refusal::TooShort => &mut self.counts.short,
+                    Refusal::Unknown => &mut self.counts.unknown,
+                    Refusal::Forged => &mut self.counts.forged,
+                    Refusal::Replayed => &mut self.counts.replayed,
+                } += 1;
+                return Ok(());
+            }
+        };
+        self.counts.taken += 1;
+        // Whoever has the key says where it is.
+        self.peers[place].address = Some(from);
+        let mut actions = Vec::new();
+        self.centre.on_frame(place, frame, &mut actions);
+        self.carry_out(actions, outputs)
+    }
+
+    fn carry_out(&mut self, actions: Vec<Action>, outputs: &mut Vec<Output>) -> Result<(), Error> {
+        for action in actions {
+            match action {
+                Action::SetTimer { at, timer } => self.timers.entry(at).or_default().push(timer),
+                Action::Note { sensor, note } => outputs.push(Output::Note { sensor, note }),
+                Action::Send { to, frame } => match to {
+                    Recipient::All => (0..self.peers.len()).for_each(|place| self.send(place, &frame, outputs)),
+                    Recipient::Sensor(place) => self.send(place, &frame, outputs),
+                },
+                Action::Predict { slot } => self.predict(slot, outputs)?,
+                Action::Update { slot, observed } => {
+                    let trouble = match update_or_drop(&mut self.receiver, &observed) {
+                        Outcome::Used => None,
+                        Outcome::SilentDropped(error) => Some(format!("silent sensors were left out: {error}")),
+                        Outcome::Failed(error) => Some(format!("nothing was used: {error}")),
+                    };
+                    let estimate = self.receiver.estimate();
+                    let step = Step {
+                        trouble,
+                        ..Step::new(slot, observed, estimate)
+                    };
+                    self.last = Some(step.clone());
+                    self.save()?;
+                    outputs.push(Output::Step(step));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn predict(&mut self, slot: u64, outputs: &mut Vec<Output>) -> Result<(), Error> {
+        self.sent.fill(0);
+        // Before anything is sent it is known that the slot has begun.
+        self.save()?;
+        let members = &self.centre.settings().members;
+        let follows = members.iter().any(|member| member.feedback == Feedback::Echoed);
+        let prepared = (|| {
+            let state = if follows { Some(self.receiver.state()?) } else { None };
+            self.receiver.predict(slot)?;
+            let feedback = (0..self.peers.len()).map(|i| self.receiver.feedback(i));
+            Ok::<_, fewbits_protocol::BoxError>((feedback.collect::<Result<Vec<_>, _>>()?, state))
+        })();
+        match prepared {
+            Ok((feedback, state)) => {
+                let mut actions = Vec::new();
+                self.centre.on_predicted(&feedback, state.as_ref(), &mut actions);
+                self.carry_out(actions, outputs)
+            }
+            Err(error) => {
+                let reason = error.to_string();
+                outputs.push(Output::Passed { slot, reason });
+                Ok(())
+            }
+        }
+    }
+
+    fn send(&mut self, place: usize, frame: &[u8], outputs: &mut Vec<Output>) {
+        let peer = &self.peers[place];
+        let Some(to) = peer.address else { return };
+        self.sent[place] += 1;
+        // Slots never begin twice, so that no counter is used twice.
+        let counter = self.centre.slot() * COUNTERS_PER_SLOT + self.sent[place].min(COUNTERS_PER_SLOT - 1);
+        let bytes = peer.key.seal(Direction::ToSensor, peer.number, counter, frame);
+        outputs.push(Output::Datagram { to, bytes });
+    }
+
+    fn save(&self) -> Result<(), Error> {
+        let Some(store) = &self.store else { return Ok(()) };
+        let state = self.receiver.state().map_err(Error::Estimator)?;
+        store.save(&Stored {
+            version: STATE_VERSION,
+            sensors: self.peers.iter().map(|peer| peer.number).collect(),
+            slot: self.centre.slot(),
+            windows: self.windows.clone(),
+            addresses: self.peers.iter().map(|peer| peer.address).collect(),
+            receiver: (state.bytes().to_vec(), state.bits()),
+            last: self.last.clone(),
+        })
+    }
+}

@@ -1,0 +1,48 @@
+//! The live page, as a browser asks for it.
+
+use crate::world::SENSORS;
+use fewbits_core::{BitString, Observation};
+use fewbits_link::{Counts, LivePage, Step};
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::Duration;
+
+fn ask(page: &LivePage, path: &str) -> TcpStream {
+    let mut stream = TcpStream::connect(page.address()).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+    write!(stream, "GET {path} HTTP/1.1\r\nHost: test\r\n\r\n").unwrap();
+    stream
+}
+
+/// Reads until `text` has come.
+fn read_until(stream: &mut TcpStream, text: &str) -> String {
+    let (mut all, mut buffer) = (String::new(), [0; 4096]);
+    while !all.contains(text) {
+        let length = stream.read(&mut buffer).unwrap();
+        assert!(length > 0, "ended after {all}");
+        all.push_str(&String::from_utf8_lossy(&buffer[..length]));
+    }
+    all
+}
+
+#[test]
+fn page_shows_past_and_coming_slots() {
+    let page = LivePage::serve(([127, 0, 0, 1], 0).into(), (0..SENSORS).collect(), 0.1).unwrap();
+    let step = |slot: u64| {
+        let observed = [
+            Observation::Received(BitString::from_bytes(vec![0x80], 1).unwrap()),
+            Observation::Nothing,
+            Observation::Lost,
+        ];
+        Step::new(slot, observed.to_vec(), vec![(1.5, 0.25)])
+    };
+    page.show(&step(41), Counts::default());
+    let html = read_until(&mut ask(&page, "/"), "</html>");
+    assert!(html.starts_with("HTTP/1.1 200") && html.contains("viewport"));
+    let mut events = ask(&page, "/events");
+    let past = read_until(&mut events, "}\n");
+    assert!(past.contains("text/event-stream") && past.contains("\"slot\":41"), "{past}");
+    assert!(past.contains("\"observed\":[1,-1,-2]") && past.contains("[1.5,0.25]"), "{past}");
+    page.show(&step(42), Counts::default());
+    assert!(read_until(&mut events, "}\n").contains("\"slot\":42"));
+}

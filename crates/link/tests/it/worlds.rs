@@ -1,0 +1,257 @@
+//! The same scenario over UDP through a lossy relay, without any network, and in the simulator: the same estimates for the same losses.
+
+use crate::world::{Record, Reports, SENSORS, assert_replayed, key, measurement, node, peers, receiver, settings};
+use fewbits_core::BitString;
+use fewbits_link::{Output, SensorLink, Station, udp};
+use fewbits_protocol::{Feedback, SensorSettings, Slot};
+use std::net::UdpSocket;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// A sensor's program: measures as the world says.
+pub struct Measuring {
+    pub number: u32,
+    pub node: Box<dyn fewbits_core::SensorNode<1> + Send>,
+    pub stop: Arc<AtomicBool>,
+}
+
+impl udp::Program for Measuring {
+    fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>> {
+        let mut rng = fewbits_monte_carlo::Stream::new(9).rng();
+        let sample = measurement(self.number, slot.number());
+        ControlFlow::Continue(self.node.report(&mut rng, &sample, feedback).unwrap_or(None))
+    }
+    fn goes_on(&mut self) -> bool {
+        !self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Starts the ten sensors. They stop with `stop`.
+pub fn sensors(
+    reports: Reports,
+    centre: std::net::SocketAddr,
+    stop: &Arc<AtomicBool>,
+) -> Vec<std::thread::JoinHandle<()>> {
+    (0..SENSORS)
+        .map(|number| {
+            let stop = stop.clone();
+            std::thread::spawn(move || {
+                let socket = udp::bind("127.0.0.1:0").unwrap();
+                let mut link = SensorLink::new(SensorSettings::new(Feedback::Told), number, key(number), None).unwrap();
+                let mut program = Measuring {
+                    number,
+                    node: node(reports),
+                    stop,
+                };
+                udp::run_sensor(&socket, centre, &mut link, &mut program).unwrap();
+            })
+        })
+        .collect()
+}
+
+/// Sensors speak to the relay, the relay to the centre from one socket per sensor. It loses 5 % of the datagrams and holds back 1 % until the next.
+fn relay(centre: std::net::SocketAddr, stop: Arc<AtomicBool>) -> (std::net::SocketAddr, std::thread::JoinHandle<u32>) {
+    let inside = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = inside.local_addr().unwrap();
+    let thread = std::thread::spawn(move || {
+        inside.set_nonblocking(true).unwrap();
+        let mut outside: Vec<(std::net::SocketAddr, UdpSocket)> = Vec::new();
+        let (mut state, mut lost, mut held) = (7_u64, 0, None::<(usize, bool, Vec<u8>)>);
+        let mut buffer = [0; 2048];
+        while !stop.load(Ordering::Relaxed) {
+            let mut arrived = Vec::new();
+            while let Ok((length, from)) = inside.recv_from(&mut buffer) {
+                let known = outside.iter().position(|(address, _)| *address == from);
+                let i = known.unwrap_or_else(|| {
+                    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+                    socket.connect(centre).unwrap();
+                    socket.set_nonblocking(true).unwrap();
+                    outside.push((from, socket));
+                    outside.len() - 1
+                });
+                arrived.push((i, true, buffer[..length].to_vec()));
+            }
+            for (i, (_, socket)) in outside.iter().enumerate() {
+                while let Ok(length) = socket.recv(&mut buffer) {
+                    arrived.push((i, false, buffer[..length].to_vec()));
+                }
+            }
+            if arrived.is_empty() {
+                std::thread::sleep(Duration::from_micros(200));
+            }
+            for datagram in arrived {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                match (state >> 33) % 100 {
+                    0..5 => lost += 1,
+                    5 if held.is_none() => held = Some(datagram),
+                    _ => {
+                        for (i, up, bytes) in std::iter::once(datagram).chain(held.take()) {
+                            let _ = if up {
+                                outside[i].1.send(&bytes)
+                            } else {
+                                inside.send_to(&bytes, outside[i].0)
+                            };
+                        }
+                    }
+                }
+            }
+        }
+        lost
+    });
+    (address, thread)
+}
+
+fn over_udp(reports: Reports, steps: usize) {
+    let socket = udp::bind("127.0.0.1:0").unwrap();
+    let centre = socket.local_addr().unwrap();
+    let stop = Arc::new(AtomicBool::new(false));
+    let (relay, lossy) = relay(centre, stop.clone());
+    let threads = sensors(reports, relay, &stop);
+    let loss = 1.0 - 0.94_f64.powi(2);
+    let mut station =
+        Station::new(settings(reports, 20_000_000, 10), receiver(reports, loss), peers(SENSORS), None).unwrap();
+    let mut records: Vec<Record> = Vec::new();
+    udp::run_station(&socket, &mut station, |_, outputs| {
+        for output in outputs {
+            if let Output::Step(step) = output {
+                records.push((step.slot, step.observed.clone(), step.estimate.clone()));
+            }
+        }
+        if records.len() < steps {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
+    })
+    .unwrap();
+    stop.store(true, Ordering::Relaxed);
+    for thread in threads {
+        thread.join().unwrap();
+    }
+    let lost = lossy.join().unwrap();
+    let received = records
+        .iter()
+        .flat_map(|(_, observed, _)| observed)
+        .filter(|o| matches!(o, fewbits_core::Observation::Received(_)))
+        .count();
+    println!("{reports:?}: {received} of {} reports, {lost} datagrams lost", 10 * records.len());
+    assert!(lost > 0 && received > records.len(), "{lost} lost, {received} received");
+    assert_replayed(&mut receiver(reports, loss), &records);
+    without_a_network(reports, loss, &records);
+    simulated(reports, loss, records);
+}
+
+/// The simulated network with the losses that were recorded. Its slots are consecutive: compared up to the first that the real centre slept through.
+fn simulated(reports: Reports, loss: f64, records: Vec<Record>) {
+    use fewbits_network::{BitStar, Clock, Field, Instant, Measurements, Radio, Seconds, Setup};
+    let first = records[0].0;
+    let records: Vec<Record> = (first..)
+        .zip(records)
+        .take_while(|(slot, record)| *slot == record.0)
+        .map(|(_, record)| record)
+        .collect();
+    let (slots, stream) = (records.len() as u32, fewbits_monte_carlo::Stream::new(5));
+    let number = move |slot: u32| Slot::of_count(first + u64::from(slot) - 1).number();
+    let measured = Measurements::from_fn(slots, move |slot, sensor| Some(measurement(sensor as u32, number(slot))));
+    let clock = Clock::new(Seconds::new(1.0).unwrap()).unwrap();
+    let recorded: Vec<Vec<bool>> = records
+        .iter()
+        .map(|(_, observed, _)| {
+            observed
+                .iter()
+                .map(|o| *o != fewbits_core::Observation::Nothing)
+                .collect()
+        })
+        .collect();
+    let report = settings(reports, 1, 1).members[0].report;
+    let star = BitStar::new(
+        move || Ok(receiver(reports, loss)),
+        Feedback::Told,
+        report,
+        move |_| -> Box<dyn fewbits_core::SensorNode<1>> { node(reports) },
+        measured,
+        clock,
+        stream,
+    );
+    let star = star
+        .unwrap()
+        .with_recorded_losses(move |slot, sensor| recorded[slot as usize - 1][sensor]);
+    let setup = Setup::new(Radio::cc2420(0.0).unwrap(), stream);
+    let mut network = star.simulate_on(Field::star(10, 10.0).unwrap(), setup).unwrap();
+    network
+        .run_until(Instant(u64::from(slots + 1) * 1_000_000_000))
+        .unwrap();
+    let estimates = network.nodes()[0].estimates();
+    println!("{reports:?}: {slots} slots simulated, {} bits of payload", network.ledger().sum().payload.0);
+    assert_eq!(estimates.len(), records.len());
+    for ((_, simulated), (slot, _, estimate)) in estimates.iter().zip(&records) {
+        assert_eq!(simulated, estimate, "slot {slot}");
+    }
+}
+
+/// The same machines in one thread, where what did not arrive over UDP does not arrive either.
+fn without_a_network(reports: Reports, loss: f64, records: &[Record]) {
+    use fewbits_protocol::{Action, Centre, CentreTimer, Payload, Receiver, Recipient, Sensor, Task, update_or_drop};
+    let mut centre = Centre::new(settings(reports, 1, 10));
+    let mut filter = receiver(reports, loss);
+    let mut sensors: Vec<_> = (0..SENSORS)
+        .map(|_| (Sensor::new(SensorSettings::new(Feedback::Told)), node(reports)))
+        .collect();
+    let mut rng = fewbits_monte_carlo::Stream::new(9).rng();
+    for (slot, observed, estimate) in records {
+        let mut actions = Vec::new();
+        centre.on_timer(*slot, CentreTimer::SlotBegins, &mut actions);
+        assert!(actions.contains(&Action::Predict { slot: *slot }));
+        filter.predict(*slot).unwrap();
+        let feedback: Vec<_> = (0..10).map(|i| filter.feedback(i).unwrap()).collect();
+        actions.clear();
+        centre.on_predicted(&feedback, None, &mut actions);
+        for action in std::mem::take(&mut actions) {
+            let Action::Send { to, frame } = action else { continue };
+            for (i, (sensor, node)) in sensors.iter_mut().enumerate() {
+                if to != Recipient::All && to != Recipient::Sensor(i) {
+                    continue;
+                }
+                let Task::Sample { slot, feedback } = sensor.on_frame(0, &frame).task else {
+                    panic!()
+                };
+                let sample = measurement(i as u32, slot.number());
+                let report = node.report(&mut rng, &sample, &feedback.into()).unwrap();
+                let Task::Send(frame) = sensor.on_sample(0, report.as_ref().map(Payload::from)).task else {
+                    continue;
+                };
+                let mut bytes = vec![0; frame.len()];
+                frame.encode(fewbits_protocol::Check::Whole, &mut bytes).unwrap();
+                // The recorded loss.
+                if observed[i] != fewbits_core::Observation::Nothing {
+                    centre.on_frame(i, &bytes, &mut actions);
+                }
+            }
+        }
+        assert!(actions.is_empty(), "{actions:?}");
+        centre.on_timer(*slot, CentreTimer::Deadline, &mut actions);
+        let Some(Action::Update {
+            observed: simulated, ..
+        }) = actions.pop()
+        else {
+            panic!()
+        };
+        assert_eq!(&simulated, observed);
+        update_or_drop(&mut filter, &simulated);
+        assert_eq!(&filter.estimate(), estimate, "slot {slot}");
+    }
+}
+
+#[test]
+fn signs_over_udp_and_without_it() {
+    over_udp(Reports::Signs, 60);
+}
+
+#[test]
+fn censored_values_over_udp_and_without_it() {
+    over_udp(Reports::Censored, 60);
+}

@@ -1,0 +1,125 @@
+//! The machines of `fewbits-protocol` over the simulated radio.
+
+use crate::books::conserves;
+use crate::worlds::{clock, setup};
+use fewbits_core::{BitString, Error, Observation, SensorNode};
+use fewbits_monte_carlo::Stream;
+use fewbits_network::{
+    BitNode, BitStar, Channel, Fault, FaultKind, Field, Measurements, Note, Seconds, SensorId, Setup, Simulator,
+};
+use fewbits_protocol::{BoxError, Feedback, Receiver, ReportLength};
+use nalgebra::{SVector, Vector1};
+use rand::Rng;
+
+const SENSORS: usize = 3;
+const SLOTS: u32 = 200;
+
+/// Counts reports of one bit; the state is slot and count.
+#[derive(Debug, Default)]
+struct Counter {
+    slot: u64,
+    count: u64,
+}
+
+impl Receiver for Counter {
+    fn sensors(&self) -> usize {
+        SENSORS
+    }
+    fn predict(&mut self, slot: u64) -> Result<(), BoxError> {
+        self.slot = slot;
+        Ok(())
+    }
+    fn feedback(&self, sensor: usize) -> Result<BitString, BoxError> {
+        Ok(BitString::from_bytes(vec![sensor as u8, self.count as u8], 16)?)
+    }
+    fn update(&mut self, observed: &[(usize, Observation<BitString>)]) -> Result<(), BoxError> {
+        let received = observed.iter().filter(|(_, o)| matches!(o, Observation::Received(_)));
+        self.count += received.count() as u64;
+        Ok(())
+    }
+    fn estimate(&self) -> Vec<(f64, f64)> {
+        vec![(self.count as f64, 0.0)]
+    }
+    fn state(&self) -> Result<BitString, BoxError> {
+        let bytes = [self.slot.to_be_bytes(), self.count.to_be_bytes()].concat();
+        Ok(BitString::from_bytes(bytes, 128)?)
+    }
+    fn restore(&mut self, state: &BitString) -> Result<(), BoxError> {
+        let (slot, count) = state.bytes().split_at_checked(8).ok_or("state")?;
+        self.slot = u64::from_be_bytes(slot.try_into()?);
+        self.count = u64::from_be_bytes(count.try_into()?);
+        Ok(())
+    }
+}
+
+/// Sends one bit in every slot.
+struct Speaker;
+
+impl SensorNode<1> for Speaker {
+    fn report(&mut self, _: &mut dyn Rng, _: &SVector<f64, 1>, _: &BitString) -> Result<Option<BitString>, Error> {
+        Ok(BitString::from_bytes(vec![0x80], 1).ok())
+    }
+}
+
+fn run(feedback: Feedback, setup: Setup) -> Simulator<BitStar<Counter, 1>> {
+    let measured = Measurements::from_fn(SLOTS, |_, _| Some(Vector1::new(0.0)));
+    let node = |_| -> Box<dyn SensorNode<1>> { Box::new(Speaker) };
+    let start = || Ok(Counter::default());
+    let star = BitStar::new(start, feedback, ReportLength::Fixed(1), node, measured, clock(), Stream::new(1)).unwrap();
+    let mut network = star.simulate_on(Field::star(SENSORS, 10.0).unwrap(), setup).unwrap();
+    network.run_until(clock().end(SLOTS)).unwrap();
+    conserves(network.ledger());
+    network
+}
+
+fn count(network: &Simulator<BitStar<Counter, 1>>, slot: u32) -> f64 {
+    network.nodes()[0].estimates()[slot as usize - 1].1[0].0
+}
+
+#[test]
+fn every_report_arrives_over_a_perfect_channel() {
+    for feedback in [Feedback::Told, Feedback::Clock, Feedback::Echoed] {
+        let network = run(feedback, setup(1));
+        assert_eq!(network.log().entries, [], "{feedback:?}");
+        assert_eq!(network.nodes()[0].estimates().len(), SLOTS as usize);
+        assert_eq!(count(&network, SLOTS), f64::from(SLOTS * SENSORS as u32), "{feedback:?}");
+    }
+}
+
+#[test]
+fn followers_come_back_after_losses_and_restarts() {
+    let restart = |slot: f64, node: u32| Fault {
+        at: Seconds::new(slot * clock().period().value()).unwrap(),
+        node: SensorId(node),
+        kind: FaultKind::Restart,
+    };
+    let network = run(
+        Feedback::Echoed,
+        Setup {
+            channel: Channel::lossy(0.1).unwrap(),
+            faults: vec![restart(50.5, 2), restart(100.5, 0)],
+            ..setup(1)
+        },
+    );
+    let noted = |wanted: fn(&Note) -> bool| network.log().notes().filter(|(_, _, note)| wanted(note)).count();
+    assert!(noted(|note| matches!(note, Note::Disagreement { .. })) > 10);
+    assert!(noted(|note| matches!(note, Note::Resynchronised { .. })) > 10);
+    // The centre began anew after slot 100. Frames pass two links of 10 % loss, and a missed echo costs a slot more.
+    let reports = count(&network, SLOTS) - count(&network, 102);
+    assert!(reports > 0.5 * 98.0 * SENSORS as f64, "{reports}");
+    assert!(matches!(network.nodes()[1], BitNode::Sensor(..)));
+}
+
+#[test]
+fn recorded_losses_are_those_that_happen() {
+    let measured = Measurements::from_fn(20, |_, _| Some(Vector1::new(0.0)));
+    let node = |_| -> Box<dyn SensorNode<1>> { Box::new(Speaker) };
+    let start = || Ok(Counter::default());
+    let star =
+        BitStar::new(start, Feedback::Told, ReportLength::Fixed(1), node, measured, clock(), Stream::new(1)).unwrap();
+    let star = star.with_recorded_losses(|slot, sensor| slot % 2 == 0 || sensor == 1);
+    let mut network = star.simulate_on(Field::star(SENSORS, 10.0).unwrap(), setup(1)).unwrap();
+    network.run_until(clock().end(20)).unwrap();
+    // Ten slots of three reports, ten of one.
+    assert_eq!(count(&network, 20), 40.0);
+}
