@@ -8,9 +8,9 @@ use crate::numbers::mean_and_deviation;
 use crate::output;
 use crate::plot::{Layer, Picture};
 use fewbits_core::Link;
-use fewbits_quantizer_design::design::AllowedCells;
-use fewbits_quantizer_design::solve::{Adc, Bits, Progress, Request, Rounded, Solution};
-use fewbits_quantizer_design::{Noise, Prior, Scene};
+
+use fewbits_quantizer_design::solve::Rounded;
+use fewbits_quantizer_design::{Adc, AllowedCells, Bits, Noise, Prior, Progress, Request, Scene, Solution};
 use fewbits_record::TimeBase;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
