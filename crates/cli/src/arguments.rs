@@ -33,10 +33,6 @@ pub(crate) enum Task {
     Send(SendOptions),
     /// Receive frames from a file, a pipe or UDP and write their rows as CSV.
     Receive(ReceiveOptions),
-    /// Run a fusion centre over UDP. Estimates go to standard output, a row per slot.
-    Centre(CentreOptions),
-    /// Run a sensor over UDP. Samples come from standard input, one per line and slot.
-    Sensor(SensorOptions),
     /// Write completions for a shell, or the manual page.
     #[command(hide = true)]
     Generate(GenerateOptions),
@@ -178,25 +174,6 @@ pub(crate) struct BenchOptions {
     /// As JSON.
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-#[derive(Args)]
-pub(crate) struct CentreOptions {
-    /// Configuration (TOML): model, prior, sensors and their keys.
-    pub(crate) configuration: PathBuf,
-    /// End after so many slots.
-    #[arg(long)]
-    pub(crate) slots: Option<u64>,
-    /// Show a page at this address, as 0.0.0.0:8080.
-    #[cfg(feature = "live")]
-    #[arg(long, value_name = "HOST:PORT")]
-    pub(crate) live: Option<std::net::SocketAddr>,
-}
-
-#[derive(Args)]
-pub(crate) struct SensorOptions {
-    /// Configuration (TOML): the centre's address, the sensor's number, key and report.
-    pub(crate) configuration: PathBuf,
 }
 
 #[derive(Args)]

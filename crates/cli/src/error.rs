@@ -69,12 +69,6 @@ pub(crate) enum Error {
         #[source]
         source: io::Error,
     },
-    /// A configuration, or what was read with it, has a value that cannot be used.
-    #[error("{file}: {reason}")]
-    Configuration { file: String, reason: String },
-    /// A centre or a sensor cannot go on.
-    #[error(transparent)]
-    Link(#[from] fewbits_link::Error),
     /// JSON could not be written.
     #[error("cannot write JSON")]
     Json(#[from] serde_json::Error),

@@ -6,7 +6,6 @@
 mod arguments;
 mod bench;
 mod bounds;
-mod centre;
 mod clock;
 mod error;
 mod info;
@@ -15,8 +14,6 @@ mod link;
 mod output;
 mod pack;
 mod plan;
-mod report;
-mod sensor;
 mod unpack;
 mod verify;
 
@@ -44,8 +41,6 @@ fn main() -> ExitCode {
         Task::Bench(options) => bench::run(&options),
         Task::Send(options) => link::send(&options),
         Task::Receive(options) => link::receive(&options),
-        Task::Centre(options) => centre::run(&options),
-        Task::Sensor(options) => sensor::run(&options),
         Task::Generate(options) => arguments::generate(&options),
     };
     match done {

@@ -5,7 +5,6 @@
 //! | [`Station`], [`SensorLink`] | frames under keys and a state that is stored, over a transport of one's own |
 //! | [`udp::run_station`], [`udp::run_sensor`] | the same over UDP, by the clock of the machine |
 //! | [`FusionReceiver`] | the estimator is the mixed fusion centre of `fewbits-filters` |
-//! | `LivePage` (feature `live`) | people want to see a running centre |
 //! | [`Key`], [`ReplayWindow`], [`Store`] | the parts |
 //!
 //! The machines are those of `fewbits-protocol`, which the simulated network runs too. Here are what a real network adds: others who can send, and
@@ -32,8 +31,6 @@
 mod envelope;
 mod error;
 mod fusion;
-#[cfg(feature = "live")]
-mod live;
 mod sensor;
 mod station;
 mod store;
@@ -42,8 +39,6 @@ pub mod udp;
 pub use envelope::{Direction, ENVELOPE_HEADER, Key, MIN_KEY_BYTES, Refusal, ReplayWindow, TAG_BYTES, sensor_of};
 pub use error::Error;
 pub use fusion::FusionReceiver;
-#[cfg(feature = "live")]
-pub use live::{HISTORY, LivePage};
 pub use sensor::{Request, SensorLink};
 pub use station::{Counts, Output, Peer, Station, Step};
 pub use store::Store;

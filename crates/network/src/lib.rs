@@ -7,7 +7,7 @@
 //! | where the nodes are, who is in range of whom | [`Field`] |
 //! | what a frame costs | [`Radio`] (one for all, or one per node), [`Account`], [`Ledger`] |
 //! | what happens to frames and nodes | [`Channel`], [`Loss`] (one for all, or one per link), [`Fault`] |
-//! | how sensors and centre talk | [`Star`] (told, or following by echo), [`Walk`] (a belief that travels) |
+//! | how sensors and centre talk | [`Star`] (told, or following by echo), [`AdHoc`] (no centre), [`Walk`] (a belief that travels) |
 //! | the machines and bytes of real sensors | [`BitStar`]: any `Receiver` of `fewbits-protocol`, any `SensorNode` |
 //! | what the sensors measure | [`Measurements`]: a table, an iterator or a closure |
 //! | what runs over it | [`Estimator`], [`Walker`]; the library's own in [`estimators`]; any `Scheme` with any filter by [`Reporting`](estimators::Reporting) |
@@ -66,7 +66,9 @@ pub use medium::{
     TWO_AA_CELLS, Transceiver, digest,
 };
 pub use note::{Note, Stage};
-pub use protocols::{BitNode, BitStar, Centre, Feedback, Lead, Sensor, Star, StarNode, Walk, WalkNode, Walker};
+pub use protocols::{
+    AdHoc, BitNode, BitStar, Centre, Feedback, Lead, Peer, Sensor, Star, StarNode, Walk, WalkNode, Walker,
+};
 pub use simulator::{
     Account, Acknowledgement, Batching, Context, Detail, Entry, EstimateError, Fault, FaultKind, Faults, Ledger, Log,
     Protocol, Reception, Setup, Simulator, Summary, Ticket, Totals, Transmission,

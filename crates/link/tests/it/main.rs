@@ -2,8 +2,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod attacks;
-#[cfg(feature = "live")]
-mod live;
 mod stops;
 mod world;
 mod worlds;

@@ -5,8 +5,8 @@ use fewbits_core::{BitString, Link};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::estimators::ParallelDymboEstimator;
 use fewbits_network::{
-    Channel, Check, Clock, Context, Error, Fault, FaultKind, Field, Frame, Instant, Kind, Lead, Loss, Note, Protocol,
-    Radio, Seconds, SensorId, Setup, Simulator, Star, Walk, Walker,
+    AdHoc, Channel, Check, Clock, Context, Error, Fault, FaultKind, Field, Frame, Instant, Kind, Lead, Loss, Note,
+    Protocol, Radio, Seconds, SensorId, Setup, Simulator, Star, Walk, Walker,
 };
 use fewbits_topology::Deployment;
 use nalgebra::Vector2;
@@ -199,5 +199,7 @@ fn what_makes_no_sense_is_refused_by_name() {
     assert!(matches!(nowhere, Err(Error::UnknownNode { node: 7, nodes: 3 })));
     let perfect = || counted(Link::PERFECT);
     assert!(Star::told(perfect(), scalar(2, 4, 1), clock(), Stream::new(1)).is_err());
+    assert!(AdHoc::new(perfect(), scalar(2, 4, 1), clock(), 3, Stream::new(1)).is_err());
+    assert!(AdHoc::new(perfect(), scalar(3, 4, 1), clock(), 0, Stream::new(1)).is_err());
     assert!(Clock::new(Seconds::ZERO).is_err() && Clock::new(Seconds::new(1e9).unwrap()).is_err());
 }

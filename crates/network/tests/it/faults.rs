@@ -8,7 +8,7 @@ use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::estimators::{Followers, ParallelDymboEstimator};
 use fewbits_network::{
-    Batching, Channel, Check, Error, Fault, FaultKind, Field, Lead, Log, Loss, Note, Seconds, SensorId, Setup,
+    AdHoc, Batching, Channel, Check, Error, Fault, FaultKind, Field, Lead, Log, Loss, Note, Seconds, SensorId, Setup,
     Simulator, Star, StarNode, Walk, Walker,
 };
 use proptest::prelude::*;
@@ -18,6 +18,8 @@ use std::collections::BTreeMap;
 /// Slots under faults, and quiet ones after them.
 const FAULTY: u32 = 10;
 const QUIET: u32 = 6;
+/// Slots after which a silent anchor of an ad-hoc network sends its digest.
+const BEACON: u32 = 2;
 
 fn seconds(s: f64) -> Seconds {
     Seconds::new(s).unwrap()
@@ -190,6 +192,31 @@ proptest! {
                     prop_assert_eq!(node.answered(), Some(slots), "node {} is still lost", i);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn peers_come_together_and_the_log_says_that_they_had_parted(setup in schedules()) {
+        let slots = FAULTY + QUIET;
+        let peers = || AdHoc::new(estimator(), scalar(3, slots as usize, 1), clock(), BEACON, Stream::new(1)).unwrap();
+        let mut network = peers().simulate(10.0, setup.clone()).unwrap();
+        network.run_until(clock().end(FAULTY)).unwrap();
+        conserves(network.ledger());
+        prop_assert!(network.nodes().iter().all(|peer| finite(peer.estimates())));
+        let mut stored = Vec::new();
+        network.snapshot(&mut stored).unwrap();
+        let alive: Vec<bool> = (0..3).map(|i| network.is_alive(SensorId(i))).collect();
+        let parted = alive[0] && (1..3).any(|i| {
+            alive[i] && network.nodes()[i].belief() != network.nodes()[0].belief()
+        });
+        let quiet = quiet(setup);
+        let field = Field::ring(3, 10.0).unwrap();
+        let mut network = Simulator::restore(peers(), field, quiet, stored.as_slice()).unwrap();
+        network.run_until(clock().end(slots)).unwrap();
+        prop_assert!(!parted || disagreements(network.log()) > 0);
+        for i in (1..3).filter(|i| alive[0] && alive[*i]) {
+            prop_assert_eq!(network.nodes()[i].belief(), network.nodes()[0].belief());
+            prop_assert!(!network.nodes()[i].is_lost());
         }
     }
 

@@ -23,7 +23,7 @@ use fewbits_monte_carlo::Stream;
 use fewbits_network::estimators::{
     CensoringEstimator, DymboEstimator, Followers, Leaders, LookUp, Patterns, Reporting, SourceChain,
 };
-use fewbits_network::{Estimator, Field, Ledger, Replicable, SensorId, Star, Walk};
+use fewbits_network::{AdHoc, Estimator, Field, Ledger, Replicable, SensorId, Star, Walk};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::{Scene, System};
@@ -79,6 +79,23 @@ where
     for sensor in &network.nodes()[1..] {
         let (slot, belief) = sensor.belief().unwrap();
         assert_eq!((slot, estimator.mean(belief)), (slots - 1, alone[slots as usize - 2].clone()));
+    }
+    among_peers(estimator, measurements, alone, up);
+}
+
+/// The same without a centre.
+fn among_peers<E: Replicable + Clone>(estimator: &E, measurements: &[Vec<E::Measurement>], alone: &[Vec<f64>], up: u64)
+where
+    E::Measurement: Clone,
+{
+    let slots = measurements.len() as u32;
+    let peers = AdHoc::new(estimator.clone(), measurements.to_vec(), clock(), 10, Stream::new(9)).unwrap();
+    let mut network = peers.simulate(10.0, setup(3)).unwrap();
+    network.run_until(clock().end(slots)).unwrap();
+    assert_eq!(network.log().entries, []);
+    assert_eq!(network.ledger().messages().payload.0, up);
+    for peer in network.nodes() {
+        assert_eq!(peer.estimates(), alone);
     }
 }
 

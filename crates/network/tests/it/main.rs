@@ -9,7 +9,6 @@
 
 mod acknowledgements;
 mod attacks;
-mod bit_star;
 mod books;
 mod defects;
 mod faults;
