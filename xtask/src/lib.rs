@@ -4,11 +4,14 @@
 //! |---|---|
 //! | [`figures`] | runs experiments, writes CSV, JSON, SVG and the gallery, fails where a claim fails |
 //! | [`mod@bench`] | runs the benchmarks and prints each as a multiple of its group's unit |
+//! | [`alone`] | builds every crate as a user would depend on it |
+//! | [`api`] | lists the public items of every crate, or compares them with the list that is kept |
 //! | [`tidy`] | checks the house rules: docs, lints, floors, panics, figure ids |
 //!
 //! No mathematics here: an experiment computes, this crate writes and draws.
 
 pub mod alone;
+pub mod api;
 pub mod bench;
 pub mod figures;
 pub mod tidy;

@@ -20,11 +20,16 @@ enum Task {
     Bench(xtask::bench::Options),
     /// Build every crate as a user would depend on it, outside the workspace, and run its examples.
     Alone(xtask::alone::Options),
+    /// List every public item of the library crates in `docs/api`, or compare with what is there.
+    Api(xtask::api::Options),
     /// Check the house rules.
     Tidy,
 }
 
 fn main() -> ExitCode {
+    if let Some(good) = xtask::api::as_rustdoc() {
+        return if good { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+    }
     let ended = |good: bool| if good { Ending::Good } else { Ending::Failed };
     let done = match Cli::parse().task {
         Task::Figures(options) => xtask::figures::run(&options).map_err(|error| error.to_string()),
@@ -32,6 +37,9 @@ fn main() -> ExitCode {
             .map(ended)
             .map_err(|error| error.to_string()),
         Task::Alone(options) => xtask::alone::run(&options)
+            .map(ended)
+            .map_err(|error| error.to_string()),
+        Task::Api(options) => xtask::api::run(&options)
             .map(ended)
             .map_err(|error| error.to_string()),
         Task::Tidy => xtask::tidy::run().map(ended).map_err(|error| error.to_string()),

@@ -5,6 +5,9 @@
 //! 3. Every figure id in the docs exists, and every figure is in the docs.
 //! 4. Every file of integration tests is a module of the crate's one test binary.
 //! 5. Every relative link of a page leads to a file, and every page of `docs` is linked from `docs/index.md`.
+//! 6. No source file has more than 400 lines, and no files of a crate import each other in a circle ([`files`]).
+
+mod files;
 
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
 use fewbits_experiments::all;
@@ -77,6 +80,7 @@ pub fn check(root: &Path) -> Result<Vec<String>, Error> {
                 .extend(unlisted(&listed, stems).map(|stem| format!("crates/{name}: tests/it/{stem}.rs never runs")));
         }
     }
+    problems.extend(files::problems(root, &source_folders(root)?)?);
     problems.extend(figure_problems(root)?);
     problems.extend(link_problems(root)?);
     Ok(problems)
@@ -124,6 +128,14 @@ fn crates(root: &Path) -> Result<Vec<Package>, Error> {
     let mut crates: Vec<Package> = metadata.packages.into_iter().filter(ours).collect();
     crates.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(crates)
+}
+
+/// The folders of all packages with sources: the crates and this one.
+fn source_folders(root: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut folders = list(&root.join("crates"))?;
+    folders.retain(|folder| folder.join("src").is_dir());
+    folders.push(root.join("xtask"));
+    Ok(folders)
 }
 
 /// A package's name without the project's.

@@ -1,19 +1,14 @@
 //! What both ends agree on beforehand.
 
-use fewbits_numerics::error::{ArgumentError, positive, within};
+use fewbits_node::adaptive as node;
+use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
-/// The agreement of a sensor and its receiver: the accuracy, and how losses are survived.
+/// The agreement of a sensor and its receiver: the accuracy, and how losses are survived. Stored (`serde`) it is checked anew;
+/// [`fewbits_node::adaptive::Config`] is the same for a microcontroller.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
-pub struct Config {
-    delta: f64,
-    period: Option<f64>,
-    sequence_bits: u32,
-    refresh_every: Option<u64>,
-    resilient: bool,
-    exact: bool,
-}
+pub struct Config(pub(crate) node::Config);
 
 impl Config {
     /// Every reconstruction is within `delta` (measurement units) of its sample, over a link that loses nothing.
@@ -21,18 +16,7 @@ impl Config {
     /// # Errors
     /// If `delta` is not above 0 or `2 delta` not finite.
     pub fn new(delta: f64) -> Result<Self, ArgumentError> {
-        positive("delta", delta)?;
-        if !(2.0 * delta).is_finite() {
-            return Err(ArgumentError::new("delta", delta, "a number whose double is finite"));
-        }
-        Ok(Self {
-            delta,
-            period: None,
-            sequence_bits: 0,
-            refresh_every: None,
-            resilient: false,
-            exact: false,
-        })
+        Ok(Self(node::Config::new(delta)?))
     }
 
     /// For an instrument whose samples are decimal numbers a multiple of `resolution` apart: these return exactly, to the last
@@ -42,11 +26,7 @@ impl Config {
     /// # Errors
     /// If `resolution` is not positive and finite, or half of it 0.
     pub fn exact(resolution: f64) -> Result<Self, ArgumentError> {
-        positive("resolution", resolution)?;
-        Ok(Self {
-            exact: true,
-            ..Self::new(0.5 * resolution)?
-        })
+        Ok(Self(node::Config::exact(resolution)?))
     }
 
     /// The same agreement with another bound.
@@ -54,15 +34,7 @@ impl Config {
     /// # Errors
     /// As [`new`](Self::new) and [`circular`](Self::circular).
     pub fn with_delta(self, delta: f64) -> Result<Self, ArgumentError> {
-        let config = Self {
-            delta: Self::new(delta)?.delta,
-            exact: false,
-            ..self
-        };
-        match self.period {
-            Some(period) => config.circular(period),
-            None => Ok(config),
-        }
+        Ok(Self(self.0.with_delta(delta)?))
     }
 
     /// The signal lives on a circle: samples are taken modulo `period` (360 for degrees), reconstructions lie in `[0, period)`,
@@ -70,14 +42,8 @@ impl Config {
     ///
     /// # Errors
     /// If `period` is not positive and finite, or above `2^40 delta`.
-    pub fn circular(mut self, period: f64) -> Result<Self, ArgumentError> {
-        positive("period", period)?;
-        if period / self.delta > (1_u64 << 40) as f64 {
-            let expected = format!("at most 2^40 delta = {}", (1_u64 << 40) as f64 * self.delta);
-            return Err(ArgumentError::new("period", period, expected));
-        }
-        self.period = Some(period);
-        Ok(self)
+    pub fn circular(self, period: f64) -> Result<Self, ArgumentError> {
+        Ok(Self(self.0.circular(period)?))
     }
 
     /// For links that lose packets: every packet counts up a number of `sequence_bits` bits (by which the receiver notices a
@@ -86,49 +52,42 @@ impl Config {
     ///
     /// # Errors
     /// If `sequence_bits` is not in `1..=16` or `refresh_every` is 0.
-    pub fn resilient(mut self, sequence_bits: u32, refresh_every: Option<u64>) -> Result<Self, ArgumentError> {
-        within("sequence_bits", f64::from(sequence_bits), 1.0, 16.0)?;
-        if refresh_every == Some(0) {
-            return Err(ArgumentError::new("refresh_every", 0, "at least 1 slot"));
-        }
-        self.sequence_bits = sequence_bits;
-        self.refresh_every = refresh_every;
-        self.resilient = true;
-        Ok(self)
+    pub fn resilient(self, sequence_bits: u32, refresh_every: Option<u64>) -> Result<Self, ArgumentError> {
+        Ok(Self(self.0.resilient(sequence_bits, refresh_every)?))
     }
 
     /// The largest error of a reconstruction.
     pub fn delta(&self) -> f64 {
-        self.delta
+        self.0.delta()
     }
 
     pub(crate) fn made_exact(self) -> Self {
-        Self { exact: true, ..self }
+        Self(self.0.made_exact())
     }
 
     /// What samples are a multiple of apart, if [`exact`](Self::exact).
     pub fn resolution(&self) -> Option<f64> {
-        self.exact.then_some(2.0 * self.delta)
+        self.0.resolution()
     }
 
     /// The period of a circular signal.
     pub fn period(&self) -> Option<f64> {
-        self.period
+        self.0.period()
     }
 
     /// Slots from one scheduled refresh to the next.
     pub fn refresh_every(&self) -> Option<u64> {
-        self.refresh_every
+        self.0.refresh_every()
     }
 
     /// Bits of the counter in a packet.
     pub fn sequence_bits(&self) -> u32 {
-        self.sequence_bits
+        self.0.sequence_bits()
     }
 
     /// Whether packets have a counter and a flag.
     pub fn is_resilient(&self) -> bool {
-        self.resilient
+        self.0.is_resilient()
     }
 }
 
@@ -148,11 +107,11 @@ struct Stored {
 impl From<Config> for Stored {
     fn from(config: Config) -> Self {
         Self {
-            delta: config.delta,
-            period: config.period,
-            sequence_bits: config.sequence_bits,
-            refresh_every: config.refresh_every,
-            exact: config.exact,
+            delta: config.delta(),
+            period: config.period(),
+            sequence_bits: config.sequence_bits(),
+            refresh_every: config.refresh_every(),
+            exact: config.resolution().is_some(),
         }
     }
 }
@@ -161,10 +120,10 @@ impl TryFrom<Stored> for Config {
     type Error = ArgumentError;
 
     fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
-        let mut config = Self {
-            exact: stored.exact,
-            ..Self::new(stored.delta)?
-        };
+        let mut config = Self::new(stored.delta)?;
+        if stored.exact {
+            config = config.made_exact();
+        }
         if let Some(period) = stored.period {
             config = config.circular(period)?;
         }

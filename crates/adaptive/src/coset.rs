@@ -88,8 +88,8 @@ impl CosetConfig {
 
     fn header(&self, counter: u32, refresh: bool) -> Packet {
         let mut packet = Packet::default();
-        packet.push(u64::from(counter), self.counter_bits);
-        packet.push(u64::from(refresh), 1);
+        packet.0.push(u64::from(counter), self.counter_bits);
+        packet.0.push(u64::from(refresh), 1);
         packet
     }
 }
@@ -164,11 +164,11 @@ impl CosetSensor {
         }
         let mut packet = config.header(self.counter, refresh);
         if refresh {
-            packet.push(index as u64, width_of(index));
+            packet.0.push(index as u64, width_of(index));
         } else {
             let farthest = self.reported.iter().map(|last| index - last);
             let width = farthest.map(width_of).max().unwrap_or(1);
-            packet.push(index as u64, width);
+            packet.0.push(index as u64, width);
         }
         self.counter = config.next(self.counter);
         self.reported.truncate(REMEMBERED - 1);

@@ -13,3 +13,9 @@ fewbits_numerics::errors! {
         Model(#[from] fewbits_models::Error),
     } and {}
 }
+
+impl From<fewbits_node::Error> for Error {
+    fn from(error: fewbits_node::Error) -> Self {
+        Self::Argument(error.into())
+    }
+}

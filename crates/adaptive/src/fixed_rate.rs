@@ -6,8 +6,9 @@ use fewbits_core::{BitReader, BitWriter, Cell, CodecError, Gaussian, Message, Ob
 use fewbits_filters::{Imm, ImmBelief, ImmWorkspace};
 use fewbits_models::{LinearGaussian, LinearSensor};
 use fewbits_numerics::error::{ArgumentError, finite, positive};
-use fewbits_numerics::normal;
+use fewbits_numerics::{normal, stored};
 use nalgebra::{Matrix2, Vector1, Vector2};
+use serde::{Deserialize, Serialize};
 
 /// Per-slot factors of the velocities; zero is the random walk.
 const DECAYS: [f64; 3] = [0.0, 0.6, 0.95];
@@ -15,6 +16,8 @@ const DECAYS: [f64; 3] = [0.0, 0.6, 0.95];
 const SCALES: std::ops::RangeInclusive<i32> = -2..=2;
 /// Probability of a new model in a slot.
 const SWITCHING: f64 = 0.05;
+/// Slots after which the thresholds of one bit begin anew.
+const TURNS: usize = 4;
 
 /// A word of 1 to 3 bits in every slot: the cell of the sample between quantiles of what both ends predict.
 ///
@@ -22,7 +25,8 @@ const SWITCHING: f64 = 0.05;
 /// `unit 4^-2 .. unit 4^2`; the cells have equal probability under its prediction (with one bit they take turns at being unequal:
 /// thresholds at one half, a tenth and nine tenths tell the scale, which a threshold at the median alone does not), a word is an [`InCell`] factor, and the
 /// estimate is the filter's mean. There is no guarantee: this is for links that carry exactly so many bits. Replicas may differ in
-/// the last place on different machines; their quantiles then do too, and words mean the same.
+/// the last place on different machines; their quantiles then do too, and words mean the same. Stored (`serde`) and read back it goes on with the
+/// same bits.
 ///
 /// ```
 /// use fewbits_adaptive::FixedRate;
@@ -36,15 +40,17 @@ const SWITCHING: f64 = 0.05;
 /// }
 /// # Ok::<(), fewbits_adaptive::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredFixedRate", into = "StoredFixedRate")]
 pub struct FixedRate {
     bits: u32,
+    unit: f64,
     noise_variance: f64,
     filter: Imm<LinearGaussian<2, 1>>,
     sensor: LinearSensor<2, 1>,
     belief: ImmBelief<2>,
     workspace: ImmWorkspace<2>,
-    /// Slots so far, modulo four.
+    /// Slots so far, modulo [`TURNS`].
     turn: usize,
 }
 
@@ -64,6 +70,22 @@ impl Message for Word {
         Ok(Self(u8::try_from(reader.read(*bits)?).unwrap_or(u8::MAX)))
     }
 }
+
+stored! { FixedRate as StoredFixedRate |rate| {
+    bits: u32 = rate.bits,
+    #[serde(with = "fewbits_numerics::stored")]
+    unit: f64 = rate.unit,
+    belief: ImmBelief<2> = rate.belief,
+    turn: usize = rate.turn,
+} => {
+    let rate = FixedRate::new(bits, unit, 0.0)?;
+    let models = rate.belief.modes().len();
+    if belief.modes().len() != models {
+        let expected = format!("{models}, one for each model");
+        return Err(ArgumentError::new("belief", format!("{} Gaussians", belief.modes().len()), expected).into());
+    }
+    Ok(FixedRate { belief, turn: turn % TURNS, ..rate })
+}, Error }
 
 impl FixedRate {
     /// Words of `bits` bits for a signal that starts about `start`, give or take `unit`, and typically moves by up to a few
@@ -90,6 +112,7 @@ impl FixedRate {
         let prior = Gaussian::new(Vector2::new(start, 0.0), Matrix2::new(unit * unit, 0.0, 0.0, 0.0))?;
         Ok(Self {
             bits,
+            unit,
             noise_variance: noise * noise,
             belief: ImmBelief::agreed(&prior, models.len())?,
             filter: Imm::switching(models, SWITCHING)?,
@@ -147,7 +170,7 @@ impl FixedRate {
     /// If the belief would no longer be finite.
     pub fn miss(&mut self) -> Result<f64, Error> {
         self.belief = self.predicted()?;
-        self.turn = (self.turn + 1) % 4;
+        self.turn = (self.turn + 1) % TURNS;
         Ok(self.estimate())
     }
 
@@ -202,7 +225,7 @@ impl FixedRate {
         self.filter
             .update_in_place(&mut predicted, &observed, &mut self.workspace)?;
         self.belief = predicted;
-        self.turn = (self.turn + 1) % 4;
+        self.turn = (self.turn + 1) % TURNS;
         Ok(())
     }
 }

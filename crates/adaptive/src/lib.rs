@@ -40,31 +40,29 @@
 //! [`fewbits_filters::Imm`] would update by truncated normals. One slot costs 24 exponentials and some 600 other operations; the
 //! errors at equal bits are the same on recordings. Only arithmetic that is the same on every machine decides what is coded.
 //!
+//! The replicas and the sensor's half stand in [`fewbits_node::adaptive`], which a microcontroller runs as it is; here are the
+//! receiver's half, streams, stored states and whole recordings.
+//!
 //! Not here: loss models and the energy of a radio, baselines, files.
 
-mod bank;
 mod block;
 mod config;
 mod coset;
-mod counts;
 mod error;
 mod fixed_rate;
-mod lattice;
-mod law;
 mod packet;
 mod receiver;
-mod replica;
 mod report;
 mod scheme;
 mod sensor;
 mod stream;
 mod tuning;
 
-pub use bank::{MODELS, SCALES};
 pub use block::{BlockCodec, Effort, JOINT_COLUMNS};
 pub use config::Config;
 pub use coset::{CosetConfig, CosetReceiver, CosetSensor, TOLERATED};
 pub use error::Error;
+pub use fewbits_node::adaptive::{MODELS, SCALES};
 pub use fixed_rate::{FixedRate, Word};
 pub use packet::Packet;
 pub use receiver::{Receiver, Tracked};

@@ -1,13 +1,11 @@
 //! The receiver's half.
 
 use crate::config::Config;
-use crate::lattice::Lattice;
 use crate::packet::{Packet, PacketReader, read_number};
-use crate::replica::Replica;
-use crate::sensor::{MODEL_BITS, checked, next, scheduled};
 use crate::stream::StreamReader;
 use crate::{Error, MODELS, report};
 use fewbits_core::{CodecError, Observation};
+use fewbits_node::adaptive::{Lattice, MODEL_BITS, Replica, is_scheduled, next_sequence};
 use fewbits_numerics::ArgumentError;
 use serde::{Deserialize, Serialize};
 
@@ -65,7 +63,13 @@ impl TryFrom<Stored> for Receiver {
     type Error = ArgumentError;
 
     fn try_from(stored: Stored) -> Result<Self, ArgumentError> {
-        let replica = checked(stored.replica, &stored.config)?;
+        let replica = stored.replica;
+        if replica
+            .as_ref()
+            .is_some_and(|replica| !replica.is_valid(&stored.config.0))
+        {
+            return Err(ArgumentError::new("replica", "inconsistent", "the state that was stored"));
+        }
         Ok(Self {
             config: stored.config,
             synchronised: stored.synchronised && replica.is_some(),
@@ -113,7 +117,7 @@ impl Receiver {
     pub fn model_weights(&self) -> [f64; MODELS] {
         self.replica
             .as_ref()
-            .map_or([1.0 / MODELS as f64; MODELS], |replica| *replica.bank.weights())
+            .map_or([1.0 / MODELS as f64; MODELS], |replica| *replica.bank().weights())
     }
 
     /// What arrived one slot after the last.
@@ -140,7 +144,7 @@ impl Receiver {
                 // The number of the packet that is gone is counted where the next one is compared.
             }
             Observation::Nothing => {
-                let missing = self.slot.is_some_and(|slot| scheduled(&self.config, slot));
+                let missing = self.slot.is_some_and(|slot| is_scheduled(&self.config.0, slot));
                 match &mut self.replica {
                     Some(replica) if self.synchronised && !missing => {
                         let slot = replica.predict(elapsed);
@@ -163,17 +167,17 @@ impl Receiver {
             return Err(ArgumentError::new("elapsed", 0, "at least 1 slot").into());
         }
         let Some(replica) = &mut self.replica else {
-            let lattice = Lattice::new(&self.config, stream.first()?);
+            let lattice = Lattice::new(&self.config.0, stream.first()?);
             let replica = self.replica.insert(Replica::new(lattice, None));
             self.synchronised = true;
             return Ok(replica.value());
         };
-        let saved = replica.bank;
+        let saved = *replica.bank();
         let slot = replica.predict(elapsed);
         let outcome = stream.get(replica, &slot).and_then(|content| match content {
             Some(content) => {
                 let outside = replica.law(&slot).bank_outside();
-                content.apply(&self.config, replica, &slot, outside)
+                report::apply(&content, &self.config.0, replica, &slot, outside)
             }
             None => {
                 replica.silent(&slot);
@@ -181,7 +185,7 @@ impl Receiver {
             }
         });
         if let Err(error) = outcome {
-            replica.bank = saved;
+            replica.restore_bank(saved);
             return Err(error.into());
         }
         Ok(replica.value())
@@ -203,7 +207,7 @@ impl Receiver {
         } else {
             self.synchronised = false;
         }
-        self.sequence = next(&self.config, sequence);
+        self.sequence = next_sequence(&self.config.0, sequence);
         Ok(())
     }
 
@@ -223,8 +227,8 @@ impl Receiver {
             None
         };
         reader.finish()?;
-        let sample = Lattice::reduce(&self.config, sample);
-        let lattice = Lattice::new(&self.config, sample);
+        let sample = Lattice::reduce(&self.config.0, sample);
+        let lattice = Lattice::new(&self.config.0, sample);
         match &mut self.replica {
             Some(replica) => replica.restart(lattice, believed),
             None => self.replica = Some(Replica::new(lattice, believed)),
@@ -237,14 +241,14 @@ impl Receiver {
         let Some(replica) = &mut self.replica else {
             return Ok(());
         };
-        let saved = replica.bank;
+        let saved = *replica.bank();
         let slot = replica.predict(elapsed);
         let law = replica.law(&slot);
         let outside = law.bank_outside();
-        let outcome =
-            report::read(&law, reader).and_then(|content| content.apply(&self.config, replica, &slot, outside));
+        let outcome = report::read(&law, reader)
+            .and_then(|content| report::apply(&content, &self.config.0, replica, &slot, outside));
         if outcome.is_err() {
-            replica.bank = saved;
+            replica.restore_bank(saved);
         }
         outcome
     }

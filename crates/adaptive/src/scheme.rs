@@ -1,12 +1,11 @@
 //! One slot as a [`Scheme`]: what a report, or silence, says about the noise-free measurement.
 
-use crate::lattice::Lattice;
 use crate::packet::Packet;
-use crate::replica::{Replica, Slot};
-use crate::report::{self, Content};
+use crate::report;
 use crate::{Error, Sensor};
 use fewbits_core::factor::{Factor, InCell, Scalar, Tilted, Value};
 use fewbits_core::{Cell, Columns, Gaussian, Link, Observation, Scheme};
+use fewbits_node::adaptive::{Content, Lattice, REACH, Replica, Slot, push};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{finite, positive};
 use nalgebra::{SVector, Vector1};
@@ -47,7 +46,7 @@ impl SlotScheme {
 
     /// The reconstruction that silence stands for.
     pub fn prediction(&self) -> f64 {
-        self.replica.lattice.value(self.slot.prediction)
+        self.replica.lattice().value(self.slot.prediction())
     }
 
     /// The packet that reports the lattice point `steps` from the prediction, for tests of the laws.
@@ -56,17 +55,17 @@ impl SlotScheme {
     /// If `steps` is zero or beyond 4096.
     pub fn packet(&self, steps: i64) -> Result<Packet, Error> {
         let content = Content::Near(steps);
-        if steps == 0 || steps.abs() > crate::law::REACH {
+        if steps == 0 || steps.abs() > REACH {
             return Err(ArgumentError::new("steps", steps, "1 to 4096 in size").into());
         }
         let mut packet = self.sensor.next_header();
-        report::push(&content, &self.replica.law(&self.slot), &mut packet);
-        Ok(packet)
+        push(&content, &self.replica.law(&self.slot), &mut packet);
+        Ok(Packet(packet))
     }
 
     fn cell(&self, j: i64) -> Result<Cell, ArgumentError> {
         // Edges computed from their own numbers: neighbours share them to the bit.
-        let lattice: &Lattice = &self.replica.lattice;
+        let lattice: &Lattice = self.replica.lattice();
         let edge = |j: i64| 0.5 * (lattice.value(j - 1) + lattice.value(j));
         Cell::new(edge(j), edge(j + 1))
     }
@@ -141,8 +140,8 @@ impl Scheme<1> for SlotScheme {
         let sample = finite("measurement", measurement[0])?;
         Ok(Content::of(&self.replica, &self.slot, sample).map(|content| {
             let mut packet = self.sensor.next_header();
-            report::push(&content, &self.replica.law(&self.slot), &mut packet);
-            packet
+            push(&content, &self.replica.law(&self.slot), &mut packet);
+            Packet(packet)
         }))
     }
 
@@ -158,19 +157,19 @@ impl Scheme<1> for SlotScheme {
         }
         let packet = match observation {
             Observation::Lost => {
-                let silent = self.cell(self.slot.prediction)?;
+                let silent = self.cell(self.slot.prediction())?;
                 let spoke = Scalar::outside(&silent, self.noise_variance, link.lost_given_sent())?;
                 return Ok(SlotFactor::Cells(spoke));
             }
             Observation::Nothing => {
-                let cell = self.cell(self.slot.prediction)?;
+                let cell = self.cell(self.slot.prediction())?;
                 return Ok(SlotFactor::Cells(InCell::silence(cell, self.noise_variance, link)?.into()));
             }
             Observation::Received(packet) => packet,
         };
         let refused = |what: String| ArgumentError::new("report", what, "a report of this slot");
         let mut reader = packet.reader();
-        let header = self.sensor.next_header();
+        let header = Packet(self.sensor.next_header());
         let there = reader
             .read(header.bits() as u32)
             .map_err(|error| refused(error.to_string()))?;
@@ -181,7 +180,7 @@ impl Scheme<1> for SlotScheme {
         let content = report::read(&law, &mut reader).map_err(|error| refused(error.to_string()))?;
         Ok(match content {
             Content::Near(k) | Content::Far(k) => {
-                let cell = self.cell(self.slot.prediction + k)?;
+                let cell = self.cell(self.slot.prediction() + k)?;
                 SlotFactor::Cells(InCell::new(cell, self.noise_variance, 0.0, link.of_received()?)?.into())
             }
             // No cell of the lattice: the sample itself.

@@ -1,15 +1,14 @@
 //! A whole recording as one range-coded stream, for storage or a reliable link.
 
-use crate::law::{ESCAPE, Law, PRECISION, Place};
-use crate::packet::{Packet, push_number, read_number};
-use crate::replica::{Replica, Slot};
-use crate::report::Content;
+use crate::packet::{Packet, read_number};
+use crate::report;
 use constriction::UnwrapInfallible;
 use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
 use constriction::stream::queue::{RangeDecoder, RangeEncoder};
 use constriction::stream::{Decode, Encode};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use fewbits_core::CodecError;
+use fewbits_node::adaptive::{Content, ESCAPE, Law, PRECISION, Place, Replica, Slot, push_number};
 use serde::{Deserialize, Serialize};
 use std::borrow::Borrow;
 use std::num::NonZeroU32;
@@ -149,7 +148,7 @@ impl StreamWriter {
     /// The first sample.
     pub(crate) fn first(&mut self, sample: f64) -> Result<(), CodecError> {
         let mut packet = Packet::default();
-        push_number(&mut packet, sample);
+        push_number(&mut packet.0, sample);
         self.encode(digit(packet.bits() as u32, 8))?;
         self.slots = self.slots.saturating_add(1);
         self.raw(&packet)
@@ -167,7 +166,7 @@ impl StreamWriter {
         };
         self.encode(content.place(&replica.law(slot)))?;
         let mut rest = Packet::default();
-        content.push_rest(&mut rest);
+        content.push_rest(&mut rest.0);
         if rest.bits() > 0 {
             self.encode(digit(rest.bits() as u32, 8))?;
             self.raw(&rest)?;
@@ -292,7 +291,7 @@ impl<'a> StreamReader<'a> {
         let mut packet = Packet::default();
         while left > 0 {
             let width = left.min(DIGIT);
-            packet.push(u64::from(self.digit(width)?), width);
+            packet.0.push(u64::from(self.digit(width)?), width);
             left -= width;
         }
         Ok(packet)
@@ -334,7 +333,7 @@ impl<'a> StreamReader<'a> {
             Packet::default()
         };
         let mut reader = rest.reader();
-        let content = Content::read(symbol, &mut reader)?;
+        let content = report::content(symbol, &mut reader)?;
         reader.finish()?;
         Ok(Some(content))
     }

@@ -191,7 +191,9 @@ fn refined(samples: &[f64], seed: f64) -> Option<f64> {
         }
     }
     // A short decimal, if it is one.
-    let written = crate::packet::TENS.iter().map(|ten| (step * ten).round() / ten);
+    let written = fewbits_node::adaptive::TENS
+        .iter()
+        .map(|ten| (step * ten).round() / ten);
     let step = written
         .into_iter()
         .find(|w| (w - step).abs() <= 1e-7 * step)

@@ -31,31 +31,25 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod bank;
-pub mod baselines;
 pub mod bounds;
-mod continuous_map;
-pub mod count;
-mod decoder;
+mod decoding;
 mod error;
-mod grid;
-mod linear;
-mod pattern;
-mod quantizer;
-mod report;
+mod observation;
+mod patterns;
+pub mod published;
 pub mod search;
-mod sensor;
-mod source;
-mod table;
 
-pub use bank::{Bank, IMPOSSIBLE, MAX_OUTCOMES};
-pub use decoder::Decoder;
+pub use decoding::decoder::Decoder;
+pub use decoding::table::{LookupTable, MAX_TABLE_SENSORS};
 pub use error::Error;
-pub use grid::{Grid, MAX_BITS, MAX_EIGHT_LEVEL_EDGES};
-pub use linear::{Mask, check_mask, generator_matrix, gray_basis, linear_pattern, mask_of, natural_basis, rank};
-pub use pattern::{Pattern, check_separation};
-pub use quantizer::BinaryQuantizer;
-pub use report::Bit;
-pub use sensor::PatternSensor;
-pub use source::{Blur, Nodes, Source};
-pub use table::{LookupTable, MAX_TABLE_SENSORS};
+pub use observation::bank::{Bank, IMPOSSIBLE, MAX_OUTCOMES};
+pub use observation::report::Bit;
+pub use observation::sensor::PatternSensor;
+pub use observation::source::{Blur, Nodes, Source};
+pub use patterns::count;
+pub use patterns::grid::{Grid, MAX_BITS, MAX_EIGHT_LEVEL_EDGES};
+pub use patterns::linear::{
+    Mask, check_mask, generator_matrix, gray_basis, linear_pattern, mask_of, natural_basis, rank,
+};
+pub use patterns::pattern::{Pattern, check_separation};
+pub use patterns::quantizer::BinaryQuantizer;

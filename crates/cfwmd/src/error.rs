@@ -32,12 +32,6 @@ pub enum Error {
         /// Sensors of the network.
         sensors: usize,
     },
-    /// A sensor reported twice in one step.
-    #[error("sensor {sensor} reported twice in one step: expected at most one report per sensor and step")]
-    ReportedTwice {
-        /// Index of the sensor.
-        sensor: usize,
-    },
     /// A received value that the sensor, had it followed the rule, would not have sent.
     #[error(
         "sensor {sensor} sent a measurement with normalised innovation squared {statistic}: expected at least the threshold {threshold}"

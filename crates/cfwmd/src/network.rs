@@ -7,7 +7,7 @@ use crate::scheme::{Censoring, rule_under};
 use fewbits_core::{Gaussian, LinearSensing, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
 use fewbits_filters::{assumed_density, kalman};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, at_least_one, non_negative};
+use fewbits_numerics::error::{at_least_one, non_negative};
 use nalgebra::SVector;
 use rand::Rng;
 
@@ -147,6 +147,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         observations: &[Observation<SVector<f64, M>>],
     ) -> Result<Vec<Observed<S, Censored<M>, M>>, Error> {
         self.count(rules.len(), observations.len())?;
+        let asked: Vec<_> = observations.iter().copied().map(Some).collect();
         let plain = !matches!(self.format, NumberFormat::Fixed(_));
         let mut all = Vec::new();
         for (i, observation) in observations.iter().enumerate() {
@@ -166,7 +167,7 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
                     push(Censored::values(&values, &noise, self.link.of_received()?)?);
                 }
             }
-            if let Some(missing) = self.missing_together(rules, observations, i) {
+            if let Some(missing) = self.missing_together(rules, &asked, i) {
                 push(self.scheme(i, &rules[i])?.missing(broadcast, &self.link, missing)?);
             }
         }
@@ -178,16 +179,20 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
     fn missing_together(
         &self,
         rules: &[CensoringRule<M>],
-        observations: &[Observation<SVector<f64, M>>],
+        observations: &[Option<Observation<SVector<f64, M>>>],
         i: usize,
     ) -> Option<MissingReports> {
-        let missing = |j: usize| observations[j].received().is_none();
+        let missing = |j: usize| observations[j].is_some_and(|observed| observed.received().is_none());
         let alike = |j: usize| missing(j) && self.identical[j] == self.identical[i] && rules[j] == rules[i];
         if !missing(i) || (M == 1 && (0..i).any(alike)) {
             return None;
         }
         let last = if M == 1 { self.sensors.len() } else { i + 1 };
-        let of = |kind| (i..last).filter(|j| alike(*j) && observations[*j] == kind).count();
+        let of = |kind| {
+            (i..last)
+                .filter(|j| alike(*j) && observations[*j] == Some(kind))
+                .count()
+        };
         Some(MissingReports {
             nothing: of(Observation::Nothing),
             lost: of(Observation::Lost),
@@ -210,6 +215,22 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         broadcast: &SVector<f64, D>,
         observations: &[Observation<SVector<f64, M>>],
     ) -> Result<(Gaussian<D>, FusionInfo), Error> {
+        let asked: Vec<_> = observations.iter().copied().map(Some).collect();
+        self.fuse_asked(predicted, rules, broadcast, &asked)
+    }
+
+    /// As [`fuse`](Self::fuse), where `None` is a sensor without observation: it was not asked, or what it did cannot be used. Neither its
+    /// value nor its silence enters.
+    ///
+    /// # Errors
+    /// As [`fuse`](Self::fuse).
+    pub fn fuse_asked(
+        &self,
+        predicted: &Gaussian<D>,
+        rules: &[CensoringRule<M>],
+        broadcast: &SVector<f64, D>,
+        observations: &[Option<Observation<SVector<f64, M>>>],
+    ) -> Result<(Gaussian<D>, FusionInfo), Error> {
         self.count(rules.len(), observations.len())?;
         let (mut belief, mut log_likelihood) = (*predicted, 0.0);
         let update = |belief: &mut Gaussian<D>, i: usize, factor: Censored<M>| -> Result<f64, Error> {
@@ -218,7 +239,7 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
             Ok(step.log_likelihood)
         };
         for (i, observation) in observations.iter().enumerate() {
-            let Observation::Received(value) = observation else {
+            let Some(Observation::Received(value)) = observation else {
                 continue;
             };
             let scheme = self.scheme(i, &rules[i])?;
@@ -239,7 +260,7 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
                 log_likelihood += update(&mut belief, i, factor)?;
             }
         }
-        let received = observations.iter().filter(|o| o.received().is_some()).count();
+        let received = observations.iter().flatten().filter(|o| o.received().is_some()).count();
         Ok((
             belief,
             FusionInfo {
@@ -271,26 +292,4 @@ impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize>
         }
         Ok((belief, info))
     }
-}
-
-/// Sorts the reports of one step by sensor: from whoever is not among them nothing arrived.
-///
-/// # Errors
-/// [`Error::UnknownSensor`], [`Error::ReportedTwice`]; if a value is not finite.
-pub fn gather<const M: usize>(
-    sensors: usize,
-    reports: impl IntoIterator<Item = (usize, SVector<f64, M>)>,
-) -> Result<Vec<Observation<SVector<f64, M>>>, Error> {
-    let mut observations = vec![Observation::Nothing; sensors];
-    for (sensor, value) in reports {
-        let slot = observations
-            .get_mut(sensor)
-            .ok_or(Error::UnknownSensor { sensor, sensors })?;
-        if slot.received().is_some() {
-            return Err(Error::ReportedTwice { sensor });
-        }
-        all_finite("report", value.as_slice())?;
-        *slot = Observation::Received(value);
-    }
-    Ok(observations)
 }

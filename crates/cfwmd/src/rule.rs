@@ -3,7 +3,8 @@
 use crate::Error;
 use crate::ellipsoid::Ellipsoid;
 use fewbits_core::{Gaussian, GaussianDynamics, LinearDynamics, Sensing};
-use fewbits_filters::extended_kalman;
+use fewbits_filters::{assumed_density, kalman};
+use fewbits_models::LinearSensor;
 use fewbits_numerics::error::positive;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -81,7 +82,7 @@ impl<const M: usize> CensoringRule<M> {
     pub fn sends(&self, innovation: &SVector<f64, M>) -> bool {
         if M == 1 {
             // The fusion centre works with this very interval.
-            innovation[0].abs() >= self.half_width
+            fewbits_node::censor::reaches(innovation[0], self.half_width)
         } else {
             self.statistic(innovation) >= self.threshold()
         }
@@ -216,9 +217,12 @@ impl<const D: usize> OwnRecursion<D> {
         estimate: &SVector<f64, D>,
     ) -> Result<OwnStep<D, M>, Error> {
         let before = Gaussian::from_trusted_parts(*estimate, self.covariance);
-        let predicted = extended_kalman::predict(dynamics, &before);
-        let expected = sensing.mean(predicted.mean());
-        let (after, info) = extended_kalman::update(sensing, &predicted, &expected)?;
+        let predicted = assumed_density::predict(dynamics, &before);
+        let at = predicted.mean();
+        let tangent = LinearSensor::new(sensing.jacobian(at), sensing.noise_covariance_at(at))
+            .map_err(fewbits_filters::Error::from)?;
+        // Only covariances matter, which no measurement changes.
+        let (after, info) = kalman::update(&tangent, &predicted, &(tangent.matrix() * at))?;
         self.covariance = *after.covariance();
         Ok(OwnStep {
             innovation_covariance: info.innovation_covariance,

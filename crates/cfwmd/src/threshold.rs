@@ -10,11 +10,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct Budget {
+    #[serde(with = "fewbits_numerics::stored")]
     messages: f64,
     sensors: usize,
 }
 
-stored! { Budget as Numbers { messages: f64, sensors: usize } => Budget::new(messages, sensors), Error }
+stored! { Budget as Numbers { #[serde(with = "fewbits_numerics::stored")] messages: f64, sensors: usize } => Budget::new(messages, sensors), Error }
 
 impl Budget {
     /// A budget of `messages` in `(0, sensors]`.

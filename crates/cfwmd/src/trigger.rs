@@ -20,10 +20,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct StochasticTrigger {
+    #[serde(with = "fewbits_numerics::stored")]
     precision: f64,
 }
 
-stored! { StochasticTrigger as Numbers { precision: f64 } => StochasticTrigger::new(precision), Error }
+stored! { StochasticTrigger as Numbers { #[serde(with = "fewbits_numerics::stored")] precision: f64 } => StochasticTrigger::new(precision), Error }
 
 impl StochasticTrigger {
     /// The trigger with precision `Y > 0` (inverse measurement units squared).
@@ -56,7 +57,7 @@ impl StochasticTrigger {
 
     /// Probability that a sensor with this innovation reports.
     pub fn probability(&self, innovation: f64) -> f64 {
-        -(-0.5 * innovation * innovation * self.precision).exp_m1()
+        fewbits_node::trigger::probability(innovation, self.precision)
     }
 }
 
@@ -193,9 +194,9 @@ impl<const D: usize, S: Sensing<D, 1>> Scheme<1> for Triggered<S, D> {
         measurement: &SVector<f64, 1>,
         broadcast: &SVector<f64, D>,
     ) -> Result<Option<f64>, fewbits_core::Error> {
-        let z = finite("measurement", measurement[0])?;
-        let innovation = finite("innovation", z - self.sensing.mean(broadcast)[0])?;
-        Ok((rng.random::<f64>() < self.trigger.probability(innovation)).then_some(z))
+        let (z, prediction) = (measurement[0], self.sensing.mean(broadcast)[0]);
+        let speaks = fewbits_node::trigger::speaks(z, prediction, self.trigger.precision, rng.random());
+        Ok(speaks.map_err(ArgumentError::from)?.then_some(z))
     }
 
     /// Silence: `s(m) = E exp(-(m + n - prediction)^2 Y/2) = sqrt(2 pi/Y) N(prediction; m, r + 1/Y)`. A known loss:

@@ -1,8 +1,6 @@
 //! The command line.
 
-use crate::Ending;
-use crate::error::Error;
-use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 /// Recordings and telemetry within guaranteed errors, small.
@@ -29,16 +27,19 @@ pub(crate) enum Task {
     Verify(VerifyOptions),
     /// Compare sizes and speeds on a table: this format, pco and (with feature `zstd`) zstd, in the same run.
     Bench(BenchOptions),
-    /// Send rows from standard input or a file as frames, to a file, a pipe or UDP.
+    /// Estimate what sensors measure from a table (CSV) of values, of reports of few bits, or of ranges to anchors: estimates with bands.
+    Track(TrackOptions),
+    /// Design quantizers of few bits for one unknown that several sensors measure.
+    Design(DesignOptions),
+    /// Send rows from standard input or a file as frames, to a file, a pipe, UDP or a serial line.
     Send(SendOptions),
-    /// Receive frames from a file, a pipe or UDP and write their rows as CSV.
+    /// Receive frames from a file, a pipe, UDP or a serial line and write their rows as CSV.
     Receive(ReceiveOptions),
     /// Run a fusion centre over UDP. Estimates go to standard output, a row per slot.
     Centre(CentreOptions),
     /// Run a sensor over UDP. Samples come from standard input, one per line and slot.
     Sensor(SensorOptions),
     /// Write completions for a shell, or the manual page.
-    #[command(hide = true)]
     Generate(GenerateOptions),
 }
 
@@ -83,6 +84,9 @@ pub(crate) struct PlanOptions {
     /// As JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    /// Draw bits against bounds into this SVG file.
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) plot: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -133,20 +137,6 @@ pub(crate) struct CatOptions {
     /// The table. Without it standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
-}
-
-impl UnpackOptions {
-    /// All rows and columns.
-    pub(crate) fn whole(self) -> CatOptions {
-        CatOptions {
-            file: self.file,
-            from: None,
-            to: None,
-            columns: Vec::new(),
-            json: false,
-            output: self.output,
-        }
-    }
 }
 
 #[derive(Args)]
@@ -214,7 +204,13 @@ pub(crate) struct SendOptions {
     /// Send UDP datagrams to this address instead of writing a stream.
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "output")]
     pub(crate) udp: Option<String>,
-    /// With UDP: the header goes before every so many frames.
+    /// Send over a serial line: its device.
+    #[arg(long, value_name = "DEVICE", conflicts_with_all = ["output", "udp"])]
+    pub(crate) serial: Option<String>,
+    /// Bits per second of the serial line.
+    #[arg(long, default_value_t = 115200, value_name = "BAUD")]
+    pub(crate) baud: u32,
+    /// With UDP or a serial line: the header goes before every so many frames.
     #[arg(long, default_value_t = 32, value_name = "FRAMES", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) header_every: u64,
     /// Where the stream goes. Without it standard output.
@@ -230,10 +226,172 @@ pub(crate) struct ReceiveOptions {
     /// Listen for UDP datagrams at this address instead.
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub(crate) udp: Option<String>,
-    /// With UDP: end when nothing came for so long.
+    /// Listen at a serial line instead: its device.
+    #[arg(long, value_name = "DEVICE", conflicts_with_all = ["udp", "file"])]
+    pub(crate) serial: Option<String>,
+    /// Bits per second of the serial line.
+    #[arg(long, default_value_t = 115200, value_name = "BAUD")]
+    pub(crate) baud: u32,
+    /// With UDP or a serial line: end when nothing came for so long.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     pub(crate) timeout: Option<std::time::Duration>,
     /// The table. Without it standard output.
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+}
+
+/// How the world moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Model {
+    /// A level that wanders.
+    Walk,
+    /// A level with a slope that wanders.
+    Velocity,
+    /// A level with slope and curvature that wanders.
+    Acceleration,
+    /// A level that returns to the mean of `--prior` (Ornstein-Uhlenbeck).
+    Returning,
+    /// A place in the plane, from its distances to anchors at known places.
+    Ranges,
+}
+
+#[derive(Args)]
+pub(crate) struct TrackOptions {
+    #[command(flatten)]
+    pub(crate) table: TableOptions,
+    /// How what is measured moves.
+    #[arg(long, value_enum, default_value = "walk")]
+    pub(crate) model: Model,
+    /// What sensors send: `value`, `bit`, `word:2` to `word:4`; or as `column=word:3,*=bit`.
+    #[arg(long, default_value = "value", value_name = "WHAT")]
+    pub(crate) send: String,
+    /// Cells are reports as they were sent (`value`, 0 or 1, number of a cell), not measurements that this command is to quantize.
+    #[arg(long)]
+    pub(crate) reports: bool,
+    /// Bits compare with these thresholds, as `column=2.5,*=3`, instead of with the prediction.
+    #[arg(long, default_value = "", value_name = "THRESHOLDS", allow_hyphen_values = true)]
+    pub(crate) threshold: String,
+    /// One report per row: the column that names the sensor (or anchor). The column of values is the other one, or that of `--columns`.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) by: Option<String>,
+    /// Standard deviation of a measurement's noise, as `0.3` or `column=0.3,*=0.5`. Without it found from the first rows.
+    #[arg(long, default_value = "", value_name = "DEVIATION")]
+    pub(crate) noise: String,
+    /// How far the level strays from its forecast (standard deviation) in some time, as `0.5/1h`. Without it found from the first rows,
+    /// and always corrected on the way.
+    #[arg(long, value_name = "SIZE/TIME")]
+    pub(crate) change: Option<String>,
+    /// What is known before the first row, as `20±5`. Without it found from the first rows.
+    #[arg(long, value_name = "MEAN±DEVIATION", allow_hyphen_values = true)]
+    pub(crate) prior: Option<String>,
+    /// Subtract each sensor's mean difference from the others in this many first rows.
+    #[arg(long, value_name = "ROWS")]
+    pub(crate) align: Option<usize>,
+    /// With `--model ranges`: a CSV of anchors: name, x, y.
+    #[arg(long, value_name = "FILE", required_if_eq("model", "ranges"))]
+    pub(crate) anchors: Option<String>,
+    /// With `--model ranges`: standard deviation of the velocity along an axis, to a factor of four.
+    #[arg(long, default_value_t = 1.0, value_name = "SPEED")]
+    pub(crate) speed: f64,
+    /// With `--model ranges`: seconds that a velocity lasts.
+    #[arg(long, default_value_t = 6.0, value_name = "SECONDS")]
+    pub(crate) persistence: f64,
+    /// With `--model ranges`: share of ranges that have nothing to do with the distance.
+    #[arg(long, default_value_t = 0.02, value_name = "SHARE")]
+    pub(crate) outliers: f64,
+    /// Draw the estimates into this SVG file.
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) plot: Option<PathBuf>,
+    /// One JSON object per row instead of CSV, and the summary as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// The estimates. Without it standard output.
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+}
+
+/// What a design is to be good at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Criterion {
+    /// Least mean squared error of the estimate.
+    Error,
+    /// Most information between the unknown and what arrives.
+    Information,
+    /// Least probability of deciding for the wrong value; needs `--prior discrete:..`.
+    Decision,
+}
+
+/// The form of a design.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Form {
+    Table,
+    Json,
+    /// C header.
+    C,
+    /// Constants for Rust without the standard library.
+    Rust,
+}
+
+#[derive(Args)]
+pub(crate) struct DesignOptions {
+    /// CSV file with a sample of the unknown in one column; `-` for standard input. Without it `--prior` says what is known.
+    #[arg(conflicts_with = "prior")]
+    pub(crate) file: Option<String>,
+    /// The column of the sample. Without it the only one.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) column: Option<String>,
+    /// What separates cells.
+    #[arg(long, default_value_t = ',', value_name = "CHARACTER")]
+    pub(crate) delimiter: char,
+    /// What is known of the unknown: `20±4` (normal), `uniform:0..40`, `discrete:0,10` or `discrete:0@0.9,10@0.1`.
+    #[arg(long, value_name = "PRIOR", allow_hyphen_values = true)]
+    pub(crate) prior: Option<String>,
+    /// Standard deviations of the sensors' noise, one per sensor, as `1,1.5`.
+    #[arg(long, value_delimiter = ',', required = true, value_name = "DEVIATIONS")]
+    pub(crate) noise: Vec<f64>,
+    /// Correlation of the noise of any two sensors.
+    #[arg(long, default_value_t = 0.0, value_name = "RHO", allow_hyphen_values = true)]
+    pub(crate) correlation: f64,
+    /// Bits of a word: `3` for every sensor, `3,1` one by one, `total:8` to be shared out.
+    #[arg(long, default_value = "3", value_name = "BITS")]
+    pub(crate) bits: String,
+    /// Probability that a bit arrives inverted; one for all sensors, or one per sensor.
+    #[arg(long, value_delimiter = ',', value_name = "PROBABILITIES")]
+    pub(crate) flips: Vec<f64>,
+    /// Probability that a word is known to be lost.
+    #[arg(long, value_delimiter = ',', value_name = "PROBABILITIES")]
+    pub(crate) erasures: Vec<f64>,
+    /// Probability that a word is lost without a trace.
+    #[arg(long, value_delimiter = ',', value_name = "PROBABILITIES")]
+    pub(crate) loss: Vec<f64>,
+    /// What the design is to be good at.
+    #[arg(long, value_enum, default_value = "error")]
+    pub(crate) criterion: Criterion,
+    /// Let a word stand for several intervals.
+    #[arg(long)]
+    pub(crate) folded: bool,
+    /// Integer thresholds for a converter, as `12:0..40`: its bits and its range in the unit of the unknown.
+    #[arg(long, value_name = "BITS:LOW..HIGH", allow_hyphen_values = true)]
+    pub(crate) adc: Option<String>,
+    /// End the search after this time with the best design so far.
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    pub(crate) time_limit: Option<std::time::Duration>,
+    /// What is written.
+    #[arg(long, value_enum, default_value = "table")]
+    pub(crate) form: Form,
+    /// The same as `--form json`.
+    #[arg(long, conflicts_with = "form")]
+    pub(crate) json: bool,
+    /// Beginning of all names in C.
+    #[arg(long, default_value = "fewbits", value_name = "NAME")]
+    pub(crate) name: String,
+    /// Longest table of a decoder in bytes; a larger one is replaced by numbers that are added up.
+    #[arg(long, default_value_t = 65536, value_name = "BYTES")]
+    pub(crate) decoder_bytes: usize,
+    /// Draw the cells into this SVG file.
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) plot: Option<PathBuf>,
+    /// The design. Without it standard output.
     #[arg(long, short, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
 }
@@ -252,26 +410,8 @@ pub(crate) enum Generated {
 
 #[derive(Args)]
 pub(crate) struct GenerateOptions {
-    what: Generated,
-}
-
-/// Writes completions or the manual page to standard output.
-pub(crate) fn generate(options: &GenerateOptions) -> Result<Ending, Error> {
-    use clap_complete::Shell;
-    let mut command = Cli::command();
-    let shell = match options.what {
-        Generated::Bash => Shell::Bash,
-        Generated::Elvish => Shell::Elvish,
-        Generated::Fish => Shell::Fish,
-        Generated::Powershell => Shell::PowerShell,
-        Generated::Zsh => Shell::Zsh,
-        Generated::Man => {
-            let page = clap_mangen::Man::new(command);
-            page.render(&mut std::io::stdout())
-                .map_err(Error::file("standard output", "write"))?;
-            return Ok(Ending::Good);
-        }
-    };
-    clap_complete::generate(shell, &mut command, "fewbits", &mut std::io::stdout());
-    Ok(Ending::Good)
+    pub(crate) what: Generated,
+    /// Write one manual page per task into this folder, instead of the first one to standard output.
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) folder: Option<PathBuf>,
 }

@@ -3,13 +3,57 @@
 use crate::error::Error;
 use fewbits_record::{Bound, Column};
 
-const EXPECTED: &str = "`±0.1`, `1%`, `decimals:3` or `lossless`, on a circle with `@360` behind it";
+const EXPECTED: &str =
+    "`±0.1`, `1%`, `decimals:3` or `lossless`, on a circle with `@360` behind it; for one column as `column=bound`";
 
 /// What the text says of one column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spec {
     pub(crate) bound: Bound,
     pub(crate) period: Option<f64>,
+}
+
+/// What an option says of each column: `column=value,...`, `*=value` or only `value` for all others.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PerColumn<T> {
+    named: Vec<(String, T)>,
+    others: T,
+}
+
+impl<T> PerColumn<T> {
+    /// `others`: what holds of columns of which the text says nothing.
+    pub(crate) fn parse(text: &str, others: T, parse_one: impl Fn(&str) -> Result<T, Error>) -> Result<Self, Error> {
+        let mut found = Self {
+            named: Vec::new(),
+            others,
+        };
+        for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+            // Names may contain `=`; values do not.
+            match part.rsplit_once('=') {
+                None | Some(("*", _)) => found.others = parse_one(part.trim_start_matches("*="))?,
+                Some((name, value)) => found.named.push((name.to_owned(), parse_one(value)?)),
+            }
+        }
+        Ok(found)
+    }
+
+    /// What holds of a column.
+    pub(crate) fn of(&self, name: &str) -> &T {
+        let named = self.named.iter().find(|(known, _)| known == name);
+        named.map_or(&self.others, |(_, value)| value)
+    }
+
+    /// Refuses names that are no columns of a table.
+    pub(crate) fn check(&self, names: &[String], file: &str) -> Result<(), Error> {
+        match self.named.iter().find(|(name, _)| !names.contains(name)) {
+            None => Ok(()),
+            Some((name, _)) => Err(Error::NoColumn {
+                file: file.to_owned(),
+                column: name.clone(),
+                existing: names.join(", "),
+            }),
+        }
+    }
 }
 
 const LOSSLESS: Spec = Spec {
@@ -46,30 +90,9 @@ fn parse_one(text: &str) -> Result<Spec, Error> {
 
 /// The bound of each column, in their order. `file` is for messages.
 pub(crate) fn parse(text: &str, names: &[String], file: &str) -> Result<Vec<Spec>, Error> {
-    let (mut specs, mut others) = (vec![None; names.len()], LOSSLESS);
-    for part in text.split(',').filter(|part| !part.trim().is_empty()) {
-        // Names may contain `=`; bounds do not.
-        let Some((name, bound)) = part.trim().rsplit_once('=') else {
-            return Err(Error::Option {
-                option: "--bound",
-                value: part.to_owned(),
-                expected: "`column=bound`, or `*=bound` for all others",
-            });
-        };
-        let spec = parse_one(bound)?;
-        if name == "*" {
-            others = spec;
-        } else if let Some(i) = names.iter().position(|known| known == name) {
-            specs[i] = Some(spec);
-        } else {
-            return Err(Error::NoColumn {
-                file: file.to_owned(),
-                column: name.to_owned(),
-                existing: names.join(", "),
-            });
-        }
-    }
-    Ok(specs.into_iter().map(|spec| spec.unwrap_or(others)).collect())
+    let specs = PerColumn::parse(text, LOSSLESS, parse_one)?;
+    specs.check(names, file)?;
+    Ok(names.iter().map(|name| *specs.of(name)).collect())
 }
 
 /// Columns with their promises; `ranges` are known for files that were read once before.

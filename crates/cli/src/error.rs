@@ -28,6 +28,26 @@ pub(crate) enum Error {
         #[source]
         source: csv::Error,
     },
+    /// A Parquet file could not be read or written.
+    #[cfg(feature = "parquet")]
+    #[error("{file}")]
+    Parquet {
+        file: String,
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// Parquet was asked for, and this program was built without it.
+    #[cfg(not(feature = "parquet"))]
+    #[error("{file}: this program was built without Parquet: build it with `--features parquet`, or use CSV")]
+    NoParquet { file: String },
+    /// A row of a table could not be taken apart.
+    #[error("{file}: row {row}: {problem}: {mend}")]
+    Line {
+        file: String,
+        row: u64,
+        problem: String,
+        mend: &'static str,
+    },
     /// A table without columns or rows.
     #[error("{file}: no {what}: the first line names the columns, rows follow")]
     Empty { file: String, what: &'static str },
@@ -54,6 +74,24 @@ pub(crate) enum Error {
         option: &'static str,
         value: String,
         expected: &'static str,
+    },
+    /// A number is missing that cannot be found from the table.
+    #[error("{option} is needed: {reason}")]
+    Needed { option: &'static str, reason: &'static str },
+    /// A row could not be used by what it was given to.
+    #[error("{file}: row {row}")]
+    Row {
+        file: String,
+        row: u64,
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// Options do not make a model, a sensor or a design.
+    #[error("{what}")]
+    Refused {
+        what: &'static str,
+        #[source]
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// Binary data would go to a terminal.
     #[error("standard output is a terminal: name a file with --output, or redirect")]
@@ -90,6 +128,21 @@ impl Error {
         }
     }
 
+    pub(crate) fn refused<E: std::error::Error + Send + Sync + 'static>(what: &'static str) -> impl Fn(E) -> Self {
+        move |source| Self::Refused {
+            what,
+            source: Box::new(source),
+        }
+    }
+
+    pub(crate) fn option(option: &'static str, value: &str, expected: &'static str) -> Self {
+        Self::Option {
+            option,
+            value: value.to_owned(),
+            expected,
+        }
+    }
+
     pub(crate) fn recording(file: &str) -> impl Fn(fewbits_record::Error) -> Self + use<> {
         let file = file.to_owned();
         move |source| Self::Recording {
@@ -100,9 +153,27 @@ impl Error {
 
     pub(crate) fn table(file: &str) -> impl Fn(csv::Error) -> Self + use<> {
         let file = file.to_owned();
-        move |source| Self::Table {
-            file: file.clone(),
-            source,
+        move |source| {
+            let row = source.position().map_or(0, csv::Position::record);
+            let (problem, mend) = match source.kind() {
+                csv::ErrorKind::UnequalLengths { expected_len, len, .. } => (
+                    format!("{len} cells instead of {expected_len}"),
+                    "mend the row, or name what separates cells with --delimiter",
+                ),
+                csv::ErrorKind::Utf8 { .. } => ("not text in UTF-8".to_owned(), "save the table as UTF-8"),
+                _ => {
+                    return Self::Table {
+                        file: file.clone(),
+                        source,
+                    };
+                }
+            };
+            Self::Line {
+                file: file.clone(),
+                row,
+                problem,
+                mend,
+            }
         }
     }
 

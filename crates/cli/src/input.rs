@@ -1,4 +1,4 @@
-//! Tables: CSV from a file or standard input, row by row.
+//! Tables: CSV from a file or standard input, Parquet from a file, row by row.
 
 use crate::arguments::TableOptions;
 use crate::clock;
@@ -6,24 +6,98 @@ use crate::error::Error;
 use fewbits_record::{TimeBase, TimeFormat};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
-use std::io::{IsTerminal, Read};
+use std::io::{IsTerminal, Read, Seek};
 
 /// A row: its tick, or `None` where rows are numbered, and its cells.
 pub(crate) type Row = (Option<i64>, Vec<Option<f64>>);
 
 /// Cells that mean that there is no sample.
 const GAPS: [&str; 8] = ["", "NA", "N/A", "n/a", "null", "NULL", "None", "?"];
+/// Names of a first column that is a time.
+const TIME_NAMES: [&str; 6] = ["time", "timestamp", "datetime", "date", "seconds", "t"];
 /// Whole numbers up to this size are doubles.
 const MAX_WHOLE: u64 = 1 << 53;
+
+/// What a table is read from.
+enum Source {
+    Csv(Box<csv::Reader<Box<dyn Read + Send>>>),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<crate::parquet::Rows>),
+}
+
+/// The first bytes of a Parquet file.
+const PARQUET: [u8; 4] = *b"PAR1";
+
+/// Whether a file begins as Parquet does; it is then read from its beginning.
+fn is_parquet(file: &mut File) -> std::io::Result<bool> {
+    let mut first = Vec::new();
+    // A pipe cannot be rewound, and Parquet not be read from one.
+    if !file.metadata()?.is_file() {
+        return Ok(false);
+    }
+    file.by_ref().take(PARQUET.len() as u64).read_to_end(&mut first)?;
+    file.rewind()?;
+    Ok(first == PARQUET)
+}
+
+impl Source {
+    /// The table and the names of its columns.
+    fn open(options: &TableOptions, file: &str) -> Result<(Self, Vec<String>), Error> {
+        let source: Box<dyn Read + Send> = if options.file == "-" {
+            Box::new(std::io::stdin())
+        } else {
+            let mut opened = File::open(file).map_err(Error::file(file, "open"))?;
+            if is_parquet(&mut opened).map_err(Error::file(file, "read"))? {
+                #[cfg(feature = "parquet")]
+                {
+                    let mut rows = crate::parquet::Rows::open(opened, file)?;
+                    let names = std::mem::take(&mut rows.names);
+                    return Ok((Self::Parquet(Box::new(rows)), names));
+                }
+                #[cfg(not(feature = "parquet"))]
+                return Err(Error::NoParquet { file: file.to_owned() });
+            }
+            let bar = progress(opened.metadata().ok().map(|data| data.len()));
+            Box::new(bar.wrap_read(opened))
+        };
+        let delimiter = u8::try_from(options.delimiter).map_err(|_| Error::Option {
+            option: "--delimiter",
+            value: options.delimiter.to_string(),
+            expected: "one character of ASCII",
+        })?;
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(delimiter)
+            .trim(csv::Trim::All)
+            .from_reader(source);
+        let names = reader
+            .headers()
+            .map_err(Error::table(file))?
+            .iter()
+            .map(str::to_owned)
+            .collect();
+        Ok((Self::Csv(Box::new(reader)), names))
+    }
+
+    /// The next row; whether there was one.
+    fn read(&mut self, record: &mut csv::StringRecord, file: &str) -> Result<bool, Error> {
+        match self {
+            Self::Csv(reader) => reader.read_record(record).map_err(Error::table(file)),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(rows) => rows.read(record),
+        }
+    }
+}
 
 /// An open table.
 pub(crate) struct Table {
     file: String,
-    reader: csv::Reader<Box<dyn Read + Send>>,
+    source: Source,
     record: csv::StringRecord,
     /// Index of the time's column and of the columns of values.
     time_column: Option<usize>,
     columns: Vec<usize>,
+    /// Index of a column of names.
+    label_column: Option<usize>,
     pub(crate) names: Vec<String>,
     all_names: Vec<String>,
     rows: u64,
@@ -53,29 +127,12 @@ pub(crate) fn progress(bytes: Option<u64>) -> ProgressBar {
 impl Table {
     /// Opens the table and reads the names.
     pub(crate) fn open(options: &TableOptions) -> Result<Self, Error> {
-        let (file, source): (String, Box<dyn Read + Send>) = match options.file.as_str() {
-            "-" => ("standard input".to_owned(), Box::new(std::io::stdin())),
-            name => {
-                let opened = File::open(name).map_err(Error::file(name, "open"))?;
-                let bar = progress(opened.metadata().ok().map(|data| data.len()));
-                (name.to_owned(), Box::new(bar.wrap_read(opened)))
-            }
+        let file = match options.file.as_str() {
+            "-" => "standard input",
+            name => name,
         };
-        let delimiter = u8::try_from(options.delimiter).map_err(|_| Error::Option {
-            option: "--delimiter",
-            value: options.delimiter.to_string(),
-            expected: "one character of ASCII",
-        })?;
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter(delimiter)
-            .trim(csv::Trim::All)
-            .from_reader(source);
-        let names: Vec<String> = reader
-            .headers()
-            .map_err(Error::table(&file))?
-            .iter()
-            .map(str::to_owned)
-            .collect();
+        let (source, names) = Source::open(options, file)?;
+        let file = file.to_owned();
         if names.is_empty() {
             return Err(Error::Empty { file, what: "columns" });
         }
@@ -103,10 +160,11 @@ impl Table {
             names: columns.iter().map(|i| names[*i].clone()).collect(),
             all_names: names,
             file,
-            reader,
+            source,
             record: csv::StringRecord::new(),
             time_column,
             columns,
+            label_column: None,
             rows: 0,
             peeked: false,
         })
@@ -117,14 +175,51 @@ impl Table {
         &self.file
     }
 
+    /// Number of the row that was read last, counted from 1 behind the names.
+    pub(crate) fn row(&self) -> u64 {
+        self.rows
+    }
+
+    /// Takes a first column whose name says that it is the time as such, unless the caller named one.
+    pub(crate) fn find_time(&mut self) {
+        let first = self.all_names[0].to_lowercase();
+        if self.time_column.is_none() && TIME_NAMES.contains(&first.as_str()) {
+            self.time_column = Some(0);
+            self.without(0);
+        }
+    }
+
+    /// Reads a column as names instead of numbers: [`Table::label`].
+    pub(crate) fn with_labels(mut self, name: &str) -> Result<Self, Error> {
+        let Some(column) = self.all_names.iter().position(|known| known == name) else {
+            return Err(Error::NoColumn {
+                file: self.file,
+                column: name.to_owned(),
+                existing: self.all_names.join(", "),
+            });
+        };
+        self.label_column = Some(column);
+        self.without(column);
+        Ok(self)
+    }
+
+    /// Does not read a column as numbers.
+    fn without(&mut self, column: usize) {
+        self.columns.retain(|other| *other != column);
+        self.names = self.columns.iter().map(|i| self.all_names[*i].clone()).collect();
+    }
+
+    /// The name in the row that was read last.
+    pub(crate) fn label(&self) -> &str {
+        let column = self.label_column.and_then(|column| self.record.get(column));
+        column.unwrap_or_default()
+    }
+
     fn read_record(&mut self) -> Result<bool, Error> {
         if std::mem::take(&mut self.peeked) {
             return Ok(true);
         }
-        let more = self
-            .reader
-            .read_record(&mut self.record)
-            .map_err(Error::table(&self.file))?;
+        let more = self.source.read(&mut self.record, &self.file)?;
         self.rows += u64::from(more);
         Ok(more)
     }
@@ -204,10 +299,12 @@ impl Table {
             return Ok(None);
         }
         let Ok(value) = text.parse::<f64>() else {
-            return Err(self.cell_error(
-                column,
-                ("is not a number", "mend the cell, leave it empty for a gap, or choose columns with --columns"),
-            ));
+            let mend = if self.all_names.len() == 1 && text.contains([';', '\t', '|']) {
+                "name what separates cells with --delimiter"
+            } else {
+                "mend the cell, leave it empty for a gap, or choose columns with --columns"
+            };
+            return Err(self.cell_error(column, ("is not a number", mend)));
         };
         let size = text.trim_start_matches(['-', '+']);
         if size.len() > 15 && size.bytes().all(|byte| byte.is_ascii_digit()) {

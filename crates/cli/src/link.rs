@@ -1,11 +1,11 @@
-//! `fewbits send` and `fewbits receive`: rows as frames over a stream or UDP, and back.
+//! `fewbits send` and `fewbits receive`: rows as frames over a stream, UDP or a serial line, and back.
 
 use crate::arguments::{ReceiveOptions, SendOptions};
 use crate::error::Error;
 use crate::input::Row;
 use crate::output::{Shape, Writer};
 use crate::unpack::{all_columns, write_blocks};
-use crate::{Ending, output, pack};
+use crate::{Ending, output, pack, serial};
 use fewbits_record::{BlockReader, FrameReader, FrameWriter};
 use std::fs::File;
 use std::io::{Read, Write};
@@ -26,9 +26,9 @@ enum Way {
         name: String,
         begun: bool,
     },
-    /// Datagrams: the header in pieces before every so many frames.
-    Datagrams {
-        socket: UdpSocket,
+    /// Frames one by one, any of which may be lost: the header in pieces before every so many.
+    Frames {
+        post: Box<dyn FnMut(&[u8]) -> std::io::Result<()>>,
         address: String,
         header_every: u64,
         sent: u64,
@@ -46,17 +46,12 @@ impl Way {
                     }
                     sink.write_all(frame).and_then(|()| sink.flush()).map_err(failed)?;
                 }
-                Self::Datagrams {
-                    socket,
+                Self::Frames {
+                    post,
                     address,
                     header_every,
                     sent,
                 } => {
-                    let post = |frame: &[u8]| match socket.send(frame) {
-                        // Nobody listens yet: as lost as any other datagram.
-                        Err(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => Ok(()),
-                        outcome => outcome.map(drop),
-                    };
                     let pieces = if sent.is_multiple_of(*header_every) {
                         writer.header_frames()
                     } else {
@@ -66,7 +61,7 @@ impl Way {
                         .iter()
                         .try_for_each(|piece| post(piece))
                         .and_then(|()| post(frame));
-                    outcome.map_err(socket_error(address, "send"))?;
+                    outcome.map_err(link_error(address, "send"))?;
                     *sent += 1;
                 }
             }
@@ -75,7 +70,7 @@ impl Way {
     }
 }
 
-fn socket_error(address: &str, action: &'static str) -> impl Fn(std::io::Error) -> Error + use<> {
+fn link_error(address: &str, action: &'static str) -> impl Fn(std::io::Error) -> Error + use<> {
     let address = address.to_owned();
     move |source| Error::Socket {
         address: address.clone(),
@@ -85,6 +80,16 @@ fn socket_error(address: &str, action: &'static str) -> impl Fn(std::io::Error) 
 }
 
 fn way(options: &SendOptions) -> Result<Way, Error> {
+    let frames = |address: &str, post| Way::Frames {
+        post,
+        address: address.to_owned(),
+        header_every: options.header_every,
+        sent: 0,
+    };
+    if let Some(device) = &options.serial {
+        let mut line = serial::open(device, options.baud)?;
+        return Ok(frames(device, Box::new(move |frame: &[u8]| serial::write(&mut line, frame))));
+    }
     let Some(address) = &options.udp else {
         let (sink, name) = output::open_binary(options.output.as_deref())?;
         return Ok(Way::Stream {
@@ -99,12 +104,15 @@ fn way(options: &SendOptions) -> Result<Way, Error> {
         "0.0.0.0:0"
     };
     let socket = UdpSocket::bind(local).and_then(|socket| socket.connect(address).map(|()| socket));
-    Ok(Way::Datagrams {
-        socket: socket.map_err(socket_error(address, "connect"))?,
-        address: address.clone(),
-        header_every: options.header_every,
-        sent: 0,
-    })
+    let socket = socket.map_err(link_error(address, "connect"))?;
+    Ok(frames(
+        address,
+        Box::new(move |frame: &[u8]| match socket.send(frame) {
+            // Nobody listens yet: as lost as any other datagram.
+            Err(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => Ok(()),
+            outcome => outcome.map(drop),
+        }),
+    ))
 }
 
 /// Runs `send`.
@@ -171,9 +179,14 @@ fn wait(
 
 /// Runs `receive`.
 pub(crate) fn receive(options: &ReceiveOptions) -> Result<Ending, Error> {
-    match &options.udp {
-        Some(address) => receive_datagrams(options, address),
-        None => receive_stream(options),
+    match (&options.udp, &options.serial) {
+        (Some(address), _) => receive_datagrams(options, address),
+        (None, Some(device)) => {
+            let line = serial::open(device, options.baud)?;
+            let mut frames = serial::Frames::new(line, options.timeout);
+            receive_frames(options, device, || frames.next())
+        }
+        (None, None) => receive_stream(options),
     }
 }
 
@@ -193,31 +206,37 @@ fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
             ending = Ending::Failed;
         }
     }
-    Ok(ending)
+    writer.finish().map(|()| ending)
 }
 
 fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, Error> {
-    let socket = UdpSocket::bind(address).map_err(socket_error(address, "listen"))?;
+    let socket = UdpSocket::bind(address).map_err(link_error(address, "listen"))?;
     socket
         .set_read_timeout(options.timeout)
-        .map_err(socket_error(address, "set the timeout"))?;
+        .map_err(link_error(address, "set the timeout"))?;
     if let Ok(local) = socket.local_addr() {
         eprintln!("listening at {local}");
     }
-    let (mut reader, mut writer) = (FrameReader::new(), None::<(Writer, Vec<usize>)>);
     let mut datagram = vec![0; MAX_DATAGRAM];
-    loop {
-        let length = match socket.recv(&mut datagram) {
-            Ok(length) => length,
-            Err(error) if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {
-                return Ok(Ending::Good);
-            }
-            Err(error) => return Err(socket_error(address, "receive")(error)),
-        };
-        let blocks = match reader.handle(&datagram[..length]) {
+    receive_frames(options, address, || match socket.recv(&mut datagram) {
+        Ok(length) => Ok(Some(datagram[..length].to_vec())),
+        Err(error) if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => Ok(None),
+        Err(error) => Err(error),
+    })
+}
+
+/// Writes the rows of frames as they come, until there is none.
+fn receive_frames(
+    options: &ReceiveOptions,
+    address: &str,
+    mut next: impl FnMut() -> std::io::Result<Option<Vec<u8>>>,
+) -> Result<Ending, Error> {
+    let (mut reader, mut writer) = (FrameReader::new(), None::<(Writer, Vec<usize>)>);
+    while let Some(frame) = next().map_err(link_error(address, "receive"))? {
+        let blocks = match reader.handle(&frame) {
             Ok(blocks) => blocks,
             Err(error) => {
-                eprintln!("warning: {address}: a datagram was refused: {error}");
+                eprintln!("warning: {address}: a frame was refused: {error}");
                 continue;
             }
         };
@@ -230,4 +249,7 @@ fn receive_datagrams(options: &ReceiveOptions, address: &str) -> Result<Ending, 
             write_blocks(blocks.into_iter().map(Ok), writer, (i64::MIN, i64::MAX), columns, address)?;
         }
     }
+    writer
+        .map_or(Ok(()), |(writer, _)| writer.finish())
+        .map(|()| Ending::Good)
 }

@@ -8,15 +8,23 @@ mod bench;
 mod bounds;
 mod centre;
 mod clock;
+mod design;
 mod error;
+mod generate;
 mod info;
 mod input;
 mod link;
+mod numbers;
 mod output;
 mod pack;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod plan;
+mod plot;
 mod report;
 mod sensor;
+mod serial;
+mod track;
 mod unpack;
 mod verify;
 
@@ -42,11 +50,13 @@ fn main() -> ExitCode {
         Task::Info(options) => info::run(&options),
         Task::Verify(options) => verify::run(&options),
         Task::Bench(options) => bench::run(&options),
+        Task::Track(options) => track::run(&options),
+        Task::Design(options) => design::run(&options),
         Task::Send(options) => link::send(&options),
         Task::Receive(options) => link::receive(&options),
+        Task::Generate(options) => generate::run(&options),
         Task::Centre(options) => centre::run(&options),
         Task::Sensor(options) => sensor::run(&options),
-        Task::Generate(options) => arguments::generate(&options),
     };
     match done {
         Ok(Ending::Good) => ExitCode::SUCCESS,

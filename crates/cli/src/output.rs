@@ -1,4 +1,4 @@
-//! Tables and recordings as output.
+//! Tables as output: rows of recordings, and of whatever else a task finds.
 
 use crate::clock;
 use crate::error::Error;
@@ -30,6 +30,12 @@ pub(crate) fn open_binary(path: Option<&Path>) -> Result<(Box<dyn Write>, String
     open(path)
 }
 
+/// Writes a whole text.
+pub(crate) fn text(path: Option<&Path>, text: &str) -> Result<(), Error> {
+    let (mut sink, name) = open(path)?;
+    sink.write_all(text.as_bytes()).map_err(Error::file(&name, "write"))
+}
+
 /// Writes one JSON value and a line end to standard output.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Error> {
     let mut out = std::io::stdout().lock();
@@ -37,20 +43,38 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Error> {
     writeln!(out).map_err(Error::file(STANDARD_OUTPUT, "write"))
 }
 
-/// A cell as text: the shortest that reads back as the same number; empty for a gap.
-fn cell(value: Option<f64>) -> String {
-    match value {
-        None => String::new(),
-        Some(value) if value.is_nan() => "NaN".to_owned(),
-        Some(value) if value != 0.0 && (value.abs() < 1e-5 || value.abs() >= 1e16) => format!("{value:e}"),
-        Some(value) => format!("{value}"),
-    }
+/// A cell of a row.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Cell {
+    Text(String),
+    Whole(i64),
+    /// `None` is a gap.
+    Number(Option<f64>),
 }
 
-/// Rows as CSV or as lines of JSON.
-pub(crate) enum Rows {
-    Csv(Box<csv::Writer<Box<dyn Write>>>),
-    Json(BufWriter<Box<dyn Write>>),
+impl Cell {
+    /// As text: the shortest that reads back as the same number; empty for a gap.
+    pub(crate) fn text(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Whole(number) => number.to_string(),
+            Self::Number(None) => String::new(),
+            Self::Number(Some(value)) if value.is_nan() => "NaN".to_owned(),
+            Self::Number(Some(value)) if *value != 0.0 && (value.abs() < 1e-5 || value.abs() >= 1e16) => {
+                format!("{value:e}")
+            }
+            Self::Number(Some(value)) => format!("{value}"),
+        }
+    }
+
+    fn json(&self) -> serde_json::Value {
+        match self {
+            Self::Whole(number) => (*number).into(),
+            Self::Number(value) if value.is_none_or(f64::is_finite) => (*value).into(),
+            // JSON has no NaN and no infinity.
+            _ => self.text().into(),
+        }
+    }
 }
 
 /// What rows look like.
@@ -60,60 +84,50 @@ pub(crate) enum Shape {
     Json,
 }
 
-/// Writes rows of a recording.
-pub(crate) struct Writer {
+impl Shape {
+    /// One JSON object per row if asked for.
+    pub(crate) fn of(json: bool) -> Self {
+        if json { Self::Json } else { Self::Csv }
+    }
+}
+
+/// Rows as CSV or as lines of JSON.
+enum Rows {
+    Csv(Box<csv::Writer<Box<dyn Write>>>),
+    Json(BufWriter<Box<dyn Write>>),
+}
+
+/// Writes rows of named cells.
+pub(crate) struct Sheet {
     rows: Rows,
-    time: TimeBase,
     names: Vec<String>,
     file: String,
 }
 
-impl Writer {
+impl Sheet {
     /// Writes the names, for CSV.
-    pub(crate) fn new(path: Option<&Path>, shape: Shape, schema: &Schema, names: &[String]) -> Result<Self, Error> {
+    pub(crate) fn new(path: Option<&Path>, shape: Shape, names: Vec<String>) -> Result<Self, Error> {
         let (sink, file) = open(path)?;
-        let mut writer = Self {
-            rows: match shape {
-                Shape::Csv => Rows::Csv(Box::new(csv::Writer::from_writer(sink))),
-                Shape::Json => Rows::Json(BufWriter::new(sink)),
-            },
-            time: schema.time(),
-            names: names.to_vec(),
-            file,
+        let rows = match shape {
+            Shape::Csv => {
+                let mut rows = csv::Writer::from_writer(sink);
+                rows.write_record(&names).map_err(Error::table(&file))?;
+                Rows::Csv(Box::new(rows))
+            }
+            Shape::Json => Rows::Json(BufWriter::new(sink)),
         };
-        if let Rows::Csv(rows) = &mut writer.rows {
-            let time = (schema.time() != TimeBase::Numbered).then_some("time");
-            let head = time.into_iter().chain(names.iter().map(String::as_str));
-            rows.write_record(head).map_err(Error::table(&writer.file))?;
-        }
-        Ok(writer)
+        Ok(Self { rows, names, file })
     }
 
-    pub(crate) fn write(&mut self, tick: i64, values: &[Option<f64>]) -> Result<(), Error> {
-        let numbered = self.time == TimeBase::Numbered;
+    /// One row, with a cell per name.
+    pub(crate) fn write(&mut self, cells: impl IntoIterator<Item = Cell>) -> Result<(), Error> {
         match &mut self.rows {
-            Rows::Csv(rows) => {
-                let time = (!numbered).then(|| clock::shown(tick, self.time));
-                let cells = values.iter().map(|value| cell(*value));
-                rows.write_record(time.into_iter().chain(cells))
-                    .map_err(Error::table(&self.file))
-            }
+            Rows::Csv(rows) => rows
+                .write_record(cells.into_iter().map(|cell| cell.text()))
+                .map_err(Error::table(&self.file)),
             Rows::Json(sink) => {
-                let key = if numbered { "row" } else { "time" };
-                let time = if numbered {
-                    tick.into()
-                } else {
-                    clock::shown(tick, self.time).into()
-                };
-                let mut object = serde_json::Map::new();
-                object.insert(key.to_owned(), time);
-                for (name, value) in self.names.iter().zip(values) {
-                    let value = match value {
-                        Some(value) if !value.is_finite() => cell(Some(*value)).into(),
-                        value => (*value).into(),
-                    };
-                    object.insert(name.clone(), value);
-                }
+                let cells = cells.into_iter().map(|cell| cell.json());
+                let object: serde_json::Map<_, _> = self.names.iter().cloned().zip(cells).collect();
                 serde_json::to_writer(&mut *sink, &object)?;
                 writeln!(sink).map_err(Error::file(&self.file, "write"))
             }
@@ -126,5 +140,79 @@ impl Writer {
             Rows::Json(sink) => sink.flush(),
         }
         .map_err(Error::file(&self.file, "write"))
+    }
+}
+
+/// Whether a file is to be Parquet: its name ends so.
+pub(crate) fn is_parquet(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "parquet")
+}
+
+/// Writes rows of a recording, as Parquet if the file's name ends so.
+pub(crate) enum Writer {
+    Sheet {
+        sheet: Sheet,
+        time: TimeBase,
+        is_json: bool,
+    },
+    #[cfg(feature = "parquet")]
+    Parquet(Box<crate::parquet::Sink>),
+}
+
+impl Writer {
+    /// Rows of these columns. Row numbers of a recording without times are written as JSON and Parquet only.
+    pub(crate) fn new(path: Option<&Path>, shape: Shape, schema: &Schema, names: &[String]) -> Result<Self, Error> {
+        if let Some(path) = path.filter(|path| is_parquet(path)) {
+            #[cfg(feature = "parquet")]
+            return Ok(Self::Parquet(Box::new(crate::parquet::Sink::create(path, schema, names)?)));
+            #[cfg(not(feature = "parquet"))]
+            return Err(Error::NoParquet {
+                file: path.display().to_string(),
+            });
+        }
+        let is_json = shape == Shape::Json;
+        let first = match schema.time() {
+            TimeBase::Numbered => is_json.then_some("row"),
+            _ => Some("time"),
+        };
+        let names = first.into_iter().map(str::to_owned).chain(names.iter().cloned());
+        Ok(Self::Sheet {
+            sheet: Sheet::new(path, shape, names.collect())?,
+            time: schema.time(),
+            is_json,
+        })
+    }
+
+    pub(crate) fn write(&mut self, tick: i64, values: &[Option<f64>]) -> Result<(), Error> {
+        match self {
+            Self::Sheet { sheet, time, is_json } => {
+                let first = match *time {
+                    TimeBase::Numbered => is_json.then_some(Cell::Whole(tick)),
+                    time => Some(Cell::Text(clock::shown(tick, time))),
+                };
+                let cells = values.iter().map(|value| Cell::Number(*value));
+                sheet.write(first.into_iter().chain(cells))
+            }
+            #[cfg(feature = "parquet")]
+            Self::Parquet(sink) => sink.write(tick, values),
+        }
+    }
+
+    /// Rows so far are out, where the form allows it.
+    pub(crate) fn flush(&mut self) -> Result<(), Error> {
+        match self {
+            Self::Sheet { sheet, .. } => sheet.flush(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(_) => Ok(()),
+        }
+    }
+
+    /// Writes what the end of a file needs.
+    pub(crate) fn finish(mut self) -> Result<(), Error> {
+        match &mut self {
+            Self::Sheet { sheet, .. } => sheet.flush(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(sink) => sink.finish(),
+        }
     }
 }

@@ -4,6 +4,7 @@ use crate::arguments::PlanOptions;
 use crate::error::Error;
 use crate::input::Table;
 use crate::pack::Counted;
+use crate::plot::{Layer, Picture};
 use crate::{Ending, output};
 use fewbits_record::{Bound, Column, Recorder, Schema, TimeBase};
 use serde::Serialize;
@@ -168,12 +169,32 @@ pub(crate) fn run(options: &PlanOptions) -> Result<Ending, Error> {
         time: plan_time(&ticks, time, rows_per_block).map_err(&failed)?,
         columns: planned.collect::<Result<_, _>>().map_err(&failed)?,
     };
+    if let Some(path) = &options.plot {
+        picture(table.file(), &plan).save(path)?;
+    }
     if options.json {
         output::json(&plan)?;
     } else {
         print(&plan);
     }
     Ok(Ending::Good)
+}
+
+/// Bits against the bound, a line per column.
+fn picture(file: &str, plan: &Plan) -> Picture {
+    let line = |(colour, column): (usize, &ColumnPlan)| Layer::Line {
+        points: column.bounds.iter().map(|bound| (bound.0.log10(), bound.2)).collect(),
+        colour,
+        name: format!("{} (lossless {:.1})", column.name, column.lossless_bits),
+    };
+    Picture {
+        title: format!("{file}: {} rows", plan.rows),
+        x: "bound in percent of the range".to_owned(),
+        y: "bits per sample".to_owned(),
+        is_log: true,
+        is_map: false,
+        layers: plan.columns.iter().enumerate().map(line).collect(),
+    }
 }
 
 fn print(plan: &Plan) {

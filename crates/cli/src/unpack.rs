@@ -1,10 +1,24 @@
 //! `fewbits unpack` and `fewbits cat`: a recording as CSV or JSON lines.
 
-use crate::arguments::CatOptions;
+use crate::arguments::{CatOptions, UnpackOptions};
 use crate::error::Error;
 use crate::output::{Shape, Writer};
 use crate::{Ending, clock};
 use fewbits_record::{Block, BlockReader, Column, Playback, Schema, TimeBase};
+
+impl UnpackOptions {
+    /// All rows and columns.
+    pub(crate) fn whole(self) -> CatOptions {
+        CatOptions {
+            file: self.file,
+            from: None,
+            to: None,
+            columns: Vec::new(),
+            json: false,
+            output: self.output,
+        }
+    }
+}
 
 /// Which rows, which columns.
 struct Selection {
@@ -78,13 +92,14 @@ pub(crate) fn write_blocks(
 /// Runs the task.
 pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
     let file = options.file.as_str();
-    let shape = if options.json { Shape::Json } else { Shape::Csv };
+    let shape = Shape::of(options.json);
     if file == "-" {
         let blocks = BlockReader::new(std::io::stdin().lock()).map_err(Error::recording("standard input"))?;
         let selection = selection(options, blocks.schema())?;
         let mut writer = Writer::new(options.output.as_deref(), shape, blocks.schema(), &selection.names)?;
         let ticks = (selection.from, selection.to);
-        return write_blocks(blocks, &mut writer, ticks, &selection.columns, "standard input");
+        let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, "standard input")?;
+        return writer.finish().map(|()| ending);
     }
     let mut playback = Playback::open(file).map_err(Error::recording(file))?;
     let selection = selection(options, playback.schema())?;
@@ -93,7 +108,8 @@ pub(crate) fn run(options: &CatOptions) -> Result<Ending, Error> {
     playback.columns(&names).map_err(Error::recording(file))?;
     let ticks = (selection.from, selection.to);
     let blocks = playback.blocks_between(ticks.0, ticks.1);
-    write_blocks(blocks, &mut writer, ticks, &selection.columns, file)
+    let ending = write_blocks(blocks, &mut writer, ticks, &selection.columns, file)?;
+    writer.finish().map(|()| ending)
 }
 
 /// All columns of a schema.

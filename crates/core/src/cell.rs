@@ -69,7 +69,9 @@ impl Cell {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Ends {
+    #[serde(default, with = "fewbits_numerics::stored")]
     lower: Option<f64>,
+    #[serde(default, with = "fewbits_numerics::stored")]
     upper: Option<f64>,
 }
 

@@ -1,7 +1,7 @@
 //! The scheme that saves nothing: every measurement travels as a number.
 
 use crate::error::Error;
-use crate::factor::{Factor, Tilted, Value};
+use crate::factor::{Constant, Factor, Scalar, Tilted, Value};
 use crate::gaussian::Gaussian;
 use crate::measurement_noise::MeasurementNoise;
 use crate::number::NumberFormat;
@@ -12,13 +12,12 @@ use fewbits_numerics::error::{finite, positive, within};
 use nalgebra::{Matrix1, SVector, Vector1};
 use rand::Rng;
 
-/// A sensor that sends its scalar measurement in 64 or 32 bits: what a Kalman filter receives.
+/// A sensor that sends its scalar measurement in 64 bits: what a Kalman filter receives.
 ///
-/// Rounding to 32 bits is not part of the noise. A value wants a checksum: over a link that inverts bits it has no factor.
+/// A value wants a checksum: over a link that inverts bits it has no factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FullValue {
     noise_variance: f64,
-    format: NumberFormat,
 }
 
 /// What a sensor that always sends its value says: the value, which arrived with some probability, or a constant.
@@ -36,17 +35,7 @@ impl FullValue {
     pub fn new(noise_variance: f64) -> Result<Self, ArgumentError> {
         Ok(Self {
             noise_variance: positive("noise_variance", noise_variance)?,
-            format: NumberFormat::Double,
         })
-    }
-
-    /// The same with values of 32 bits.
-    #[must_use]
-    pub fn in_single_precision(self) -> Self {
-        Self {
-            format: NumberFormat::Single,
-            ..self
-        }
     }
 }
 
@@ -71,6 +60,10 @@ impl Factor<1> for SentValue {
             ..own
         })
     }
+
+    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+        Some((self.value.map_or(Constant::ONE.into(), Scalar::from), self.log_probability))
+    }
 }
 
 impl Scheme<1> for FullValue {
@@ -84,7 +77,7 @@ impl Scheme<1> for FullValue {
     fn feedback_format(&self) {}
 
     fn report_format(&self) -> NumberFormat {
-        self.format
+        NumberFormat::Double
     }
 
     fn encode<R: Rng + ?Sized>(
@@ -94,7 +87,7 @@ impl Scheme<1> for FullValue {
         measurement: &Vector1<f64>,
         (): &(),
     ) -> Result<Option<f64>, Error> {
-        Ok(Some(self.format.rounded(finite("measurement", measurement[0])?)?))
+        Ok(Some(finite("measurement", measurement[0])?))
     }
 
     fn factor(&self, (): &(), observation: &Observation<f64>, link: &Link) -> Result<SentValue, Error> {

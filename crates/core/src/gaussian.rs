@@ -28,7 +28,9 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Moments<D>"))]
 pub struct Gaussian<const D: usize> {
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     mean: SVector<f64, D>,
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     covariance: SMatrix<f64, D, D>,
 }
 
@@ -173,7 +175,9 @@ impl Gaussian<1> {
 #[derive(Deserialize)]
 #[serde(rename = "Gaussian", deny_unknown_fields)]
 struct Moments<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     mean: SVector<f64, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     covariance: SMatrix<f64, D, D>,
 }
 
@@ -229,6 +233,16 @@ pub struct FactoredGaussian<const D: usize> {
     log_peak: f64,
 }
 
+/// The squared distance of a state for which it came out as NaN: infinite, as differences of infinities are, unless the state itself is NaN.
+#[cold]
+fn out_of_range(x: &[f64]) -> f64 {
+    if x.iter().any(|x| x.is_nan()) {
+        f64::NAN
+    } else {
+        f64::INFINITY
+    }
+}
+
 impl<const D: usize> FactoredGaussian<D> {
     /// The plain belief.
     pub fn gaussian(&self) -> &Gaussian<D> {
@@ -250,7 +264,7 @@ impl<const D: usize> FactoredGaussian<D> {
         self.log_peak
     }
 
-    /// Squared Mahalanobis distance of `x` from the mean.
+    /// Squared Mahalanobis distance of `x` from the mean; infinite where it leaves the range of numbers.
     #[inline]
     pub fn squared_distance(&self, x: &SVector<f64, D>) -> f64 {
         let mut white = x - self.gaussian.mean;
@@ -262,7 +276,7 @@ impl<const D: usize> FactoredGaussian<D> {
             white[i] /= self.lower[(i, i)];
             sum += white[i] * white[i];
         }
-        sum
+        if sum.is_nan() { out_of_range(x.as_slice()) } else { sum }
     }
 
     /// `ln N(x; mean, covariance)`.
@@ -297,6 +311,11 @@ impl<const D: usize> FactoredGaussian<D> {
                 for (x, square) in row.iter_mut().zip(&mut square) {
                     *x /= scale;
                     *square += *x * *x;
+                }
+            }
+            if square[..count].iter().any(|q| q.is_nan()) {
+                for (i, q) in square[..count].iter_mut().enumerate().filter(|(_, q)| q.is_nan()) {
+                    *q = out_of_range(&states.map(|column| column[start + i]));
                 }
             }
             logs.iter_mut()

@@ -31,13 +31,15 @@ pub enum NumberFormat {
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Numbers"))]
 pub struct Levels {
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     lower: f64,
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     upper: f64,
     bits: u32,
 }
 
 #[cfg(feature = "serde")]
-stored! { Levels as Numbers { lower: f64, upper: f64, bits: u32 } => Levels::new(lower, upper, bits), ArgumentError }
+stored! { Levels as Numbers { #[serde(with = "fewbits_numerics::stored")] lower: f64, #[serde(with = "fewbits_numerics::stored")] upper: f64, bits: u32 } => Levels::new(lower, upper, bits), ArgumentError }
 
 impl Levels {
     /// The levels from `lower` to `upper` (measurement units), `bits` of 1 to 32.

@@ -77,13 +77,16 @@ impl<R> From<Option<R>> for Observation<R> {
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Numbers"))]
 pub struct Link {
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     loss: f64,
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     erasure: f64,
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     crossover: f64,
 }
 
 #[cfg(feature = "serde")]
-stored! { Link as Numbers { loss: f64, #[serde(default)] erasure: f64, crossover: f64 } =>
+stored! { Link as Numbers { #[serde(with = "fewbits_numerics::stored")] loss: f64, #[serde(default, with = "fewbits_numerics::stored")] erasure: f64, #[serde(with = "fewbits_numerics::stored")] crossover: f64 } =>
 Link::new(loss, crossover)?.with_erasure(erasure), ArgumentError }
 
 impl Link {

@@ -1,22 +1,19 @@
-//! Beliefs as values.
+//! Probability densities over a `D`-dimensional state: particles, Gaussian mixtures, kernel estimates and grids.
 //!
-//! A belief is what is known about the state at one moment. Here it is a plain value: it can be stored, sent, compared and
-//! replayed, and the filters of the crates above are functions from one belief to the next.
+//! Every density here is a plain value. It can be stored, compared and restored. The filters of `fewbits-filters` are functions from one
+//! density to the next.
 //!
-//! - [`Particles`]: weighted points, for a belief of any shape. Coordinates are columns and weights are logarithms; the price
-//!   is that a single particle is scattered over `D + 1` slices, which suits filters (they sweep over all particles) and not
-//!   programs that move one particle at a time.
-//! - [`KernelEstimate`]: particles under a common Gaussian kernel ([`Bandwidth`] says how wide), so that they have a density.
-//! - [`Mixture`]: a few Gaussians with full covariances: what a belief is reduced to ([`Reduction`]) before it travels.
-//! - [`divergence`], [`plug_in`], [`quadrature`]: how far two beliefs are apart, estimated, bounded and integrated.
-//! - [`product`]: several beliefs about one state, multiplied.
-//! - [`wire`]: a mixture in a few bytes.
-//! - [`Cells`]: equal small cells, refined until the moments have settled: the exact belief in few dimensions.
-//! - [`Lpg`]: a linear combination of products of Hermite polynomials and Gaussians, squared, so that it is nowhere negative.
-//! - [`Clumps`]: any cloud of weighted points summed up by a few hundred parts, to which [`Mixture`]s are fitted.
-//! - [`laplace`]: Gaussians from the peak of a density and from its cumulants.
-//! - [`GaussianCloud`]: weighted Gaussians that share one covariance, the belief of a Rao-Blackwellised filter.
-//! - [`PointMass`] on a [`Grid`], [`PlaneMass`] on a lattice: densities of one and two dimensions by their values at nodes.
+//! | density | use it when | value `p(x)` |
+//! |---|---|---|
+//! | [`Particles`] | the shape is unknown; particle filters update it | none |
+//! | [`GaussianCloud`] | part of the state is linear: the belief of a Rao-Blackwellised filter | sum of Gaussians of one covariance |
+//! | [`KernelEstimate`] | particles need a value of the density; [`Bandwidth`] chooses the kernel | sum of Gaussians of one covariance |
+//! | [`Mixture`] | a few Gaussians describe it, each with a covariance of its own | sum of Gaussians |
+//! | [`PointMass`] on a [`Grid`] | one dimension, values at the nodes of a grid | linear between nodes |
+//! | [`PlaneMass`] | two dimensions, values at the nodes of a lattice | bilinear between nodes |
+//!
+//! All of them implement [`Belief`](fewbits_core::Belief): mean, covariance, draws into columns. Those with a value also implement
+//! [`Density`](fewbits_core::Density).
 //!
 //! ```
 //! use fewbits_densities::Particles;
@@ -26,57 +23,22 @@
 //! # Ok::<(), fewbits_densities::Error>(())
 //! ```
 //!
-//! Not here: dynamics, measurements and resampling, which belong to filters.
+//! Coordinates of particles are columns and weights are logarithms. Filters sweep over all particles, so each sweep runs in vector
+//! registers. The price is that one particle is spread over `D + 1` slices: a program that moves single particles pays for it.
+//!
+//! Not here: dynamics, measurements and resampling (`fewbits-filters`); the reduction of a density to a few Gaussians, divergences
+//! and the code of a mixture in a few bytes (`fewbits-mixture-codec`); products of mixtures (`fewbits-pf-mpa`); adaptive cells and
+//! Hermite series (`fewbits-diffusive`).
 
-mod bandwidth;
-mod beliefs;
-pub mod cells;
-pub mod clumps;
-mod credible;
-pub mod cut;
-pub mod divergence;
 mod error;
-mod fast_kernel;
-mod gaussian_cloud;
-mod grid;
-pub mod hermite;
-mod kernel;
-pub mod laplace;
-pub mod lpg;
-mod matrix;
-pub mod merge;
+mod grids;
+mod kernel_estimate;
 mod mixture;
 mod particles;
-mod plane;
-pub mod plug_in;
-mod point_mass;
-pub mod product;
-pub mod quadrature;
-mod reduce;
-mod refine;
-mod stored;
-pub mod tree;
-mod weights;
-pub mod wire;
 
-pub use bandwidth::{Bandwidth, Rule, SampleSize, Shape};
-pub use cells::{CellOptions, CellTarget, Cells};
-pub use clumps::{Clump, Clumps, MixtureFit};
-pub use credible::{HighestDensity, ellipse};
-pub use cut::{Criterion, Cut, NodeErrors};
 pub use error::Error;
-pub use fast_kernel::TabulatedEstimate;
-pub use gaussian_cloud::GaussianCloud;
-pub use grid::Grid;
-pub use kernel::KernelEstimate;
-pub use lpg::Lpg;
-pub use merge::MergeCost;
-pub use mixture::{Component, Mixture};
-pub use particles::Particles;
-pub use plane::PlaneMass;
-pub use plug_in::{Cubature, PlugIn};
-pub use point_mass::PointMass;
-pub use reduce::{PaperReductions, Reduction};
-pub use refine::refine;
-pub use tree::{Split, Tree};
+pub use grids::{Grid, PlaneMass, PointMass};
+pub use kernel_estimate::{Bandwidth, KernelEstimate, Rule, SampleSize, Shape, add_cross_sums};
+pub use mixture::{Component, Mixture, ellipse};
+pub use particles::{Categorical, GaussianCloud, Particles};
 pub use {nalgebra, rand};

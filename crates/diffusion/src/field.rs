@@ -1,6 +1,6 @@
 //! What sensors measure of a source anywhere in the domain: the form that estimators take.
 
-use crate::{Domain, Error, Steady, StepControl, Transient, Transport};
+use crate::{Domain, Error, Patch, Steady, StepControl, Transient, Transport};
 use fewbits_models::nalgebra::Vector3;
 use fewbits_models::{Receptor, SourceGradient, SourceModel};
 use fewbits_numerics::ArgumentError;
@@ -44,12 +44,8 @@ impl SensorField {
     /// # Errors
     /// If a point is outside or blocked, or the transport has no steady state.
     pub fn steady(transport: &Transport, points: &[[f64; 3]]) -> Result<Self, Error> {
-        let patches = points
-            .iter()
-            .map(|point| transport.domain().point(*point))
-            .collect::<Result<Vec<_>, _>>()?;
         let responses = Steady::new(transport)?
-            .adjoint(&patches)?
+            .adjoint(&patches(transport, points)?)?
             .into_iter()
             .map(|field| vec![field])
             .collect();
@@ -67,14 +63,10 @@ impl SensorField {
         ages: &[f64],
         control: StepControl,
     ) -> Result<Self, Error> {
-        let patches = points
-            .iter()
-            .map(|point| transport.domain().point(*point))
-            .collect::<Result<Vec<_>, _>>()?;
         let mut by_sensor = vec![Vec::with_capacity(ages.len()); points.len()];
         for fields in Transient::new(transport)
             .with_control(control)?
-            .step_responses(&patches, ages)?
+            .step_responses(&patches(transport, points)?, ages)?
         {
             by_sensor
                 .iter_mut()
@@ -194,10 +186,11 @@ impl SensorField {
 
     /// Value and gradient of a response at a point.
     fn interpolate(&self, sensor: usize, point: &Vector3<f64>, age: f64) -> SourceGradient {
-        let mut result = SourceGradient {
+        const NOTHING: SourceGradient = SourceGradient {
             value: 0.0,
-            gradient: Vector3::zeros(),
+            gradient: Vector3::new(0.0, 0.0, 0.0),
         };
+        let mut result = NOTHING;
         let (Some(stencil), Some(fields)) = (self.stencil(&(*point).into()), self.responses.get(sensor)) else {
             return result;
         };
@@ -207,15 +200,12 @@ impl SensorField {
             result.gradient += weight * gradient;
         }
         // Steps in time may leave an error below zero.
-        if result.value < 0.0 {
-            SourceGradient {
-                value: 0.0,
-                gradient: Vector3::zeros(),
-            }
-        } else {
-            result
-        }
+        if result.value < 0.0 { NOTHING } else { result }
     }
+}
+
+fn patches(transport: &Transport, points: &[[f64; 3]]) -> Result<Vec<Patch>, Error> {
+    points.iter().map(|point| transport.domain().point(*point)).collect()
 }
 
 /// Multilinear interpolation between up to eight free cells.

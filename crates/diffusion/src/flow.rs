@@ -1,6 +1,6 @@
 //! Wind as flows through the faces of a domain.
 
-use crate::domain::Face;
+use crate::domain::{EdgeFace, Face};
 use crate::solver::{Direction, Solver};
 use crate::{Boundary, Domain, Error};
 use faer::Mat;
@@ -44,9 +44,15 @@ const MAX_DIVERGENCE: f64 = 1e-10;
 impl Flow {
     /// No wind.
     pub fn still(domain: &Domain) -> Self {
+        Self::through(domain, |_| 0.0, |_| 0.0)
+    }
+
+    /// Flows through all faces between cells, and through the open faces at the edge.
+    fn through(domain: &Domain, inside: impl Fn(&Face) -> f64, edge: impl Fn(&EdgeFace) -> f64) -> Self {
+        let edge = |face: &EdgeFace| if face.boundary.is_open() { edge(face) } else { 0.0 };
         Self {
-            inside: vec![0.0; domain.faces.len()],
-            edge: vec![0.0; domain.edge_faces.len()],
+            inside: domain.faces.iter().map(inside).collect(),
+            edge: domain.edge_faces.iter().map(edge).collect(),
         }
     }
 
@@ -66,22 +72,11 @@ impl Flow {
             velocity(point)[axis]
         };
         let inside = |face: &Face| face.area * at(face.cells[0], face.axis, face.halves[0]);
-        Self {
-            inside: domain.faces.iter().map(inside).collect(),
-            edge: domain
-                .edge_faces
-                .iter()
-                .map(|face| {
-                    let outwards = if face.upper { 1.0 } else { -1.0 };
-                    if face.boundary.is_open() {
-                        outwards * face.area * at(face.cell, face.axis, outwards * face.half)
-                    } else {
-                        0.0
-                    }
-                })
-                .collect(),
-        }
-        .treated(domain, divergence)
+        let edge = |face: &EdgeFace| {
+            let outwards = if face.upper { 1.0 } else { -1.0 };
+            outwards * face.area * at(face.cell, face.axis, outwards * face.half)
+        };
+        Self::through(domain, inside, edge).treated(domain, divergence)
     }
 
     /// The wind measured as mean velocities in the free cells, m/s, such as from a file: at a face the mean of both cells, weighted
@@ -99,22 +94,11 @@ impl Flow {
             let [below, above] = face.halves;
             face.area * (low * above + high * below) / (below + above)
         };
-        Self {
-            inside: domain.faces.iter().map(inside).collect(),
-            edge: domain
-                .edge_faces
-                .iter()
-                .map(|face| {
-                    let outwards = if face.upper { face.area } else { -face.area };
-                    if face.boundary.is_open() {
-                        outwards * velocities[face.cell][face.axis]
-                    } else {
-                        0.0
-                    }
-                })
-                .collect(),
-        }
-        .treated(domain, divergence)
+        let edge = |face: &EdgeFace| {
+            let outwards = if face.upper { face.area } else { -face.area };
+            outwards * velocities[face.cell][face.axis]
+        };
+        Self::through(domain, inside, edge).treated(domain, divergence)
     }
 
     /// Net flow out of each free cell, m^3/s.
@@ -246,18 +230,14 @@ impl PotentialFlow {
         let difference = total / passing;
         potential.iter_mut().for_each(|phi| *phi *= difference);
         let fall = |face: &Face| conductance(face) * (potential[face.cells[0]] - potential[face.cells[1]]);
-        let flow = Flow {
-            inside: domain.faces.iter().map(fall).collect(),
-            edge: domain
-                .edge_faces
-                .iter()
-                .map(|face| match face.boundary {
-                    Boundary::Inflow => face.area / face.half * (potential[face.cell] - difference),
-                    Boundary::Outflow => face.area / face.half * potential[face.cell],
-                    _ => 0.0,
-                })
-                .collect(),
-        };
+        let flow = Flow::through(domain, fall, |face| {
+            let outside = if face.boundary == Boundary::Inflow {
+                difference
+            } else {
+                0.0
+            };
+            face.area / face.half * (potential[face.cell] - outside)
+        });
         flow.check(domain)?;
         Ok(Self {
             flow,

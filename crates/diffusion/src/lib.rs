@@ -47,6 +47,7 @@ mod grid;
 mod plan;
 mod solver;
 mod steady;
+mod stepper;
 mod transient;
 mod transport;
 

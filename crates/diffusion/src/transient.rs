@@ -1,21 +1,13 @@
 //! Concentrations that change with time.
 
-use crate::solver::{Direction, Factor};
+pub use crate::stepper::Method;
+
+use crate::solver::Direction;
+use crate::stepper::{State, Stepper};
 use crate::{Error, Patch, Transport};
 use faer::Mat;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, finite, positive};
-
-/// How a step in time is made. Both methods damp what a sudden start excites.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Method {
-    /// Trapezoidal rule, then a backward difference (TR-BDF2): second order, with an embedded error of third order. Concentrations may
-    /// fall below zero by the error: [`Snapshot::lowest`] says how far.
-    #[default]
-    TrBdf2,
-    /// Two implicit Euler steps of half the length; their difference from one whole step is the error. First order, never negative.
-    ImplicitEuler,
-}
 
 /// How long steps are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,56 +60,29 @@ pub struct Snapshot {
 /// one factorisation of V + w step A for each length of step; the last ones used are kept
 /// ```
 pub struct Transient<'a> {
-    transport: &'a Transport,
-    method: Method,
+    stepper: Stepper<'a>,
     control: StepControl,
-    /// Factors by their coefficient of `A`; the last used comes last.
-    factors: Vec<(f64, Factor<'a>)>,
 }
 
-/// Factorisations that are kept.
-const MAX_FACTORS: usize = 16;
 /// A step this far below the interval does not change the time any more.
 const MIN_SHARE_EXPONENT: i32 = -45;
-/// `2 - sqrt 2`: the share of the step at which the trapezoidal rule ends, so that both stages have one matrix.
-const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
-const HALF_GAMMA: f64 = 0.5 * GAMMA;
-/// Weight of the first two slopes.
-const WEIGHT: f64 = 0.25 * std::f64::consts::SQRT_2;
-/// Weights of the third-order formula less those of the method (Hosea and Shampine, Applied Numerical Mathematics 20 (1996) 21).
-const ERROR: [f64; 3] = [
-    (1.0 - WEIGHT) / 3.0 - WEIGHT,
-    (3.0 * WEIGHT + 1.0) / 3.0 - WEIGHT,
-    HALF_GAMMA / 3.0 - HALF_GAMMA,
-];
 /// A step is doubled if its error is below the tolerance over this: the error grows eightfold, and half of that is margin.
 const DOUBLING_MARGIN: f64 = 16.0;
-
-/// Columns that evolve together.
-struct State {
-    concentration: Mat<f64>,
-    dose: Mat<f64>,
-    lowest: f64,
-    steps: usize,
-    /// Length of the next step, s.
-    wanted: f64,
-}
 
 impl<'a> Transient<'a> {
     /// A solver with TR-BDF2 and the default tolerance.
     pub fn new(transport: &'a Transport) -> Self {
         Self {
-            transport,
-            method: Method::default(),
+            stepper: Stepper::new(transport),
             control: StepControl::default(),
-            factors: Vec::new(),
         }
     }
 
     /// With another method.
     #[must_use]
-    pub fn with_method(self, method: Method) -> Self {
-        Self { method, ..self }
+    pub fn with_method(mut self, method: Method) -> Self {
+        self.stepper.method = method;
+        self
     }
 
     /// With another control of the steps.
@@ -139,13 +104,13 @@ impl<'a> Transient<'a> {
     /// before it starts or starts before 0, a patch is of another domain, [`Error::Factorisation`] or [`Error::StepTooSmall`].
     pub fn run(&mut self, initial: &[f64], releases: &[Release], times: &[f64]) -> Result<Vec<Snapshot>, Error> {
         // Checks number and finiteness.
-        self.transport.net_outflow(initial)?;
+        self.stepper.transport.net_outflow(initial)?;
         check_instants("times", times)?;
         let last = times.last().copied().unwrap_or(0.0);
         let mut instants = times.to_vec();
         for release in releases {
             finite("rate", release.rate)?;
-            self.transport.check_patch(&release.patch)?;
+            self.stepper.transport.check_patch(&release.patch)?;
             if !(release.start >= 0.0 && release.start <= release.stop) {
                 let shown = format!("{} to {}", release.start, release.stop);
                 return Err(ArgumentError::new("start, stop", shown, "0 <= start <= stop").into());
@@ -154,7 +119,7 @@ impl<'a> Transient<'a> {
         }
         instants.sort_by(f64::total_cmp);
         instants.dedup();
-        let mut state = self.begin(Mat::from_fn(initial.len(), 1, |i, _| initial[i]));
+        let mut state = State::new(Mat::from_fn(initial.len(), 1, |i, _| initial[i]));
         let unit = common_unit(&instants);
         let (mut now, mut active, mut snapshots) = (0.0, vec![false; releases.len()], Vec::new());
         for (k, end) in instants.into_iter().enumerate() {
@@ -196,16 +161,16 @@ impl<'a> Transient<'a> {
     /// If ages do not increase from above 0, a patch is of another domain, [`Error::Factorisation`] or [`Error::StepTooSmall`].
     pub fn step_responses(&mut self, sensors: &[Patch], ages: &[f64]) -> Result<Vec<Vec<Vec<f64>>>, Error> {
         check_instants("ages", ages)?;
-        let count = self.transport.volumes.len();
+        let count = self.stepper.transport.volumes.len();
         let mut source = Mat::zeros(count, sensors.len());
         for (j, sensor) in sensors.iter().enumerate() {
-            self.transport.check_patch(sensor)?;
+            self.stepper.transport.check_patch(sensor)?;
             sensor
                 .shares
                 .iter()
                 .for_each(|(cell, share)| source[(*cell, j)] += share);
         }
-        let mut state = self.begin(Mat::zeros(count, sensors.len()));
+        let mut state = State::new(Mat::zeros(count, sensors.len()));
         state.wanted = self.first_step(&state.concentration, &source);
         let (mut now, mut responses) = (0.0, Vec::with_capacity(ages.len()));
         let unit = common_unit(ages);
@@ -218,17 +183,6 @@ impl<'a> Transient<'a> {
         Ok(responses)
     }
 
-    fn begin(&self, concentration: Mat<f64>) -> State {
-        let dose = Mat::zeros(concentration.nrows(), concentration.ncols());
-        State {
-            concentration,
-            dose,
-            lowest: 0.0,
-            steps: 0,
-            wanted: f64::INFINITY,
-        }
-    }
-
     /// A small share of the time in which a cell that holds or receives something loses it.
     fn first_step(&self, concentration: &Mat<f64>, source: &Mat<f64>) -> f64 {
         let StepControl::Tolerance(tolerance) = self.control else {
@@ -238,7 +192,7 @@ impl<'a> Transient<'a> {
         for j in 0..source.ncols() {
             let pairs = concentration.col_as_slice(j).iter().zip(source.col_as_slice(j));
             for (i, _) in pairs.enumerate().filter(|(_, (c, s))| **c != 0.0 || **s != 0.0) {
-                shortest = f64::min(shortest, self.transport.volumes[i] / self.transport.diagonal[i]);
+                shortest = f64::min(shortest, self.stepper.transport.volumes[i] / self.stepper.transport.diagonal[i]);
             }
         }
         shortest * tolerance.cbrt()
@@ -258,7 +212,7 @@ impl<'a> Transient<'a> {
             StepControl::Equal(steps) => {
                 let step = duration / steps as f64;
                 for _ in 0..steps {
-                    let (next, dose, _) = self.step(direction, &state.concentration, source, step)?;
+                    let (next, dose, _) = self.stepper.step(direction, &state.concentration, source, step)?;
                     state.accept(next, dose);
                 }
                 return Ok(());
@@ -279,7 +233,7 @@ impl<'a> Transient<'a> {
         }
         while left > 0 {
             let step = length(level);
-            let (next, dose, error) = self.step(direction, &state.concentration, source, step)?;
+            let (next, dose, error) = self.stepper.step(direction, &state.concentration, source, step)?;
             if error.is_nan() || error > tolerance {
                 if level <= MIN_SHARE_EXPONENT {
                     return Err(Error::StepTooSmall { step });
@@ -301,123 +255,6 @@ impl<'a> Transient<'a> {
         }
         Ok(())
     }
-
-    /// One step: the columns after it, what it adds to the dose, and its estimated error relative to each column's largest value.
-    fn step(
-        &mut self,
-        direction: Direction,
-        now: &Mat<f64>,
-        source: &Mat<f64>,
-        step: f64,
-    ) -> Result<(Mat<f64>, Mat<f64>, f64), Error> {
-        let (rows, columns) = (now.nrows(), now.ncols());
-        let transport = self.transport;
-        let volumes = &transport.volumes;
-        match self.method {
-            Method::ImplicitEuler => {
-                let euler = |from: &Mat<f64>, step: f64, factor: &Factor<'_>| {
-                    let mut next =
-                        Mat::from_fn(rows, columns, |i, j| volumes[i] * from[(i, j)] + step * source[(i, j)]);
-                    factor.solve(direction, &mut next);
-                    next
-                };
-                let whole = euler(now, step, self.factor(step)?);
-                let half_factor = self.factor(0.5 * step)?;
-                let middle = euler(now, 0.5 * step, half_factor);
-                let next = euler(&middle, 0.5 * step, half_factor);
-                let dose = Mat::from_fn(rows, columns, |i, j| 0.5 * step * (middle[(i, j)] + next[(i, j)]));
-                let error = relative_error(&(&next - &whole), &next);
-                Ok((next, dose, error))
-            }
-            Method::TrBdf2 => {
-                let weight = HALF_GAMMA * step;
-                let factor = self.factor(weight)?;
-                let slope = |c: &Mat<f64>| {
-                    let mut out = Mat::zeros(rows, columns);
-                    for j in 0..columns {
-                        transport.apply(direction, c.col_as_slice(j), out.col_as_slice_mut(j));
-                        out.col_as_slice_mut(j)
-                            .iter_mut()
-                            .zip(source.col_as_slice(j))
-                            .for_each(|(out, s)| *out = s - *out);
-                    }
-                    out
-                };
-                let first = slope(now);
-                let mut middle = Mat::from_fn(rows, columns, |i, j| {
-                    volumes[i] * now[(i, j)] + weight * (first[(i, j)] + source[(i, j)])
-                });
-                factor.solve(direction, &mut middle);
-                let second = slope(&middle);
-                let mut next = Mat::from_fn(rows, columns, |i, j| {
-                    volumes[i] * now[(i, j)]
-                        + step * WEIGHT * (first[(i, j)] + second[(i, j)])
-                        + weight * source[(i, j)]
-                });
-                factor.solve(direction, &mut next);
-                let third = slope(&next);
-                // Solving with the matrix once more keeps the estimate bounded for stiff parts.
-                let mut error = Mat::from_fn(rows, columns, |i, j| {
-                    step * (ERROR[0] * first[(i, j)] + ERROR[1] * second[(i, j)] + ERROR[2] * third[(i, j)])
-                });
-                factor.solve(direction, &mut error);
-                let dose = Mat::from_fn(rows, columns, |i, j| {
-                    step * WEIGHT * (now[(i, j)] + middle[(i, j)]) + weight * next[(i, j)]
-                });
-                let error = relative_error(&error, &next);
-                Ok((next, dose, error))
-            }
-        }
-    }
-
-    /// The factor of `V + weight A`.
-    fn factor(&mut self, weight: f64) -> Result<&Factor<'a>, Error> {
-        match self.factors.iter().position(|(known, _)| *known == weight) {
-            Some(at) => self.factors[at..].rotate_left(1),
-            None => {
-                let diagonal = self.transport.volumes.iter().zip(&self.transport.diagonal);
-                let diagonal: Vec<f64> = diagonal.map(|(volume, rate)| volume + weight * rate).collect();
-                if self.factors.len() == MAX_FACTORS {
-                    self.factors.remove(0);
-                }
-                let factor = self
-                    .transport
-                    .solver()?
-                    .factor(&diagonal, &self.transport.rates, weight)?;
-                self.factors.push((weight, factor));
-            }
-        }
-        Ok(&self.factors[self.factors.len() - 1].1)
-    }
-}
-
-impl State {
-    fn accept(&mut self, next: Mat<f64>, dose: Mat<f64>) {
-        self.dose += dose;
-        for j in 0..next.ncols() {
-            self.lowest = next.col_as_slice(j).iter().copied().fold(self.lowest, f64::min);
-        }
-        self.concentration = next;
-        self.steps += 1;
-    }
-}
-
-/// The largest error of a column over the largest number of that column, over all columns.
-fn relative_error(error: &Mat<f64>, values: &Mat<f64>) -> f64 {
-    let size = |column: &[f64]| {
-        column
-            .iter()
-            .fold(0.0, |most: f64, x| if x.is_nan() { f64::INFINITY } else { most.max(x.abs()) })
-    };
-    let of_column = |j: usize| {
-        let error = size(error.col_as_slice(j));
-        if error == 0.0 {
-            0.0
-        } else {
-            error / size(values.col_as_slice(j))
-        }
-    };
-    (0..error.ncols()).map(of_column).fold(0.0, f64::max)
 }
 
 fn check_instants(name: &'static str, instants: &[f64]) -> Result<(), Error> {

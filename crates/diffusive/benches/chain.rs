@@ -4,7 +4,7 @@
 
 use divan::{Bencher, black_box};
 use fewbits_core::Gaussian;
-use fewbits_densities::CellOptions;
+use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Search, SearchBox, SourceLikelihood, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;

@@ -1,8 +1,9 @@
 //! Beliefs that travel, apart from raw records, and what an update starts from.
 
+use crate::density::Lpg;
 use crate::rate::RateRange;
 use fewbits_core::{Belief, Density, Gaussian};
-use fewbits_densities::{Component, Lpg, Mixture};
+use fewbits_densities::{Component, Mixture};
 use nalgebra::Vector2;
 
 /// A Gaussian ends here, in standard deviations.

@@ -2,9 +2,9 @@
 
 use crate::SourceLikelihood;
 use crate::belief::SearchBox;
+use crate::density::CellTarget;
 use crate::fit::Fit;
 use crate::target::Target;
-use fewbits_densities::CellTarget;
 use fewbits_models::SourceModel;
 use nalgebra::Vector2;
 

@@ -6,6 +6,7 @@ use fewbits_models::diffusion::Air;
 use fewbits_models::{Homogeneous, Receptor, SourceModel};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, finite, positive, within};
+use fewbits_numerics::golden::maximum;
 use fewbits_numerics::normal::interval;
 use nalgebra::Vector2;
 
@@ -16,7 +17,8 @@ const BISECTIONS: usize = 60;
 
 /// Distances at which the highest concentration along a ray is looked for, and steps of its refinement.
 const DISTANCES: usize = 128;
-const REFINEMENTS: usize = 80;
+/// Share of the bracket to which the distance of the highest concentration is found.
+const PEAK_TOLERANCE: f64 = 1e-8;
 
 /// A posterior over position and rate, asked about concentrations at the height of the sensors, in their medium.
 #[derive(Debug, Clone)]
@@ -258,19 +260,10 @@ impl<'a, M: SourceModel> AlongRay<'a, M> {
                 (best, along.peak) = (i, (distance(i), value));
             }
         }
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let (mut low, mut high) = (distance(best.saturating_sub(1)), distance((best + 1).min(DISTANCES - 1)));
-        for _ in 0..REFINEMENTS {
-            let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-            if along.at(left) > along.at(right) {
-                high = right
-            } else {
-                low = left
-            }
-        }
-        let value = along.at(0.5 * (low + high));
+        let (low, high) = (distance(best.saturating_sub(1)), distance((best + 1).min(DISTANCES - 1)));
+        let (place, value) = maximum(|x| along.at(x), low, high, PEAK_TOLERANCE);
         if value > along.peak.1 {
-            along.peak = (0.5 * (low + high), value);
+            along.peak = (place, value);
         }
         Ok(along)
     }

@@ -6,7 +6,7 @@ fewbits_numerics::errors! {
         /// The physics.
         Model(#[from] fewbits_models::Error),
         /// A belief could not be formed.
-        Density(#[from] fewbits_densities::Error),
+        Density(#[from] crate::density::Error),
         /// The network.
         Topology(#[from] fewbits_topology::Error),
         /// A message could not be written or read.
@@ -24,5 +24,11 @@ fewbits_numerics::errors! {
         /// Concentrations were asked for everywhere along a ray, but the model has them only at its receptors.
         #[error("the model changes along the ground: expected one that is homogeneous")]
         NotHomogeneous,
+    }
+}
+
+impl From<fewbits_densities::Error> for Error {
+    fn from(error: fewbits_densities::Error) -> Self {
+        Self::Density(error.into())
     }
 }

@@ -62,6 +62,7 @@
 mod belief;
 mod best_fit;
 mod chain;
+pub mod density;
 mod envelope;
 mod error;
 mod fit;

@@ -1,11 +1,12 @@
 //! What travels, as bits.
 
 use crate::belief::{JointBelief, PositionBelief};
+use crate::density::Lpg;
 use crate::fit::Fit;
 use crate::project::{Travelling, lpg_scalars};
 use crate::{Error, Record};
 use fewbits_core::{BitReader, BitWriter, CodecError, Message, NumberFormat};
-use fewbits_densities::{Component, Lpg, Mixture};
+use fewbits_densities::{Component, Mixture};
 use fewbits_models::SourceModel;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{non_negative, within};

@@ -1,10 +1,10 @@
 //! Several models of the medium, of which one is right: winds or diffusivities on a small grid.
 
 use crate::belief::{Prior, SearchBox};
+use crate::density::CellOptions;
 use crate::posterior::Posterior;
 use crate::{Error, RateModel, SourceLikelihood, SourceSensor};
 use fewbits_core::Gaussian;
-use fewbits_densities::CellOptions;
 use fewbits_models::SourceModel;
 use fewbits_models::diffusion::Air;
 use fewbits_numerics::ArgumentError;
@@ -121,7 +121,7 @@ impl<M: SourceModel> ModelGrid<M> {
             let likelihood = SourceLikelihood::new(records.collect::<Result<_, _>>()?, rate)?;
             let posterior = match Posterior::new(&Prior::Exact(*prior), &likelihood, search, None, options) {
                 Ok(posterior) => Some(posterior),
-                Err(Error::Density(fewbits_densities::Error::Core(fewbits_core::Error::Impossible))) => None,
+                Err(Error::Density(crate::density::Error::Core(fewbits_core::Error::Impossible))) => None,
                 Err(other) => return Err(other),
             };
             all.push(ModelPosterior {
@@ -137,7 +137,7 @@ impl<M: SourceModel> ModelGrid<M> {
         };
         let largest = logs().fold(f64::NEG_INFINITY, f64::max);
         if largest == f64::NEG_INFINITY {
-            return Err(fewbits_densities::Error::from(fewbits_core::Error::Impossible).into());
+            return Err(crate::density::Error::from(fewbits_core::Error::Impossible).into());
         }
         let weights: Vec<f64> = logs().map(|log| (log - largest).exp()).collect();
         let total: f64 = weights.iter().sum();

@@ -1,11 +1,11 @@
 //! The exact posterior of one update, over cells.
 
 use crate::belief::{Prior, SearchBox};
+use crate::density::{CellOptions, Cells, Clumps};
 use crate::fit::Fit;
 use crate::target::Target;
 use crate::{Error, SourceLikelihood};
 use fewbits_core::{Belief, Gaussian};
-use fewbits_densities::{CellOptions, Cells, Clumps};
 use fewbits_models::SourceModel;
 use nalgebra::{Vector2, Vector3};
 

@@ -1,11 +1,12 @@
 //! From an exact posterior to what travels on.
 
 use crate::belief::{JointBelief, PositionBelief};
+use crate::density::LpgFit;
+use crate::density::{Clumps, Lpg, MixtureFit};
 use crate::posterior::Posterior;
 use crate::{Error, RateModel};
 use fewbits_core::Gaussian;
-use fewbits_densities::lpg::LpgFit;
-use fewbits_densities::{Clumps, Component, Lpg, Mixture, MixtureFit};
+use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
 use serde::{Deserialize, Serialize};
@@ -45,7 +46,7 @@ impl Form {
             Self::Mixture(n) | Self::Particles(n) => at_least_one("components", n).map(|_| ())?,
             Self::Lpg { components, degree } => {
                 at_least_one("components", components)?;
-                if degree > fewbits_densities::hermite::HIGHEST_DEGREE {
+                if degree > crate::density::polynomials::HIGHEST_DEGREE {
                     return Err(ArgumentError::new("degree", degree, "at most 20").into());
                 }
             }
@@ -148,7 +149,7 @@ fn lpg(posterior: &Posterior, components: usize, degree: usize, rate: &RateModel
 fn about_components<const D: usize>(
     clumps: &Clumps<D>,
     components: usize,
-    fit: impl Fn(&[Component<D>]) -> Result<LpgFit<D>, fewbits_densities::Error>,
+    fit: impl Fn(&[Component<D>]) -> Result<LpgFit<D>, crate::density::Error>,
 ) -> Result<LpgFit<D>, Error> {
     let about = |count: usize| {
         let mixture = clumps.fit(&MixtureFit::new(count)?)?;

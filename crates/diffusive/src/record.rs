@@ -4,7 +4,8 @@ use crate::rate::{Intervals, RateRange, RateSums, log_sample_marginal, log_sampl
 use crate::{Error, SourceSensor};
 use fewbits_models::diffusion::{Air, Profile};
 use fewbits_models::{Homogeneous, Receptor, SourceModel};
-use fewbits_numerics::error::positive;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, positive};
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::Vector2;
 
@@ -54,6 +55,24 @@ struct Along {
     steepness: [f64; 2],
     /// Wind speed over diffusivity, 1/m.
     drift: f64,
+}
+
+impl<M: SourceModel> SourceSensor<M> {
+    /// What was sampled at a node, ready for likelihoods.
+    ///
+    /// # Errors
+    /// If the number of samples is not that of the instants, one is not finite, or the model has no concentrations at `node`.
+    pub fn record(&self, node: &Vector2<f64>, samples: &[f64]) -> Result<Record<M>, Error>
+    where
+        M: Clone,
+    {
+        if samples.len() != self.instants().len() {
+            let expected = format!("{}, one for each instant", self.instants().len());
+            return Err(ArgumentError::new("samples", samples.len(), expected).into());
+        }
+        all_finite("samples", samples)?;
+        Record::new(self, node, samples.iter().map(|y| y - self.bias()).collect(), self.noise())
+    }
 }
 
 impl<M: SourceModel> Record<M> {

@@ -1,9 +1,8 @@
 //! What a node samples: the concentration at its place at a few instants, with bias and noise.
 
-use crate::{Error, Record};
+use crate::Error;
 use fewbits_models::diffusion::Air;
 use fewbits_models::{Homogeneous, Receptor, SourceGradient, SourceModel};
-use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, at_least_one, finite, non_negative, positive};
 use nalgebra::{Vector2, Vector3};
 use rand::{Rng, RngExt};
@@ -204,22 +203,6 @@ impl<M: SourceModel> SourceSensor<M> {
             .into_iter()
             .map(|a| rate * a + self.bias + self.noise * rng.sample::<f64, _>(StandardNormal))
             .collect()
-    }
-
-    /// What was sampled at a node, ready for likelihoods.
-    ///
-    /// # Errors
-    /// If the number of samples is not that of the instants, one is not finite, or the model has no concentrations at `node`.
-    pub fn record(&self, node: &Vector2<f64>, samples: &[f64]) -> Result<Record<M>, Error>
-    where
-        M: Clone,
-    {
-        if samples.len() != self.instants.len() {
-            let expected = format!("{}, one for each instant", self.instants.len());
-            return Err(ArgumentError::new("samples", samples.len(), expected).into());
-        }
-        all_finite("samples", samples)?;
-        Record::new(self, node, samples.iter().map(|y| y - self.bias).collect(), self.noise)
     }
 }
 

@@ -1,12 +1,13 @@
 //! A belief times the likelihood of records, cell by cell.
 
 use crate::belief::{JointBelief, PositionBelief, Prior};
+use crate::density::Slice;
+use crate::density::{CellTarget, Cells};
 use crate::rate::{Intervals, RateModel, RateRange, RateSums, cut_normal, ends_about};
 use crate::{Error, SourceLikelihood};
 use fewbits_core::Columns;
-use fewbits_densities::lpg::Slice;
-use fewbits_densities::{CellTarget, Cells};
 use fewbits_models::SourceModel;
+use fewbits_numerics::LogSum;
 use fewbits_numerics::kernels::largest;
 use fewbits_numerics::normal::log_interval;
 use nalgebra::{Matrix2, Vector2};
@@ -358,44 +359,7 @@ impl<M: SourceModel> Target<'_, M> {
             .zip(&terms)
             .for_each(|(place, log)| results[*place].add(*log));
         for (cell, result) in cells.iter().zip(&results) {
-            out[*cell] = result.log();
-        }
-    }
-}
-
-/// A sum of exponentials, kept scaled by its largest term.
-#[derive(Clone, Copy)]
-struct LogSum {
-    largest: f64,
-    scaled: f64,
-}
-
-impl Default for LogSum {
-    fn default() -> Self {
-        Self {
-            largest: f64::NEG_INFINITY,
-            scaled: 0.0,
-        }
-    }
-}
-
-impl LogSum {
-    #[inline]
-    fn add(&mut self, log: f64) {
-        if log > self.largest {
-            self.scaled = self.scaled * (self.largest - log).exp() + 1.0;
-            self.largest = log;
-        } else if log > self.largest - 40.0 {
-            self.scaled += (log - self.largest).exp();
-        }
-    }
-
-    #[inline]
-    fn log(&self) -> f64 {
-        if self.largest == f64::NEG_INFINITY {
-            self.largest
-        } else {
-            self.largest + self.scaled.ln()
+            out[*cell] = result.value();
         }
     }
 }
@@ -410,5 +374,5 @@ fn log_mixture(lobes: &[Lobe], precisions: &[[[f64; 3]; 2]], at: &Vector2<f64>) 
             result.add(lobe.log_scale - 0.5 * quadratic(p, &d));
         }
     }
-    (results[0].log(), results[1].log())
+    (results[0].value(), results[1].value())
 }

@@ -57,7 +57,9 @@ pub struct RoundedSample {
 }
 
 stored! { RoundedSample as Numbers |scheme| {
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64 = scheme.noise_variance,
+    #[serde(with = "fewbits_numerics::stored")]
     resolution: f64 = scheme.resolution,
     bits: u32 = scheme.bits,
 } => RoundedSample::new(noise_variance, resolution)?.with_bits(bits), Error }

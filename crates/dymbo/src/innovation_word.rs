@@ -3,7 +3,8 @@
 use crate::Error;
 use fewbits_core::factor::{Constant, InCell, Partition, Scalar};
 use fewbits_core::{
-    BitReader, BitWriter, Cell, CodecError, Link, MeasurementNoise, Message, NumberFormat, Observation, Scheme,
+    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
+    Scheme,
 };
 use fewbits_numerics::error::{ArgumentError, finite, positive};
 use fewbits_numerics::stored;
@@ -17,9 +18,21 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Prediction {
     /// Predicted measurement.
+    #[serde(with = "fewbits_numerics::stored")]
     pub mean: f64,
     /// Standard deviation of the innovation, `sqrt(P + sigma^2)`.
+    #[serde(with = "fewbits_numerics::stored")]
     pub deviation: f64,
+}
+
+/// Of the predicted measurement, noise included.
+impl From<&Gaussian<1>> for Prediction {
+    fn from(measurement: &Gaussian<1>) -> Self {
+        Self {
+            mean: measurement.mean()[0],
+            deviation: measurement.covariance()[0].sqrt(),
+        }
+    }
 }
 
 impl Message for Prediction {
@@ -72,6 +85,7 @@ pub struct InnovationWord {
 }
 
 stored! { InnovationWord as Numbers |word| {
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64 = word.noise_variance,
     bits: u32 = word.bits,
 } => InnovationWord::new(noise_variance, bits as usize), Error }
@@ -105,12 +119,8 @@ impl InnovationWord {
     /// If a number is not finite, or the deviation is not positive.
     #[inline]
     pub fn word(&self, measurement: f64, prediction: &Prediction) -> Result<CellIndex, ArgumentError> {
-        let scale = positive("deviation", prediction.deviation)?;
-        let offset = finite("measurement", measurement)? - finite("prediction", prediction.mean)?;
-        let below = self
-            .quantizer
-            .breakpoints()
-            .partition_point(|edge| *edge <= offset / scale);
+        let thresholds = self.quantizer.breakpoints();
+        let below = fewbits_node::innovation_cell(thresholds, measurement, prediction.mean, prediction.deviation)?;
         Ok(CellIndex(below as u16))
     }
 

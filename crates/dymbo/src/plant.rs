@@ -22,8 +22,11 @@ pub struct ScalarPlant {
 }
 
 stored! { ScalarPlant as Numbers |plant| {
+    #[serde(with = "fewbits_numerics::stored")]
     coefficient: f64 = plant.coefficient(),
+    #[serde(with = "fewbits_numerics::stored")]
     process_variance: f64 = plant.process_variance(),
+    #[serde(with = "fewbits_numerics::stored")]
     measurement_variance: f64 = plant.measurement_variance(),
 } => ScalarPlant::new(coefficient, process_variance, measurement_variance), Error }
 

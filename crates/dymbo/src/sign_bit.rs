@@ -29,10 +29,11 @@ use std::f64::consts::FRAC_2_PI;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Numbers")]
 pub struct SignBit {
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
 }
 
-stored! { SignBit as Numbers { noise_variance: f64 } => SignBit::new(noise_variance), Error }
+stored! { SignBit as Numbers { #[serde(with = "fewbits_numerics::stored")] noise_variance: f64 } => SignBit::new(noise_variance), Error }
 
 impl SignBit {
     /// A sensor with measurement variance `sigma^2 > 0`.
@@ -86,7 +87,8 @@ impl Scheme<1> for SignBit {
         measurement: &Vector1<f64>,
         threshold: &f64,
     ) -> Result<Option<Sign>, fewbits_core::Error> {
-        Ok(Some(Sign::of(measurement[0], *threshold)?))
+        let reached = fewbits_node::sign_bit(measurement[0], *threshold).map_err(ArgumentError::from)?;
+        Ok(Some(if reached { Sign::Above } else { Sign::Below }))
     }
 
     fn factor(

@@ -6,10 +6,10 @@
 
 use crate::sign_bit::SignBit;
 use crate::{Error, sign_bit};
-use fewbits_core::{Factor, Gaussian, LinearDynamics, Link, Observation, Scheme, Sign};
+use fewbits_core::{Gaussian, LinearDynamics, Link, Observation, Scheme, Sign};
 use fewbits_filters::{SteadyState, assumed_density, kalman};
 use fewbits_models::ScalarSensor;
-use fewbits_numerics::error::{ArgumentError, finite};
+use fewbits_numerics::error::ArgumentError;
 use fewbits_numerics::linalg::{solve_semidefinite, symmetrised};
 use fewbits_numerics::normal::SQRT_2_OVER_PI;
 use nalgebra::{SMatrix, SVector};
@@ -112,8 +112,14 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         observation: &Observation<Sign>,
     ) -> Result<(Gaussian<D>, VectorInfo), Error> {
         let &Observation::Received(bit) = observation else {
-            let threshold = self.threshold(predicted, sensor)?;
-            return self.update_at(predicted, sensor, threshold, observation);
+            let (posterior, log_likelihood) = self.folded(predicted, predicted, self.sensor(sensor)?, observation)?;
+            return Ok((
+                posterior,
+                VectorInfo {
+                    log_likelihood,
+                    bits: 0,
+                },
+            ));
         };
         let (sensor, clean) = (self.sensor(sensor)?, 1.0 - 2.0 * self.link.crossover());
         let cross = predicted.covariance() * sensor.direction();
@@ -134,26 +140,19 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         Ok((posterior, info))
     }
 
-    /// The same for any threshold, by the assumed-density update with the factor of a [`SignBit`].
-    ///
-    /// # Errors
-    /// As [`SignFilter::update`]; if the threshold is not finite.
-    pub fn update_at(
+    /// The assumed-density update of `belief` with the factor of a [`SignBit`] whose threshold is the prediction of `asked`, and
+    /// `ln p(observation | past)`.
+    fn folded(
         &self,
-        predicted: &Gaussian<D>,
-        sensor: usize,
-        threshold: f64,
+        asked: &Gaussian<D>,
+        belief: &Gaussian<D>,
+        sensor: &ScalarSensor<D>,
         observation: &Observation<Sign>,
-    ) -> Result<(Gaussian<D>, VectorInfo), Error> {
-        let sensor = self.sensor(sensor)?;
-        finite("threshold", threshold)?;
+    ) -> Result<(Gaussian<D>, f64), Error> {
+        let threshold = sensor.direction().dot(asked.mean());
         let factor = SignBit::new(sensor.noise_variance())?.factor(&threshold, observation, &self.link)?;
-        let (posterior, info) = assumed_density::update(predicted, sensor.matrix(), &factor)?;
-        let info = VectorInfo {
-            log_likelihood: info.log_likelihood,
-            bits: u32::from(observation.received().is_some()),
-        };
-        Ok((posterior, info))
+        let (posterior, info) = assumed_density::update(belief, sensor.matrix(), &factor)?;
+        Ok((posterior, info.log_likelihood))
     }
 
     /// Corrects with what was observed of all sensors, whose thresholds were those of this belief: the best linear function of
@@ -167,29 +166,19 @@ impl<F: LinearDynamics<D>, const D: usize, const M: usize> SignFilter<F, D, M> {
         predicted: &Gaussian<D>,
         observations: &[Observation<Sign>; M],
     ) -> Result<(Gaussian<D>, VectorInfo), Error> {
-        let (crosses, mut spread) = self.innovations(predicted);
+        let (crosses, spread) = self.innovations(predicted);
         let (gain, covariance) = self.parallel_gain(predicted, &crosses, &spread, observations)?;
         let signs = SVector::<f64, M>::from_fn(|i, _| observations[i].received().map_or(0.0, |bit| bit.value()));
         let mut info = VectorInfo {
             log_likelihood: 0.0,
-            bits: 0,
+            bits: observations.iter().filter(|o| o.received().is_some()).count() as u32,
         };
-        // The assumed-density update of what the sensors measure, without the state.
-        let mut mean = SVector::<f64, M>::zeros();
-        for (i, observation) in observations.iter().enumerate() {
-            let noise = self.sensors[i].noise_variance();
-            let seen = (spread[(i, i)] - noise).max(0.0);
-            let prior = Gaussian::from_symmetric_parts([mean[i]].into(), [[seen]].into());
-            let tilted = SignBit::new(noise)?
-                .factor(&0.0, observation, &self.link)?
-                .tilted(&prior)?;
-            if seen > 0.0 {
-                let gain = spread.column(i) / seen;
-                mean += gain * (tilted.mean[0] - mean[i]);
-                spread -= gain * gain.transpose() * (seen - tilted.covariance[0]);
-            }
-            info.log_likelihood += tilted.log_evidence;
-            info.bits += u32::from(observation.received().is_some());
+        // The likelihood folds one bit after the other into the state.
+        let mut belief = *predicted;
+        for (sensor, observation) in self.sensors.iter().zip(observations) {
+            let (next, log_likelihood) = self.folded(predicted, &belief, sensor, observation)?;
+            belief = next;
+            info.log_likelihood += log_likelihood;
         }
         let posterior = Gaussian::from_trusted_parts(predicted.mean() + gain * signs, covariance);
         if !(posterior.is_finite() && info.log_likelihood.is_finite()) {
@@ -350,10 +339,10 @@ mod tests {
             let filter = filter.with_link(Link::new(0.2, 0.1).unwrap());
             let bit = if above { &ABOVE } else { &BELOW };
             let (closed, one) = filter.update(&prior, 0, bit).unwrap();
-            let (general, same) = filter.update_at(&prior, 0, filter.threshold(&prior, 0).unwrap(), bit).unwrap();
+            let (general, same) = filter.folded(&prior, &prior, &sensor, bit).unwrap();
             prop_assert!((closed.mean() - general.mean()).amax() <= 1e-13 * scale);
             prop_assert!((closed.covariance() - general.covariance()).amax() <= 1e-13 * prior.covariance().amax());
-            prop_assert!((one.log_likelihood - same.log_likelihood).abs() < 1e-12);
+            prop_assert!((one.log_likelihood - same).abs() < 1e-12);
         }
     }
 
@@ -412,7 +401,6 @@ mod tests {
         let filter = SignFilter::new(dynamics(), [ScalarSensor::scalar(Vector2::new(1.0, 0.5), 1.0).unwrap()]);
         assert!(matches!(filter.threshold(&belief(), 1), Err(Error::Argument(_))));
         assert!(matches!(filter.update(&belief(), 1, &ABOVE), Err(Error::Argument(_))));
-        assert!(filter.update_at(&belief(), 0, f64::NAN, &ABOVE).is_err());
         assert_eq!(filter.update(&belief(), 0, &Observation::Nothing), Err(Error::IMPOSSIBLE));
     }
 
@@ -433,27 +421,6 @@ mod tests {
         assert_eq!(blind.update_parallel(&belief(), &[]).unwrap().0, belief());
         let alone = blind.sequential_steady_state().unwrap();
         assert!((alone.filtered_covariance - dynamics().stationary_covariance().unwrap()).amax() < 1e-11);
-    }
-
-    /// The likelihood of several bits is that of one after the other, each folded into the state.
-    #[test]
-    fn several_bits_are_as_likely_as_one_after_the_other() {
-        let sensors =
-            [[1.0, 0.5], [-0.3, 2.0], [0.0, 0.0], [0.8, 0.8]].map(|h| ScalarSensor::scalar(h.into(), 0.7).unwrap());
-        for link in [Link::PERFECT, Link::new(0.2, 0.1).unwrap()] {
-            let filter = SignFilter::new(dynamics(), sensors).with_link(link);
-            for last in [ABOVE, BELOW, Observation::Lost] {
-                let bits = [ABOVE, BELOW, ABOVE, last];
-                let (mut belief_so_far, mut log_likelihood) = (belief(), 0.0);
-                for (i, bit) in bits.iter().enumerate() {
-                    let threshold = filter.threshold(&belief(), i).unwrap();
-                    let (next, info) = filter.update_at(&belief_so_far, i, threshold, bit).unwrap();
-                    (belief_so_far, log_likelihood) = (next, log_likelihood + info.log_likelihood);
-                }
-                let together = filter.update_parallel(&belief(), &bits).unwrap().1;
-                assert!((together.log_likelihood - log_likelihood).abs() < 1e-13);
-            }
-        }
     }
 
     #[test]

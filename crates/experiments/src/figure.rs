@@ -2,6 +2,7 @@
 
 use crate::claim::{Claim, Claims};
 use crate::error::Error;
+use crate::kept::Kept;
 use crate::parameters::{self, Settings};
 use crate::plot::Plot;
 use crate::schema::{self, Fields, Parameter};
@@ -58,6 +59,8 @@ pub struct Context<'a> {
     pub cancel: Option<&'a AtomicBool>,
     /// Reads a user's file: figures open none themselves.
     pub read: Option<&'a ReadFile<'a>>,
+    /// What earlier figures of this run computed.
+    pub kept: Option<&'a Kept>,
 }
 
 impl Context<'_> {
@@ -68,6 +71,7 @@ impl Context<'_> {
             progress: None,
             cancel: None,
             read: None,
+            kept: None,
         }
     }
 
@@ -174,6 +178,11 @@ pub trait Figure: Sync {
         false
     }
 
+    /// The world that the figure shares with others: these are run one after the other, and results in [`Context::kept`] serve all.
+    fn world(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Computes the rows. Same parameters and seed, same bytes, on any number of threads.
     ///
     /// # Errors
@@ -207,6 +216,9 @@ pub trait AnyFigure: Sync {
 
     /// Whether the figure measures time and must not share the machine with others.
     fn measures_time(&self) -> bool;
+
+    /// The world that the figure shares with others, which are best run one after the other.
+    fn world(&self) -> Option<&'static str>;
 
     /// The parameters with defaults, ranges and meanings.
     fn parameters(&self) -> Vec<Parameter>;
@@ -257,6 +269,10 @@ impl<F: Figure> AnyFigure for F {
 
     fn measures_time(&self) -> bool {
         Figure::measures_time(self)
+    }
+
+    fn world(&self) -> Option<&'static str> {
+        Figure::world(self)
     }
 
     fn parameters(&self) -> Vec<Parameter> {

@@ -73,6 +73,8 @@ mod pages {
     struct Readme;
     #[doc = include_str!("../../../docs/guide.md")]
     struct Guide;
+    #[doc = include_str!("../../../docs/tutorial.md")]
+    struct Tutorial;
     #[doc = include_str!("../../../docs/own-scheme.md")]
     struct OwnScheme;
     #[doc = include_str!("../../../docs/adaptive.md")]

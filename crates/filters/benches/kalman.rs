@@ -4,7 +4,7 @@
 
 use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_core::Gaussian;
-use fewbits_filters::{FixedLagSmoother, Grid, PointMass, PointMassFilter, kalman};
+use fewbits_filters::{Grid, PointMass, PointMassFilter, kalman};
 use fewbits_models::{Ar1, LinearSensor, ScalarSensor, constant_velocity_1d, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector1, Vector2, Vector4};
@@ -40,13 +40,6 @@ fn constant_velocity_plane(bencher: Bencher) {
     let sensing = LinearSensor::new(matrix, Matrix2::identity()).unwrap();
     let belief = Gaussian::new(Vector4::zeros(), Matrix4::identity()).unwrap();
     bencher.bench(|| kalman::step(&dynamics, &sensing, black_box(&belief), black_box(&Vector2::new(0.4, -0.1))));
-}
-
-#[divan::bench]
-fn fixed_lag_5_scalar(bencher: Bencher) {
-    let mut smoother = FixedLagSmoother::new(Ar1::new(0.9, 0.5).unwrap(), 5).unwrap();
-    let belief = Gaussian::scalar(0.2, 0.7).unwrap();
-    bencher.bench_local(|| smoother.push(black_box(belief)));
 }
 
 /// Prediction and update on a hundred nodes.

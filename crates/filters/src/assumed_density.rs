@@ -1,6 +1,6 @@
 //! The assumed-density filter: one update for every factor.
 
-use crate::{Error, extended_kalman};
+use crate::Error;
 use fewbits_core::{Factor, Gaussian, GaussianDynamics, Observed, Sensing};
 use fewbits_numerics::linalg::{congruence, congruence_of, solve_semidefinite, times_transposed};
 use nalgebra::{SMatrix, SVector};
@@ -15,6 +15,13 @@ pub struct UpdateInfo<const D: usize, const M: usize> {
     pub correction: SVector<f64, M>,
     /// Regression of the state on the noise-free measurement, `G = P H' (H P H')^-1`.
     pub gain: SMatrix<f64, D, M>,
+}
+
+/// Time update about the mean: `f(m)`, `F P F' + Q` with `F` the Jacobian at `m`.
+pub fn predict<const D: usize>(dynamics: &impl GaussianDynamics<D>, belief: &Gaussian<D>) -> Gaussian<D> {
+    let jacobian = dynamics.jacobian(belief.mean());
+    let covariance = congruence(&jacobian, belief.covariance()) + dynamics.noise_covariance_at(belief.mean());
+    Gaussian::from_trusted_parts(dynamics.mean(belief.mean()), covariance)
 }
 
 /// Gaussian update through a linear sensor: what the factor says about `m = H x`, `x` follows by regression.
@@ -53,7 +60,7 @@ pub fn update_through<const D: usize, const M: usize>(
     update_at(belief, predicted, &jacobian, &observed.factor)
 }
 
-/// One step: the time update about the mean ([`extended_kalman::predict`]), then [`update_through`].
+/// One step: the time update about the mean ([`predict`]), then [`update_through`].
 ///
 /// # Errors
 /// As [`update`].
@@ -62,7 +69,7 @@ pub fn step<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
-    update_through(&extended_kalman::predict(dynamics, belief), observed)
+    update_through(&predict(dynamics, belief), observed)
 }
 
 fn update_at<const D: usize, const M: usize>(

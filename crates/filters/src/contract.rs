@@ -1,16 +1,22 @@
 //! The contract of filters at a receiver: a time update, and one measurement update for all that was observed at one instant.
 //!
-//! Everything here is object-safe, so that models, sensors and observations of any kind stand in one list. A filter that is known
-//! at compile time is faster through its own functions ([`crate::assumed_density`], [`crate::ParticleFilter`]).
+//! Models, sensors and observations are object-safe, so that any kinds stand in one list.
+//!
+//! | filter | belief | for |
+//! |---|---|---|
+//! | [`MomentFilter`] | Gaussian | any sensor, linearised; with values the (extended) Kalman filter |
+//! | [`GridOnAxes`](crate::GridOnAxes) | Gaussian | any likelihood of two or three coordinates |
+//! | [`BootstrapFilter`](crate::BootstrapFilter), [`GuidedFilter`](crate::GuidedFilter) | particles | any likelihood; sharp ones |
+//! | [`CloudFilter`](crate::CloudFilter) | Gaussians of one covariance | linear motion, scalar sensors |
+//! | [`PointMasses`](crate::PointMasses) | values on a grid | a scalar state: the exact answer |
+//! | [`NoiseBank`](crate::NoiseBank) | Gaussians with weights | unknown process noise, [`Switching`](crate::Switching) motion |
 
-use crate::assumed_density;
-use crate::grid_filter::check_axes;
-use crate::{Error, GridFilter, GridWorkspace, ParticleFilter, Workspace};
+use crate::{Error, assumed_density};
+use fewbits_core::factor::Scalar;
 use fewbits_core::{
     Belief, Columns, ColumnsMut, Evolution, Factor, Gaussian, GaussianDynamics, Likelihood, Observed, Sensing,
 };
-use fewbits_densities::Particles;
-use fewbits_numerics::error::{at_least_one, refuse};
+use fewbits_models::LinearSensor;
 use fewbits_numerics::linalg::congruence;
 use nalgebra::{SMatrix, SVector};
 use rand::Rng;
@@ -19,18 +25,31 @@ use rand::Rng;
 ///
 /// `noise_scale` multiplies the covariance of the process noise; 1 is the model as it was stated.
 pub trait Motion<const D: usize> {
+    /// Mean of the next state.
+    fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, D>;
+
     /// Moves a Gaussian: `f(m)`, `F P F' + noise_scale Q` with `F` and `Q` at the mean.
     fn predict(&self, belief: &Gaussian<D>, noise_scale: f64) -> Gaussian<D>;
 
     /// Moves every state of a cloud by a draw of its own.
     fn move_columns(&self, rng: &mut dyn Rng, noise_scale: f64, states: ColumnsMut<'_, D>);
+
+    /// The motions between which this one switches; empty for most.
+    fn modes(&self) -> &[Box<dyn Motion<D>>] {
+        &[]
+    }
 }
 
 impl<const D: usize, G: GaussianDynamics<D>> Motion<D> for G {
+    fn mean(&self, state: &SVector<f64, D>) -> SVector<f64, D> {
+        fewbits_core::Dynamics::mean(self, state)
+    }
+
     fn predict(&self, belief: &Gaussian<D>, noise_scale: f64) -> Gaussian<D> {
         let jacobian = self.jacobian(belief.mean());
         let noise = self.noise_covariance_at(belief.mean()) * noise_scale;
-        Gaussian::from_trusted_parts(self.mean(belief.mean()), congruence(&jacobian, belief.covariance()) + noise)
+        let mean = fewbits_core::Dynamics::mean(self, belief.mean());
+        Gaussian::from_trusted_parts(mean, congruence(&jacobian, belief.covariance()) + noise)
     }
 
     fn move_columns(&self, rng: &mut dyn Rng, noise_scale: f64, mut states: ColumnsMut<'_, D>) {
@@ -42,7 +61,7 @@ impl<const D: usize, G: GaussianDynamics<D>> Motion<D> for G {
         let stretch = noise_scale.sqrt();
         for i in 0..fewbits_core::columns::count(&states) {
             let state = SVector::<f64, D>::from_fn(|d, _| states[d][i]);
-            let mean = self.mean(&state);
+            let mean = fewbits_core::Dynamics::mean(self, &state);
             let moved = mean + (self.propagate(rng, &state) - mean) * stretch;
             fewbits_core::columns::set_state(&mut states, i, &moved);
         }
@@ -88,6 +107,10 @@ pub trait StateLikelihood<const D: usize>: Likelihood<D> {
 
     /// Whether the likelihood depends on this coordinate, near this state.
     fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool;
+
+    /// As a scalar factor seen through a linear sensor, times `exp` of a number: what filters need that impute measurements. `None` if
+    /// the sensor is not linear about `state`, or the factor is of another kind.
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearSensor<D, 1>, Scalar, 1>, f64)>;
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikelihood<D> for Observed<S, F, M> {
@@ -103,6 +126,32 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikeli
     fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool {
         let jacobian: SMatrix<f64, M, D> = self.sensing.jacobian(state);
         jacobian.column(axis).iter().any(|x| *x != 0.0)
+    }
+
+    fn as_linear_scalar(&self, state: &SVector<f64, D>) -> Option<(Observed<LinearSensor<D, 1>, Scalar, 1>, f64)> {
+        let (factor, log_scale) = self.factor.as_scalar().filter(|_| M == 1)?;
+        let jacobian = self.sensing.jacobian(state);
+        let row = SVector::<f64, D>::from_fn(|d, _| jacobian[(0, d)]);
+        let (mean, noise) = (self.sensing.mean(state)[0], self.sensing.noise_covariance_at(state)[(0, 0)]);
+        let offset = (mean - row.dot(state)).abs();
+        let sensor = LinearSensor::scalar(row, noise).ok()?;
+        (offset <= OFFSET * (mean.abs() + noise.sqrt())).then(|| (Observed::new(sensor, factor), log_scale))
+    }
+}
+
+/// `h(x) - h'(x) x`, relative to `h(x)` and the noise's deviation, that counts as rounding of a linear sensor.
+const OFFSET: f64 = 1e-9;
+
+/// Observations of one instant: their log likelihoods add.
+pub(crate) struct All<'a, const D: usize>(pub &'a [&'a dyn StateLikelihood<D>]);
+
+impl<const D: usize> Likelihood<D> for All<'_, D> {
+    fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
+        self.0.iter().map(|one| one.log_likelihood(state)).sum()
+    }
+
+    fn add_log_likelihoods(&self, states: Columns<'_, D>, logs: &mut [f64]) {
+        self.0.iter().for_each(|one| one.add_log_likelihoods(states, logs));
     }
 }
 
@@ -127,6 +176,14 @@ pub trait StateFilter<const D: usize> {
     /// If the prior cannot be represented.
     fn start(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Self::Belief, Error>;
 
+    /// The belief before the first update after `lost` has been given up. What `lost` has learnt of the model may be kept.
+    ///
+    /// # Errors
+    /// As [`start`](Self::start).
+    fn restart(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>, _lost: &Self::Belief) -> Result<Self::Belief, Error> {
+        self.start(rng, prior)
+    }
+
     /// Time update, the process noise multiplied by `noise_scale`.
     ///
     /// # Errors
@@ -147,8 +204,25 @@ pub trait StateFilter<const D: usize> {
         &mut self,
         rng: &mut dyn Rng,
         belief: &mut Self::Belief,
-        observed: &[Box<dyn StateLikelihood<D>>],
+        observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error>;
+
+    /// One step from a belief to the next: [`predict`](Self::predict), then [`update`](Self::update).
+    ///
+    /// # Errors
+    /// As the two.
+    fn step(
+        &mut self,
+        rng: &mut dyn Rng,
+        motion: &dyn Motion<D>,
+        belief: &Self::Belief,
+        observed: &[&dyn StateLikelihood<D>],
+    ) -> Result<(Self::Belief, Info), Error> {
+        let mut next = belief.clone();
+        self.predict(rng, motion, 1.0, &mut next)?;
+        let info = self.update(rng, &mut next, observed)?;
+        Ok((next, info))
+    }
 }
 
 /// The filter of [`assumed_density`]: with values it is the extended Kalman filter. Observations of one instant are taken in one
@@ -178,7 +252,7 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
         &mut self,
         _: &mut dyn Rng,
         belief: &mut Gaussian<D>,
-        observed: &[Box<dyn StateLikelihood<D>>],
+        observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error> {
         let (mut next, mut log_likelihood) = (*belief, 0.0);
         for one in observed {
@@ -190,181 +264,6 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
         Ok(Info {
             log_likelihood,
             effective_sample_size: None,
-        })
-    }
-}
-
-/// [`GridFilter`] over the coordinates `axes` of the state: all observations of one instant jointly, without linearisation.
-#[derive(Debug, Clone)]
-pub struct GridOnAxes<const D: usize, const K: usize> {
-    grid: GridFilter,
-    axes: [usize; K],
-    workspace: GridWorkspace<K>,
-}
-
-impl<const D: usize, const K: usize> GridOnAxes<D, K> {
-    /// The filter for likelihoods that depend on no other coordinates than `axes`.
-    ///
-    /// # Errors
-    /// If these are not different coordinates of a state of `D`.
-    pub fn new(grid: GridFilter, axes: [usize; K]) -> Result<Self, Error> {
-        check_axes::<D, K>(&axes)?;
-        Ok(Self {
-            grid,
-            axes,
-            workspace: GridWorkspace::default(),
-        })
-    }
-}
-
-/// Likelihoods of a state of `D` as one of the coordinates `axes`, the others at `state`.
-struct OnPlane<'a, const D: usize, const K: usize> {
-    observed: &'a [Box<dyn StateLikelihood<D>>],
-    axes: [usize; K],
-    state: SVector<f64, D>,
-}
-
-impl<const D: usize, const K: usize> Likelihood<K> for OnPlane<'_, D, K> {
-    fn log_likelihood(&self, place: &SVector<f64, K>) -> f64 {
-        let mut state = self.state;
-        self.axes
-            .iter()
-            .zip(place.iter())
-            .for_each(|(axis, x)| state[*axis] = *x);
-        self.observed.iter().map(|one| one.log_likelihood(&state)).sum()
-    }
-
-    fn add_log_likelihoods(&self, places: Columns<'_, K>, logs: &mut [f64]) {
-        const BLOCK: usize = 256;
-        // Coordinates that nothing reads.
-        let constant: [[f64; BLOCK]; D] = std::array::from_fn(|d| [self.state[d]; BLOCK]);
-        for (block, logs) in logs.chunks_mut(BLOCK).enumerate() {
-            let (start, count) = (block * BLOCK, logs.len());
-            let column = |d: usize| match self.axes.iter().position(|axis| *axis == d) {
-                Some(k) => &places[k][start..start + count],
-                None => &constant[d][..count],
-            };
-            let states: Columns<'_, D> = std::array::from_fn(column);
-            self.observed
-                .iter()
-                .for_each(|one| one.add_log_likelihoods(states, logs));
-        }
-    }
-}
-
-impl<const D: usize, const K: usize> StateFilter<D> for GridOnAxes<D, K> {
-    type Belief = Gaussian<D>;
-
-    fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Gaussian<D>, Error> {
-        Ok(*prior)
-    }
-
-    fn predict(
-        &mut self,
-        _: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut Gaussian<D>,
-    ) -> Result<(), Error> {
-        *belief = motion.predict(belief, noise_scale);
-        Ok(())
-    }
-
-    /// Refuses likelihoods that read another coordinate than the grid's.
-    fn update(
-        &mut self,
-        _: &mut dyn Rng,
-        belief: &mut Gaussian<D>,
-        observed: &[Box<dyn StateLikelihood<D>>],
-    ) -> Result<Info, Error> {
-        if observed.is_empty() {
-            return Ok(Info::default());
-        }
-        let others = (0..D).filter(|d| !self.axes.contains(d));
-        for axis in others {
-            if observed.iter().any(|one| one.reads(belief.mean(), axis)) {
-                let expected = format!("likelihoods that read the coordinates {:?} only", self.axes);
-                return refuse("observed", format!("a likelihood that reads coordinate {axis}"), expected);
-            }
-        }
-        let joint = OnPlane {
-            observed,
-            axes: self.axes,
-            state: *belief.mean(),
-        };
-        let (next, info) = self.grid.update(belief, self.axes, &joint, &mut self.workspace)?;
-        *belief = next;
-        Ok(Info {
-            log_likelihood: info.log_likelihood,
-            effective_sample_size: None,
-        })
-    }
-}
-
-/// [`ParticleFilter`] (bootstrap) with a number of particles.
-#[derive(Debug, Clone)]
-pub struct BootstrapFilter<const D: usize> {
-    filter: ParticleFilter,
-    count: usize,
-    workspace: Workspace<D>,
-}
-
-impl<const D: usize> BootstrapFilter<D> {
-    /// The filter with `count` particles.
-    ///
-    /// # Errors
-    /// If there is none.
-    pub fn new(filter: ParticleFilter, count: usize) -> Result<Self, Error> {
-        Ok(Self {
-            filter,
-            count: at_least_one("count", count)?,
-            workspace: Workspace::default(),
-        })
-    }
-}
-
-/// Observations of one instant: their log likelihoods add.
-struct All<'a, const D: usize>(&'a [Box<dyn StateLikelihood<D>>]);
-
-impl<const D: usize> Likelihood<D> for All<'_, D> {
-    fn log_likelihood(&self, state: &SVector<f64, D>) -> f64 {
-        self.0.iter().map(|one| one.log_likelihood(state)).sum()
-    }
-
-    fn add_log_likelihoods(&self, states: Columns<'_, D>, logs: &mut [f64]) {
-        self.0.iter().for_each(|one| one.add_log_likelihoods(states, logs));
-    }
-}
-
-impl<const D: usize> StateFilter<D> for BootstrapFilter<D> {
-    type Belief = Particles<D>;
-
-    fn start(&mut self, mut rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Particles<D>, Error> {
-        Ok(Particles::from_belief(&mut rng, prior, self.count)?)
-    }
-
-    fn predict(
-        &mut self,
-        mut rng: &mut dyn Rng,
-        motion: &dyn Motion<D>,
-        noise_scale: f64,
-        belief: &mut Particles<D>,
-    ) -> Result<(), Error> {
-        self.filter.resample(&mut rng, belief, &mut self.workspace)?;
-        motion.move_columns(rng, noise_scale, belief.columns_mut());
-        Ok(())
-    }
-
-    fn update(
-        &mut self,
-        _: &mut dyn Rng,
-        belief: &mut Particles<D>,
-        observed: &[Box<dyn StateLikelihood<D>>],
-    ) -> Result<Info, Error> {
-        let info = self.filter.update(belief, &All(observed))?;
-        Ok(Info {
-            log_likelihood: info.log_likelihood,
-            effective_sample_size: Some(info.effective_sample_size),
         })
     }
 }

@@ -1,136 +1,137 @@
-//! Proposals that have seen what was observed: the optimal one for a value, a tilted one for any factor.
+//! Particles that move towards what was observed.
 
 use crate::Error;
-use crate::particle::Proposal;
-use fewbits_core::factor::Tilted;
-use fewbits_core::{Belief, Factor, Gaussian, GaussianDynamics, LinearDynamics, LinearSensing, Observed, Sensing};
-use fewbits_numerics::linalg::{semidefinite_factor, solve_semidefinite, symmetrised};
-use fewbits_numerics::normal::LN_SQRT_2PI;
+use crate::contract::{All, Info, Motion, StateFilter, StateLikelihood};
+use crate::particle::{ParticleFilter, Workspace, weigh};
+use fewbits_core::columns::{set_state, state_at};
+use fewbits_core::{Gaussian, Likelihood};
+use fewbits_densities::Particles;
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::linalg::{congruence, semidefinite_factor, solve_semidefinite, symmetrised};
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-/// `p(x_k | x_{k-1}, z)` for dynamics with additive Gaussian noise `Q` and a linear measurement `z = H x + n`.
+/// Share of draws that are taken from the motion itself.
+const DEFENCE: f64 = 0.1;
+
+/// A particle filter whose particles are drawn with a look at what was observed, for likelihoods that are sharp against the process
+/// noise.
 ///
-/// With `S = H Q H^T + R`, `K = Q H^T S^-1` and `m = f(x)`: draws `x' ~ N(m + K (z - H m), Q - K H Q)` with the importance
-/// weight `N(z; H m, S)`, which does not depend on the draw. `Q` may be singular.
+/// ```text
+/// predict:  resample if due; f = E[x' | x], Q = Cov[x' | x] of each particle, Q = L L', x' = f + L u, u ~ N(0, I)
+/// update:   N(d, S) of u: the moments of N(f, Q) given the observations, one after the other
+///           nine times in ten: u ~ N(d, S)          otherwise: as predicted
+///           w *= p(observed | x') N(u; 0, I) / (.9 N(u; d, S) + .1 N(u; 0, I))
+/// ```
+/// The draws from the motion bound the weight by ten times the likelihood, however light the tails of `N(d, S)` may be. Exact for every
+/// sensor: linearisation shapes the proposal only. `Q` may be singular. An update must follow its own predict; a second one weighs only.
 #[derive(Debug, Clone)]
-pub struct OptimalProposal<'a, Dyn, const D: usize, const M: usize> {
-    dynamics: &'a Dyn,
-    matrix: SMatrix<f64, M, D>,
-    measurement: SVector<f64, M>,
-    gain: SMatrix<f64, D, M>,
-    noise_factor: SMatrix<f64, D, D>,
-    innovation_factor: Cholesky<f64, nalgebra::Const<M>>,
-    log_normaliser: f64,
+pub struct GuidedFilter<const D: usize> {
+    filter: ParticleFilter,
+    count: usize,
+    workspace: Workspace<D>,
+    /// `N(f, Q)` of each particle since the last predict.
+    moves: Vec<Gaussian<D>>,
 }
 
-impl<'a, Dyn: LinearDynamics<D>, const D: usize, const M: usize> OptimalProposal<'a, Dyn, D, M> {
-    /// The proposal for one measurement.
+impl<const D: usize> GuidedFilter<D> {
+    /// The filter with `count` particles.
     ///
     /// # Errors
-    /// A measurement that is not finite; an innovation covariance that is not positive definite.
-    pub fn new(
-        dynamics: &'a Dyn,
-        sensing: &impl LinearSensing<D, M>,
-        measurement: SVector<f64, M>,
-    ) -> Result<Self, Error> {
-        fewbits_numerics::error::all_finite("measurement", measurement.as_slice())?;
-        let (q, h) = (dynamics.noise_covariance(), sensing.matrix());
-        let innovation = symmetrised(&(h * q * h.transpose() + sensing.noise_covariance()));
-        let innovation_factor = Cholesky::new(innovation).ok_or_else(|| {
-            fewbits_numerics::ArgumentError::new(
-                "sensing",
-                "a singular innovation covariance",
-                "a positive definite one",
-            )
-        })?;
-        let gain = innovation_factor.solve(&(h * q)).transpose();
-        let left = symmetrised(&(q - gain * h * q));
-        let log_determinant: f64 = innovation_factor.l().diagonal().iter().map(|d| d.ln()).sum();
+    /// If there is none.
+    pub fn new(filter: ParticleFilter, count: usize) -> Result<Self, Error> {
         Ok(Self {
-            dynamics,
-            matrix: *h,
-            measurement,
-            gain,
-            noise_factor: semidefinite_factor("noise_covariance", &left)?,
-            innovation_factor,
-            log_normaliser: -log_determinant - M as f64 * LN_SQRT_2PI,
+            filter,
+            count: at_least_one("count", count)?,
+            workspace: Workspace::default(),
+            moves: Vec::new(),
         })
     }
 }
 
-impl<Dyn: LinearDynamics<D>, const D: usize, const M: usize> Proposal<D> for OptimalProposal<'_, Dyn, D, M> {
-    fn propose<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> (SVector<f64, D>, f64) {
-        let mean = self.dynamics.mean(state);
-        let innovation = self.measurement - self.matrix * mean;
-        let squared = innovation.dot(&self.innovation_factor.solve(&innovation));
-        let noise = SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal));
-        (mean + self.gain * innovation + self.noise_factor * noise, self.log_normaliser - 0.5 * squared)
+/// A particle under its proposal, and `ln` of the motion's density over the proposal's there. The predicted particle if the
+/// observations have no moments under its motion.
+fn propose<const D: usize>(
+    rng: &mut dyn Rng,
+    own: &SVector<f64, D>,
+    moved: &Gaussian<D>,
+    observed: &[&dyn StateLikelihood<D>],
+) -> Option<(SVector<f64, D>, f64)> {
+    let posterior = observed
+        .iter()
+        .try_fold(*moved, |belief, one| one.condition(&belief).map(|c| c.belief))
+        .ok()?;
+    // u = back (x' - f) on the range of Q; elsewhere u stays standard normal.
+    let lower = semidefinite_factor("noise_covariance", moved.covariance()).ok()?;
+    let back = solve_semidefinite(moved.covariance(), &lower).ok()?.transpose();
+    let still = SMatrix::<f64, D, D>::identity() - symmetrised(&(back * lower));
+    let shift = back * (posterior.mean() - moved.mean());
+    let spread = Cholesky::new(symmetrised(&(congruence(&back, posterior.covariance()) + still)))?;
+    let drawn = if rng.random::<f64>() < DEFENCE {
+        back * (own - moved.mean())
+    } else {
+        shift + spread.l() * SVector::<f64, D>::from_fn(|_, _| rng.sample(StandardNormal))
+    };
+    let offset = drawn - shift;
+    let log_root: f64 = spread.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+    let ratio = 0.5 * (drawn.norm_squared() - offset.dot(&spread.solve(&offset))) - log_root;
+    let mixed = ratio.max(0.0) + ((1.0 - DEFENCE) * ratio.min(0.0).exp() + DEFENCE * (-ratio.max(0.0)).exp()).ln();
+    mixed.is_finite().then(|| (moved.mean() + lower * drawn, -mixed))
+}
+
+impl<const D: usize> StateFilter<D> for GuidedFilter<D> {
+    type Belief = Particles<D>;
+
+    fn start(&mut self, mut rng: &mut dyn Rng, prior: &Gaussian<D>) -> Result<Particles<D>, Error> {
+        self.moves.clear();
+        Ok(Particles::from_belief(&mut rng, prior, self.count)?)
     }
-}
 
-/// Share of draws that [`TiltedProposal`] takes from the dynamics themselves.
-const DEFENCE: f64 = 0.1;
-
-/// A proposal for dynamics with Gaussian noise and any factor: the posterior of the noise-free measurement `m` that
-/// [`Factor::tilted`] finds from each particle, with the rest of the state following as the noise correlates it.
-///
-/// ```text
-/// f = E[x' | x],  m = h(f),  H = h'(f),  V = H Q(x) H',  G = Q H' V^-1
-/// T = N(tilted mean, tilted covariance) of N(m, V) under the factor
-/// y ~ p(x' | x),  u = m + H (y - f)                      the dynamics' own draw
-/// nine times in ten:  v ~ T,  x' = y + G (v - u)         otherwise:  v = u,  x' = y
-/// c = ln p(observed | h(x')) + ln N(v; m, V) - ln(.9 T(v) + .1 N(v; m, V))
-/// ```
-/// The draws from the dynamics bound the weight by ten times the likelihood, however much lighter than the posterior's the tails
-/// of `T` may be. Exact for every sensor: the linearisation shapes the proposal only. `Q` may be singular; where it does not
-/// move `m`, or the factor has no tilted moments, the particle moves by the dynamics alone. For a value through a linear sensor
-/// [`OptimalProposal`] is the better one.
-#[derive(Debug, Clone, Copy)]
-pub struct TiltedProposal<'a, Dyn, S, F, const M: usize> {
-    dynamics: &'a Dyn,
-    observed: &'a Observed<S, F, M>,
-}
-
-impl<'a, Dyn, S, F, const M: usize> TiltedProposal<'a, Dyn, S, F, M> {
-    /// The proposal for what was observed.
-    pub fn new(dynamics: &'a Dyn, observed: &'a Observed<S, F, M>) -> Self {
-        Self { dynamics, observed }
+    fn predict(
+        &mut self,
+        mut rng: &mut dyn Rng,
+        motion: &dyn Motion<D>,
+        noise_scale: f64,
+        belief: &mut Particles<D>,
+    ) -> Result<(), Error> {
+        self.filter.resample(&mut rng, belief, &mut self.workspace)?;
+        let columns = belief.columns();
+        let known = |i| Gaussian::from_trusted_parts(state_at(&columns, i), SMatrix::zeros());
+        self.moves.clear();
+        self.moves
+            .extend((0..belief.len()).map(|i| motion.predict(&known(i), noise_scale)));
+        motion.move_columns(rng, noise_scale, belief.columns_mut());
+        Ok(())
     }
-}
 
-impl<Dyn, S, F, const D: usize, const M: usize> Proposal<D> for TiltedProposal<'_, Dyn, S, F, M>
-where
-    Dyn: GaussianDynamics<D>,
-    S: Sensing<D, M>,
-    F: Factor<M>,
-{
-    fn propose<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> (SVector<f64, D>, f64) {
-        let Observed { sensing, factor } = self.observed;
-        let weigh = |next: &SVector<f64, D>| factor.log_likelihood(&sensing.mean(next));
-        let own = self.dynamics.propagate(rng, state);
-        let mean = self.dynamics.mean(state);
-        let (matrix, noise) = (sensing.jacobian(&mean), self.dynamics.noise_covariance_at(state));
-        let cross = noise * matrix.transpose();
-        let prior = Gaussian::from_trusted_parts(sensing.mean(&mean), matrix * cross);
-        let gain = solve_semidefinite(prior.covariance(), &cross.transpose()).map(|g| g.transpose());
-        let tilted = factor
-            .tilted(&prior)
-            .ok()
-            .and_then(|Tilted { mean, covariance, .. }| Gaussian::from_trusted_parts(mean, covariance).factored().ok());
-        let (Ok(gain), Ok(prior), Some(tilted)) = (gain, prior.factored(), tilted) else {
-            return (own, weigh(&own));
-        };
-        let reached = prior.mean() + matrix * (own - mean);
-        let (next, measured) = if rng.random::<f64>() < DEFENCE {
-            (own, reached)
-        } else {
-            let drawn = tilted.sample(rng);
-            (own + gain * (drawn - reached), drawn)
-        };
-        let ratio = tilted.log_pdf(&measured) - prior.log_pdf(&measured);
-        let mixed = ratio.max(0.0) + ((1.0 - DEFENCE) * ratio.min(0.0).exp() + DEFENCE * (-ratio.max(0.0)).exp()).ln();
-        (next, weigh(&next) - mixed)
+    fn update(
+        &mut self,
+        rng: &mut dyn Rng,
+        belief: &mut Particles<D>,
+        observed: &[&dyn StateLikelihood<D>],
+    ) -> Result<Info, Error> {
+        let mut next = belief.clone();
+        let mut ratios = vec![0.0; belief.len()];
+        if self.moves.len() == belief.len() && !observed.is_empty() {
+            let mut columns = next.columns_mut();
+            for (i, (moved, ratio)) in self.moves.iter().zip(&mut ratios).enumerate() {
+                let own = SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
+                if let Some((state, log_ratio)) = propose(rng, &own, moved, observed) {
+                    set_state(&mut columns, i, &state);
+                    *ratio = log_ratio;
+                }
+            }
+        }
+        let info = weigh(&mut next, |states, logs| {
+            logs.iter_mut().zip(&ratios).for_each(|(log, ratio)| *log += ratio);
+            All(observed).add_log_likelihoods(states, logs);
+        })?;
+        *belief = next;
+        self.moves.clear();
+        Ok(Info {
+            log_likelihood: info.log_likelihood,
+            effective_sample_size: Some(info.effective_sample_size),
+        })
     }
 }

@@ -1,7 +1,6 @@
 //! The interacting-multiple-model filter: several models of one world, and any factor.
 
-use crate::closed_loop::Filter;
-use crate::{Error, assumed_density, extended_kalman};
+use crate::{Error, assumed_density};
 use fewbits_core::{Belief, ColumnsMut, Factor, Gaussian, GaussianDynamics, Observed, Sensing};
 use fewbits_numerics::error::{ArgumentError, at_least_one, probabilities, within};
 use nalgebra::{SMatrix, SVector};
@@ -33,6 +32,7 @@ pub struct Imm<G> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored<D>")]
 pub struct ImmBelief<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     probabilities: Vec<f64>,
     modes: Vec<Gaussian<D>>,
 }
@@ -40,6 +40,7 @@ pub struct ImmBelief<const D: usize> {
 #[derive(Deserialize)]
 #[serde(rename = "ImmBelief", deny_unknown_fields)]
 struct Stored<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     probabilities: Vec<f64>,
     modes: Vec<Gaussian<D>>,
 }
@@ -98,7 +99,7 @@ impl<const D: usize> ImmBelief<D> {
 }
 
 /// Moments of a mixture whose weights sum to one, the spread about the mean as a sum of squares.
-fn moments<'a, const D: usize>(parts: impl Iterator<Item = (f64, &'a Gaussian<D>)> + Clone) -> Gaussian<D> {
+pub(crate) fn moments<'a, const D: usize>(parts: impl Iterator<Item = (f64, &'a Gaussian<D>)> + Clone) -> Gaussian<D> {
     let mean = parts.clone().fold(SVector::zeros(), |sum, (w, g)| sum + g.mean() * w);
     let covariance = parts.fold(SMatrix::zeros(), |sum, (w, g)| {
         let d = g.mean() - mean;
@@ -116,7 +117,10 @@ impl<const D: usize> Belief<D> for ImmBelief<D> {
         *self.moment_matched().covariance()
     }
 
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, states: ColumnsMut<'_, D>) {
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
         let count = states.first().map_or(0, |column| column.len());
         for i in 0..count {
             let mut left: f64 = rng.random();
@@ -138,14 +142,6 @@ impl<const D: usize> Belief<D> for ImmBelief<D> {
             }
         }
     }
-}
-
-/// What a step reveals.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct ImmInfo {
-    /// `ln p(observation | past)`.
-    pub log_likelihood: f64,
 }
 
 /// Buffers kept from step to step.
@@ -216,10 +212,10 @@ impl<G> Imm<G> {
         G: GaussianDynamics<D>,
     {
         self.check(belief)?;
-        mix(belief, &self.transition, workspace, |j, mixed| Ok(extended_kalman::predict(&self.models[j], mixed)))
+        mix(belief, &self.transition, workspace, |j, mixed| Ok(assumed_density::predict(&self.models[j], mixed)))
     }
 
-    /// Measurement update.
+    /// Measurement update; returns `ln p(observation | past)`.
     ///
     /// # Errors
     /// [`fewbits_core::Error::Impossible`] if the observation is impossible under every model; the belief is then as it was.
@@ -229,31 +225,12 @@ impl<G> Imm<G> {
         belief: &mut ImmBelief<D>,
         observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
         workspace: &mut ImmWorkspace<D>,
-    ) -> Result<ImmInfo, Error> {
+    ) -> Result<f64, Error> {
         self.check(belief)?;
-        let log_likelihood = weigh(belief, workspace, |mode| {
+        weigh(belief, workspace, |mode| {
             let (next, info) = assumed_density::update_through(mode, observed)?;
             Ok((next, info.log_likelihood))
-        })?;
-        Ok(ImmInfo { log_likelihood })
-    }
-
-    /// One slot: mixing, time update, measurement update.
-    ///
-    /// # Errors
-    /// As [`update_in_place`](Self::update_in_place), or if the belief is of another number of models.
-    pub fn step<const D: usize, const M: usize>(
-        &self,
-        belief: &ImmBelief<D>,
-        observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
-    ) -> Result<(ImmBelief<D>, ImmInfo), Error>
-    where
-        G: GaussianDynamics<D>,
-    {
-        let (mut next, mut workspace) = (belief.clone(), ImmWorkspace::default());
-        self.predict_in_place(&mut next, &mut workspace)?;
-        let info = self.update_in_place(&mut next, observed, &mut workspace)?;
-        Ok((next, info))
+        })
     }
 }
 
@@ -312,35 +289,4 @@ pub(crate) fn weigh<const D: usize>(
     std::mem::swap(&mut belief.modes, &mut workspace.modes);
     std::mem::swap(&mut belief.probabilities, &mut workspace.probabilities);
     Ok(peak + total.ln())
-}
-
-/// In a closed loop the models of the filter move the belief; the loop's own dynamics only move the world.
-impl<const D: usize, const M: usize, G, World, S, F> Filter<D, World, Observed<S, F, M>> for Imm<G>
-where
-    G: GaussianDynamics<D>,
-    S: Sensing<D, M>,
-    F: Factor<M>,
-{
-    type Belief = ImmBelief<D>;
-    type Workspace = ImmWorkspace<D>;
-
-    fn advance<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        _: &World,
-        belief: &mut ImmBelief<D>,
-        workspace: &mut ImmWorkspace<D>,
-    ) -> Result<(), Error> {
-        self.predict_in_place(belief, workspace)
-    }
-
-    fn absorb<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        belief: &mut ImmBelief<D>,
-        observed: &Observed<S, F, M>,
-        workspace: &mut ImmWorkspace<D>,
-    ) -> Result<f64, Error> {
-        Ok(self.update_in_place(belief, observed, workspace)?.log_likelihood)
-    }
 }

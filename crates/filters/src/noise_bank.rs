@@ -1,10 +1,10 @@
-//! Process noise learnt from evidence: a bank of filters that differ in its scale.
+//! Filters that differ in the scale of the process noise or in the model, weighed by evidence.
 
 use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
 use crate::imm::{ImmWorkspace, mix, weigh};
 use crate::{Error, ImmBelief};
 use fewbits_core::Gaussian;
-use fewbits_numerics::error::{at_least_one, positive, within};
+use fewbits_numerics::error::{at_least_one, positive, refuse, within};
 use rand::Rng;
 
 /// A bank of filters whose models differ in the scale of their process noise, weighed by evidence and mixed as in
@@ -14,6 +14,7 @@ use rand::Rng;
 /// predict:  w <- (1 - e) w + e / M, beliefs mixed; filter j moves with its own scale of the noise
 /// update:   each filter takes in the observations; w_j times its evidence, normalised
 /// ```
+/// A [`Switching`](crate::Switching) world with as many models as there are scales gives each filter a model of its own.
 /// `e` is how often the scale may change: with 0 the bank settles on one scale for good. Words of 2 bits and more tell the scale by
 /// evidence; single bits at the prediction do not (use [`NoiseLearning`](crate::centre::NoiseLearning)).
 #[derive(Debug, Clone)]
@@ -67,6 +68,11 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         Ok(ImmBelief::agreed(&self.filter.start(rng, prior)?, self.scales.len())?)
     }
 
+    fn restart(&mut self, rng: &mut dyn Rng, prior: &Gaussian<D>, lost: &ImmBelief<D>) -> Result<ImmBelief<D>, Error> {
+        let start = self.filter.start(rng, prior)?;
+        Ok(ImmBelief::new(lost.probabilities().to_vec(), vec![start; lost.modes().len()])?)
+    }
+
     fn predict(
         &mut self,
         rng: &mut dyn Rng,
@@ -80,8 +86,13 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
             transition,
             workspace,
         } = self;
+        let modes = motion.modes();
+        if !(modes.is_empty() || modes.len() == scales.len()) {
+            return refuse("motion", format!("{} modes", modes.len()), format!("{}, one for each scale", scales.len()));
+        }
         mix(belief, transition, workspace, |j, mixed| {
             let mut moved = *mixed;
+            let motion = modes.get(j).map_or(motion, |mode| &**mode);
             filter.predict(rng, motion, noise_scale * scales[j], &mut moved)?;
             Ok(moved)
         })
@@ -91,7 +102,7 @@ impl<const D: usize, F: StateFilter<D, Belief = Gaussian<D>>> StateFilter<D> for
         &mut self,
         rng: &mut dyn Rng,
         belief: &mut ImmBelief<D>,
-        observed: &[Box<dyn StateLikelihood<D>>],
+        observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error> {
         let Self { filter, workspace, .. } = self;
         let log_likelihood = weigh(belief, workspace, |mode| {

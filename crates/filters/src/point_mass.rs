@@ -1,12 +1,14 @@
 //! The exact scalar filter on a grid: the referee of every approximate one.
 
 use crate::Error;
-use fewbits_core::{GaussianDynamics, Likelihood, LinearDynamics};
+use crate::contract::{All, Info, Motion, StateFilter, StateLikelihood};
+use fewbits_core::{Gaussian, GaussianDynamics, Likelihood, LinearDynamics};
 use fewbits_densities::{Grid, PointMass};
 use fewbits_numerics::error::ArgumentError;
 use fewbits_numerics::normal::INV_SQRT_2PI;
 use fewbits_numerics::quadrature::gauss_legendre;
-use nalgebra::Vector1;
+use nalgebra::{Matrix1, Vector1};
+use rand::Rng;
 
 /// Standard deviations beyond which a kernel row is below rounding.
 const REACH: f64 = 8.6;
@@ -62,16 +64,16 @@ impl PointMassFilter {
     /// # Errors
     /// If the noise out of some node has a standard deviation below the spacing; see [`PointMassFilter::linear`].
     pub fn new(dynamics: &impl GaussianDynamics<1>, grid: Grid) -> Result<Self, Error> {
-        let noise = |y: &f64| {
-            let state = Vector1::new(*y);
-            (dynamics.mean(&state)[0], dynamics.noise_covariance_at(&state)[0].sqrt())
-        };
-        let nodes: Vec<f64> = grid.nodes().collect();
-        let moved: Vec<(f64, f64)> = nodes.iter().map(noise).collect();
+        let moved = moved(&grid, dynamics, 1.0);
+        Self::resolving(grid, &moved)
+    }
+
+    /// The filter that moves node `i` to a normal of mean and deviation `moved[i]`.
+    fn resolving(grid: Grid, moved: &[(f64, f64)]) -> Result<Self, Error> {
         if let Some((_, deviation)) = moved.iter().find(|(_, s)| s.is_nan() || *s < COARSEST * grid.spacing()) {
             return Err(too_coarse(&grid, *deviation));
         }
-        Ok(Self::from_kernel(grid, &moved))
+        Ok(Self::from_kernel(grid, moved))
     }
 
     /// Rows of `h N(x; f(y), Q(y))` from the `(f, sqrt Q)` of each node.
@@ -240,6 +242,71 @@ impl PointMassFilter {
     }
 }
 
+/// Mean and deviation of the next state from each node.
+fn moved(grid: &Grid, motion: &(impl Motion<1> + ?Sized), noise_scale: f64) -> Vec<(f64, f64)> {
+    let from = |y: f64| motion.predict(&Gaussian::from_trusted_parts(Vector1::new(y), Matrix1::zeros()), noise_scale);
+    let moves = grid.nodes().map(from);
+    moves
+        .map(|next| (next.mean()[0], next.covariance()[0].sqrt()))
+        .collect()
+}
+
+/// [`PointMassFilter`] of any motion that its grid resolves. The kernel is kept while the motion stays the same.
+#[derive(Debug, Clone)]
+pub struct PointMasses {
+    grid: Grid,
+    moved: Vec<(f64, f64)>,
+    kernel: Option<PointMassFilter>,
+}
+
+impl PointMasses {
+    /// The filter on this grid.
+    pub fn new(grid: Grid) -> Self {
+        Self {
+            grid,
+            moved: Vec::new(),
+            kernel: None,
+        }
+    }
+}
+
+impl StateFilter<1> for PointMasses {
+    type Belief = PointMass;
+
+    fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<1>) -> Result<PointMass, Error> {
+        Ok(PointMass::normal(self.grid, prior.mean()[0], prior.covariance()[0])?)
+    }
+
+    fn predict(
+        &mut self,
+        _: &mut dyn Rng,
+        motion: &dyn Motion<1>,
+        noise_scale: f64,
+        belief: &mut PointMass,
+    ) -> Result<(), Error> {
+        let moved = moved(&self.grid, motion, noise_scale);
+        let kernel = match self.kernel.take().filter(|_| self.moved == moved) {
+            Some(kernel) => kernel,
+            None => PointMassFilter::resolving(self.grid, &moved)?,
+        };
+        *belief = kernel.predict(belief)?;
+        (self.moved, self.kernel) = (moved, Some(kernel));
+        Ok(())
+    }
+
+    fn update(
+        &mut self,
+        _: &mut dyn Rng,
+        belief: &mut PointMass,
+        observed: &[&dyn StateLikelihood<1>],
+    ) -> Result<Info, Error> {
+        Ok(Info {
+            log_likelihood: belief.update(&All(observed))?,
+            effective_sample_size: None,
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::PointMassFilter;
@@ -279,7 +346,10 @@ mod tests {
                         .collect::<Vec<_>>(),
                 );
             }
-            let smoothed = smoother::smooth(&dynamics, &beliefs).unwrap();
+            let mut smoothed = beliefs.clone();
+            for n in (0..data.len() - 1).rev() {
+                smoothed[n] = smoother::smooth_step(&dynamics, &beliefs[n], &smoothed[n + 1]).unwrap();
+            }
             for n in 0..data.len() {
                 let exact = filter.smooth(&grid_beliefs[n], &likelihoods[n + 1..]).unwrap();
                 assert!((exact.mean() - smoothed[n].mean()[0]).abs() < 1e-11);

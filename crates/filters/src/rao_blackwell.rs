@@ -1,11 +1,13 @@
 //! A linear Gaussian state observed through cells, Rao-Blackwellised.
 
-use crate::particle::{ParticleFilter, ParticleInfo, Workspace, add, weigh};
+use crate::contract::{Info, Motion, StateFilter, StateLikelihood};
+use crate::particle::{ParticleFilter, ParticleInfo, Workspace, weigh};
 use crate::{Error, kalman};
 use fewbits_core::columns::{count, set_state};
 use fewbits_core::factor::Scalar;
 use fewbits_core::{Cell, FactoredGaussian, Gaussian, LinearDynamics, LinearSensing, Observed};
 use fewbits_densities::GaussianCloud;
+use fewbits_numerics::error::{at_least_one, refuse};
 use fewbits_numerics::normal;
 use nalgebra::SVector;
 use rand::{Rng, RngExt};
@@ -40,7 +42,6 @@ pub struct CloudWorkspace<const D: usize> {
     particles: Workspace<D>,
     log_weights: Vec<f64>,
     next: Option<GaussianCloud<D>>,
-    before: Option<GaussianCloud<D>>,
 }
 
 impl RaoBlackwellised {
@@ -52,7 +53,8 @@ impl RaoBlackwellised {
     /// Resamples if due and moves every mean by the dynamics. Side rows stay as they are.
     ///
     /// # Errors
-    /// As [`ParticleFilter::resample`].
+    /// As [`ParticleFilter::resample`]; [`fewbits_core::Error::NotANumber`] if the covariance leaves the range of numbers, before anything has
+    /// changed.
     pub fn predict<const D: usize, R: Rng + ?Sized>(
         &self,
         rng: &mut R,
@@ -60,6 +62,14 @@ impl RaoBlackwellised {
         belief: &mut GaussianCloud<D>,
         workspace: &mut CloudWorkspace<D>,
     ) -> Result<(), Error> {
+        let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
+        let shared = kalman::predict(dynamics, &shared);
+        if !shared.is_finite() {
+            return Err(fewbits_core::Error::NotANumber {
+                what: "the predicted covariance",
+            }
+            .into());
+        }
         self.filter
             .resample(rng, belief.means_mut(), &mut workspace.particles)?;
         let mut columns = belief.means_mut().columns_mut();
@@ -67,8 +77,7 @@ impl RaoBlackwellised {
             let mean = dynamics.transition() * SVector::<f64, D>::from_fn(|d, _| columns[d][i]);
             set_state(&mut columns, i, &mean);
         }
-        let shared = Gaussian::from_trusted_parts(SVector::zeros(), *belief.shared_covariance());
-        belief.set_shared_covariance(*kalman::predict(dynamics, &shared).covariance());
+        belief.set_shared_covariance(*shared.covariance());
         Ok(())
     }
 
@@ -83,17 +92,33 @@ impl RaoBlackwellised {
         observed: &Observed<impl LinearSensing<D, 1>, F, 1>,
         workspace: &mut CloudWorkspace<D>,
     ) -> Result<ParticleInfo, Error> {
-        let imputation = Imputation::new(observed.factor.clone().into());
+        self.update_all(rng, belief, [(&observed.sensing, observed.factor.clone().into())].into_iter(), workspace)
+    }
+
+    fn update_all<'a, const D: usize, R: Rng + ?Sized, S: LinearSensing<D, 1> + 'a>(
+        &self,
+        rng: &mut R,
+        belief: &mut GaussianCloud<D>,
+        observed: impl Iterator<Item = (&'a S, Scalar)>,
+        workspace: &mut CloudWorkspace<D>,
+    ) -> Result<ParticleInfo, Error> {
         let next = workspace.next.get_or_insert_with(|| belief.clone());
         next.clone_from(belief);
         let log_weights = &mut workspace.log_weights;
         log_weights.clear();
         log_weights.resize(belief.means().len(), 0.0);
-        self.impute(rng, next, &observed.sensing, log_weights, |rng, innovation, predicted, _| {
-            let (z, log_weight) = imputation.draw(rng, predicted[0], innovation.lower()[(0, 0)]);
-            ([z].into(), log_weight)
+        for (sensing, factor) in observed {
+            let imputation = Imputation::new(factor);
+            self.impute(rng, next, sensing, log_weights, |rng, innovation, predicted, _| {
+                let (z, log_weight) = imputation.draw(rng, predicted[0], innovation.lower()[(0, 0)]);
+                ([z].into(), log_weight)
+            })?;
+        }
+        let info = weigh(next.means_mut(), |_, logs| {
+            logs.iter_mut()
+                .zip(&*log_weights)
+                .for_each(|(log, added)| *log += added);
         })?;
-        let info = weigh(next.means_mut(), |_, logs| add(logs, log_weights))?;
         std::mem::swap(belief, next);
         Ok(info)
     }
@@ -132,47 +157,79 @@ impl RaoBlackwellised {
         belief.set_shared_covariance(*updated.covariance());
         Ok(())
     }
+}
 
-    /// One step: [`predict`](Self::predict), then [`update`](Self::update) with everything observed.
+/// [`RaoBlackwellised`] with a number of particles. Refuses observations that are no [`Scalar`] factor through a linear sensor; a motion
+/// that is not linear is taken as linear about the mean.
+#[derive(Debug, Clone)]
+pub struct CloudFilter<const D: usize> {
+    filter: RaoBlackwellised,
+    count: usize,
+    workspace: CloudWorkspace<D>,
+}
+
+impl<const D: usize> CloudFilter<D> {
+    /// The filter with `count` particles.
     ///
     /// # Errors
-    /// As the two.
-    pub fn step<const D: usize, R: Rng + ?Sized, F: Clone + Into<Scalar>>(
-        &self,
-        rng: &mut R,
-        dynamics: &impl LinearDynamics<D>,
-        belief: &GaussianCloud<D>,
-        observed: &Observed<impl LinearSensing<D, 1>, F, 1>,
-    ) -> Result<(GaussianCloud<D>, ParticleInfo), Error> {
-        let mut next = belief.clone();
-        let mut workspace = CloudWorkspace::default();
-        self.predict(rng, dynamics, &mut next, &mut workspace)?;
-        let info = self.update(rng, &mut next, observed, &mut workspace)?;
-        Ok((next, info))
+    /// If there is none.
+    pub fn new(filter: RaoBlackwellised, count: usize) -> Result<Self, Error> {
+        Ok(Self {
+            filter,
+            count: at_least_one("count", count)?,
+            workspace: CloudWorkspace::default(),
+        })
+    }
+}
+
+impl<const D: usize> StateFilter<D> for CloudFilter<D> {
+    type Belief = GaussianCloud<D>;
+
+    fn start(&mut self, _: &mut dyn Rng, prior: &Gaussian<D>) -> Result<GaussianCloud<D>, Error> {
+        Ok(GaussianCloud::agreed(prior, self.count)?)
     }
 
-    /// The same in place.
-    ///
-    /// # Errors
-    /// As [`step`](Self::step); the belief is then as it was before the step.
-    pub fn step_in_place<const D: usize, R: Rng + ?Sized, F: Clone + Into<Scalar>>(
-        &self,
-        rng: &mut R,
-        dynamics: &impl LinearDynamics<D>,
+    fn predict(
+        &mut self,
+        rng: &mut dyn Rng,
+        motion: &dyn Motion<D>,
+        noise_scale: f64,
         belief: &mut GaussianCloud<D>,
-        observed: &Observed<impl LinearSensing<D, 1>, F, 1>,
-        workspace: &mut CloudWorkspace<D>,
-    ) -> Result<ParticleInfo, Error> {
-        let mut before = workspace.before.take().unwrap_or_else(|| belief.clone());
-        before.clone_from(belief);
-        let info = self
-            .predict(rng, dynamics, belief, workspace)
-            .and_then(|()| self.update(rng, belief, observed, workspace));
-        if info.is_err() {
-            std::mem::swap(belief, &mut before);
+    ) -> Result<(), Error> {
+        let shared = Gaussian::from_trusted_parts(belief.means().mean(), *belief.shared_covariance());
+        let moved = motion.predict(&shared, noise_scale);
+        let particles = &mut self.workspace.particles;
+        self.filter.filter.resample(rng, belief.means_mut(), particles)?;
+        let mut columns = belief.means_mut().columns_mut();
+        for i in 0..count(&columns) {
+            let mean = motion.mean(&SVector::<f64, D>::from_fn(|d, _| columns[d][i]));
+            set_state(&mut columns, i, &mean);
         }
-        workspace.before = Some(before);
-        info
+        belief.set_shared_covariance(*moved.covariance());
+        Ok(())
+    }
+
+    fn update(
+        &mut self,
+        rng: &mut dyn Rng,
+        belief: &mut GaussianCloud<D>,
+        observed: &[&dyn StateLikelihood<D>],
+    ) -> Result<Info, Error> {
+        let (mean, mut log_scale) = (belief.means().mean(), 0.0);
+        let mut scalars = Vec::with_capacity(observed.len());
+        for one in observed {
+            let Some((scalar, log)) = one.as_linear_scalar(&mean) else {
+                return refuse("observed", "another likelihood", "scalar factors through linear sensors");
+            };
+            scalars.push(scalar);
+            log_scale += log;
+        }
+        let scalars = scalars.iter().map(|one| (&one.sensing, one.factor.clone()));
+        let info = self.filter.update_all(rng, belief, scalars, &mut self.workspace)?;
+        Ok(Info {
+            log_likelihood: info.log_likelihood + log_scale,
+            effective_sample_size: Some(info.effective_sample_size),
+        })
     }
 }
 

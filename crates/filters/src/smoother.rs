@@ -1,14 +1,13 @@
-//! Rauch-Tung-Striebel smoothing, of a whole record and at a fixed lag.
+//! Rauch-Tung-Striebel smoothing, one step back at a time: folded over a record it is the smoother of the record, over the last few
+//! beliefs that of a fixed lag.
 //!
-//! Both need nothing but the filtered beliefs and the dynamics, so they smooth the output of any filter that keeps Gaussian
+//! It needs nothing but the filtered beliefs and the dynamics, so it smooths the output of any filter that keeps Gaussian
 //! beliefs, whatever its messages were.
 
 use crate::{Error, kalman};
 use fewbits_core::{Gaussian, LinearDynamics};
-use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::linalg::solve_semidefinite;
 use nalgebra::SMatrix;
-use std::collections::VecDeque;
 
 /// One backward step: the belief at `n` given the future, from the filtered belief at `n` and the smoothed belief at `n + 1`.
 ///
@@ -37,71 +36,6 @@ pub fn smooth_step<const D: usize>(
     ))
 }
 
-/// Smooths a whole record of filtered beliefs, oldest first.
-///
-/// # Errors
-/// As [`smooth_step`].
-pub fn smooth<const D: usize>(
-    dynamics: &impl LinearDynamics<D>,
-    filtered: &[Gaussian<D>],
-) -> Result<Vec<Gaussian<D>>, Error> {
-    let mut smoothed = filtered.to_vec();
-    for n in (0..filtered.len().saturating_sub(1)).rev() {
-        smoothed[n] = smooth_step(dynamics, &filtered[n], &smoothed[n + 1])?;
-    }
-    Ok(smoothed)
-}
-
-/// A smoother that runs beside a filter and reports each state `lag` steps late.
-///
-/// ```
-/// use fewbits_core::Gaussian;
-/// use fewbits_filters::FixedLagSmoother;
-/// use fewbits_models::Ar1;
-/// let mut smoother = FixedLagSmoother::new(Ar1::new(0.9, 0.5)?, 2)?;
-/// assert!(smoother.push(Gaussian::scalar(0.0, 1.0)?)?.is_none());
-/// assert!(smoother.push(Gaussian::scalar(1.0, 0.5)?)?.is_none());
-/// let late = smoother.push(Gaussian::scalar(1.0, 0.5)?)?;
-/// assert!(late.is_some_and(|belief| belief.mean()[0] > 0.0));
-/// # Ok::<(), fewbits_filters::Error>(())
-/// ```
-#[derive(Debug, Clone)]
-pub struct FixedLagSmoother<F, const D: usize> {
-    dynamics: F,
-    lag: usize,
-    window: VecDeque<Gaussian<D>>,
-}
-
-impl<const D: usize, F: LinearDynamics<D>> FixedLagSmoother<F, D> {
-    /// A smoother for filtered beliefs under `dynamics`, `lag >= 1` steps late.
-    ///
-    /// # Errors
-    /// A lag of zero.
-    pub fn new(dynamics: F, lag: usize) -> Result<Self, Error> {
-        Ok(Self {
-            dynamics,
-            lag: at_least_one("lag", lag)?,
-            window: VecDeque::with_capacity(lag),
-        })
-    }
-
-    /// Takes the newest filtered belief; returns the smoothed belief of `lag` steps ago once there is one. Costs `lag`
-    /// backward steps and no allocation.
-    ///
-    /// # Errors
-    /// As [`smooth_step`]; the window is then as before.
-    pub fn push(&mut self, filtered: Gaussian<D>) -> Result<Option<Gaussian<D>>, Error> {
-        let mut smoothed = None;
-        if self.window.len() == self.lag {
-            let mut past = self.window.iter().rev();
-            smoothed = Some(past.try_fold(filtered, |next, belief| smooth_step(&self.dynamics, belief, &next))?);
-            self.window.pop_front();
-        }
-        self.window.push_back(filtered);
-        Ok(smoothed)
-    }
-}
-
 /// Steady variance of a scalar fixed-lag smoother: `V_0 = M`, `V_l = M + C^2 (V_{l-1} - P)` with `C = a M / P`, from the
 /// filter's steady predicted variance `P` and filtered variance `M`.
 pub fn scalar_fixed_lag_variance(coefficient: f64, steady: &crate::ScalarSteadyState, lag: usize) -> f64 {
@@ -115,7 +49,7 @@ pub fn scalar_fixed_lag_variance(coefficient: f64, steady: &crate::ScalarSteadyS
 
 #[cfg(test)]
 mod tests {
-    use super::{FixedLagSmoother, scalar_fixed_lag_variance, smooth, smooth_step};
+    use super::{scalar_fixed_lag_variance, smooth_step};
     use crate::{kalman, scalar_steady_state};
     use fewbits_core::{Dynamics, Gaussian, Sensing};
     use fewbits_models::{Ar1, LinearSensor, constant_velocity_1d};
@@ -177,9 +111,13 @@ mod tests {
     fn smoothing_is_conditioning_on_the_whole_record() {
         for known in [false, true] {
             let (filtered, data) = record(known);
-            let smoothed = smooth(&constant_velocity_1d(1.0, 0.3).unwrap(), &filtered).unwrap();
+            let dynamics = constant_velocity_1d(1.0, 0.3).unwrap();
             let (mean, covariance) = joint_posterior(known, &data);
-            for (n, belief) in smoothed.iter().enumerate() {
+            let mut belief = filtered[data.len()];
+            for n in (0..=data.len()).rev() {
+                if n < data.len() {
+                    belief = smooth_step(&dynamics, &filtered[n], &belief).unwrap();
+                }
                 assert!((belief.mean() - mean.fixed_rows::<2>(2 * n)).amax() < 1e-10);
                 assert!((belief.covariance() - covariance.fixed_view::<2, 2>(2 * n, 2 * n)).amax() < 1e-10);
             }
@@ -205,35 +143,20 @@ mod tests {
     }
 
     #[test]
-    fn fixed_lag_is_the_smoother_of_the_record_so_far() {
-        let dynamics = constant_velocity_1d(1.0, 0.3).unwrap();
-        let (filtered, _) = record(false);
-        let mut lagged = FixedLagSmoother::new(dynamics, 3).unwrap();
-        for (n, belief) in filtered.iter().enumerate() {
-            let out = lagged.push(*belief).unwrap();
-            assert_eq!(out.is_some(), n >= 3);
-            if let Some(out) = out {
-                let whole = smooth(&dynamics, &filtered[..=n]).unwrap();
-                assert!((out.mean() - whole[n - 3].mean()).amax() < 1e-13);
-                assert!((out.covariance() - whole[n - 3].covariance()).amax() < 1e-13);
-            }
-        }
-    }
-
-    #[test]
     fn steady_lag_variance_is_where_the_recursion_settles() {
         let dynamics = Ar1::new(0.9, 0.5).unwrap();
         let sensing = LinearSensor::direct(1.0).unwrap();
-        let mut smoother = FixedLagSmoother::new(dynamics, 4).unwrap();
-        let mut belief = Gaussian::scalar(0.0, 1.0).unwrap();
-        let mut last = f64::NAN;
-        for _ in 0..200 {
-            belief = kalman::step(&dynamics, &sensing, &belief, &SMatrix::zeros()).unwrap().0;
-            if let Some(out) = smoother.push(belief).unwrap() {
-                last = out.covariance()[0];
-            }
+        let mut filtered = vec![Gaussian::scalar(0.0, 1.0).unwrap()];
+        for n in 0..200 {
+            filtered.push(
+                kalman::step(&dynamics, &sensing, &filtered[n], &SMatrix::zeros())
+                    .unwrap()
+                    .0,
+            );
         }
+        let back = filtered[196..200].iter().rev();
+        let lagged = back.fold(filtered[200], |next, belief| smooth_step(&dynamics, belief, &next).unwrap());
         let steady = scalar_steady_state(0.9, 0.5, 1.0, 1.0).unwrap();
-        assert!((last - scalar_fixed_lag_variance(0.9, &steady, 4)).abs() < 1e-13);
+        assert!((lagged.covariance()[0] - scalar_fixed_lag_variance(0.9, &steady, 4)).abs() < 1e-13);
     }
 }

@@ -3,7 +3,9 @@
 fewbits_numerics::errors! {
     /// What a hand-over refuses.
     pub enum Error wraps {
-        /// The belief refused: no particle agrees with the measurement, or it does not fit its format.
+        /// No particle agrees with the measurement, or particles could not be formed.
         Density(#[from] fewbits_densities::Error),
+        /// The belief could not be reduced or coded.
+        Codec(#[from] fewbits_mixture_codec::Error),
     } and {}
 }

@@ -6,7 +6,7 @@
 //!
 //! - [`HandoffFilter`]: one leader's step, from the mixture that was received to the one that is sent. How the belief is reduced
 //!   is a [`Reducer`]: to a number of components, to a number of bits, or a type of your own.
-//! - [`Accounting`]: what the losses of all steps say about the error at the end, by the bounds as printed, corrected and
+//! - [`published::Accounting`]: what the losses of all steps say about the error at the end, by the bounds as printed, corrected and
 //!   tightened.
 //!
 //! ```
@@ -33,12 +33,11 @@
 //!
 //! Not here: who leads (the simulated network decides), the true state, the price of energy.
 
-mod accounting;
 mod error;
 mod filter;
+pub mod published;
 mod reducer;
 
-pub use accounting::{Accounting, Amplification, Bounds, StepError};
 pub use error::Error;
 pub use filter::{HandoffFilter, HandoffInfo, trimmed};
 pub use reducer::{Coded, Components, Handover, RateLimited, Reducer, Whole};

@@ -2,8 +2,9 @@
 
 use crate::Error;
 use fewbits_core::{BitString, CodecError, Message};
-use fewbits_densities::wire::{CodedMixture, RateControl, WireFormat};
-use fewbits_densities::{KernelEstimate, Mixture, Reduction};
+use fewbits_densities::{KernelEstimate, Mixture};
+use fewbits_mixture_codec::Reduction;
+use fewbits_mixture_codec::wire::{CodedMixture, RateControl, WireFormat};
 
 /// A belief as the next leader receives it, and the message that it was received in.
 ///
@@ -35,9 +36,9 @@ impl<const D: usize> Handover<D> {
     }
 
     fn coded(message: &CodedMixture<D>, format: &WireFormat<D>) -> Result<Self, Error> {
-        let bits = message.to_bits(format).map_err(fewbits_densities::Error::from)?;
+        let bits = message.to_bits(format).map_err(fewbits_mixture_codec::Error::from)?;
         let decode = |bits: &BitString| Ok::<_, CodecError>(CodedMixture::from_bits(format, bits)?.into_mixture());
-        Ok(Self::received(bits, decode).map_err(fewbits_densities::Error::from)?)
+        Ok(Self::received(bits, decode).map_err(fewbits_mixture_codec::Error::from)?)
     }
 
     /// What the next leader knows.

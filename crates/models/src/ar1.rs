@@ -19,7 +19,9 @@ pub struct Ar1 {
 }
 
 stored! { Ar1 as Parameters |model| {
+    #[serde(with = "fewbits_numerics::stored")]
     coefficient: f64 = model.coefficient(),
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64 = model.noise_variance(),
 } => Ar1::new_unstable(coefficient, noise_variance), Error }
 

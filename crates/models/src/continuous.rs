@@ -33,8 +33,11 @@ pub struct ContinuousLinear<const D: usize> {
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "ContinuousLinear", deny_unknown_fields)]
 struct Parameters<const D: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     drift: SMatrix<f64, D, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     offset: SVector<f64, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     density: SMatrix<f64, D, D>,
 }
 

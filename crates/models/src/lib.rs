@@ -16,6 +16,7 @@
 //! | linear with Gaussian noise, any dimension | [`LinearGaussian`] |
 //! | white-noise acceleration on a line, in a plane | [`constant_velocity_1d`], [`constant_velocity_2d`] |
 //! | linear in continuous time: Ornstein-Uhlenbeck, nearly constant velocity and acceleration, random walk | [`ContinuousLinear`], over any time an [`AffineGaussian`] |
+//! | several of these, one at a time; the manoeuvring target | [`Switching`], over any time the models and transition of an IMM filter |
 //! | linear sensing, scalar and vector | [`ScalarSensor`], [`LinearSensor`] |
 //! | received amplitude that falls with distance | [`ReceivedPower`] |
 //! | a substance that diffuses through air, ground, vessels | [`diffusion`] |
@@ -45,6 +46,7 @@ mod linear_gaussian;
 mod linear_sensor;
 mod received_power;
 mod source_model;
+mod switching;
 
 pub use ar1::Ar1;
 pub use constant_velocity::{constant_velocity_1d, constant_velocity_2d};
@@ -54,4 +56,5 @@ pub use linear_gaussian::LinearGaussian;
 pub use linear_sensor::{LinearSensor, ScalarSensor};
 pub use received_power::ReceivedPower;
 pub use source_model::{Homogeneous, Receptor, SourceGradient, SourceModel};
+pub use switching::Switching;
 pub use {nalgebra, rand};

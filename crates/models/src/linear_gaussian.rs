@@ -29,8 +29,11 @@ pub struct LinearGaussian<const D: usize, const U: usize> {
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "LinearGaussian", deny_unknown_fields)]
 struct Parameters<const D: usize, const U: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     transition: SMatrix<f64, D, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     gain: SMatrix<f64, D, U>,
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variances: SVector<f64, U>,
 }
 

@@ -23,7 +23,9 @@ pub struct LinearSensor<const D: usize, const M: usize> {
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "LinearSensor", deny_unknown_fields)]
 struct Parameters<const D: usize, const M: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     matrix: SMatrix<f64, M, D>,
+    #[serde(with = "fewbits_numerics::stored")]
     noise_covariance: SMatrix<f64, M, M>,
 }
 

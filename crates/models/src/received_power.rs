@@ -29,11 +29,16 @@ pub struct ReceivedPower<const D: usize> {
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "ReceivedPower", deny_unknown_fields)]
 struct Parameters {
+    #[serde(with = "fewbits_numerics::stored")]
     position: Vector2<f64>,
     axes: [usize; 2],
+    #[serde(with = "fewbits_numerics::stored")]
     power: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     attenuation: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     exponent: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64,
 }
 

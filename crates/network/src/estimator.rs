@@ -72,7 +72,8 @@ pub trait Estimator {
         question: &Self::Question,
     ) -> Result<Option<Self::Report>, Error>;
 
-    /// The receiver's half: one observation for each sensor.
+    /// The receiver's half: for each sensor one observation, or `None` if it was not asked or what it did cannot be used. A sensor
+    /// without observation changes nothing, neither by a report nor by silence.
     ///
     /// # Errors
     /// [`Error::Impossible`] if the observations have probability zero; others of the filter.
@@ -81,7 +82,7 @@ pub trait Estimator {
         rng: &mut Pcg64Dxsm,
         slot: u32,
         predicted: &Self::Belief,
-        observations: &[Observation<Self::Report>],
+        observations: &[Option<Observation<Self::Report>>],
     ) -> Result<Self::Belief, Error>;
 
     /// The estimate: one number per coordinate.
@@ -112,6 +113,13 @@ pub trait Replicable: Estimator {
     /// # Errors
     /// If the bits are no belief.
     fn belief_of(&self, bits: &BitString) -> Result<Self::Belief, Error>;
+}
+
+/// The observations of sensors that always speak: to them a known loss, as no observation, says nothing about the state.
+#[cfg(any(feature = "dymbo", feature = "look-up"))]
+pub(crate) fn always_spoken<R: Clone>(observations: &[Option<Observation<R>>]) -> Vec<Observation<R>> {
+    let known = |o: &Option<Observation<R>>| o.clone().unwrap_or(Observation::Lost);
+    observations.iter().map(known).collect()
 }
 
 /// A belief that is sent whole: `D` means and `D (D + 1)/2` covariances in double precision.

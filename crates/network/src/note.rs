@@ -29,8 +29,8 @@ pub enum Note {
         /// From which slot on.
         slot: u32,
     },
-    /// The update failed with the observations as they arrived, and succeeded after every report that did not come was taken as lost.
-    TakenAsLost {
+    /// The update failed with the observations as they arrived, and succeeded without the sensors of which nothing arrived.
+    SilenceIgnored {
         /// The slot.
         slot: u32,
         /// Why the update failed the first time.
@@ -96,8 +96,8 @@ impl fmt::Display for Note {
             Self::Late => f.write_str("late frame"),
             Self::Disagreement { with, slot } => write!(f, "disagreement with {with}, slot {slot}"),
             Self::Resynchronised { slot } => write!(f, "resynchronised, slot {slot}"),
-            Self::TakenAsLost { slot, reason } => {
-                write!(f, "missing reports taken as lost, slot {slot}: {reason}")
+            Self::SilenceIgnored { slot, reason } => {
+                write!(f, "missing reports ignored, slot {slot}: {reason}")
             }
             Self::Failed { stage, slot, reason } => write!(f, "{stage} failed, slot {slot}: {reason}"),
             Self::NotMeasured { slot } => write!(f, "no measurement, slot {slot}"),

@@ -1,7 +1,7 @@
 //! The stored form of a checked type, and floats that are stored exactly whatever the format does.
 //!
 //! Some text formats print a float exactly and read it back one unit in the last place off. `#[serde(with = "fewbits_numerics::stored")]`
-//! on a field of type `f64`, or an `Option`, `Vec`, array or pair of [`Floats`], writes text formats' floats as text, the
+//! on a field of type `f64`, a matrix, or an `Option`, `Vec`, array or pair of [`Floats`], writes text formats' floats as text, the
 //! shortest that reads back exactly (`"0.1"`), and those of binary formats as they are. Plain numbers are read too.
 //!
 //! ```
@@ -17,6 +17,7 @@
 //! assert_eq!(serde_json::from_str::<Belief>(r#"{"weights":[0.5, 1]}"#).unwrap(), Belief { weights: [0.5, 1.0] });
 //! ```
 
+use nalgebra::SMatrix;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt::{Formatter, Result as Written};
@@ -146,6 +147,19 @@ impl<T: Floats, const N: usize> Floats for [T; N] {
     }
 }
 
+/// Column by column, as nalgebra writes it.
+impl<const R: usize, const C: usize> Floats for SMatrix<f64, R, C> {
+    type Form = Vec<Exact>;
+
+    fn form(&self) -> Self::Form {
+        self.iter().copied().map(Exact).collect()
+    }
+
+    fn read(form: Self::Form) -> Option<Self> {
+        (form.len() == R * C).then(|| Self::from_iterator(form.into_iter().map(|x| x.0)))
+    }
+}
+
 impl<A: Floats, B: Floats> Floats for (A, B) {
     type Form = (A::Form, B::Form);
 
@@ -202,8 +216,8 @@ pub fn deserialize<'de, T: Floats, D: Deserializer<'de>>(deserializer: D) -> Res
 /// ```
 #[macro_export]
 macro_rules! stored {
-    ($type:ident as $form:ident |$value:ident| { $($field:ident: $kind:ty = $get:expr),+ $(,)? } => $make:expr, $error:ty) => {
-        $crate::stored! { #[derive(::serde::Serialize)] $type as $form { $($field: $kind),+ } => $make, $error }
+    ($type:ident as $form:ident |$value:ident| { $($(#[$attribute:meta])* $field:ident: $kind:ty = $get:expr),+ $(,)? } => $make:expr, $error:ty) => {
+        $crate::stored! { #[derive(::serde::Serialize)] $type as $form { $($(#[$attribute])* $field: $kind),+ } => $make, $error }
 
         impl From<$type> for $form {
             fn from($value: $type) -> Self {

@@ -6,8 +6,8 @@ use divan::{AllocProfiler, Bencher};
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{
-    Bootstrap, Encoder, GridFilter, GuidedGaussian, Linearised, MessagePassing, Network, QuantizedRange, RangeNoise,
-    Ranged, Reports, Target, Tracker,
+    Encoder, GridFilter, GuidedGaussian, Linearised, MessagePassing, Network, QuantizedRange, RangeNoise, Ranged,
+    Reports, Target, Tracker,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
 use rand::RngExt;
@@ -82,9 +82,4 @@ fn gaussian_message_passing(bencher: Bencher) {
 #[divan::bench]
 fn guided_40(bencher: Bencher) {
     step(bencher, &GuidedGaussian::new(40).unwrap());
-}
-
-#[divan::bench]
-fn bootstrap_500(bencher: Bencher) {
-    step(bencher, &Bootstrap::new(500).unwrap());
 }

@@ -1,77 +1,40 @@
 //! Tracks a vehicle from recorded ranges, in full and with 1 to 4 bits a range, and compares with the true track.
-//!
-//! ```text
-//! cargo run --release -p fewbits-pf-mpa --example plaza -- ANCHORS.csv RANGES.csv TRUTH.csv
-//! ```
-//! Columns `anchor,x_m,y_m`; `t_s,anchor,range_m`, one anchor at a time; `t_s,x_m,y_m`.
+//! `plaza ANCHORS.csv RANGES.csv TRUTH.csv`: columns `anchor,x_m,y_m`; `t_s,anchor,range_m`; `t_s,x_m,y_m,...`.
 
 use fewbits_pf_mpa::{RangeSettings, RangeTracker, Travel};
 use nalgebra::Vector2;
 use std::error::Error;
 
-fn column(row: &csv::StringRecord, at: usize) -> Result<f64, Box<dyn Error>> {
-    Ok(row.get(at).unwrap_or_default().trim().parse()?)
-}
-
-fn rows(file: &str) -> Result<Vec<csv::StringRecord>, Box<dyn Error>> {
-    Ok(csv::Reader::from_path(file)?.records().collect::<Result<_, _>>()?)
-}
-
-/// Rows in order of their first column.
-fn in_order(rows: Vec<csv::StringRecord>) -> Result<Vec<csv::StringRecord>, Box<dyn Error>> {
-    let mut timed = rows
-        .into_iter()
-        .map(|row| Ok((column(&row, 0)?, row)))
-        .collect::<Result<Vec<_>, Box<dyn Error>>>()?;
-    timed.sort_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(timed.into_iter().map(|(_, row)| row).collect())
+fn rows<T: serde::de::DeserializeOwned>(file: Option<&String>) -> Result<Vec<T>, Box<dyn Error>> {
+    let file = file.ok_or("usage: plaza ANCHORS.csv RANGES.csv TRUTH.csv")?;
+    Ok(csv::Reader::from_path(file)?.deserialize().collect::<Result<_, _>>()?)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let files: Vec<String> = std::env::args().skip(1).collect();
-    let [anchors, ranges, truth] = files.as_slice() else {
-        return Err("usage: plaza ANCHORS.csv RANGES.csv TRUTH.csv".into());
-    };
-    let place = |row: &csv::StringRecord| Ok((row[0].to_owned(), Vector2::new(column(row, 1)?, column(row, 2)?)));
-    let anchors = rows(anchors)?
-        .iter()
-        .map(place)
-        .collect::<Result<Vec<_>, Box<dyn Error>>>()?;
-    let (ranges, truth) = (in_order(rows(ranges)?)?, in_order(rows(truth)?)?);
-    println!("ranges      RMS error / m   NEES   losses   bits per range   speed / m/s");
-    for travel in [
-        Travel::Full,
-        Travel::Bits(1),
-        Travel::Bits(2),
-        Travel::Bits(3),
-        Travel::Bits(4),
-    ] {
-        let mut tracker = RangeTracker::new(anchors.clone(), travel, RangeSettings::default())?;
-        let (mut rng, mut at, mut scores, mut speed) = (fewbits_monte_carlo::Stream::new(1).rng(), 0, Vec::new(), 0.0);
-        for row in &ranges {
-            let time = column(row, 0)?;
-            let Some(found) = tracker.push(&mut rng, time, &row[1], column(row, 2)?)? else {
-                continue;
-            };
-            while at + 1 < truth.len() && column(&truth[at], 0)? < time {
-                at += 1
+    let anchors: Vec<(String, f64, f64)> = rows(files.first())?;
+    let mut ranges: Vec<(f64, String, f64)> = rows(files.get(1))?;
+    let truth: Vec<(f64, f64, f64)> = rows(files.get(2))?;
+    ranges.sort_by(|a, b| a.0.total_cmp(&b.0));
+    println!("RMS error / m   NEES   losses   bits per range   speed / m/s   ranges");
+    for travel in std::iter::once(Travel::Full).chain((1..=4).map(Travel::Bits)) {
+        let places = anchors.iter().map(|(name, x, y)| (name.clone(), Vector2::new(*x, *y)));
+        let mut tracker = RangeTracker::new(places, travel, RangeSettings::default())?;
+        let mut rng = fewbits_monte_carlo::Stream::new(1).rng();
+        let (mut squares, mut nees, mut speed) = (Vec::new(), Vec::new(), 0.0);
+        for (time, anchor, range) in &ranges {
+            if let Some(found) = tracker.push(&mut rng, *time, anchor, *range)? {
+                let at = truth.partition_point(|row| row.0 < *time);
+                let (_, x, y) = truth.get(at).or(truth.last()).ok_or("no true positions")?;
+                squares.push((found.position - Vector2::new(*x, *y)).norm_squared());
+                nees.extend(found.normalised_error(&Vector2::new(*x, *y)));
+                speed = found.speed;
             }
-            let error = found.position - Vector2::new(column(&truth[at], 1)?, column(&truth[at], 2)?);
-            let nees = found
-                .covariance
-                .cholesky()
-                .map_or(f64::NAN, |factor| 0.5 * error.dot(&factor.solve(&error)));
-            scores.push((error.norm_squared(), nees));
-            speed = found.speed;
         }
-        let mean = |score: fn(&(f64, f64)) -> f64| scores.iter().map(score).sum::<f64>() / scores.len().max(1) as f64;
-        let bits = tracker.bits() as f64 / ranges.len().max(1) as f64;
-        println!(
-            "{travel:<10?}  {:13.3}   {:4.2}   {:6}   {bits:14.2}   {speed:11.2}",
-            mean(|s| s.0).sqrt(),
-            mean(|s| s.1),
-            tracker.losses()
-        );
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let bits = tracker.bits() as f64 / ranges.len() as f64;
+        let (error, losses, nees) = (mean(&squares).sqrt(), tracker.losses(), mean(&nees));
+        println!("{error:13.3}   {nees:4.2}   {losses:6}   {bits:14.2}   {speed:11.2}   {travel:?}");
     }
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! What no tracker can beat: Fisher information of a range, and the posterior Cramer-Rao recursion.
 
 use crate::Error;
-use crate::encoder::RangeReference;
 use crate::error::refuse;
+use crate::quantized::RangeReference;
 use crate::sensor::{RangeNoise, RangeSensor};
 use crate::target::Target;
 use fewbits_filters::cramer_rao;

@@ -29,7 +29,10 @@ pub struct RangeFactor {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Kind {
-    Value(f64),
+    Value {
+        range: f64,
+        log_share: f64,
+    },
     Cell {
         lower: f64,
         upper: f64,
@@ -51,10 +54,20 @@ impl RangeFactor {
     /// # Errors
     /// If it is not finite.
     pub fn value(range: f64, noise: RangeNoise) -> Result<Self, Error> {
+        Self::arrived(range, 1.0, noise)
+    }
+
+    /// The range itself, of a report that arrives with probability `share`.
+    ///
+    /// # Errors
+    /// If it is not finite, or `share` is outside `(0, 1]`.
+    pub fn arrived(range: f64, share: f64, noise: RangeNoise) -> Result<Self, Error> {
         finite("range", range)?;
+        within("share", share, f64::MIN_POSITIVE, 1.0)?;
+        let log_share = share.ln();
         Ok(Self {
             noise,
-            kind: Kind::Value(range),
+            kind: Kind::Value { range, log_share },
         })
     }
 
@@ -117,7 +130,7 @@ impl RangeFactor {
     pub fn reconstruction(&self) -> Option<(f64, f64)> {
         let uniform = |[a, b]: [f64; 2]| (0.5 * (a + b), (b - a) * (b - a) / 12.0);
         match &self.kind {
-            Kind::Value(z) => Some((*z, 0.0)),
+            Kind::Value { range, .. } => Some((*range, 0.0)),
             Kind::Cell { nominal, .. } => Some(uniform(*nominal)),
             Kind::Levels { edges, given } => {
                 let cells = || edges.windows(2).zip(given).map(|(e, p)| (uniform([e[0], e[1]]), *p));
@@ -136,7 +149,7 @@ impl RangeFactor {
     pub fn log_probability(&self, d: f64) -> f64 {
         let deviation = self.noise.deviation(d);
         match &self.kind {
-            Kind::Value(z) => normal::log_pdf((z - d) / deviation) - deviation.ln(),
+            Kind::Value { range, log_share } => log_share + normal::log_pdf((range - d) / deviation) - deviation.ln(),
             Kind::Cell {
                 lower,
                 upper,
@@ -163,7 +176,7 @@ impl RangeFactor {
             width: self.noise.deviation(location),
         };
         let mut features: Vec<Feature> = match &self.kind {
-            Kind::Value(z) => vec![feature(*z)],
+            Kind::Value { range, .. } => vec![feature(*range)],
             Kind::Cell { lower, upper, .. } => [*lower, *upper]
                 .into_iter()
                 .filter(|e| e.is_finite())
@@ -222,13 +235,13 @@ impl Factor<1> for RangeFactor {
         let noise = self.noise;
         let pairs = log_weights.iter_mut().zip(means[0]);
         match &self.kind {
-            Kind::Value(z) => vectorised(
+            Kind::Value { range, log_share } => vectorised(
                 #[inline(always)]
                 || {
                     for (log_weight, d) in pairs {
                         let deviation = noise.deviation(*d);
-                        let t = (z - d) / deviation;
-                        *log_weight -= 0.5 * t * t + normal::LN_SQRT_2PI + scalar::ln(deviation);
+                        let t = (range - d) / deviation;
+                        *log_weight += log_share - (0.5 * t * t + normal::LN_SQRT_2PI + scalar::ln(deviation));
                     }
                 },
             ),
@@ -293,7 +306,11 @@ impl Factor<1> for RangeFactor {
         if self.noise.relative() == 0.0 {
             let variance = self.noise.at_sensor() * self.noise.at_sensor();
             match &self.kind {
-                Kind::Value(z) => return Value::scalar(*z, variance)?.tilted(prior),
+                Kind::Value { range, log_share } => {
+                    let mut tilted = Value::scalar(*range, variance)?.tilted(prior)?;
+                    tilted.log_evidence += log_share;
+                    return Ok(tilted);
+                }
                 Kind::Cell {
                     lower,
                     upper,

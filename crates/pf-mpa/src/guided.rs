@@ -77,7 +77,7 @@ impl GuidedGaussian {
             logs[i] = prior.log_pdf(&place) - proposal.log_pdf(&place);
             set_state(&mut places.each_mut().map(Vec::as_mut_slice), i, &place);
         }
-        Likelihood::<2>::add_log_likelihoods(observed, places.each_ref().map(Vec::as_slice), logs);
+        observed.add_log_likelihoods(places.each_ref().map(Vec::as_slice), logs);
         let peak = kernels::largest(logs);
         if !peak.is_finite() {
             return Ok(None);

@@ -2,7 +2,8 @@
 
 use crate::Error;
 use crate::error::refuse;
-use fewbits_densities::{Component, Mixture, product};
+use crate::product;
+use fewbits_densities::{Component, Mixture};
 use fewbits_numerics::error::at_least_one;
 use nalgebra::DMatrix;
 

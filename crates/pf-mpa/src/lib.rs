@@ -14,17 +14,16 @@
 //! |---|---|
 //! | the sensor, its noise, its quantizer, what a level says | [`RangeSensor`], [`RangeNoise`], [`QuantizedRange`], [`RangeFactor`] |
 //! | how all nodes derive the same cells | [`Encoder`]: published, predicted, adaptive |
-//! | the target | [`Target`], [`WithManoeuvre`] |
+//! | the target: as dynamics, as nine interacting models, with its manoeuvre as part of the state | [`Target`], [`WithManoeuvre`] |
 //! | the recommended tracker | [`GridFilter`] |
 //! | ranges of a recording: bias, outliers, missing anchors, unknown speed, acquisition | [`RangeTracker`] |
 //! | linearised: extended Kalman filters, Gaussian message passing | [`Linearised`] |
-//! | particles and draws | [`GuidedGaussian`], [`Bootstrap`], [`RaoBlackwellGuided`] |
+//! | particles and draws | [`ParticleFilter`](fewbits_filters::ParticleFilter) on [`WithManoeuvre`], [`GuidedGaussian`], [`RaoBlackwellGuided`] |
 //! | Algorithm 6 | [`MessagePassing`], its [`ProductSampler`] |
 //! | bounds | [`CramerRao`], [`level_information`] |
 //! | two targets, measurements in unknown order | [`association`] |
 //! | who leads, what is handed over, in bits | [`leader`] |
 //! | factor graphs, sum-product over finite alphabets | [`graph`] |
-//! | particle messages on graphs of one's own | [`node`] |
 //!
 //! ```
 //! use fewbits_core::Gaussian;
@@ -49,6 +48,7 @@
 
 pub mod association;
 mod bound;
+mod chain;
 mod encoder;
 mod error;
 mod factor;
@@ -60,8 +60,10 @@ pub mod leader;
 mod linearised;
 mod message;
 mod message_passing;
-pub mod node;
-mod particle;
+pub mod product;
+mod product_sampler;
+mod quantized;
+mod rao_blackwell;
 mod recording;
 mod ring;
 mod sensor;
@@ -69,19 +71,22 @@ mod target;
 mod tracker;
 
 pub use bound::{CramerRao, level_information, position_information, range_information};
-pub use encoder::{Encoder, IntervalRule, Normalisation, QuantizedRange, RangeReference, optimal_loading};
+pub use chain::AccelerationChain;
+pub use encoder::{Encoder, Normalisation, optimal_loading};
 pub use error::Error;
 pub use factor::RangeFactor;
 pub use fewbits_filters::{GridFilter, GridInfo, GridWorkspace};
 pub use guided::{GuidedGaussian, GuidedWorkspace};
 pub use labels::{LabelChain, ratio_second_moments};
 pub use linearised::{Linearised, QuantizationNoise, Velocity};
-pub use message::{KernelRule, ProductSampler, kernel_error};
-pub use message_passing::{DynamicsWeight, MessagePassing, MessageWorkspace, Ring, RingWeight};
-pub use particle::{Bootstrap, RaoBlackwellGuided, VelocityCloud, VelocityWorkspace};
+pub use message::{DynamicsWeight, KernelRule, Ring, RingWeight, kernel_error};
+pub use message_passing::{MessagePassing, MessageWorkspace};
+pub use product_sampler::ProductSampler;
+pub use quantized::{IntervalRule, QuantizedRange, RangeReference};
+pub use rao_blackwell::{RaoBlackwellGuided, VelocityCloud, VelocityWorkspace};
 pub use recording::{RangeEstimate, RangeSettings, RangeTracker, Travel};
 pub use ring::RingBias;
 pub use sensor::{BiasedRangeSensor, RangeNoise, RangeSensor};
-pub use target::{AccelerationChain, Manoeuvres, Target, WithManoeuvre};
-pub use tracker::{Network, Ranged, Reports, StepInfo, Tracker};
+pub use target::{Manoeuvres, Target, WithManoeuvre};
+pub use tracker::{Network, POSITION, Ranged, Reports, StepInfo, Tracker};
 pub use {nalgebra, rand};

@@ -4,9 +4,9 @@ use crate::Error;
 use crate::target::{Manoeuvres, Target};
 use crate::tracker::{Ranged, StepInfo, Tracker};
 use fewbits_core::Gaussian;
-use fewbits_numerics::linalg::symmetrised;
-use fewbits_numerics::normal::LN_SQRT_2PI;
-use nalgebra::{Matrix4, RowVector4, Vector4};
+use fewbits_filters::kalman;
+use fewbits_models::LinearSensor;
+use nalgebra::{Matrix1, Matrix4, RowVector4, Vector1, Vector4};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -76,8 +76,8 @@ impl Linearised {
     /// # Errors
     /// [`fewbits_core::Error::Impossible`] if the result is no number.
     pub fn update(&self, predicted: &Gaussian<4>, observed: &[Ranged]) -> Result<(Gaussian<4>, f64), Error> {
-        let mut log_likelihood = 0.0;
-        let (about, mut mean, mut covariance) = (*predicted.mean(), *predicted.mean(), *predicted.covariance());
+        let (mut next, mut log_likelihood) = (*predicted, 0.0);
+        let about = *predicted.mean();
         for range in observed {
             let Some((value, quantization)) = range.factor.reconstruction() else {
                 continue;
@@ -91,43 +91,32 @@ impl Linearised {
                     QuantizationNoise::Ignored => 0.0,
                     QuantizationNoise::Uniform => quantization,
                 };
-            let innovation = value - distance - (row * (mean - about))[0];
-            let cross = covariance * row.transpose();
-            let spread = (row * cross)[0] + noise;
-            if spread.is_nan() || spread <= 0.0 {
-                return Err(Error::IMPOSSIBLE);
-            }
-            let gain = cross / spread;
-            let keep = Matrix4::identity() - gain * row;
-            mean += gain * innovation;
-            covariance = symmetrised(&(keep * covariance * keep.transpose() + gain * gain.transpose() * noise));
-            log_likelihood -= 0.5 * innovation * innovation / spread + 0.5 * spread.ln() + LN_SQRT_2PI;
+            // The range as a linear function of the state about the predicted mean.
+            let sensing = LinearSensor::new(row, Matrix1::new(noise))?;
+            let measured = row * about + Vector1::new(value - distance);
+            let (updated, info) = kalman::update(&sensing, &next, &measured)?;
+            next = updated;
+            log_likelihood += info.log_likelihood;
         }
         if self.velocity == Velocity::Transfer {
-            (mean, covariance) = transferred(predicted, &mean, &covariance);
+            next = transferred(predicted, &next);
         }
-        if !mean.iter().chain(covariance.iter()).all(|x| x.is_finite()) {
+        if !next.is_finite() {
             return Err(Error::IMPOSSIBLE);
         }
-        Ok((Gaussian::from_trusted_parts(mean, covariance), log_likelihood))
+        Ok((next, log_likelihood))
     }
 }
 
 /// The position's update beside the predicted velocity.
-fn transferred(
-    predicted: &Gaussian<4>,
-    mean: &Vector4<f64>,
-    covariance: &Matrix4<f64>,
-) -> (Vector4<f64>, Matrix4<f64>) {
+fn transferred(predicted: &Gaussian<4>, updated: &Gaussian<4>) -> Gaussian<4> {
+    let (mean, own) = (updated.mean(), predicted.mean());
     let mut joined = Matrix4::zeros();
-    joined
-        .fixed_view_mut::<2, 2>(0, 0)
-        .copy_from(&covariance.fixed_view::<2, 2>(0, 0));
-    joined
-        .fixed_view_mut::<2, 2>(2, 2)
-        .copy_from(&predicted.covariance().fixed_view::<2, 2>(2, 2));
-    let own = predicted.mean();
-    (Vector4::new(mean[0], mean[1], own[2], own[3]), joined)
+    for (at, from) in [(0, updated), (2, predicted)] {
+        let block = from.covariance().fixed_view::<2, 2>(at, at);
+        joined.fixed_view_mut::<2, 2>(at, at).copy_from(&block);
+    }
+    Gaussian::from_trusted_parts(Vector4::new(mean[0], mean[1], own[2], own[3]), joined)
 }
 
 impl Tracker for Linearised {

@@ -4,7 +4,8 @@ use crate::Error;
 use crate::error::refuse;
 use crate::leader::lower_factor;
 use crate::linearised::Velocity;
-use crate::message::{Drawn, KernelMessage, KernelRule, ProductSampler, ProductWorkspace, kernel_of};
+use crate::message::{DynamicsWeight, KernelMessage, KernelRule, Ring, RingWeight, kernel_of};
+use crate::product_sampler::{Drawn, ProductSampler, ProductWorkspace};
 use crate::target::Target;
 use crate::tracker::{Ranged, StepInfo, Tracker};
 use fewbits_core::Gaussian;
@@ -15,38 +16,6 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
-
-/// From which bearings a ring message is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Ring {
-    /// All around, as printed.
-    Full,
-    /// Those where the prediction is.
-    Local,
-}
-
-/// Weights of the points of a ring message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum RingWeight {
-    /// All the same: a uniform bearing makes the plane density proportional to `l(d) / d` (erratum `mpa-3`).
-    Uniform,
-    /// The radius, so that the message is the likelihood `l(d)` over the plane.
-    Jacobian,
-    /// The printed ratio `sum_j f(x_i | X_j) / f(x_i | X_i)`.
-    PrintedRatio,
-}
-
-/// Weights of the predicted points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DynamicsWeight {
-    /// All the same: one draw from each component is an exact stratified sample (erratum `mpa-4`).
-    Uniform,
-    /// The printed ratio, evaluated on the position, where the transition has a density (erratum `mpa-16`).
-    PrintedRatio,
-}
 
 /// Particle message passing on the factor graph of one step.
 ///
@@ -276,7 +245,7 @@ impl MessagePassing {
 }
 
 /// `ln (sum_j f(x_i | X_j) / (N f(x_i | X_i)))` for every `i`, from `log_density(i, j)`: cost `N^2`.
-pub(crate) fn printed_ratios(log_weights: &mut [f64], logs: &mut Vec<f64>, log_density: impl Fn(usize, usize) -> f64) {
+fn printed_ratios(log_weights: &mut [f64], logs: &mut Vec<f64>, log_density: impl Fn(usize, usize) -> f64) {
     let n = log_weights.len();
     logs.resize(n, 0.0);
     for (i, log_weight) in log_weights.iter_mut().enumerate() {

@@ -3,11 +3,11 @@
 use crate::Error;
 use crate::error::refuse;
 use fewbits_core::columns::measurements_agree;
-use fewbits_core::{Columns, ColumnsMut, Sensing};
+use fewbits_core::{Columns, ColumnsMut, OnAxes, Sensing};
 use fewbits_numerics::error::{all_finite, finite, non_negative};
 use fewbits_numerics::kernels::vectorised;
 use fewbits_numerics::stored;
-use nalgebra::{Matrix1, SMatrix, SVector, Vector1, Vector2};
+use nalgebra::{Matrix1, RowVector2, RowVector3, Vector1, Vector2, Vector3};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
@@ -89,8 +89,8 @@ impl RangeNoise {
     }
 }
 
-/// A range sensor at a fixed place: `z = |p - n| + v`, `v` of the given [`RangeNoise`]. The position `p` is the first two
-/// coordinates of the state, whatever follows them.
+/// A range sensor at a fixed place: `z = |p - n| + v`, `v` of the given [`RangeNoise`]. It senses a position, two coordinates; in a larger
+/// state it is told which ones those are ([`RangeSensor::on_axes`]).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Place")]
 pub struct RangeSensor {
@@ -121,6 +121,22 @@ impl RangeSensor {
     pub fn new(position: Vector2<f64>, noise: RangeNoise) -> Result<Self, Error> {
         all_finite("position", position.as_slice())?;
         Ok(Self { position, noise })
+    }
+
+    /// The same sensor in a state of `D` coordinates that has the position at `axes`: `[0, 2]` for `[x, vx, y, vy]`.
+    ///
+    /// ```compile_fail
+    /// // A state of four coordinates is no position: without axes it does not compile.
+    /// use fewbits_core::Sensing;
+    /// use fewbits_pf_mpa::{RangeNoise, RangeSensor};
+    /// let sensor = RangeSensor::new([0.0, 0.0].into(), RangeNoise::constant(1.0).unwrap()).unwrap();
+    /// sensor.mean(&nalgebra::Vector4::new(3.0, 0.5, 4.0, 0.5));
+    /// ```
+    ///
+    /// # Errors
+    /// If an axis is not below `D`, or both are the same.
+    pub fn on_axes<const D: usize>(self, axes: [usize; 2]) -> Result<OnAxes<Self, D, 2>, Error> {
+        Ok(OnAxes::new(self, axes)?)
     }
 
     /// Where it stands.
@@ -189,74 +205,75 @@ impl RangeSensor {
     }
 }
 
-impl<const D: usize> Sensing<D, 1> for RangeSensor {
+impl Sensing<2, 1> for RangeSensor {
     #[inline]
-    fn mean(&self, state: &SVector<f64, D>) -> Vector1<f64> {
-        const { assert!(D >= 2, "the position takes two coordinates") };
-        Vector1::new(self.distance(state[0], state[1]))
+    fn mean(&self, place: &Vector2<f64>) -> Vector1<f64> {
+        Vector1::new(self.distance(place[0], place[1]))
     }
 
-    fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, 1, D> {
-        let direction = self.direction(state[0], state[1]);
-        let mut row = SMatrix::zeros();
-        row[0] = direction[0];
-        row[1] = direction[1];
-        row
+    fn jacobian(&self, place: &Vector2<f64>) -> RowVector2<f64> {
+        self.direction(place[0], place[1]).transpose()
     }
 
-    fn noise_covariance_at(&self, state: &SVector<f64, D>) -> Matrix1<f64> {
-        let deviation = self.noise.deviation(self.distance(state[0], state[1]));
+    fn noise_covariance_at(&self, place: &Vector2<f64>) -> Matrix1<f64> {
+        let deviation = self.noise.deviation(self.distance(place[0], place[1]));
         Matrix1::new(deviation * deviation)
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> Vector1<f64> {
-        Vector1::new(self.measure(rng, self.distance(state[0], state[1])))
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, place: &Vector2<f64>) -> Vector1<f64> {
+        Vector1::new(self.measure(rng, self.distance(place[0], place[1])))
     }
 
-    fn mean_columns(&self, states: &Columns<'_, D>, [means]: ColumnsMut<'_, 1>) {
-        if !measurements_agree(states, &mut [&mut *means]) {
+    fn mean_columns(&self, places: &Columns<'_, 2>, [means]: ColumnsMut<'_, 1>) {
+        if !measurements_agree(places, &mut [&mut *means]) {
             return;
         }
-        self.distances(states[0], states[1], means);
+        self.distances(places[0], places[1], means);
     }
 }
 
-/// A range sensor whose measurements are all too long by the third coordinate of the state: `z = |p - n| + b + v`. Its noise is
+/// A range sensor whose measurements are all too long by a bias: `z = |p - n| + b + v`, of the coordinates `[x, y, b]`. Its noise is
 /// taken at `|p - n| + b`, which is exact where it is constant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BiasedRangeSensor(pub RangeSensor);
 
-impl<const D: usize> Sensing<D, 1> for BiasedRangeSensor {
+impl BiasedRangeSensor {
+    /// The same sensor in a state of `D` coordinates that has position and bias at `axes`.
+    ///
+    /// # Errors
+    /// If an axis is not below `D`, or one is named twice.
+    pub fn on_axes<const D: usize>(self, axes: [usize; 3]) -> Result<OnAxes<Self, D, 3>, Error> {
+        Ok(OnAxes::new(self, axes)?)
+    }
+}
+
+impl Sensing<3, 1> for BiasedRangeSensor {
     #[inline]
-    fn mean(&self, state: &SVector<f64, D>) -> Vector1<f64> {
-        const { assert!(D >= 3, "the position takes two coordinates, the bias one") };
+    fn mean(&self, state: &Vector3<f64>) -> Vector1<f64> {
         Vector1::new(self.0.distance(state[0], state[1]) + state[2])
     }
 
-    fn jacobian(&self, state: &SVector<f64, D>) -> SMatrix<f64, 1, D> {
-        let mut row: SMatrix<f64, 1, D> = self.0.jacobian(state);
-        row[2] = 1.0;
-        row
+    fn jacobian(&self, state: &Vector3<f64>) -> RowVector3<f64> {
+        let direction = self.0.direction(state[0], state[1]);
+        RowVector3::new(direction[0], direction[1], 1.0)
     }
 
-    fn noise_covariance_at(&self, state: &SVector<f64, D>) -> Matrix1<f64> {
-        let mean: Vector1<f64> = self.mean(state);
-        let deviation = self.0.noise.deviation(mean[0]);
+    fn noise_covariance_at(&self, state: &Vector3<f64>) -> Matrix1<f64> {
+        let deviation = self.0.noise.deviation(self.mean(state)[0]);
         Matrix1::new(deviation * deviation)
     }
 
-    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &SVector<f64, D>) -> Vector1<f64> {
-        let mean: Vector1<f64> = self.mean(state);
-        Vector1::new(self.0.measure(rng, mean[0]))
+    fn sample<R: Rng + ?Sized>(&self, rng: &mut R, state: &Vector3<f64>) -> Vector1<f64> {
+        Vector1::new(self.0.measure(rng, self.mean(state)[0]))
     }
 
-    fn mean_columns(&self, states: &Columns<'_, D>, [means]: ColumnsMut<'_, 1>) {
+    fn mean_columns(&self, states: &Columns<'_, 3>, [means]: ColumnsMut<'_, 1>) {
         if !measurements_agree(states, &mut [&mut *means]) {
             return;
         }
         self.0.distances(states[0], states[1], means);
-        for (i, mean) in means.iter_mut().enumerate() {
-            *mean += states[2][i];
+        for (mean, bias) in means.iter_mut().zip(states[2]) {
+            *mean += bias;
         }
     }
 }
@@ -265,7 +282,6 @@ impl<const D: usize> Sensing<D, 1> for BiasedRangeSensor {
 mod tests {
     use super::*;
     use fewbits_core::laws::sensing;
-    use nalgebra::{Vector3, Vector4};
 
     fn sensor(noise: RangeNoise) -> RangeSensor {
         RangeSensor::new(Vector2::new(1.0, -2.0), noise).unwrap()
@@ -278,10 +294,12 @@ mod tests {
             RangeNoise::constant(0.4).unwrap(),
             RangeNoise::new(0.3, 0.1).unwrap(),
         ] {
-            let at = Vector4::new(4.0, 2.0, 9.0, 9.0);
-            sensing::is_consistent(&sensor(noise), &[at, Vector4::new(-3.0, 7.0, 0.0, 1.0)]).unwrap();
+            let at = nalgebra::Vector4::new(4.0, 9.0, 2.0, 9.0);
+            let sensed = sensor(noise).on_axes::<4>([0, 2]).unwrap();
+            assert_eq!(sensed.mean(&at)[0], 5.0);
+            sensing::is_consistent(&sensed, &[at, nalgebra::Vector4::new(-3.0, 0.0, 7.0, 1.0)]).unwrap();
             let mut rng = fewbits_monte_carlo::Stream::new(3).rng();
-            sensing::draws_have_the_law(&sensor(noise), &mut rng, &at, 20_000).unwrap();
+            sensing::draws_have_the_law(&sensed, &mut rng, &at, 20_000).unwrap();
             let biased = BiasedRangeSensor(sensor(noise));
             let at = Vector3::new(4.0, 2.0, 0.5);
             sensing::is_consistent(&biased, &[at]).unwrap();
@@ -315,6 +333,8 @@ mod tests {
         assert!(RangeNoise::constant(0.0).is_err() && RangeNoise::from_snr_db(-1e9).is_err());
         let noise = RangeNoise::constant(1.0).unwrap();
         assert!(RangeSensor::new(Vector2::new(f64::NAN, 0.0), noise).is_err());
+        assert!(sensor(noise).on_axes::<4>([0, 0]).is_err() && sensor(noise).on_axes::<4>([0, 4]).is_err());
+        assert!(BiasedRangeSensor(sensor(noise)).on_axes::<4>([0, 2, 2]).is_err());
         assert!(serde_json::from_str::<RangeNoise>(r#"{"constant":0,"relative":0}"#).is_err());
     }
 }

@@ -1,127 +1,18 @@
 //! A target that manoeuvres: constant velocity, pushed by white noise and by an acceleration that jumps between three values.
 
 use crate::Error;
+use crate::chain::AccelerationChain;
 use crate::error::refuse;
 use fewbits_core::{Dynamics, Gaussian};
-use fewbits_models::LinearGaussian;
-use fewbits_numerics::error::{non_negative, positive, probabilities};
+use fewbits_densities::Particles;
+use fewbits_filters::Imm;
+use fewbits_models::{AffineGaussian, LinearGaussian};
+use fewbits_numerics::error::{non_negative, positive};
 use fewbits_numerics::stored;
 use nalgebra::{Matrix4, Matrix4x2, SVector, Vector2, Vector4, Vector6};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
-
-/// The acceleration of one axis: an independent Markov chain on `(0, +g, -g)`, in this order.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "StoredChain", into = "StoredChain")]
-pub struct AccelerationChain {
-    magnitude: f64,
-    initial: [f64; 3],
-    transition: [[f64; 3]; 3],
-}
-
-stored! { AccelerationChain as StoredChain |chain| {
-    magnitude: f64 = chain.magnitude,
-    initial: [f64; 3] = chain.initial,
-    transition: [[f64; 3]; 3] = chain.transition,
-} => AccelerationChain::new(magnitude, initial, transition), Error }
-
-impl AccelerationChain {
-    /// A chain with accelerations `0`, `+magnitude`, `-magnitude` (length per time squared), the law `initial` of the one that
-    /// acts on the first step, and the rows of `transition` for "from".
-    ///
-    /// # Errors
-    /// If the magnitude is negative, or a law does not sum to one within `1e-9`.
-    pub fn new(magnitude: f64, initial: [f64; 3], transition: [[f64; 3]; 3]) -> Result<Self, Error> {
-        non_negative("magnitude", magnitude)?;
-        probabilities("initial", &initial)?;
-        for row in &transition {
-            probabilities("transition", row)?;
-        }
-        Ok(Self {
-            magnitude,
-            initial,
-            transition,
-        })
-    }
-
-    /// The printed chain for accelerations of the given magnitude.
-    ///
-    /// # Errors
-    /// If the magnitude is negative.
-    pub fn printed(magnitude: f64) -> Result<Self, Error> {
-        Self::new(magnitude, [0.7, 0.15, 0.15], [[0.6, 0.2, 0.2], [0.4, 0.5, 0.1], [0.4, 0.1, 0.5]])
-    }
-
-    /// `g`.
-    pub fn magnitude(&self) -> f64 {
-        self.magnitude
-    }
-
-    /// The three accelerations.
-    pub fn values(&self) -> [f64; 3] {
-        [0.0, self.magnitude, -self.magnitude]
-    }
-
-    /// Law of the acceleration that acts on step `k`, counted from zero: `Pr_0 Tr^k`, in `O(log k)`.
-    pub fn law(&self, k: usize) -> [f64; 3] {
-        // The bits of `k`, lowest first: at bit `b` the transition is `Tr^(2^b)`.
-        let (mut law, mut transition, mut left) = (self.initial, self.transition, k);
-        while left > 0 {
-            if left & 1 == 1 {
-                law = times(&law, &transition);
-            }
-            transition = transition.map(|row| times(&row, &transition));
-            left >>= 1;
-        }
-        law
-    }
-
-    /// Mean and variance of the acceleration that acts on step `k`.
-    pub fn moments(&self, k: usize) -> (f64, f64) {
-        let [_, up, down] = self.law(k);
-        let mean = self.magnitude * (up - down);
-        // Summed as positives: the variance cannot fall below zero.
-        let rest = (1.0 - up - down).max(0.0);
-        let (over, under) = (self.magnitude - mean, self.magnitude + mean);
-        (mean, rest * mean * mean + up * over * over + down * under * under)
-    }
-
-    /// A draw from the law of step `k`.
-    pub fn sample<R: Rng + ?Sized>(&self, rng: &mut R, k: usize) -> f64 {
-        draw(rng, &self.law(k), &self.values())
-    }
-
-    /// The acceleration that follows `now` (one of the three; anything else counts as the nearest).
-    pub fn next<R: Rng + ?Sized>(&self, rng: &mut R, now: f64) -> f64 {
-        let from = if now > 0.5 * self.magnitude {
-            1
-        } else if now < -0.5 * self.magnitude {
-            2
-        } else {
-            0
-        };
-        draw(rng, &self.transition[from], &self.values())
-    }
-}
-
-/// `row matrix`, scaled to sum to one as both do: squared again and again, rounding would take it away.
-fn times(row: &[f64; 3], matrix: &[[f64; 3]; 3]) -> [f64; 3] {
-    let product: [f64; 3] = std::array::from_fn(|j| (0..3).map(|i| row[i] * matrix[i][j]).sum());
-    let total: f64 = product.iter().sum();
-    product.map(|p| p / total)
-}
-
-fn draw<R: Rng + ?Sized>(rng: &mut R, law: &[f64; 3], values: &[f64; 3]) -> f64 {
-    let u: f64 = rng.random();
-    if u < law[0] {
-        values[0]
-    } else if u < law[0] + law[1] {
-        values[1]
-    } else {
-        values[2]
-    }
-}
 
 /// The target: state `[x, y, vx, vy]`, `X_k = F X_{k-1} + G a_k + G u_k`, `F = [[1, ts], [0, 1]]` and `G = [ts^2/2, ts]'` on each
 /// axis, `u ~ N(0, q)`, `a` of an [`AccelerationChain`].
@@ -133,31 +24,11 @@ pub struct Target {
     chain: AccelerationChain,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "Target", deny_unknown_fields)]
-struct StoredTarget {
-    interval: f64,
-    noise_variance: f64,
-    chain: AccelerationChain,
-}
-
-impl From<Target> for StoredTarget {
-    fn from(target: Target) -> Self {
-        Self {
-            interval: target.interval,
-            noise_variance: target.noise_variance,
-            chain: target.chain,
-        }
-    }
-}
-
-impl TryFrom<StoredTarget> for Target {
-    type Error = Error;
-
-    fn try_from(stored: StoredTarget) -> Result<Self, Error> {
-        Self::new(stored.interval, stored.noise_variance, stored.chain)
-    }
-}
+stored! { Target as StoredTarget |target| {
+    interval: f64 = target.interval,
+    noise_variance: f64 = target.noise_variance,
+    chain: AccelerationChain = target.chain,
+} => Target::new(interval, noise_variance, chain), Error }
 
 impl Target {
     /// A target observed every `interval`, pushed by white accelerations of variance `noise_variance` per axis.
@@ -233,6 +104,38 @@ impl Target {
         )
     }
 
+    /// Step `k` as dynamics, for any filter of Gaussians; manoeuvres count as noise of their mean and variance, or are left out.
+    ///
+    /// # Errors
+    /// If the covariance of the noise leaves the range of numbers.
+    pub fn motion(&self, k: usize, manoeuvres: Manoeuvres) -> Result<AffineGaussian<4>, Error> {
+        let (mean, variance) = match manoeuvres {
+            Manoeuvres::Ignored => (0.0, 0.0),
+            Manoeuvres::AsNoise => self.chain.moments(k),
+        };
+        self.pushed(&Vector2::repeat(mean), variance)
+    }
+
+    /// Step `k` under each pair of accelerations, as interacting multiple models: nine, the acceleration along y fastest. The first step's
+    /// are drawn anew, whatever the probabilities before it.
+    ///
+    /// # Errors
+    /// As [`motion`](Self::motion).
+    pub fn modes(&self, k: usize) -> Result<Imm<AffineGaussian<4>>, Error> {
+        let (values, axis) = (self.chain.values(), self.chain.transition(k));
+        let pairs = || (0..9).map(|mode| (mode / 3, mode % 3));
+        let models = pairs().map(|(x, y)| self.pushed(&Vector2::new(values[x], values[y]), 0.0));
+        let row = |(x, y): (usize, usize)| pairs().map(|(to_x, to_y)| axis[x][to_x] * axis[y][to_y]).collect();
+        Ok(Imm::new(models.collect::<Result<_, _>>()?, &pairs().map(row).collect::<Vec<Vec<f64>>>())?)
+    }
+
+    /// One step under accelerations of this mean and additional variance.
+    fn pushed(&self, acceleration: &Vector2<f64>, variance: f64) -> Result<AffineGaussian<4>, Error> {
+        let gain = self.gain();
+        let noise = gain * gain.transpose() * (self.noise_variance + variance);
+        Ok(AffineGaussian::new(self.transition(), gain * acceleration, noise)?)
+    }
+
     /// Moves a state by one step under the given accelerations.
     pub fn moved<R: Rng + ?Sized>(
         &self,
@@ -300,6 +203,26 @@ impl WithManoeuvre {
         Vector6::new(state[0], state[1], state[2], state[3], 0.0, 0.0)
     }
 
+    /// A cloud of `count` states before the first step.
+    ///
+    /// # Errors
+    /// If there is none, or the prior cannot be drawn from.
+    pub fn cloud<R: Rng + ?Sized>(rng: &mut R, prior: &Gaussian<4>, count: usize) -> Result<Particles<6>, Error> {
+        let states: Particles<4> = Particles::from_belief(rng, prior, count)?;
+        let mut next = 0;
+        Ok(Particles::from_draws(count, || {
+            let state = states.point(next).unwrap_or_else(|| *prior.mean());
+            next += 1;
+            Self::start(&state)
+        })?)
+    }
+
+    /// Mean and covariance of position and velocity.
+    pub fn estimate(cloud: &Particles<6>) -> Gaussian<4> {
+        let (mean, covariance) = (cloud.mean(), cloud.covariance());
+        Gaussian::from_trusted_parts(Vector4::from_fn(|i, _| mean[i]), Matrix4::from_fn(|i, j| covariance[(i, j)]))
+    }
+
     /// The acceleration that acts in this step after `last`.
     pub(crate) fn next<R: Rng + ?Sized>(&self, rng: &mut R, last: f64) -> f64 {
         match self.step {
@@ -312,12 +235,8 @@ impl WithManoeuvre {
     fn expected(&self, last: f64) -> f64 {
         let chain = &self.target.chain;
         let from = chain.values().iter().position(|v| *v == last).unwrap_or(0);
-        let law = if self.step == 0 {
-            chain.initial
-        } else {
-            chain.transition[from]
-        };
-        chain.magnitude * (law[1] - law[2])
+        let law = chain.transition(self.step)[from];
+        chain.magnitude() * (law[1] - law[2])
     }
 }
 
@@ -336,10 +255,7 @@ impl Dynamics<6> for WithManoeuvre {
     }
 }
 
-/// Positions of a track, refused if there is none.
-///
-/// # Errors
-/// If the list is empty.
+/// Refuses an empty list of sensors.
 pub(crate) fn at_least_one_sensor(count: usize) -> Result<(), Error> {
     if count == 0 {
         return refuse("sensors", "an empty list", "at least one sensor (three for an unambiguous position)");
@@ -350,23 +266,8 @@ pub(crate) fn at_least_one_sensor(count: usize) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fewbits_filters::{ImmBelief, extended_kalman};
     use fewbits_monte_carlo::Stream;
-
-    /// Defect: `law(k)` took `k` products; at 1e8 that is most of a second.
-    #[test]
-    fn laws_of_any_step_are_powers_of_the_transition() {
-        let chain = AccelerationChain::printed(0.1).unwrap();
-        let mut naive = chain.law(0);
-        for k in 0..40 {
-            let law = chain.law(k);
-            assert!((0..3).all(|i| (law[i] - naive[i]).abs() < 1e-14), "{k}: {law:?} {naive:?}");
-            naive = std::array::from_fn(|j| (0..3).map(|i| naive[i] * chain.transition[i][j]).sum());
-        }
-        // A chain that alternates has no fixed point: 1, 0, 1, 0 ...
-        let swap = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
-        let swapping = AccelerationChain::new(1.0, [1.0, 0.0, 0.0], swap).unwrap();
-        assert_eq!((swapping.law(usize::MAX), swapping.law(1 << 60)), ([0.0, 1.0, 0.0], [1.0, 0.0, 0.0]));
-    }
 
     #[test]
     fn particles_with_manoeuvres_have_their_mean() {
@@ -398,12 +299,36 @@ mod tests {
         assert!(target.simulate(&mut rng, start.mean(), 0).is_empty());
     }
 
+    /// The nine modes are the same world: their moments are those of manoeuvres as noise, their probabilities the chain's laws.
     #[test]
-    fn bad_chains_and_intervals_are_refused() {
+    fn modes_have_the_moments_of_the_target() {
+        let target = Target::printed().unwrap();
+        let start = Gaussian::new(Vector4::new(1.0, 2.0, 0.5, -0.5), Matrix4::identity() * 0.04).unwrap();
+        let (mut belief, mut workspace) = (ImmBelief::agreed(&start, 9).unwrap(), Default::default());
+        for k in 0..4 {
+            target
+                .modes(k)
+                .unwrap()
+                .predict_in_place(&mut belief, &mut workspace)
+                .unwrap();
+            let law = target.chain().law(k);
+            for (mode, p) in belief.probabilities().iter().enumerate() {
+                assert!((p - law[mode / 3] * law[mode % 3]).abs() < 1e-14, "{k} {mode}");
+            }
+            let motion = target.motion(k, Manoeuvres::AsNoise).unwrap();
+            if k == 0 {
+                let (own, expected) = (belief.moment_matched(), extended_kalman::predict(&motion, &start));
+                assert!((own.mean() - expected.mean()).amax() < 1e-14);
+                assert!((own.covariance() - expected.covariance()).amax() < 1e-14);
+                assert_eq!(expected.mean(), target.predict(&start, k, Manoeuvres::AsNoise).mean());
+            }
+        }
+    }
+
+    #[test]
+    fn bad_intervals_are_refused() {
         let printed = AccelerationChain::printed(0.1).unwrap();
         assert!(Target::new(0.0, 0.02, printed).is_err() && Target::new(1.0, -0.1, printed).is_err());
-        assert!(AccelerationChain::new(0.1, [0.7, 0.2, 0.2], printed.transition).is_err());
-        assert!(AccelerationChain::new(f64::NAN, printed.initial, printed.transition).is_err());
         let json = serde_json::to_string(&Target::printed().unwrap()).unwrap();
         assert_eq!(serde_json::from_str::<Target>(&json).unwrap(), Target::printed().unwrap());
     }

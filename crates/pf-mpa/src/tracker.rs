@@ -1,9 +1,10 @@
 //! What every tracker here does, and the sensors it tracks with.
 
 use crate::Error;
-use crate::encoder::{Encoder, QuantizedRange, RangeReference};
+use crate::encoder::Encoder;
 use crate::error::refuse;
 use crate::factor::RangeFactor;
+use crate::quantized::{QuantizedRange, RangeReference};
 use crate::sensor::RangeSensor;
 use crate::target::{Manoeuvres, Target, at_least_one_sensor};
 use fewbits_core::{Gaussian, Observed};
@@ -11,7 +12,10 @@ use nalgebra::Vector2;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// What one range sensor's report says about the state.
+/// Coordinates of the position in the states of [`Target`] and of [`WithManoeuvre`](crate::WithManoeuvre).
+pub const POSITION: [usize; 2] = [0, 1];
+
+/// What one range sensor's report says about the position.
 pub type Ranged = Observed<RangeSensor, RangeFactor, 1>;
 
 /// What a step reveals besides the new belief.
@@ -137,7 +141,10 @@ impl Network {
     pub fn references(&self, target: &Target, k: usize, previous: &Gaussian<4>) -> Result<Vec<RangeReference>, Error> {
         let predicted = target.predict(previous, k, Manoeuvres::AsNoise);
         let noise = self.scheme.noise();
-        let of = |s: &RangeSensor| self.encoder.reference(target, s, noise, previous, &predicted);
+        let of = |s: &RangeSensor| {
+            let sensor = s.on_axes::<4>(POSITION)?;
+            self.encoder.reference(target, &sensor, noise, previous, &predicted)
+        };
         self.sensors.iter().map(of).collect()
     }
 

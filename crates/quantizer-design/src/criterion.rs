@@ -23,6 +23,16 @@ pub enum Criterion {
     BayesError,
 }
 
+/// Which cells of the sample may share a level or a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum AllowedCells {
+    /// One interval for each.
+    #[default]
+    Intervals,
+    /// Several intervals for one: folded cells.
+    Any,
+}
+
 impl Criterion {
     /// `+1` if larger is better, `-1` if smaller is.
     pub fn sense(self) -> f64 {

@@ -1,14 +1,31 @@
 //! Joint design of the scalar quantizers of several sensors, and what follows from their symbols.
 //!
 //! Several sensors measure one unknown through noise, and each may report a few bits. Which cells should each sensor use so
-//! that together they say most? [`design::estimation`] and [`design::detection`] answer with sensible choices; everything behind it is for the specialist:
+//! that together they say most, and which word stands for which cell? Start with [`Request`]: it takes the prior and the noise
+//! ([`Scene`]), the bits of each sensor ([`Bits`]) and the link, and returns [`Solutions`], best first. A [`Solution`] encodes
+//! and decodes, and leaves the library as a table, JSON, a C header or Rust constants ([`Export`]).
+//!
+//! ```
+//! use fewbits_core::Link;
+//! use fewbits_quantizer_design::{Bits, Noise, Prior, Request, Scene};
+//!
+//! let scene = Scene::new(Prior::normal(20.0, 4.0)?, Noise::independent_with_deviations(&[1.0, 1.5])?)?;
+//! let solutions = Request::estimation(scene, Bits::Each(2), Link::flipping(0.02)?).run()?;
+//! let best = solutions.best();
+//! let words = best.encode(&[21.3, 22.0])?;
+//! let estimate = best.decoder(16)?.decode_symbols(&words)?;
+//! assert!((estimate.mean - 21.5).abs() < 2.0 && best.value() < 16.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! | module | what it holds |
 //! |---|---|
+//! | [`solve`] | requests, solutions, exports, designs for a box of scenes |
 //! | [`scene`], [`system`] | prior and noise; the sensors with their quantizers and channels |
-//! | [`design`] | algorithms: joint, greedy, cyclic, alternating, global for one sensor, folded cells, words, detection |
+//! | [`design`] | local design of given levels by Newton's method: all sensors at once, or one after the other |
 //! | [`decoder`], [`table`] | the posterior of the unknown, decisions and tests |
-//! | [`bounds`] | what no design can beat |
+//! | [`bounds`] | limits that no design can pass |
+//! | [`published`] | algorithms of the publications, to reproduce their tables |
 //!
 //! The central choice: **every figure of merit is computed exactly, never sampled.** Given the unknown (and a shared noise
 //! factor) the sensors are independent, so each joint outcome has a probability that is a one-dimensional sum of products of
@@ -46,6 +63,7 @@
 pub mod bounds;
 pub mod decoder;
 pub mod design;
+pub mod published;
 pub mod scene;
 pub mod solve;
 pub mod system;
@@ -62,11 +80,12 @@ mod moments;
 mod newton;
 mod problem;
 
-pub use criterion::Criterion;
+pub use criterion::{AllowedCells, Criterion};
 pub use derivatives::Derivatives;
 pub use error::Error;
 pub use fewbits_quantizers::{Channel, Labelling, Quantizer, Symbol, canonical, lloyd_max, quantizer};
 pub use newton::{AtSaddle, Certificate, Newton};
 pub use scene::{Noise, Prior, Scene};
+pub use solve::{Adc, Bits, Export, Progress, Request, Solution, Solutions};
 pub use system::{SensorGroup, System};
 pub use table::JointTable;

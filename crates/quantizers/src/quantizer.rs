@@ -61,10 +61,7 @@ pub fn check_increasing(breakpoints: &[f64]) -> Result<(), ArgumentError> {
 /// If `y` is NaN.
 #[inline]
 pub fn cell_of(breakpoints: &[f64], y: f64) -> Result<usize, Error> {
-    if y.is_nan() {
-        return refuse("measurement", y, "a number");
-    }
-    Ok(breakpoints.partition_point(|b| *b <= y))
+    Ok(fewbits_node::cell_of(breakpoints, y).map_err(ArgumentError::from)?)
 }
 
 impl Quantizer {

@@ -54,6 +54,10 @@ pub enum Error {
         /// The names that exist, with commas between them.
         existing: String,
     },
+    /// Arrow refused a batch.
+    #[cfg(feature = "arrow")]
+    #[error("no record batch")]
+    Batch(#[from] arrow_schema::ArrowError),
     /// The codec of values refused a sample that was checked before.
     #[error("column `{column}` cannot be coded")]
     Codec {

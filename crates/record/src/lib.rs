@@ -48,6 +48,8 @@
 //! Not here: how values are predicted and coded (`fewbits-adaptive`), text formats and the command line (`fewbits-cli`). The format
 //! is described byte by byte in `docs/record.md`.
 
+#[cfg(feature = "arrow")]
+pub mod arrow;
 mod block;
 mod bound;
 mod codec;

@@ -136,15 +136,18 @@ pub(crate) fn encode(ticks: &[i64], grid: &Grid) -> (TimeKind, Vec<u8>) {
 fn coded(ticks: &[i64], grid: &Grid) -> Option<Vec<u8>> {
     let (start, last) = (*ticks.first()?, *ticks.last()?);
     let steps = ticks.len() as i128 - 1;
-    // Exact times share a divisor; others may move by the tolerance either way.
-    let scale = match grid.tolerance {
-        0 => ticks
-            .iter()
-            .fold(0, |d, tick| greatest_common_divisor(d, tick.abs_diff(start)))
-            .max(1),
-        tolerance => 2 * tolerance + 1,
+    // Exact times share a divisor; others may move by the tolerance either way. Where the divisor is the coarser scale, whole seconds
+    // within a millisecond say, exact times are the shorter ones.
+    let divisor = ticks
+        .iter()
+        .fold(0, |d, tick| greatest_common_divisor(d, tick.abs_diff(start)))
+        .max(1);
+    let freedom = 2 * grid.tolerance + 1;
+    let (scale, unit) = if divisor >= freedom {
+        (divisor, i128::from(divisor))
+    } else {
+        (freedom, 1)
     };
-    let unit = if grid.tolerance == 0 { i128::from(scale) } else { 1 };
     let mean = (i128::from(last) - i128::from(start)) / (steps.max(1) * unit) * unit;
     let numbers = ticks.iter().enumerate().map(|(row, tick)| {
         let rest = i128::from(*tick) - i128::from(start) - mean * row as i128;

@@ -7,9 +7,7 @@
 use crate::linear::{JonkerVolgenant, LinearAssignment};
 use crate::{CodedSensors, Error, pair_costs};
 use fewbits_core::Link;
-use fewbits_quantizer_design::Scene;
-use fewbits_quantizer_design::design::AllowedCells;
-use fewbits_quantizer_design::solve::{Bits, Request};
+use fewbits_quantizer_design::{AllowedCells, Bits, Request, Scene};
 
 /// Breakpoints of a sensor, and the word of each cell.
 pub type BitCells = (Vec<f64>, Vec<usize>);

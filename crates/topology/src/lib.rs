@@ -2,7 +2,7 @@
 //!
 //! | question | answer |
 //! |---|---|
-//! | where do the sensors stand | [`Deployment`]: uniform, grid, jittered grid, Poisson disk, given |
+//! | where do the sensors stand | [`Deployment`]: uniform, grid, given |
 //! | who is in radio range of whom | [`Graph`], built in time and memory linear in nodes and edges |
 //! | how far, in hops, and by which way | [`Hops`]: breadth-first distances and the routing tree they form |
 //! | is the network in one piece | [`Graph::components`] |

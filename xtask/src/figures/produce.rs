@@ -50,6 +50,9 @@ mod tests {
         fn measures_time(&self) -> bool {
             false
         }
+        fn world(&self) -> Option<&'static str> {
+            None
+        }
         fn parameters(&self) -> Vec<Parameter> {
             Vec::new()
         }

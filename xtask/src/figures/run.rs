@@ -7,7 +7,7 @@ use super::select::Job;
 use super::times::expected_seconds;
 use super::write::{Directory, Summary};
 use super::{Ending, Error, Options, reuse, serve, write};
-use fewbits_experiments::Context;
+use fewbits_experiments::{Context, Kept};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -26,6 +26,7 @@ struct Run<'a> {
     pool: rayon::ThreadPool,
     progress: Progress,
     started: Instant,
+    kept: Kept,
     /// Place of each job in the order of the figures.
     finished: Mutex<Finished>,
 }
@@ -89,6 +90,7 @@ pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options) -> Result<En
         pool,
         progress,
         started: Instant::now(),
+        kept: Kept::default(),
         finished: Mutex::new(finished),
     };
     let server = options.serve.then(|| serve::Server::start(out.path())).transpose()?;
@@ -139,6 +141,7 @@ impl Run<'_> {
             progress: Some(&report),
             cancel: Some(&STOP),
             read: Some(&read),
+            kept: Some(&self.kept),
         };
         let result = produce(&self.pool, planned.job, &context);
         let threads = self.pool.current_num_threads();
@@ -168,12 +171,21 @@ impl Run<'_> {
 
     /// Runs figures on as many threads as the pool has.
     fn side_by_side(&self, planned: &[&Planned<'_>]) {
+        // Figures of one world follow one another, from the place of the longest.
+        let mut worlds: Vec<Vec<&Planned<'_>>> = Vec::new();
+        for figure in planned {
+            let world = figure.job.figure.world();
+            match worlds.iter_mut().find(|w| world.is_some() && w[0].job.figure.world() == world) {
+                Some(shared) => shared.push(figure),
+                None => worlds.push(vec![figure]),
+            }
+        }
         let next = AtomicUsize::new(0);
         std::thread::scope(|scope| {
-            for _ in 0..self.pool.current_num_threads().min(planned.len()) {
+            for _ in 0..self.pool.current_num_threads().min(worlds.len()) {
                 scope.spawn(|| {
-                    while let Some(planned) = planned.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        self.make(planned);
+                    while let Some(world) = worlds.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        world.iter().for_each(|planned| self.make(planned));
                     }
                 });
             }

@@ -1,11 +1,11 @@
 //! Laws of the next index: what each expert says about the probability below and above an edge.
 //!
-//! Positions are relative to the last index. All laws are logistic, as those of [`crate::bank`], whose 24 filters [`Filters`] runs in
+//! Positions are relative to the last index. All laws are logistic, as those of [`fewbits_node::adaptive::Bank`], whose 24 filters [`Filters`] runs in
 //! `f32`.
 
 use super::elementary::exp2;
 use super::priors::FILTER_WEIGHTS;
-use crate::bank::{DECAYS, MODELS, SCALES, steady_gains};
+use fewbits_node::adaptive::{DECAYS, MODELS, SCALES, steady_gains};
 use fewbits_numerics::kernels::vectorised;
 use std::sync::LazyLock;
 

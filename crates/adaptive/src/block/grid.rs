@@ -1,8 +1,8 @@
 //! Which points a block's reconstructions are: from samples to whole numbers and back.
 
 use crate::Config;
-use crate::packet::TENS;
 use fewbits_core::CodecError;
+use fewbits_node::adaptive::TENS;
 
 /// Largest decimal digits of a sample: their sums stay whole doubles.
 const LARGEST_DIGITS: f64 = (1_u64 << 51) as f64;

@@ -320,7 +320,7 @@ impl BlockCodec {
         let grid = match (kind, self.accuracy) {
             (SAMPLES, _) => None,
             (decimals @ 0..DECIMALS, _) if second & 2 == 0 => {
-                let width = Grid::width(self.delta(), crate::packet::TENS[usize::from(decimals)]);
+                let width = Grid::width(self.delta(), fewbits_node::adaptive::TENS[usize::from(decimals)]);
                 let width = width.ok_or_else(|| invalid("decimals", decimals, "a grid not finer than the samples"))?;
                 Some(Grid::Decimal { decimals, width })
             }

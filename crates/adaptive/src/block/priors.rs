@@ -5,7 +5,7 @@
 //! lengths differ by less than .2 % from these. They are part of the format: other numbers read other samples.
 
 use super::mixer::WEIGHTS;
-use crate::bank::MODELS;
+use fewbits_node::adaptive::MODELS;
 
 /// Weights of the filters: random walks, then velocities that decay by 0.6 and 0.95 a slot, each by increasing scale.
 #[rustfmt::skip]

@@ -1,4 +1,4 @@
-//! Neither half allocates once it has started.
+//! Neither half allocates.
 
 use super::common::mixed;
 use allocation_counter::measure;
@@ -6,7 +6,7 @@ use fewbits_adaptive::{Config, Receiver, Sensor};
 
 #[test]
 fn samples_and_reports_allocate_nothing() {
-    assert!(size_of::<Sensor>() <= 1024);
+    assert!(size_of::<Sensor>() <= 4096);
     let line = Config::new(0.05).unwrap();
     for config in [line, line.circular(7.0).unwrap(), line.resilient(4, Some(100)).unwrap()] {
         let (mut sensor, mut receiver) = (Sensor::new(config), Receiver::new(config));
@@ -15,9 +15,7 @@ fn samples_and_reports_allocate_nothing() {
             let report = sensor.encode(sample).unwrap();
             receiver.receive(&report.map(|r| r.packet).into()).unwrap();
         };
-        let first = measure(|| one(samples[0]));
-        // Values and residuals of both.
-        assert_eq!(first.bytes_total, 2 * (256 * (8 + 4) + 3 * 129 * 2));
+        assert_eq!(measure(|| one(samples[0])).count_total, 0);
         let used = measure(|| {
             samples
                 .iter()

@@ -15,3 +15,4 @@ mod recording;
 mod replicas;
 mod scheme;
 mod tuning;
+mod wild;

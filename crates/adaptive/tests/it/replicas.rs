@@ -110,6 +110,24 @@ fn sensors_stored_as_text_go_on_with_the_same_bits() {
     }
 }
 
+#[test]
+fn fixed_rates_stored_as_text_go_on_with_the_same_bits() {
+    for bits in 1..=3 {
+        let (mut sensor, mut receiver) =
+            (FixedRate::new(bits, 0.3, 20.0).unwrap(), FixedRate::new(bits, 0.3, 20.0).unwrap());
+        for sample in mixed(12, 700) {
+            let word = sensor.encode(sample).unwrap();
+            let stored = serde_json::to_value(&receiver).unwrap();
+            assert!(!holds_a_float(&stored));
+            receiver = serde_json::from_str(&stored.to_string()).unwrap();
+            assert_eq!(receiver.receive(word).unwrap().to_bits(), sensor.estimate().to_bits());
+        }
+        let mut strange = serde_json::to_value(&sensor).unwrap();
+        strange["belief"] = serde_json::json!({"probabilities": [1.0], "modes": [{"mean": [0.0, 0.0], "covariance": [1.0, 0.0, 0.0, 1.0]}]});
+        assert!(serde_json::from_value::<FixedRate>(strange).is_err());
+    }
+}
+
 /// Packets survive as bits, their lengths are less than a bit above the ideal ones, and a stream is within one percent.
 #[test]
 fn lengths_are_what_they_should_be() {

@@ -3,7 +3,7 @@
 use super::rate_distortion::ConditionalMean;
 use crate::Error;
 use crate::Source;
-use crate::source::noise_in_range;
+use crate::observation::source::noise_in_range;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::newton;

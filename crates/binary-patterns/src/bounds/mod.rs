@@ -16,9 +16,9 @@ pub use centralised::{centralised_bound, centralised_bound_of_levels};
 pub use rate_distortion::{ConditionalMean, RemoteDistortion, network_rate_distortion, remote_distortion};
 pub use van_trees::optimal_weight_van_trees;
 
-use super::Bank;
-use super::source::{Kind, Nodes};
+use crate::Bank;
 use crate::Error;
+use crate::observation::source::{Kind, Nodes};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::quadrature::gauss_legendre;
 

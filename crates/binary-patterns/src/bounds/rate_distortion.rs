@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::Source;
-use crate::source::Kind;
-use crate::source::noise_in_range;
+use crate::observation::source::Kind;
+use crate::observation::source::noise_in_range;
 use fewbits_numerics::error::{at_least_one, non_negative};
 use fewbits_numerics::normal::{interval, pdf, truncated_moments};
 use fewbits_numerics::quadrature::gauss_legendre;

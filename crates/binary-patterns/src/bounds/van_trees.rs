@@ -1,6 +1,6 @@
 //! The Bayesian Cramer-Rao bound with the best weight function.
 
-use crate::source::{Blur, Kind};
+use crate::observation::source::{Blur, Kind};
 use crate::{Bank, Error};
 use fewbits_numerics::newton;
 use std::f64::consts::PI;

@@ -2,9 +2,9 @@
 
 use super::outcomes::{Outcomes, SEARCH_PANEL};
 use crate::Error;
-use crate::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
-use crate::source::noise_in_range;
-use crate::source::{Blur, Nodes};
+use crate::observation::bank::{CountTable, IMPOSSIBLE, MAX_OUTCOMES};
+use crate::observation::source::noise_in_range;
+use crate::observation::source::{Blur, Nodes};
 use crate::{Bank, BinaryQuantizer, Grid, Pattern, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
@@ -314,9 +314,9 @@ impl<'a> Kernel<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{linear_pattern, rank};
     use super::super::LinearSearch;
     use super::*;
+    use crate::{linear_pattern, rank};
     use approx::assert_relative_eq;
 
     fn masks(grid: &Grid) -> Vec<BinaryQuantizer> {

@@ -3,10 +3,10 @@
 use super::lbfgs::{Stop, minimise};
 use super::outcomes::SEARCH_PANEL;
 use crate::Error;
-use crate::bank::IMPOSSIBLE;
-use crate::decoder::moments;
-use crate::linear::grid_bits;
-use crate::source::Nodes;
+use crate::decoding::decoder::moments;
+use crate::observation::bank::IMPOSSIBLE;
+use crate::observation::source::Nodes;
+use crate::patterns::linear::grid_bits;
 use crate::{Bank, BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;

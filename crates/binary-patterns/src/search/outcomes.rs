@@ -1,6 +1,6 @@
 //! Joint outcomes on the nodes of a search.
 
-use crate::bank::CountTable;
+use crate::observation::bank::CountTable;
 use nalgebra::{DMatrixView, DMatrixViewMut, Dyn, Matrix, Storage};
 
 /// Nodes for searching: half the width of the final ones suffices with fewer points, to about `1e-10`.

@@ -25,7 +25,9 @@ pub struct Ellipsoid<const M: usize> {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers<const M: usize> {
+    #[serde(with = "fewbits_numerics::stored")]
     innovation_covariance: SMatrix<f64, M, M>,
+    #[serde(with = "fewbits_numerics::stored")]
     threshold: f64,
 }
 

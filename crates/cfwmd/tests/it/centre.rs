@@ -3,7 +3,7 @@
 use fewbits_cfwmd::scheme::{CovarianceFeedback, Prediction};
 use fewbits_core::{Dynamics, Evolution, Gaussian, Link, NumberFormat, Observation, SchemeNode, Sensing, SensorNode};
 use fewbits_filters::MomentFilter;
-use fewbits_filters::centre::{Event, Failures, FusionCentre, Reporting, Slot};
+use fewbits_filters::centre::{Event, FusionCentre, Reporting, Slot};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::{Moments, Stream};
 use rand::RngExt;
@@ -19,19 +19,14 @@ struct Outcome {
     wrong: usize,
 }
 
-/// Ten sensors that send when their innovation exceeds `threshold`; eight die after 100 of `slots` slots.
-fn run(loss: f64, threshold: f64, slots: u32, seed: u64) -> Outcome {
+/// Ten sensors that send when their innovation exceeds one deviation; eight die after 100 of `slots` slots.
+fn run(loss: f64, slots: u32, seed: u64) -> Outcome {
     let (mut rng, mut world) = (Stream::new(seed).named("centre").rng(), Stream::new(seed).named("world").rng());
     let model = ContinuousLinear::ornstein_uhlenbeck(0.0, 20.0, 10.0).unwrap();
     let sensing = LinearSensor::direct(1.0).unwrap();
-    let scheme = CovarianceFeedback::new(sensing, threshold, NumberFormat::Double).unwrap();
+    let scheme = CovarianceFeedback::new(sensing, 1.0, NumberFormat::Double).unwrap();
     let prior = Gaussian::scalar(0.0, 10.0).unwrap();
     let mut centre = FusionCentre::new(&mut rng, model, MomentFilter, &prior).unwrap();
-    let failures = Failures {
-        rate: 1e-3,
-        ..Failures::default()
-    };
-    centre = centre.with_failures(failures).unwrap();
     let mut nodes = Vec::new();
     for number in 0..SENSORS {
         let ask = |state: &Gaussian<1>, _: &Gaussian<1>| Prediction(*state);
@@ -85,7 +80,7 @@ fn eight_of_ten_dead_sensors_are_named() {
     for loss in [0.0, 0.2] {
         let (mut nees, mut named, mut wrong) = (Moments::default(), 0, 0);
         for seed in 0..10 {
-            let outcome = run(loss, 1.0, 600, seed);
+            let outcome = run(loss, 600, seed);
             nees.merge(&outcome.nees);
             named += outcome.delays.iter().filter(|delay| **delay <= 100).count();
             wrong += outcome.wrong;
@@ -99,12 +94,24 @@ fn eight_of_ten_dead_sensors_are_named() {
     }
 }
 
+/// Defect: each sensor was doubted alone, and at one failure in 10^4 seconds the silence of eight dead ones was believed for 24 slots:
+/// NEES 1.55 over the 100 slots after their deaths.
+#[test]
+fn sensors_that_die_together_are_doubted_together() {
+    let mut nees = Moments::default();
+    for seed in 0..40 {
+        nees.merge(&run(0.2, 200, 2000 + seed).nees);
+    }
+    println!("NEES over the 100 slots after the deaths: {:.3}", nees.mean());
+    assert!(nees.mean() < 1.3, "NEES {}", nees.mean());
+}
+
 #[test]
 fn working_sensors_are_seldom_named_dead() {
     // 10 sensors, 100 slots before the deaths of `run`; all living is every slot up to then.
     let mut wrong = 0;
     for seed in 0..100 {
-        wrong += run(0.2, 1.0, DEATH, 1000 + seed).wrong;
+        wrong += run(0.2, DEATH, 1000 + seed).wrong;
     }
     // 10^5 sensor slots at 10^-4: ten; Poisson's 4 deviations.
     assert!(wrong <= 23, "{wrong} in 10^5");

@@ -1,7 +1,7 @@
 //! Fusion with feedback: the Gaussian, the particle and the Rao-Blackwellised centre against each other and exact limits.
 
 use fewbits_cfwmd::Error;
-use fewbits_cfwmd::network::{Network, gather};
+use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
 use fewbits_cfwmd::schedule::expected_covariances;
 use fewbits_cfwmd::threshold::Budget;
@@ -366,17 +366,6 @@ fn the_rate_is_met_without_feedback_of_any_kind() {
         })
         .collect();
     assert!(rate.estimate().z_score(0.3).abs() < 4.0, "{:?}", rate.estimate());
-}
-
-#[test]
-fn a_step_is_gathered_by_sensor() {
-    let value = Vector1::new(2.0);
-    let nothing = Observation::Nothing;
-    assert_eq!(gather(3, [(2, value)]).unwrap(), [nothing, nothing, Observation::Received(value)]);
-    assert_eq!(gather::<1>(2, []).unwrap(), [nothing; 2]);
-    assert_eq!(gather(2, [(2, value)]), Err(Error::UnknownSensor { sensor: 2, sensors: 2 }));
-    assert_eq!(gather(2, [(1, value), (1, value)]), Err(Error::ReportedTwice { sensor: 1 }));
-    assert!(gather(1, [(0, Vector1::new(f64::INFINITY))]).is_err());
 }
 
 /// A known start and rank-one process noise: the measured components of the first step are one number.

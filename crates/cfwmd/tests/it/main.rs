@@ -7,6 +7,7 @@ mod centre;
 mod fixtures;
 mod fusion;
 mod no_feedback;
+mod node;
 mod schemes;
 mod silence;
 mod wild;

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod design;
+mod pages;
+mod track;
 mod fleet;
 
 use std::io::{BufRead, BufReader, Write};
@@ -149,7 +152,12 @@ fn info_and_plan_speak_of_columns() {
         (&1000.into(), &true.into(), &11.into())
     );
     assert!(text(&good(&folder, &["info", "a.fewb"], b"")).contains("direction: ±2@360"));
-    let plan = good(&folder, &["plan", "a.csv", "--time", "exact", "--json"], b"");
+    let plan = good(&folder, &["plan", "a.csv", "--time", "exact", "--json", "--plot", "plan.svg"], b"");
+    assert!(
+        std::fs::read_to_string(folder.join("plan.svg"))
+            .unwrap()
+            .contains("direction")
+    );
     let plan: serde_json::Value = serde_json::from_slice(&plan).unwrap();
     assert_eq!(plan["columns"][2]["name"], "price");
     assert!((plan["columns"][2]["steps"][0].as_f64().unwrap() - 0.001).abs() < 1e-9);
@@ -226,6 +234,53 @@ fn refusals_name_file_row_column_and_mend() {
     assert!(message.contains("more than 53 bits"), "{message}");
 }
 
+#[cfg(not(feature = "parquet"))]
+#[test]
+fn parquet_names_the_missing_feature() {
+    let (_kept, folder) = folder();
+    good(&folder, &["pack", "a.csv", "-o", "a.fewb"], b"");
+    let message = refused(&folder, &["unpack", "a.fewb", "-o", "a.parquet"], b"");
+    assert!(
+        message.contains("a.parquet: this program was built without Parquet") && message.contains("--features parquet")
+    );
+    std::fs::write(folder.join("table"), b"PAR1....PAR1").unwrap();
+    assert!(refused(&folder, &["pack", "table", "-o", "x"], b"").contains("--features parquet"));
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn parquet_returns_what_it_holds() {
+    let (_kept, folder) = folder();
+    good(&folder, &["pack", "a.csv", "--time", "exact", "-o", "a.fewb"], b"");
+    let csv = text(&good(&folder, &["unpack", "a.fewb"], b""));
+    good(&folder, &["unpack", "a.fewb", "-o", "a.parquet"], b"");
+    good(
+        &folder,
+        &[
+            "pack",
+            "a.parquet",
+            "--columns",
+            "temp,flow,price,direction",
+            "-o",
+            "b.fewb",
+        ],
+        b"",
+    );
+    let values = |text: &str| -> Vec<String> {
+        text.lines()
+            .skip(1)
+            .map(|line| line.split_once(',').map_or("", |cells| cells.1).to_owned())
+            .collect()
+    };
+    let again = text(&good(&folder, &["unpack", "b.fewb"], b""));
+    assert!(again.lines().skip(1).eq(values(&csv)));
+    let times = good(&folder, &["pack", "a.parquet", "--time", "exact"], b"");
+    assert_eq!(text(&good(&folder, &["unpack", "-"], &times)), csv);
+    good(&folder, &["cat", "a.fewb", "--columns", "price,temp", "-o", "c.parquet"], b"");
+    let message = refused(&folder, &["pack", "c.parquet", "--bound", "flow=1%", "-o", "x"], b"");
+    assert!(message.contains("there are time, price, temp"), "{message}");
+}
+
 #[test]
 fn sent_stream_is_received() {
     let (_kept, folder) = folder();
@@ -270,6 +325,49 @@ fn datagrams_are_received() {
     assert!(received.lines().count() > 150, "{} lines", received.lines().count());
 }
 
+/// A named pipe stands for a serial line: what begins in the middle, and noise, cost whole frames only.
+#[cfg(unix)]
+#[test]
+fn serial_line_is_received() {
+    let (_kept, folder) = folder();
+    if !Command::new("mkfifo")
+        .arg("line")
+        .current_dir(&folder)
+        .status()
+        .is_ok_and(|status| status.success())
+    {
+        return;
+    }
+    let receiver = Command::new(env!("CARGO_BIN_EXE_fewbits"))
+        .args(["receive", "--serial", "line", "--timeout", "2s"])
+        .current_dir(&folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut noise = std::fs::OpenOptions::new()
+        .write(true)
+        .open(folder.join("line"))
+        .unwrap();
+    noise.write_all(b"\x07noise\x00\x00\xff").unwrap();
+    let words = [
+        "send",
+        "-",
+        "--bound",
+        BOUND,
+        "--max-bytes",
+        "200",
+        "--serial",
+        "line",
+        "--header-every",
+        "4",
+    ];
+    good(&folder, &words, table().as_bytes());
+    let received = text(&receiver.wait_with_output().unwrap().stdout);
+    // The noise is one frame with the first piece of the header, which comes again.
+    assert_eq!(received.lines().count(), 1001);
+}
+
 #[test]
 fn completions_and_manual_are_generated() {
     let (_kept, folder) = folder();
@@ -277,4 +375,8 @@ fn completions_and_manual_are_generated() {
         assert!(text(&good(&folder, &["generate", shell], b"")).contains("rows-per-block"));
     }
     assert!(text(&good(&folder, &["generate", "man"], b"")).starts_with(".ie"));
+    good(&folder, &["generate", "man", "--folder", "."], b"");
+    for page in ["fewbits.1", "fewbits-track.1", "fewbits-design.1", "fewbits-pack.1"] {
+        assert!(folder.join(page).is_file(), "{page}");
+    }
 }

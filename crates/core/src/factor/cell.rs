@@ -38,8 +38,11 @@ pub struct InCell {
 #[cfg(feature = "serde")]
 stored! { InCell as Numbers |factor| {
     cell: Cell = factor.cell,
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64 = factor.variance,
+    #[serde(with = "fewbits_numerics::stored")]
     floor: f64 = factor.floor,
+    #[serde(with = "fewbits_numerics::stored")]
     share: f64 = factor.share,
 } => InCell::new(cell, noise_variance, floor, share), ArgumentError }
 

@@ -63,6 +63,12 @@ pub trait Factor<const M: usize> {
     /// [`Error::Impossible`] if the observation has probability zero under the prior; [`Error::NotANumber`] if the prior or the likelihood
     /// leaves the range of numbers; [`Error::NotConverged`].
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error>;
+
+    /// This factor as one of the kinds of [`Scalar`] times `exp` of a number; `None` for other kinds. Filters that impute measurements
+    /// ask for it.
+    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+        None
+    }
 }
 
 /// The posterior of a noise-free measurement: `N(m; prior) p(observation | m) / evidence`.
@@ -123,5 +129,9 @@ impl<const M: usize, F: Factor<M> + ?Sized> Factor<M> for &F {
 
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         (**self).tilted(prior)
+    }
+
+    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+        (**self).as_scalar()
     }
 }

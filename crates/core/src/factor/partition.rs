@@ -30,8 +30,11 @@ pub struct Partition {
 
 #[cfg(feature = "serde")]
 stored! { Partition as Numbers |factor| {
+    #[serde(with = "fewbits_numerics::stored")]
     edges: Vec<f64> = factor.edges,
+    #[serde(with = "fewbits_numerics::stored")]
     given_cell: Vec<f64> = factor.given_cell,
+    #[serde(with = "fewbits_numerics::stored")]
     noise_variance: f64 = factor.variance,
 } => Partition::new(edges, given_cell, noise_variance), ArgumentError }
 

@@ -1,7 +1,7 @@
 //! Reports that may have nothing to do with the measurement.
 
 use super::{Factor, Tilted};
-use crate::columns::Columns;
+use crate::columns::{Columns, lengths_agree};
 use crate::error::Error;
 use crate::gaussian::Gaussian;
 use fewbits_numerics::ArgumentError;
@@ -62,6 +62,9 @@ impl<const M: usize, F: Factor<M>> Factor<M> for Robust<F> {
 
     fn add_log_likelihoods(&self, means: &Columns<'_, M>, log_weights: &mut [f64]) {
         const BLOCK: usize = 256;
+        if !lengths_agree(means, log_weights) {
+            return;
+        }
         let mut own = [0.0; BLOCK];
         for (block, log_weights) in log_weights.chunks_mut(BLOCK).enumerate() {
             let (start, own) = (block * BLOCK, &mut own[..log_weights.len()]);
@@ -83,12 +86,17 @@ impl<const M: usize, F: Factor<M>> Factor<M> for Robust<F> {
         let log_evidence = self.mixed(own.log_evidence);
         let share = (own.log_evidence + self.log_genuine - log_evidence).exp();
         let offset = own.mean - prior.mean();
+        let mean = prior.mean() + offset * share;
+        let covariance = own.covariance * share
+            + prior.covariance() * (1.0 - share)
+            + offset * offset.transpose() * (share * (1.0 - share));
+        if !(log_evidence.is_finite() && mean.iter().chain(covariance.iter()).all(|x| x.is_finite())) {
+            return Err(Error::NotANumber { what: "the posterior" });
+        }
         Ok(Tilted {
             log_evidence,
-            mean: prior.mean() + offset * share,
-            covariance: own.covariance * share
-                + prior.covariance() * (1.0 - share)
-                + offset * offset.transpose() * (share * (1.0 - share)),
+            mean,
+            covariance,
         })
     }
 }

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(transparent))]
 pub struct Constant {
+    #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
     probability: f64,
 }
 
@@ -54,6 +55,10 @@ impl<const M: usize> Factor<M> for Constant {
 
     fn tilted(&self, prior: &Gaussian<M>) -> Result<Tilted<M>, Error> {
         Tilted::unchanged(prior, self.probability.ln())
+    }
+
+    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+        Some(((*self).into(), 0.0))
     }
 }
 
@@ -162,6 +167,10 @@ impl Factor<1> for Scalar {
 
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         delegate!(self, factor => factor.tilted(prior))
+    }
+
+    fn as_scalar(&self) -> Option<(Scalar, f64)> {
+        Some((self.clone(), 0.0))
     }
 }
 

@@ -6,7 +6,7 @@ use crate::gaussian::FactoredGaussian;
 use nalgebra::SVector;
 use rand::Rng;
 
-/// Draws have the belief's mean and covariance, entry by entry within four standard errors.
+/// Draws have the belief's mean and covariance, entry by entry within four standard errors; draws into columns of unequal lengths are NaN.
 ///
 /// # Errors
 /// The entry that disagrees.
@@ -33,11 +33,23 @@ pub fn samples_have_the_moments<const D: usize, R: Rng + ?Sized>(
             product.check("samples have the covariance of their belief", at, covariance[(i, j)], slack)?;
         }
     }
+    if D > 1 {
+        let mut columns: [Vec<f64>; D] = std::array::from_fn(|d| vec![0.25; 3 + d % 2]);
+        belief.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
+        not_a_number("draws into columns of unequal lengths are NaN", columns.iter().flatten())?;
+    }
     Ok(())
 }
 
+fn not_a_number<'a>(law: &'static str, mut numbers: impl Iterator<Item = &'a f64>) -> Result<(), Violation> {
+    match numbers.find(|x| !x.is_nan()) {
+        Some(number) => Err(Violation::new(law, number, "NaN")),
+        None => Ok(()),
+    }
+}
+
 /// The density integrates to one, by importance sampling from `proposal` (which should be wider than the belief), within four
-/// standard errors; and the sweep adds what the scalar function returns.
+/// standard errors; and the sweep adds what the scalar function returns, or NaN where lengths differ.
 ///
 /// # Errors
 /// The integral found, or the state at which the sweep disagrees.
@@ -57,6 +69,11 @@ pub fn density_integrates_to_one<const D: usize, R: Rng + ?Sized>(
         let alone = belief.log_density(&x);
         agree("a sweep is the scalar", format!("{x:?}"), logs[i], 0.25 + alone, 1e-12, 1.0)?;
         total.add((alone - proposal.log_pdf(&x)).exp());
+    }
+    for length in [draws + 1, draws.saturating_sub(1)] {
+        let mut logs = vec![0.25; length];
+        belief.add_log_densities(&columns.each_ref().map(Vec::as_slice), &mut logs);
+        not_a_number("a sweep over slices of unequal lengths writes NaN", logs.iter())?;
     }
     total.check("a density integrates to one", "the whole space", 1.0, 1e-12)
 }

@@ -12,6 +12,8 @@ pub mod message;
 pub mod scheme;
 pub mod sensing;
 
+pub use fewbits_numerics::wild;
+
 use crate::columns::Columns;
 use nalgebra::SVector;
 

@@ -45,6 +45,7 @@ pub fn total_probability_with<const M: usize, S: Scheme<M>>(
     tolerance: f64,
 ) -> Result<(), Violation> {
     const LOST: &str = "a loss that is known where the link knows of none has the probability that the sensor spoke";
+    link_delivers_once(link)?;
     let nothing = failed(TOTAL, scheme.factor(feedback, &Observation::Nothing, link))?;
     let lost = failed(TOTAL, scheme.factor(feedback, &Observation::Lost, link))?;
     for m in measurements {
@@ -59,6 +60,23 @@ pub fn total_probability_with<const M: usize, S: Scheme<M>>(
         }
     }
     Ok(())
+}
+
+/// What becomes of a report over a link is one of three: it arrives, is lost without a trace, or is known to be lost. The probabilities that
+/// schemes take from the link ([`Link::delivery`]) sum to one; where no loss is known, `Lost` is conditioned on and has the factor 1.
+///
+/// # Errors
+/// The sum found.
+pub fn link_delivers_once(link: &Link) -> Result<(), Violation> {
+    const LAW: &str = "a report arrives, is lost, or is known to be lost";
+    let of = |observation| link.delivery::<()>(&observation);
+    let (arrives, nothing, lost) = (of(Observation::Received(())), of(Observation::Nothing), of(Observation::Lost));
+    agree(LAW, "its `lost_given_sent`", link.lost_given_sent(), lost, 0.0, 0.0)?;
+    if link.erasure() == 0.0 {
+        agree(LAW, "a loss that the link does not know of", lost, 1.0, 0.0, 0.0)?;
+        return agree(LAW, format!("{link:?}"), arrives + nothing, 1.0, 1e-15, 0.0);
+    }
+    agree(LAW, format!("{link:?}"), arrives + nothing + lost, 1.0, 1e-15, 0.0)
 }
 
 /// Law 2: at the noise-free measurement `m`, `draws` measurements from `measure` are encoded and sent through the link; the

@@ -1,6 +1,6 @@
 //! Every law holds for an honest implementation, whatever its unit and with no noise at all, and refuses each way of being wrong.
 
-use fewbits_core::columns::lengths_agree;
+use fewbits_core::columns::{columns_agree, lengths_agree};
 use fewbits_core::factor::{Constant, Factor, Tilted, Value};
 use fewbits_core::{
     Belief, BitReader, BitWriter, CodecError, Columns, ColumnsMut, Density, Dynamics, Error, Gaussian,
@@ -145,7 +145,11 @@ impl Belief<2> for Plane {
         NOISE * self.square()
     }
 
-    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, [x, y]: ColumnsMut<'_, 2>) {
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, 2>) {
+        if !columns_agree(&mut states) {
+            return;
+        }
+        let [x, y] = states;
         for (x, y) in x.iter_mut().zip(y) {
             let point = self.draw(rng, HERE * self.unit);
             (*x, *y) = (point[0], point[1]);
@@ -161,6 +165,9 @@ impl Density<2> for Plane {
     }
 
     fn add_log_densities(&self, states: &Columns<'_, 2>, logs: &mut [f64]) {
+        if !lengths_agree(states, logs) {
+            return;
+        }
         let off = if self.has(Fault::Sweep) { 1e-6 } else { 0.0 };
         for (i, log) in logs.iter_mut().enumerate() {
             *log += self.log_density(&Vector2::new(states[0][i], states[1][i])) + off;
@@ -418,6 +425,33 @@ fn laws_of_schemes_refuse_what_is_wrong() {
         let biased = coin(0.33, 0.2, lost);
         assert!(total(&biased).is_ok() && honest(&biased).is_err());
         assert!(honest(&coin(0.3, 0.25, lost)).is_err());
+    }
+}
+
+/// Whether each probability of a link is the share of reports that it is stated for, in words of the laws and by counting.
+#[test]
+fn links_deliver_as_they_say() {
+    let coin = |link: &Link| Coin {
+        heads: 0.3,
+        nothing: link.loss(),
+        lost: link.lost_given_sent(),
+    };
+    for (loss, erasure) in [(0.0, 0.0), (0.2, 0.0), (0.0, 0.3), (0.2, 0.1), (0.5, 0.5), (0.0, 1.0)] {
+        let link = Link::lossy(loss).unwrap().with_erasure(erasure).unwrap();
+        laws::scheme::link_delivers_once(&link).unwrap();
+        laws::scheme::total_probability(&coin(&link), &0.0, &link, [Sign::Above, Sign::Below], &[Vector1::new(0.0)])
+            .unwrap();
+        let rng = &mut Stream::new(8).rng();
+        let (draws, mut lost) = (20_000, 0.0);
+        for _ in 0..draws {
+            let seen = link.transmit(rng, Some(&Sign::Above), &()).unwrap();
+            lost += f64::from(u8::from(seen == Observation::Lost)) / f64::from(draws);
+        }
+        // Where no loss is known, none is seen, and the factor is conditioned on it.
+        let stated = if erasure > 0.0 { link.lost_given_sent() } else { 0.0 };
+        let error = (stated * (1.0 - stated) / f64::from(draws)).sqrt();
+        assert!((lost - stated).abs() <= 4.0 * error + 1e-12, "{link:?}: {lost} for {stated}");
+        assert_eq!(Constant::of_delivery(&Observation::<Sign>::Lost, &link), Constant::new(coin(&link).lost).unwrap());
     }
 }
 

@@ -1,4 +1,5 @@
-//! Densities that several tests share.
+//! Densities that the tests of several crates share.
+#![allow(dead_code, reason = "each crate uses some of them")]
 
 use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles};
 use fewbits_monte_carlo::Stream;

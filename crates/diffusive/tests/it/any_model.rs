@@ -2,7 +2,7 @@
 
 use super::{field, joint, sensor};
 use fewbits_core::{Belief, Gaussian, Likelihood};
-use fewbits_densities::CellOptions;
+use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{Form, Posterior, Prior, RateModel, RateRange, Search, SourceLikelihood, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_models::{Receptor, SourceGradient, SourceModel};

@@ -2,9 +2,10 @@
 
 use super::{RULES, field, joint, sensor};
 use fewbits_core::Gaussian;
-use fewbits_densities::hermite::{hermite, multi_indices};
-use fewbits_densities::laplace::Peak;
-use fewbits_densities::{CellOptions, Cells, Clumps, Component, Lpg, MixtureFit};
+use fewbits_densities::Component;
+use fewbits_diffusive::density::laplace::Peak;
+use fewbits_diffusive::density::polynomials::{hermite, multi_indices};
+use fewbits_diffusive::density::{CellOptions, Cells, Clumps, Lpg, MixtureFit};
 use fewbits_diffusive::information::Predictions;
 use fewbits_diffusive::{
     Form, Posterior, Prior, RateModel, RateRange, RateSums, Search, SearchBox, SourceLikelihood, SourceSensor, Status,

@@ -2,7 +2,7 @@
 
 use super::{field, joint};
 use fewbits_core::Gaussian;
-use fewbits_densities::CellOptions;
+use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information_of};
 use fewbits_diffusive::{Envelope, Posterior, Prior, RateModel, SourceLikelihood, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground, Wall};

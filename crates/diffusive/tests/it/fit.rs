@@ -74,6 +74,39 @@ fn right_model_is_not_refused() {
     }
 }
 
+/// Both error rates of every form: right models that are refused, and wrong ones (release rate 2.5 outside .5 to 1.5; source at x = 105,
+/// outside the box) that converge.
+#[test]
+#[ignore = "some 500 searches: minutes of one core"]
+fn error_rates_of_every_form() {
+    let lpg = Form::Lpg {
+        components: 2,
+        degree: 5,
+    };
+    for (form, right) in [
+        (Form::Mixture(4), 200),
+        (Form::Raw, 60),
+        (Form::Gaussian, 60),
+        (lpg, 40),
+        (Form::Particles(25), 40),
+    ] {
+        let (refusals, _, _) = refused(form, anywhere, field(1.0), 0..right);
+        let rate = |_| Truth {
+            source: Vector2::new(62.0, 50.0),
+            rate: 2.5,
+        };
+        let outside = |_| Truth {
+            source: Vector2::new(105.0, 50.0),
+            rate: 1.0,
+        };
+        let (by_rate, rate_converged, _) = refused(form, rate, field(1.0), 0..20);
+        let (by_place, place_converged, wrong) = refused(form, outside, tight(), 0..20);
+        println!(
+            "{form:?}: right refused {refusals} of {right}; rate 2.5 refused {by_rate}, converged {rate_converged} of 20; outside refused {by_place}, converged {place_converged} of 20, wrong {wrong}"
+        );
+    }
+}
+
 /// Before, 11 to 30 of 40 searches converged, all of them in the wrong place.
 #[test]
 fn source_outside_the_box_is_not_found_inside() {

@@ -3,7 +3,7 @@
 use super::{field, joint, sensor};
 use fewbits_core::laws::likelihood::sweep_is_scalar;
 use fewbits_core::{Belief, Density, Gaussian, Likelihood, laws};
-use fewbits_densities::{CellOptions, Lpg};
+use fewbits_diffusive::density::{CellOptions, Lpg};
 use fewbits_diffusive::{
     Form, JointBelief, PositionBelief, Posterior, Prior, RateLikelihood, RateModel, RateRange, RateSums,
     SourceLikelihood, SourceSensor, Travelling, project,
@@ -200,7 +200,7 @@ fn projections() {
     let gaussians = known
         .clumps(200)
         .unwrap()
-        .fit(&fewbits_densities::MixtureFit::new(4).unwrap())
+        .fit(&fewbits_diffusive::density::MixtureFit::new(4).unwrap())
         .unwrap();
     let mut before = f64::INFINITY;
     for degree in [0, 2, 4, 6] {

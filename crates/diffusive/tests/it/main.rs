@@ -9,15 +9,21 @@
 
 mod any_model;
 mod attacks;
+mod cells;
+mod clumps;
 #[path = "../../../models/tests/it/diffusion_entries.rs"]
 mod diffusion_entries;
 mod envelopes;
 mod fit;
 mod fixtures;
+mod laplace;
 mod laws;
 mod messages;
 mod searches;
+mod series;
+mod slices;
 mod unknown_models;
+mod wild;
 
 use fewbits_diffusive::{RateModel, RateRange, Rule, SearchBox, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};

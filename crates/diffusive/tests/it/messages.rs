@@ -3,7 +3,7 @@
 use super::{field, joint, sensor};
 use fewbits_core::laws::message::{decoding_is_total, round_trip};
 use fewbits_core::{BitString, Gaussian, Message, NumberFormat};
-use fewbits_densities::CellOptions;
+use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::message::{Contract, Packet, SampleCode, Wire};
 use fewbits_diffusive::{Fit, Form, Posterior, Prior, RateModel, SourceLikelihood, project};
 use nalgebra::{Matrix2, Vector2};

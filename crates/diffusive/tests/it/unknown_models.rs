@@ -2,7 +2,7 @@
 
 use super::{field, joint, sensor};
 use fewbits_core::Gaussian;
-use fewbits_densities::CellOptions;
+use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::{Form, ModelGrid, Posterior, Prior, Search, SourceLikelihood, SourceSensor, Status};
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_monte_carlo::Stream;

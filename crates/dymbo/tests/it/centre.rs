@@ -7,7 +7,7 @@ use fewbits_core::{
 use fewbits_dymbo::{InnovationWord, Prediction, SignBit};
 use fewbits_filters::centre::{CentreState, Event, FusionCentre, NoiseLearning, RemoteSensor, Reporting, Slot};
 use fewbits_filters::{
-    BootstrapFilter, Error, GridFilter, GridOnAxes, MomentFilter, NoiseBank, ParticleFilter, StateFilter,
+    BootstrapFilter, Error, GridFilter, GridOnAxes, MomentFilter, NoiseBank, ParticleFilter, Particles, StateFilter,
 };
 use fewbits_models::{ContinuousLinear, LinearSensor, PLANE_POSITION};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -41,10 +41,7 @@ fn sensor<const D: usize>(
         }
         Kind::Word => {
             let scheme = InnovationWord::new(noise, 3).unwrap();
-            let ask = |_: &Gaussian<D>, m: &Gaussian<1>| Prediction {
-                mean: m.mean()[0],
-                deviation: m.covariance()[0].sqrt(),
-            };
+            let ask = |_: &Gaussian<D>, m: &Gaussian<1>| Prediction::from(m);
             (Box::new(Reporting::new(sensing, scheme, link, ask)), Box::new(SchemeNode::new(scheme)))
         }
         Kind::Value => {
@@ -364,7 +361,16 @@ fn a_restored_centre_goes_on_with_the_same_bits() {
     }
     // Stored as text: what the centre knows, and the streams.
     let state = serde_json::to_string(&first.centre.state()).unwrap();
+    // Outside of quotes no float stands, so that no parser of numbers can change a bit.
+    assert!(state.split('"').step_by(2).all(|bare| !bare.contains(['.', 'e'])), "{state}");
     let streams = serde_json::to_string(&(&first.rng, &first.filter_rng)).unwrap();
+    // Stored as bytes: less than half, and any other bytes are refused.
+    let bytes = first.centre.state().to_bytes().unwrap();
+    assert!(2 * bytes.len() < state.len(), "{} of {}", bytes.len(), state.len());
+    assert!(CentreState::<Particles<4>>::from_bytes(&bytes).unwrap() == first.centre.state());
+    let refused = |bytes: &[u8]| CentreState::<Particles<4>>::from_bytes(bytes).is_err();
+    assert!(refused(&[]) && refused(&bytes[..bytes.len() - 1]) && refused(&[&bytes[..], &[0]].concat()));
+    assert!(refused(&[&[1][..], &bytes[1..]].concat()));
     let state: CentreState<_> = serde_json::from_str(&state).unwrap();
     second.centre.restore(state).unwrap();
     (second.rng, second.filter_rng) = serde_json::from_str(&streams).unwrap();

@@ -3,7 +3,7 @@
 use super::feedback::descend;
 use super::{Scene, quantizers};
 use crate::prelude::*;
-use fewbits_binary_patterns::baselines::{AdaptiveRule, adaptive};
+use fewbits_binary_patterns::published::{AdaptiveRule, adaptive};
 use fewbits_binary_patterns::search::{Descent, free_breakpoints};
 use fewbits_binary_patterns::{BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source, gray_basis};
 use fewbits_sensor_assignment::{

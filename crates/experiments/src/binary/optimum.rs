@@ -2,8 +2,7 @@
 
 use super::{Scene, crossing, descent_from, each, mask_text, not_below, sweep};
 use crate::prelude::*;
-use fewbits_binary_patterns::baselines::Luo;
-use fewbits_binary_patterns::search::{by_information, tile};
+use fewbits_binary_patterns::published::{Luo, by_information, tile};
 use fewbits_binary_patterns::{Mask, gray_basis};
 
 pub struct Optimum;

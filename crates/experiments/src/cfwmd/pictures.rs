@@ -37,9 +37,11 @@ pub(super) fn by_step(steps: &[Step]) -> Plot {
                 let marks: Vec<_> = rows.map(|r| (r.k as f64, r.rmse(part))).collect();
                 (!marks.is_empty()).then(|| Layer::curve(*scheme, colour_of(scheme, order), marks))
             });
-            panels.push(
-                Panel::linear(format!("{title}, l = {l}{world_name}"), "time step k", axis).with_all(layers.flatten()),
-            );
+            // One scale for all budgets, so that heights can be compared.
+            let top = steps.iter().map(|r| r.rmse(part).value).fold(0.0, f64::max);
+            let axes = (Axis::linear("time step k"), Axis::linear(axis).between(0.0, 1.05 * top));
+            let title = format!("{title}, l = {l}{world_name}");
+            panels.push(Panel::new(title, axes.0, axes.1).with_all(layers.flatten()));
         }
     }
     Plot::grid(2, panels)

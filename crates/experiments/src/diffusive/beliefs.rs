@@ -3,7 +3,7 @@
 use super::common::{B, LPG, Scheme, Settings};
 use crate::prelude::*;
 use fewbits_core::Density;
-use fewbits_densities::{Clumps, MixtureFit};
+use fewbits_diffusive::density::{Clumps, MixtureFit};
 use fewbits_diffusive::{Form, Outcome, PositionBelief, Posterior, RateModel, Travelling, project};
 use nalgebra::Vector2;
 

@@ -36,6 +36,10 @@ impl Figure for Bytes {
          records grow with every node): on a short route the samples themselves, quantised to the noise, are the \
          cheapest message and lose nothing.");
 
+    fn world(&self) -> Option<&'static str> {
+        Some("diffusive-chains")
+    }
+
     fn cost(&self, p: &Settings) -> Cost {
         Cost::new(p.trials as f64, p.trials as f64 * 2e4)
     }

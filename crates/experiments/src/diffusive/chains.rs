@@ -168,6 +168,10 @@ impl Figure for Chains {
         )
     }
 
+    fn world(&self) -> Option<&'static str> {
+        Some("diffusive-chains")
+    }
+
     fn run(&self, p: &Settings, context: &Context<'_>) -> Result<Rows, Error> {
         let schemes = (self.schemes)();
         // One name for all: every figure sees the same deployments and noise.
@@ -201,17 +205,21 @@ impl Figure for Chains {
             let (name, range) = (s.name, s.range);
             rows.curves.iter().filter(move |c| c.scheme == name && c.range == range)
         };
+        // One form of the belief has one colour, whether the rate is known or not; a second range takes the next free ones.
+        let form = |s: &Scheme| (s.name.trim_end_matches(" known rate"), s.range);
+        let forms = distinct(&schemes, form);
+        let colour = |s: &Scheme| forms.iter().position(|f| *f == form(s)).unwrap_or_default();
         let threshold = schemes[0].example.threshold.log10();
         let last = rows.curves.iter().map(|c| c.step).max().unwrap_or(1) as f64;
         let limit = || Layer::dashed("threshold", vec![(1.0, threshold), (last, threshold)]).coloured(7);
         let determinants = |title: &str, chosen: &dyn Fn(&Scheme) -> bool| {
             let axis = Axis::linear("lg det of the covariance (m^4)");
-            let mut panel = Panel::new(title, Axis::linear("nodes"), axis).with(limit());
-            for (i, scheme) in schemes.iter().filter(|s| chosen(s)).enumerate() {
+            let panel = Panel::new(title, Axis::linear("nodes"), axis).with(limit());
+            let line = |scheme: &Scheme| {
                 let line = points(of(scheme), |c| (c.step as f64, c.log10det_med.map_or(f64::NAN, |m| m.value)));
-                panel = panel.with(Layer::line(label(scheme), line).coloured(i));
-            }
-            panel
+                Layer::line(label(scheme), line).coloured(colour(scheme))
+            };
+            panel.with_all(schemes.iter().filter(|s| chosen(s)).map(line))
         };
         if schemes.len() > 7 {
             // Too many lines for one panel.
@@ -225,13 +233,11 @@ impl Figure for Chains {
             );
         }
         let mut errors = Panel::semilog("Error", "nodes", "distance to the source (m)").without_legend();
-        for (i, scheme) in schemes.iter().enumerate() {
-            if i == 0 {
-                let band = of(scheme).map(|c| (c.step as f64, c.err_q10, c.err_q90)).collect();
-                errors = errors.with(Layer::band("", band).coloured(i));
-            }
-            errors =
-                errors.with(Layer::line(label(scheme), points(of(scheme), |c| (c.step as f64, c.err_med))).coloured(i));
+        let band = of(&schemes[0]).map(|c| (c.step as f64, c.err_q10, c.err_q90)).collect();
+        errors = errors.with(Layer::band("", band).coloured(colour(&schemes[0])));
+        for scheme in &schemes {
+            let line = points(of(scheme), |c| (c.step as f64, c.err_med));
+            errors = errors.with(Layer::line(label(scheme), line).coloured(colour(scheme)));
         }
         let determinants = determinants("Determinant", &|_| true);
         Plot::grid(2, vec![errors, determinants])

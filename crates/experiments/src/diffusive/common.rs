@@ -1,5 +1,6 @@
 //! What the figures of this system share: the two examples, networks, searches, and statistics of many searches.
 
+use crate::kept::Kept;
 use crate::prelude::*;
 use fewbits_diffusive::message::Wire;
 use fewbits_diffusive::{Form, Outcome, RateModel, RateRange, Rule, Search, SearchBox, SourceSensor, Status};
@@ -277,11 +278,29 @@ pub(super) fn tracks(
     settings: &Settings,
     schemes: &[Scheme],
 ) -> Result<Vec<Vec<Track>>, Error> {
-    let every = |trial: Trial| -> Result<Vec<Track>, Error> {
-        let one = |scheme: &Scheme| Ok(Track::of(&scheme.run(settings, trial)?, &scheme.example.source()));
-        schemes.iter().map(one).collect()
+    // All that the tracks of a scheme depend on; its name is none of it.
+    let name = |scheme: &Scheme| {
+        let unnamed = Scheme { name: "", ..*scheme };
+        format!("{experiment} {} {settings:?} {unnamed:?}", context.seed)
     };
-    trials(context, experiment, settings.trials, every)
+    let own = Kept::default();
+    let kept = context.kept.unwrap_or(&own);
+    let missing: Vec<&Scheme> = schemes.iter().filter(|s| kept.get::<Vec<Track>>(&name(s)).is_none()).collect();
+    let every = |trial: Trial| -> Result<Vec<Track>, Error> {
+        let one = |scheme: &&Scheme| Ok(Track::of(&scheme.run(settings, trial)?, &scheme.example.source()));
+        missing.iter().map(one).collect()
+    };
+    if !missing.is_empty() {
+        let new = trials(context, experiment, settings.trials, every)?;
+        for (i, scheme) in missing.iter().enumerate() {
+            kept.put(name(scheme), new.iter().map(|tracks| tracks[i].clone()).collect::<Vec<_>>());
+        }
+    }
+    let all: Vec<Vec<Track>> = schemes.iter().filter_map(|s| kept.get(&name(s))).collect();
+    let count = all.first().map_or(0, Vec::len);
+    Ok((0..count)
+        .map(|trial| all.iter().map(|tracks| tracks[trial].clone()).collect())
+        .collect())
 }
 
 /// Runs a closure on every trial of an experiment.

@@ -89,6 +89,10 @@ impl Figure for Selection {
          and its pairwise bound) and by Mahalanobis distance. Right: how rules rank the neighbours after three nodes of example B, as rank \
          correlation with the exact mutual information.");
 
+    fn world(&self) -> Option<&'static str> {
+        Some("diffusive-chains")
+    }
+
     fn cost(&self, p: &Parameters) -> Cost {
         Cost::new(p.trials as f64 * 0.3 + p.ranking_trials as f64 * p.draws as f64 * 0.01, 1e7)
     }

@@ -1,7 +1,7 @@
 //! Table I: Hermite polynomials of two variables.
 
 use crate::prelude::*;
-use fewbits_densities::hermite::{gaussian_moment, hermite_terms, multi_indices};
+use fewbits_diffusive::density::polynomials::{gaussian_moment, hermite_terms, multi_indices};
 use nalgebra::{Matrix2, Vector2};
 
 parameters! {

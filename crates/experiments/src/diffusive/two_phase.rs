@@ -2,10 +2,10 @@
 
 use crate::Error;
 use fewbits_core::Density;
-use fewbits_densities::hermite::{hermite, multi_indices};
-use fewbits_densities::laplace::Peak;
-use fewbits_densities::{Cells, MixtureFit};
 use fewbits_diffusive::Posterior;
+use fewbits_diffusive::density::laplace::Peak;
+use fewbits_diffusive::density::polynomials::{hermite, multi_indices};
+use fewbits_diffusive::density::{Cells, MixtureFit};
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Vector2};
 
 /// Points of a local mesh along each axis, over three standard deviations on either side.

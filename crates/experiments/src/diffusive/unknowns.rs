@@ -3,7 +3,7 @@
 use super::common::{B, Settings, search_box, trials};
 use crate::prelude::*;
 use fewbits_core::{Belief, Gaussian};
-use fewbits_densities::CellOptions;
+use fewbits_diffusive::density::CellOptions;
 use fewbits_diffusive::information::{Unknown, fisher_information_of};
 use fewbits_diffusive::{Posterior, Prior, RateModel, RateRange, Record, SourceLikelihood};
 use nalgebra::{Matrix2, Vector2};

@@ -87,7 +87,7 @@ impl Figure for KalmanVariance {
             let kalman = points(curve, |r| (r.plant.gamma, r.kf_reduction));
             let sign_bit = points(curve, |r| (r.plant.gamma, r.dymbo_reduction));
             panel = panel
-                .with(Layer::line(format!("Kalman, a = {a}"), kalman).coloured(i))
+                .with(Layer::unbroken(format!("Kalman, a = {a}"), kalman).coloured(i))
                 .with(Layer::dashed(format!("sign bit, a = {a}"), sign_bit).coloured(i));
         }
         Plot::of(panel)

@@ -10,6 +10,7 @@ mod fig5;
 mod gap;
 mod prop1b;
 mod prop2;
+mod selftuning;
 mod sensors;
 mod smoother;
 mod threshold;
@@ -33,5 +34,6 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &sensors::SeveralSensors,
         &smoother::Smoothing,
         &vector::VectorState,
+        &selftuning::SelfTuning,
     ]
 }

@@ -4,9 +4,10 @@ use super::exact::{Lattice, StepLaw};
 use super::filters::{PARTICLES, REFERENCE, plain_step, prior, world};
 use super::world::Walk;
 use crate::prelude::*;
-use fewbits_densities::tree::{At, Axis as SplitAxis};
-use fewbits_densities::{Bandwidth, Criterion, Reduction, Split};
+use fewbits_densities::Bandwidth;
 use fewbits_handoff::{Components, HandoffFilter, Reducer, Whole};
+use fewbits_mixture_codec::tree::{At, Axis as SplitAxis};
+use fewbits_mixture_codec::{Criterion, Reduction, Split};
 
 parameters! {
     pub struct Parameters {

@@ -3,7 +3,8 @@
 use super::filters::{PARTICLES, STEPS, Smoothing, Truth, posteriors, prior, single};
 use super::world::World;
 use crate::prelude::*;
-use fewbits_densities::{Reduction, ellipse};
+use fewbits_densities::ellipse;
+use fewbits_mixture_codec::Reduction;
 
 parameters! {
     pub struct Parameters {

@@ -3,7 +3,7 @@
 use super::filters::{CRITERIA, PARTICLES, STEPS, Smoothing, estimate, paper_cut, prior, world};
 use super::world::Walk;
 use crate::prelude::*;
-use fewbits_handoff::{Accounting, Amplification, StepError};
+use fewbits_handoff::published::{Accounting, Amplification, StepError};
 use std::f64::consts::LN_10;
 
 parameters! {

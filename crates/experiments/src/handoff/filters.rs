@@ -3,10 +3,10 @@
 use super::world::{Point, START, Walk, World};
 use crate::Error;
 use fewbits_core::Gaussian;
-use fewbits_densities::{
-    Bandwidth, Component, Criterion, KernelEstimate, Mixture, PaperReductions, Particles, Reduction, SampleSize, cut,
-};
+use fewbits_densities::{Bandwidth, Component, KernelEstimate, Mixture, Particles, SampleSize};
 use fewbits_handoff::{HandoffFilter, Whole, trimmed};
+use fewbits_mixture_codec::published::PaperReductions;
+use fewbits_mixture_codec::{Criterion, Reduction, cut};
 use fewbits_monte_carlo::Stream;
 use nalgebra::SMatrix;
 use rand::Rng;

@@ -3,8 +3,9 @@
 use super::filters::{Truth, as_f32, posteriors};
 use crate::prelude::*;
 use fewbits_core::Message;
-use fewbits_densities::wire::{CodedMixture, WireFormat};
-use fewbits_densities::{Bandwidth, Criterion, KernelEstimate, Mixture, Reduction};
+use fewbits_densities::{Bandwidth, KernelEstimate, Mixture};
+use fewbits_mixture_codec::wire::{CodedMixture, WireFormat};
+use fewbits_mixture_codec::{Criterion, Reduction};
 use nalgebra::Vector2;
 
 parameters! {

@@ -2,9 +2,10 @@
 
 use super::filters::{Truth, posteriors};
 use crate::prelude::*;
-use fewbits_densities::merge::{MergeCost, merge};
-use fewbits_densities::tree::{At, Axis as SplitAxis};
-use fewbits_densities::{Criterion, KernelEstimate, Mixture, Reduction, Split};
+use fewbits_densities::{KernelEstimate, Mixture};
+use fewbits_mixture_codec::merge::{MergeCost, merge};
+use fewbits_mixture_codec::tree::{At, Axis as SplitAxis};
+use fewbits_mixture_codec::{Criterion, Reduction, Split};
 use std::time::Instant;
 
 parameters! {

@@ -2,20 +2,19 @@
 
 use super::common::{MI, MSE, breakpoints, bsc, lloyd, lloyd_system, name, scene};
 use crate::prelude::*;
-use fewbits_quantizer_design::design::{self, Discovery};
-use fewbits_quantizer_design::{Channel, Criterion, Newton, Quantizer, SensorGroup, System, bounds};
+use fewbits_core::Link;
+use fewbits_quantizer_design::{
+    AllowedCells, Bits, Channel, Criterion, Newton, Quantizer, Request, SensorGroup, System, bounds, design, published,
+};
 
 parameters! {
     pub struct Parameters {
         /// Random starts among contiguous quantizers.
         #[garde(range(min = 1, max = 10_000))]
         contiguous_starts: usize = 20 => quick 8,
-        /// Random label sequences among folded quantizers.
+        /// Starts of the search for folded quantizers.
         #[garde(range(min = 1, max = 10_000))]
         folded_starts: usize = 60 => quick 24,
-        /// Grid cells of a sensor in that search.
-        #[garde(range(min = 16, max = 1000))]
-        grid: usize = 160,
         /// Crossovers at which words are compared.
         #[garde(length(min = 1, max = 20), inner(range(min = 0.0, max = 0.45)))]
         crossovers: Vec<f64> = vec![0.001, 0.01, 0.05, 0.1, 0.2],
@@ -177,12 +176,13 @@ fn searches(p: &Parameters, context: &Context<'_>) -> Result<Vec<Search>, Error>
             let scene = scene(&[noise_sd; 2], rho)?;
             let start = lloyd_system(&scene, levels, |n| scene.sample_deviation(n))?;
             let contiguous = design::multi_start(&start, criterion, p.contiguous_starts, 1, &Newton::default())?;
-            let settings = Discovery {
-                grid: p.grid,
-                starts: p.folded_starts,
-                ..Discovery::default()
-            };
-            let folded = design::discover(&contiguous.system, criterion, &settings)?;
+            let mut request = Request::estimation(scene.clone(), Bits::Each(levels.ilog2()), Link::PERFECT)
+                .with_cells(AllowedCells::Any)
+                .with_starts(p.folded_starts);
+            if criterion == MI {
+                request = request.by_information();
+            }
+            let folded = design::joint(request.run()?.best().system(), criterion, &Newton::default())?;
             let bits = (levels as f64).log2();
             let bound = match rho {
                 0.0 => Some(bounds::ceo(scene.prior(), scene.noise(), &[bits; 2])?.distortion),
@@ -214,8 +214,8 @@ fn thresholds() -> Result<Vec<Threshold>, Error> {
     let mut rows = Vec::new();
     for (varied, criterion) in [("noise_sd", MI), ("noise_sd", MSE), ("rho", MI), ("rho", MSE)] {
         let threshold = match varied {
-            "rho" => design::symmetry_breaking(0.1, 0.9, criterion, |rho| signs(1.0, rho)),
-            _ => design::symmetry_breaking(0.2, 2.0, criterion, |sd| signs(sd, 0.0)),
+            "rho" => published::symmetry_breaking(0.1, 0.9, criterion, |rho| signs(1.0, rho)),
+            _ => published::symmetry_breaking(0.2, 2.0, criterion, |sd| signs(sd, 0.0)),
         }?;
         rows.push(Threshold {
             varied,
@@ -238,16 +238,16 @@ fn words(p: &Parameters, context: &Context<'_>) -> Result<Vec<Words>, Error> {
                 &[("same", false)]
             };
             for &(sensors, mixed) in kinds {
-                let found = design::assign_words(
+                let found = published::assign_words(
                     &scene,
                     2,
                     crossover,
                     2..=4,
                     criterion,
                     if mixed {
-                        design::Words::PerSensor
+                        published::Words::PerSensor
                     } else {
-                        design::Words::Shared
+                        published::Words::Shared
                     },
                 )?;
                 for (rank, assignment) in found.iter().enumerate().take(if mixed { 5 } else { usize::MAX }) {
@@ -356,7 +356,7 @@ fn effort() -> Result<Vec<Effort>, Error> {
         let limit = fast.quantizers();
         let (mut current, mut alternating) = (start, 0);
         while apart(current.groups()[0].quantizer(), &limit[0]) > 1e-8 && alternating < 1000 {
-            current = current.with_quantizer(0, design::alternating_step(&current, 0, MI)?)?;
+            current = current.with_quantizer(0, published::alternating_step(&current, 0, MI)?)?;
             alternating += 1;
         }
         // The last iteration only confirms that the step vanished.

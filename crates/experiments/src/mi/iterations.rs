@@ -3,7 +3,7 @@
 
 use super::common::{MI, MSE, bsc, lloyd_system, scene};
 use crate::prelude::*;
-use fewbits_quantizer_design::{System, design};
+use fewbits_quantizer_design::{System, published};
 use serde::de::DeserializeOwned;
 use std::f64::consts::LN_2;
 use std::marker::PhantomData;
@@ -201,9 +201,9 @@ impl<S: Setting> Figure for Iterations<S> {
             for k in 1..=2 * steps {
                 let stage = if k <= steps { 1 } else { 2 };
                 let quantizer = if stage == 1 {
-                    design::alternating_step(&first_alone(&both)?, 0, MI)?
+                    published::alternating_step(&first_alone(&both)?, 0, MI)?
                 } else {
-                    design::alternating_step(&both, 1, MI)?
+                    published::alternating_step(&both, 1, MI)?
                 };
                 both = both.with_quantizer(stage - 1, quantizer)?;
                 chain.push(step(crossover, [k, stage, k - (stage - 1) * steps], &both)?);
@@ -212,7 +212,7 @@ impl<S: Setting> Figure for Iterations<S> {
             cyclic.push(step(crossover, [0, 1, 0], &both)?);
             for k in 1..=2 * steps {
                 let sensor = (k - 1) % 2;
-                both = both.with_quantizer(sensor, design::alternating_step(&both, sensor, MI)?)?;
+                both = both.with_quantizer(sensor, published::alternating_step(&both, sensor, MI)?)?;
                 cyclic.push(step(crossover, [k, sensor + 1, k.div_ceil(2)], &both)?);
             }
         }

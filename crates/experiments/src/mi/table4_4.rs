@@ -5,8 +5,10 @@ use crate::prelude::*;
 use crate::reference;
 use fewbits_numerics::normal;
 use fewbits_quantizer_design::decoder::NeymanPearson;
-use fewbits_quantizer_design::design::{self, Separation};
-use fewbits_quantizer_design::{Channel, Criterion, JointTable, Newton, Noise, Prior, Quantizer, Scene, System};
+use fewbits_quantizer_design::published::{self, Separation};
+use fewbits_quantizer_design::{
+    Channel, Criterion, JointTable, Newton, Noise, Prior, Quantizer, Scene, System, design,
+};
 
 const PE: Criterion = Criterion::BayesError;
 
@@ -138,7 +140,7 @@ impl Figure for Table44 {
             let start = about(signal, 1.0)?;
             let all = System::identical(scene(signal, p.sensors)?, start.clone())?;
             let one = System::identical(scene(signal, 1)?, start.clone())?;
-            let separated = |d| design::separate(d, signal, 1.0, &start, &ideal, &newton).map(|found| found.0);
+            let separated = |d| published::separate(d, signal, 1.0, &start, &ideal, &newton).map(|found| found.0);
             let best = design::joint(&all, PE, &newton)?.quantizers().remove(0);
             let common = [
                 ("mi-joint", design::joint(&all, MI, &newton)?.quantizers().remove(0)),
@@ -173,7 +175,7 @@ impl Figure for Table44 {
             grid.extend(best.breakpoints());
             grid.sort_by(f64::total_cmp);
             grid.dedup_by(|a, b| *a - *b < 1e-9);
-            let alone = design::best_contiguous(&minimum, 0, PE, &grid)?.1;
+            let alone = published::best_contiguous(&minimum, 0, PE, &grid)?.1;
             let unquantized_pe = normal::cdf(-0.5 * signal * (p.sensors as f64).sqrt());
             let single_change_gain = 1.0 - alone / minimum.value(PE)?;
             rows.checks.push(Check {

@@ -251,7 +251,7 @@ impl Figure for Fig37 {
             let k = |r: &Step| r.k as f64;
             Panel::linear(format!("R = {variance}"), "step", "position")
                 .with(Layer::unbroken("target 1", points(of("jpda"), |r| (k(r), r.t1))))
-                .with(Layer::unbroken("target 2", points(of("jpda"), |r| (k(r), r.t2))))
+                .with(Layer::unbroken("target 2", points(of("jpda"), |r| (k(r), r.t2))).coloured(7))
                 .with(Layer::points("printed, 1", points(of("tanh"), |r| (k(r), r.estimate1))).coloured(2))
                 .with(Layer::points("printed, 2", points(of("tanh"), |r| (k(r), r.estimate2))).coloured(3))
                 .with(Layer::dashed("exact, 1", points(of("jpda"), |r| (k(r), r.estimate1))).coloured(4))

@@ -2,9 +2,10 @@
 
 use crate::prelude::*;
 use fewbits_core::NumberFormat;
-use fewbits_densities::{Component, Mixture, product};
+use fewbits_densities::{Component, Mixture};
 use fewbits_pf_mpa::graph::{self, FactorGraph};
 use fewbits_pf_mpa::leader::StepBits;
+use fewbits_pf_mpa::product;
 use fewbits_pf_mpa::{LabelChain, RingBias, kernel_error, ratio_second_moments};
 use nalgebra::{Matrix1, Matrix2, SMatrix, SVector, Vector1, Vector2};
 

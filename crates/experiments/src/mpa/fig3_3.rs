@@ -109,14 +109,26 @@ impl Figure for Fig33 {
         };
         let truth = points(t.track.iter().filter(|r| r.method == "truth"), |r| (r.x, r.y));
         let sensors = canonical().iter().map(|s| (s[0], s[1])).collect();
-        let panel = Panel::new(
-            "50 dB, four levels",
-            Axis::linear("x / m").between(0.0, 20.0),
-            Axis::linear("y / m").between(0.0, 20.0),
-        )
-        .with(Layer::unbroken("truth", truth))
-        .with_all(names.iter().enumerate().map(line))
-        .with(Layer::points("sensors", sensors).coloured(8));
-        Plot::of(panel)
+        let square = |title, [x, y]: [(f64, f64); 2]| {
+            let axis = |label, (low, high)| Axis::linear(label).between(low, high);
+            Panel::new(title, axis("x / m", x), axis("y / m", y))
+                .with(Layer::unbroken("truth", truth.clone()))
+                .with_all(names.iter().enumerate().map(line))
+        };
+        // The same length in metres on both axes: the square round the true track.
+        let range = |of: fn(&(f64, f64)) -> f64| {
+            let values = truth.iter().map(of);
+            (values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max))
+        };
+        let (x, y) = (range(|p| p.0), range(|p| p.1));
+        let half = 0.6 * (x.1 - x.0).max(y.1 - y.0);
+        let near = [x, y].map(|(low, high)| {
+            let centre = 0.5 * (low + high);
+            (centre - half, centre + half)
+        });
+        let field = square("50 dB, four levels", [(0.0, 20.0); 2])
+            .with(Layer::points("sensors", sensors).coloured(8))
+            .without_legend();
+        Plot::grid(2, vec![field, square("the track, enlarged", near)])
     }
 }

@@ -1,11 +1,12 @@
 //! The canonical scenario, and every tracker on it.
 
 use crate::prelude::*;
-use fewbits_core::{Belief, Gaussian};
+use fewbits_core::{Belief, Gaussian, Observed, OnAxes};
+use fewbits_filters::ParticleFilter;
 use fewbits_pf_mpa::{
-    Bootstrap, DynamicsWeight, Encoder, GridFilter, GuidedGaussian, IntervalRule, KernelRule, Linearised,
-    MessagePassing, Network, QuantizedRange, RangeNoise, RaoBlackwellGuided, Reports, Ring, RingWeight, StepInfo,
-    Target, Tracker, Velocity,
+    DynamicsWeight, Encoder, GridFilter, GuidedGaussian, IntervalRule, KernelRule, Linearised, MessagePassing, Network,
+    POSITION, QuantizedRange, RangeFactor, RangeNoise, RangeSensor, Ranged, RaoBlackwellGuided, Reports, Ring,
+    RingWeight, Target, Tracker, Velocity, WithManoeuvre,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
 use rand::RngExt;
@@ -122,7 +123,6 @@ pub(super) enum Method {
 /// What one trajectory gave: the estimate after every step.
 pub(super) struct Run {
     pub(super) estimates: Vec<Gaussian<4>>,
-    pub(super) infos: Vec<StepInfo>,
 }
 
 impl Method {
@@ -197,54 +197,67 @@ impl Method {
     }
 
     pub(super) fn run(&self, world: &World, network: &Network, target: &Target, stream: Stream) -> Result<Run, Error> {
-        let stream = stream.named(&self.name());
-        let reports = self.reports();
-        fn go<T: Tracker>(
-            tracker: Result<T, fewbits_pf_mpa::Error>,
-            (world, network, target): (&World, &Network, &Target),
-            reports: Reports,
-            stream: Stream,
-        ) -> Result<Run, Error> {
-            Ok(track(&tracker?, world, network, target, reports, stream)?)
-        }
-        let all = (world, network, target);
+        let mut rng = stream.named(&self.name()).fast_rng();
+        let all = (world, network, target, self.reports());
         match self {
-            Self::Linear(l, _) => go(Ok(*l), all, reports, stream),
-            Self::Grid(n) => go(GridFilter::new(*n).map_err(Into::into), all, reports, stream),
-            Self::Guided(n) => go(GuidedGaussian::new(*n), all, reports, stream),
-            Self::Bootstrap(n, _) => go(Bootstrap::new(*n), all, reports, stream),
-            Self::RaoBlackwell(n) => go(RaoBlackwellGuided::new(*n), all, reports, stream),
-            Self::Messages(m) => go(Ok(*m), all, reports, stream),
+            Self::Linear(l, _) => track(l, all, &mut rng),
+            Self::Grid(n) => track(&GridFilter::new(*n)?, all, &mut rng),
+            Self::Guided(n) => track(&GuidedGaussian::new(*n)?, all, &mut rng),
+            Self::RaoBlackwell(n) => track(&RaoBlackwellGuided::new(*n)?, all, &mut rng),
+            Self::Messages(m) => track(m, all, &mut rng),
+            Self::Bootstrap(n, _) => {
+                let cloud = WithManoeuvre::cloud(&mut rng, &prior()?, *n)?;
+                let mut workspace = fewbits_filters::Workspace::default();
+                follow(all, cloud, WithManoeuvre::estimate, |k, cloud, observed| {
+                    let observed: Vec<_> = observed.iter().map(in_state).collect::<Result<_, _>>()?;
+                    let motion = WithManoeuvre::at(*target, k);
+                    ParticleFilter::default().step_in_place(&mut rng, &motion, cloud, &observed, &mut workspace)?;
+                    Ok(())
+                })
+            }
         }
     }
 }
 
-/// One trajectory. Where a step fails (a lost cloud in a region of probability zero, points without spread), the belief stays.
-pub(super) fn track<T: Tracker>(
+/// A range of a state that holds the manoeuvre, too.
+fn in_state(range: &Ranged) -> Result<Observed<OnAxes<RangeSensor, 6, 2>, RangeFactor, 1>, fewbits_pf_mpa::Error> {
+    Ok(Observed::new(range.sensing.on_axes(POSITION)?, range.factor.clone()))
+}
+
+/// One trajectory of a tracker.
+fn track<T: Tracker>(
     tracker: &T,
-    world: &World,
-    network: &Network,
-    target: &Target,
-    reports: Reports,
-    stream: Stream,
-) -> Result<Run, fewbits_pf_mpa::Error> {
-    let mut rng = stream.fast_rng();
-    let prior = prior().map_err(|_| fewbits_core::Error::Impossible)?;
-    let mut belief = tracker.start(&mut rng, target, &prior)?;
+    all: (&World, &Network, &Target, Reports),
+    rng: &mut impl rand::Rng,
+) -> Result<Run, Error> {
+    let belief = tracker.start(rng, all.2, &prior()?)?;
     let mut workspace = T::Workspace::default();
-    let mut run = Run {
-        estimates: Vec::with_capacity(STEPS),
-        infos: Vec::with_capacity(STEPS),
-    };
+    follow(
+        all,
+        belief,
+        |belief| tracker.estimate(belief),
+        |k, belief, observed| {
+            tracker.step_in_place(rng, all.2, k, belief, observed, &mut workspace)?;
+            Ok(())
+        },
+    )
+}
+
+/// One trajectory. Where a step fails (a lost cloud in a region of probability zero, points without spread), the belief stays.
+fn follow<B>(
+    (world, network, target, reports): (&World, &Network, &Target, Reports),
+    mut belief: B,
+    estimate: impl Fn(&B) -> Gaussian<4>,
+    mut step: impl FnMut(usize, &mut B, &[Ranged]) -> Result<(), fewbits_pf_mpa::Error>,
+) -> Result<Run, Error> {
+    let mut estimates = Vec::with_capacity(STEPS);
     for k in 0..world.track.len() {
         let ranges = world.ranges(network, k);
-        let observed = network.observe(target, k, &tracker.estimate(&belief), &ranges, reports);
-        let stepped =
-            observed.and_then(|o| tracker.step_in_place(&mut rng, target, k, &mut belief, &o, &mut workspace));
-        run.infos.push(stepped.unwrap_or_default());
-        run.estimates.push(tracker.estimate(&belief));
+        let observed = network.observe(target, k, &estimate(&belief), &ranges, reports);
+        let _ = observed.and_then(|o| step(k, &mut belief, &o));
+        estimates.push(estimate(&belief));
     }
-    Ok(run)
+    Ok(Run { estimates })
 }
 
 impl Run {

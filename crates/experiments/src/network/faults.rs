@@ -45,8 +45,10 @@ rows! {
         feedback: &'static str,
         /// Root mean squared error.
         rmse: Measured,
-        /// Slots until a sensor that restarts in the middle of the run answers again, at most 50.
+        /// Slots until a sensor that restarts in the middle of the run answers again; 50 where it has not by then.
         recovery: Measured,
+        /// Share of the runs in which it has not within 50 slots.
+        unrecovered: Measured,
         /// Disagreements noted, of 100 slots.
         disagreements: Measured,
     }
@@ -61,8 +63,8 @@ struct Point {
     echoed: bool,
 }
 
-/// Squared error, slots to recover, disagreements of 100 slots.
-fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
+/// Squared error, slots to recover, disagreements of 100 slots, whether the sensor did not recover.
+fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
     let (a, q) = (worlds::COEFFICIENT, worlds::PROCESS);
     let (dynamics, sensor) = (Ar1::new(a, q)?, LinearSensor::<1, 1>::direct(1.0)?);
     let start = Gaussian::scalar(0.0, dynamics.stationary_variance()?)?;
@@ -121,13 +123,11 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
     };
     let mut network = star.and_then(|star| star.simulate(RADIUS, setup))?;
     network.run_until(clock.end(middle))?;
-    let mut recovery = 0;
-    while recovery < 50 && middle + recovery < slots as u32 {
+    let (mut recovery, mut answers) = (0, false);
+    while !answers && recovery < 50 && middle + recovery < slots as u32 {
         recovery += 1;
         network.run_until(clock.end(middle + recovery))?;
-        if network.nodes()[restarted.index()].answered() == Some(middle + recovery) {
-            break;
-        }
+        answers = network.nodes()[restarted.index()].answered() == Some(middle + recovery);
     }
     network.run_until(clock.end(slots as u32))?;
     let estimates = network.nodes()[0].estimates();
@@ -139,6 +139,7 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 3], Error> {
         squared.map(gap).sum::<f64>() / count,
         f64::from(recovery),
         100.0 * noted / slots as f64,
+        f64::from(u8::from(!answers)),
     ])
 }
 
@@ -170,20 +171,21 @@ impl Figure for Faulty {
             p.trials,
             &points,
             |point| format!("{} {}", point.fault, point.level),
-            |_| [Moments::default(); 3],
+            |_| [Moments::default(); 4],
             |point, sums, it| {
                 let numbers = run(point, it.stream, p.slots)?;
                 sums.iter_mut().zip(numbers).for_each(|(sum, x)| sum.add(x));
                 Ok::<_, Error>(())
             },
         )?;
-        let row = |(point, sums): (&Point, &[Moments; 3])| Row {
+        let row = |(point, sums): (&Point, &[Moments; 4])| Row {
             fault: point.fault,
             level: point.level,
             feedback: if point.echoed { "echoed" } else { "told" },
             rmse: Measured::root_mean(&sums[0]),
             recovery: Measured::mean(&sums[1]),
             disagreements: Measured::mean(&sums[2]),
+            unrecovered: Measured::mean(&sums[3]),
         };
         Ok(points.iter().zip(&sums).map(row).collect())
     }
@@ -234,16 +236,17 @@ impl Figure for Faulty {
                     Axis::linear(label)
                 }
             };
-            let both = |panel: Panel, of_row: fn(&Row) -> Measured| {
+            let both = |panel: Panel, of_row: fn(&Row) -> Option<Measured>| {
                 panel
                     .with(Layer::measured("told", of("told"), |r: &Row| (r.level, of_row(r))).coloured(0))
                     .with(
                         Layer::measured("following by echo", of("echoed"), |r: &Row| (r.level, of_row(r))).coloured(1),
                     )
             };
-            panels.push(both(Panel::new("error", axis(), Axis::linear("RMSE / noise deviation")), |r| r.rmse));
+            panels.push(both(Panel::new("error", axis(), Axis::linear("RMSE / noise deviation")), |r| Some(r.rmse)));
+            // A mean over runs that were cut off is no time of recovery.
             panels.push(both(Panel::new("recovery of a restarted sensor", axis(), Axis::linear("slots")), |r| {
-                r.recovery
+                (r.unrecovered.value == 0.0).then_some(r.recovery)
             }));
         }
         Plot::grid(2, panels)

@@ -9,12 +9,13 @@ use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::factor::Value;
 use fewbits_core::{Belief, Gaussian, LinearDynamics, Link, NumberFormat, Observed, Sensing};
-use fewbits_densities::wire::WireFormat;
-use fewbits_densities::{Mixture, Reduction};
+use fewbits_densities::Mixture;
 use fewbits_dymbo::{CountFusion, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarPlant};
-use fewbits_filters::{AssumedDensity, kalman};
+use fewbits_filters::{MomentFilter, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
-use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
+use fewbits_mixture_codec::Reduction;
+use fewbits_mixture_codec::wire::WireFormat;
+use fewbits_models::{Ar1, LinearGaussian, LinearSensor, PLANE_POSITION, constant_velocity_2d};
 use fewbits_network::estimators::{
     CensoringEstimator, DymboEstimator, Followers, Leaders, LookUp, ParallelDymboEstimator, Patterns, Reporting,
     SendAll,
@@ -23,7 +24,7 @@ use fewbits_network::{Clock, Field, Ledger, Radio, Replicable, Seconds, SensorId
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
 use fewbits_quantizer_design::{Criterion, Newton, Scene, System, design};
 use fewbits_quantizers::{Labelling, Quantizer, QuantizingSensor, lloyd_max};
-use nalgebra::{Matrix1, Matrix4, RowVector2, RowVector4, SVector, Vector1, Vector2, Vector4};
+use nalgebra::{Matrix4, SVector, Vector1, Vector4};
 
 /// Sensors of either world; their noise has unit variance.
 pub(super) const SENSORS: usize = 4;
@@ -215,7 +216,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
             sensors: self.sensors.clone(),
             scheme: InnovationWord::new(1.0, bits)?,
             link: Link::PERFECT,
-            filter: AssumedDensity,
+            filter: MomentFilter,
             broadcast: asked as fn(&Gaussian<1>) -> Prediction,
             start: self.start,
         })
@@ -289,7 +290,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
                     sensors: self.sensors.clone(),
                     scheme: SendAll::new(1.0, if coarse { self.coarse } else { self.fine })?,
                     link: Link::PERFECT,
-                    filter: AssumedDensity,
+                    filter: MomentFilter,
                     broadcast: nothing as fn(&Gaussian<1>),
                     start: self.start,
                 };
@@ -326,7 +327,7 @@ impl World<4, LinearGaussian<4, 2>> {
         let places = [[-FAR, 0.0], [0.0, -FAR], [FAR, 0.0], [0.0, FAR]];
         let sensor = |place: [f64; 2]| {
             RangeSensor::new(place.into(), noise)
-                .map(InPlane)
+                .and_then(|sensor| sensor.on_axes::<4>(PLANE_POSITION))
                 .map_err(Error::failed)
         };
         let sensors = places.map(sensor).into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -336,7 +337,7 @@ impl World<4, LinearGaussian<4, 2>> {
             sensors: sensors.clone(),
             scheme: QuantizedRange::new(1 << bits, noise)?,
             link: Link::PERFECT,
-            filter: AssumedDensity,
+            filter: MomentFilter,
             // In single precision, as it travels.
             broadcast: move |expected: &Gaussian<1>| RangeReference {
                 centre: f64::from(expected.mean()[0] as f32),
@@ -345,35 +346,6 @@ impl World<4, LinearGaussian<4, 2>> {
             start: self.start,
         };
         self.over_star_of(&sensors, ranges, talk, stream, slots)
-    }
-}
-
-/// A range sensor of states that alternate position and velocity.
-#[derive(Debug, Clone, Copy)]
-struct InPlane(RangeSensor);
-
-impl InPlane {
-    fn place(state: &Vector4<f64>) -> Vector2<f64> {
-        Vector2::new(state[0], state[2])
-    }
-}
-
-impl Sensing<4, 1> for InPlane {
-    fn mean(&self, state: &Vector4<f64>) -> Vector1<f64> {
-        self.0.mean(&Self::place(state))
-    }
-
-    fn jacobian(&self, state: &Vector4<f64>) -> RowVector4<f64> {
-        let slope: RowVector2<f64> = self.0.jacobian(&Self::place(state));
-        RowVector4::new(slope[0], 0.0, slope[1], 0.0)
-    }
-
-    fn noise_covariance_at(&self, state: &Vector4<f64>) -> Matrix1<f64> {
-        self.0.noise_covariance_at(&Self::place(state))
-    }
-
-    fn sample<R: rand::Rng + ?Sized>(&self, rng: &mut R, state: &Vector4<f64>) -> Vector1<f64> {
-        self.0.sample(rng, &Self::place(state))
     }
 }
 
@@ -427,7 +399,7 @@ impl World<1, Ar1> {
                     sensors: self.sensors.clone(),
                     scheme: QuantizingSensor::with_variance(quantizer, labels, 1.0)?,
                     link: Link::PERFECT,
-                    filter: AssumedDensity,
+                    filter: MomentFilter,
                     broadcast: nothing as fn(&Gaussian<1>),
                     start,
                 };

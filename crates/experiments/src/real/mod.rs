@@ -2,6 +2,7 @@
 
 mod baselines;
 mod bits;
+mod codecs;
 mod loss;
 mod models;
 mod packets;
@@ -12,5 +13,11 @@ use crate::AnyFigure;
 
 /// The figures of this system.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
-    vec![&bits::Bits, &packets::Packets, &models::Models, &loss::Loss]
+    vec![
+        &bits::Bits,
+        &packets::Packets,
+        &models::Models,
+        &loss::Loss,
+        &codecs::Codecs,
+    ]
 }

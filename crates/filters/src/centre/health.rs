@@ -69,7 +69,9 @@ impl Residual {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Cusum {
+    #[serde(with = "fewbits_numerics::stored")]
     up: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     down: f64,
 }
 

@@ -25,115 +25,34 @@
 //! Not here: radio, addresses, frames; schemes of any one paper.
 
 mod health;
+mod judge;
+mod late;
+mod learning;
 mod presence;
 mod remote;
+mod slot;
 mod state;
 
 pub use health::FalseAlarms;
+pub use learning::NoiseLearning;
 pub use presence::Failures;
 pub use remote::{RemoteSensor, Reporting};
+pub use slot::{Event, Received, Slot};
 pub use state::CentreState;
 
 use crate::Error;
-use crate::contract::{Evolving, Info, StateFilter, StateLikelihood};
+use crate::contract::{Evolving, StateFilter, StateLikelihood};
+use fewbits_core::factor::Scalar;
 use fewbits_core::{Belief, BitString, Gaussian, Observation};
 use fewbits_numerics::error::{finite, non_negative, positive, refuse};
-use health::{Alarm, Residual, SEQUENCES, limit};
 use rand::Rng;
-use state::{Checkpoint, MemberState, StoredSlot};
+use state::{Checkpoint, MemberState};
 use std::collections::BTreeMap;
-
-/// Reports of at most this many bits are words, whose alternatives are enumerated.
-const WORD_BITS: usize = 4;
-/// Observations without an alarm after which an excluded sensor is believed again.
-const READMISSION: u32 = 100;
-
-/// One sensor in one slot: what it was told, and what was observed of it. A sensor that was not asked has no slot.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Slot {
-    /// Number of the sensor.
-    pub sensor: u32,
-    /// The feedback as it travelled.
-    pub feedback: BitString,
-    /// What was observed.
-    pub observation: Observation<BitString>,
-}
-
-impl Slot {
-    /// A slot of sensor `sensor`.
-    pub fn new(sensor: u32, feedback: BitString, observation: Observation<BitString>) -> Self {
-        Self {
-            sensor,
-            feedback,
-            observation,
-        }
-    }
-}
-
-/// Something that the centre noticed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Event {
-    /// A sensor has been silent for so long that it is taken for dead. Its silence no longer says anything.
-    Dead(u32),
-    /// A report came from a sensor that had been taken for dead.
-    Alive(u32),
-    /// A sensor's reports contradict the others': they are no longer used, but still watched.
-    Excluded(u32),
-    /// An excluded sensor has agreed with the others for long and is used again.
-    Readmitted(u32),
-    /// The model does not hold for the sensors together: observations are too unlikely, or residuals repeat. The track is lost, or a noise
-    /// is understated.
-    Lost,
-    /// Observations are likelier than they should be, or residuals alternate: a noise is overstated.
-    NoiseOverstated,
-    /// The belief was replaced by the prior of [`FusionCentre::reacquire_from`].
-    Reacquired,
-}
-
-/// What an update reveals.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct Received {
-    /// What the filter says.
-    pub info: Info,
-    /// What the centre noticed.
-    pub events: Vec<Event>,
-}
-
-/// Process noise learnt from the signs of neighbouring residuals: `ln Q <- ln Q + gain b_k b_(k-1)`.
-///
-/// Residuals of a right model are independent; if `Q` is too small they repeat, if too large they alternate. It costs no bits and works
-/// from one bit per sample on. On signals of bursts and rests one scale is not enough ([`NoiseBank`](crate::NoiseBank)).
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct NoiseLearning {
-    /// Step of `ln Q` per observation; .03 follows a ninefold jump within 200 samples, .01 is finer and slower.
-    pub gain: f64,
-    /// Smallest and largest factor of the stated process noise.
-    pub range: [f64; 2],
-}
-
-impl NoiseLearning {
-    /// Steps of .03, within a factor of 1000 to either side.
-    pub const DEFAULT: Self = Self {
-        gain: 0.03,
-        range: [1e-3, 1e3],
-    };
-
-    fn check(&self) -> Result<(), Error> {
-        non_negative("gain", self.gain)?;
-        positive("range", self.range[0])?;
-        positive("range", self.range[1])?;
-        if self.range[0] > self.range[1] {
-            return refuse("range", format!("{:?}", self.range), "the smaller factor first");
-        }
-        Ok(())
-    }
-}
 
 struct Member<const D: usize> {
     sensor: Box<dyn RemoteSensor<D>>,
+    /// Whether nothing but the link keeps its reports back.
+    always_speaks: bool,
     state: MemberState,
 }
 
@@ -154,6 +73,7 @@ pub struct FusionCentre<const D: usize, F: StateFilter<D>> {
     now: f64,
     noise_scale: f64,
     members: BTreeMap<u32, Member<D>>,
+    outage: presence::Outage,
     monitor: health::Monitor,
     history: Vec<Checkpoint<F::Belief>>,
     dropped: u64,
@@ -183,6 +103,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             now: 0.0,
             noise_scale: 1.0,
             members: BTreeMap::new(),
+            outage: presence::Outage::default(),
             monitor: health::Monitor::default(),
             history: Vec::new(),
             dropped: 0,
@@ -224,7 +145,17 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         })
     }
 
+    /// The same with another factor of the stated process noise to begin with: one that was learnt before.
+    ///
+    /// # Errors
+    /// If it is not above 0.
+    pub fn with_noise_scale(self, noise_scale: f64) -> Result<Self, Error> {
+        positive("noise_scale", noise_scale)?;
+        Ok(Self { noise_scale, ..self })
+    }
+
     /// The same, starting anew from `prior` whenever the track is lost: what is known of the state without any report.
+    /// What was learnt of the process noise is kept.
     #[must_use]
     pub fn reacquire_from(self, prior: Gaussian<D>) -> Self {
         Self {
@@ -247,8 +178,12 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// # Errors
     /// If the sensor cannot ask for a report under the present belief: its noise is stated twice with different numbers.
     pub fn join(&mut self, number: u32, sensor: impl RemoteSensor<D> + 'static) -> Result<(), Error> {
-        sensor.feedback(&self.estimate())?;
+        let estimate = self.estimate();
+        let feedback = sensor.feedback(&estimate)?;
+        let nothing = sensor.likelihood(&feedback, &Observation::Nothing, 1.0).ok();
+        let nothing = nothing.and_then(|one| one.as_linear_scalar(estimate.mean()));
         let member = Member {
+            always_speaks: nothing.is_some_and(|(one, _)| matches!(one.factor, Scalar::Constant(_))),
             sensor: Box::new(sensor),
             state: MemberState::new(),
         };
@@ -341,9 +276,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let mut belief = self.belief.clone();
             self.filter.predict(rng, &*motion, self.noise_scale, &mut belief)?;
             self.belief = belief;
-            for member in self.members.values_mut() {
-                member.state.presence.advance(seconds, &self.failures);
-            }
+            let sensors = self.members.values_mut().map(|member| &mut member.state.presence);
+            self.outage.advance(seconds, &self.failures, sensors);
             self.now = time;
         }
         Ok(self)
@@ -377,6 +311,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
         let before = (self.window > 0.0).then(|| self.belief.clone());
         let mut belief = self.belief.clone();
+        let used: Vec<&dyn StateLikelihood<D>> = used.iter().map(|one| &**one).collect();
         let info = self.filter.update(rng, &mut belief, &used)?;
         self.belief = belief;
         if let Some(before) = before {
@@ -384,223 +319,5 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
         let events = self.judge(rng, slots, &watched)?;
         Ok(Received { info, events })
-    }
-
-    /// Takes in what was observed at an earlier `time`: the belief goes back to it, and all that came since is taken in again. Returns
-    /// whether it did; reports older than the window are dropped and counted. Presence and health are not judged again.
-    ///
-    /// # Errors
-    /// As [`receive`](Self::receive).
-    pub fn late(&mut self, rng: &mut dyn Rng, time: f64, slots: &[Slot]) -> Result<bool, Error> {
-        finite("time", time)?;
-        let Some(from) = self.history.iter().rposition(|checkpoint| checkpoint.time <= time) else {
-            self.dropped += slots.len() as u64;
-            return Ok(false);
-        };
-        let mut replayed = self.history[from..].to_vec();
-        let stored: Vec<StoredSlot> = slots.iter().map(|slot| self.stored(slot)).collect::<Result<_, _>>()?;
-        let at = replayed.partition_point(|checkpoint| checkpoint.time <= time);
-        let late = Checkpoint {
-            time,
-            belief: replayed[0].belief.clone(),
-            slots: stored,
-        };
-        replayed.insert(at, late);
-        let (mut belief, mut now) = (replayed[0].belief.clone(), replayed[0].time);
-        for checkpoint in &mut replayed {
-            self.moved(rng, &mut belief, checkpoint.time - now)?;
-            now = checkpoint.time;
-            checkpoint.belief = belief.clone();
-            let mut likelihoods: Vec<Box<dyn StateLikelihood<D>>> = Vec::new();
-            for slot in checkpoint.slots.iter().filter(|slot| slot.used) {
-                // A sensor may have left since.
-                if let Some(member) = self.members.get(&slot.sensor) {
-                    let (feedback, observation) = slot.bits()?;
-                    likelihoods.push(member.sensor.likelihood(&feedback, &observation, slot.working)?);
-                }
-            }
-            self.filter.update(rng, &mut belief, &likelihoods)?;
-        }
-        self.moved(rng, &mut belief, self.now - now)?;
-        self.history.truncate(from);
-        self.history.extend(replayed);
-        self.belief = belief;
-        Ok(true)
-    }
-
-    fn moved(&mut self, rng: &mut dyn Rng, belief: &mut F::Belief, seconds: f64) -> Result<(), Error> {
-        if seconds > 0.0 {
-            let motion = self.world.over(seconds)?;
-            self.filter.predict(rng, &*motion, self.noise_scale, belief)?;
-        }
-        Ok(())
-    }
-
-    fn stored(&self, slot: &Slot) -> Result<StoredSlot, Error> {
-        let state = &self.member(slot.sensor)?.state;
-        Ok(StoredSlot::new(slot, state.presence.working, !state.excluded))
-    }
-
-    /// Keeps the belief before an instant and its slots, as long as the window lasts.
-    fn remember(&mut self, before: F::Belief, slots: &[Slot]) {
-        let stored = slots.iter().filter_map(|slot| self.stored(slot).ok()).collect();
-        self.history.push(Checkpoint {
-            time: self.now,
-            belief: before,
-            slots: stored,
-        });
-        // The last belief before the window is what a report from its beginning goes back to.
-        let oldest = self.now - self.window;
-        let first = self.history.partition_point(|checkpoint| checkpoint.time < oldest);
-        self.history.drain(..first.saturating_sub(1));
-    }
-
-    /// What one slot says about its sensor, from the belief before.
-    fn watch(
-        &self,
-        member: &Member<D>,
-        slot: &Slot,
-        predicted: &Gaussian<D>,
-        likelihood: &dyn StateLikelihood<D>,
-    ) -> Result<Watched, Error> {
-        let evidence = |observation: &Observation<BitString>, working: f64| -> Result<Option<(f64, f64)>, Error> {
-            let likelihood = member.sensor.likelihood(&slot.feedback, observation, working)?;
-            possible(likelihood.condition(predicted))
-        };
-        match &slot.observation {
-            Observation::Lost => Ok(Watched::Nothing),
-            Observation::Nothing => {
-                let silence = evidence(&slot.observation, 1.0)?.map_or(0.0, |(log, _)| log.exp());
-                Ok(Watched::Silence(silence.min(1.0)))
-            }
-            Observation::Received(bits) => {
-                let Some((log, correction)) = possible(likelihood.condition(predicted))? else {
-                    return Ok(Watched::Report(None));
-                };
-                if let Some(variance) = member.sensor.value_variance(predicted) {
-                    let arrives = (member.sensor.arrival() * member.state.presence.working).ln();
-                    return Ok(Watched::Report(Residual::of_value(log - arrives, variance, correction)));
-                }
-                if bits.bits() == 0 || bits.bits() > WORD_BITS {
-                    return Ok(Watched::Report(None));
-                }
-                let mut words = Vec::with_capacity(1 << bits.bits());
-                let mut at = 0;
-                for word in 0..1_u8 << bits.bits() {
-                    let other = BitString::from_bytes(vec![word << (8 - bits.bits())], bits.bits())?;
-                    if other == *bits {
-                        at = words.len();
-                        words.push((log, correction));
-                        continue;
-                    }
-                    let observation = Observation::Received(other);
-                    // A word that the scheme never sends is no alternative.
-                    if let Ok(Some(found)) = evidence(&observation, member.state.presence.working) {
-                        words.push(found);
-                    }
-                }
-                Ok(Watched::Report(Residual::of_word(&words, at)))
-            }
-        }
-    }
-
-    /// Presence, health and noise from what was watched.
-    fn judge(&mut self, rng: &mut dyn Rng, slots: &[Slot], watched: &[Watched]) -> Result<Vec<Event>, Error> {
-        let mut events = Vec::new();
-        let (sensor_limit, centre_limit) = (
-            limit(self.false_alarms.sensor / SEQUENCES as f64),
-            limit(self.false_alarms.centre / SEQUENCES as f64),
-        );
-        let mut pooled = [(0.0, 0_u32); SEQUENCES];
-        let mut products = 0.0;
-        let allowed = self.members.len() / 2;
-        let mut excluded = self.members.values().filter(|m| m.state.excluded).count();
-        for (slot, watched) in slots.iter().zip(watched) {
-            let Some(member) = self.members.get_mut(&slot.sensor) else {
-                continue;
-            };
-            let state = &mut member.state;
-            match watched {
-                Watched::Nothing => {}
-                Watched::Silence(silence) => {
-                    if state.presence.silent(*silence, &self.failures) {
-                        events.push(Event::Dead(slot.sensor));
-                    }
-                }
-                Watched::Report(found) => {
-                    if state.presence.heard() {
-                        events.push(Event::Alive(slot.sensor));
-                    }
-                    let Some(found) = found else { continue };
-                    let product = state.last_residual.map(|last| last * found.residual);
-                    state.last_residual = Some(found.residual);
-                    let terms = [Some(found.surprise), Some(found.residual), product];
-                    let alarm = state.monitor.add(terms, sensor_limit) == Some(Alarm::Contradiction);
-                    state.quiet = if alarm { 0 } else { state.quiet.saturating_add(1) };
-                    if state.excluded {
-                        if state.quiet >= READMISSION {
-                            state.excluded = false;
-                            excluded -= 1;
-                            events.push(Event::Readmitted(slot.sensor));
-                        }
-                        continue;
-                    }
-                    if alarm && excluded < allowed {
-                        state.excluded = true;
-                        excluded += 1;
-                        self.monitor = health::Monitor::default();
-                        events.push(Event::Excluded(slot.sensor));
-                        continue;
-                    }
-                    // Residuals of different sensors have different signs when a track is lost; surprises and products do not.
-                    for (sum, term) in pooled.iter_mut().zip([terms[0], None, terms[2]]) {
-                        if let Some(term) = term {
-                            *sum = (sum.0 + term, sum.1 + 1);
-                        }
-                    }
-                    products += product.unwrap_or(0.0).clamp(-3.0, 3.0);
-                }
-            }
-        }
-        if let Some(learning) = &self.learning {
-            let [low, high] = learning.range;
-            self.noise_scale = (self.noise_scale * (learning.gain * products).exp()).clamp(low, high);
-        }
-        let terms = pooled.map(|(sum, count)| (count > 0).then(|| sum / f64::from(count).sqrt()));
-        let alarm = self.monitor.add(terms, centre_limit);
-        if alarm == Some(Alarm::Overstatement) {
-            events.push(Event::NoiseOverstated);
-        }
-        if alarm == Some(Alarm::Contradiction) {
-            events.push(Event::Lost);
-            if let Some(prior) = self.acquisition {
-                self.belief = self.filter.start(rng, &prior)?;
-                self.history.clear();
-                for member in self.members.values_mut() {
-                    member.state.last_residual = None;
-                    member.state.monitor = health::Monitor::default();
-                }
-                events.push(Event::Reacquired);
-            }
-        }
-        Ok(events)
-    }
-}
-
-/// What one slot says about its sensor.
-enum Watched {
-    Nothing,
-    Silence(f64),
-    Report(Option<Residual>),
-}
-
-/// Evidence and correction, `None` if the observation is impossible.
-fn possible<const D: usize>(
-    conditioned: Result<crate::contract::Conditioned<D>, Error>,
-) -> Result<Option<(f64, f64)>, Error> {
-    match conditioned {
-        Ok(found) => Ok(Some((found.log_likelihood, found.correction))),
-        Err(Error::Core(fewbits_core::Error::Impossible)) => Ok(None),
-        Err(error) => Err(error),
     }
 }

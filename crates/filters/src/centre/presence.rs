@@ -1,16 +1,21 @@
 //! Whether a silent sensor still works.
 //!
 //! ```text
-//! w            probability to work before the slot; over dt seconds  w <- w exp(-failure_rate dt)
-//! silence      w <- w E / (w E + 1 - w),   E = p(nothing arrives | works) under the belief without this observation
-//! a report     w <- 1
+//! alone        probability to work before the slot if sensors fail one by one; over dt seconds  alone <- alone exp(-rate dt)
+//! struck       the same if a common failure has struck, which takes each sensor with probability 1/2
+//! b            probability that it has; over dt seconds  b <- b + (1 - b) (1 - exp(-rate dt))
+//! silence      w <- w E / (w E + 1 - w) for both,   E = p(nothing arrives | works) under the belief without this observation
+//! a report     both <- 1
+//! b's odds     times the product over the sensors of p(observed | struck) / p(observed | alone)
+//! working      (1 - b) alone + b struck
 //! R            (1 + R) / E after silence, 0 after a report: the Shiryaev-Roberts statistic
 //! named dead   when R reaches 1 / (rate of false alarms)
 //! ```
 //! `R` minus the number of slots is a martingale while the sensor works, so that a working sensor is named dead less than once in
 //! `1 / rate` slots on average (Pollak 1985), whatever the scheme, the threshold and the loss.
 //!
-//! Not covered: sensors that die because of the state (the target destroys them), or together.
+//! Without a common failure, sensors that die together would each have to be doubted alone, and their silence would be believed for long.
+//! Not covered: sensors that die because of the state (the target destroys them).
 
 use crate::Error;
 use fewbits_numerics::error::{non_negative, within};
@@ -20,7 +25,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Failures {
-    /// Failures of a working sensor per second.
+    /// Failures of a working sensor per second, and common failures of half of the sensors per second.
     pub rate: f64,
     /// How often a working sensor may be named dead, per slot.
     pub false_alarms: f64,
@@ -48,7 +53,13 @@ impl Failures {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Presence {
+    #[serde(with = "fewbits_numerics::stored")]
     pub working: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    alone: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    struck: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     statistic: f64,
     pub named_dead: bool,
 }
@@ -57,32 +68,79 @@ impl Presence {
     pub fn new() -> Self {
         Self {
             working: 1.0,
+            alone: 1.0,
+            struck: 1.0,
             statistic: 0.0,
             named_dead: false,
         }
     }
 
-    pub fn advance(&mut self, seconds: f64, failures: &Failures) {
-        self.working *= (-failures.rate * seconds).exp();
-    }
-
-    /// Nothing arrived, which has probability `silence` if the sensor works. Whether the sensor is named dead now.
-    pub fn silent(&mut self, silence: f64, failures: &Failures) -> bool {
-        let alive = self.working * silence;
-        let total = alive + 1.0 - self.working;
-        // Certain to work and certain to report: silence is impossible, and the failure has happened all the same.
-        self.working = if total > 0.0 { alive / total } else { 0.0 };
+    /// Nothing arrived, which has probability `silence` if the sensor works. `ln` of how much likelier a common failure makes that, and
+    /// whether the sensor is named dead now.
+    pub fn silent(&mut self, silence: f64, failures: &Failures) -> (f64, bool) {
+        let evidence = |works: &mut f64| {
+            let alive = *works * silence;
+            let total = alive + 1.0 - *works;
+            // Certain to work and certain to report: silence is impossible, and the failure has happened all the same.
+            *works = if total > 0.0 { alive / total } else { 0.0 };
+            total.max(f64::MIN_POSITIVE)
+        };
+        let ratio = (evidence(&mut self.struck) / evidence(&mut self.alone)).ln();
         self.statistic = (1.0 + self.statistic) / silence.max(f64::MIN_POSITIVE);
         let dead = self.statistic * failures.false_alarms >= 1.0;
         let news = dead && !self.named_dead;
         self.named_dead |= dead;
-        news
+        (ratio, news)
     }
 
-    /// A report arrived. Whether the sensor had been named dead.
-    pub fn heard(&mut self) -> bool {
+    /// A report arrived. `ln` of how much likelier a common failure makes that, and whether the sensor had been named dead.
+    pub fn heard(&mut self) -> (f64, bool) {
+        let ratio = (self.struck.max(f64::MIN_POSITIVE) / self.alone.max(f64::MIN_POSITIVE)).ln();
         let news = self.named_dead;
         *self = Self::new();
-        news
+        (ratio, news)
+    }
+}
+
+/// Share of the sensors that a common failure takes.
+const TAKEN: f64 = 0.5;
+/// Probability from which on a common failure counts as a fact, and the next one may come.
+const SETTLED: f64 = 0.999;
+
+/// The probability that a common failure has struck.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub(super) struct Outage(f64);
+
+impl Outage {
+    pub fn advance<'a>(&mut self, seconds: f64, failures: &Failures, sensors: impl Iterator<Item = &'a mut Presence>) {
+        let survives = (-failures.rate * seconds).exp();
+        let new = (1.0 - self.0) * (1.0 - survives);
+        let total = self.0 + new;
+        for sensor in sensors {
+            if total > 0.0 {
+                sensor.struck = (self.0 * survives * sensor.struck + new * (1.0 - TAKEN) * sensor.alone) / total;
+            }
+            sensor.alone *= survives;
+            sensor.working = (1.0 - total) * sensor.alone + total * sensor.struck;
+        }
+        self.0 = total;
+    }
+
+    /// Takes in what the sensors of one instant say together.
+    pub fn weigh<'a>(&mut self, log_ratio: f64, sensors: impl Iterator<Item = &'a mut Presence>) {
+        // The odds' logarithm within what a double can tell from certainty.
+        let odds = ((self.0 / (1.0 - self.0)).ln() + log_ratio).clamp(-700.0, 700.0).exp();
+        self.0 = odds / (1.0 + odds);
+        let settled = self.0 > SETTLED;
+        for sensor in sensors {
+            sensor.working = (1.0 - self.0) * sensor.alone + self.0 * sensor.struck;
+            if settled {
+                sensor.alone = sensor.working;
+            }
+        }
+        if settled {
+            self.0 = 0.0;
+        }
     }
 }

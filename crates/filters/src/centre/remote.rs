@@ -170,8 +170,10 @@ where
     }
 
     fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64> {
-        let measurement = self.predicted(predicted).ok().filter(|_| self.sends_values && M == 1)?;
-        Some(measurement.covariance()[(0, 0)])
+        if !(self.sends_values && M == 1) {
+            return None;
+        }
+        Some(self.predicted(predicted).ok()?.covariance()[(0, 0)])
     }
 
     fn arrival(&self) -> f64 {

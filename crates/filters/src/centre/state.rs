@@ -1,17 +1,18 @@
 //! What a centre knows, as a value that is stored and goes on to the bit.
 
 use super::health::Monitor;
-use super::presence::Presence;
+use super::presence::{Outage, Presence};
 use super::{FusionCentre, Slot};
 use crate::Error;
 use crate::contract::StateFilter;
 use fewbits_core::{BitString, Observation};
 use fewbits_numerics::error::{finite, positive, refuse};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The version of the stored form.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// What is known of one sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,6 +20,7 @@ const VERSION: u32 = 1;
 pub(super) struct MemberState {
     pub presence: Presence,
     pub monitor: Monitor,
+    #[serde(default, with = "fewbits_numerics::stored")]
     pub last_residual: Option<f64>,
     pub excluded: bool,
     /// Observations since the last alarm.
@@ -41,6 +43,7 @@ impl MemberState {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Checkpoint<B> {
+    #[serde(with = "fewbits_numerics::stored")]
     pub time: f64,
     pub belief: B,
     pub slots: Vec<StoredSlot>,
@@ -53,6 +56,7 @@ pub(super) struct StoredSlot {
     pub sensor: u32,
     feedback: (Vec<u8>, usize),
     observation: Observation<(Vec<u8>, usize)>,
+    #[serde(with = "fewbits_numerics::stored")]
     pub working: f64,
     pub used: bool,
 }
@@ -82,19 +86,56 @@ impl StoredSlot {
 
 /// What a centre knows: everything but its models, its filter and its settings, which the program states again.
 ///
-/// Stored as JSON by `serde_json` with its feature `float_roundtrip`, or by any format that keeps every bit of a double, a centre that
-/// is restored goes on with the same bits, given the same random stream.
+/// Stored as bytes ([`to_bytes`](Self::to_bytes)) or by any format of serde, a centre that is restored goes on with the same bits, given the
+/// same random stream: floats are stored exactly whatever the format does ([`fewbits_numerics::stored`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CentreState<B> {
     version: u32,
+    #[serde(with = "fewbits_numerics::stored")]
     now: f64,
+    #[serde(with = "fewbits_numerics::stored")]
     noise_scale: f64,
     belief: B,
     members: BTreeMap<u32, MemberState>,
+    outage: Outage,
     monitor: Monitor,
     history: Vec<Checkpoint<B>>,
     dropped: u64,
+}
+
+impl<B: Serialize> CentreState<B> {
+    /// The compact binary form: a byte with the version, then CBOR (RFC 8949), in which a double takes at most 9 bytes.
+    ///
+    /// # Errors
+    /// If the belief has no such form.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
+        let mut bytes = vec![VERSION as u8];
+        match ciborium::into_writer(self, &mut bytes) {
+            Ok(()) => Ok(bytes),
+            Err(error) => refuse("belief", error, "a belief that serialises"),
+        }
+    }
+}
+
+impl<B: DeserializeOwned> CentreState<B> {
+    /// Reads [`to_bytes`](Self::to_bytes).
+    ///
+    /// # Errors
+    /// If the bytes are of another version, or no state of this kind of belief.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        let expected = format!("the bytes of a centre's state of version {VERSION}");
+        let mut rest = match bytes.split_first() {
+            Some((version, rest)) if u32::from(*version) == VERSION => rest,
+            Some((version, _)) => return refuse("version", version, expected),
+            None => return refuse("bytes", "empty", expected),
+        };
+        match ciborium::from_reader(&mut rest) {
+            Ok(state) if rest.is_empty() => Ok(state),
+            Ok(_) => refuse("bytes", format!("{} bytes too many", rest.len()), expected),
+            Err(error) => refuse("bytes", error, expected),
+        }
+    }
 }
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
@@ -110,6 +151,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 .iter()
                 .map(|(number, m)| (*number, m.state.clone()))
                 .collect(),
+            outage: self.outage,
             monitor: self.monitor,
             history: self.history.clone(),
             dropped: self.dropped,
@@ -136,6 +178,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         self.now = state.now;
         self.noise_scale = state.noise_scale;
         self.belief = state.belief;
+        self.outage = state.outage;
         self.monitor = state.monitor;
         self.history = state.history;
         self.dropped = state.dropped;

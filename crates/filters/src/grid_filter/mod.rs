@@ -3,11 +3,14 @@
 //! For likelihoods of a few coordinates of the state, of any shape: sharp, wide, with edges, curved, with several modes. The grid
 //! follows the posterior until it resolves it; what it cannot resolve is an error and no number.
 //!
-//! Not here: beliefs that are no Gaussian ([`PointMassFilter`](crate::PointMassFilter), [`PlaneFilter`](crate::PlaneFilter)), more than
+//! Not here: beliefs that are no Gaussian ([`PointMassFilter`](crate::PointMassFilter)), more than
 //! about three observed coordinates ([`ParticleFilter`](crate::ParticleFilter)).
 
+mod on_axes;
 mod pass;
 mod region;
+
+pub use on_axes::GridOnAxes;
 
 use crate::Error;
 use fewbits_core::{Gaussian, Likelihood};
@@ -283,7 +286,7 @@ struct Moments<const K: usize> {
 }
 
 /// Refuses axes that are not `K` different coordinates of a state of `D`.
-pub(crate) fn check_axes<const D: usize, const K: usize>(axes: &[usize; K]) -> Result<(), Error> {
+fn check_axes<const D: usize, const K: usize>(axes: &[usize; K]) -> Result<(), Error> {
     if K == 0 || K > D {
         return refuse("axes", format!("{K} coordinates"), format!("1 to {D} coordinates"));
     }

@@ -3,13 +3,12 @@
 use fewbits_core::factor::{Constant, InCell, Scalar};
 use fewbits_core::{Cell, Error as CoreError, Gaussian, Likelihood, Observed};
 use fewbits_filters::{
-    CloudWorkspace, Error, GaussianCloud, Grid, ParticleFilter, Particles, PlaneFilter, PointMass, PointMassFilter,
-    Proposal, RaoBlackwellised, Resampling, Schedule, Workspace, assumed_density,
+    CloudWorkspace, Error, GaussianCloud, Grid, ParticleFilter, Particles, PointMass, PointMassFilter,
+    RaoBlackwellised, Resampling, Schedule, Workspace, assumed_density,
 };
-use fewbits_models::{Ar1, LinearGaussian, LinearSensor};
+use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, SVector, Vector1, Vector2};
-use rand::Rng;
 
 fn impossible<T: std::fmt::Debug>(result: Result<T, impl Into<Error>>) {
     let error = result.map_err(Into::into);
@@ -45,12 +44,6 @@ fn cloud() -> Particles<1> {
 
 #[test]
 fn particle_filters() {
-    struct Nowhere;
-    impl Proposal<1> for Nowhere {
-        fn propose<R: Rng + ?Sized>(&self, _: &mut R, state: &Vector1<f64>) -> (Vector1<f64>, f64) {
-            (state * 2.0, f64::NEG_INFINITY)
-        }
-    }
     struct NotANumber;
     impl Likelihood<1> for NotANumber {
         fn log_likelihood(&self, state: &Vector1<f64>) -> f64 {
@@ -66,12 +59,9 @@ fn particle_filters() {
         let filter = ParticleFilter::new(Resampling::Systematic, schedule);
         for never in &nevers::<1>() {
             impossible(filter.update(&mut belief, never));
-            impossible(filter.step(&mut rng, &dynamics, &belief, never));
             impossible(filter.step_in_place(&mut rng, &dynamics, &mut belief, never, &mut workspace));
-            impossible(filter.auxiliary_step(&mut rng, &dynamics, &mut belief, never, &mut workspace));
         }
         no_number(filter.update(&mut belief, &NotANumber));
-        impossible(filter.guided_step(&mut rng, &Nowhere, &mut belief, &mut workspace));
         assert_eq!(belief, before);
         assert_eq!(belief.weights(), before.weights());
         assert_eq!(belief.effective_sample_size(), before.effective_sample_size());
@@ -80,15 +70,12 @@ fn particle_filters() {
 
 #[test]
 fn the_rao_blackwellised_filter() {
-    let dynamics = Ar1::new(0.9, 1.0).unwrap();
     let mut rng = Stream::new(1).fast_rng();
     let before = GaussianCloud::new(cloud(), [[2.0]].into()).unwrap();
     let (mut belief, mut workspace) = (before.clone(), CloudWorkspace::default());
     let filter = RaoBlackwellised::new(ParticleFilter::new(Resampling::Systematic, Schedule::Below(0.9)));
     for never in &nevers::<1>() {
         impossible(filter.update(&mut rng, &mut belief, never, &mut workspace));
-        impossible(filter.step(&mut rng, &dynamics, &belief, never));
-        impossible(filter.step_in_place(&mut rng, &dynamics, &mut belief, never, &mut workspace));
         assert_eq!(belief, before);
         assert_eq!(belief.means().weights(), before.means().weights());
     }
@@ -108,18 +95,6 @@ fn the_grid_filters() {
     no_number(belief.update_with(|x| if x > 1.0 { f64::NAN } else { 0.0 }));
     no_number(belief.reweight(&vec![f64::NAN; grid.points()]));
     impossible(belief.reweight(&vec![0.0; grid.points()]));
-    assert_eq!(belief, before);
-
-    let dynamics = LinearGaussian::with_covariance(Matrix2::identity() * 0.9, Matrix2::identity()).unwrap();
-    let filter = PlaneFilter::new(&dynamics, 0.6).unwrap();
-    let before = filter
-        .normal(&Gaussian::new(Vector2::new(1.0, 0.0), Matrix2::identity()).unwrap())
-        .unwrap();
-    let mut belief = before.clone();
-    for never in &nevers::<2>() {
-        impossible(filter.step(&belief, never));
-        impossible(belief.update(never));
-    }
     assert_eq!(belief, before);
 }
 

@@ -3,7 +3,8 @@
 // Helpers fail loudly, as tests do.
 #![allow(clippy::unwrap_used)]
 
-mod closed_loop;
+mod contract;
+mod stored;
 mod failure;
 mod imm;
 mod particle;

@@ -3,8 +3,8 @@
 use fewbits_core::factor::{Constant, InCell, Scalar, Value};
 use fewbits_core::{Belief, Cell, Dynamics, Gaussian, Link, Observed, Sensing, Sign};
 use fewbits_filters::{
-    Grid, OptimalProposal, ParticleFilter, Particles, PointMass, PointMassFilter, Resampling, Schedule, TiltedProposal,
-    Workspace, kalman,
+    BootstrapFilter, Grid, GuidedFilter, ParticleFilter, Particles, PointMass, PointMassFilter, Resampling, Schedule,
+    StateFilter, StateLikelihood, Workspace, kalman,
 };
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_1d};
 use fewbits_monte_carlo::{Moments, Stream};
@@ -66,37 +66,44 @@ impl Scene {
 enum Kind {
     Bootstrap,
     Guided,
-    Tilted,
-    Auxiliary,
 }
 
 impl Kind {
-    const ALL: [Self; 4] = [Self::Bootstrap, Self::Guided, Self::Tilted, Self::Auxiliary];
+    const ALL: [Self; 2] = [Self::Bootstrap, Self::Guided];
+}
+
+/// One step of either filter in place; the estimate of the log-likelihood and the effective sample size.
+fn advance<const D: usize>(
+    kind: Kind,
+    filter: ParticleFilter,
+    rng: &mut Pcg64Mcg,
+    dynamics: &impl fewbits_core::GaussianDynamics<D>,
+    belief: &mut Particles<D>,
+    observed: &dyn StateLikelihood<D>,
+) -> (f64, f64) {
+    let count = belief.len();
+    let (next, info) = match kind {
+        Kind::Bootstrap => BootstrapFilter::new(filter, count)
+            .unwrap()
+            .step(rng, dynamics, belief, &[observed]),
+        Kind::Guided => GuidedFilter::new(filter, count)
+            .unwrap()
+            .step(rng, dynamics, belief, &[observed]),
+    }
+    .unwrap();
+    *belief = next;
+    (info.log_likelihood, info.effective_sample_size.unwrap())
 }
 
 /// Runs one filter over the scene; the final belief and the estimate of the log-likelihood.
 fn run(scene: &Scene, kind: Kind, filter: ParticleFilter, count: usize, stream: Stream) -> (Particles<2>, f64) {
     let mut rng = stream.fast_rng();
     let mut belief = scene.start(count, &mut rng);
-    let mut workspace = Workspace::default();
     let mut log_likelihood = 0.0;
     for z in &scene.measurements {
-        let observed = scene.value(*z);
-        let info = match kind {
-            Kind::Bootstrap => filter.step_in_place(&mut rng, &scene.dynamics, &mut belief, &observed, &mut workspace),
-            Kind::Guided => {
-                let proposal = OptimalProposal::new(&scene.dynamics, &scene.sensor, SVector::from([*z])).unwrap();
-                filter.guided_step(&mut rng, &proposal, &mut belief, &mut workspace)
-            }
-            Kind::Tilted => {
-                let proposal = TiltedProposal::new(&scene.dynamics, &observed);
-                filter.guided_step(&mut rng, &proposal, &mut belief, &mut workspace)
-            }
-            Kind::Auxiliary => filter.auxiliary_step(&mut rng, &scene.dynamics, &mut belief, &observed, &mut workspace),
-        }
-        .unwrap();
-        log_likelihood += info.log_likelihood;
-        assert!((info.effective_sample_size - belief.effective_sample_size()).abs() < 1e-9);
+        let (log, size) = advance(kind, filter, &mut rng, &scene.dynamics, &mut belief, &scene.value(*z));
+        log_likelihood += log;
+        assert!((size - belief.effective_sample_size()).abs() < 1e-9);
     }
     (belief, log_likelihood)
 }
@@ -171,21 +178,15 @@ fn against_the_grid(observed_at: impl Fn(usize) -> Scalar) {
         evidence += increment;
     }
     let filter = ParticleFilter::default();
-    for guided in [false, true] {
+    for kind in Kind::ALL {
         let mut moments = <(Moments, Moments, Moments)>::default();
         for repeat in 0..10 {
             let mut rng = Stream::new(21).indexed(repeat).fast_rng();
             let prior = Gaussian::scalar(0.0, 3.0).unwrap();
             let mut belief = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
-            let (mut workspace, mut total) = (Workspace::default(), 0.0);
+            let mut total = 0.0;
             for likelihood in &likelihoods {
-                let info = if guided {
-                    let proposal = TiltedProposal::new(&dynamics, likelihood);
-                    filter.guided_step(&mut rng, &proposal, &mut belief, &mut workspace)
-                } else {
-                    filter.step_in_place(&mut rng, &dynamics, &mut belief, likelihood, &mut workspace)
-                };
-                total += info.unwrap().log_likelihood;
+                total += advance(kind, filter, &mut rng, &dynamics, &mut belief, likelihood).0;
             }
             moments.0.add(belief.mean()[0]);
             moments.1.add(belief.covariance()[(0, 0)]);
@@ -198,7 +199,7 @@ fn against_the_grid(observed_at: impl Fn(usize) -> Scalar) {
         ] {
             let off = (ours.mean() - truth).abs();
             let found = ours.estimate();
-            assert!(off < 5.0 * ours.standard_error() + 1e-3 && off < 0.05, "{guided}: {found:?} against {truth}");
+            assert!(off < 5.0 * ours.standard_error() + 1e-3 && off < 0.05, "{kind:?}: {found:?} against {truth}");
         }
     }
 }
@@ -257,7 +258,7 @@ fn the_number_of_particles_can_change() {
 
 /// A sharp value seen through the square root of a distance: weights of the proposal that has seen it are far more even.
 #[test]
-fn a_tilted_proposal_pays_where_the_dynamics_are_wide() {
+fn a_guided_filter_pays_where_the_dynamics_are_wide() {
     struct Root;
     impl Sensing<1, 1> for Root {
         fn mean(&self, state: &Vector1<f64>) -> Vector1<f64> {
@@ -276,21 +277,17 @@ fn a_tilted_proposal_pays_where_the_dynamics_are_wide() {
     let dynamics = Ar1::new(0.9, 1.0).unwrap();
     let observed = Observed::new(Root, Value::scalar(5.0, 1e-4).unwrap());
     let prior = Gaussian::scalar(5.0, 0.5).unwrap();
-    let (filter, mut workspace) = (ParticleFilter::default(), Workspace::default());
     let (mut plain, mut guided) = <(Moments, Moments)>::default();
     let mut sizes = [0.0; 2];
     for repeat in 0..40 {
         let mut rng = Stream::new(22).indexed(repeat).fast_rng();
-        let mut belief = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
-        let (_, info) = filter.step(&mut rng, &dynamics, &belief, &observed).unwrap();
-        plain.add(info.log_likelihood.exp());
-        sizes[0] += info.effective_sample_size;
-        let proposal = TiltedProposal::new(&dynamics, &observed);
-        let info = filter
-            .guided_step(&mut rng, &proposal, &mut belief, &mut workspace)
-            .unwrap();
-        guided.add(info.log_likelihood.exp());
-        sizes[1] += info.effective_sample_size;
+        let start = Particles::from_belief(&mut rng, &prior, 4000).unwrap();
+        for (kind, moments, sum) in [(Kind::Bootstrap, &mut plain, 0), (Kind::Guided, &mut guided, 1)] {
+            let mut belief = start.clone();
+            let (log, size) = advance(kind, ParticleFilter::default(), &mut rng, &dynamics, &mut belief, &observed);
+            moments.add(log.exp());
+            sizes[sum] += size;
+        }
     }
     let error = plain.standard_error().hypot(guided.standard_error());
     assert!((plain.mean() - guided.mean()).abs() < 4.0 * error, "{:?} {:?}", plain.estimate(), guided.estimate());

@@ -23,9 +23,8 @@ fn with_values_only_it_is_the_kalman_filter() {
         let (next, info) = kalman::step(&dynamics, &sensor, &exact, &SVector::from([z])).unwrap();
         exact = next;
         let observed = Observed::new(sensor, Value::scalar(z, 2.0).unwrap());
-        let update = filter
-            .step_in_place(&mut rng, &dynamics, &mut ours, &observed, &mut workspace)
-            .unwrap();
+        filter.predict(&mut rng, &dynamics, &mut ours, &mut workspace).unwrap();
+        let update = filter.update(&mut rng, &mut ours, &observed, &mut workspace).unwrap();
         assert!((update.log_likelihood - info.log_likelihood).abs() < 1e-9);
         assert!((ours.gaussian().mean() - exact.mean()).amax() < 1e-9);
         assert!((ours.gaussian().covariance() - exact.covariance()).amax() < 1e-9);
@@ -70,7 +69,8 @@ fn bits_cells_silence_and_loss_agree_with_the_grid() {
         let mut ours = GaussianCloud::agreed(&Gaussian::scalar(0.5, 2.0).unwrap(), 200).unwrap();
         let mut total = 0.0;
         for observed in &sequence {
-            let info = filter.step_in_place(&mut rng, &dynamics, &mut ours, observed, &mut workspace);
+            filter.predict(&mut rng, &dynamics, &mut ours, &mut workspace).unwrap();
+            let info = filter.update(&mut rng, &mut ours, observed, &mut workspace);
             total += info.unwrap().log_likelihood;
         }
         mean.add(ours.gaussian().mean()[0]);

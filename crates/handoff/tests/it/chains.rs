@@ -1,7 +1,7 @@
 //! The bounds on chains of lossy hand-overs of discrete beliefs, where everything is exact.
 
-use fewbits_densities::divergence::discrete;
-use fewbits_handoff::{Accounting, Amplification, StepError};
+use fewbits_handoff::published::{Accounting, Amplification, StepError};
+use fewbits_mixture_codec::divergence::discrete;
 use fewbits_monte_carlo::Stream;
 use rand::{Rng, RngExt};
 
@@ -96,7 +96,7 @@ fn expected_bounds_hold_over_all_data() {
                 let posterior = filtered(&known, &rows, &given(second));
                 let sent = blurred(&mut rng, &posterior);
                 let e = discrete(&posterior, &sent).unwrap();
-                let step = |d: &fewbits_densities::divergence::Divergence| StepError {
+                let step = |d: &fewbits_mixture_codec::divergence::Divergence| StepError {
                     ml: d.ml,
                     dr: d.dr,
                     kl: d.kl,

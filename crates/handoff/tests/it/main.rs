@@ -5,3 +5,4 @@
 
 mod chains;
 mod filter;
+mod wild;

@@ -116,13 +116,13 @@ where
         _: &mut Pcg64Dxsm,
         _: u32,
         predicted: &Followed<D>,
-        observations: &[Observation<Packet>],
+        observations: &[Option<Observation<Packet>>],
     ) -> Result<Followed<D>, Error> {
         let mut belief = predicted.clone();
         for ((receiver, sensor), observation) in belief.receivers.iter_mut().zip(&self.sensors).zip(observations) {
             // A packet that the sensor cannot have sent is one that was damaged.
             let tracked = receiver
-                .receive(observation)
+                .receive(observation.as_ref().unwrap_or(&Observation::Lost))
                 .or_else(|_| receiver.receive(&Observation::Lost))
                 .map_err(|error| Error::estimator("adaptive", error))?;
             let (Some(value), true) = (tracked.value, tracked.synchronised) else {

@@ -223,10 +223,12 @@ where
         _: &mut Pcg64Dxsm,
         slot: u32,
         predicted: &Gaussian<D>,
-        observations: &[Observation<SVector<f64, M>>],
+        observations: &[Option<Observation<SVector<f64, M>>>],
     ) -> Result<Gaussian<D>, Error> {
         let rules = self.rules(slot, predicted)?;
-        let fused = self.network.fuse(predicted, &rules, predicted.mean(), observations);
+        let fused = self
+            .network
+            .fuse_asked(predicted, &rules, predicted.mean(), observations);
         Ok(fused.map_err(of)?.0)
     }
 

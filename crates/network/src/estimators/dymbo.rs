@@ -1,7 +1,7 @@
 //! One bit per sample, or a few: the filters of Dymbo.
 
 use crate::error::Error;
-use crate::estimator::{Estimator, gaussian_replica};
+use crate::estimator::{Estimator, always_spoken, gaussian_replica};
 use fewbits_core::{Gaussian, Message, NumberFormat, Observation, Scheme, Sign};
 use fewbits_dymbo::{ParallelFilter, ScalarFilter, SignBit};
 use nalgebra::Vector1;
@@ -74,9 +74,11 @@ impl<F: ScalarFilter> Estimator for DymboEstimator<F> {
         _: &mut Pcg64Dxsm,
         _: u32,
         predicted: &Gaussian<1>,
-        observations: &[Observation<Self::Report>],
+        observations: &[Option<Observation<Self::Report>>],
     ) -> Result<Gaussian<1>, Error> {
-        let observation = observations.first().unwrap_or(&Observation::Lost);
+        let Some(Some(observation)) = observations.first() else {
+            return Ok(*predicted);
+        };
         Ok(self.filter.update(predicted, observation).map_err(impossible)?.0)
     }
 
@@ -155,9 +157,13 @@ impl Estimator for ParallelDymboEstimator {
         _: &mut Pcg64Dxsm,
         _: u32,
         belief: &Gaussian<1>,
-        observations: &[Observation<Sign>],
+        observations: &[Option<Observation<Sign>>],
     ) -> Result<Gaussian<1>, Error> {
-        Ok(self.filter.step(belief, observations).map_err(impossible)?.0)
+        Ok(self
+            .filter
+            .step(belief, &always_spoken(observations))
+            .map_err(impossible)?
+            .0)
     }
 
     fn mean(&self, belief: &Gaussian<1>) -> Vec<f64> {

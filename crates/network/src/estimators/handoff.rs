@@ -5,8 +5,8 @@ use crate::protocols::{Lead, Walker};
 use crate::units::SensorId;
 use fewbits_core::{BitString, Dynamics, Likelihood, Message};
 use fewbits_densities::Mixture;
-use fewbits_densities::wire::CodedMixture;
 use fewbits_handoff::{Coded, HandoffFilter};
+use fewbits_mixture_codec::wire::CodedMixture;
 use rand_pcg::Pcg64Dxsm;
 
 /// A [`HandoffFilter`] whose belief crosses the network as the bits of its wire format.

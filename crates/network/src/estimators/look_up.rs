@@ -1,7 +1,7 @@
 //! Static quantizers and a table at the fusion centre: no feedback, no memory.
 
 use crate::error::Error;
-use crate::estimator::{Estimator, gaussian_replica};
+use crate::estimator::{Estimator, always_spoken, gaussian_replica};
 use fewbits_binary_patterns::{Bit, LookupTable, PatternSensor};
 use fewbits_core::{Gaussian, Observation};
 use fewbits_numerics::ArgumentError;
@@ -127,12 +127,15 @@ impl Estimator for LookUp {
         _: &mut Pcg64Dxsm,
         _: u32,
         _: &Gaussian<1>,
-        observations: &[Observation<Symbol>],
+        observations: &[Option<Observation<Symbol>>],
     ) -> Result<Gaussian<1>, Error> {
-        let estimate = self.decoder.decode(observations).map_err(|error| match error {
-            fewbits_quantizer_design::Error::ImpossibleOutcome => Error::Impossible,
-            other => Error::estimator("look-up", other),
-        })?;
+        let estimate = self
+            .decoder
+            .decode(&always_spoken(observations))
+            .map_err(|error| match error {
+                fewbits_quantizer_design::Error::ImpossibleOutcome => Error::Impossible,
+                other => Error::estimator("look-up", other),
+            })?;
         Ok(Gaussian::scalar(estimate.mean, estimate.variance)?)
     }
 }
@@ -195,11 +198,11 @@ impl Estimator for Patterns {
         _: &mut Pcg64Dxsm,
         _: u32,
         _: &Gaussian<1>,
-        observations: &[Observation<Bit>],
+        observations: &[Option<Observation<Bit>>],
     ) -> Result<Gaussian<1>, Error> {
         let (mean, squared_error) = self
             .table
-            .decode_with_error(observations)
+            .decode_with_error(&always_spoken(observations))
             .map_err(|error| Error::estimator("look-up", error))?;
         Ok(Gaussian::scalar(mean, squared_error)?)
     }

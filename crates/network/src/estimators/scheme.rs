@@ -2,19 +2,16 @@
 
 use crate::error::Error;
 use crate::estimator::{Estimator, gaussian_replica};
-use fewbits_core::{
-    Belief, Dynamics, Gaussian, GaussianDynamics, Link, Message, Observation, Observed, Scheme, Sensing,
-};
-use fewbits_filters::{AssumedDensity, Filter};
+use fewbits_core::{Belief, Gaussian, GaussianDynamics, Link, Message, Observation, Observed, Scheme, Sensing};
+use fewbits_filters::{MomentFilter, StateFilter};
 use nalgebra::SVector;
 use rand_pcg::Pcg64Dxsm;
 
-/// Sensors that report by one [`Scheme`], and a filter that receives them: [`fewbits_filters::ClosedLoop`] over a network.
+/// Sensors that report by one [`Scheme`], and a filter that receives them.
 ///
 /// The reports of one slot are absorbed one after the other, in the order of the sensors.
 #[derive(Debug, Clone)]
-pub struct Reporting<const D: usize, const M: usize, G, S, C: Scheme<M>, F: Filter<D, G, Observed<S, C::Factor, M>>, B>
-{
+pub struct Reporting<const D: usize, const M: usize, G, S, C: Scheme<M>, F: StateFilter<D>, B> {
     /// How the world moves.
     pub dynamics: G,
     /// How each sensor senses it.
@@ -33,11 +30,11 @@ pub struct Reporting<const D: usize, const M: usize, G, S, C: Scheme<M>, F: Filt
 
 impl<const D: usize, const M: usize, G, S, C, F, B> Estimator for Reporting<D, M, G, S, C, F, B>
 where
-    G: Dynamics<D>,
+    G: GaussianDynamics<D>,
     S: Sensing<D, M> + Clone,
     C: Scheme<M>,
     C::State: Clone,
-    F: Filter<D, G, Observed<S, C::Factor, M>>,
+    F: StateFilter<D> + Clone,
     B: Fn(&Gaussian<M>) -> C::Feedback,
 {
     type Belief = F::Belief;
@@ -60,9 +57,7 @@ where
 
     fn predict(&self, rng: &mut Pcg64Dxsm, _: u32, belief: &F::Belief) -> Result<F::Belief, Error> {
         let mut predicted = belief.clone();
-        let mut workspace = F::Workspace::default();
-        self.filter
-            .advance(rng, &self.dynamics, &mut predicted, &mut workspace)?;
+        self.filter.clone().predict(rng, &self.dynamics, 1.0, &mut predicted)?;
         Ok(predicted)
     }
 
@@ -99,16 +94,17 @@ where
         rng: &mut Pcg64Dxsm,
         slot: u32,
         predicted: &F::Belief,
-        observations: &[Observation<C::Report>],
+        observations: &[Option<Observation<C::Report>>],
     ) -> Result<F::Belief, Error> {
-        let (mut belief, mut workspace) = (predicted.clone(), F::Workspace::default());
+        let (mut belief, mut filter) = (predicted.clone(), self.filter.clone());
         let format = self.scheme.feedback_format();
         for (i, (sensor, observation)) in self.sensors.iter().zip(observations).enumerate() {
+            let Some(observation) = observation else { continue };
             // The feedback as it travelled.
             let feedback = C::Feedback::from_bits(&format, &self.question(slot, predicted, i)?.to_bits(&format)?)?;
             let factor = self.scheme.factor(&feedback, observation, &self.link)?;
             let observed = Observed::new(sensor.clone(), factor);
-            self.filter.absorb(rng, &mut belief, &observed, &mut workspace)?;
+            filter.update(rng, &mut belief, &[&observed])?;
         }
         Ok(belief)
     }
@@ -118,5 +114,5 @@ where
     }
 }
 
-gaussian_replica!([const D: usize, const M: usize, G, S, C, B] Reporting<D, M, G, S, C, AssumedDensity, B>
+gaussian_replica!([const D: usize, const M: usize, G, S, C, B] Reporting<D, M, G, S, C, MomentFilter, B>
     where G: GaussianDynamics<D>, S: Sensing<D, M> + Clone, C: Scheme<M>, C::State: Clone, B: Fn(&Gaussian<M>) -> C::Feedback);

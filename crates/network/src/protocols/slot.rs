@@ -17,7 +17,10 @@ use serde::{Deserialize, Serialize};
 pub(crate) enum Arrived {
     #[default]
     Nothing,
+    /// A report was sent and not understood.
     Lost,
+    /// The report answers another prediction than the receiver's: no observation.
+    Foreign,
     Report(#[serde(with = "stored")] BitString),
 }
 
@@ -47,23 +50,28 @@ pub(crate) fn from_prior<E: Estimator>(e: &E, stream: Stream, slot: u32) -> Resu
 
 /// Updates the predicted belief with what arrived in one slot. Always returns a belief:
 /// 1. Update with the observations as they arrived.
-/// 2. If that fails, replace every `Nothing` by `Lost` and update again; return [`Note::TakenAsLost`] with the first error.
-/// 3. If that fails too, mark all as `Lost` and return `predicted` with [`Note::Failed`] and the first error.
+/// 2. If that fails, update again without the sensors of which nothing arrived; return [`Note::SilenceIgnored`] with the first error.
+///    Whether these were silent or lost is unknown, so that they give no observation.
+/// 3. If that fails too, return `predicted` with [`Note::Failed`] and the first error.
 ///
-/// An update fails if a report does not decode, the estimator returns an error, or the mean is not finite. `arrived` holds what was used.
+/// An update fails if a report does not decode, the estimator returns an error, or the mean is not finite. Whoever is told `arrived` gets the
+/// same belief from the same prediction.
 pub(crate) fn update_or_discard<E: Estimator>(
     e: &E,
     stream: Stream,
     slot: u32,
     predicted: &E::Belief,
-    arrived: &mut [Arrived],
+    arrived: &[Arrived],
 ) -> (E::Belief, Option<Note>) {
-    let attempt = |arrived: &[Arrived]| {
+    let attempt = |silence_counts: bool| {
         let observations = arrived.iter().enumerate().map(|(sensor, arrived)| {
             Ok(match arrived {
-                Arrived::Nothing => Observation::Nothing,
-                Arrived::Lost => Observation::Lost,
-                Arrived::Report(bits) => Observation::Received(E::Report::from_bits(&e.report_format(sensor), bits)?),
+                Arrived::Nothing => silence_counts.then_some(Observation::Nothing),
+                Arrived::Foreign => None,
+                Arrived::Lost => Some(Observation::Lost),
+                Arrived::Report(bits) => {
+                    Some(Observation::Received(E::Report::from_bits(&e.report_format(sensor), bits)?))
+                }
             })
         });
         let observations = observations.collect::<Result<Vec<_>, CodecError>>()?;
@@ -77,20 +85,16 @@ pub(crate) fn update_or_discard<E: Estimator>(
             }),
         }
     };
-    let first = match attempt(arrived) {
+    let first = match attempt(true) {
         Ok(belief) => return (belief, None),
         Err(error) => error,
     };
     let reason = first.in_full();
-    if arrived.contains(&Arrived::Nothing) {
-        for nothing in arrived.iter_mut().filter(|a| **a == Arrived::Nothing) {
-            *nothing = Arrived::Lost;
-        }
-        if let Ok(belief) = attempt(arrived) {
-            return (belief, Some(Note::TakenAsLost { slot, reason }));
-        }
+    if arrived.contains(&Arrived::Nothing)
+        && let Ok(belief) = attempt(false)
+    {
+        return (belief, Some(Note::SilenceIgnored { slot, reason }));
     }
-    arrived.fill(Arrived::Lost);
     let stage = Stage::Update;
     (predicted.clone(), Some(Note::Failed { stage, slot, reason }))
 }
@@ -167,14 +171,15 @@ pub(crate) fn check_fits(clock: &Clock, setup: &Setup, question: Option<u64>, se
 /// Bits of a report's length in an echo, where the report does not say where it ends.
 const LENGTH_BITS: u32 = 16;
 
-/// What a centre tells those that follow it: for each sensor `0` for nothing, `10` for lost, `11` and the report. Before a report that does not
+/// What a centre tells those that follow it: for each sensor `0` for nothing, `100` for lost, `101` for no observation, `11` and the report. Before a report that does not
 /// say where it ends goes its length.
 pub(crate) fn echo_bits(arrived: &[Arrived], end: ReportEnd) -> Result<BitString, CodecError> {
     let mut writer = BitWriter::new();
     for arrived in arrived {
         match arrived {
             Arrived::Nothing => writer.write(0, 1)?,
-            Arrived::Lost => writer.write(0b10, 2)?,
+            Arrived::Lost => writer.write(0b100, 3)?,
+            Arrived::Foreign => writer.write(0b101, 3)?,
             Arrived::Report(bits) => {
                 writer.write(0b11, 2)?;
                 if end == ReportEnd::OfMessage {
@@ -196,7 +201,11 @@ pub(crate) fn echo_of<E: Estimator>(e: &E, bits: &BitString) -> Result<Vec<Arriv
                 return Ok(Arrived::Nothing);
             }
             if !reader.read_bit()? {
-                return Ok(Arrived::Lost);
+                return Ok(if reader.read_bit()? {
+                    Arrived::Foreign
+                } else {
+                    Arrived::Lost
+                });
             }
             let format = e.report_format(sensor);
             Ok(Arrived::Report(match e.report_end() {
@@ -210,4 +219,102 @@ pub(crate) fn echo_of<E: Estimator>(e: &E, bits: &BitString) -> Result<Vec<Arriv
         .collect::<Result<_, CodecError>>()?;
     reader.finish()?;
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fewbits_core::Sign;
+
+    /// Two sensors that always speak, so that nothing from one is impossible. The belief is what the update was told of each sensor.
+    struct Strict {
+        refuses_all: bool,
+    }
+
+    impl Estimator for Strict {
+        type Belief = Vec<Option<Observation<Sign>>>;
+        type Measurement = ();
+        type Question = ();
+        type Report = Sign;
+        type Memory = ();
+
+        fn sensors(&self) -> usize {
+            2
+        }
+
+        fn start(&self) -> Self::Belief {
+            Vec::new()
+        }
+
+        fn memory(&self, _: usize) {}
+
+        fn predict(&self, _: &mut Pcg64Dxsm, _: u32, belief: &Self::Belief) -> Result<Self::Belief, Error> {
+            Ok(belief.clone())
+        }
+
+        fn question(&self, _: u32, _: &Self::Belief, _: usize) -> Result<(), Error> {
+            Ok(())
+        }
+
+        fn question_format(&self, _: usize) {}
+
+        fn report_format(&self, _: usize) {}
+
+        fn report(
+            &self,
+            _: &mut Pcg64Dxsm,
+            _: u32,
+            _: usize,
+            (): &mut (),
+            (): &(),
+            (): &(),
+        ) -> Result<Option<Sign>, Error> {
+            Ok(Some(Sign::Above))
+        }
+
+        fn update(
+            &self,
+            _: &mut Pcg64Dxsm,
+            _: u32,
+            _: &Self::Belief,
+            observations: &[Option<Observation<Sign>>],
+        ) -> Result<Self::Belief, Error> {
+            if self.refuses_all || observations.contains(&Some(Observation::Nothing)) {
+                return Err(Error::Impossible);
+            }
+            Ok(observations.to_vec())
+        }
+
+        fn mean(&self, _: &Self::Belief) -> Vec<f64> {
+            vec![0.0]
+        }
+    }
+
+    fn report() -> Arrived {
+        Arrived::Report(Sign::Above.to_bits(&()).unwrap())
+    }
+
+    #[test]
+    fn an_impossible_silence_is_no_observation() {
+        let update = |refuses_all, arrived: &[Arrived]| {
+            update_or_discard(&Strict { refuses_all }, Stream::new(1), 1, &Vec::new(), arrived)
+        };
+        let (received, lost) = (Some(Observation::Received(Sign::Above)), Some(Observation::Lost));
+        let (belief, note) = update(false, &[report(), Arrived::Nothing]);
+        assert_eq!(belief, [received, None]);
+        assert!(matches!(note, Some(Note::SilenceIgnored { .. })), "{note:?}");
+        assert_eq!(update(false, &[Arrived::Lost, Arrived::Foreign]), (vec![lost, None], None));
+        let (belief, note) = update(true, &[report(), Arrived::Nothing]);
+        assert!(belief.is_empty() && matches!(note, Some(Note::Failed { .. })), "{note:?}");
+    }
+
+    #[test]
+    fn echoes_tell_what_arrived() {
+        let kinds = [Arrived::Nothing, Arrived::Lost, Arrived::Foreign, report()];
+        for (a, b) in kinds.iter().flat_map(|a| kinds.iter().map(move |b| (a, b))) {
+            let arrived = vec![a.clone(), b.clone()];
+            let bits = echo_bits(&arrived, ReportEnd::InReport).unwrap();
+            assert_eq!(echo_of(&Strict { refuses_all: false }, &bits), Ok(arrived));
+        }
+    }
 }

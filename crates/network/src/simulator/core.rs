@@ -191,7 +191,7 @@ impl SimulatorCore {
             Note::Late => faults.late += 1,
             Note::Disagreement { .. } => faults.disagreements += 1,
             Note::Resynchronised { .. } => faults.resynchronisations += 1,
-            Note::TakenAsLost { .. } => faults.taken_as_lost += 1,
+            Note::SilenceIgnored { .. } => faults.silence_ignored += 1,
             Note::Failed { .. } => faults.failures += 1,
             _ => {}
         }

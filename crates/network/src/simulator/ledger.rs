@@ -67,8 +67,8 @@ pub struct Faults {
     pub given_up: u64,
     /// Steps of estimators and sensors that failed.
     pub failures: u64,
-    /// Updates that succeeded only after missing reports were taken as lost.
-    pub taken_as_lost: u64,
+    /// Updates that succeeded only without the sensors of which nothing arrived.
+    pub silence_ignored: u64,
     /// Frames that came a second time.
     pub duplicates: u64,
     /// Frames that came too late.

@@ -129,7 +129,7 @@ impl fmt::Display for Summary {
         let faults = &self.faults;
         write!(
             f,
-            "\nlost {}, damaged {}, late {}, duplicates {}, given up {}, disagreements {}, resynchronisations {}, taken as lost {}, failed steps {}",
+            "\nlost {}, damaged {}, late {}, duplicates {}, given up {}, disagreements {}, resynchronisations {}, silence ignored {}, failed steps {}",
             faults.lost,
             faults.damaged,
             faults.late,
@@ -137,7 +137,7 @@ impl fmt::Display for Summary {
             faults.given_up,
             faults.disagreements,
             faults.resynchronisations,
-            faults.taken_as_lost,
+            faults.silence_ignored,
             faults.failures
         )
     }

@@ -7,7 +7,7 @@ use fewbits_core::{
     BitReader, BitString, BitWriter, CodecError, Gaussian, Link, Message, NumberFormat, Observation, Sign,
 };
 use fewbits_dymbo::{CountFusion, ParallelFilter};
-use fewbits_filters::AssumedDensity;
+use fewbits_filters::MomentFilter;
 use fewbits_models::{Ar1, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::estimators::{Followers, ParallelDymboEstimator, Patterns, Reporting, SendAll};
@@ -25,7 +25,7 @@ fn all_send(link: Link) -> impl Replicable<Measurement = Vector1<f64>, Belief = 
         sensors: vec![LinearSensor::<1, 1>::direct(1.0).unwrap(); 3],
         scheme: SendAll::new(1.0, NumberFormat::Double).unwrap(),
         link,
-        filter: AssumedDensity,
+        filter: MomentFilter,
         broadcast: (|_: &Gaussian<1>| ()) as fn(&Gaussian<1>),
         start: start(),
     }
@@ -173,13 +173,13 @@ fn patterns_have_the_variance_given_the_bits() {
         .unwrap()
         .unwrap();
     let after = patterns
-        .update(&mut rng, 1, &predicted, &[Observation::Received(bit)])
+        .update(&mut rng, 1, &predicted, &[Some(Observation::Received(bit))])
         .unwrap();
     let share = 2.0 / std::f64::consts::PI * variance * variance / (variance + 1.0);
     assert!((after.mean()[0].abs() - share.sqrt()).abs() < 1e-9, "{after:?}");
     assert!((after.covariance()[0] - (variance - share)).abs() < 1e-9, "{after:?}");
     let nothing = patterns
-        .update(&mut rng, 1, &predicted, &[Observation::Nothing])
+        .update(&mut rng, 1, &predicted, &[Some(Observation::Nothing)])
         .unwrap();
     assert!((nothing.covariance()[0] - variance).abs() < 1e-9);
 }
@@ -337,9 +337,15 @@ impl Estimator for OneIsTold {
         _: &mut Pcg64Dxsm,
         _: u32,
         predicted: &Vec<f64>,
-        observations: &[Observation<Sign>],
+        observations: &[Option<Observation<Sign>>],
     ) -> Result<Vec<f64>, Error> {
-        let came = |o: &Observation<Sign>| if o.received().is_some() { 1.0 } else { 0.0 };
+        let came = |o: &Option<Observation<Sign>>| {
+            if let Some(Observation::Received(_)) = o {
+                1.0
+            } else {
+                0.0
+            }
+        };
         Ok(predicted.iter().zip(observations).map(|(n, o)| n + came(o)).collect())
     }
 
@@ -438,7 +444,7 @@ impl Estimator for Mistaken {
         rng: &mut Pcg64Dxsm,
         slot: u32,
         predicted: &Self::Belief,
-        observations: &[Observation<Self::Report>],
+        observations: &[Option<Observation<Self::Report>>],
     ) -> Result<Self::Belief, Error> {
         self.0.update(rng, slot, predicted, observations)
     }

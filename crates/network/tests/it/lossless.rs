@@ -9,14 +9,15 @@ use fewbits_core::factor::{InCell, Value};
 use fewbits_core::{
     BitString, Cell, Dynamics, Gaussian, Link, Message, NumberFormat, Observation, Observed, Scheme, Sensing, Sign,
 };
-use fewbits_densities::wire::WireFormat;
-use fewbits_densities::{Grid, Mixture, PointMass, Reduction};
+use fewbits_densities::{Grid, Mixture, PointMass};
 use fewbits_diffusive::{RateModel, RateRange, Search, SearchBox, SourceSensor, Status};
 use fewbits_dymbo::{
     CountFusion, DymboFilter, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarFilter,
 };
-use fewbits_filters::{AssumedDensity, PointMassFilter, assumed_density, kalman};
+use fewbits_filters::{MomentFilter, PointMassFilter, PointMasses, assumed_density, kalman};
 use fewbits_handoff::{Coded, HandoffFilter};
+use fewbits_mixture_codec::Reduction;
+use fewbits_mixture_codec::wire::WireFormat;
 use fewbits_models::diffusion::{Air, Ground};
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
@@ -241,7 +242,7 @@ fn words_in_the_plane() {
         sensors: plane_sensors(),
         scheme,
         link: Link::PERFECT,
-        filter: AssumedDensity,
+        filter: MomentFilter,
         broadcast,
         start: plane_start(),
     };
@@ -283,7 +284,7 @@ fn a_strangers_scheme_with_an_exact_filter() {
         sensors: vec![sensor; 3],
         scheme,
         link: Link::PERFECT,
-        filter,
+        filter: PointMasses::new(grid),
         broadcast: |m: &Gaussian<1>| m.mean()[0],
         start: prior,
     };
@@ -507,7 +508,12 @@ fn followed_signals() {
 fn quantized_ranges_in_the_plane() {
     let noise = RangeNoise::from_snr_db(40.0).unwrap();
     let sensors: Vec<_> = [[4.0, 4.0], [16.0, 4.0], [10.0, 16.0]]
-        .map(|place| RangeSensor::new(place.into(), noise).unwrap())
+        .map(|place| {
+            RangeSensor::new(place.into(), noise)
+                .unwrap()
+                .on_axes::<4>([0, 1])
+                .unwrap()
+        })
         .to_vec();
     let scheme = QuantizedRange::new(4, noise).unwrap();
     // As it travels: in single precision.
@@ -559,7 +565,7 @@ fn quantized_ranges_in_the_plane() {
         sensors,
         scheme,
         link: Link::PERFECT,
-        filter: AssumedDensity,
+        filter: MomentFilter,
         broadcast,
         start,
     };

@@ -15,4 +15,5 @@ mod defects;
 mod faults;
 mod lossless;
 mod stored;
+mod wild;
 mod worlds;

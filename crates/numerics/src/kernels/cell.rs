@@ -9,7 +9,7 @@
 
 use super::elementary::{exp_sum, half_square, ln_corrected, select};
 use super::tail::scaled_tail;
-use crate::normal::INV_SQRT_2PI;
+use crate::constants::INV_SQRT_2PI;
 
 /// Cells narrower than this, in local decay lengths, are summed as a series.
 const NARROW: f64 = 1.0;

@@ -1,6 +1,6 @@
 //! Exponential and logarithm without branches, calls or table look-ups.
 
-use std::f64::consts::LOG2_E;
+use core::f64::consts::LOG2_E;
 
 /// `2^52 + 2^51`: adding it leaves the nearest integer in the low bits of the mantissa.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
@@ -32,7 +32,7 @@ const EXP: [f64; 10] = [
 /// `yes` or `no`, both computed: a branch here would be copied into what follows and double the work of a sweep.
 #[inline(always)]
 pub(crate) fn select(condition: bool, yes: f64, no: f64) -> f64 {
-    std::hint::select_unpredictable(condition, yes, no)
+    core::hint::select_unpredictable(condition, yes, no)
 }
 
 /// Horner's scheme on four interleaved parts: short chains that run side by side, for a sweep is as slow as its longest chain.
@@ -87,6 +87,7 @@ pub fn exp(x: f64) -> f64 {
 }
 
 /// `exp(-t^2/2)`, accurate relative to itself: the square is taken in two parts.
+#[cfg(feature = "std")]
 #[inline(always)]
 pub(crate) fn exp_minus_half_square(t: f64) -> f64 {
     let (high, low) = half_square(t);
@@ -94,6 +95,7 @@ pub(crate) fn exp_minus_half_square(t: f64) -> f64 {
 }
 
 /// `t^2/2` as the sum of two numbers, the first exact. The second is NaN where the first is infinite.
+#[cfg(feature = "std")]
 #[inline(always)]
 pub(crate) fn half_square(t: f64) -> (f64, f64) {
     // 26 bits: their square is exact.
@@ -145,6 +147,7 @@ pub fn ln(x: f64) -> f64 {
 }
 
 /// `ln(1 - y)` for `y` in `[0, 0.65]`, accurate relative to itself; `-0.0` never, `0.0` at zero.
+#[cfg(feature = "std")]
 #[inline(always)]
 pub(crate) fn ln_one_minus(y: f64) -> f64 {
     let rest = 1.0 - y;

@@ -37,33 +37,54 @@
 //! assert_eq!(log_weights[1], fewbits_numerics::normal::log_cdf((-2.0 - 0.5) / 0.3));
 //! ```
 
+#[cfg(feature = "std")]
 pub(crate) mod cell;
 pub(crate) mod elementary;
+#[cfg(feature = "std")]
 mod normals;
+#[cfg(feature = "std")]
+mod power_of_half;
+#[cfg(feature = "std")]
 mod reduce;
+#[cfg(feature = "std")]
 pub(crate) mod tail;
 
+#[cfg(feature = "std")]
 pub use normals::{StandardNormals, fill_standard_normals};
-pub use reduce::{ExpSums, dot, exp_minus, largest, largest_number, log_sum_exp, sum, weighted_covariance};
-
-use pulp::Arch;
+#[cfg(feature = "std")]
+pub use reduce::{
+    ExpSums, LANES, dot, exp_minus, folded, largest, largest_number, log_sum_exp, sum, weighted_covariance,
+};
 
 /// The functions of the slices one element at a time: no branches, no calls, always inlined. For loops under [`vectorised`];
 /// elsewhere [`normal`](crate::normal) has the same functions under the same names.
 pub mod scalar {
+    #[cfg(feature = "std")]
     pub use super::cell::{WIDE, interval, interval_wide, log_interval, log_interval_wide};
     pub use super::elementary::{exp, ln};
+    #[cfg(feature = "std")]
+    pub use super::power_of_half::power_of_half;
+    #[cfg(feature = "std")]
     pub use super::tail::{cdf, erfcx, inverse_mills, log_cdf, pdf};
 }
 
 /// Runs `work` compiled for the widest vector instructions of this machine.
 ///
-/// `work` is a loop over slices that calls [`scalar`] functions; give the closure `#[inline(always)]`.
+/// `work` is a loop over slices that calls [`scalar`] functions; give the closure `#[inline(always)]`. Without the feature `std`
+/// `work` is compiled for the target's own instructions.
 #[inline(always)]
 pub fn vectorised<R>(work: impl FnOnce() -> R) -> R {
-    Arch::new().dispatch(work)
+    #[cfg(feature = "std")]
+    {
+        pulp::Arch::new().dispatch(work)
+    }
+    #[cfg(not(feature = "std"))]
+    {
+        work()
+    }
 }
 
+#[cfg(feature = "std")]
 macro_rules! in_place {
     ($($(#[$doc:meta])* $name:ident)*) => {$(
         $(#[$doc])*
@@ -77,6 +98,7 @@ macro_rules! in_place {
     )*};
 }
 
+#[cfg(feature = "std")]
 in_place! {
     /// `exp(x)` of every element, in place.
     exp
@@ -92,6 +114,7 @@ in_place! {
     inverse_mills
 }
 
+#[cfg(feature = "std")]
 macro_rules! over_cells {
     ($($(#[$doc:meta])* $name:ident)*) => {$(
         $(#[$doc])*
@@ -105,6 +128,7 @@ macro_rules! over_cells {
     )*};
 }
 
+#[cfg(feature = "std")]
 over_cells! {
     /// `Phi(upper_i) - Phi(lower_i)` over the shorter of the two, written over the lower edges.
     interval

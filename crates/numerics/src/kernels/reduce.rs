@@ -4,14 +4,14 @@ use super::elementary;
 use super::vectorised;
 
 /// Lanes of every reduction, whatever the machine: the order of additions is part of the result.
-const LANES: usize = 8;
+pub const LANES: usize = 8;
 
 /// Elements of a block; a multiple of [`LANES`].
 const BLOCK: usize = 512;
 
 /// Adds the lanes in a fixed tree.
 #[inline(always)]
-fn folded(lane: [f64; LANES]) -> f64 {
+pub fn folded(lane: [f64; LANES]) -> f64 {
     ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]))
 }
 

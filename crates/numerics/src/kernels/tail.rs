@@ -4,7 +4,7 @@
 //! `ln Phi`, `phi/Phi` and `erfcx` are each an exponential or a logarithm away from it.
 
 use super::elementary::{exp_minus_half_square, exp_sum, half_square, ln_corrected, polynomial, select};
-use crate::normal::INV_SQRT_2PI;
+use crate::constants::INV_SQRT_2PI;
 use std::f64::consts::SQRT_2;
 
 /// Where the variable `q = (t - 5)/(t + 5)` of the approximation is zero.

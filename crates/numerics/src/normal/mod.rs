@@ -12,7 +12,6 @@
 //! | mean and variance beyond a one-sided cut | [`one_sided`], [`one_sided_variance`] | both tails |
 //! | mean and variance in a cell | [`truncated_moments`] | narrow, far and unbounded cells |
 //! | a draw from a cell | [`sample_truncated`] | the same |
-//! | `P(a < (X, Y) < b)` | [`bivariate_rectangle`] | every correlation, far rectangles |
 //!
 //! ```
 //! use fewbits_numerics::normal;
@@ -24,12 +23,10 @@
 //! Arguments are plain `f64` and are not checked: NaN in gives NaN out, infinities are meant. Over slices the same functions,
 //! to the last bit, are in [`kernels`](crate::kernels), which states their bounds.
 
-mod bivariate;
 mod one_sided;
 mod quantile;
 mod truncated;
 
-pub use bivariate::bivariate_rectangle;
 pub use one_sided::{OneSided, one_sided, one_sided_variance};
 pub use quantile::quantile;
 pub use truncated::{TruncatedMoments, sample_truncated, truncated_moments};
@@ -39,10 +36,7 @@ use crate::kernels::elementary::{ln_corrected, ln_one_minus};
 use crate::kernels::scalar;
 use crate::kernels::tail::{cut, scaled_tail};
 
-/// `1 / sqrt(2 pi)`.
-pub const INV_SQRT_2PI: f64 = 0.398_942_280_401_432_7;
-/// `ln sqrt(2 pi)`.
-pub const LN_SQRT_2PI: f64 = 0.918_938_533_204_672_7;
+pub use crate::constants::{INV_SQRT_2PI, LN_SQRT_2PI};
 /// `sqrt(2 / pi)`, the gain of a sign bit at its threshold.
 pub const SQRT_2_OVER_PI: f64 = 0.797_884_560_802_865_4;
 

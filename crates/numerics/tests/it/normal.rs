@@ -45,7 +45,6 @@ fn every_function_meets_high_precision_values() {
             "truncated_mean" => truncated_moments(a[0], a[1]).unwrap().mean,
             "truncated_variance" => truncated_moments(a[0], a[1]).unwrap().variance,
             "quantile" => normal::quantile(a[0]),
-            "bivariate_rectangle" => normal::bivariate_rectangle([a[0], a[2]], [a[1], a[3]], a[4]).unwrap(),
             other => panic!("no test for {other}"),
         };
         let expected: f64 = entry.value.parse().unwrap();
@@ -90,12 +89,6 @@ fn degenerate_arguments_are_refused_or_have_their_limits() {
     }
     let whole = truncated_moments(f64::NEG_INFINITY, f64::INFINITY).unwrap();
     assert_eq!((whole.mean, whole.variance), (0.0, 1.0));
-    for rho in [-1.5, f64::NAN] {
-        assert!(normal::bivariate_rectangle([-1.0; 2], [1.0; 2], rho).is_err());
-    }
-    assert_eq!(normal::bivariate_rectangle([1.0, 0.0], [0.0, 1.0], 0.5).unwrap(), 0.0);
-    let diagonal = normal::bivariate_rectangle([-1.0, 0.0], [2.0, 3.0], 1.0).unwrap();
-    assert!((diagonal - normal::interval(0.0, 2.0)).abs() < 1e-15);
 }
 
 #[test]

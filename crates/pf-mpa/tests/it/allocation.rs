@@ -4,7 +4,7 @@ use allocation_counter::measure;
 use fewbits_core::Gaussian;
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{
-    Bootstrap, Encoder, GridFilter, GuidedGaussian, Linearised, MessagePassing, Network, QuantizedRange, RangeNoise,
+    Encoder, GridFilter, GuidedGaussian, Linearised, MessagePassing, Network, QuantizedRange, RangeNoise,
     RaoBlackwellGuided, Reports, Target, Tracker,
 };
 use nalgebra::{Matrix4, Vector2, Vector4};
@@ -44,6 +44,5 @@ fn a_step_allocates_nothing() {
     allocates_nothing("published", &MessagePassing::published(40).unwrap());
     allocates_nothing("message passing", &Linearised::MESSAGE_PASSING);
     allocates_nothing("guided", &GuidedGaussian::new(40).unwrap());
-    allocates_nothing("bootstrap", &Bootstrap::new(500).unwrap());
     allocates_nothing("Rao-Blackwell", &RaoBlackwellGuided::new(40).unwrap());
 }

@@ -1,12 +1,13 @@
 //! Bad input is a typed error, extreme input an answer.
 
-use fewbits_core::Gaussian;
+use fewbits_core::{Gaussian, Observed};
 use fewbits_densities::Particles;
+use fewbits_filters::{ParticleFilter, Workspace};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{
-    AccelerationChain, Bootstrap, Encoder, Error, GridFilter, GridWorkspace, GuidedGaussian, Linearised,
-    MessagePassing, Network, ProductSampler, QuantizedRange, RangeNoise, RangeReference, RaoBlackwellGuided, Reports,
-    Target, Tracker,
+    AccelerationChain, Encoder, GridFilter, GridWorkspace, GuidedGaussian, Linearised, MessagePassing, Network,
+    POSITION, ProductSampler, QuantizedRange, RangeNoise, RangeReference, RaoBlackwellGuided, Reports, Target, Tracker,
+    WithManoeuvre,
 };
 use fewbits_quantizers::Symbol;
 use nalgebra::{Matrix4, Vector2, Vector4};
@@ -66,7 +67,6 @@ fn no_tracker_depends_on_the_unit() {
     unit_free(&Linearised::MESSAGE_PASSING_TRANSFER, 1e-9);
     unit_free(&GridFilter::default(), 1e-9);
     unit_free(&GuidedGaussian::new(20).unwrap(), 1e-6);
-    unit_free(&Bootstrap::new(200).unwrap(), 1e-6);
     unit_free(&RaoBlackwellGuided::new(100).unwrap(), 1e-6);
     unit_free(&MessagePassing::improved(20).unwrap(), 1e-6);
     unit_free(&MessagePassing::published(20).unwrap(), 1e-6);
@@ -96,12 +96,17 @@ fn a_failed_step_leaves_the_belief_as_it_was() {
         .observe(&target, 0, &prior(1.0), &[0.001; 5], Reports::Levels)
         .unwrap();
     let far = Gaussian::known(Vector4::new(1e160, 0.0, 0.0, 0.0)).unwrap();
-    let bootstrap = Bootstrap::new(5).unwrap();
     let mut rng = Stream::new(3).rng();
-    let mut belief = bootstrap.start(&mut rng, &target, &far).unwrap();
+    let mut belief = WithManoeuvre::cloud(&mut rng, &far, 5).unwrap();
     let before = belief.clone();
-    let failed = bootstrap.step_in_place(&mut rng, &target, 0, &mut belief, &observed, &mut Default::default());
-    assert!(matches!(failed, Err(Error::Core(fewbits_core::Error::Impossible))) || failed.is_ok());
+    let sensed: Vec<_> = observed
+        .iter()
+        .map(|one| Observed::new(one.sensing.on_axes::<6>(POSITION).unwrap(), one.factor.clone()))
+        .collect();
+    let motion = WithManoeuvre::at(target, 0);
+    let failed =
+        ParticleFilter::default().step_in_place(&mut rng, &motion, &mut belief, &sensed, &mut Workspace::default());
+    assert!(matches!(failed, Err(fewbits_filters::Error::Core(fewbits_core::Error::Impossible))) || failed.is_ok());
     if failed.is_err() {
         assert_eq!(belief, before);
     }
@@ -149,7 +154,7 @@ fn settings_are_checked() {
     let error = Network::new(&twice, scheme, encoder).unwrap_err().to_string();
     assert!(error.contains("different places"), "{error}");
     assert!(GridFilter::new(2).is_err() && GuidedGaussian::new(1).is_err());
-    assert!(Bootstrap::new(0).is_err() && RaoBlackwellGuided::new(0).is_err());
+    assert!(RaoBlackwellGuided::new(0).is_err());
     let mut broken = MessagePassing::improved(2).unwrap();
     broken.particles = 1;
     let mut rng = Stream::new(1).rng();
@@ -172,7 +177,7 @@ fn every_kind_of_bad_input_is_a_typed_error() {
     indefinite[(0, 0)] = -1e-3;
     let refused = [
         ("one particle", MessagePassing::improved(1).is_err()),
-        ("no particle", Bootstrap::new(0).is_err() && RaoBlackwellGuided::new(0).is_err()),
+        ("no particle", RaoBlackwellGuided::new(0).is_err()),
         ("one draw", GuidedGaussian::new(1).is_err()),
         ("two nodes", GridFilter::new(2).is_err()),
         ("one level", QuantizedRange::new(1, noise).is_err() && QuantizedRange::new(0, noise).is_err()),

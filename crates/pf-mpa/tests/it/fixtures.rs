@@ -2,9 +2,10 @@
 
 use fewbits_core::factor::Factor;
 use fewbits_core::{Gaussian, NumberFormat};
-use fewbits_densities::{Bandwidth, Component, Mixture, Rule, product};
+use fewbits_densities::{Bandwidth, Component, Mixture, Rule};
 use fewbits_pf_mpa::association::{self, Rule as Association, tanh_rule};
 use fewbits_pf_mpa::leader::StepBits;
+use fewbits_pf_mpa::product;
 use fewbits_pf_mpa::{
     AccelerationChain, CramerRao, Encoder, GridFilter, GridWorkspace, LabelChain, Linearised, Manoeuvres, Network,
     Normalisation, QuantizedRange, RangeNoise, RangeReference, Reports, RingBias, Target, Tracker, kernel_error,

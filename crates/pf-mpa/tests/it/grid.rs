@@ -75,6 +75,21 @@ fn errors_are_as_stated_from_blunt_to_sharp() {
     }
 }
 
+/// The same 27 settings with enough tracks to tell .9 from 1.1: one standard error is .03.
+#[test]
+#[ignore = "27,000 tracks: a minute of one core"]
+fn errors_are_as_stated_over_1000_tracks() {
+    for deviation in [0.05, 0.5, 5.0] {
+        for snr_db in [20.0, 50.0, 90.0] {
+            for bits in [1, 4, 10] {
+                let nees = consistency(deviation, snr_db, bits, 1000);
+                println!("{deviation} m, {snr_db} dB, {bits} bits: {:.3} +- {:.3}", nees.mean(), nees.standard_error());
+                assert!((nees.mean() - 1.0).abs() < 0.1 + 2.0 * nees.standard_error());
+            }
+        }
+    }
+}
+
 /// One isotropic zoom of two passes gave 47.7.
 #[test]
 fn seventy_decibels_and_256_levels_are_consistent() {

@@ -2,9 +2,9 @@
 
 use fewbits_core::factor::Factor;
 use fewbits_core::laws::{factor, likelihood, message, scheme};
-use fewbits_core::{Gaussian, Link, NumberFormat, Observation, Observed, Scheme};
-use fewbits_filters::{AssumedDensity, ClosedLoop, Filter, ParticleFilter, Particles};
-use fewbits_models::constant_velocity_2d;
+use fewbits_core::{Belief, Dynamics, Gaussian, Link, NumberFormat, Observation, Observed, Scheme, Sensing};
+use fewbits_filters::{BootstrapFilter, MomentFilter, ParticleFilter, StateFilter, StateLikelihood};
+use fewbits_models::{PLANE_POSITION, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
 use fewbits_pf_mpa::{QuantizedRange, RangeFactor, RangeNoise, RangeReference, RangeSensor};
 use fewbits_quantizers::{Labelling, Symbol};
@@ -83,6 +83,7 @@ fn factors_obey_their_laws() {
                 let prior = Gaussian::scalar(5.0 * scale, 0.4 * scale * scale).unwrap();
                 factor::tilted_is_quadrature(&own, &prior, 4.9 * scale, 60_001, 1e-8).unwrap();
                 let sensor = RangeSensor::new(Vector2::new(scale, -scale), noise).unwrap();
+                let sensor = sensor.on_axes::<4>([0, 2]).unwrap();
                 let states = [Vector4::zeros(), Vector4::new(3.0, 2.0, 1.0, 1.0) * scale];
                 likelihood::sweep_is_scalar(&Observed::new(sensor, own), &states).unwrap();
             }
@@ -100,71 +101,47 @@ fn references_travel_as_two_numbers() {
     assert_eq!(message::round_trip(&sent, &NumberFormat::Single), Ok(64));
 }
 
-/// Tracks by the library's own loop; the root mean squared position error of the last slots.
-fn loop_error<F>(filter: &F, belief: F::Belief) -> f64
-where
-    F: Filter<4, fewbits_models::LinearGaussian<4, 2>, Observed<Planar, RangeFactor, 1>>,
-{
+/// The root mean squared position error of 20 slots of five sensors.
+fn tracking_error<F: StateFilter<4>>(mut filter: F, start: &Gaussian<4>) -> f64 {
     let noise = RangeNoise::from_snr_db(30.0).unwrap();
     let places = [[4.0, 4.0], [16.0, 4.0], [10.0, 10.0], [4.0, 16.0], [16.0, 16.0]];
-    let sensors = places.map(|p| Planar(RangeSensor::new(p.into(), noise).unwrap()));
     let dynamics = constant_velocity_2d(1.0, 0.02).unwrap();
-    let network = ClosedLoop {
-        dynamics: &dynamics,
-        sensors: &sensors,
-        scheme: &QuantizedRange::new(4, noise).unwrap(),
-        link: Link::PERFECT,
-        filter,
-        broadcast: |m: &Gaussian<1>| {
-            let spread = m.covariance()[0].sqrt().hypot(noise.deviation(m.mean()[0]));
-            let single = |x: f64| f64::from(x as f32);
-            RangeReference {
-                centre: single(m.mean()[0]),
-                half_width: single(1.991 * spread),
-            }
-        },
-    };
+    let scheme = QuantizedRange::new(4, noise).unwrap();
     let (mut world, mut rng) = (Stream::new(1).rng(), Stream::new(2).rng());
-    let mut state = network.start(Vector4::new(13.0, 0.0, 17.0, -0.6), belief);
+    let (mut truth, mut belief) = (*start.mean(), filter.start(&mut rng, start).unwrap());
     let mut squares = 0.0;
     for _ in 0..20 {
-        let slot = network.step(&mut world, &mut rng, &mut state).unwrap();
-        assert_eq!((slot.report_bits, slot.feedback_bits), (10, 5 * 64));
-        let error = fewbits_core::Belief::mean(&state.belief) - state.truth;
+        truth = dynamics.propagate(&mut world, &truth);
+        filter.predict(&mut rng, &dynamics, 1.0, &mut belief).unwrap();
+        let (mean, covariance) = (belief.mean(), belief.covariance());
+        let observed = places.map(|place| {
+            let sensor = RangeSensor::new(place.into(), noise).unwrap().on_axes(PLANE_POSITION).unwrap();
+            let (range, jacobian) = (sensor.mean(&mean)[0], sensor.jacobian(&mean));
+            let spread = (jacobian * covariance * jacobian.transpose())[0]
+                .sqrt()
+                .hypot(noise.deviation(range));
+            let reference = RangeReference {
+                centre: range,
+                half_width: 1.991 * spread,
+            };
+            let sample = sensor.sample(&mut world, &truth);
+            let report = scheme.encode(&mut world, &mut (), &sample, &reference).unwrap();
+            Observed::new(sensor, scheme.factor(&reference, &report.into(), &Link::PERFECT).unwrap())
+        });
+        let observed = observed.each_ref().map(|one| one as &dyn StateLikelihood<4>);
+        filter.update(&mut rng, &mut belief, &observed).unwrap();
+        let error = belief.mean() - truth;
         squares += (error[0] * error[0] + error[2] * error[2]) / 20.0;
     }
     squares.sqrt()
-}
-
-/// The library's constant-velocity state is `[x, vx, y, vy]`.
-#[derive(Debug, Clone, Copy)]
-struct Planar(RangeSensor);
-
-impl fewbits_core::Sensing<4, 1> for Planar {
-    fn mean(&self, x: &Vector4<f64>) -> Vector1<f64> {
-        Vector1::new(self.0.distance(x[0], x[2]))
-    }
-
-    fn jacobian(&self, x: &Vector4<f64>) -> nalgebra::RowVector4<f64> {
-        let u = self.0.direction(x[0], x[2]);
-        nalgebra::RowVector4::new(u[0], 0.0, u[1], 0.0)
-    }
-
-    fn noise_covariance_at(&self, x: &Vector4<f64>) -> nalgebra::Matrix1<f64> {
-        nalgebra::Matrix1::new(self.0.noise().deviation(self.mean(x)[0]).powi(2))
-    }
-
-    fn sample<R: rand::Rng + ?Sized>(&self, rng: &mut R, x: &Vector4<f64>) -> Vector1<f64> {
-        Vector1::new(self.0.measure(rng, self.mean(x)[0]))
-    }
 }
 
 #[test]
 fn every_filter_of_the_library_tracks_with_it() {
     let covariance = nalgebra::Matrix4::from_diagonal(&Vector4::new(0.04, 0.01, 0.04, 0.01));
     let start = Gaussian::new(Vector4::new(13.0, 0.0, 17.0, -0.6), covariance).unwrap();
-    let particles = Particles::from_belief(&mut Stream::new(5).rng(), &start, 4000).unwrap();
-    let (particle, assumed) = (loop_error(&ParticleFilter::default(), particles), loop_error(&AssumedDensity, start));
+    let particles = BootstrapFilter::new(ParticleFilter::default(), 4000).unwrap();
+    let (particle, assumed) = (tracking_error(particles, &start), tracking_error(MomentFilter, &start));
     assert!(particle < 0.4 && assumed < 0.4, "{particle} {assumed}");
 }
 

@@ -1,4 +1,5 @@
-//! Recordings made for the tracker: other speeds, noises, anchors and gaps than it was told.
+//! Recordings made for the tracker: other speeds, noises, anchors and gaps than it was told. As in real ones, errors of an anchor's ranges
+//! are alike for seconds.
 
 use fewbits_core::{Dynamics, Evolution};
 use fewbits_models::ContinuousLinear;
@@ -18,10 +19,14 @@ struct Recording {
     truth: Vec<Vector2<f64>>,
 }
 
+/// Deviation of the error that an anchor's ranges share, in metres, and for how long, in seconds.
+const LASTING: (f64, f64) = (0.9, 4.0);
+
 /// What a recording is made of.
 #[derive(Clone, Copy, Debug)]
 struct World {
     speed: f64,
+    /// Deviation of the part of the error that is new in each range; the part that lasts for seconds has deviation [`LASTING`].
     noise: f64,
     bias: f64,
     anchors: usize,
@@ -43,15 +48,23 @@ impl World {
         let model = ContinuousLinear::forgotten_velocity_2d(self.speed, 8.0).unwrap();
         let mut state = Vector4::new(100.0, 0.0, -20.0, 0.0);
         let (mut time, mut ranges, mut truth) = (1000.0, Vec::new(), Vec::new());
+        // The lasting error of each anchor, and when it last ranged.
+        let mut lasting = vec![(0.0, f64::NEG_INFINITY); self.anchors];
         for k in 0..LENGTH {
             let seconds = 0.3 + 0.4 * rng.random::<f64>() + if k == LENGTH / 2 { self.gap } else { 0.0 };
             state = model.over(seconds).unwrap().propagate(&mut rng, &state);
             (state[0], state[2]) = (100.0 + (state[0] - 100.0) * 0.997, -20.0 + (state[2] + 20.0) * 0.997);
             time += seconds;
-            let (name, place) = &anchors[rng.random_range(0..anchors.len())];
+            let anchor = rng.random_range(0..anchors.len());
+            let (name, place) = &anchors[anchor];
             let position = Vector2::new(state[0], state[2]);
+            let (shared, last) = lasting[anchor];
+            let kept = ((last - time) / LASTING.1).exp();
+            let shared: f64 =
+                kept * shared + (1.0 - kept * kept).sqrt() * LASTING.0 * rng.sample::<f64, _>(StandardNormal);
+            lasting[anchor] = (shared, time);
             let normal: f64 = rng.sample(StandardNormal);
-            let mut range = (position - place).norm() + self.bias + self.noise * normal;
+            let mut range = (position - place).norm() + self.bias + self.noise * normal + shared;
             if rng.random::<f64>() < 0.015 {
                 range += 30.0 * rng.random::<f64>();
             }
@@ -80,7 +93,7 @@ fn score(recording: &Recording, travel: Travel, settings: RangeSettings) -> Scor
         if let Some(found) = tracker.push(&mut rng, *time, anchor, *range).unwrap() {
             let error = found.position - truth;
             squares.add(error.norm_squared());
-            nees.add(0.5 * error.dot(&found.covariance.cholesky().unwrap().solve(&error)));
+            nees.add(found.normalised_error(truth).unwrap());
             speed = found.speed;
         }
     }
@@ -105,64 +118,54 @@ const WORLDS: [World; 4] = [
     },
     World {
         speed: 1.0,
-        noise: 1.5,
+        noise: 1.3,
         bias: -1.0,
         anchors: 5,
-        gap: 35.0,
+        gap: 30.0,
     },
     World {
         speed: 2.0,
-        noise: 1.5,
+        noise: 1.3,
         bias: 3.0,
         anchors: 4,
         gap: 10.0,
     },
     World {
         speed: 3.0,
-        noise: 1.3,
+        noise: 1.2,
         bias: 0.0,
         anchors: 6,
         gap: 0.0,
     },
 ];
 
+/// The speed is stated as 1 m/s, right or wrong: the tracker is compared with itself when it is told the truth, and few bits with full
+/// ranges. With everything known one bit costs 1.25 to 1.6 of full ranges in such recordings, two bits 1.06 to 1.15: the faster the
+/// target, the more.
 #[test]
-fn few_bits_track_nearly_as_well_as_full_ranges() {
+fn few_bits_and_a_learnt_speed_cost_little() {
+    let travels = [Travel::Full, Travel::Bits(1), Travel::Bits(2)];
     for (seed, world) in WORLDS.into_iter().enumerate() {
         let recording = world.record(seed as u64);
-        let travels = [Travel::Full, Travel::Bits(1), Travel::Bits(2)];
-        let [full, one, two] = travels.map(|travel| score(&recording, travel, RangeSettings::default()));
-        println!("{world:?}");
-        [&full, &one, &two].iter().for_each(|s| println!("    {s:.3?}"));
-        assert!((0.3..3.0).contains(&(full.speed / world.speed)), "{full:?}");
-        assert!(two.rms < 1.2 * full.rms && (2.0..3.0).contains(&two.bits), "{world:?}: {full:?} {two:?}");
-        let mut judged = vec![full, two];
-        // At thrice the stated speed one bit loses the track again and again: it is claimed up to twice.
-        if world.speed <= 2.0 {
-            assert!(one.rms < 1.6 * judged[0].rms && (1.0..2.0).contains(&one.bits), "{world:?}: {judged:?} {one:?}");
-            judged.push(one);
-        }
-        for s in judged {
-            assert!(s.losses <= 1, "{world:?}: {s:?}");
-            assert!((0.5..1.5).contains(&s.nees), "{world:?}: {s:?}");
-        }
-    }
-}
-
-#[test]
-fn a_learnt_speed_is_as_good_as_the_best_fixed_one() {
-    for (seed, world) in WORLDS.into_iter().enumerate() {
-        let recording = world.record(seed as u64);
-        let learnt = score(&recording, Travel::Full, RangeSettings::default());
-        let best = [0.5, 1.0, 2.0].map(|speed| RangeSettings {
-            speed,
+        let told = RangeSettings {
+            speed: world.speed,
+            speed_factor: 1.0,
             ..RangeSettings::default()
+        };
+        let scores = travels.map(|travel| {
+            let learnt = score(&recording, travel, RangeSettings::default());
+            let known = score(&recording, travel, told);
+            println!("{travel:?} {world:?}: {:.3}\n    {learnt:.3?}\n    {known:.3?}", learnt.rms / known.rms);
+            let most = if travel == Travel::Bits(1) { 1.15 } else { 1.05 };
+            assert!(learnt.rms < most * known.rms, "{travel:?} {world:?}: {learnt:?} {known:?}");
+            assert!((0.4..2.5).contains(&(learnt.speed / world.speed)), "{travel:?} {world:?}: {learnt:?}");
+            assert!((0.7..1.5).contains(&learnt.nees) && learnt.losses <= 1, "{travel:?} {world:?}: {learnt:?}");
+            learnt
         });
-        let best = best
-            .map(|settings| score(&recording, Travel::Full, settings).rms)
-            .into_iter()
-            .fold(f64::INFINITY, f64::min);
-        assert!(learnt.rms < 1.05 * best, "{world:?}: {} for {best}", learnt.rms);
+        let [full, one, two] = &scores;
+        println!("    1 bit {:.3}, 2 bits {:.3} of full", one.rms / full.rms, two.rms / full.rms);
+        assert!(two.rms < 1.15 * full.rms && (2.0..3.0).contains(&two.bits), "{world:?}: {scores:?}");
+        assert!(one.rms < 1.7 * full.rms && (1.0..2.0).contains(&one.bits), "{world:?}: {scores:?}");
     }
 }
 
@@ -198,6 +201,35 @@ fn a_lost_track_is_flagged_and_found_again() {
         }
         println!("{travel:?}: flagged or caught up after {:.1} ranges", delays.mean());
         assert!(delays.mean() < 20.0, "{travel:?}: {}", delays.mean());
+    }
+}
+
+/// The ranges before the track are those of a place 40 m away.
+#[test]
+fn a_wrong_start_is_flagged_and_mended() {
+    for travel in [Travel::Full, Travel::Bits(1), Travel::Bits(2)] {
+        for seed in 0..4 {
+            let mut recording = WORLDS[1].record(70 + seed);
+            let mut rng = Stream::new(1).rng();
+            let mut tracker = RangeTracker::new(recording.anchors.clone(), travel, RangeSettings::default()).unwrap();
+            let (mut first, mut right) = (None, None);
+            for (k, truth) in recording.truth.iter().enumerate().take(LENGTH / 4) {
+                let (time, anchor, range) = &mut recording.ranges[k];
+                if first.is_none() {
+                    let place = recording.anchors.iter().find(|a| a.0 == *anchor).unwrap().1;
+                    *range += (truth + Vector2::new(28.0, 28.0) - place).norm() - (truth - place).norm();
+                }
+                if let Some(found) = tracker.push(&mut rng, *time, anchor, *range).unwrap() {
+                    let start = *first.get_or_insert(k);
+                    if k > start && (found.lost || (found.position - truth).norm() < 8.0) {
+                        right.get_or_insert(k - start);
+                    }
+                }
+            }
+            let delay = right.unwrap_or(LENGTH);
+            println!("{travel:?}, seed {seed}: flagged or right after {delay} ranges");
+            assert!(delay <= 20, "{travel:?}, seed {seed}: {delay}");
+        }
     }
 }
 

@@ -160,7 +160,7 @@ pub fn optimise_groups(
 }
 
 /// The largest of a curvature and those over moves of the sensors of a group against each other.
-pub(super) fn with_opposed(
+fn with_opposed(
     system: &System,
     groups: &[usize],
     criterion: Criterion,
@@ -179,7 +179,7 @@ pub(super) fn with_opposed(
 }
 
 /// The size of the breakpoints of some groups: the least standard deviation of their samples.
-pub(super) fn breakpoint_scale(system: &System, groups: &[usize]) -> f64 {
+fn breakpoint_scale(system: &System, groups: &[usize]) -> f64 {
     groups
         .iter()
         .filter_map(|g| system.groups().get(*g))

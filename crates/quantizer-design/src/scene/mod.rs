@@ -11,10 +11,12 @@
 mod continuous;
 mod noise;
 mod prior;
+mod resolution;
 
 pub use continuous::{Continuous, SampleFit};
 pub use noise::Noise;
 pub use prior::Prior;
+pub(crate) use resolution::Resolution;
 
 use crate::error::Error;
 use fewbits_numerics::normal;
@@ -32,37 +34,6 @@ const PRIOR_STEP: f64 = 0.25;
 const ENTROPY_STEP: f64 = 0.2;
 /// The same for products of cell probabilities of two sensors, which are entire functions; more sensors make them sharper.
 const PRODUCT_STEP: f64 = 0.4;
-/// How finely a scene is discretised.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Resolution {
-    /// Exact to 1e-12.
-    Full,
-    /// To about 1e-5, for searches.
-    Coarse,
-    /// To about one per cent, for searches over many joint symbols.
-    Rough,
-}
-
-impl Resolution {
-    /// Steps in units of the steps of the full resolution.
-    fn step(self) -> f64 {
-        match self {
-            Self::Full => 1.0,
-            Self::Coarse => 2.0,
-            Self::Rough => 3.0,
-        }
-    }
-
-    /// Half-widths in units of those of the full resolution.
-    fn reach(self) -> f64 {
-        match self {
-            Self::Full => 1.0,
-            Self::Coarse => 0.7,
-            Self::Rough => 0.42,
-        }
-    }
-}
-
 /// Most nodes a rule may take; less noise than this resolves asks for another method.
 const NODE_LIMIT: usize = 1 << 20;
 
@@ -294,15 +265,6 @@ impl Scene {
     /// Mean of every sample: the prior's.
     pub fn sample_mean(&self) -> f64 {
         self.mean
-    }
-
-    /// The scene in units in which every number is `factor` times as large.
-    ///
-    /// # Errors
-    /// If `factor` is not a positive number, or a rescaled number is none.
-    pub fn rescaled(&self, factor: f64) -> Result<Self, Error> {
-        fewbits_numerics::error::positive("factor", factor)?;
-        Self::new(self.prior.rescaled(factor)?, self.noise.rescaled(factor)?)
     }
 
     /// The same prior seen by some of the sensors only.

@@ -77,7 +77,7 @@ pub struct Rounded {
 impl Rounded {
     /// The word of a sensor for a code, or `None` if there is no such sensor.
     pub fn encode(&self, sensor: usize, code: u32) -> Option<usize> {
-        let cell = self.thresholds.get(sensor)?.partition_point(|t| *t <= code);
+        let cell = fewbits_node::cell_of(self.thresholds.get(sensor)?, code).ok()?;
         self.solution.sensors().get(sensor)?.words.get(cell).copied()
     }
 }

@@ -159,7 +159,7 @@ impl Export {
                     "breakpoints": s.breakpoints,
                     "words": s.words,
                     "symbols": s.symbols(),
-                    "link": { "loss": s.link.loss(), "crossover": s.link.crossover() },
+                    "link": { "loss": s.link.loss(), "erasure": s.link.erasure(), "crossover": s.link.crossover() },
                     "thresholds": self.codes.as_ref().map(|codes| &codes[n]),
                 })
             })
@@ -209,6 +209,24 @@ impl Export {
         );
         for (n, sensor) in sensors.iter().enumerate() {
             let breakpoints = sensor.breakpoints.len();
+            if breakpoints == 0 {
+                // C has no empty arrays. A sensor behind a useless link may send one word only.
+                let _ = write!(
+                    text,
+                    "\n/* Sensor {}: one word. */\n\
+                     static inline unsigned {name}_encode_{n}(double sample)\n{{\n    (void)sample;\n    return {};\n}}\n",
+                    sensor.sensor, sensor.words[0],
+                );
+                if self.codes.is_some() {
+                    let _ = write!(
+                        text,
+                        "static inline unsigned {name}_encode_code_{n}(unsigned long code)\n{{\n    (void)code;\n    \
+                         return {};\n}}\n",
+                        sensor.words[0],
+                    );
+                }
+                continue;
+            }
             let _ = write!(
                 text,
                 "\n/* Sensor {}: words of {} bits. A sample on a breakpoint belongs to the cell above it; NaN is word of cell 0. */\n\

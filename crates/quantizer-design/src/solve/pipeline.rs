@@ -3,10 +3,9 @@
 use super::landscape::{Grid, Landscape, WordLaw, Words};
 use super::polish::{Polished, polish};
 use super::request::{Control, Request, Stage};
-use super::search::{Point, Shape, WordedCells, climb, first_edges, random_start, refine, spacing, start};
+use super::search::{Point, WordedCells, cells_of, climb, grid_with, random_start, refine, spacing, start};
 use super::solution::Solution;
-use crate::criterion::Criterion;
-use crate::design::AllowedCells;
+use crate::criterion::{AllowedCells, Criterion};
 use crate::error::Error;
 use crate::scene::{Resolution, Scene};
 use crate::system::OUTCOME_LIMIT;
@@ -56,7 +55,7 @@ impl Participant {
         for t in 0..words {
             for w in 0..words {
                 let arrives = self.link.word_probability(w as u64, t as u64, self.bits);
-                transition[t * words + w] = (1.0 - missing) * arrives;
+                transition[t * words + w] = self.link.arrival() * arrives;
             }
         }
         if missing > 0.0 {
@@ -70,9 +69,9 @@ impl Participant {
     }
 }
 
-/// Probability that a word is not received, whether or not that is noticed: these sensors always report.
+/// Probability that a word is not received. Whether that is noticed makes no difference: these sensors always report.
 pub(super) fn missing(link: &Link) -> f64 {
-    link.loss()
+    link.loss() + link.erasure()
 }
 
 pub(super) fn solve(request: &Request<'_>, bits: &[u32], control: &mut Control<'_>) -> Result<Vec<Solution>, Error> {
@@ -86,19 +85,18 @@ pub(super) fn solve(request: &Request<'_>, bits: &[u32], control: &mut Control<'
         .collect();
     let sensors: Vec<usize> = participants.iter().map(|p| p.sensor).collect();
     let scene = request.scene.subset(&sensors)?;
-    let shape = match request.cells {
-        AllowedCells::Intervals => Shape::Intervals,
-        AllowedCells::Any => Shape::Any,
-    };
     let given = request
         .start
         .as_ref()
         .map(|all| sensors.iter().map(|n| all[*n].clone()).collect::<Vec<_>>());
     let starts = (request.starts, given.as_deref());
-    let mut searched = search(&scene, request.criterion, &participants, shape, starts, control)?;
-    searched
-        .designs
-        .extend(classic_detection(&scene, request.criterion, &participants));
+    let mut searched = search(&scene, request.criterion, &participants, request.cells, starts, control)?;
+    if request.criterion == Criterion::BayesError {
+        // The error probability has kinks and many flat places: the design of most information is a good start.
+        let cells = plain(&scene, &participants)?;
+        let informed = polish(&scene, Criterion::MutualInformation, &participants, cells, false, control.stopped)?;
+        searched.designs.push(informed.cells);
+    }
     let parts = searched.designs.len();
     let mut found: Vec<Solution> = Vec::new();
     for (done, cells) in searched.designs.into_iter().enumerate() {
@@ -115,34 +113,6 @@ pub(super) fn solve(request: &Request<'_>, bits: &[u32], control: &mut Control<'
     Ok(found)
 }
 
-/// For decisions over clear links: the design of most information followed to the least error probability, which starts from
-/// quantizers that keep the hypotheses apart.
-fn classic_detection(scene: &Scene, criterion: Criterion, participants: &[Participant]) -> Option<Vec<WordedCells>> {
-    let bits = participants[0].bits;
-    let is_clear = |p: &Participant| p.bits == bits && p.link == Link::PERFECT;
-    if criterion != Criterion::BayesError || !participants.iter().all(is_clear) {
-        return None;
-    }
-    let design = crate::design::detection(scene, bits).ok()?;
-    let mut cells = vec![
-        WordedCells {
-            breakpoints: Vec::new(),
-            words: vec![0]
-        };
-        participants.len()
-    ];
-    for group in design.system.groups() {
-        for n in group.sensors() {
-            let quantizer = group.quantizer();
-            cells[*n] = WordedCells {
-                breakpoints: quantizer.breakpoints().to_vec(),
-                words: quantizer.labels().to_vec(),
-            };
-        }
-    }
-    Some(cells)
-}
-
 /// Cells and words of the designs that are worth polishing, best first.
 pub(super) struct Searched {
     pub(super) designs: Vec<Vec<WordedCells>>,
@@ -156,7 +126,7 @@ pub(super) fn search(
     scene: &Scene,
     criterion: Criterion,
     participants: &[Participant],
-    shape: Shape,
+    shape: AllowedCells,
     (starts, given): (usize, Option<&[WordedCells]>),
     control: &mut Control<'_>,
 ) -> Result<Searched, Error> {
@@ -189,11 +159,8 @@ pub(super) fn search(
     }
     let grids: Vec<Grid> = (0..cells.len())
         .map(|n| {
-            let mut edges = first_edges(&landscape, n, cells[n]);
-            edges.extend(given.iter().flat_map(|given| &given[n].breakpoints));
-            edges.sort_by(f64::total_cmp);
-            edges.dedup();
-            landscape.grid(n, edges)
+            let more = given.map_or(&[][..], |given| &given[n].breakpoints);
+            grid_with(&landscape, n, cells[n], more)
         })
         .collect();
     // A climb takes some ten rounds.
@@ -201,11 +168,11 @@ pub(super) fn search(
     let mut points: Vec<Point> = Vec::new();
     if let Some(given) = given {
         let words = given.iter().zip(&grids).map(|(c, g)| c.on(&g.edges)).collect();
-        points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.go_on()));
+        points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.step()));
     }
     for i in 0..starts {
         let words = joint_start(&landscape, &grids, participants, &singles, i);
-        points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.go_on()));
+        points.push(climb(&landscape, grids.clone(), words, shape, &mut || control.step()));
         control.report(Stage::AllSensors, i + 1, starts);
         if !control.go_on() {
             break;
@@ -232,7 +199,7 @@ pub(super) fn search(
             if !is_due && !control.go_on() {
                 break;
             }
-            point = refine(&landscape, point, &mut spacings, shape, &mut || is_due || control.go_on());
+            point = refine(&landscape, point, &mut spacings, shape, &mut || control.step() || is_due);
             control.report(Stage::Refinement, p * refinements + r + 1, parts);
         }
         refined.push(point);
@@ -268,15 +235,6 @@ fn plain(scene: &Scene, participants: &[Participant]) -> Result<Vec<WordedCells>
     participants.iter().enumerate().map(of).collect()
 }
 
-fn cells_of(point: &Point) -> Vec<WordedCells> {
-    point
-        .grids
-        .iter()
-        .zip(&point.words)
-        .map(|(g, w)| WordedCells::of(&g.edges, w))
-        .collect()
-}
-
 /// The best points, those of nearly equal value once.
 fn best_few(mut points: Vec<Point>, same: f64) -> Vec<Point> {
     points.sort_by(|a, b| b.value.total_cmp(&a.value));
@@ -291,7 +249,7 @@ fn single_sensors(
     criterion: Criterion,
     participants: &[Participant],
     laws: &[WordLaw],
-    shape: Shape,
+    shape: AllowedCells,
     control: &mut Control<'_>,
 ) -> Result<Vec<Vec<WordedCells>>, Error> {
     // A single sensor's decisions need few levels: what it tells is what counts beside other sensors.
@@ -310,7 +268,7 @@ fn single_sensors(
         let landscape = Landscape::new(&[(1.0, &own)], criterion, vec![laws[n].clone()], Resolution::Coarse)?;
         let bits = participants[n].bits;
         let cells = grid_cells(bits);
-        let grid = landscape.grid(0, first_edges(&landscape, 0, cells));
+        let grid = grid_with(&landscape, 0, cells, &[]);
         let starts = match bits {
             ..=3 => 12,
             4 => 8,
@@ -320,7 +278,7 @@ fn single_sensors(
         for i in 0..starts {
             let words = single_start(&landscape, 0, &grid, bits, i);
             // The first starts are run whatever the time.
-            let mut go_on = || i < FIRST_STARTS || control.go_on();
+            let mut go_on = || control.step() || i < FIRST_STARTS;
             points.push(climb(&landscape, vec![grid.clone()], vec![words], shape, &mut go_on));
             if i + 1 >= FIRST_STARTS && !control.go_on() {
                 break;
@@ -334,7 +292,7 @@ fn single_sensors(
         for mut point in best_few(points, SAME * unit) {
             let mut spacings = [spacing(&landscape, 0, cells)];
             for _ in 0..REFINEMENTS {
-                point = refine(&landscape, point, &mut spacings, shape, &mut || control.go_on());
+                point = refine(&landscape, point, &mut spacings, shape, &mut || control.step());
             }
             best.push(point);
         }

@@ -3,8 +3,7 @@
 use super::search::WordedCells;
 use super::solution::{Solution, Solutions};
 use super::{pipeline, share};
-use crate::criterion::Criterion;
-use crate::design::AllowedCells;
+use crate::criterion::{AllowedCells, Criterion};
 use crate::error::{Error, refuse};
 use crate::scene::{Prior, Scene};
 use fewbits_core::Link;
@@ -228,7 +227,7 @@ impl<'a> Request<'a> {
         let mut found: Vec<Solution> = pipeline::solve(&self, &bits, &mut control)?;
         let sense = self.criterion.sense();
         found.sort_by(|a, b| (sense * b.value()).total_cmp(&(sense * a.value())));
-        Ok(Solutions::new(found, control.stopped))
+        Ok(Solutions::new(found, control.steps, control.stopped))
     }
 }
 
@@ -238,6 +237,7 @@ pub(super) struct Control<'a> {
     limit: Option<Duration>,
     progress: Option<&'a mut dyn FnMut(Progress)>,
     pub(super) stopped: bool,
+    pub(super) steps: usize,
 }
 
 impl<'a> Control<'a> {
@@ -247,6 +247,7 @@ impl<'a> Control<'a> {
             limit,
             progress,
             stopped: false,
+            steps: 0,
         }
     }
 
@@ -256,6 +257,12 @@ impl<'a> Control<'a> {
             self.stopped = true;
         }
         !self.stopped
+    }
+
+    /// Counts a step of the search. Whether there is time left for it.
+    pub(super) fn step(&mut self) -> bool {
+        self.steps += 1;
+        self.go_on()
     }
 
     pub(super) fn report(&mut self, stage: Stage, done: usize, parts: usize) {

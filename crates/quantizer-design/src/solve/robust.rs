@@ -3,9 +3,9 @@
 use super::landscape::{Grid, Landscape, WordLaw};
 use super::pipeline::Participant;
 use super::request::Request;
-use super::search::{Shape, WordedCells, climb, first_edges, refine, spacing};
+use super::search::{WordedCells, cells_of, climb, grid_with, refine, spacing};
 use super::solution::{SensorDesign, Solution};
-use crate::criterion::Criterion;
+use crate::criterion::{AllowedCells, Criterion};
 use crate::error::{Error, refuse};
 use crate::law::Reports;
 use crate::scene::{Resolution, Scene};
@@ -184,14 +184,7 @@ pub fn minimax(
     let mut weights = vec![1.0 / scenes.len() as f64; scenes.len()];
     let weighted: Vec<(f64, &Scene)> = weights.iter().copied().zip(&scenes).collect();
     let mut landscape = Landscape::new(&weighted, Criterion::MeanSquaredError, laws, Resolution::Coarse)?;
-    let mut cells: Vec<WordedCells> = nominal
-        .sensors()
-        .iter()
-        .map(|s| WordedCells {
-            breakpoints: s.breakpoints.clone(),
-            words: s.words.clone(),
-        })
-        .collect();
+    let mut cells = nominal.cells();
     let nominal_estimates = estimates(&nominal.system_in(&centre)?)?;
     let nominal_worst_case = worst(&scenes, nominal, &nominal_estimates)?.0;
     let mut best: Option<Minimax> = None;
@@ -260,26 +253,15 @@ fn corners(mean: f64, deviation: f64, noise: f64) -> Vec<Corner> {
 /// The cells that a climb from the present ones leads to.
 fn best_cells(landscape: &Landscape, cells: &[WordedCells]) -> Vec<WordedCells> {
     let grids: Vec<Grid> = (0..cells.len())
-        .map(|n| {
-            let mut edges = first_edges(landscape, n, GRID);
-            edges.extend(&cells[n].breakpoints);
-            edges.sort_by(f64::total_cmp);
-            edges.dedup();
-            landscape.grid(n, edges)
-        })
+        .map(|n| grid_with(landscape, n, GRID, &cells[n].breakpoints))
         .collect();
     let words = cells.iter().zip(&grids).map(|(c, g)| c.on(&g.edges)).collect();
-    let mut point = climb(landscape, grids, words, Shape::Intervals, &mut || true);
+    let mut point = climb(landscape, grids, words, AllowedCells::Intervals, &mut || true);
     let mut spacings: Vec<f64> = (0..cells.len()).map(|n| spacing(landscape, n, GRID)).collect();
     for _ in 0..3 {
-        point = refine(landscape, point, &mut spacings, Shape::Intervals, &mut || true);
+        point = refine(landscape, point, &mut spacings, AllowedCells::Intervals, &mut || true);
     }
-    point
-        .grids
-        .iter()
-        .zip(&point.words)
-        .map(|(g, w)| WordedCells::of(&g.edges, w))
-        .collect()
+    cells_of(&point)
 }
 
 /// The largest error over the scenes, and all of them.

@@ -17,6 +17,7 @@
 //! fail to converge.
 
 use super::landscape::{Block, Grid, Landscape, REACH, Words};
+use crate::criterion::AllowedCells;
 use crate::moments::Table;
 use fewbits_monte_carlo::Stream;
 use rand::RngExt;
@@ -36,13 +37,6 @@ const MAX_EXCHANGE_WORK: f64 = 3e8;
 const MAX_ROUNDS: usize = 60;
 /// Sweeps after which a loop over cells or words ends.
 const MAX_SWEEPS: usize = 40;
-
-/// Whether each word belongs to one interval or to any cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shape {
-    Intervals,
-    Any,
-}
 
 /// A point of the search: a grid and its words for every sensor.
 #[derive(Debug, Clone)]
@@ -87,8 +81,27 @@ impl WordedCells {
     }
 }
 
+/// Cells and words of every sensor at a point.
+pub(super) fn cells_of(point: &Point) -> Vec<WordedCells> {
+    point
+        .grids
+        .iter()
+        .zip(&point.words)
+        .map(|(g, w)| WordedCells::of(&g.edges, w))
+        .collect()
+}
+
+/// The first grid of a sensor, with some more edges.
+pub(super) fn grid_with(landscape: &Landscape, sensor: usize, cells: usize, more: &[f64]) -> Grid {
+    let mut edges = first_edges(landscape, sensor, cells);
+    edges.extend(more);
+    edges.sort_by(f64::total_cmp);
+    edges.dedup();
+    landscape.grid(sensor, edges)
+}
+
 /// Edges spread half evenly and half by probability over a sensor's sample.
-pub(super) fn first_edges(landscape: &Landscape, sensor: usize, cells: usize) -> Vec<f64> {
+fn first_edges(landscape: &Landscape, sensor: usize, cells: usize) -> Vec<f64> {
     let sample = landscape.sample(sensor);
     let (even, reach) = (cells / 2, EVEN_SHARE * REACH * sample.deviation);
     let mut edges: Vec<f64> = (1..even)
@@ -130,7 +143,7 @@ pub(super) fn climb(
     landscape: &Landscape,
     grids: Vec<Grid>,
     mut words: Vec<Words>,
-    shape: Shape,
+    shape: AllowedCells,
     go_on: &mut dyn FnMut() -> bool,
 ) -> Point {
     let mut symbols: Vec<Vec<Table>> = (0..grids.len())
@@ -170,7 +183,7 @@ pub(super) fn refine(
     landscape: &Landscape,
     point: Point,
     spacings: &mut [f64],
-    shape: Shape,
+    shape: AllowedCells,
     go_on: &mut dyn FnMut() -> bool,
 ) -> Point {
     let (mut grids, mut words) = (Vec::new(), Vec::new());
@@ -202,7 +215,7 @@ struct Sensor<'a> {
     landscape: &'a Landscape,
     grid: &'a Grid,
     block: &'a Block,
-    shape: Shape,
+    shape: AllowedCells,
     words: Words,
     value: f64,
 }
@@ -239,8 +252,8 @@ impl Sensor<'_> {
         for _ in 0..MAX_SWEEPS {
             let worth = self.landscape.worth(self.block, self.grid, &self.words);
             let next = match self.shape {
-                Shape::Any => self.best_words(&worth),
-                Shape::Intervals => self.best_intervals(&worth),
+                AllowedCells::Any => self.best_words(&worth),
+                AllowedCells::Intervals => self.best_intervals(&worth),
             };
             if !self.accept(next) {
                 return;

@@ -12,7 +12,7 @@
 
 use super::pipeline::{Participant, search};
 use super::request::{Control, MAX_BITS, Request};
-use super::search::Shape;
+use crate::criterion::AllowedCells;
 use crate::error::Error;
 use std::collections::BTreeMap;
 
@@ -94,7 +94,7 @@ fn value_of(request: &Request<'_>, bits: &[u32], control: &mut Control<'_>) -> R
         })
         .collect();
     let scene = request.scene.subset(&sensors)?;
-    let found = search(&scene, request.criterion, &participants, Shape::Intervals, (2, None), control)?;
+    let found = search(&scene, request.criterion, &participants, AllowedCells::Intervals, (2, None), control)?;
     // Too many joint symbols to compare: such a share is not taken.
     Ok(if found.value.is_nan() {
         f64::NEG_INFINITY

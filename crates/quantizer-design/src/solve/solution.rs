@@ -19,12 +19,17 @@ use std::fmt::Write;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solutions {
     all: Vec<Solution>,
+    steps: usize,
     is_cut_short: bool,
 }
 
 impl Solutions {
-    pub(super) fn new(all: Vec<Solution>, is_cut_short: bool) -> Self {
-        Self { all, is_cut_short }
+    pub(super) fn new(all: Vec<Solution>, steps: usize, is_cut_short: bool) -> Self {
+        Self {
+            all,
+            steps,
+            is_cut_short,
+        }
     }
 
     /// The best design.
@@ -36,6 +41,12 @@ impl Solutions {
     /// All designs, best first.
     pub fn all(&self) -> &[Solution] {
         &self.all
+    }
+
+    /// Steps of the search. In each, cells and words of one sensor were improved with the other sensors as they were. The number
+    /// depends on the request alone, unless a time limit ended the search.
+    pub fn steps(&self) -> usize {
+        self.steps
     }
 
     /// Whether the time limit ended the search.
@@ -229,15 +240,11 @@ impl Solution {
             let expected = format!("one per sensor, {}", self.sensors.len());
             return refuse("breakpoints", format!("{} lists", breakpoints.len()), expected);
         }
-        let cells: Vec<WordedCells> = self
-            .sensors
-            .iter()
+        let mut cells = self.cells();
+        cells
+            .iter_mut()
             .zip(breakpoints)
-            .map(|(sensor, breakpoints)| WordedCells {
-                breakpoints,
-                words: sensor.words.clone(),
-            })
-            .collect();
+            .for_each(|(cells, b)| cells.breakpoints = b);
         self.with_cells(cells)
     }
 
@@ -275,15 +282,16 @@ impl Solution {
             let expected = format!("{}, those that take part", self.sensors.len());
             return refuse("scene", format!("{} sensors", scene.sensors()), expected);
         }
-        let cells: Vec<WordedCells> = self
-            .sensors
-            .iter()
-            .map(|s| WordedCells {
-                breakpoints: s.breakpoints.clone(),
-                words: s.words.clone(),
-            })
-            .collect();
-        super::polish::system_of(scene, &self.participants(), &cells, true)
+        super::polish::system_of(scene, &self.participants(), &self.cells(), true)
+    }
+
+    /// Cells and words of every sensor.
+    pub(super) fn cells(&self) -> Vec<WordedCells> {
+        let cells = self.sensors.iter().map(|s| WordedCells {
+            breakpoints: s.breakpoints.clone(),
+            words: s.words.clone(),
+        });
+        cells.collect()
     }
 
     /// The design as a table for reading: sensors, cells, words, value, bound and certificate.

@@ -111,34 +111,11 @@ impl System {
     /// # Errors
     /// Unless `levels` is in `2..=4096`.
     pub fn lloyd_max(scene: Scene, levels: usize) -> Result<Self, Error> {
-        let channel = Channel::ideal(levels)?;
-        Self::lloyd_max_over(scene, &channel)
-    }
-
-    /// As [`System::lloyd_max`], each sensor behind its own copy of the channel, one level per input.
-    ///
-    /// # Errors
-    /// Unless the channel has 2 to 4096 inputs.
-    pub fn lloyd_max_over(scene: Scene, channel: &Channel) -> Result<Self, Error> {
-        let standard = lloyd_max::gaussian(channel.inputs())?;
+        let standard = lloyd_max::gaussian(levels)?;
         let quantizers = (0..scene.sensors())
             .map(|n| Ok(Quantizer::from(&standard.affine(scene.sample_mean(), scene.sample_deviation(n))?)))
             .collect::<Result<Vec<_>, Error>>()?;
-        let channels = vec![channel.clone(); scene.sensors()];
-        Self::distinct(scene, quantizers, channels)
-    }
-
-    /// The system in units in which every number of the scene and every breakpoint is `factor` times as large.
-    ///
-    /// # Errors
-    /// If `factor` is not a positive number.
-    pub fn rescaled(&self, factor: f64) -> Result<Self, Error> {
-        let groups = self.groups.iter().map(|g| {
-            let quantizer = g.quantizer.affine(0.0, factor)?;
-            SensorGroup::new(quantizer, g.channel.clone(), g.sensors.clone())
-        });
-        let rescaled = Self::new(self.scene.rescaled(factor)?, groups.collect::<Result<_, _>>()?)?;
-        Ok(rescaled.with_outcome_limit(self.outcome_limit))
+        Self::ideal(scene, quantizers)
     }
 
     /// The system of some of the sensors only, in the given order.

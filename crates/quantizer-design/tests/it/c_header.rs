@@ -1,4 +1,4 @@
-//! The C header, compiled and run.
+//! The C header and the Rust constants, compiled and run.
 
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
@@ -72,6 +72,102 @@ fn answers(export: &Export, name: &str, input: String) -> Option<String> {
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();
     Some(String::from_utf8(output.stdout).unwrap())
+}
+
+/// Sensor 0 sends one word only: nothing gets through.
+fn useless_link() -> Export {
+    let noise = Noise::independent_with_deviations(&[1.0, 1.0]).unwrap();
+    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let links = vec![Link::flipping(0.5).unwrap(), Link::PERFECT];
+    let request = Request::estimation(scene, Bits::Each(1), Link::PERFECT).with_links(links);
+    let adc = Adc::new(12, 0.0..=40.0).unwrap();
+    let rounded = request
+        .unwrap()
+        .with_starts(2)
+        .run()
+        .unwrap()
+        .best()
+        .rounded(&[adc, adc]);
+    rounded.unwrap().export("plant", 4096).unwrap()
+}
+
+#[test]
+fn a_sensor_with_one_word_makes_a_valid_header() {
+    let export = useless_link();
+    let Some(output) = answers(&export, "useless", "0 1 25.0 4000\n1 0 15.0 10\n".to_owned()) else {
+        return;
+    };
+    let first = |symbols: &[usize]| export.decode(symbols).unwrap();
+    for (line, (symbols, mean)) in output.lines().zip([([0, 1], first(&[0, 1])), ([1, 0], first(&[1, 0]))]) {
+        assert_eq!(line.split(' ').next().unwrap().parse::<f64>().unwrap(), mean, "{symbols:?}");
+    }
+}
+
+/// A program that has the constants as a module prints them, real numbers as their bits.
+#[test]
+fn the_rust_constants_are_the_design() {
+    let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
+    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let request = Request::estimation(scene, Bits::PerSensor(vec![2, 1]), Link::new(0.05, 0.02).unwrap());
+    let adc = Adc::new(12, 0.0..=40.0).unwrap();
+    let rounded = request
+        .with_starts(2)
+        .run()
+        .unwrap()
+        .best()
+        .rounded(&[adc, adc])
+        .unwrap();
+    let numbers = |values: &[f64]| values.iter().map(|v| v.to_bits().to_string()).collect::<Vec<_>>();
+    let mut expected: Vec<Vec<String>> = Vec::new();
+    for (sensor, thresholds) in rounded.solution.sensors().iter().zip(&rounded.thresholds) {
+        expected.push(numbers(&sensor.breakpoints));
+        expected.push(sensor.words.iter().map(ToString::to_string).collect());
+        expected.push(thresholds.iter().map(ToString::to_string).collect());
+    }
+    let joint = rounded.export("plant", 4096).unwrap();
+    let pairs = (0..5).flat_map(|a| (0..3).map(move |b| [a, b]));
+    let means: Vec<f64> = pairs.map(|symbols| joint.decode(&symbols).unwrap()).collect();
+    let additive = rounded.solution.additive_decoder().unwrap();
+    let mut linear = vec![numbers(&[additive.offset])];
+    linear.extend(additive.weights.iter().map(|w| numbers(w)));
+    let sensors: String = (0..2)
+        .map(|n| format!("bits(&plant::BREAKPOINTS_{n}); all(&plant::WORDS_{n}); all(&plant::THRESHOLDS_{n});"))
+        .collect();
+    let cases = [
+        (joint, "bits(&plant::MEANS);", vec![numbers(&means)]),
+        (
+            rounded.export("plant", 64).unwrap(),
+            "bits(&plant::OFFSET); bits(&plant::WEIGHTS_0); bits(&plant::WEIGHTS_1);",
+            linear,
+        ),
+    ];
+    for (i, (export, decoder, tail)) in cases.into_iter().enumerate() {
+        let directory = Directory(std::env::temp_dir().join(format!("fewbits-rust-{i}-{}", std::process::id())));
+        let path = |file: &str| directory.0.join(file);
+        std::fs::create_dir_all(&directory.0).unwrap();
+        std::fs::write(path("plant.rs"), export.to_rust()).unwrap();
+        let main = format!(
+            "mod plant;\nfn all<T: ToString>(v: &[T]) {{ println!(\"{{}}\", v.iter().map(|v| v.to_string()).collect::<Vec<_>>().join(\" \")) }}\n\
+             fn bits(v: &[f64]) {{ all(&v.iter().map(|v| v.to_bits()).collect::<Vec<_>>()) }}\n\
+             fn main() {{ {sensors} {decoder} }}\n"
+        );
+        std::fs::write(path("main.rs"), main).unwrap();
+        let compiler = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+        let built = Command::new(compiler)
+            .args(["--edition=2024", "-D", "warnings", "-o"])
+            .arg(path("main"))
+            .arg(path("main.rs"))
+            .output()
+            .unwrap();
+        assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+        let output = Command::new(path("main")).output().unwrap();
+        let found: Vec<Vec<String>> = String::from_utf8(output.stdout)
+            .unwrap()
+            .lines()
+            .map(|line| line.split(' ').map(str::to_owned).collect())
+            .collect();
+        assert_eq!(found, [expected.clone(), tail].concat());
+    }
 }
 
 #[test]

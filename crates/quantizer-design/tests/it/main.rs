@@ -8,3 +8,4 @@ mod nelder_mead;
 mod request;
 mod scale;
 mod scenes;
+mod wild;

@@ -3,11 +3,12 @@
 use super::scenes;
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
-use fewbits_quantizer_design::design::{AllowedCells, Scope};
+use fewbits_quantizer_design::AllowedCells;
+use fewbits_quantizer_design::design::Scope;
 use fewbits_quantizer_design::solve::{Adc, Bits, Request, Solution, minimax};
 use fewbits_quantizer_design::{Certificate, Noise, Prior, Scene};
 use rand::RngExt;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 fn pair(scale: f64) -> Scene {
     let noise = Noise::equicorrelated_with_deviations(&[scale; 2], 0.5).unwrap();
@@ -63,7 +64,6 @@ fn simulated(solution: &Solution, deviations: &[f64], rho: f64, draws: u64) -> (
 /// The job of the guide, in ten lines: two correlated sensors of three bits over a link that flips 2 % of the bits.
 #[test]
 fn two_correlated_sensors_over_a_flipping_link() {
-    let started = Instant::now();
     let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
     let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
     let link = Link::flipping(0.02).unwrap();
@@ -77,7 +77,8 @@ fn two_correlated_sensors_over_a_flipping_link() {
         .unwrap()
         .to_c_header();
     assert!(header.contains("plant_thresholds_0") && header.contains("plant_decode"));
-    assert!(started.elapsed() < Duration::from_secs(10) || cfg!(debug_assertions));
+    // A step takes some 5 ms, so these are far below 10 s on any machine.
+    assert!(solutions.steps() < 1000, "{} steps", solutions.steps());
     // 400 starts find no better intervals than these.
     assert!(solution.value() < 1.365_94, "{}", solution.value());
     assert_eq!((solution.certificate(), solution.scope()), (Certificate::LocalOptimum, Scope::EverySensor));
@@ -88,6 +89,18 @@ fn two_correlated_sensors_over_a_flipping_link() {
         "{error} {standard_error} {}",
         solution.value()
     );
+}
+
+/// The same job where a word may stand for several intervals: below the 1.365 that is asked of it.
+#[test]
+fn two_correlated_sensors_with_folded_cells() {
+    let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
+    let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
+    let request = Request::estimation(scene, Bits::Each(3), Link::flipping(0.02).unwrap());
+    let solutions = request.with_cells(AllowedCells::Any).run().unwrap();
+    assert!(solutions.best().value() < 1.354_45, "{}", solutions.best().value());
+    assert_eq!(solutions.best().certificate(), Certificate::LocalOptimum);
+    assert!(solutions.steps() < 1000, "{} steps", solutions.steps());
 }
 
 #[test]
@@ -130,6 +143,7 @@ fn detection_reaches_the_printed_error_probability() {
     let scene = Scene::new(Prior::binary(2.0, 0.5).unwrap(), noise).unwrap();
     let found = Request::detection(scene, Bits::Each(2), Link::PERFECT)
         .unwrap()
+        .with_starts(2)
         .run()
         .unwrap();
     assert!(found.best().value() < 1.660_803_1e-2, "{}", found.best().value());
@@ -164,8 +178,17 @@ fn designs_scale_with_the_unit() {
 fn losses_of_one_sensor_mix_prior_and_posterior() {
     let scene = || Scene::gaussian_with_deviations(1.0, &[0.5]).unwrap();
     let clear = best(scene(), Bits::Each(2), Link::PERFECT).value();
-    let lossy = best(scene(), Bits::Each(2), Link::lossy(0.3).unwrap()).value();
-    assert!((lossy - (0.3 + 0.7 * clear)).abs() < 1e-9);
+    // Whether the loss is noticed makes no difference.
+    for link in [
+        Link::lossy(0.3).unwrap(),
+        Link::PERFECT.with_erasure(0.3).unwrap(),
+        Link::lossy(0.1).unwrap().with_erasure(0.2).unwrap(),
+    ] {
+        let lossy = best(scene(), Bits::Each(2), link);
+        assert!((lossy.value() - (0.3 + 0.7 * clear)).abs() < 1e-9, "{link:?}");
+        assert_eq!(lossy.sensors()[0].symbols(), 5);
+        assert!((lossy.decoder(5).unwrap().decode_symbols(&[4]).unwrap().variance - 1.0).abs() < 1e-9);
+    }
 }
 
 #[test]
@@ -178,8 +201,8 @@ fn a_useless_link_leaves_the_prior() {
 fn shared_out_bits_are_the_best_of_all_shares() {
     let scene = || Scene::gaussian_with_deviations(1.0, &[0.2, 1.5]).unwrap();
     let link = Link::flipping(0.01).unwrap();
-    let shared = best(scene(), Bits::Total(4), link);
-    let all = (0..=4).map(|first| best(scene(), Bits::PerSensor(vec![first, 4 - first]), link).value());
+    let shared = best(scene(), Bits::Total(3), link);
+    let all = (0..=3).map(|first| best(scene(), Bits::PerSensor(vec![first, 3 - first]), link).value());
     let least = all.fold(f64::INFINITY, f64::min);
     assert!((shared.value() / least - 1.0).abs() < 1e-6, "{} {least}", shared.value());
     assert!(Request::estimation(scene(), Bits::Total(0), link).run().is_err());
@@ -196,7 +219,7 @@ fn random_scenes_are_no_worse_than_nelder_mead() {
     for i in 0..5 {
         let task = scenes::task(i, [1e-4, 1.0, 1e4][i as usize % 3], 3, 2).unwrap();
         let (found, _) = task.solve(None).unwrap();
-        let reference = task.nelder_mead(Duration::from_millis(150)).unwrap();
+        let reference = task.nelder_mead(Duration::from_millis(100)).unwrap();
         assert!(found.value() <= reference * (1.0 + 1e-9), "{}: {} {reference}", task.what, found.value());
     }
 }

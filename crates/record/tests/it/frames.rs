@@ -1,6 +1,6 @@
 //! Frames on links that lose, reorder and damage them.
 
-use crate::common::{Cells, row_holds, rows, schema};
+use crate::common::{Cells, Numbers, row_holds, rows, schema};
 use fewbits_record::{Block, Error, FrameReader, FrameWriter, TimeBase};
 use proptest::prelude::*;
 
@@ -59,6 +59,41 @@ fn lost_frames_lose_their_rows_only() {
     }
     let missing = seen.iter().filter(|count| **count == 0).count();
     assert!(seen.iter().all(|count| *count <= 1) && missing > 0 && missing < truth.len() * 2 * lost / frames.len());
+}
+
+#[test]
+fn two_percent_loss_of_frames_of_128_rows() {
+    let truth = rows(128 * 150);
+    let (pieces, frames) = frames(&truth, 1 << 16);
+    let (mut reader, mut seen) = (FrameReader::new(), vec![0; truth.len()]);
+    pieces
+        .iter()
+        .for_each(|piece| assert!(reader.handle(piece).unwrap().is_empty()));
+    let (mut numbers, mut lost) = (Numbers(5), vec![false; frames.len()]);
+    // A link that loses a frame in fifty, damages another one, and repeats a third.
+    for (i, frame) in frames.iter().enumerate() {
+        let fate = numbers.next();
+        lost[i] = fate < 0.04;
+        if fate < 0.02 {
+            continue;
+        }
+        let mut arrived = frame.clone();
+        if lost[i] {
+            let bit = (numbers.next() * 8.0 * frame.len() as f64) as usize;
+            arrived[bit / 8] ^= 1 << (bit % 8);
+            assert!(reader.handle(&arrived).is_err());
+            continue;
+        }
+        keep(&reader.handle(&arrived).unwrap(), &truth, &mut seen);
+        if fate > 0.98 {
+            keep(&reader.handle(&arrived).unwrap(), &truth, &mut vec![0; truth.len()]);
+        }
+    }
+    // Rows without a value within its bound are those of the frames that did not arrive whole, and no others.
+    assert!(lost.iter().filter(|lost| **lost).count() >= 3);
+    for (row, count) in seen.iter().enumerate() {
+        assert_eq!(*count == 0, lost[row / 128], "row {row}");
+    }
 }
 
 #[test]

@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[cfg(feature = "arrow")]
+mod arrow;
 mod common;
 mod damage;
 mod frames;
+mod fuzz;
 mod guarantee;
 mod random;
 mod reading;

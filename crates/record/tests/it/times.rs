@@ -57,3 +57,17 @@ fn tolerant_ticks_are_within_it() {
     }
     assert!(restored(&jitter, 25_000_000).0 < restored(&jitter, 0).0 / 3);
 }
+
+#[test]
+fn small_tolerance_costs_no_more_than_exact_times() {
+    let mut numbers = Numbers(4);
+    let seconds: Vec<i64> = (0..300)
+        .map(|i| 1_000_000_000 * (600 * i + (60.0 * numbers.next()) as i64))
+        .collect();
+    let (exact, _) = restored(&seconds, 0);
+    for tolerance in [1_000, 1_000_000, 400_000_000] {
+        let (bytes, restored) = restored(&seconds, tolerance);
+        assert!(bytes <= exact + 8, "{tolerance}: {bytes} bytes, exact {exact}");
+        assert_eq!(restored, seconds);
+    }
+}

@@ -5,3 +5,4 @@
 mod entry;
 mod fixtures;
 mod laws;
+mod wild;

@@ -165,6 +165,9 @@ fn boxes(frame: &Frame<'_, '_>, boxes: &[(f64, f64, f64, f64)], ink: RGBColor, o
     Ok(())
 }
 
+/// Shades of a field besides the lowest: more than an eye tells apart.
+const SHADES: f64 = 128.0;
+
 fn field(
     frame: &Frame<'_, '_>,
     x: &[f64],
@@ -175,10 +178,20 @@ fn field(
     let (left, bottom) = (edges(x), edges(y));
     // Each cell reaches under its next neighbours, drawn later, so that no seam shines through.
     let under = |edges: &[f64], i: usize| edges[(i + 2).min(edges.len() - 1)];
+    // Neighbours of one shade are one rectangle: a fine field would be megabytes of cells otherwise.
+    let shade = |value: f64| {
+        let share = (value - low) / (high - low).max(f64::MIN_POSITIVE);
+        value.is_finite().then(|| (SHADES * share.clamp(0.0, 1.0)).round())
+    };
     for (j, row) in values.iter().enumerate() {
-        for (i, value) in row.iter().enumerate().filter(|(_, v)| v.is_finite()) {
-            let shade = heat((value - low) / (high - low).max(f64::MIN_POSITIVE));
-            boxes(frame, &[(left[i], under(&left, i), bottom[j], under(&bottom, j))], shade, 1.0)?;
+        let mut start = 0;
+        for run in row.chunk_by(|a, b| shade(*a) == shade(*b)) {
+            let last = start + run.len() - 1;
+            if let Some(shade) = shade(run[0]) {
+                let cell = (left[start], under(&left, last), bottom[j], under(&bottom, j));
+                boxes(frame, &[cell], heat(shade / SHADES), 1.0)?;
+            }
+            start = last + 1;
         }
     }
     Ok(())

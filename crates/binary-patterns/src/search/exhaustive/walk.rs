@@ -1,10 +1,10 @@
 //! The tree of all multisets of masks.
 
-use super::{LinearSearch, MaskSet};
-use crate::bank::{CountTable, IMPOSSIBLE};
-use crate::linear::{Span, flips_under_reflection};
+use super::setting::{LinearSearch, MaskSet};
+use crate::observation::bank::{CountTable, IMPOSSIBLE};
+use crate::observation::source::{Blur, Nodes};
+use crate::patterns::linear::{Span, flips_under_reflection};
 use crate::search::outcomes::{Outcomes, SEARCH_PANEL};
-use crate::source::{Blur, Nodes};
 use crate::{Error, Mask, linear_pattern};
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::DMatrix;

@@ -127,7 +127,7 @@ impl<E: Estimator> Star<E> {
         let slot = centre.slot;
         let mut note = None;
         if let Some(predicted) = centre.predicted.take() {
-            let after = update_or_discard(&self.estimator, self.stream, slot, &predicted, &mut centre.arrived);
+            let after = update_or_discard(&self.estimator, self.stream, slot, &predicted, &centre.arrived);
             (centre.belief, note) = after;
         }
         centre.estimates.resize(slot as usize - 1, Vec::new());
@@ -158,7 +158,7 @@ impl<E: Estimator> Star<E> {
             Kind::Report if frame.slot != centre.slot || centre.predicted.is_none() => context.note(Note::Late),
             Kind::Report if centre.arrived[sensor] != Arrived::Nothing => context.note(Note::Duplicate),
             Kind::Report if frame.digest != centre.digests[sensor] => {
-                centre.arrived[sensor] = Arrived::Lost;
+                centre.arrived[sensor] = Arrived::Foreign;
                 let (with, slot) = (from, frame.slot);
                 context.note(Note::Disagreement { with, slot });
             }

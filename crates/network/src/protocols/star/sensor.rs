@@ -192,8 +192,8 @@ impl<E: Estimator> Star<E> {
         if at + 2 != slot {
             return None;
         }
-        let mut arrived = echo_of(&self.estimator, echo).ok()?;
+        let arrived = echo_of(&self.estimator, echo).ok()?;
         let predicted = predict(&self.estimator, self.stream, slot - 1, belief).ok()?;
-        Some(update_or_discard(&self.estimator, self.stream, slot - 1, &predicted, &mut arrived).0)
+        Some(update_or_discard(&self.estimator, self.stream, slot - 1, &predicted, &arrived).0)
     }
 }

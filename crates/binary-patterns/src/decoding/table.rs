@@ -1,0 +1,190 @@
+//! Estimates for all that a bank may report.
+
+use crate::observation::source::Nodes;
+use crate::{Bank, Bit, Error};
+use fewbits_core::Observation;
+use fewbits_numerics::ArgumentError;
+use serde::{Deserialize, Serialize};
+
+/// Most sensors for a table over bit strings.
+pub const MAX_TABLE_SENSORS: usize = 24;
+
+/// Estimates for every outcome of a bank.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredTable", into = "StoredTable")]
+pub struct LookupTable {
+    pub(crate) bank: Bank,
+    pub(crate) estimates: Vec<f64>,
+}
+
+/// The stored form of a table.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredTable {
+    bank: Bank,
+    estimates: Vec<f64>,
+}
+
+impl From<LookupTable> for StoredTable {
+    fn from(table: LookupTable) -> Self {
+        Self {
+            bank: table.bank,
+            estimates: table.estimates,
+        }
+    }
+}
+
+impl TryFrom<StoredTable> for LookupTable {
+    type Error = Error;
+
+    fn try_from(stored: StoredTable) -> Result<Self, Error> {
+        fewbits_numerics::error::all_finite("estimates", &stored.estimates)?;
+        let outcomes = stored.bank.checked_outcomes()?;
+        if stored.estimates.len() != outcomes {
+            let given = format!("{} estimates", stored.estimates.len());
+            return Err(ArgumentError::new("estimates", given, format!("{outcomes}, one per outcome")).into());
+        }
+        Ok(Self {
+            bank: stored.bank,
+            estimates: stored.estimates,
+        })
+    }
+}
+
+impl LookupTable {
+    /// The estimate from one observation per sensor. Where a bit is missing (these sensors always report, so that nothing
+    /// received, like an erasure, says nothing) it is the posterior mean given the others, whatever the table's decoder.
+    ///
+    /// # Errors
+    /// If the number of observations is not the number of sensors.
+    pub fn decode(&self, observations: &[Observation<Bit>]) -> Result<f64, Error> {
+        let bits: Vec<bool> = observations
+            .iter()
+            .filter_map(|o| o.received().map(|bit| bit.0))
+            .collect();
+        if bits.len() == observations.len() {
+            return self.estimate(&bits);
+        }
+        self.bank.posterior_mean(observations)
+    }
+
+    /// The estimate of [`decode`](Self::decode), and its mean squared error given the observations, in squared units of the source.
+    ///
+    /// # Errors
+    /// If the number of observations is not the number of sensors.
+    pub fn decode_with_error(&self, observations: &[Observation<Bit>]) -> Result<(f64, f64), Error> {
+        let estimate = self.decode(observations)?;
+        Ok((estimate, self.bank.posterior_squared_error(observations, estimate)?))
+    }
+
+    /// The estimate for one bit a sensor.
+    ///
+    /// # Errors
+    /// If the number of bits is not the number of sensors.
+    pub fn estimate(&self, bits: &[bool]) -> Result<f64, Error> {
+        Ok(self.estimates[self.bank.index_of(bits)?])
+    }
+
+    /// Number of distinguishable outcomes stored.
+    pub fn outcomes(&self) -> usize {
+        self.estimates.len()
+    }
+
+    /// `(E[xhat|x] - x, Var[xhat|x])`: bias and variance of the estimate for one value of the source.
+    ///
+    /// # Errors
+    /// If `x` is not finite.
+    pub fn conditional_error(&self, x: f64) -> Result<(f64, f64), Error> {
+        let x = fewbits_numerics::error::finite("x", x)?;
+        let at = Nodes {
+            x: vec![x],
+            w: vec![1.0],
+        };
+        let (mut mean, mut second) = (0.0, 0.0);
+        self.bank.for_outcomes(&at, |index, w| {
+            let off = self.estimates[index] - x;
+            mean += w[0] * off;
+            second += w[0] * off * off;
+        });
+        Ok((mean, (second - mean * mean).max(0.0)))
+    }
+
+    /// Expanded to all `2^N` bit strings, sensor 1 the most significant bit of the index.
+    ///
+    /// # Errors
+    /// If there are more than 24 sensors.
+    pub fn expand(&self) -> Result<Vec<f64>, Error> {
+        let sensors = self.bank.sensors();
+        if sensors > MAX_TABLE_SENSORS {
+            return Err(Error::TooManyOutcomes {
+                outcomes: 1u128.checked_shl(sensors as u32).unwrap_or(u128::MAX),
+                limit: 1 << MAX_TABLE_SENSORS,
+            });
+        }
+        (0usize..1 << sensors)
+            .map(|word| {
+                let bits: Vec<bool> = (0..sensors).rev().map(|at| word >> at & 1 == 1).collect();
+                self.estimate(&bits)
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BinaryQuantizer, Decoder, Source};
+
+    #[test]
+    fn a_missing_bit_leaves_the_posterior_of_the_others() {
+        let q = |b: &[f64]| BinaryQuantizer::new(b.to_vec()).unwrap();
+        let all = vec![q(&[0.0]), q(&[-0.5, 0.5]), q(&[0.25])];
+        let bank = |quantizers: Vec<BinaryQuantizer>| {
+            Bank::homogeneous_with_deviation(Source::uniform(1.0).unwrap(), quantizers, 0.2).unwrap()
+        };
+        let table = bank(all.clone()).table(Decoder::Mmse).unwrap();
+        let others = bank(all[..2].to_vec()).table(Decoder::Mmse).unwrap();
+        for bits in [[false, true], [true, true], [true, false]] {
+            let mut seen = bits.map(|b| Observation::Received(Bit(b))).to_vec();
+            seen.push(Observation::Lost);
+            assert!((table.decode(&seen).unwrap() - others.estimate(&bits).unwrap()).abs() < 1e-12);
+            assert!(table.decode(&seen[..2]).is_err());
+            seen[2] = Observation::Received(Bit(true));
+            let full = [bits[0], bits[1], true];
+            assert_eq!(table.decode(&seen).unwrap(), table.estimate(&full).unwrap());
+        }
+        let json = serde_json::to_string(&table).unwrap();
+        assert_eq!(serde_json::from_str::<LookupTable>(&json).unwrap(), table);
+    }
+
+    /// The mean squared error of every outcome, weighted by its probability, is the mean squared error of the table.
+    #[test]
+    fn errors_given_the_bits_average_to_the_mse() {
+        let quantizers = [vec![0.0], vec![-0.5, 0.5], vec![0.25]].map(|edges| BinaryQuantizer::new(edges).unwrap());
+        let source = Source::uniform(1.0).unwrap();
+        let bank = Bank::homogeneous_with_deviation(source, quantizers.to_vec(), 0.2).unwrap();
+        for decoder in [Decoder::Mmse, Decoder::ContinuousMap] {
+            let table = bank.table(decoder).unwrap();
+            let mut average = 0.0;
+            for word in 0..8 {
+                let bits = [word & 4 != 0, word & 2 != 0, word & 1 != 0];
+                // P(bits) by the trapezoidal rule over the source, which is uniform on [-1, 1].
+                let steps = 4000;
+                let probability: f64 = (0..=steps)
+                    .map(|i| {
+                        let x = -1.0 + 2.0 * f64::from(i) / f64::from(steps);
+                        let end = if i == 0 || i == steps { 0.5 } else { 1.0 };
+                        let given = |n: usize| bank.sensor(n).probabilities(x)[usize::from(bits[n])];
+                        end * given(0) * given(1) * given(2) / f64::from(steps)
+                    })
+                    .sum();
+                let seen = bits.map(|b| Observation::Received(Bit(b)));
+                let (estimate, error) = table.decode_with_error(&seen).unwrap();
+                assert_eq!(estimate, table.estimate(&bits).unwrap());
+                average += probability * error;
+            }
+            let mse = bank.mse(decoder).unwrap();
+            assert!((average / mse - 1.0).abs() < 1e-6, "{average} for {mse}");
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! Division of the measurement axis into cells.
+
+use crate::Error;
+use crate::observation::source::{Kind, Source};
+use fewbits_numerics::ArgumentError;
+use fewbits_quantizers::quantizer::{cell_of, check_increasing};
+use serde::{Deserialize, Serialize};
+
+/// Most bits a cell index may take.
+pub const MAX_BITS: usize = 16;
+
+/// Interior edges of the eight-level Lloyd-Max quantizer of `N(0, 1)` with the four digits that Max (1960) prints.
+pub const MAX_EIGHT_LEVEL_EDGES: [f64; 7] = [-1.748, -1.05, -0.5006, 0.0, 0.5006, 1.05, 1.748];
+
+/// Interior edges `t_1 < ... < t_{L-1}` that divide the axis into `L` cells; the outer cells reach to infinity.
+///
+/// For a bounded source the infinite outer cells are the clipping rule: a measurement below `-V` counts as `-V`, one above
+/// `V` as `V` (the thesis, section 5.2, prints the two sides swapped; erratum `binary-1`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
+pub struct Grid {
+    breakpoints: Vec<f64>,
+}
+
+impl TryFrom<Vec<f64>> for Grid {
+    type Error = Error;
+
+    fn try_from(breakpoints: Vec<f64>) -> Result<Self, Error> {
+        Self::from_breakpoints(breakpoints)
+    }
+}
+
+impl From<Grid> for Vec<f64> {
+    fn from(grid: Grid) -> Self {
+        grid.breakpoints
+    }
+}
+
+impl Grid {
+    /// `2^bits` cells with edges at multiples of `2 V / 2^bits` from `-V`.
+    ///
+    /// # Errors
+    /// If `half_width` is not positive and finite or `bits` not in `1..=16`.
+    pub fn uniform(half_width: f64, bits: usize) -> Result<Self, Error> {
+        let half_width = fewbits_numerics::error::positive("half_width", half_width)?;
+        let cells = 1usize << bits_in_range(bits)?;
+        // Symmetric by construction: the edge in the middle is exactly zero.
+        let breakpoints = (1..cells)
+            .map(|l| half_width * (2.0 * l as f64 - cells as f64) / cells as f64)
+            .collect();
+        Ok(Self { breakpoints })
+    }
+
+    /// From any strictly increasing finite interior edges, at least one.
+    ///
+    /// # Errors
+    /// If the edges are empty, not finite or not strictly increasing.
+    pub fn from_breakpoints(breakpoints: Vec<f64>) -> Result<Self, Error> {
+        if breakpoints.is_empty() {
+            return Err(ArgumentError::new("breakpoints", "empty", "at least one breakpoint").into());
+        }
+        check_increasing(&breakpoints)?;
+        Ok(Self { breakpoints })
+    }
+
+    /// `2^bits` cells of the Lloyd-Max quantizer of `N(0, std^2)`.
+    ///
+    /// # Errors
+    /// If `std` is not positive and finite or `bits` not in `1..=8`.
+    pub fn lloyd_max(std: f64, bits: usize) -> Result<Self, Error> {
+        let std = fewbits_numerics::error::positive("std", std)?;
+        let table = fewbits_quantizers::lloyd_max::gaussian_table(bits_in_range(bits)?)?;
+        Self::from_breakpoints(table.breakpoints().iter().map(|t| t * std).collect())
+    }
+
+    /// The eight-cell Gaussian grid with the printed four digits ([`MAX_EIGHT_LEVEL_EDGES`]), for reproductions.
+    ///
+    /// # Errors
+    /// If `std` is not positive and finite.
+    pub fn printed_gaussian(std: f64) -> Result<Self, Error> {
+        let std = fewbits_numerics::error::positive("std", std)?;
+        Self::from_breakpoints(MAX_EIGHT_LEVEL_EDGES.iter().map(|t| t * std).collect())
+    }
+
+    /// The interior edges.
+    pub fn breakpoints(&self) -> &[f64] {
+        &self.breakpoints
+    }
+
+    /// Number of cells `L`.
+    pub fn cells(&self) -> usize {
+        self.breakpoints.len() + 1
+    }
+
+    /// Bits of a cell index, if `L` is a power of two.
+    pub fn bits(&self) -> Option<usize> {
+        self.cells()
+            .is_power_of_two()
+            .then(|| self.cells().trailing_zeros() as usize)
+    }
+
+    /// Index of the cell of a measurement, from 0: the number of edges at or below it.
+    ///
+    /// # Errors
+    /// If the measurement is NaN.
+    pub fn locate(&self, measurement: f64) -> Result<usize, Error> {
+        Ok(cell_of(&self.breakpoints, measurement)?)
+    }
+
+    /// True if `t_l = -t_{L-l}` throughout.
+    pub fn is_symmetric(&self) -> bool {
+        self.breakpoints
+            .iter()
+            .zip(self.breakpoints.iter().rev())
+            .all(|(a, b)| a + b == 0.0)
+    }
+
+    /// Limits of cell `l`, cut to the support of the source; `None` if nothing of it lies inside.
+    pub(crate) fn support(&self, cell: usize, source: &Source) -> Option<(f64, f64)> {
+        let reach = source.reach();
+        let low = if cell == 0 {
+            -reach
+        } else {
+            self.breakpoints[cell - 1].max(-reach)
+        };
+        let high = self.breakpoints.get(cell).copied().unwrap_or(reach).min(reach);
+        (low < high).then_some((low, high))
+    }
+
+    /// Mean squared error of the cell centroids when the measurement is exact; `Delta^2/12` for a uniform source on its grid.
+    pub fn noiseless_mse(&self, source: &Source) -> f64 {
+        let rule = fewbits_numerics::quadrature::gauss_legendre::<24>();
+        (0..self.cells())
+            .filter_map(|cell| self.support(cell, source))
+            .map(|(low, high)| {
+                let width = match source.kind() {
+                    Kind::Uniform { .. } => high - low,
+                    Kind::Gaussian { std } => std,
+                };
+                let nodes = source.nodes_between(low, high, width, rule);
+                let mass = nodes.expectation(|_| 1.0);
+                let centroid = nodes.expectation(|x| x) / mass;
+                if mass > 0.0 {
+                    nodes.expectation(|x| (x - centroid) * (x - centroid))
+                } else {
+                    0.0
+                }
+            })
+            .sum()
+    }
+}
+
+pub(crate) fn bits_in_range(bits: usize) -> Result<usize, Error> {
+    if (1..=MAX_BITS).contains(&bits) {
+        Ok(bits)
+    } else {
+        Err(ArgumentError::new("bits", bits, "a number of bits in 1..=16").into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn uniform_edges_are_symmetric() {
+        let grid = Grid::uniform(0.7, 4).unwrap();
+        assert_eq!((grid.cells(), grid.bits()), (16, Some(4)));
+        assert!(grid.is_symmetric());
+        assert_relative_eq!(grid.breakpoints()[0], -0.7 + 1.4 / 16.0, max_relative = 1e-14);
+    }
+
+    #[test]
+    fn measurements_clip_to_the_outer_cells() {
+        let grid = Grid::uniform(1.0, 3).unwrap();
+        assert_eq!(grid.locate(f64::NEG_INFINITY).unwrap(), 0);
+        assert_eq!(grid.locate(-7.0).unwrap(), 0);
+        assert_eq!(grid.locate(0.0).unwrap(), 4);
+        assert_eq!(grid.locate(f64::INFINITY).unwrap(), 7);
+        assert!(grid.locate(f64::NAN).is_err());
+    }
+
+    #[test]
+    fn noiseless_error_is_the_textbook_one() {
+        let uniform = Grid::uniform(1.0, 3)
+            .unwrap()
+            .noiseless_mse(&Source::uniform(1.0).unwrap());
+        assert_relative_eq!(uniform, 0.25 * 0.25 / 12.0, max_relative = 1e-12);
+        let source = Source::gaussian_with_deviation(0.7).unwrap();
+        let exact = 0.49
+            * fewbits_quantizers::lloyd_max::gaussian_table(3)
+                .unwrap()
+                .mean_squared_error();
+        let optimal = Grid::lloyd_max(0.7, 3).unwrap().noiseless_mse(&source);
+        assert_relative_eq!(optimal, exact, max_relative = 1e-10);
+        // Four printed digits cost next to nothing at a minimum.
+        let printed = Grid::printed_gaussian(0.7).unwrap().noiseless_mse(&source);
+        assert!(printed > exact && printed < exact * (1.0 + 1e-5));
+    }
+
+    #[test]
+    fn bad_grids_are_refused() {
+        assert!(Grid::uniform(1.0, 0).is_err());
+        assert!(Grid::uniform(1.0, 17).is_err());
+        assert!(Grid::uniform(f64::NAN, 3).is_err());
+        assert!(Grid::from_breakpoints(vec![]).is_err());
+        assert!(Grid::from_breakpoints(vec![0.0, 0.0]).is_err());
+        assert!(Grid::from_breakpoints(vec![f64::NEG_INFINITY, 0.0]).is_err());
+    }
+}

@@ -1,0 +1,215 @@
+//! Linear patterns: XORs of the natural binary digits of the cell index, named by masks over GF(2).
+
+use crate::Error;
+use crate::patterns::grid::bits_in_range;
+use crate::{Grid, Pattern};
+use fewbits_numerics::ArgumentError;
+
+/// Selects which natural patterns are XORed: the most significant of the `bits` binary digits selects pattern 1.
+///
+/// With three bits, `4` is the sign bit `00001111`, `6` its XOR with the second, `00111100`, and so on.
+pub type Mask = u32;
+
+/// Checks that `mask` is in `1..2^bits`.
+///
+/// # Errors
+/// If `bits` is not in `1..=16`, or the mask is 0 or has a digit beyond `bits`.
+pub fn check_mask(mask: Mask, bits: usize) -> Result<Mask, Error> {
+    let bits = bits_in_range(bits)?;
+    if mask != 0 && mask < 1 << bits {
+        Ok(mask)
+    } else {
+        Err(ArgumentError::new("mask", mask, format!("a mask in 1..{}", 1u32 << bits)).into())
+    }
+}
+
+/// The pattern of a mask over `2^bits` cells: bit `l` is the parity of `mask & l`.
+///
+/// # Errors
+/// As [`check_mask`].
+pub fn linear_pattern(mask: Mask, bits: usize) -> Result<Pattern, Error> {
+    check_mask(mask, bits)?;
+    Pattern::new((0..1u32 << bits).map(|l| (l & mask).count_ones() % 2 == 1).collect())
+}
+
+impl Pattern {
+    /// The linear pattern of a mask over `2^bits` cells; [`Pattern::mask`] is the way back.
+    ///
+    /// # Errors
+    /// As [`check_mask`].
+    pub fn linear(mask: Mask, bits: usize) -> Result<Self, Error> {
+        linear_pattern(mask, bits)
+    }
+
+    /// The mask of the pattern, if it is linear.
+    pub fn mask(&self) -> Option<Mask> {
+        mask_of(self)
+    }
+}
+
+/// Masks of the natural binary code, most significant digit first: `{4, 2, 1}` for three bits.
+///
+/// # Errors
+/// If `bits` is not in `1..=16`.
+pub fn natural_basis(bits: usize) -> Result<Vec<Mask>, Error> {
+    let bits = bits_in_range(bits)?;
+    Ok((0..bits).rev().map(|at| 1 << at).collect())
+}
+
+/// Masks of the reflected Gray code, coarsest bit first: `{4, 6, 3}` for three bits.
+///
+/// # Errors
+/// If `bits` is not in `1..=16`.
+pub fn gray_basis(bits: usize) -> Result<Vec<Mask>, Error> {
+    let natural = natural_basis(bits)?;
+    Ok((0..natural.len())
+        .map(|b| {
+            if b == 0 {
+                natural[0]
+            } else {
+                natural[b - 1] | natural[b]
+            }
+        })
+        .collect())
+}
+
+/// A set of vectors over GF(2) in echelon form.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Span {
+    leading: [Mask; 32],
+    rank: usize,
+}
+
+impl Span {
+    pub fn rank(&self) -> usize {
+        self.rank
+    }
+
+    /// The span with one more vector.
+    #[must_use]
+    pub fn with(mut self, mut mask: Mask) -> Self {
+        while mask != 0 {
+            let top = mask.ilog2() as usize;
+            if self.leading[top] == 0 {
+                self.leading[top] = mask;
+                self.rank += 1;
+                break;
+            }
+            mask ^= self.leading[top];
+        }
+        self
+    }
+}
+
+/// Rank over GF(2) of a set of masks. The patterns of `masks` separate all `2^bits` cells exactly if it is `bits`.
+pub fn rank(masks: &[Mask]) -> usize {
+    masks.iter().fold(Span::default(), |span, &mask| span.with(mask)).rank()
+}
+
+/// The generator matrix, one row a cell and one column a sensor: entry `(l, n)` is the bit of sensor `n` for cell `l`.
+///
+/// # Errors
+/// As [`check_mask`], for any mask.
+pub fn generator_matrix(masks: &[Mask], bits: usize) -> Result<Vec<Vec<bool>>, Error> {
+    let columns = masks
+        .iter()
+        .map(|&mask| linear_pattern(mask, bits))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok((0..1 << bits_in_range(bits)?)
+        .map(|cell| columns.iter().map(|p| p.bits()[cell]).collect())
+        .collect())
+}
+
+/// The mask of a pattern over `2^bits` cells, if it is linear.
+pub fn mask_of(pattern: &Pattern) -> Option<Mask> {
+    let cells = pattern.cells();
+    if !cells.is_power_of_two() || cells > 1 << crate::patterns::grid::MAX_BITS {
+        return None;
+    }
+    let bits = cells.trailing_zeros() as usize;
+    // A linear pattern is fixed by its bits at the powers of two.
+    let mask = (0..bits)
+        .filter(|&at| pattern.bits()[1 << at])
+        .fold(0, |m, at| m | 1 << at);
+    (linear_pattern(mask, bits).as_ref() == Ok(pattern)).then_some(mask)
+}
+
+/// True if the noise statistics of linear patterns on `grid` are symmetric under `x -> -x`: a mask of even weight keeps its
+/// bit, one of odd weight flips it.
+pub(crate) fn flips_under_reflection(mask: Mask) -> bool {
+    mask.count_ones() % 2 == 1
+}
+
+/// The grid's number of bits.
+pub(crate) fn grid_bits(grid: &Grid) -> Result<usize, Error> {
+    match grid.bits() {
+        Some(bits) => bits_in_range(bits),
+        None => Err(ArgumentError::new("grid", format!("{} cells", grid.cells()), "a power of two of cells").into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check_separation;
+    use proptest::prelude::*;
+
+    fn strings(masks: &[Mask], bits: usize) -> Vec<String> {
+        masks
+            .iter()
+            .map(|&m| linear_pattern(m, bits).unwrap().to_string())
+            .collect()
+    }
+
+    #[test]
+    fn bases_of_three_bits() {
+        assert_eq!(natural_basis(3).unwrap(), [4, 2, 1]);
+        assert_eq!(gray_basis(3).unwrap(), [4, 6, 3]);
+        assert_eq!(gray_basis(4).unwrap(), [8, 12, 6, 3]);
+        assert_eq!(strings(&[4, 2, 1], 3), ["00001111", "00110011", "01010101"]);
+        assert_eq!(strings(&[14, 5, 11], 4), ["0011110011000011", "0101101001011010", "0110011010011001"]);
+    }
+
+    #[test]
+    fn adjacent_rows_of_the_gray_generator_differ_in_one_bit() {
+        for bits in 1..=8 {
+            let rows = generator_matrix(&gray_basis(bits).unwrap(), bits).unwrap();
+            for pair in rows.windows(2) {
+                assert_eq!(pair[0].iter().zip(&pair[1]).filter(|(a, b)| a != b).count(), 1);
+            }
+        }
+    }
+
+    #[test]
+    fn only_linear_patterns_have_masks() {
+        assert_eq!(mask_of(&"00111100".parse().unwrap()), Some(6));
+        // Table 5.2 prints this one, which is no XOR of natural patterns.
+        assert_eq!(mask_of(&"10001110".parse().unwrap()), None);
+        assert_eq!(mask_of(&"010".parse().unwrap()), None);
+        let grid = Grid::uniform(0.3, 4).unwrap();
+        for mask in 1..16 {
+            let pattern = Pattern::linear(mask, 4).unwrap();
+            assert_eq!(pattern.mask(), Some(mask));
+            assert_eq!(Pattern::of(&pattern.on(&grid).unwrap(), &grid), Some(pattern));
+        }
+        let off = crate::BinaryQuantizer::new(vec![0.01]).unwrap();
+        assert_eq!(Pattern::of(&off, &grid), None);
+    }
+
+    #[test]
+    fn bad_masks_are_refused() {
+        assert!(linear_pattern(0, 3).is_err());
+        assert!(linear_pattern(8, 3).is_err());
+        assert!(linear_pattern(1, 0).is_err());
+        assert!(linear_pattern(1, 17).is_err());
+        assert!(gray_basis(0).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn full_rank_is_separation(masks in prop::collection::vec(1u32..16, 1..8)) {
+            let patterns: Vec<Pattern> = masks.iter().map(|&m| linear_pattern(m, 4).unwrap()).collect();
+            prop_assert_eq!(rank(&masks) == 4, check_separation(&patterns).is_ok());
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Bit patterns over the cells of a grid.
+
+use crate::Error;
+use crate::{BinaryQuantizer, Grid};
+use fewbits_numerics::ArgumentError;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// One bit a cell: the sensor sends bit `l` when its measurement falls into cell `l`.
+///
+/// A pattern and its complement name the same quantizer with its outputs relabelled, so the constructor keeps the one
+/// that starts with 0. It reads from and prints as a string of digits, the lowest cell first.
+///
+/// ```
+/// use fewbits_binary_patterns::Pattern;
+/// let pattern: Pattern = "11000011".parse()?;
+/// assert_eq!(pattern.to_string(), "00111100");
+/// # Ok::<(), fewbits_binary_patterns::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Pattern {
+    bits: Vec<bool>,
+}
+
+impl Pattern {
+    /// From one bit a cell, the lowest cell first.
+    ///
+    /// # Errors
+    /// If all bits are equal (or there are none).
+    pub fn new(mut bits: Vec<bool>) -> Result<Self, Error> {
+        if bits.iter().all(|&b| b == bits[0]) {
+            return Err(Error::ConstantPattern { cells: bits.len() });
+        }
+        if bits[0] {
+            bits.iter_mut().for_each(|b| *b = !*b);
+        }
+        Ok(Self { bits })
+    }
+
+    /// The bits, the first of them 0.
+    pub fn bits(&self) -> &[bool] {
+        &self.bits
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.bits.len()
+    }
+
+    /// The quantizer that sends this pattern over `grid`; runs of equal bits become one cell.
+    ///
+    /// # Errors
+    /// If the pattern has not as many bits as the grid has cells.
+    pub fn on(&self, grid: &Grid) -> Result<BinaryQuantizer, Error> {
+        if self.cells() != grid.cells() {
+            return Err(Error::PatternLength {
+                pattern: self.cells(),
+                grid: grid.cells(),
+            });
+        }
+        let thresholds = self
+            .bits
+            .windows(2)
+            .zip(grid.breakpoints())
+            .filter(|(pair, _)| pair[0] != pair[1])
+            .map(|(_, &edge)| edge)
+            .collect();
+        BinaryQuantizer::new(thresholds)
+    }
+
+    /// The pattern seen in a mirror, in canonical form.
+    #[must_use]
+    pub fn reflected(&self) -> Self {
+        let flip = self.bits[self.bits.len() - 1];
+        Self {
+            bits: self.bits.iter().rev().map(|&b| b ^ flip).collect(),
+        }
+    }
+
+    /// All `2^(cells-1) - 1` patterns over `cells` cells, in the order of their strings.
+    ///
+    /// # Errors
+    /// If `cells` is not in `2..=20`; there are too many beyond.
+    pub fn all(cells: usize) -> Result<Vec<Self>, Error> {
+        if !(2..=20).contains(&cells) {
+            return Err(ArgumentError::new("cells", cells, "a number of cells in 2..=20").into());
+        }
+        Ok((1u32..1 << (cells - 1))
+            .map(|word| Self {
+                bits: (0..cells).rev().map(|at| word >> at & 1 == 1).collect(),
+            })
+            .collect())
+    }
+}
+
+impl Pattern {
+    /// The pattern over `grid` that makes this quantizer, if all its breakpoints are the grid's (to `1e-9` of its extent).
+    pub fn of(quantizer: &BinaryQuantizer, grid: &Grid) -> Option<Self> {
+        let edges = grid.breakpoints();
+        let slack = 1e-9 * edges.iter().fold(0.0, |m, e| f64::max(m, e.abs()));
+        let places = quantizer
+            .breakpoints()
+            .iter()
+            .map(|b| edges.iter().position(|e| (e - b).abs() <= slack))
+            .collect::<Option<Vec<_>>>()?;
+        let bit = |cell: usize| places.iter().filter(|at| **at < cell).count() % 2 == 1;
+        Self::new((0..grid.cells()).map(bit).collect()).ok()
+    }
+}
+
+impl TryFrom<String> for Pattern {
+    type Error = Error;
+
+    fn try_from(text: String) -> Result<Self, Error> {
+        text.parse()
+    }
+}
+
+impl From<Pattern> for String {
+    fn from(pattern: Pattern) -> Self {
+        pattern.to_string()
+    }
+}
+
+impl fmt::Display for Pattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.bits
+            .iter()
+            .try_for_each(|&b| f.write_str(if b { "1" } else { "0" }))
+    }
+}
+
+impl FromStr for Pattern {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let bits = text
+            .chars()
+            .map(|c| match c {
+                '0' => Ok(false),
+                '1' => Ok(true),
+                other => Err(ArgumentError::new("pattern", format!("{other:?} in {text:?}"), "digits 0 and 1 only")),
+            })
+            .collect::<Result<_, _>>()?;
+        Self::new(bits)
+    }
+}
+
+/// Checks that every two cells differ in the bit of at least one pattern, so that without noise each cell is recognised.
+///
+/// For linear patterns this is full rank. For others linear independence over GF(2) is necessary but does not suffice
+/// (erratum `binary-3`), hence the test of the columns themselves.
+///
+/// # Errors
+/// [`Error::NotSeparating`] names the first two cells that no pattern separates; [`Error::PatternLength`] if lengths differ.
+pub fn check_separation(patterns: &[Pattern]) -> Result<(), Error> {
+    let Some(first) = patterns.first() else {
+        return Err(Error::NotSeparating { first: 0, second: 1 });
+    };
+    if let Some(odd) = patterns.iter().find(|p| p.cells() != first.cells()) {
+        return Err(Error::PatternLength {
+            pattern: odd.cells(),
+            grid: first.cells(),
+        });
+    }
+    let mut columns: Vec<(Vec<bool>, usize)> = (0..first.cells())
+        .map(|cell| (patterns.iter().map(|p| p.bits[cell]).collect(), cell))
+        .collect();
+    columns.sort();
+    match columns.windows(2).find(|w| w[0].0 == w[1].0) {
+        None => Ok(()),
+        Some(w) => Err(Error::NotSeparating {
+            first: w[0].1,
+            second: w[1].1,
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pattern(text: &str) -> Pattern {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn complements_are_one_pattern() {
+        assert_eq!(pattern("1001"), pattern("0110"));
+        assert!(matches!("0000".parse::<Pattern>(), Err(Error::ConstantPattern { cells: 4 })));
+        assert!("".parse::<Pattern>().is_err());
+        assert!("01x0".parse::<Pattern>().is_err());
+    }
+
+    #[test]
+    fn runs_merge_into_thresholds() {
+        let grid = Grid::uniform(1.0, 2).unwrap();
+        assert_eq!(pattern("0110").on(&grid).unwrap().breakpoints(), [-0.5, 0.5]);
+        assert_eq!(pattern("01100110").on(&grid), Err(Error::PatternLength { pattern: 8, grid: 4 }));
+    }
+
+    #[test]
+    fn there_are_127_patterns_over_eight_cells() {
+        let all = Pattern::all(8).unwrap();
+        assert_eq!(all.len(), 127);
+        assert!(all.iter().all(|p| !p.bits()[0] && p.reflected().reflected() == *p));
+        assert!(all.windows(2).all(|w| w[0] < w[1]));
+    }
+
+    #[test]
+    fn independent_patterns_need_not_separate() {
+        // Independent over GF(2), yet cells 5 and 6 carry the same column.
+        let patterns = [pattern("00001111"), pattern("00110000"), pattern("01000000")];
+        assert!(matches!(check_separation(&patterns), Err(Error::NotSeparating { .. })));
+        let natural = [pattern("00001111"), pattern("00110011"), pattern("01010101")];
+        assert_eq!(check_separation(&natural), Ok(()));
+        assert!(check_separation(&[]).is_err());
+    }
+}

@@ -1,0 +1,26 @@
+//! What only reproduces printed comparisons: other schemes that send one bit per sensor, and the thesis's shortcuts around a search. The
+//! recommended designs are in [`search`](crate::search). All errors are exact.
+
+mod adaptive;
+mod luo;
+mod multi_threshold;
+mod strategies;
+
+pub use adaptive::{AdaptiveErrors, AdaptiveRule, adaptive, bounded_mle};
+pub use luo::{Luo, LuoErrors};
+pub use multi_threshold::{MultiThreshold, multi_threshold_bound};
+pub use strategies::{by_information, tile};
+
+use crate::Error;
+use crate::{Bank, BinaryQuantizer, Source};
+use fewbits_numerics::error::at_least_one;
+
+/// `sensors` sensors that all send the sign of their measurement.
+///
+/// # Errors
+/// If there is no sensor or `noise_std` is not positive and finite.
+pub fn fixed_threshold(source: Source, noise_std: f64, sensors: usize) -> Result<Bank, Error> {
+    at_least_one("sensors", sensors)?;
+    let sign = BinaryQuantizer::new(vec![0.0])?;
+    Bank::homogeneous_with_deviation(source, vec![sign; sensors], noise_std)
+}

@@ -1,0 +1,110 @@
+//! What an exhaustive search looks through.
+
+use crate::observation::source::noise_in_range;
+use crate::patterns::count::{full_rank_multisets, multisets};
+use crate::patterns::linear::{check_mask, grid_bits};
+use crate::{Bank, Error, Grid, Mask, PatternSensor, Source, linear_pattern};
+use fewbits_numerics::error::at_least_one;
+use serde::{Deserialize, Serialize};
+
+/// A set of masks, one a sensor, in increasing order, with the error it achieves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MaskSet {
+    /// The masks.
+    pub masks: Vec<Mask>,
+    /// Mean squared error of the posterior mean.
+    #[serde(deserialize_with = "crate::error::stored_size")]
+    pub mse: f64,
+}
+
+/// The search for `N` linear patterns on a grid of `2^B` cells that minimise the posterior mean's error.
+///
+/// ```text
+/// search(last mask, sensors left r, W(outcome, x)):
+///     for each later mask j:                              # all leaves of this prefix are one matrix product
+///         (M0, M1) <- int W(outcome, x) C(r,k) P1j^k P0j^(r-k) (1, x) dx
+///         mse      <- Var X - sum M1^2 / M0
+///     for each later mask j and multiplicity m < r:
+///         search(j, r - m, W x [C(m,k) P1j^k P0j^(m-k)])
+/// ```
+///
+/// A mask that `m` sensors share has `m + 1` outcomes, not `2^m`. On a symmetric grid `x -> -x` flips the bit of masks of odd
+/// weight and keeps the others, so that half of the nodes carry everything: the integral over the other half is that of
+/// the mirrored outcome. The first levels of the tree are shared among the threads of the current rayon pool; the result
+/// does not depend on their number.
+#[derive(Debug, Clone)]
+pub struct LinearSearch {
+    pub(super) source: Source,
+    pub(super) grid: Grid,
+    pub(super) bits: usize,
+    pub(super) noise_std: f64,
+    pub(super) sensors: usize,
+    pub(super) full_rank: bool,
+    pub(super) forced: Vec<usize>,
+}
+
+impl LinearSearch {
+    /// A search for masks of full rank.
+    ///
+    /// # Errors
+    /// If the grid has not `2^B` cells, the noise is not positive and finite, or there is no sensor.
+    pub fn with_deviation(source: Source, grid: Grid, noise_std: f64, sensors: usize) -> Result<Self, Error> {
+        let bits = grid_bits(&grid)?;
+        at_least_one("sensors", sensors)?;
+        Ok(Self {
+            source,
+            bits,
+            noise_std: noise_in_range(noise_std)?,
+            sensors,
+            full_rank: true,
+            forced: vec![0; (1 << bits) - 1],
+            grid,
+        })
+    }
+
+    /// Drops the constraint that the masks separate all cells. In noise it costs up to a third of the error.
+    #[must_use]
+    pub fn any_rank(mut self) -> Self {
+        self.full_rank = false;
+        self
+    }
+
+    /// Requires these masks to be in the set, as often as they are listed. With the Gray basis: strategy 1.
+    ///
+    /// # Errors
+    /// If a mask is out of range or there are more of them than sensors.
+    pub fn with_forced(mut self, masks: &[Mask]) -> Result<Self, Error> {
+        self.forced.fill(0);
+        for &mask in masks {
+            self.forced[check_mask(mask, self.bits)? as usize - 1] += 1;
+        }
+        at_least_one("sensors", (self.sensors + 1).saturating_sub(masks.len()))?;
+        Ok(self)
+    }
+
+    /// Number of sets without regard to forced masks.
+    ///
+    /// # Errors
+    /// If full rank is required of fewer sensors than bits, or the number exceeds 128 bits.
+    pub fn sets(&self) -> Result<u128, Error> {
+        if self.full_rank {
+            full_rank_multisets(self.bits, self.sensors)
+        } else {
+            multisets((1 << self.bits) - 1, self.sensors as u128)
+        }
+    }
+
+    /// The bank that a set of masks makes with this source, grid and noise.
+    ///
+    /// # Errors
+    /// If a mask is out of range or there is none.
+    pub fn bank(&self, masks: &[Mask]) -> Result<Bank, Error> {
+        let sensors = masks
+            .iter()
+            .map(|&mask| {
+                PatternSensor::with_deviation(linear_pattern(mask, self.bits)?.on(&self.grid)?, self.noise_std)
+            })
+            .collect::<Result<_, _>>()?;
+        Bank::new(self.source, sensors)
+    }
+}

@@ -1,0 +1,110 @@
+//! Frames on a serial line: each in consistent-overhead byte stuffing (Cheshire and Baker 1999), ended by a zero byte, so that a
+//! receiver that begins in the middle, or after noise, finds the next frame.
+
+use crate::error::Error;
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, IsTerminal, Read, Write};
+use std::process::Command;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Duration;
+
+/// Longest frame that is put together; what is longer is noise.
+const MAX_FRAME: usize = 1 << 16;
+/// Chunks that are read ahead.
+const CHUNKS: usize = 64;
+/// Pause before a line without bytes is read again.
+const PAUSE: Duration = Duration::from_millis(20);
+
+fn refused(device: &str, action: &'static str) -> impl Fn(std::io::Error) -> Error + use<> {
+    Error::file(device, action)
+}
+
+/// Opens the device; a terminal is set to raw bytes at `baud`. Reads of a terminal wait a tenth of a second.
+pub(crate) fn open(device: &str, baud: u32) -> Result<File, Error> {
+    let line = OpenOptions::new().read(true).write(true).open(device);
+    let line = line.map_err(refused(device, "open"))?;
+    // Anything else (a named pipe) has no speed.
+    if line.is_terminal() {
+        let settings = ["raw", "-echo", "clocal", "min", "0", "time", "1"];
+        let set = Command::new("stty")
+            .args(["-F", device, &baud.to_string()])
+            .args(settings)
+            .output()
+            .map_err(refused(device, "run stty for"))?;
+        if !set.status.success() {
+            let problem = String::from_utf8_lossy(&set.stderr).trim().to_owned();
+            return Err(refused(device, "set up")(std::io::Error::other(problem)));
+        }
+    }
+    Ok(line)
+}
+
+/// Writes one frame.
+pub(crate) fn write(line: &mut File, frame: &[u8]) -> std::io::Result<()> {
+    let mut bytes = cobs::encode_vec(frame);
+    bytes.push(0);
+    line.write_all(&bytes)
+}
+
+/// Frames as they come.
+pub(crate) struct Frames {
+    chunks: Receiver<std::io::Result<Vec<u8>>>,
+    timeout: Option<Duration>,
+    /// Bytes that are no whole frame yet.
+    collected: Vec<u8>,
+}
+
+impl Frames {
+    pub(crate) fn new(mut line: File, timeout: Option<Duration>) -> Self {
+        let (sender, chunks) = sync_channel(CHUNKS);
+        // Reading blocks, and the timeout does not wait for it. The thread ends with the process.
+        std::thread::spawn(move || {
+            let mut buffer = [0; 4096];
+            loop {
+                let chunk = match line.read(&mut buffer) {
+                    Ok(0) => {
+                        std::thread::sleep(PAUSE);
+                        continue;
+                    }
+                    Ok(count) => Ok(buffer[..count].to_vec()),
+                    Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                    Err(error) => Err(error),
+                };
+                let is_last = chunk.is_err();
+                if sender.send(chunk).is_err() || is_last {
+                    return;
+                }
+            }
+        });
+        Self {
+            chunks,
+            timeout,
+            collected: Vec::new(),
+        }
+    }
+
+    /// The next frame; `None` if nothing came for the timeout.
+    pub(crate) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
+        loop {
+            if let Some(end) = self.collected.iter().position(|byte| *byte == 0) {
+                let bytes: Vec<u8> = self.collected.drain(..=end).collect();
+                // Noise is no frame.
+                match cobs::decode_vec(&bytes[..end]) {
+                    Ok(frame) if !frame.is_empty() => return Ok(Some(frame)),
+                    _ => continue,
+                }
+            }
+            if self.collected.len() > MAX_FRAME {
+                self.collected.clear();
+            }
+            let chunk = match self.timeout {
+                Some(timeout) => self.chunks.recv_timeout(timeout).ok(),
+                None => self.chunks.recv().ok(),
+            };
+            match chunk {
+                Some(chunk) => self.collected.extend(chunk?),
+                None => return Ok(None),
+            }
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! A fusion centre over sensors that all measure one level.
+
+use super::rows::Instant;
+use super::sensors::{Sends, threshold_bits};
+use crate::arguments::Model;
+use fewbits_core::{Error as CoreError, Gaussian, Link, Observation, SensorNode};
+use fewbits_filters::centre::{Event, Failures, FalseAlarms, FusionCentre, NoiseLearning, Slot};
+use fewbits_filters::{Error as FilterError, MomentFilter};
+use fewbits_models::ContinuousLinear;
+use nalgebra::{SMatrix, SVector, Vector1};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+/// Why a row was refused, or no centre could be made.
+pub(super) type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// Failures of a sensor per row.
+const FAILURE: f64 = 1e-4;
+/// False alarms per observation and per row: a table of many sensors and rows should have none. Offsets that `--align` finds from some
+/// rows are a little off, which a more sensitive test calls a contradiction.
+const ALARMS: FalseAlarms = FalseAlarms {
+    sensor: 1e-6,
+    centre: 1e-5,
+};
+/// The least sensitive tests.
+const NO_ALARMS: FalseAlarms = FalseAlarms {
+    sensor: 1e-9,
+    centre: 1e-9,
+};
+/// Deviation of a slope that is not known, in multiples of the change per time.
+const STEEPEST: f64 = 10.0;
+
+/// What is supposed of the level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct World {
+    pub(super) model: Model,
+    /// Deviation of the level from its forecast, and after how many seconds.
+    pub(super) change: f64,
+    pub(super) within: f64,
+    /// Mean and deviation before the first row.
+    pub(super) prior: (f64, f64),
+    /// Seconds between rows.
+    pub(super) interval: f64,
+}
+
+/// What is supposed of a sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Seat {
+    pub(super) sends: Sends,
+    /// Deviation of its noise.
+    pub(super) noise: f64,
+    pub(super) threshold: Option<f64>,
+    /// Share of reports that do not arrive.
+    pub(super) loss: f64,
+    /// What is subtracted from its measurements.
+    pub(super) offset: f64,
+}
+
+/// Estimates after an instant.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Step {
+    /// Level, slope, curvature: as many as the model has, with deviations.
+    pub(super) estimate: Vec<(f64, f64)>,
+    /// `ln p` of what came.
+    pub(super) log_likelihood: f64,
+    /// Bits that were sent, reports, and events by sensor.
+    pub(super) bits: usize,
+    pub(super) reports: usize,
+    pub(super) events: Vec<(&'static str, Option<usize>)>,
+    /// Sensors that are used, and factor of the process noise.
+    pub(super) used: usize,
+    pub(super) noise_scale: f64,
+}
+
+/// A centre of any number of coordinates.
+pub(super) trait Estimator {
+    /// Seats the next sensor.
+    fn join(&mut self, seat: Seat) -> Result<(), Failure>;
+    /// How many are seated.
+    fn seated(&self) -> usize;
+    /// Takes in one instant.
+    fn step(&mut self, instant: &Instant) -> Result<Step, Failure>;
+    /// What is known of a sensor: probability to work, whether its reports are used.
+    fn health(&self, sensor: usize) -> (f64, bool);
+}
+
+/// What the centre is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Use {
+    /// Cells are measurements, which sensors of this program quantize.
+    Measurements,
+    /// Cells are reports.
+    Reports,
+    /// Measurements in full, and nothing is learnt on the way: its likelihoods are compared.
+    Comparison,
+}
+
+/// A centre for the model.
+pub(super) fn centre(world: &World, purpose: Use) -> Result<Box<dyn Estimator>, Failure> {
+    let (c, t) = (world.change * world.change, world.within);
+    Ok(match world.model {
+        Model::Velocity => {
+            let model = ContinuousLinear::nearly_constant_velocity(3.0 * c / t.powi(3))?;
+            Box::new(Centre::<2>::new(model, world, purpose)?)
+        }
+        Model::Acceleration => {
+            let model = ContinuousLinear::nearly_constant_acceleration(20.0 * c / t.powi(5))?;
+            Box::new(Centre::<3>::new(model, world, purpose)?)
+        }
+        Model::Returning => {
+            let variance = world.prior.1 * world.prior.1;
+            // The deviation after `within` seconds, `v (1 - exp(-2 t / tau))`, solved for `tau`.
+            let rate = -0.5 * (-c / variance).ln_1p() / t;
+            let model = ContinuousLinear::ornstein_uhlenbeck(world.prior.0, 1.0 / rate, variance)?;
+            Box::new(Centre::<1>::new(model, world, purpose)?)
+        }
+        // Ranges have a tracker of their own.
+        Model::Walk | Model::Ranges => {
+            Box::new(Centre::<1>::new(ContinuousLinear::random_walk(c / t)?, world, purpose)?)
+        }
+    })
+}
+
+struct Member {
+    seat: Seat,
+    node: Box<dyn SensorNode<1>>,
+}
+
+struct Centre<const D: usize> {
+    centre: FusionCentre<D, MomentFilter>,
+    members: Vec<Member>,
+    purpose: Use,
+    rng: Pcg64Mcg,
+}
+
+impl<const D: usize> Centre<D> {
+    fn new(model: ContinuousLinear<D>, world: &World, purpose: Use) -> Result<Self, Failure> {
+        let mut rng = Pcg64Mcg::seed_from_u64(0);
+        let mut mean = SVector::<f64, D>::zeros();
+        mean[0] = world.prior.0;
+        let per_time = STEEPEST * world.change;
+        let deviations = SVector::<f64, D>::from_fn(|i, _| match i {
+            0 => world.prior.1,
+            i => per_time / world.within.powi(i as i32),
+        });
+        let covariance = SMatrix::from_diagonal(&deviations.component_mul(&deviations));
+        let prior = Gaussian::new(mean, covariance)?;
+        let failures = Failures {
+            rate: FAILURE / world.interval,
+            ..Failures::default()
+        };
+        let mut centre = FusionCentre::new(&mut rng, model, MomentFilter, &prior)?.with_failures(failures)?;
+        centre = if purpose == Use::Comparison {
+            centre.with_false_alarms(NO_ALARMS)?
+        } else {
+            centre
+                .with_false_alarms(ALARMS)?
+                .learning_noise(NoiseLearning::DEFAULT)?
+        };
+        Ok(Self {
+            centre,
+            members: Vec::new(),
+            purpose,
+            rng,
+        })
+    }
+
+    fn slot(&mut self, sensor: usize, cell: Option<f64>) -> Result<Slot, Failure> {
+        let number = sensor as u32;
+        let member = &mut self.members[sensor];
+        let feedback = match member.seat.threshold {
+            Some(threshold) => threshold_bits(threshold - member.seat.offset)?,
+            None => self.centre.feedback(number)?,
+        };
+        // A measurement that is no number is none.
+        let report = match cell.filter(|cell| cell.is_finite()) {
+            None => None,
+            Some(cell) if self.purpose == Use::Reports && member.seat.sends != Sends::Value => {
+                Some(member.seat.sends.bits(cell)?)
+            }
+            Some(cell) => {
+                let measurement = Vector1::new(cell - member.seat.offset);
+                member.node.report(&mut self.rng, &measurement, &feedback)?
+            }
+        };
+        Ok(Slot::new(number, feedback, Observation::from(report)))
+    }
+}
+
+impl<const D: usize> Estimator for Centre<D> {
+    fn join(&mut self, seat: Seat) -> Result<(), Failure> {
+        let sends = if self.purpose == Use::Comparison {
+            Sends::Value
+        } else {
+            seat.sends
+        };
+        let seat = Seat { sends, ..seat };
+        let remote = sends.remote::<D>(seat.noise, Link::lossy(seat.loss)?)?;
+        self.centre.join(self.members.len() as u32, remote)?;
+        self.members.push(Member {
+            node: sends.node(seat.noise)?,
+            seat,
+        });
+        Ok(())
+    }
+
+    fn seated(&self) -> usize {
+        self.members.len()
+    }
+
+    fn step(&mut self, instant: &Instant) -> Result<Step, Failure> {
+        self.centre.advance(&mut self.rng, instant.seconds)?;
+        let slots = instant.reports.iter().map(|(sensor, cell)| self.slot(*sensor, *cell));
+        let slots: Vec<Slot> = slots.collect::<Result<_, _>>()?;
+        let received = slots.iter().filter_map(|slot| slot.observation.received());
+        let (bits, reports) = received.fold((0, 0), |(bits, reports), report| (bits + report.bits(), reports + 1));
+        let (events, log_likelihood) = match self.centre.receive(&mut self.rng, &slots) {
+            Ok(received) => {
+                let events = received.events.into_iter().map(|event| match event {
+                    Event::Dead(sensor) => ("dead", Some(sensor as usize)),
+                    Event::Alive(sensor) => ("alive", Some(sensor as usize)),
+                    Event::Excluded(sensor) => ("excluded", Some(sensor as usize)),
+                    Event::Readmitted(sensor) => ("readmitted", Some(sensor as usize)),
+                    Event::Lost => ("lost", None),
+                    Event::NoiseOverstated => ("noise overstated", None),
+                    _ => ("reacquired", None),
+                });
+                (events.collect(), received.info.log_likelihood)
+            }
+            // Nothing that is known explains the reports: they are dropped.
+            Err(FilterError::Core(CoreError::Impossible)) => (vec![("impossible", None)], f64::NEG_INFINITY),
+            Err(error) => return Err(error.into()),
+        };
+        let belief = self.centre.estimate();
+        Ok(Step {
+            estimate: (0..D)
+                .map(|i| (belief.mean()[i], belief.covariance()[(i, i)].sqrt()))
+                .collect(),
+            log_likelihood,
+            bits,
+            reports,
+            events,
+            used: (0..self.members.len()).filter(|sensor| self.health(*sensor).1).count(),
+            noise_scale: self.centre.noise_scale(),
+        })
+    }
+
+    fn health(&self, sensor: usize) -> (f64, bool) {
+        let number = sensor as u32;
+        let dead = self.centre.is_named_dead(number).unwrap_or(true);
+        let excluded = self.centre.is_excluded(number).unwrap_or(true);
+        (self.centre.working(number).unwrap_or(0.0), !dead && !excluded)
+    }
+}

@@ -1,0 +1,319 @@
+//! A level that sensors measure: its estimates with bands, row by row.
+
+use super::centre::{Estimator, Failure, Step, Use, centre};
+use super::report::{BAND, first_cell, first_name, summarise};
+use super::rows::{Instant, Instants};
+use super::settings::Settings;
+use crate::Ending;
+use crate::arguments::{Model, TrackOptions};
+use crate::error::Error;
+use crate::output::{Cell, Shape, Sheet};
+use crate::plot::{Layer, Picture, Thinned};
+use serde::Serialize;
+
+/// What was found over the whole table.
+#[derive(Serialize)]
+struct Summary {
+    rows: u64,
+    reports: usize,
+    bits: usize,
+    bits_per_report: f64,
+    /// Deviation of a measurement's noise that is supposed of sensors of which nothing was said.
+    noise: f64,
+    /// Deviation of the level from its forecast and in how many seconds: what was supposed, and factor of its square at the end.
+    change: f64,
+    within: f64,
+    noise_scale: f64,
+    /// Root mean square difference from the estimates of the same values in full.
+    difference_from_full_values: Option<f64>,
+    sensors: Vec<SensorSummary>,
+    events: Vec<EventSummary>,
+}
+
+#[derive(Serialize)]
+struct SensorSummary {
+    name: String,
+    reports: usize,
+    gaps: usize,
+    working: f64,
+    used: bool,
+}
+
+#[derive(Serialize)]
+struct EventSummary {
+    time: String,
+    event: &'static str,
+    sensor: Option<String>,
+}
+
+/// Events that are kept for the summary.
+const MAX_EVENTS: usize = 1000;
+/// Events that are printed.
+const PRINTED_EVENTS: usize = 12;
+
+struct Picked {
+    seconds: f64,
+    estimate: (f64, f64),
+    full: Option<f64>,
+}
+
+/// Both centres, and what is to be told of them.
+struct Run {
+    settings: Settings,
+    file: String,
+    centre: Box<dyn Estimator>,
+    /// The same sensors without quantization.
+    full: Option<Box<dyn Estimator>>,
+    squares: f64,
+    summary: Summary,
+    path: Thinned<Picked>,
+    measured: Thinned<(f64, f64)>,
+}
+
+impl Run {
+    fn new(options: &TrackOptions, settings: Settings, instants: &Instants) -> Result<Self, Error> {
+        let refused = |source: Failure| Error::Refused {
+            what: "the model is refused",
+            source,
+        };
+        let purpose = if options.reports {
+            Use::Reports
+        } else {
+            Use::Measurements
+        };
+        let is_quantized = !options.reports && settings.has_bits(&instants.names);
+        let full = is_quantized
+            .then(|| centre(&settings.world, Use::Comparison))
+            .transpose();
+        Ok(Self {
+            centre: centre(&settings.world, purpose).map_err(refused)?,
+            full: full.map_err(refused)?,
+            file: instants.file().to_owned(),
+            squares: 0.0,
+            summary: Summary {
+                rows: 0,
+                reports: 0,
+                bits: 0,
+                bits_per_report: 0.0,
+                noise: settings.noise,
+                change: settings.world.change,
+                within: settings.world.within,
+                noise_scale: 1.0,
+                difference_from_full_values: None,
+                sensors: Vec::new(),
+                events: Vec::new(),
+            },
+            settings,
+            path: Thinned::new(),
+            measured: Thinned::new(),
+        })
+    }
+
+    fn step(&mut self, instant: &Instant, names: &[String]) -> Result<Step, Error> {
+        let refused = |source: Failure| Error::Row {
+            file: self.file.clone(),
+            row: instant.row,
+            source,
+        };
+        // Sensors of a table of reports are new when they are first named.
+        for (sensor, name) in names.iter().enumerate().skip(self.centre.seated()) {
+            let seat = self.settings.seat(sensor, name);
+            self.centre.join(seat.clone()).map_err(refused)?;
+            if let Some(full) = &mut self.full {
+                full.join(seat).map_err(refused)?;
+            }
+            self.summary.sensors.push(SensorSummary {
+                name: name.clone(),
+                reports: 0,
+                gaps: 0,
+                working: 1.0,
+                used: true,
+            });
+        }
+        let step = self.centre.step(instant).map_err(refused)?;
+        let full = self
+            .full
+            .as_mut()
+            .map(|full| full.step(instant))
+            .transpose()
+            .map_err(refused)?;
+        let summary = &mut self.summary;
+        summary.rows += 1;
+        summary.reports += step.reports;
+        summary.bits += step.bits;
+        summary.noise_scale = step.noise_scale;
+        for (sensor, cell) in &instant.reports {
+            match cell {
+                Some(_) => summary.sensors[*sensor].reports += 1,
+                None => summary.sensors[*sensor].gaps += 1,
+            }
+        }
+        for (event, sensor) in &step.events {
+            if summary.events.len() < MAX_EVENTS {
+                summary.events.push(EventSummary {
+                    time: instant.time.clone(),
+                    event,
+                    sensor: sensor.map(|sensor| names[sensor].clone()),
+                });
+            }
+        }
+        let full = full.map(|full| full.estimate[0].0);
+        self.squares += full.map_or(0.0, |full| (full - step.estimate[0].0).powi(2));
+        self.path.push(Picked {
+            seconds: instant.seconds,
+            estimate: step.estimate[0],
+            full,
+        });
+        Ok(step)
+    }
+
+    fn finish(mut self, options: &TrackOptions) -> Result<(Summary, Picture), Error> {
+        let rows = self.summary.rows.max(1) as f64;
+        self.summary.bits_per_report = self.summary.bits as f64 / (self.summary.reports as f64).max(1.0);
+        self.summary.difference_from_full_values = self.full.as_ref().map(|_| (self.squares / rows).sqrt());
+        for (number, sensor) in self.summary.sensors.iter_mut().enumerate() {
+            (sensor.working, sensor.used) = self.centre.health(number);
+        }
+        let points = self.path.points();
+        let edge = |sign: f64| {
+            let at = |picked: &Picked| (picked.seconds, picked.estimate.0 + sign * BAND * picked.estimate.1);
+            points.iter().map(at).collect::<Vec<_>>()
+        };
+        let mut layers = vec![
+            Layer::Band {
+                lower: edge(-1.0),
+                upper: edge(1.0),
+                colour: 0,
+            },
+            Layer::Dots {
+                points: self.measured.points().to_vec(),
+                colour: 6,
+                name: if options.reports {
+                    String::new()
+                } else {
+                    "measurements".to_owned()
+                },
+            },
+        ];
+        if self.full.is_some() {
+            layers.push(Layer::Line {
+                points: points.iter().filter_map(|p| Some((p.seconds, p.full?))).collect(),
+                colour: 1,
+                name: "estimate from values in full".to_owned(),
+            });
+        }
+        layers.push(Layer::Line {
+            points: points.iter().map(|p| (p.seconds, p.estimate.0)).collect(),
+            colour: 0,
+            name: "estimate, band of 95 %".to_owned(),
+        });
+        let picture = Picture {
+            title: format!(
+                "{}: {} rows, {:.2} bits per report",
+                self.file, self.summary.rows, self.summary.bits_per_report
+            ),
+            x: "seconds since the first row".to_owned(),
+            y: "level".to_owned(),
+            is_log: false,
+            is_map: false,
+            layers,
+        };
+        Ok((self.summary, picture))
+    }
+}
+
+fn text(step: &Step, names: &[String]) -> String {
+    let words: Vec<String> = step
+        .events
+        .iter()
+        .map(|(event, sensor)| match sensor {
+            Some(sensor) => format!("{} {event}", names[*sensor]),
+            None => (*event).to_owned(),
+        })
+        .collect();
+    words.join("; ")
+}
+
+/// Runs the task.
+pub(super) fn run(options: &TrackOptions, mut instants: Instants) -> Result<Ending, Error> {
+    let settings = Settings::find(options, &mut instants)?;
+    let parts: &[&str] = match options.model {
+        Model::Velocity => &["level", "slope"],
+        Model::Acceleration => &["level", "slope", "curvature"],
+        _ => &["level"],
+    };
+    let columns = parts
+        .iter()
+        .flat_map(|part| [(*part).to_owned(), format!("{part}_low"), format!("{part}_high")]);
+    let last = ["reports", "bits", "sensors_used", "noise_scale", "events"].map(str::to_owned);
+    let names = std::iter::once(first_name(&instants).to_owned())
+        .chain(columns)
+        .chain(last);
+    let mut run = Run::new(options, settings, &instants)?;
+    let mut sheet = Sheet::new(options.output.as_deref(), Shape::of(options.json), names.collect())?;
+    while let Some(instant) = instants.next()? {
+        let step = run.step(&instant, &instants.names)?;
+        if !options.reports {
+            let values = instant
+                .reports
+                .iter()
+                .filter_map(|(_, cell)| *cell)
+                .filter(|cell| cell.is_finite());
+            values.for_each(|value| run.measured.push((instant.seconds, value)));
+        }
+        let estimates = step.estimate.iter().flat_map(|(mean, deviation)| {
+            [*mean, mean - BAND * deviation, mean + BAND * deviation].map(|number| Cell::Number(Some(number)))
+        });
+        let last = [
+            Cell::Whole(step.reports as i64),
+            Cell::Whole(step.bits as i64),
+            Cell::Whole(step.used as i64),
+            Cell::Number(Some(step.noise_scale)),
+            Cell::Text(text(&step, &instants.names)),
+        ];
+        let first = first_cell(&instants, instant.time);
+        sheet.write(std::iter::once(first).chain(estimates).chain(last))?;
+    }
+    sheet.flush()?;
+    let (summary, picture) = run.finish(options)?;
+    if let Some(path) = &options.plot {
+        picture.save(path)?;
+    }
+    summarise(&summary, &lines(&summary), options.json)?;
+    Ok(Ending::Good)
+}
+
+fn lines(summary: &Summary) -> Vec<String> {
+    let mut lines = vec![
+        format!(
+            "{} rows, {} reports of {:.2} bits on average",
+            summary.rows, summary.reports, summary.bits_per_report
+        ),
+        format!(
+            "supposed: noise {:.4}, change {:.4} in {:.4} s; learnt: {:.3} times that change",
+            summary.noise,
+            summary.change,
+            summary.within,
+            summary.noise_scale.sqrt()
+        ),
+    ];
+    if let Some(difference) = summary.difference_from_full_values {
+        lines.push(format!("estimates differ by {difference:.4} (root mean square) from those of values in full"));
+    }
+    for sensor in summary.sensors.iter().filter(|sensor| !sensor.used) {
+        let why = if sensor.working < 0.5 {
+            "it is silent"
+        } else {
+            "it contradicts the others (constant offsets: --align ROWS)"
+        };
+        lines.push(format!("{} is not used any more: {why}", sensor.name));
+    }
+    for event in summary.events.iter().take(PRINTED_EVENTS) {
+        let sensor = event.sensor.as_deref().unwrap_or("all sensors");
+        lines.push(format!("{}: {sensor}: {}", event.time, event.event));
+    }
+    if summary.events.len() > PRINTED_EVENTS {
+        lines.push(format!("and {} more events", summary.events.len() - PRINTED_EVENTS));
+    }
+    lines
+}

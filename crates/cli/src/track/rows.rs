@@ -1,0 +1,193 @@
+//! Rows of a table as instants: what each sensor reported at one time.
+
+use crate::arguments::{TableOptions, TrackOptions};
+use crate::clock;
+use crate::error::Error;
+use crate::input::Table;
+use fewbits_record::TimeBase;
+use std::collections::VecDeque;
+
+/// Times above these are no seconds since 1970 but parts of a second: how many make one.
+const PARTS_OF_A_SECOND: [(f64, f64); 3] = [(1e17, 1e9), (1e14, 1e6), (4e9, 1e3)];
+
+/// What came at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Instant {
+    /// Seconds since the first row.
+    pub(super) seconds: f64,
+    /// The time as the table writes it.
+    pub(super) time: String,
+    /// The first row of this time.
+    pub(super) row: u64,
+    /// Numbers of sensors, and what they reported; `None` if the cell is empty.
+    pub(super) reports: Vec<(usize, Option<f64>)>,
+}
+
+/// A table as instants.
+pub(super) struct Instants {
+    table: Table,
+    base: TimeBase,
+    is_long: bool,
+    /// Seconds of a tick.
+    tick: f64,
+    first: Option<i64>,
+    last: f64,
+    next_number: i64,
+    /// Names of the sensors so far.
+    pub(super) names: Vec<String>,
+    /// Rows that were read ahead.
+    ahead: VecDeque<Instant>,
+    /// The row behind an instant of several rows.
+    pending: Option<Instant>,
+}
+
+impl Instants {
+    pub(super) fn open(options: &TrackOptions) -> Result<Self, Error> {
+        let table_options = TableOptions {
+            // Only the time between rows counts, so that decimals beyond a nanosecond may go.
+            time: options.table.time.clone().or(Some("±2ns".to_owned())),
+            ..options.table.clone()
+        };
+        let mut table = Table::open(&TableOptions {
+            time: options.table.time.clone(),
+            ..table_options.clone()
+        })?;
+        table.find_time();
+        if let Some(name) = &options.by {
+            table = table.with_labels(name)?;
+            if table.names.len() != 1 {
+                return Err(Error::Mismatch {
+                    file: table.file().to_owned(),
+                    problem: format!(
+                        "columns {}: one column of values is expected beside time and --by, name it with --columns",
+                        table.names.join(", ")
+                    ),
+                });
+            }
+        }
+        if table.names.is_empty() {
+            return Err(Error::Empty {
+                file: table.file().to_owned(),
+                what: "columns of values",
+            });
+        }
+        let base = table.time_base(&table_options, None)?;
+        let tick = match base {
+            TimeBase::Clock { decimals, .. } => 0.1_f64.powi(i32::from(decimals)),
+            _ => 1.0,
+        };
+        Ok(Self {
+            names: if options.by.is_some() {
+                Vec::new()
+            } else {
+                table.names.clone()
+            },
+            is_long: options.by.is_some(),
+            table,
+            base,
+            tick,
+            first: None,
+            last: 0.0,
+            next_number: 0,
+            ahead: VecDeque::new(),
+            pending: None,
+        })
+    }
+
+    /// What messages call the table.
+    pub(super) fn file(&self) -> &str {
+        self.table.file()
+    }
+
+    /// Whether rows have times.
+    pub(super) fn has_time(&self) -> bool {
+        self.base != TimeBase::Numbered
+    }
+
+    /// Reads up to so many instants without taking them.
+    pub(super) fn peek(&mut self, count: usize) -> Result<&VecDeque<Instant>, Error> {
+        while self.ahead.len() < count {
+            match self.read()? {
+                Some(instant) => self.ahead.push_back(instant),
+                None => break,
+            }
+        }
+        Ok(&self.ahead)
+    }
+
+    /// The next instant.
+    pub(super) fn next(&mut self) -> Result<Option<Instant>, Error> {
+        match self.ahead.pop_front() {
+            Some(instant) => Ok(Some(instant)),
+            None => self.read(),
+        }
+    }
+
+    fn read(&mut self) -> Result<Option<Instant>, Error> {
+        let Some(mut instant) = self
+            .pending
+            .take()
+            .map_or_else(|| self.read_row(), |row| Ok(Some(row)))?
+        else {
+            return Ok(None);
+        };
+        // Rows of one time are one instant, if each row is a report.
+        while self.is_long {
+            match self.read_row()? {
+                Some(row) if row.seconds == instant.seconds => instant.reports.extend(row.reports),
+                row => {
+                    self.pending = row;
+                    break;
+                }
+            }
+        }
+        Ok(Some(instant))
+    }
+
+    fn read_row(&mut self) -> Result<Option<Instant>, Error> {
+        let Some((tick, cells)) = self.table.next(self.base)? else {
+            return Ok(None);
+        };
+        let tick = tick.unwrap_or(self.next_number);
+        self.next_number = tick.wrapping_add(1);
+        if self.first.is_none() && self.has_time() {
+            let first = tick as f64 * self.tick;
+            if let Some((_, parts)) = PARTS_OF_A_SECOND.iter().find(|(above, _)| first.abs() > *above) {
+                eprintln!("{}: times are taken as {parts:e} parts of a second", self.file());
+                self.tick /= parts;
+            }
+        }
+        let first = *self.first.get_or_insert(tick);
+        let seconds = (i128::from(tick) - i128::from(first)) as f64 * self.tick;
+        let time = clock::shown(tick, self.base);
+        if seconds < self.last {
+            return Err(Error::Mismatch {
+                file: self.file().to_owned(),
+                problem: format!(
+                    "row {}: time {time} is before that of the row above: sort the rows by time",
+                    self.table.row()
+                ),
+            });
+        }
+        self.last = seconds;
+        let reports = if self.is_long {
+            let label = self.table.label();
+            let sensor = match self.names.iter().position(|name| name == label) {
+                Some(sensor) => sensor,
+                None => {
+                    self.names.push(label.to_owned());
+                    self.names.len() - 1
+                }
+            };
+            vec![(sensor, cells[0])]
+        } else {
+            cells.into_iter().enumerate().collect()
+        };
+        Ok(Some(Instant {
+            seconds,
+            time,
+            row: self.table.row(),
+            reports,
+        }))
+    }
+}

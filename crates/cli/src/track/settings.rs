@@ -1,0 +1,302 @@
+//! What options and first rows say of the level and its sensors.
+
+use super::centre::{Seat, Use, World, centre};
+use super::rows::{Instant, Instants};
+use super::sensors::Sends;
+use crate::arguments::{Model, TrackOptions};
+use crate::bounds::PerColumn;
+use crate::error::Error;
+use crate::numbers::{above_zero, mean_and_deviation, number};
+
+/// Rows that are looked at before the first estimate.
+const FIRST_ROWS: usize = 200;
+/// Steps of the search for change and noise, as logarithms, and its reach.
+const STEPS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
+const REACH: f64 = 9.0;
+/// Share of lost reports that is supposed at least and at most.
+const LOSS: (f64, f64) = (0.02, 0.5);
+/// Deviation of rounding to a step, in steps.
+const ROUNDING: f64 = 0.29;
+/// Measurements and process in the first guess: the change is this share of the noise.
+const FIRST_CHANGE: f64 = 0.3;
+/// Median of the size of a standard normal number.
+const NORMAL_MEDIAN: f64 = 0.6745;
+
+const DO_NOT_VARY: &str = "the first rows do not vary, so it cannot be found from them";
+const NO_VALUES: &str = "it cannot be found from reports of few bits";
+
+/// All that a centre over a level needs.
+pub(super) struct Settings {
+    pub(super) world: World,
+    noises: PerColumn<Option<f64>>,
+    pub(super) noise: f64,
+    sends: PerColumn<Sends>,
+    thresholds: PerColumn<Option<f64>>,
+    /// Per sensor, as far as the first rows go.
+    losses: Vec<f64>,
+    offsets: Vec<f64>,
+}
+
+/// `0.5/1h`; rows that are numbered are a second apart.
+fn change(text: &str) -> Result<(f64, f64), Error> {
+    const EXPECTED: &str = "a change above 0 and the time in which it happens, as `0.5/1h`, or `0.5` in one row";
+    let Some((size, time)) = text.split_once('/') else {
+        return Ok((above_zero("--change", text, EXPECTED)?, 1.0));
+    };
+    let time = humantime::parse_duration(time).map_err(|_| Error::option("--change", text, EXPECTED))?;
+    let seconds = time.as_secs_f64();
+    if seconds > 0.0 {
+        Ok((above_zero("--change", size, EXPECTED)?, seconds))
+    } else {
+        Err(Error::option("--change", text, EXPECTED))
+    }
+}
+
+/// The middle one; 0 if there is none.
+fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Finite measurements of one sensor.
+fn values_of(first: &[Instant], sensor: usize) -> Vec<f64> {
+    let all = first.iter().flat_map(|instant| &instant.reports);
+    let own = all.filter(|(other, _)| *other == sensor);
+    own.filter_map(|(_, cell)| cell.filter(|cell| cell.is_finite()))
+        .collect()
+}
+
+/// Mean difference of each sensor's values from the middle of the row.
+fn offsets(first: &[Instant], sensors: usize) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0_u32); sensors];
+    for instant in first {
+        let cells = || instant.reports.iter().filter_map(|(n, cell)| Some((*n, (*cell)?)));
+        if cells().count() < 2 {
+            continue;
+        }
+        let middle = median(cells().map(|(_, cell)| cell).collect());
+        cells().for_each(|(n, cell)| sums[n] = (sums[n].0 + cell - middle, sums[n].1 + 1));
+    }
+    sums.into_iter()
+        .map(|(sum, count)| sum / f64::from(count.max(1)))
+        .collect()
+}
+
+impl Settings {
+    pub(super) fn find(options: &TrackOptions, instants: &mut Instants) -> Result<Self, Error> {
+        const NOISE: &str = "a standard deviation above 0";
+        const THRESHOLD: &str = "a number";
+        let noises = PerColumn::parse(&options.noise, None, |text| above_zero("--noise", text, NOISE).map(Some))?;
+        let thresholds =
+            PerColumn::parse(&options.threshold, None, |text| number("--threshold", text, THRESHOLD).map(Some))?;
+        let sends = PerColumn::parse(&options.send, Sends::Value, Sends::parse)?;
+        if options.by.is_none() {
+            noises.check(&instants.names, instants.file())?;
+            thresholds.check(&instants.names, instants.file())?;
+            sends.check(&instants.names, instants.file())?;
+        }
+        let asked_change = options.change.as_deref().map(change).transpose()?;
+        let asked_prior = options
+            .prior
+            .as_deref()
+            .map(|text| mean_and_deviation("--prior", text))
+            .transpose()?;
+        let asked_noise = noises.of("*").filter(|_| !options.noise.is_empty());
+        // Rows that are not needed are not waited for: estimates follow a pipe.
+        let known = asked_change.is_some() && asked_prior.is_some() && asked_noise.is_some() && options.align.is_none();
+        let rows = if known {
+            1
+        } else {
+            FIRST_ROWS.max(options.align.unwrap_or(0))
+        };
+        let first: Vec<Instant> = instants.peek(rows)?.iter().cloned().collect();
+        if first.is_empty() {
+            return Err(Error::Empty {
+                file: instants.file().to_owned(),
+                what: "rows",
+            });
+        }
+        let sensors = instants.names.len();
+        let gaps = (0..sensors).map(|sensor| {
+            let rows = first.iter().flat_map(|instant| &instant.reports);
+            let (all, empty) = rows
+                .filter(|(other, _)| *other == sensor)
+                .fold((0.0, 0.0), |(all, empty), (_, cell)| (all + 1.0, empty + f64::from(u8::from(cell.is_none()))));
+            (empty / f64::max(all, 1.0)).clamp(LOSS.0, LOSS.1)
+        });
+        let mut settings = Self {
+            world: World {
+                model: options.model,
+                change: 0.0,
+                within: 1.0,
+                prior: (0.0, 0.0),
+                interval: median(first.windows(2).map(|pair| pair[1].seconds - pair[0].seconds).collect()),
+            },
+            noises,
+            noise: 0.0,
+            sends,
+            thresholds,
+            losses: gaps.collect(),
+            offsets: options
+                .align
+                .map_or(Vec::new(), |rows| offsets(&first[..rows.min(first.len())], sensors)),
+        };
+        if settings.world.interval <= 0.0 {
+            settings.world.interval = 1.0;
+        }
+        settings.world.within = asked_change.map_or(settings.world.interval, |change| change.1);
+        let can_look = |option: &'static str, asked: bool| {
+            let is_bits =
+                options.reports && (0..sensors).any(|n| settings.sends.of(&instants.names[n]) != &Sends::Value);
+            if is_bits && !asked {
+                Err(Error::Needed {
+                    option,
+                    reason: NO_VALUES,
+                })
+            } else {
+                Ok(())
+            }
+        };
+        can_look("--noise", asked_noise.is_some())?;
+        can_look("--change", asked_change.is_some())?;
+        can_look("--prior", asked_prior.is_some())?;
+        settings.world.change = asked_change.map_or(0.0, |change| change.0);
+        settings.noise = asked_noise.unwrap_or(0.0);
+        settings.world.prior = asked_prior.unwrap_or((0.0, 0.0));
+        if asked_change.is_none() || asked_noise.is_none() || asked_prior.is_none() {
+            settings.fit(&first, sensors)?;
+        }
+        Ok(settings)
+    }
+
+    /// Finds what was not said from the first rows: the prior by their spread; change and noise by the likelihood that the centre has of
+    /// them in full.
+    fn fit(&mut self, first: &[Instant], sensors: usize) -> Result<(), Error> {
+        let shifted = |n: usize| {
+            let offset = self.offsets.get(n).copied().unwrap_or(0.0);
+            values_of(first, n)
+                .into_iter()
+                .map(|value| value - offset)
+                .collect::<Vec<f64>>()
+        };
+        let all: Vec<Vec<f64>> = (0..sensors).map(shifted).collect();
+        let flat: Vec<f64> = all.iter().flatten().copied().collect();
+        if flat.is_empty() {
+            return Err(Error::Needed {
+                option: "--prior",
+                reason: "the first rows hold no numbers",
+            });
+        }
+        let count = flat.len() as f64;
+        let mean = flat.iter().sum::<f64>() / count;
+        let spread = (flat.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / count).sqrt();
+        let differences: Vec<f64> = all
+            .iter()
+            .flat_map(|values| values.windows(2).map(|pair| (pair[1] - pair[0]).abs()))
+            .collect();
+        let typical = median(differences.clone()) / (NORMAL_MEDIAN * std::f64::consts::SQRT_2);
+        let mean_size = differences.iter().sum::<f64>() / (differences.len() as f64).max(1.0);
+        let steps = fewbits_adaptive::own_steps(&flat);
+        let floor = ROUNDING * steps.into_iter().reduce(f64::min).unwrap_or(0.0);
+        let scale = [typical, mean_size, spread].into_iter().find(|size| *size > 0.0);
+        let Some(scale) = scale.map(|scale| scale.max(floor)) else {
+            return Err(Error::Needed {
+                option: if self.noise > 0.0 { "--change" } else { "--noise" },
+                reason: DO_NOT_VARY,
+            });
+        };
+        let (fit_change, fit_noise) = (self.world.change == 0.0, self.noise == 0.0);
+        if self.world.prior.1 == 0.0 {
+            let deviation = if self.world.model == Model::Returning {
+                spread.max(scale)
+            } else {
+                // The level of the first row is not the mean of all.
+                2.0 * spread.max(scale)
+            };
+            self.world.prior = (
+                if self.world.model == Model::Returning {
+                    mean
+                } else {
+                    all.iter().find_map(|v| v.first().copied()).unwrap_or(mean)
+                },
+                deviation,
+            );
+        }
+        if fit_noise {
+            self.noise = scale;
+        }
+        if fit_change {
+            self.world.change = FIRST_CHANGE * scale;
+        }
+        if !(fit_change || fit_noise) {
+            return Ok(());
+        }
+        let at = (self.world.change, self.noise);
+        let mut likelihood = |place: [f64; 2]| {
+            let noise = at.1 * place[1].exp();
+            if noise < floor || place.iter().any(|part| part.abs() > REACH) {
+                return f64::NEG_INFINITY;
+            }
+            self.world.change = at.0 * place[0].exp();
+            self.noise = noise;
+            self.log_likelihood(first, sensors).unwrap_or(f64::NEG_INFINITY)
+        };
+        let (mut best, mut place) = (likelihood([0.0, 0.0]), [0.0, 0.0]);
+        let free = [fit_change, fit_noise];
+        for step in STEPS {
+            loop {
+                let mut is_better = false;
+                for axis in (0..2).filter(|axis| free[*axis]) {
+                    for sign in [-step, step] {
+                        let mut other = place;
+                        other[axis] += sign;
+                        let found = likelihood(other);
+                        if found > best {
+                            (best, place, is_better) = (found, other, true);
+                        }
+                    }
+                }
+                if !is_better {
+                    break;
+                }
+            }
+        }
+        self.world.change = at.0 * place[0].exp();
+        self.noise = at.1 * place[1].exp();
+        Ok(())
+    }
+
+    fn log_likelihood(&self, first: &[Instant], sensors: usize) -> Option<f64> {
+        let mut centre = centre(&self.world, Use::Comparison).ok()?;
+        for sensor in 0..sensors {
+            centre
+                .join(self.seat_with(sensor, Sends::Value, self.noise, None))
+                .ok()?;
+        }
+        let steps = first
+            .iter()
+            .map(|instant| Some(centre.step(instant).ok()?.log_likelihood));
+        steps.sum()
+    }
+
+    fn seat_with(&self, sensor: usize, sends: Sends, noise: f64, threshold: Option<f64>) -> Seat {
+        Seat {
+            sends,
+            noise,
+            threshold,
+            loss: self.losses.get(sensor).copied().unwrap_or(LOSS.0),
+            offset: self.offsets.get(sensor).copied().unwrap_or(0.0),
+        }
+    }
+
+    /// What is supposed of a sensor.
+    pub(super) fn seat(&self, sensor: usize, name: &str) -> Seat {
+        let noise = self.noises.of(name).unwrap_or(self.noise);
+        self.seat_with(sensor, *self.sends.of(name), noise, *self.thresholds.of(name))
+    }
+
+    /// Whether any sensor sends less than values.
+    pub(super) fn has_bits(&self, names: &[String]) -> bool {
+        names.iter().any(|name| *self.sends.of(name) != Sends::Value)
+    }
+}

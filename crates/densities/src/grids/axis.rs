@@ -1,0 +1,110 @@
+//! Uniform nodes on a line.
+
+use crate::Error;
+use fewbits_numerics::error::{ArgumentError, finite, positive};
+use serde::{Deserialize, Serialize};
+
+/// Uniform nodes of a trapezoid rule.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored")]
+pub struct Grid {
+    #[serde(with = "fewbits_numerics::stored")]
+    lower: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    spacing: f64,
+    points: usize,
+}
+
+/// The stored form, checked when it is read.
+#[derive(Deserialize)]
+#[serde(rename = "Grid", deny_unknown_fields)]
+struct Stored {
+    #[serde(with = "fewbits_numerics::stored")]
+    lower: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    spacing: f64,
+    points: usize,
+}
+
+impl TryFrom<Stored> for Grid {
+    type Error = Error;
+
+    fn try_from(stored: Stored) -> Result<Self, Error> {
+        let (lower, spacing) = (finite("lower", stored.lower)?, positive("spacing", stored.spacing)?);
+        if !(2..=MOST).contains(&stored.points) || !(lower + spacing * stored.points as f64).is_finite() {
+            return Err(ArgumentError::new("points", stored.points, format!("2 to {MOST} nodes")).into());
+        }
+        Ok(Self {
+            lower,
+            spacing,
+            points: stored.points,
+        })
+    }
+}
+
+/// Most nodes of a grid.
+const MOST: usize = 1_000_000;
+
+impl Grid {
+    /// Nodes from `lower` to `upper` or just beyond, `spacing` apart.
+    ///
+    /// # Errors
+    /// If bounds are not finite or not increasing, the spacing is not positive, or there are more than a million nodes.
+    pub fn new(lower: f64, upper: f64, spacing: f64) -> Result<Self, Error> {
+        finite("lower", lower)?;
+        finite("upper", upper)?;
+        positive("spacing", spacing)?;
+        let intervals = ((upper - lower) / spacing).ceil();
+        if !(1.0..MOST as f64).contains(&intervals) {
+            let expected = "an interval that holds 1 to a million spacings";
+            return Err(ArgumentError::new("grid", format!("[{lower}, {upper}] by {spacing}"), expected).into());
+        }
+        Ok(Self {
+            lower,
+            spacing,
+            points: intervals as usize + 1,
+        })
+    }
+
+    /// Nodes symmetric about zero, zero included, out to `half_width` or just beyond.
+    ///
+    /// # Errors
+    /// As [`Grid::new`].
+    pub fn symmetric(half_width: f64, spacing: f64) -> Result<Self, Error> {
+        let half = (positive("half_width", half_width)? / positive("spacing", spacing)?).ceil() * spacing;
+        let mut grid = Self::new(-half, half, spacing)?;
+        // Rounding of the quotient must not cost the symmetry.
+        grid.points = 2 * (half / spacing).round() as usize + 1;
+        Ok(grid)
+    }
+
+    /// Number of nodes.
+    pub fn points(&self) -> usize {
+        self.points
+    }
+
+    /// Distance of neighbouring nodes.
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// Node `i`.
+    #[inline]
+    pub fn node(&self, i: usize) -> f64 {
+        self.lower + i as f64 * self.spacing
+    }
+
+    /// All nodes, increasing.
+    pub fn nodes(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.points).map(|i| self.node(i))
+    }
+
+    /// Indices of the nodes within `[lower, upper]`.
+    #[inline]
+    pub fn indices_within(&self, lower: f64, upper: f64) -> std::ops::Range<usize> {
+        let from = ((lower - self.lower) / self.spacing).ceil().max(0.0) as usize;
+        let to = ((upper - self.lower) / self.spacing).floor() + 1.0;
+        let to = (to.max(0.0) as usize).min(self.points);
+        from.min(to)..to
+    }
+}

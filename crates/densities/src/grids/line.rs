@@ -1,0 +1,241 @@
+//! A density on a line.
+
+use super::axis::Grid;
+use crate::Error;
+use crate::particles::weights::Categorical;
+use fewbits_core::{Belief, ColumnsMut, Density, Likelihood};
+use fewbits_numerics::error::{ArgumentError, finite, positive};
+use fewbits_numerics::normal::log_pdf_with;
+use nalgebra::{Matrix1, Vector1};
+use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
+
+/// A density held by its values at the nodes of a [`Grid`].
+/// Between the nodes it is linear.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored")]
+pub struct PointMass {
+    grid: Grid,
+    #[serde(with = "fewbits_numerics::stored")]
+    density: Vec<f64>,
+}
+
+/// The stored form, checked when it is read.
+#[derive(Deserialize)]
+#[serde(rename = "PointMass", deny_unknown_fields)]
+struct Stored {
+    grid: Grid,
+    #[serde(with = "fewbits_numerics::stored")]
+    density: Vec<f64>,
+}
+
+impl TryFrom<Stored> for PointMass {
+    type Error = Error;
+
+    fn try_from(Stored { grid, density }: Stored) -> Result<Self, Error> {
+        check_density(&density, grid.points(), grid.spacing())?;
+        Ok(Self { grid, density })
+    }
+}
+
+/// Densities at `nodes` nodes of the given volume each: finite, non-negative, integrating to one.
+pub(crate) fn check_density(density: &[f64], nodes: usize, volume: f64) -> Result<(), Error> {
+    let bad = density.iter().find(|p| !(**p >= 0.0 && p.is_finite()));
+    let total = density.iter().sum::<f64>() * volume;
+    if bad.is_some() || density.len() != nodes || (total - 1.0).abs() > 1e-9 {
+        let text = format!("{} numbers with integral {total}", density.len());
+        return Err(ArgumentError::new("density", text, format!("{nodes} densities that integrate to 1")).into());
+    }
+    Ok(())
+}
+
+/// Multiplies the values of a density with the exponentials of `logs` and scales them to sum to one; returns the logarithm
+/// of the sum before. On failure nothing is changed.
+pub(crate) fn absorb(density: &mut [f64], logs: &[f64]) -> Result<f64, Error> {
+    let reachable = logs.iter().zip(&*density).filter(|(_, p)| **p > 0.0);
+    let peak = reachable.map(|(l, _)| *l).fold(f64::NEG_INFINITY, f64::max);
+    // Where the density is zero the likelihood may be anything.
+    let product = |(l, p): (&f64, &f64)| if *p > 0.0 { p * (l - peak).exp() } else { 0.0 };
+    let sum = logs.iter().zip(&*density).map(product).sum::<f64>();
+    let no_number = logs.iter().zip(&*density).any(|(l, p)| *p > 0.0 && l.is_nan());
+    if no_number || peak == f64::INFINITY {
+        return Err(fewbits_core::Error::NotANumber { what: "the likelihood" }.into());
+    }
+    // A peak of `-inf` leaves a sum that is no number.
+    if !(sum > 0.0 && sum.is_finite()) {
+        return Err(fewbits_core::Error::Impossible.into());
+    }
+    for (p, l) in density.iter_mut().zip(logs) {
+        *p = product((l, p)) / sum;
+    }
+    Ok(sum.ln() + peak)
+}
+
+impl PointMass {
+    /// The density proportional to `exp(log_density(x))`.
+    ///
+    /// # Errors
+    /// [`fewbits_core::Error::Impossible`] if that is zero at every node.
+    pub fn new(grid: Grid, log_density: impl Fn(f64) -> f64) -> Result<Self, Error> {
+        let mut mass = Self {
+            grid,
+            density: vec![1.0; grid.points()],
+        };
+        mass.update_with(log_density)?;
+        Ok(mass)
+    }
+
+    /// A normal density.
+    ///
+    /// # Errors
+    /// A variance that is not positive; [`fewbits_core::Error::Impossible`] if it lies off the grid.
+    pub fn normal(grid: Grid, mean: f64, variance: f64) -> Result<Self, Error> {
+        finite("mean", mean)?;
+        positive("variance", variance)?;
+        Self::new(grid, |x| log_pdf_with(x, mean, variance))
+    }
+
+    /// The nodes.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Density at the nodes; sums to one over the spacing.
+    pub fn density(&self) -> &[f64] {
+        &self.density
+    }
+
+    /// Mean.
+    pub fn mean(&self) -> f64 {
+        self.expectation(|x| x)
+    }
+
+    /// Variance.
+    pub fn variance(&self) -> f64 {
+        let mean = self.mean();
+        self.expectation(|x| (x - mean) * (x - mean))
+    }
+
+    /// `E f(x)`.
+    pub fn expectation(&self, f: impl Fn(f64) -> f64) -> f64 {
+        let sum: f64 = self.grid.nodes().zip(&self.density).map(|(x, p)| p * f(x)).sum();
+        sum * self.grid.spacing()
+    }
+
+    /// Bayes' rule with any likelihood; returns `ln p(observed | past)`.
+    ///
+    /// # Errors
+    /// [`fewbits_core::Error::Impossible`] if the product with the belief is zero at every node; the belief is then as before.
+    pub fn update(&mut self, observed: &(impl Likelihood<1> + ?Sized)) -> Result<f64, Error> {
+        let nodes: Vec<f64> = self.grid.nodes().collect();
+        let mut logs = vec![0.0; nodes.len()];
+        observed.add_log_likelihoods([&nodes], &mut logs);
+        self.absorb(&logs)
+    }
+
+    /// The same with the log likelihood as a function of the state.
+    ///
+    /// # Errors
+    /// As [`PointMass::update`].
+    pub fn update_with(&mut self, log_likelihood: impl Fn(f64) -> f64) -> Result<f64, Error> {
+        let logs: Vec<f64> = self.grid.nodes().map(log_likelihood).collect();
+        self.absorb(&logs)
+    }
+
+    fn absorb(&mut self, logs: &[f64]) -> Result<f64, Error> {
+        let log_evidence = absorb(&mut self.density, logs)? + self.grid.spacing().ln();
+        self.density.iter_mut().for_each(|p| *p /= self.grid.spacing());
+        Ok(log_evidence)
+    }
+
+    /// The same with the likelihood tabulated at the nodes, up to a factor, and without allocation; returns the evidence in
+    /// units of that factor. Prefer [`PointMass::update`] where the likelihood may underflow.
+    ///
+    /// # Errors
+    /// A table of wrong length; [`fewbits_core::Error::Impossible`], which leaves the belief as it was.
+    pub fn reweight(&mut self, likelihood: &[f64]) -> Result<f64, Error> {
+        if likelihood.len() != self.density.len() {
+            let expected = "one value per node";
+            return Err(ArgumentError::new("likelihood", format!("{} values", likelihood.len()), expected).into());
+        }
+        let sum: f64 = self.density.iter().zip(likelihood).map(|(p, l)| p * l).sum();
+        let evidence = sum * self.grid.spacing();
+        if !evidence.is_finite() {
+            return Err(fewbits_core::Error::NotANumber { what: "the likelihood" }.into());
+        }
+        if evidence <= 0.0 {
+            return Err(fewbits_core::Error::Impossible.into());
+        }
+        for (p, l) in self.density.iter_mut().zip(likelihood) {
+            *p *= l / evidence;
+        }
+        Ok(evidence)
+    }
+
+    /// Writes a new density through `fill`, node by node, and scales it to integrate to one.
+    ///
+    /// # Errors
+    /// [`fewbits_core::Error::Impossible`] if nothing is left; the density is then uniform.
+    pub fn refill(&mut self, fill: impl FnOnce(&mut [f64])) -> Result<(), Error> {
+        fill(&mut self.density);
+        self.normalise().inspect_err(|_| {
+            let uniform = 1.0 / (self.grid.points() as f64 * self.grid.spacing());
+            self.density.fill(uniform);
+        })
+    }
+
+    /// Scales the density to integrate to one.
+    fn normalise(&mut self) -> Result<(), Error> {
+        let total = self.density.iter().sum::<f64>() * self.grid.spacing();
+        if !(total > 0.0 && total.is_finite()) {
+            return Err(fewbits_core::Error::Impossible.into());
+        }
+        for p in &mut self.density {
+            *p /= total;
+        }
+        Ok(())
+    }
+}
+
+/// The difference of two uniforms: how far a draw of a linear interpolant lies from its node, in spacings.
+pub(crate) fn triangular<R: Rng + ?Sized>(rng: &mut R) -> f64 {
+    rng.random::<f64>() - rng.random::<f64>()
+}
+
+/// Variance of [`triangular`].
+pub(crate) const TRIANGULAR_VARIANCE: f64 = 1.0 / 6.0;
+
+impl Belief<1> for PointMass {
+    fn mean(&self) -> Vector1<f64> {
+        Vector1::new(self.mean())
+    }
+
+    fn covariance(&self) -> Matrix1<f64> {
+        Matrix1::new(self.variance())
+    }
+
+    /// Draws of the linear interpolant, drawn towards the mean by what interpolation adds to the variance.
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, [states]: ColumnsMut<'_, 1>) {
+        let cumulative = Categorical::new(&self.density);
+        let (mean, variance, h) = (self.mean(), self.variance(), self.grid.spacing());
+        let shrink = (variance / (variance + TRIANGULAR_VARIANCE * h * h)).sqrt();
+        for x in states {
+            let drawn = self.grid.node(cumulative.draw(rng)) + h * triangular(rng);
+            *x = mean + shrink * (drawn - mean);
+        }
+    }
+}
+
+impl Density<1> for PointMass {
+    /// Linear between the nodes, zero outside.
+    fn log_density(&self, state: &Vector1<f64>) -> f64 {
+        let at = (state[0] - self.grid.node(0)) / self.grid.spacing();
+        let below = at.floor();
+        let value = |i: f64| {
+            let inside = i >= 0.0 && i < self.density.len() as f64;
+            if inside { self.density[i as usize] } else { 0.0 }
+        };
+        let share = at - below;
+        ((1.0 - share) * value(below) + share * value(below + 1.0)).ln()
+    }
+}

@@ -1,0 +1,9 @@
+//! Densities by their values at the nodes of a grid, on a line and in the plane.
+
+mod axis;
+mod line;
+mod plane;
+
+pub use axis::Grid;
+pub use line::PointMass;
+pub use plane::PlaneMass;

@@ -1,0 +1,311 @@
+//! Gaussian mixtures with full covariances.
+
+mod component;
+mod ellipse;
+
+pub use component::Component;
+pub use ellipse::ellipse;
+
+use crate::Error;
+use crate::particles::Particles;
+use crate::particles::weights::systematic;
+use fewbits_core::{Belief, Columns, ColumnsMut, Density, Gaussian};
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::kernels::{scalar, vectorised};
+use fewbits_numerics::normal;
+use fewbits_numerics::{ArgumentError, LogSum};
+use nalgebra::{SMatrix, SVector};
+use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
+
+/// A belief `sum_k w_k N(x; m_k, S_k)` over `R^D` with weights that sum to one.
+///
+/// ```
+/// use fewbits_densities::{Component, Mixture};
+/// use nalgebra::{Matrix1, Vector1};
+/// let lobe = |w, m| Component::new(w, Vector1::new(m), Matrix1::new(0.25));
+/// let belief = Mixture::new(vec![lobe(1.0, -1.0)?, lobe(3.0, 1.0)?])?;
+/// assert_eq!(belief.mean()[0], 0.5);
+/// assert_eq!(belief.covariance()[(0, 0)], 1.0);
+/// # Ok::<(), fewbits_densities::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct Mixture<const D: usize> {
+    components: Vec<Component<D>>,
+}
+
+/// Points per block of a sweep: all log densities of a block stay in the first-level cache.
+const BLOCK: usize = 128;
+
+impl<const D: usize> Mixture<D> {
+    /// A mixture of at least one component; the weights are normalised.
+    ///
+    /// # Errors
+    /// If there is no component or the weights sum to zero or to infinity.
+    pub fn new(components: Vec<Component<D>>) -> Result<Self, Error> {
+        at_least_one("components", components.len())?;
+        let total: f64 = components.iter().map(|c| c.weight).sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return Err(ArgumentError::new("weights", format!("a sum of {total}"), "a finite sum above 0").into());
+        }
+        let mut components = components;
+        for c in &mut components {
+            c.weight /= total;
+        }
+        Ok(Self { components })
+    }
+
+    /// One Gaussian as a mixture.
+    ///
+    /// # Errors
+    /// If its covariance is singular.
+    pub fn single(gaussian: &Gaussian<D>) -> Result<Self, Error> {
+        Self::new(vec![Component::new(1.0, *gaussian.mean(), *gaussian.covariance())?])
+    }
+
+    /// The components.
+    pub fn components(&self) -> &[Component<D>] {
+        &self.components
+    }
+
+    /// Number of components, at least one.
+    pub fn len(&self) -> usize {
+        self.components.len()
+    }
+
+    /// Never true: a mixture has at least one component.
+    pub fn is_empty(&self) -> bool {
+        self.components.is_empty()
+    }
+
+    /// Mean.
+    pub fn mean(&self) -> SVector<f64, D> {
+        self.components.iter().map(|c| c.mean() * c.weight).sum()
+    }
+
+    /// Covariance: within the components plus between their means.
+    pub fn covariance(&self) -> SMatrix<f64, D, D> {
+        let mean = self.mean();
+        self.components
+            .iter()
+            .map(|c| {
+                let d = c.mean() - mean;
+                (c.covariance() + d * d.transpose()) * c.weight
+            })
+            .sum()
+    }
+
+    /// The Gaussian of the same mean and covariance.
+    pub fn moment_matched(&self) -> Gaussian<D> {
+        Gaussian::from_trusted_parts(self.mean(), self.covariance())
+    }
+
+    /// `ln p(x)`; finite wherever `x` is finite and not astronomically far away, never NaN.
+    pub fn log_pdf(&self, x: &SVector<f64, D>) -> f64 {
+        let kept = self.components.iter().filter(|c| c.weight > 0.0);
+        kept.map(|c| c.weight.ln() + c.log_pdf(x)).collect::<LogSum>().value()
+    }
+
+    /// Writes `ln p` of every point of `columns` to `out`; points beyond the end of `out` are passed over.
+    pub fn log_pdf_columns(&self, columns: Columns<'_, D>, out: &mut [f64]) {
+        if !fewbits_core::columns::lengths_agree(&columns, out) {
+            return;
+        }
+        let kept: Vec<&Component<D>> = self.components.iter().filter(|c| c.weight > 0.0).collect();
+        let mut terms = vec![0.0; kept.len() * BLOCK];
+        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
+            let from = block * BLOCK;
+            let columns: [&[f64]; D] = columns.each_ref().map(|c| &c[from..from + out.len()]);
+            for (c, row) in kept.iter().zip(terms.chunks_mut(BLOCK)) {
+                c.log_terms(&columns, &mut row[..out.len()]);
+            }
+            log_sum_rows(&terms, out);
+        }
+    }
+
+    /// One draw.
+    pub fn sample<R: Rng + ?Sized>(&self, rng: &mut R) -> SVector<f64, D> {
+        let u: f64 = rng.random();
+        let mut cumulative = 0.0;
+        let chosen = self.components.iter().find(|c| {
+            cumulative += c.weight;
+            u < cumulative
+        });
+        match chosen.or(self.components.last()) {
+            Some(c) => c.draw(rng),
+            None => SVector::zeros(),
+        }
+    }
+
+    /// `count` equally weighted draws with systematic selection of the components: each contributes `count w_k` draws, rounded
+    /// up or down.
+    ///
+    /// # Errors
+    /// If `count` is 0.
+    pub fn sample_systematic<R: Rng + ?Sized>(&self, rng: &mut R, count: usize) -> Result<Particles<D>, Error> {
+        at_least_one("count", count)?;
+        let weights: Vec<f64> = self.components.iter().map(Component::weight).collect();
+        let mut chosen = systematic(rng, &weights, count).into_iter();
+        Particles::from_draws(count, || self.components[chosen.next().unwrap_or(0)].draw(rng))
+    }
+
+    /// The law of the chosen coordinates, in the given order.
+    ///
+    /// # Errors
+    /// If an axis is out of range or given twice.
+    pub fn marginal<const K: usize>(&self, axes: [usize; K]) -> Result<Mixture<K>, Error> {
+        for (i, axis) in axes.iter().enumerate() {
+            if *axis >= D || axes[..i].contains(axis) {
+                return Err(ArgumentError::new("axes", format!("{axes:?}"), format!("different axes below {D}")).into());
+            }
+        }
+        let components = self.components.iter().map(|c| {
+            let mean = SVector::from_fn(|i, _| c.mean()[axes[i]]);
+            let covariance = SMatrix::from_fn(|i, j| c.covariance()[(axes[i], axes[j])]);
+            Component::new(c.weight, mean, covariance)
+        });
+        Mixture::new(components.collect::<Result<_, _>>()?)
+    }
+
+    /// The law of `matrix x + shift`.
+    ///
+    /// # Errors
+    /// If the image of a component is singular or not finite.
+    pub fn affine<const K: usize>(
+        &self,
+        matrix: &SMatrix<f64, K, D>,
+        shift: &SVector<f64, K>,
+    ) -> Result<Mixture<K>, Error> {
+        let components = self
+            .components
+            .iter()
+            .map(|c| Component::new(c.weight, matrix * c.mean() + shift, matrix * c.covariance() * matrix.transpose()));
+        Mixture::new(components.collect::<Result<_, _>>()?)
+    }
+}
+
+/// Writes `ln sum exp` over the rows of `terms` (each [`BLOCK`] long) to `out`; `-inf` where every row is.
+fn log_sum_rows(terms: &[f64], out: &mut [f64]) {
+    vectorised(
+        #[inline(always)]
+        || {
+            let n = out.len();
+            let mut largest = [f64::MIN; BLOCK];
+            let mut total = [0.0; BLOCK];
+            for row in terms.chunks_exact(BLOCK) {
+                for (l, x) in largest[..n].iter_mut().zip(row) {
+                    *l = if *x > *l { *x } else { *l };
+                }
+            }
+            for row in terms.chunks_exact(BLOCK) {
+                for ((t, x), l) in total[..n].iter_mut().zip(row).zip(&largest) {
+                    *t += scalar::exp(x - l);
+                }
+            }
+            for ((out, t), l) in out.iter_mut().zip(&total).zip(&largest) {
+                *out = l + scalar::ln(*t);
+            }
+        },
+    );
+}
+
+impl<const D: usize> Belief<D> for Mixture<D> {
+    fn mean(&self) -> SVector<f64, D> {
+        self.mean()
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.covariance()
+    }
+
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        let count = states.iter().map(|c| c.len()).min().unwrap_or(0);
+        for k in 0..count {
+            let draw = self.sample(rng);
+            states.iter_mut().zip(draw.iter()).for_each(|(state, x)| state[k] = *x);
+        }
+    }
+}
+
+impl<const D: usize> Density<D> for Mixture<D> {
+    fn log_density(&self, state: &SVector<f64, D>) -> f64 {
+        self.log_pdf(state)
+    }
+
+    fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
+        let mut own = vec![0.0; logs.len()];
+        self.log_pdf_columns(*states, &mut own);
+        logs.iter_mut().zip(own).for_each(|(log, x)| *log += x);
+    }
+}
+
+impl Mixture<1> {
+    /// `P(X <= x)`.
+    pub fn cdf(&self, x: f64) -> f64 {
+        self.components
+            .iter()
+            .map(|c| c.weight * normal::cdf((x - c.mean()[0]) / c.factor().lower[(0, 0)]))
+            .sum()
+    }
+}
+
+/// The plain form in which a mixture is stored.
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    #[serde(with = "fewbits_numerics::stored")]
+    weights: Vec<f64>,
+    #[serde(with = "fewbits_numerics::stored")]
+    means: Vec<Vec<f64>>,
+    #[serde(with = "fewbits_numerics::stored")]
+    covariances: Vec<Vec<Vec<f64>>>,
+}
+
+impl<const D: usize> From<Mixture<D>> for Stored {
+    fn from(mixture: Mixture<D>) -> Self {
+        let rows = |c: &Component<D>| {
+            (0..D)
+                .map(|i| (0..D).map(|j| c.covariance()[(i, j)]).collect())
+                .collect()
+        };
+        Self {
+            weights: mixture.components.iter().map(Component::weight).collect(),
+            means: mixture
+                .components
+                .iter()
+                .map(|c| c.mean().as_slice().to_vec())
+                .collect(),
+            covariances: mixture.components.iter().map(rows).collect(),
+        }
+    }
+}
+
+impl<const D: usize> TryFrom<Stored> for Mixture<D> {
+    type Error = Error;
+
+    fn try_from(stored: Stored) -> Result<Self, Error> {
+        let n = stored.weights.len();
+        let square = |c: &Vec<Vec<f64>>| c.len() == D && c.iter().all(|row| row.len() == D);
+        if stored.means.len() != n
+            || stored.covariances.len() != n
+            || stored.means.iter().any(|m| m.len() != D)
+            || !stored.covariances.iter().all(square)
+        {
+            let expected = format!("{n} means of {D} and {n} covariances of {D} by {D} numbers");
+            return Err(ArgumentError::new("means", "of another shape", expected).into());
+        }
+        let components = (0..n).map(|k| {
+            let mean = SVector::from_fn(|i, _| stored.means[k][i]);
+            let covariance = SMatrix::from_fn(|i, j| stored.covariances[k][i][j]);
+            Component::new(stored.weights[k], mean, covariance)
+        });
+        let mut mixture = Self::new(components.collect::<Result<_, _>>()?)?;
+        // Weights that already summed to one are kept to the last bit.
+        let total: f64 = stored.weights.iter().sum();
+        if (total - 1.0).abs() < 1e-12 {
+            let kept = mixture.components.iter_mut().zip(stored.weights);
+            kept.for_each(|(component, weight)| component.weight = weight);
+        }
+        Ok(mixture)
+    }
+}

@@ -1,0 +1,380 @@
+//! Weighted particles in structure-of-arrays form.
+
+mod gaussian_cloud;
+mod stored;
+pub(crate) mod weights;
+
+pub use gaussian_cloud::GaussianCloud;
+pub use weights::Categorical;
+
+use crate::Error;
+use fewbits_core::{Belief, Columns, ColumnsMut};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, at_least_one};
+use fewbits_numerics::kernels::{dot, weighted_covariance};
+use nalgebra::{SMatrix, SVector};
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+use stored::StoredParticles;
+use weights::{gather_rows, normalise};
+
+/// A belief `sum_i w_i delta(x - x_i)` over `R^D`, always normalised.
+///
+/// Each coordinate is one contiguous column and the weights are kept as logarithms and as themselves, so that a filter's
+/// inner loops run over plain slices, no weight underflows on the way, and one exponential a particle is paid where the
+/// weights change. They change only through [`reweigh`](Self::reweigh), which either succeeds or leaves the belief as it was.
+///
+/// Beside its state a particle may carry a row of numbers of its own ([`with_side`](Self::with_side)), which is selected with
+/// it: what a sensor estimates under the particle's history, a label, a statistic.
+///
+/// ```
+/// use fewbits_densities::Particles;
+/// let belief = Particles::new([vec![0.0, 1.0, 4.0]], &[0.0, 0.0, f64::NEG_INFINITY])?;
+/// assert_eq!(belief.mean()[0], 0.5);
+/// assert_eq!(belief.effective_sample_size(), 2.0);
+/// # Ok::<(), fewbits_densities::Error>(())
+/// ```
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(try_from = "StoredParticles", into = "StoredParticles")]
+pub struct Particles<const D: usize> {
+    columns: [Vec<f64>; D],
+    log_weights: Vec<f64>,
+    weights: Vec<f64>,
+    effective_sample_size: f64,
+    /// One row of `side.len() / len` numbers per particle.
+    side: Vec<f64>,
+    /// Room for a column or for weights under construction, so that no step allocates.
+    scratch: Vec<f64>,
+}
+
+impl<const D: usize> Particles<D> {
+    /// Particles from their columns and log weights, which may share any offset; `-inf` is a weight of zero.
+    ///
+    /// # Errors
+    /// Lengths that differ, no particle, a coordinate that is not finite, a log weight that is NaN or `+inf`, or all weights
+    /// zero.
+    pub fn new(columns: [Vec<f64>; D], log_weights: &[f64]) -> Result<Self, Error> {
+        if let Some(bad) = log_weights.iter().find(|w| w.is_nan() || **w == f64::INFINITY) {
+            return Err(ArgumentError::new("log_weights", bad, "log weights below infinity").into());
+        }
+        let mut belief = Self::uniform(columns)?;
+        if belief.len() != log_weights.len() {
+            return Err(ArgumentError::new(
+                "log_weights",
+                format!("{} numbers", log_weights.len()),
+                format!("{}, one per particle", belief.len()),
+            )
+            .into());
+        }
+        belief.reweigh(|_, own| own.copy_from_slice(log_weights))?;
+        Ok(belief)
+    }
+
+    /// Equally weighted particles from their columns.
+    ///
+    /// # Errors
+    /// Lengths that differ, no particle, a coordinate that is not finite.
+    pub fn uniform(columns: [Vec<f64>; D]) -> Result<Self, Error> {
+        let count = columns.first().map_or(0, Vec::len);
+        at_least_one("particles", count)?;
+        for column in &columns {
+            if column.len() != count {
+                return Err(ArgumentError::new(
+                    "columns",
+                    format!("a column of length {}", column.len()),
+                    format!("length {count}, as the first column"),
+                )
+                .into());
+            }
+            all_finite("columns", column)?;
+        }
+        let mut belief = Self {
+            columns,
+            log_weights: Vec::with_capacity(count),
+            weights: Vec::with_capacity(count),
+            effective_sample_size: 0.0,
+            side: Vec::new(),
+            scratch: Vec::with_capacity(count),
+        };
+        belief.equalise(count);
+        Ok(belief)
+    }
+
+    /// Equally weighted particles, drawn one after the other.
+    ///
+    /// # Errors
+    /// No particle, or a draw that is not finite.
+    pub fn from_draws(count: usize, mut draw: impl FnMut() -> SVector<f64, D>) -> Result<Self, Error> {
+        let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| Vec::with_capacity(count));
+        for _ in 0..count {
+            let point = draw();
+            for (column, x) in columns.iter_mut().zip(point.iter()) {
+                column.push(*x);
+            }
+        }
+        Self::uniform(columns)
+    }
+
+    /// Equally weighted particles, independent draws from a belief.
+    ///
+    /// # Errors
+    /// If `count` is zero or a draw is not finite.
+    pub fn from_belief<R: Rng + ?Sized>(rng: &mut R, belief: &impl Belief<D>, count: usize) -> Result<Self, Error> {
+        let mut columns: [Vec<f64>; D] = std::array::from_fn(|_| vec![0.0; count]);
+        belief.sample_columns(rng, columns.each_mut().map(Vec::as_mut_slice));
+        Self::uniform(columns)
+    }
+
+    /// The same particles, each with a row of numbers of its own; `side` holds the rows one after the other.
+    ///
+    /// # Errors
+    /// If the length of `side` is no multiple of the number of particles, or an entry is not finite.
+    pub fn with_side(mut self, side: Vec<f64>) -> Result<Self, Error> {
+        all_finite("side", &side)?;
+        if !side.len().is_multiple_of(self.len()) {
+            let expected = format!("rows of equal length for {} particles", self.len());
+            return Err(ArgumentError::new("side", format!("{} numbers", side.len()), expected).into());
+        }
+        self.side = side;
+        Ok(self)
+    }
+
+    /// Numbers beside each particle's state.
+    pub fn side_width(&self) -> usize {
+        self.side.len() / self.len()
+    }
+
+    /// The numbers beside all states, one row after the other.
+    pub fn side(&self) -> &[f64] {
+        &self.side
+    }
+
+    /// Coordinates and side rows for work in place. Finite numbers must stay finite.
+    pub fn parts_mut(&mut self) -> (ColumnsMut<'_, D>, &mut [f64]) {
+        (self.columns.each_mut().map(Vec::as_mut_slice), &mut self.side)
+    }
+
+    /// Number of particles, at least one.
+    pub fn len(&self) -> usize {
+        self.weights.len()
+    }
+
+    /// Never true: a belief has at least one particle.
+    pub fn is_empty(&self) -> bool {
+        self.weights.is_empty()
+    }
+
+    /// The coordinates, one contiguous column each.
+    pub fn columns(&self) -> Columns<'_, D> {
+        self.columns.each_ref().map(Vec::as_slice)
+    }
+
+    /// The coordinates for work in place, such as propagation. Finite numbers must stay finite.
+    pub fn columns_mut(&mut self) -> ColumnsMut<'_, D> {
+        self.columns.each_mut().map(Vec::as_mut_slice)
+    }
+
+    /// Normalised weights.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// Logarithms of the normalised weights.
+    pub fn log_weights(&self) -> &[f64] {
+        &self.log_weights
+    }
+
+    /// Particle `i`, or `None` past the end.
+    pub fn point(&self, i: usize) -> Option<SVector<f64, D>> {
+        (i < self.len()).then(|| SVector::from_fn(|d, _| self.columns[d][i]))
+    }
+
+    /// `1 / sum w_i^2`, between 1 and the number of particles.
+    pub fn effective_sample_size(&self) -> f64 {
+        self.effective_sample_size
+    }
+
+    /// Lets `change` edit the log weights (typically: add log likelihoods) and normalises them. Returns
+    /// `ln sum_i exp(log weight_i)` after the change: the log-likelihood estimate if log likelihoods were added.
+    ///
+    /// # Errors
+    /// [`fewbits_core::Error::Impossible`] if no weight is left, [`fewbits_core::Error::NotANumber`] if one is NaN or infinite; the belief is
+    /// then as it was before.
+    pub fn reweigh(&mut self, change: impl FnOnce(Columns<'_, D>, &mut [f64])) -> Result<f64, Error> {
+        self.scratch.clear();
+        self.scratch.extend_from_slice(&self.log_weights);
+        change(self.columns.each_ref().map(Vec::as_slice), &mut self.scratch);
+        let (log_sum, effective_sample_size) = normalise(&mut self.scratch, &mut self.weights)?;
+        std::mem::swap(&mut self.log_weights, &mut self.scratch);
+        self.effective_sample_size = effective_sample_size;
+        Ok(log_sum)
+    }
+
+    /// Replaces the particles by copies of the chosen ones, equally weighted. The number of particles becomes that of the
+    /// indices.
+    ///
+    /// # Errors
+    /// If there is no index, or one is not below [`len`](Self::len); the belief is then as it was.
+    pub fn select(&mut self, ancestors: &[u32]) -> Result<(), Error> {
+        self.check(ancestors)?;
+        let width = self.side_width();
+        for column in &mut self.columns {
+            self.scratch.clear();
+            self.scratch.extend(ancestors.iter().map(|a| column[*a as usize]));
+            std::mem::swap(column, &mut self.scratch);
+        }
+        if width > 0 {
+            self.scratch.clear();
+            gather_rows(&self.side, width, ancestors, &mut self.scratch);
+            std::mem::swap(&mut self.side, &mut self.scratch);
+        }
+        self.equalise(ancestors.len());
+        Ok(())
+    }
+
+    /// Becomes a selection of the particles of `source`, equally weighted, in the memory of this belief.
+    ///
+    /// # Errors
+    /// As [`select`](Self::select).
+    pub fn select_from(&mut self, source: &Self, ancestors: &[u32]) -> Result<(), Error> {
+        source.check(ancestors)?;
+        for (column, from) in self.columns.iter_mut().zip(&source.columns) {
+            column.clear();
+            column.extend(ancestors.iter().map(|a| from[*a as usize]));
+        }
+        self.side.clear();
+        gather_rows(&source.side, source.side_width(), ancestors, &mut self.side);
+        self.equalise(ancestors.len());
+        Ok(())
+    }
+
+    fn check(&self, ancestors: &[u32]) -> Result<(), Error> {
+        at_least_one("ancestors", ancestors.len())?;
+        let count = self.len();
+        // A maximum runs in vector registers, a search does not.
+        let largest = ancestors.iter().fold(0, |largest: u32, a| largest.max(*a));
+        if largest as usize >= count {
+            return Err(ArgumentError::new("ancestors", largest, format!("indices below {count}")).into());
+        }
+        Ok(())
+    }
+
+    pub(crate) fn equalise(&mut self, count: usize) {
+        let weight = 1.0 / count as f64;
+        self.weights.clear();
+        self.weights.resize(count, weight);
+        self.log_weights.clear();
+        self.log_weights.resize(count, weight.ln());
+        self.effective_sample_size = count as f64;
+    }
+
+    /// Weighted mean.
+    pub fn mean(&self) -> SVector<f64, D> {
+        SVector::from_fn(|d, _| dot(&self.weights, &self.columns[d]))
+    }
+
+    /// Weighted covariance `sum w (x - mean)(x - mean)^T` about a given mean, without a small-sample correction.
+    pub fn covariance_about(&self, mean: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        let w = self.weights.as_slice();
+        let mut covariance = SMatrix::zeros();
+        for i in 0..D {
+            for j in 0..=i {
+                let entry = weighted_covariance(w, (&self.columns[i], mean[i]), (&self.columns[j], mean[j]));
+                covariance[(i, j)] = entry;
+                covariance[(j, i)] = entry;
+            }
+        }
+        covariance
+    }
+
+    /// Weighted covariance about the mean.
+    pub fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.covariance_about(&self.mean())
+    }
+}
+
+/// `clone_from` reuses memory, so that a filter can keep a belief to fall back to without allocating.
+impl<const D: usize> Clone for Particles<D> {
+    fn clone(&self) -> Self {
+        Self {
+            columns: self.columns.clone(),
+            log_weights: self.log_weights.clone(),
+            weights: self.weights.clone(),
+            effective_sample_size: self.effective_sample_size,
+            side: self.side.clone(),
+            scratch: Vec::with_capacity(self.len()),
+        }
+    }
+
+    fn clone_from(&mut self, other: &Self) {
+        self.columns.clone_from(&other.columns);
+        self.log_weights.clone_from(&other.log_weights);
+        self.weights.clone_from(&other.weights);
+        self.effective_sample_size = other.effective_sample_size;
+        self.side.clone_from(&other.side);
+    }
+}
+
+/// Equality of the belief: columns, weights and side rows.
+impl<const D: usize> PartialEq for Particles<D> {
+    fn eq(&self, other: &Self) -> bool {
+        self.columns == other.columns && self.log_weights == other.log_weights && self.side == other.side
+    }
+}
+
+impl<const D: usize> Belief<D> for Particles<D> {
+    fn mean(&self) -> SVector<f64, D> {
+        self.mean()
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.covariance()
+    }
+
+    /// Each draw is a particle, chosen by its weight.
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
+        let cumulative = Categorical::new(&self.weights);
+        let count = fewbits_core::columns::count(&states);
+        let chosen: Vec<usize> = (0..count).map(|_| cumulative.draw(rng)).collect();
+        for (states, column) in states.into_iter().zip(&self.columns) {
+            for (x, i) in states.iter_mut().zip(&chosen) {
+                *x = column[*i];
+            }
+        }
+    }
+}
+
+impl<const D: usize> From<Particles<D>> for StoredParticles {
+    fn from(belief: Particles<D>) -> Self {
+        Self::new(
+            belief.columns.into(),
+            belief.weights,
+            &belief.log_weights,
+            belief.effective_sample_size,
+            belief.side,
+        )
+    }
+}
+
+impl<const D: usize> TryFrom<StoredParticles> for Particles<D> {
+    type Error = Error;
+
+    fn try_from(stored: StoredParticles) -> Result<Self, Error> {
+        let (columns, weights, log_weights, effective, side) = stored.parts()?;
+        let columns = columns.try_into().map_err(|columns: Vec<Vec<f64>>| {
+            ArgumentError::new("columns", format!("{} columns", columns.len()), format!("{D} columns"))
+        })?;
+        let mut belief = Self::new(columns, &log_weights)?.with_side(side)?;
+        // As it was stored, to the last bit.
+        if weights.windows(2).all(|pair| pair[0] == pair[1]) {
+            belief.equalise(weights.len());
+        } else {
+            belief.effective_sample_size = effective.unwrap_or(belief.effective_sample_size);
+            (belief.weights, belief.log_weights) = (weights, log_weights);
+        }
+        Ok(belief)
+    }
+}

@@ -1,0 +1,89 @@
+//! Weights of particles: draws in proportion, rows that travel along, normalisation.
+
+use crate::Error;
+use fewbits_numerics::kernels::{exp_minus, largest_number, sum, vectorised};
+use rand::{Rng, RngExt};
+
+/// Draws of indices in proportion to weights, by their running sums: `O(n)` to prepare, `O(log n)` a draw.
+///
+/// ```
+/// use fewbits_densities::Categorical;
+/// use rand::SeedableRng;
+/// let weighted = Categorical::new(&[0.0, 2.0, 0.0]);
+/// assert_eq!(weighted.draw(&mut rand_pcg::Pcg64Mcg::seed_from_u64(1)), 1);
+/// ```
+#[derive(Debug, Clone)]
+pub struct Categorical {
+    sums: Vec<f64>,
+    last: usize,
+}
+
+impl Categorical {
+    /// Prepares draws from weights of any sum, each zero or positive. If all are zero, every draw is index 0.
+    pub fn new(weights: &[f64]) -> Self {
+        let mut total = 0.0;
+        let mut sum = |w: &f64| {
+            total += w;
+            total
+        };
+        Self {
+            sums: weights.iter().map(&mut sum).collect(),
+            last: weights.iter().rposition(|w| *w > 0.0).unwrap_or(0),
+        }
+    }
+
+    /// An index of positive weight.
+    pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
+        let point = rng.random::<f64>() * self.sums.last().copied().unwrap_or(0.0);
+        self.sums.partition_point(|sum| *sum <= point).min(self.last)
+    }
+}
+
+/// Indices of `count` systematic draws from `weights`: index `i` comes up `count w_i / sum w` times, rounded up or down.
+pub(crate) fn systematic<R: Rng + ?Sized>(rng: &mut R, weights: &[f64], count: usize) -> Vec<usize> {
+    let offset: f64 = rng.random();
+    let total: f64 = sum(weights);
+    let (mut i, mut cumulative) = (0, weights.first().copied().unwrap_or(0.0));
+    let next = |k: usize| {
+        let level = (k as f64 + offset) / count as f64 * total;
+        while level >= cumulative && i + 1 < weights.len() {
+            i += 1;
+            cumulative += weights[i];
+        }
+        i
+    };
+    (0..count).map(next).collect()
+}
+
+/// Copies the chosen rows.
+pub(crate) fn gather_rows(rows: &[f64], width: usize, chosen: &[u32], out: &mut Vec<f64>) {
+    if width > 0 {
+        for a in chosen {
+            let start = *a as usize * width;
+            out.extend_from_slice(&rows[start..start + width]);
+        }
+    }
+}
+
+/// Normalises log weights and writes their exponentials; returns `ln sum exp` and the effective
+/// sample size. On failure `weights` is as it was.
+pub(crate) fn normalise(logs: &mut [f64], weights: &mut [f64]) -> Result<(f64, f64), Error> {
+    let what = "a log weight";
+    let largest = largest_number(logs).ok_or(fewbits_core::Error::NotANumber { what })?;
+    if !largest.is_finite() {
+        return Err(fewbits_core::Error::unlikely_or_no_number(largest, what).into());
+    }
+    let sums = exp_minus(logs, largest, weights);
+    let log_sum = largest + sums.sum.ln();
+    let scale = 1.0 / sums.sum;
+    vectorised(
+        #[inline(always)]
+        || {
+            for (log, weight) in logs.iter_mut().zip(weights) {
+                *log -= log_sum;
+                *weight *= scale;
+            }
+        },
+    );
+    Ok((log_sum, sums.sum * sums.sum / sums.sum_of_squares))
+}

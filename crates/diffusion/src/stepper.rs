@@ -1,0 +1,187 @@
+//! One step in time of a transport, with its error.
+
+use crate::solver::{Direction, Factor};
+use crate::{Error, Transport};
+use faer::Mat;
+
+/// How a step in time is made. Both methods damp what a sudden start excites.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Trapezoidal rule, then a backward difference (TR-BDF2): second order, with an embedded error of third order. Concentrations may
+    /// fall below zero by the error: [`Snapshot::lowest`] says how far.
+    #[default]
+    TrBdf2,
+    /// Two implicit Euler steps of half the length; their difference from one whole step is the error. First order, never negative.
+    ImplicitEuler,
+}
+
+/// Factorisations that are kept.
+const MAX_FACTORS: usize = 16;
+/// `2 - sqrt 2`: the share of the step at which the trapezoidal rule ends, so that both stages have one matrix.
+const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
+const HALF_GAMMA: f64 = 0.5 * GAMMA;
+/// Weight of the first two slopes.
+const WEIGHT: f64 = 0.25 * std::f64::consts::SQRT_2;
+/// Weights of the third-order formula less those of the method (Hosea and Shampine, Applied Numerical Mathematics 20 (1996) 21).
+const ERROR: [f64; 3] = [
+    (1.0 - WEIGHT) / 3.0 - WEIGHT,
+    (3.0 * WEIGHT + 1.0) / 3.0 - WEIGHT,
+    HALF_GAMMA / 3.0 - HALF_GAMMA,
+];
+/// Makes steps in time, and keeps the factors of the last lengths of step.
+pub(crate) struct Stepper<'a> {
+    pub(crate) transport: &'a Transport,
+    pub(crate) method: Method,
+    /// Factors by their coefficient of `A`; the last used comes last.
+    factors: Vec<(f64, Factor<'a>)>,
+}
+
+impl<'a> Stepper<'a> {
+    pub(crate) fn new(transport: &'a Transport) -> Self {
+        Self {
+            transport,
+            method: Method::default(),
+            factors: Vec::new(),
+        }
+    }
+
+    /// One step: the columns after it, what it adds to the dose, and its estimated error relative to each column's largest value.
+    pub(crate) fn step(
+        &mut self,
+        direction: Direction,
+        now: &Mat<f64>,
+        source: &Mat<f64>,
+        step: f64,
+    ) -> Result<(Mat<f64>, Mat<f64>, f64), Error> {
+        let (rows, columns) = (now.nrows(), now.ncols());
+        let transport = self.transport;
+        let volumes = &transport.volumes;
+        match self.method {
+            Method::ImplicitEuler => {
+                let euler = |from: &Mat<f64>, step: f64, factor: &Factor<'_>| {
+                    let mut next =
+                        Mat::from_fn(rows, columns, |i, j| volumes[i] * from[(i, j)] + step * source[(i, j)]);
+                    factor.solve(direction, &mut next);
+                    next
+                };
+                let whole = euler(now, step, self.factor(step)?);
+                let half_factor = self.factor(0.5 * step)?;
+                let middle = euler(now, 0.5 * step, half_factor);
+                let next = euler(&middle, 0.5 * step, half_factor);
+                let dose = Mat::from_fn(rows, columns, |i, j| 0.5 * step * (middle[(i, j)] + next[(i, j)]));
+                let error = relative_error(&(&next - &whole), &next);
+                Ok((next, dose, error))
+            }
+            Method::TrBdf2 => {
+                let weight = HALF_GAMMA * step;
+                let factor = self.factor(weight)?;
+                let slope = |c: &Mat<f64>| {
+                    let mut out = Mat::zeros(rows, columns);
+                    for j in 0..columns {
+                        transport.apply(direction, c.col_as_slice(j), out.col_as_slice_mut(j));
+                        out.col_as_slice_mut(j)
+                            .iter_mut()
+                            .zip(source.col_as_slice(j))
+                            .for_each(|(out, s)| *out = s - *out);
+                    }
+                    out
+                };
+                let first = slope(now);
+                let mut middle = Mat::from_fn(rows, columns, |i, j| {
+                    volumes[i] * now[(i, j)] + weight * (first[(i, j)] + source[(i, j)])
+                });
+                factor.solve(direction, &mut middle);
+                let second = slope(&middle);
+                let mut next = Mat::from_fn(rows, columns, |i, j| {
+                    volumes[i] * now[(i, j)]
+                        + step * WEIGHT * (first[(i, j)] + second[(i, j)])
+                        + weight * source[(i, j)]
+                });
+                factor.solve(direction, &mut next);
+                let third = slope(&next);
+                // Solving with the matrix once more keeps the estimate bounded for stiff parts.
+                let mut error = Mat::from_fn(rows, columns, |i, j| {
+                    step * (ERROR[0] * first[(i, j)] + ERROR[1] * second[(i, j)] + ERROR[2] * third[(i, j)])
+                });
+                factor.solve(direction, &mut error);
+                let dose = Mat::from_fn(rows, columns, |i, j| {
+                    step * WEIGHT * (now[(i, j)] + middle[(i, j)]) + weight * next[(i, j)]
+                });
+                let error = relative_error(&error, &next);
+                Ok((next, dose, error))
+            }
+        }
+    }
+
+    /// The factor of `V + weight A`.
+    fn factor(&mut self, weight: f64) -> Result<&Factor<'a>, Error> {
+        match self.factors.iter().position(|(known, _)| *known == weight) {
+            Some(at) => self.factors[at..].rotate_left(1),
+            None => {
+                let diagonal = self.transport.volumes.iter().zip(&self.transport.diagonal);
+                let diagonal: Vec<f64> = diagonal.map(|(volume, rate)| volume + weight * rate).collect();
+                if self.factors.len() == MAX_FACTORS {
+                    self.factors.remove(0);
+                }
+                let factor = self
+                    .transport
+                    .solver()?
+                    .factor(&diagonal, &self.transport.rates, weight)?;
+                self.factors.push((weight, factor));
+            }
+        }
+        Ok(&self.factors[self.factors.len() - 1].1)
+    }
+}
+
+/// Columns that evolve together.
+pub(crate) struct State {
+    pub(crate) concentration: Mat<f64>,
+    pub(crate) dose: Mat<f64>,
+    pub(crate) lowest: f64,
+    pub(crate) steps: usize,
+    /// Length of the next step, s.
+    pub(crate) wanted: f64,
+}
+
+impl State {
+    /// Columns before their first step, without any dose.
+    pub(crate) fn new(concentration: Mat<f64>) -> Self {
+        let dose = Mat::zeros(concentration.nrows(), concentration.ncols());
+        Self {
+            concentration,
+            dose,
+            lowest: 0.0,
+            steps: 0,
+            wanted: f64::INFINITY,
+        }
+    }
+
+    /// Takes over the columns after a step, and adds what the step adds to the dose.
+    pub(crate) fn accept(&mut self, next: Mat<f64>, dose: Mat<f64>) {
+        self.dose += dose;
+        for j in 0..next.ncols() {
+            self.lowest = next.col_as_slice(j).iter().copied().fold(self.lowest, f64::min);
+        }
+        self.concentration = next;
+        self.steps += 1;
+    }
+}
+
+/// The largest error of a column over the largest number of that column, over all columns.
+fn relative_error(error: &Mat<f64>, values: &Mat<f64>) -> f64 {
+    let size = |column: &[f64]| {
+        column
+            .iter()
+            .fold(0.0, |most: f64, x| if x.is_nan() { f64::INFINITY } else { most.max(x.abs()) })
+    };
+    let of_column = |j: usize| {
+        let error = size(error.col_as_slice(j));
+        if error == 0.0 {
+            0.0
+        } else {
+            error / size(values.col_as_slice(j))
+        }
+    };
+    (0..error.ncols()).map(of_column).fold(0.0, f64::max)
+}

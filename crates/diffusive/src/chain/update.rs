@@ -1,0 +1,108 @@
+//! One node's update of the posteriors of all models.
+
+use super::Search;
+use super::alternatives::{Alternative, EXCLUDED};
+use super::outcome::{Status, failure};
+use crate::belief::{PositionBelief, Prior, SearchBox};
+use crate::best_fit::best_fit;
+use crate::posterior::Posterior;
+use crate::project::Travelling;
+use crate::target::Target;
+use crate::{Error, RateModel, SourceLikelihood};
+use fewbits_densities::Mixture;
+use fewbits_models::SourceModel;
+
+impl Search {
+    /// Updates the posterior of every model that is left, and the models' probabilities. A status if the search ends here.
+    pub(super) fn update<M: SourceModel + Clone>(
+        &self,
+        alternatives: &mut [Alternative<M>],
+        received: Option<&Travelling>,
+    ) -> Result<Option<Status>, Error> {
+        let mut end = None;
+        for alternative in alternatives.iter_mut().filter(|a| a.log_weight > f64::NEG_INFINITY) {
+            let (prior, likelihood, near) = self.terms(alternative, received)?;
+            match Posterior::new(&prior, &likelihood, &self.search, near, &self.cells) {
+                Ok(posterior) => {
+                    alternative.log_evidence = posterior.cells.log_evidence();
+                    alternative.posterior = Some(posterior);
+                }
+                Err(error) => {
+                    let status = failure(&error).ok_or(error)?;
+                    let status = self.explained(status, &prior, &likelihood, received.is_some())?;
+                    if status == Status::Unresolved {
+                        // The evidence of this model is not known: no other can be said to be right.
+                        return Ok(Some(status));
+                    }
+                    alternative.log_weight = f64::NEG_INFINITY;
+                    end = Some(status);
+                }
+            }
+        }
+        let largest = alternatives
+            .iter()
+            .map(Alternative::log_posterior)
+            .fold(f64::NEG_INFINITY, f64::max);
+        if largest == f64::NEG_INFINITY {
+            return Ok(Some(end.unwrap_or(Status::Misfit)));
+        }
+        let mut total = 0.0;
+        for alternative in alternatives.iter_mut() {
+            let log = alternative.log_posterior() - largest;
+            if log < -EXCLUDED {
+                alternative.log_weight = f64::NEG_INFINITY;
+            }
+            alternative.probability = log.exp();
+            total += alternative.probability;
+        }
+        alternatives.iter_mut().for_each(|a| a.probability /= total);
+        Ok(None)
+    }
+
+    /// What an update of one model multiplies: the prior, the likelihood, and the box that holds the product.
+    fn terms<M: SourceModel + Clone>(
+        &self,
+        alternative: &Alternative<M>,
+        received: Option<&Travelling>,
+    ) -> Result<(Prior, SourceLikelihood<M>, Option<SearchBox>), Error> {
+        let all = alternative.records.as_slice();
+        let last = &all[all.len() - 1..];
+        let (prior, records) = match (received, &self.rate) {
+            (None, _) => (Prior::Exact(self.prior), all),
+            (Some(Travelling::WithRate(belief)), RateModel::Joint(range)) => {
+                (Prior::WithRate(belief.clone(), *range), last)
+            }
+            (Some(Travelling::WithRate(belief)), _) => {
+                let position = Mixture::single(&belief.position())?;
+                (Prior::Position(PositionBelief::Mixture(position)), last)
+            }
+            (Some(Travelling::Position(position)), _) => (Prior::Position(position.clone()), last),
+        };
+        let near = match (received, &alternative.posterior) {
+            (None, Some(posterior)) => Some(posterior.around(&self.search)),
+            _ => None,
+        };
+        Ok((prior, SourceLikelihood::new(records.to_vec(), self.rate)?, near))
+    }
+
+    /// The status of an update that failed. If not even the best position explains the samples, that is the reason.
+    pub(super) fn explained<M: SourceModel>(
+        &self,
+        status: Status,
+        prior: &Prior,
+        likelihood: &SourceLikelihood<M>,
+        carried: bool,
+    ) -> Result<Status, Error> {
+        let Some(level) = self.refusal else {
+            return Ok(status);
+        };
+        let fit = best_fit(&Target::new(prior, likelihood)?, likelihood, &self.search);
+        Ok(match (status, fit) {
+            // What excludes a belief that was received may lie in the belief.
+            (Status::BeliefMiss, None) if carried => status,
+            (_, None) => Status::Misfit,
+            (_, Some(fit)) if fit.is_refused(level) => Status::Misfit,
+            _ => status,
+        })
+    }
+}

@@ -1,0 +1,189 @@
+//! A weighted cloud summed up by a few clumps.
+
+use super::Error;
+use fewbits_core::Columns;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{at_least_one, non_negative};
+use nalgebra::{SMatrix, SVector};
+
+/// Weight, mean and covariance of one part of a belief.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clump<const D: usize> {
+    /// Share of the mass.
+    pub weight: f64,
+    /// Mean.
+    pub mean: SVector<f64, D>,
+    /// Covariance within the clump, possibly singular.
+    pub covariance: SMatrix<f64, D, D>,
+}
+
+/// A belief as clumps: their moments together are exactly those of the points they were made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clumps<const D: usize> {
+    pub(super) clumps: Vec<Clump<D>>,
+    pub(super) least: SVector<f64, D>,
+}
+
+impl<const D: usize> Clumps<D> {
+    /// Splits weighted points into at most `count` clumps: again and again the clump whose points spread most (weight times
+    /// largest variance) is cut at its mean across that coordinate. `spread` is what each point adds to the variances, one
+    /// column a coordinate or an empty one: a point may stand for a coordinate that was integrated out.
+    ///
+    /// # Errors
+    /// If `count` is zero, lengths differ, or no weight is above zero.
+    pub fn new(
+        columns: &Columns<'_, D>,
+        spread: &Columns<'_, D>,
+        weights: &[f64],
+        count: usize,
+    ) -> Result<Self, Error> {
+        at_least_one("count", count)?;
+        if columns.iter().any(|c| c.len() != weights.len())
+            || spread.iter().any(|c| !c.is_empty() && c.len() != weights.len())
+        {
+            return Err(ArgumentError::new("columns", "of different lengths", "one number a weight").into());
+        }
+        let mut order: Vec<u32> = Vec::with_capacity(weights.len());
+        let mut total = 0.0;
+        for (i, weight) in weights.iter().enumerate() {
+            if non_negative("weights", *weight)? > 0.0 {
+                order.push(i as u32);
+                total += weight;
+            }
+        }
+        if order.is_empty() {
+            return Err(fewbits_core::Error::Impossible.into());
+        }
+        let mut cloud = Cloud {
+            columns,
+            spread,
+            weights,
+            total,
+            scale: SVector::repeat(1.0),
+        };
+        // Coordinates may have different units: variances count in parts of the whole's.
+        let whole = cloud.part(&order, 0, order.len()).clump.covariance.diagonal();
+        cloud.scale = whole.map(|v| if v > 0.0 { v.recip() } else { 0.0 });
+        let mut parts = vec![cloud.part(&order, 0, order.len())];
+        while parts.len() < count {
+            let widest = (0..parts.len()).max_by(|a, b| parts[*a].urgency.total_cmp(&parts[*b].urgency));
+            let Some(chosen) = widest.filter(|at| parts[*at].urgency > 0.0) else {
+                break;
+            };
+            let (from, to, axis) = (parts[chosen].from, parts[chosen].to, parts[chosen].axis);
+            let cut = parts[chosen].clump.mean[axis];
+            let middle = from + partition(&mut order[from..to], |i| columns[axis][i as usize] < cut);
+            if middle == from || middle == to {
+                // Rounding left no point on one side.
+                parts[chosen].urgency = 0.0;
+                continue;
+            }
+            parts[chosen] = cloud.part(&order, from, middle);
+            parts.push(cloud.part(&order, middle, to));
+        }
+        Ok(Self {
+            clumps: parts.into_iter().map(|part| part.clump).collect(),
+            least: SVector::zeros(),
+        })
+    }
+
+    /// The clumps.
+    pub fn clumps(&self) -> &[Clump<D>] {
+        &self.clumps
+    }
+
+    /// Mean of the whole.
+    pub fn mean(&self) -> SVector<f64, D> {
+        self.clumps.iter().map(|c| c.mean * c.weight).sum()
+    }
+
+    /// Covariance of the whole.
+    pub fn covariance(&self) -> SMatrix<f64, D, D> {
+        let mean = self.mean();
+        self.clumps
+            .iter()
+            .map(|c| {
+                let d = c.mean - mean;
+                (c.covariance + d * d.transpose()) * c.weight
+            })
+            .sum()
+    }
+
+    /// The same, with least variances of fitted components: what the points resolve. Zero sets none.
+    ///
+    /// # Errors
+    /// If a variance is negative or not finite.
+    pub fn with_least_variances(self, least: SVector<f64, D>) -> Result<Self, Error> {
+        for variance in &least {
+            non_negative("least", *variance)?;
+        }
+        Ok(Self { least, ..self })
+    }
+}
+
+struct Cloud<'a, const D: usize> {
+    columns: &'a Columns<'a, D>,
+    spread: &'a Columns<'a, D>,
+    weights: &'a [f64],
+    total: f64,
+    /// What makes variances of different coordinates comparable.
+    scale: SVector<f64, D>,
+}
+
+struct Part<const D: usize> {
+    clump: Clump<D>,
+    from: usize,
+    to: usize,
+    axis: usize,
+    urgency: f64,
+}
+
+impl<const D: usize> Cloud<'_, D> {
+    fn part(&self, order: &[u32], from: usize, to: usize) -> Part<D> {
+        let members = &order[from..to];
+        let origin = SVector::<f64, D>::from_fn(|d, _| self.columns[d][members[0] as usize]);
+        let (mut weight, mut first, mut second) = (0.0, SVector::<f64, D>::zeros(), SMatrix::<f64, D, D>::zeros());
+        let mut own = SVector::<f64, D>::zeros();
+        for &i in members {
+            let i = i as usize;
+            let w = self.weights[i];
+            let d = SVector::<f64, D>::from_fn(|k, _| self.columns[k][i] - origin[k]);
+            weight += w;
+            first += d * w;
+            second += d * (d * w).transpose();
+            for k in 0..D {
+                own[k] += w * self.spread[k].get(i).copied().unwrap_or(0.0);
+            }
+        }
+        let mean = first / weight;
+        let between = second / weight - mean * mean.transpose();
+        let (axis, variance) = between.diagonal().component_mul(&self.scale).argmax();
+        Part {
+            clump: Clump {
+                weight: weight / self.total,
+                mean: origin + mean,
+                covariance: between + SMatrix::from_diagonal(&(own / weight)),
+            },
+            from,
+            to,
+            axis,
+            urgency: if members.len() > 1 {
+                weight * variance.max(0.0)
+            } else {
+                0.0
+            },
+        }
+    }
+}
+
+/// Moves the indices that satisfy `left` to the front and returns their number.
+fn partition(order: &mut [u32], left: impl Fn(u32) -> bool) -> usize {
+    let mut boundary = 0;
+    for i in 0..order.len() {
+        if left(order[i]) {
+            order.swap(i, boundary);
+            boundary += 1;
+        }
+    }
+    boundary
+}

@@ -1,0 +1,330 @@
+//! Gaussian mixtures fitted to clumps by expectation-maximisation.
+
+use super::Error;
+use super::clumps::{Clump, Clumps};
+use fewbits_core::Columns;
+use fewbits_densities::{Component, Mixture};
+use fewbits_numerics::eigen::symmetric_eigen;
+use fewbits_numerics::error::{at_least_one, within};
+use nalgebra::{Cholesky, SMatrix, SVector};
+
+/// How a mixture is fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct MixtureFit {
+    /// The most components.
+    pub components: usize,
+    /// Components below this weight are dropped and the others fitted anew.
+    pub least_weight: f64,
+    /// The most steps of expectation-maximisation.
+    pub iterations: usize,
+    /// It stops when the mean log density rises by less than this, in nats.
+    pub tolerance: f64,
+}
+
+impl MixtureFit {
+    /// A fit of at most `components` Gaussians.
+    ///
+    /// # Errors
+    /// If `components` is zero.
+    pub fn new(components: usize) -> Result<Self, Error> {
+        Ok(Self {
+            components: at_least_one("components", components)?,
+            least_weight: 0.02,
+            iterations: 60,
+            tolerance: 1e-4,
+        })
+    }
+
+    /// The same, with another least weight.
+    ///
+    /// # Errors
+    /// If it is outside `[0, 1]`.
+    pub fn with_least_weight(self, least_weight: f64) -> Result<Self, Error> {
+        within("least_weight", least_weight, 0.0, 1.0)?;
+        Ok(Self { least_weight, ..self })
+    }
+}
+
+impl<const D: usize> Clumps<D> {
+    /// A Gaussian mixture of the same mean and covariance, by expectation-maximisation over the clumps.
+    ///
+    /// A clump counts with its covariance: the expected log density decides its shares, and its spread goes into the
+    /// components. The start is the clumps' own coarsest splitting, so that the result is deterministic.
+    ///
+    /// # Errors
+    /// If the whole has no spread in some direction.
+    pub fn fit(&self, options: &MixtureFit) -> Result<Mixture<D>, Error> {
+        let whole = self.covariance();
+        let mut components = self.start(options.components);
+        loop {
+            let fitted = self.improve(components, &whole, options);
+            let least = fitted
+                .iter()
+                .enumerate()
+                .min_by(|a, b| a.1.weight.total_cmp(&b.1.weight))
+                .map(|(at, c)| (at, c.weight));
+            match least {
+                Some((at, weight)) if weight < options.least_weight && fitted.len() > 1 => {
+                    components = fitted;
+                    components.swap_remove(at);
+                }
+                _ => {
+                    let parts = fitted
+                        .into_iter()
+                        .map(|c| Component::new(c.weight, c.mean, c.covariance));
+                    return Ok(Mixture::new(parts.collect::<Result<_, _>>()?)?);
+                }
+            }
+        }
+    }
+
+    fn start(&self, count: usize) -> Vec<Clump<D>> {
+        let column = |d: usize| self.clumps.iter().map(|c| c.mean[d]).collect::<Vec<_>>();
+        let columns: [Vec<f64>; D] = std::array::from_fn(column);
+        let weights: Vec<f64> = self.clumps.iter().map(|c| c.weight).collect();
+        let none: Columns<'_, D> = [&[]; D];
+        match Clumps::new(&columns.each_ref().map(Vec::as_slice), &none, &weights, count) {
+            Ok(coarse) => coarse.clumps,
+            Err(_) => self.clumps.clone(),
+        }
+    }
+
+    fn improve(&self, start: Vec<Clump<D>>, whole: &SMatrix<f64, D, D>, options: &MixtureFit) -> Vec<Clump<D>> {
+        // The floor keeps components from collapsing onto single clumps; it is below what the belief resolves.
+        let floor = (whole.diagonal() * 1e-9).sup(&self.least);
+        let mut components = start;
+        for c in &mut components {
+            c.covariance = raised(c.covariance, &floor);
+        }
+        let mut before = f64::NEG_INFINITY;
+        let mut logs = vec![0.0; components.len()];
+        for _ in 0..options.iterations {
+            let prepared: Vec<_> = components.iter().map(Prepared::new).collect();
+            let mut sums: Vec<Sums<D>> = components.iter().map(|_| Sums::default()).collect();
+            let mut mean_log = 0.0;
+            for clump in &self.clumps {
+                let mut best = f64::NEG_INFINITY;
+                for (log, p) in logs.iter_mut().zip(&prepared) {
+                    *log = p.as_ref().map_or(f64::NEG_INFINITY, |p| p.expected_log(clump));
+                    best = best.max(*log);
+                }
+                let mut total = 0.0;
+                for log in &mut logs {
+                    *log = if *log > best - 40.0 { (*log - best).exp() } else { 0.0 };
+                    total += *log;
+                }
+                mean_log += clump.weight * (best + total.ln());
+                for (share, s) in logs.iter().zip(&mut sums) {
+                    if *share > 0.0 {
+                        s.add(clump, clump.weight * share / total);
+                    }
+                }
+            }
+            components = sums.iter().filter_map(|s| s.clump(&floor)).collect();
+            logs.truncate(components.len());
+            let gained = mean_log - before;
+            if gained <= options.tolerance || gained.is_nan() {
+                break;
+            }
+            before = mean_log;
+        }
+        components
+    }
+}
+
+/// A covariance whose eigenvalues, in coordinates where the given variances are one, are at least one.
+fn raised<const D: usize>(covariance: SMatrix<f64, D, D>, least: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+    if least.iter().any(|v| *v <= 0.0) {
+        return covariance;
+    }
+    let scale = least.map(f64::sqrt);
+    let scaled = SMatrix::<f64, D, D>::from_fn(|i, j| covariance[(i, j)] / (scale[i] * scale[j]));
+    let (values, vectors) = symmetric_eigen(scaled);
+    if values.iter().all(|v| *v >= 1.0) {
+        return covariance;
+    }
+    let lifted = vectors * SMatrix::from_diagonal(&values.map(|v| v.max(1.0))) * vectors.transpose();
+    SMatrix::from_fn(|i, j| 0.5 * (lifted[(i, j)] + lifted[(j, i)]) * scale[i] * scale[j])
+}
+
+/// A component ready to be evaluated.
+struct Prepared<const D: usize> {
+    mean: SVector<f64, D>,
+    precision: SMatrix<f64, D, D>,
+    log_scale: f64,
+}
+
+impl<const D: usize> Prepared<D> {
+    fn new(c: &Clump<D>) -> Option<Self> {
+        let factor = Cholesky::new(c.covariance)?;
+        let half_log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+        Some(Self {
+            mean: c.mean,
+            precision: factor.inverse(),
+            log_scale: c.weight.ln() - half_log_determinant,
+        })
+    }
+
+    /// Expected log density over the clump, up to a constant.
+    #[inline]
+    fn expected_log(&self, clump: &Clump<D>) -> f64 {
+        let d = clump.mean - self.mean;
+        self.log_scale - 0.5 * (d.dot(&(self.precision * d)) + self.precision.dot(&clump.covariance))
+    }
+}
+
+struct Sums<const D: usize> {
+    weight: f64,
+    first: SVector<f64, D>,
+    second: SMatrix<f64, D, D>,
+    origin: Option<SVector<f64, D>>,
+}
+
+impl<const D: usize> Default for Sums<D> {
+    fn default() -> Self {
+        Self {
+            weight: 0.0,
+            first: SVector::zeros(),
+            second: SMatrix::zeros(),
+            origin: None,
+        }
+    }
+}
+
+impl<const D: usize> Sums<D> {
+    #[inline]
+    fn add(&mut self, clump: &Clump<D>, weight: f64) {
+        // Second moments about the first clump met, which is near: no cancellation against a far origin.
+        let d = clump.mean - *self.origin.get_or_insert(clump.mean);
+        self.weight += weight;
+        self.first += d * weight;
+        self.second += (d * d.transpose() + clump.covariance) * weight;
+    }
+
+    fn clump(&self, floor: &SVector<f64, D>) -> Option<Clump<D>> {
+        let origin = self.origin?;
+        let mean = self.first / self.weight;
+        (self.weight > 1e-12).then(|| Clump {
+            weight: self.weight,
+            mean: origin + mean,
+            covariance: raised(self.second / self.weight - mean * mean.transpose(), floor),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eigenvalues_are_raised_in_the_units_of_the_least_variances() {
+        let turn = SMatrix::<f64, 2, 2>::new(0.8, -0.6, 0.6, 0.8);
+        let unit = SMatrix::<f64, 2, 2>::new(2.0, 0.0, 0.0, 0.25);
+        let of =
+            |a: f64, b: f64| unit * turn * SMatrix::from_diagonal(&SVector::from([a, b])) * turn.transpose() * unit;
+        let least = SVector::from([4.0, 0.0625]);
+        for (a, b) in [(0.3, 2.0), (3.0, 0.2), (0.1, 0.4), (1.5, 2.5)] {
+            assert!((raised(of(a, b), &least) - of(a.max(1.0), b.max(1.0))).amax() < 1e-14, "{a} {b}");
+        }
+        for none in [[0.0, 0.0625], [4.0, 0.0]] {
+            assert_eq!(raised(of(0.3, 0.2), &SVector::from(none)), of(0.3, 0.2));
+        }
+    }
+
+    /// One step of expectation-maximisation as the textbooks have it, and the mean log density before it.
+    fn step(clumps: &[Clump<2>], components: &[Clump<2>]) -> (Vec<Clump<2>>, f64) {
+        let density = |k: &Clump<2>, c: &Clump<2>| {
+            let precision = k.covariance.try_inverse().unwrap();
+            let d = c.mean - k.mean;
+            let square = d.dot(&(precision * d)) + (precision * c.covariance).trace();
+            k.weight * (-0.5 * square).exp() / k.covariance.determinant().sqrt()
+        };
+        let total = |c: &Clump<2>| components.iter().map(|k| density(k, c)).sum::<f64>();
+        let fitted = components.iter().map(|k| {
+            let shares: Vec<f64> = clumps.iter().map(|c| c.weight * density(k, c) / total(c)).collect();
+            let weight: f64 = shares.iter().sum();
+            let mean = shares
+                .iter()
+                .zip(clumps)
+                .map(|(s, c)| c.mean * *s)
+                .sum::<SVector<f64, 2>>()
+                / weight;
+            let spread = |c: &Clump<2>| c.covariance + (c.mean - mean) * (c.mean - mean).transpose();
+            let second: SMatrix<f64, 2, 2> = shares.iter().zip(clumps).map(|(s, c)| spread(c) * *s).sum();
+            Clump {
+                weight,
+                mean,
+                covariance: second / weight,
+            }
+        });
+        (fitted.collect(), clumps.iter().map(|c| c.weight * total(c).ln()).sum())
+    }
+
+    #[test]
+    fn fits_are_expectation_maximisation_until_it_gains_too_little() {
+        // A bent band of points.
+        let at = |i: i32| f64::from(i) * 0.05;
+        let x: Vec<f64> = (0..120).map(|i| at(i) + 0.3 * (7.0 * at(i)).sin()).collect();
+        let y: Vec<f64> = (0..120)
+            .map(|i| 1e3 * ((at(i) - 2.0).powi(2) + (11.3 * at(i)).cos()))
+            .collect();
+        let weights: Vec<f64> = (0..120).map(|i| 1.2 + (1.7 * at(i)).sin()).collect();
+        let clumps = Clumps::new(&[&x, &y], &[&[], &[]], &weights, 40).unwrap();
+        let close = |found: &Mixture<2>, exact: &[Clump<2>]| {
+            assert_eq!(found.len(), exact.len());
+            let unit = SVector::from([1.0, 1e3]);
+            for (a, b) in found.components().iter().zip(exact) {
+                let gap = (a.covariance() - b.covariance).component_div(&(unit * unit.transpose()));
+                let off = (a.mean() - b.mean).component_div(&unit);
+                assert!((a.weight() - b.weight).abs() < 1e-8 && off.amax() < 1e-8 && gap.amax() < 1e-7, "{off} {gap}");
+            }
+        };
+        let options = |iterations, tolerance, least_weight| MixtureFit {
+            components: 3,
+            least_weight,
+            iterations,
+            tolerance,
+        };
+        let mut exact = vec![clumps.start(3)];
+        let mut heights = Vec::new();
+        for k in 0..9 {
+            let (next, height) = step(clumps.clumps(), &exact[k]);
+            close(&clumps.fit(&options(k + 1, -1.0, 0.0)).unwrap(), &next);
+            exact.push(next);
+            heights.push(height);
+        }
+        // It ends after the first step before which the height rose by less than the tolerance.
+        for k in [2, 5, 8] {
+            let gain = heights[k] - heights[k - 1];
+            assert!(gain < heights[k - 1] - heights[k - 2] || k == 2);
+            let tolerance = 1.0001 * gain;
+            let ends = (1..9).find(|k| heights[*k] - heights[*k - 1] <= tolerance).unwrap();
+            close(&clumps.fit(&options(60, tolerance, 0.0)).unwrap(), &exact[ends + 1]);
+        }
+        // What is too light is dropped, one after the other, and the rest fitted on from where it was.
+        let fitted = |least| clumps.fit(&options(9, -1.0, least)).unwrap();
+        let lightest = (0..3)
+            .min_by(|a, b| exact[9][*a].weight.total_cmp(&exact[9][*b].weight))
+            .unwrap();
+        let least = 1.0001 * exact[9][lightest].weight;
+        let mut left = exact[9].clone();
+        left.swap_remove(lightest);
+        for _ in 0..9 {
+            left = step(clumps.clumps(), &left).0;
+        }
+        assert!(left.iter().all(|c| c.weight > least));
+        close(&fitted(least), &left);
+        close(&fitted(0.9999 * exact[9][lightest].weight), &exact[9]);
+        let one = fitted(1.0);
+        assert!(
+            one.len() == 1
+                && (one.mean() - clumps.mean())
+                    .component_div(&SVector::from([1.0, 1e3]))
+                    .amax()
+                    < 1e-12
+        );
+        assert!(MixtureFit::new(0).is_err() && MixtureFit::new(3).unwrap().with_least_weight(1.1).is_err());
+        assert_eq!(MixtureFit::new(3).unwrap().with_least_weight(0.3).unwrap().least_weight, 0.3);
+    }
+}

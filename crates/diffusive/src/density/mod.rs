@@ -1,0 +1,23 @@
+//! Densities of the position and rate of a source: the exact posterior over cells, and what is fitted to it.
+//!
+//! | density | use it when |
+//! |---|---|
+//! | [`Cells`] | moments must be exact (about 1e-7) in one to three dimensions; takes thousands of evaluations |
+//! | [`Clumps`] | a mixture is to be fitted to cells: a few hundred weighted Gaussians with the moments of all cells |
+//! | [`Lpg`] | the shape must be kept in few numbers: a squared series of Hermite polynomials about Gaussians |
+//! | [`laplace`] | there is one peak: its mode and curvature, or its cumulants |
+//!
+//! [`polynomials`] has the Hermite polynomials and the plain series of the paper.
+
+mod cells;
+mod clumps;
+mod error;
+pub mod laplace;
+mod mixture_fit;
+mod series;
+
+pub use cells::{CellOptions, CellTarget, Cells};
+pub use clumps::{Clump, Clumps};
+pub use error::Error;
+pub use mixture_fit::MixtureFit;
+pub use series::{Lpg, LpgFit, Slice, SliceMoments, polynomials};

@@ -1,0 +1,338 @@
+//! Linear combinations of polynomial Gaussians.
+
+mod basis;
+mod fit;
+pub mod polynomials;
+mod three_dimensions;
+
+pub use fit::LpgFit;
+pub use three_dimensions::{Slice, SliceMoments};
+
+use super::Error;
+use basis::{gauss_hermite, hermite_products};
+use fewbits_core::columns::state_at;
+use fewbits_core::{Belief, Columns, ColumnsMut, Density};
+use fewbits_densities::Component;
+use fewbits_numerics::error::{all_finite, at_least_one};
+use fewbits_numerics::normal::LN_SQRT_2PI;
+use fewbits_numerics::{ArgumentError, LogSum};
+use nalgebra::{SMatrix, SVector};
+use polynomials::{check_degree, multi_indices};
+use rand::{Rng, RngExt};
+
+/// A belief `s(x)^2` with `s(x) = sum_l sum_nu c_l,nu sqrt(phi_l(x)) h_nu(u_l)`: Gaussians `phi_l`, whitened coordinates
+/// `u_l = L_l^-1 (x - m_l)`, and products `h_nu` of orthonormal Hermite polynomials of total degree up to `k`.
+///
+/// The space spanned is that of the paper's polynomials `He_nu(z; W)`, but the coordinates are well conditioned, and the square
+/// can never be negative. One component of degree `k` costs `5 + (k + 1)(k + 2) / 2` numbers in the plane: the Gaussian and the
+/// coefficients. (The paper's factors `lambda_l` repeat the scale of the coefficients and are not sent.)
+///
+/// The coefficients are the Galerkin projection of `sqrt(p)`, `c = G^-1 b` with the Gram matrix `G` of the basis and
+/// `b = int basis sqrt(p)`: where `p` is zero, so is the fit, without any point having been placed there. Its affinity with `p`,
+/// `int s sqrt(p)`, comes for free and says how good it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lpg<const D: usize> {
+    terms: Vec<Term<D>>,
+    degree: usize,
+    indices: Vec<[usize; D]>,
+    mean: SVector<f64, D>,
+    covariance: SMatrix<f64, D, D>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Term<const D: usize> {
+    gaussian: Component<D>,
+    half_log_peak: f64,
+    /// Norm of the whitener.
+    steepness: f64,
+    coefficients: Vec<f64>,
+}
+
+impl<const D: usize> Lpg<D> {
+    /// A belief from its Gaussians and coefficients, one list for each Gaussian in the order of
+    /// [`multi_indices`]; normalised.
+    ///
+    /// # Errors
+    /// If there is no component, `degree` exceeds 20, a list has the wrong length or an entry that is not finite, or the square
+    /// integrates to zero.
+    pub fn new(gaussians: &[Component<D>], degree: usize, coefficients: &[Vec<f64>]) -> Result<Self, Error> {
+        let mut belief = Self::skeleton(gaussians, degree)?;
+        let size = belief.indices.len();
+        if coefficients.len() != gaussians.len() || coefficients.iter().any(|c| c.len() != size) {
+            let expected = format!("{} lists of {size} numbers", gaussians.len());
+            return Err(ArgumentError::new("coefficients", "of other lengths", expected).into());
+        }
+        for (term, list) in belief.terms.iter_mut().zip(coefficients) {
+            all_finite("coefficients", list)?;
+            term.coefficients.clone_from(list);
+        }
+        belief.settle()?;
+        Ok(belief)
+    }
+
+    fn skeleton(gaussians: &[Component<D>], degree: usize) -> Result<Self, Error> {
+        at_least_one("components", gaussians.len())?;
+        check_degree(degree)?;
+        let indices = multi_indices::<D>(degree)?;
+        let mut terms = Vec::with_capacity(gaussians.len());
+        for gaussian in gaussians {
+            terms.push(Term {
+                gaussian: *gaussian,
+                half_log_peak: -0.25 * gaussian.log_determinant() - 0.5 * D as f64 * LN_SQRT_2PI,
+                steepness: gaussian.factor().whitener.norm(),
+                coefficients: vec![0.0; indices.len()],
+            });
+        }
+        Ok(Self {
+            terms,
+            degree,
+            indices,
+            mean: SVector::zeros(),
+            covariance: SMatrix::zeros(),
+        })
+    }
+
+    /// The Gaussians.
+    pub fn gaussians(&self) -> impl Iterator<Item = &Component<D>> {
+        self.terms.iter().map(|term| &term.gaussian)
+    }
+
+    /// Coefficients of each Gaussian's polynomials, in the order of [`multi_indices`].
+    pub fn coefficients(&self) -> impl Iterator<Item = &[f64]> {
+        self.terms.iter().map(|term| term.coefficients.as_slice())
+    }
+
+    /// Highest total degree of the polynomials.
+    pub fn degree(&self) -> usize {
+        self.degree
+    }
+
+    /// How many numbers describe the belief: of each component a mean, a covariance and the coefficients; one less for the norm.
+    pub fn scalars(&self) -> usize {
+        self.terms.len() * (D + D * (D + 1) / 2 + self.indices.len()) - 1
+    }
+
+    /// The log density at `x`, and the logarithm of a bound of it anywhere within `half_width` of `x` in every coordinate:
+    /// Gaussians widened by the cell and polynomials by their absolute values. `scratch` is room for the polynomials.
+    pub fn log_density_and_bound(&self, x: &SVector<f64, D>, half_width: f64, scratch: &mut Vec<f64>) -> (f64, f64) {
+        scratch.resize(self.indices.len(), 0.0);
+        let (mut bound, mut highest) = (LogSum::default(), f64::NEG_INFINITY);
+        let (mut largest, mut sum) = (f64::NEG_INFINITY, 0.0);
+        for term in &self.terms {
+            let u = term.whitened(x);
+            // How far a corner of the cell is in whitened coordinates.
+            let reach = half_width * (D as f64).sqrt() * term.steepness;
+            let length = u.norm();
+            let near = (length - reach).max(0.0);
+            let peak = term.half_log_peak - 0.25 * near * near;
+            let log = term.half_log_peak - 0.25 * length * length;
+            if peak < highest - 60.0 {
+                continue;
+            }
+            hermite_products(&self.indices, self.degree, &u, scratch);
+            let parts = scratch
+                .iter()
+                .zip(&term.coefficients)
+                .map(|(polynomial, c)| polynomial * c);
+            let (value, size): (f64, f64) = (parts.clone().sum(), parts.map(f64::abs).sum());
+            let size: f64 = if reach > 0.5 {
+                size.max(term.coefficients.iter().map(|c| c.abs()).sum())
+            } else {
+                size
+            };
+            bound.add(peak + size.ln());
+            highest = bound.value();
+            if log > largest {
+                sum *= (largest - log).exp();
+                largest = log;
+            }
+            sum += value * (log - largest).exp();
+        }
+        let size: f64 = sum.abs();
+        let density = if size > 0.0 && size.is_finite() {
+            2.0 * (largest + size.ln())
+        } else {
+            f64::NEG_INFINITY
+        };
+        (density, 2.0 * highest)
+    }
+
+    /// Calls `visit(l, m, weight, x, u_l, u_m)` at the nodes of rules that integrate `sqrt(phi_l phi_m)` times polynomials of
+    /// degree up to `2 nodes - 1` per axis exactly, for every pair `l <= m` that overlaps.
+    fn pairs(
+        &self,
+        nodes: usize,
+        mut visit: impl FnMut(usize, usize, f64, &SVector<f64, D>, &SVector<f64, D>, &SVector<f64, D>),
+    ) -> Result<(), Error> {
+        let rule = gauss_hermite(nodes);
+        for l in 0..self.terms.len() {
+            for m in l..self.terms.len() {
+                let (a, b) = (&self.terms[l], &self.terms[m]);
+                let (wa, wb) = (&a.gaussian.factor().whitener, &b.gaussian.factor().whitener);
+                let precision = (wa.tr_mul(wa) + wb.tr_mul(wb)) * 0.5;
+                let Some(factor) = precision.cholesky() else {
+                    return Err(ArgumentError::new("covariance", "singular", "a positive definite matrix").into());
+                };
+                let pull = wa.tr_mul(wa) * a.gaussian.mean() + wb.tr_mul(wb) * b.gaussian.mean();
+                let mean = factor.solve(&(pull * 0.5));
+                let covariance = factor.inverse();
+                let Some(root) = covariance.cholesky() else {
+                    return Err(ArgumentError::new("covariance", "singular", "a positive definite matrix").into());
+                };
+                let (ua, ub) = (a.whitened(&mean), b.whitened(&mean));
+                let half_log_det: f64 = root.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+                // sqrt(phi_l phi_m) = exp(overlap) N(x; mean, covariance)
+                let overlap = a.half_log_peak + b.half_log_peak + half_log_det + D as f64 * LN_SQRT_2PI
+                    - 0.25 * (ua.norm_squared() + ub.norm_squared());
+                if overlap < -60.0 {
+                    continue;
+                }
+                let lower = root.l();
+                for i in 0..nodes.pow(D as u32) {
+                    let (mut rest, mut weight) = (i, overlap.exp());
+                    let g = SVector::<f64, D>::from_fn(|_, _| {
+                        let (node, w) = rule[rest % nodes];
+                        rest /= nodes;
+                        weight *= w;
+                        node
+                    });
+                    let x = mean + lower * g;
+                    visit(l, m, weight, &x, &a.whitened(&x), &b.whitened(&x));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Normalises, and finds mean and covariance.
+    fn settle(&mut self) -> Result<(), Error> {
+        let size = self.indices.len();
+        let mut values = vec![0.0; size];
+        let (mut mass, mut first, mut second) = (0.0, SVector::<f64, D>::zeros(), SMatrix::<f64, D, D>::zeros());
+        let origin = *self.terms[0].gaussian.mean();
+        self.pairs(self.degree + 2, |l, m, weight, x, ul, um| {
+            let mut at = |term: &Term<D>, u| {
+                hermite_products(&self.indices, self.degree, u, &mut values);
+                values.iter().zip(&term.coefficients).map(|(v, c)| v * c).sum::<f64>()
+            };
+            let product = at(&self.terms[l], ul) * at(&self.terms[m], um);
+            let w = weight * product * if l == m { 1.0 } else { 2.0 };
+            let d = x - origin;
+            mass += w;
+            first += d * w;
+            second += d * d.transpose() * w;
+        })?;
+        if !(mass > 0.0 && mass.is_finite()) {
+            return Err(fewbits_core::Error::Impossible.into());
+        }
+        let norm = mass.sqrt();
+        for term in &mut self.terms {
+            term.coefficients.iter_mut().for_each(|c| *c /= norm);
+        }
+        let mean = first / mass;
+        self.mean = origin + mean;
+        self.covariance = second / mass - mean * mean.transpose();
+        Ok(())
+    }
+
+    /// `s(x)` as sign and logarithm.
+    #[inline]
+    fn log_root(&self, x: &SVector<f64, D>, values: &mut [f64]) -> f64 {
+        let mut largest = f64::NEG_INFINITY;
+        let mut sum = 0.0;
+        for term in &self.terms {
+            let u = term.whitened(x);
+            let log = term.half_log_peak - 0.25 * u.norm_squared();
+            hermite_products(&self.indices, self.degree, &u, values);
+            let polynomial: f64 = values.iter().zip(&term.coefficients).map(|(v, c)| v * c).sum();
+            if log > largest {
+                sum *= (largest - log).exp();
+                largest = log;
+            }
+            sum += polynomial * (log - largest).exp();
+        }
+        let size = sum.abs();
+        if size > 0.0 && size.is_finite() {
+            largest + size.ln()
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+}
+
+impl<const D: usize> Term<D> {
+    #[inline]
+    fn whitened(&self, x: &SVector<f64, D>) -> SVector<f64, D> {
+        self.gaussian.factor().whitener * (x - self.gaussian.mean())
+    }
+}
+
+impl<const D: usize> Belief<D> for Lpg<D> {
+    fn mean(&self) -> SVector<f64, D> {
+        self.mean
+    }
+
+    fn covariance(&self) -> SMatrix<f64, D, D> {
+        self.covariance
+    }
+
+    /// Rejection from a widened mixture of the Gaussians with a bound found on 1000 trial points times three; a point above the
+    /// bound is accepted as it is.
+    fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
+        let count = states.first().map_or(0, |column| column.len());
+        let widened = |rng: &mut R| {
+            let term = &self.terms[rng.random_range(0..self.terms.len())];
+            let g = SVector::<f64, D>::from_fn(|_, _| rng.sample(rand_distr::StandardNormal));
+            term.gaussian.mean() + term.gaussian.cholesky_factor() * g * WIDER
+        };
+        let mut values = vec![0.0; self.indices.len()];
+        // Up to a constant, which the bound has too.
+        let log_proposal = |x: &SVector<f64, D>| {
+            let parts = self
+                .terms
+                .iter()
+                .map(|term| 2.0 * term.half_log_peak - 0.5 * term.whitened(x).norm_squared() / (WIDER * WIDER));
+            parts.collect::<LogSum>().value()
+        };
+        let mut bound = f64::NEG_INFINITY;
+        for _ in 0..1000 {
+            let x = widened(rng);
+            bound = bound.max(2.0 * self.log_root(&x, &mut values) - log_proposal(&x));
+        }
+        bound += 3.0_f64.ln();
+        for i in 0..count {
+            let mut x = widened(rng);
+            for _ in 0..100_000 {
+                let ratio = 2.0 * self.log_root(&x, &mut values) - log_proposal(&x) - bound;
+                if rng.random::<f64>().ln() < ratio {
+                    break;
+                }
+                x = widened(rng);
+            }
+            for d in 0..D {
+                states[d][i] = x[d];
+            }
+        }
+    }
+}
+
+/// Widening of the proposal of the rejection sampler.
+const WIDER: f64 = 1.6;
+impl<const D: usize> Density<D> for Lpg<D> {
+    fn log_density(&self, state: &SVector<f64, D>) -> f64 {
+        2.0 * self.log_root(state, &mut vec![0.0; self.indices.len()])
+    }
+
+    fn add_log_densities(&self, states: &Columns<'_, D>, logs: &mut [f64]) {
+        if !fewbits_core::columns::lengths_agree(states, logs) {
+            return;
+        }
+        let mut values = vec![0.0; self.indices.len()];
+        for (i, log) in logs.iter_mut().enumerate() {
+            *log += 2.0 * self.log_root(&state_at(states, i), &mut values);
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! Polynomial Gaussians over a plane and one more coordinate, beside beliefs that are cells over the plane.
+
+use super::basis::{gauss_hermite, row_of_polynomials};
+use super::fit::LpgFit;
+use super::polynomials::HIGHEST_DEGREE;
+use super::{Lpg, Term};
+use crate::density::{Cells, Error};
+use fewbits_core::columns::state_at;
+use fewbits_densities::Component;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::quadrature::gauss_legendre;
+use nalgebra::{DVector, Vector2, Vector3};
+
+/// A belief over three coordinates at one place of the first two: `s(t)^2` along the third, with
+/// `s(t) = sum_l exp(height_l - u_l^2 / 4) sum_k d_lk h_k(u_l)`, `u_l = (t - centre_l) / deviation_l`.
+///
+/// Made to be used again for place after place: [`Lpg::slice`] overwrites it.
+#[derive(Debug, Clone, Default)]
+pub struct Slice {
+    terms: Vec<SliceTerm>,
+    degree: usize,
+    /// Sums of absolute values, which bound `|s|`.
+    absolute: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct SliceTerm {
+    height: f64,
+    centre: f64,
+    deviation: f64,
+    coefficients: [f64; HIGHEST_DEGREE + 1],
+}
+
+/// Integral, mean and variance of a slice times a likelihood.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SliceMoments {
+    /// Logarithm of the integral.
+    pub log_mass: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Variance.
+    pub variance: f64,
+}
+
+/// A Gaussian times a polynomial of the degrees in use ends here, in standard deviations.
+const ENDS: f64 = 8.5;
+/// A panel of the quadrature along a slice is at most so many standard deviations wide, and a stretch has at least so many panels.
+const PANEL: f64 = 2.5;
+const LEAST_PANELS: usize = 6;
+const MOST_PANELS: usize = 200;
+/// Terms this many nats below the largest are left out.
+const FAINT: f64 = 60.0;
+
+impl Lpg<3> {
+    /// The best approximation of a belief that is cells over the first two coordinates and, in each cell, a normal of the third
+    /// with the given mean and variance: as [`Lpg::fit`], the third coordinate integrated in closed form.
+    ///
+    /// # Errors
+    /// If there is no Gaussian, `degree` exceeds 20, the lengths differ, or the basis is singular (two equal Gaussians).
+    pub fn fit_lifted(
+        cells: &Cells<2>,
+        means: &[f64],
+        variances: &[f64],
+        gaussians: &[Component<3>],
+        degree: usize,
+    ) -> Result<LpgFit<3>, Error> {
+        let belief = Self::skeleton(gaussians, degree)?;
+        if means.len() != cells.len() || variances.len() != cells.len() {
+            return Err(ArgumentError::new("means", means.len(), format!("{}, one for each cell", cells.len())).into());
+        }
+        let gram = belief.gram()?;
+        let size = belief.indices.len();
+        let mut b = DVector::zeros(gram.nrows());
+        // Exact for polynomials of this degree.
+        let rule = gauss_hermite(degree / 2 + 1);
+        let columns = cells.columns();
+        let (mut first, mut second, mut third, mut row) =
+            (vec![0.0; degree + 1], vec![0.0; degree + 1], vec![0.0; degree + 1], vec![0.0; degree + 1]);
+        for (i, weight) in cells.weights().iter().enumerate() {
+            let (mean, variance) = (means[i], variances[i]);
+            if variance.is_nan() || variance <= 0.0 {
+                // No width: no overlap.
+                continue;
+            }
+            let place = state_at(&columns, i);
+            for (l, term) in belief.terms.iter().enumerate() {
+                let (u, centre, deviation) = term.at_place(&place);
+                // The product of the two roots along the third coordinate: a Gaussian of variance 2 / precision.
+                let precision = 1.0 / variance + 1.0 / (deviation * deviation);
+                let gap = mean - centre;
+                let log = term.half_log_peak
+                    - 0.25 * (u.norm_squared() + gap * gap / (variance + deviation * deviation))
+                    - 0.25 * (std::f64::consts::TAU * variance).ln()
+                    + 0.5 * (2.0 * std::f64::consts::TAU / precision).ln();
+                if log < -80.0 {
+                    continue;
+                }
+                let factor = weight.sqrt() * cells.width() * log.exp();
+                let middle = gap / (variance * precision);
+                third.fill(0.0);
+                for (node, share) in &rule {
+                    row_of_polynomials((middle + node * (2.0 / precision).sqrt()) / deviation, &mut row);
+                    third.iter_mut().zip(&row).for_each(|(sum, h)| *sum += share * h);
+                }
+                row_of_polynomials(u.x, &mut first);
+                row_of_polynomials(u.y, &mut second);
+                for (nu, [i, j, k]) in belief.indices.iter().enumerate() {
+                    b[l * size + nu] += factor * first[*i] * second[*j] * third[*k];
+                }
+            }
+        }
+        belief.project(&gram, &b)
+    }
+
+    /// Writes the belief along the third coordinate at a place of the other two to `slice`. With a `half_width` above zero, about the
+    /// most that it is anywhere within that of the place: Gaussians widened by the cell, polynomials by their absolute values.
+    pub fn slice(&self, place: &Vector2<f64>, half_width: f64, slice: &mut Slice) {
+        let degree = self.degree;
+        slice.terms.clear();
+        (slice.degree, slice.absolute) = (degree, half_width > 0.0);
+        let (mut first, mut second) = ([0.0; HIGHEST_DEGREE + 1], [0.0; HIGHEST_DEGREE + 1]);
+        for term in &self.terms {
+            let (u, centre, deviation) = term.at_place(place);
+            let w = &term.gaussian.factor().whitener;
+            let reach = half_width * (2.0 * w.fixed_view::<2, 2>(0, 0).norm_squared()).sqrt();
+            let near = (u.norm() - reach).max(0.0);
+            // How far the centre moves within the cell.
+            let shift = half_width * (w[(2, 0)].abs() + w[(2, 1)].abs()) * deviation;
+            row_of_polynomials(u.x, &mut first[..=degree]);
+            row_of_polynomials(u.y, &mut second[..=degree]);
+            let mut coefficients = [0.0; HIGHEST_DEGREE + 1];
+            for ([i, j, k], c) in self.indices.iter().zip(&term.coefficients) {
+                let value = c * first[*i] * second[*j];
+                coefficients[*k] += match slice.absolute {
+                    false => value,
+                    // A coarse cell: near the middle the polynomials are about one.
+                    true if reach > 0.5 => value.abs().max(c.abs()),
+                    true => value.abs(),
+                };
+            }
+            slice.terms.push(SliceTerm {
+                height: term.half_log_peak - 0.25 * near * near,
+                centre,
+                deviation: deviation.hypot(shift),
+                coefficients,
+            });
+        }
+    }
+}
+
+impl Term<3> {
+    /// The first two whitened coordinates of a place, and centre and deviation of the Gaussian along the third there.
+    fn at_place(&self, place: &Vector2<f64>) -> (Vector2<f64>, f64, f64) {
+        let (w, mean) = (&self.gaussian.factor().whitener, self.gaussian.mean());
+        let d = place - mean.xy();
+        let deviation = w[(2, 2)].recip();
+        let u = self.gaussian.factor().whitener * Vector3::new(d.x, d.y, 0.0);
+        (u.xy(), mean.z - u.z * deviation, deviation)
+    }
+}
+
+impl Slice {
+    /// Moments over `low <= t <= high` of the slice times `exp(-(energy - 2 correlation t + response t^2) / 2)`, to about eight
+    /// digits: Gauss-Legendre panels over where each term's product with the likelihood has its mass.
+    ///
+    /// The logarithm of the mass is `-inf` where there is none.
+    pub fn tilted(&self, [response, correlation, energy]: [f64; 3], [low, high]: [f64; 2]) -> SliceMoments {
+        let likelihood = |t: f64| -0.5 * (energy - t * (2.0 * correlation - t * response));
+        let mut stretches: Vec<Stretch> = Vec::with_capacity(self.terms.len());
+        let mut peak = f64::NEG_INFINITY;
+        for term in &self.terms {
+            let precision = 1.0 / (term.deviation * term.deviation) + response;
+            let centre = term.centre + (correlation - response * term.centre) / precision;
+            let inside = centre.clamp(low, high);
+            let off = (inside - term.centre) / term.deviation;
+            let height = 2.0 * term.height - 0.5 * off * off + likelihood(inside);
+            if height.is_finite() {
+                peak = peak.max(height);
+                stretches.push(Stretch::around(centre, precision, height, [low, high]));
+            }
+        }
+        let none = SliceMoments {
+            log_mass: f64::NEG_INFINITY,
+            mean: 0.5 * (low + high),
+            variance: 0.0,
+        };
+        stretches.retain(|s| s.height > peak - FAINT && s.from < s.to);
+        stretches.sort_by(|a, b| a.from.total_cmp(&b.from));
+        let origin = none.mean;
+        let (mut mass, mut first, mut second) = (0.0, 0.0, 0.0);
+        let mut row = [0.0; HIGHEST_DEGREE + 1];
+        let mut rest = stretches.as_slice();
+        while let Some((head, tail)) = rest.split_first() {
+            // Stretches that overlap are integrated as one.
+            let mut whole = *head;
+            let mut others = tail;
+            while let Some((next, further)) = others.split_first().filter(|(next, _)| next.from < whole.to) {
+                whole.to = whole.to.max(next.to);
+                whole.step = whole.step.min(next.step);
+                others = further;
+            }
+            rest = others;
+            let panels = (((whole.to - whole.from) / whole.step).ceil() as usize).clamp(LEAST_PANELS, MOST_PANELS);
+            for (t, weight) in gauss_legendre::<8>().panels(whole.from, whole.to, panels) {
+                let root = self.root(t, 0.5 * (likelihood(t) - peak), &mut row[..=self.degree]);
+                let share = weight * root * root;
+                let d = t - origin;
+                mass += share;
+                first += share * d;
+                second += share * d * d;
+            }
+        }
+        if !(mass > 0.0 && mass.is_finite()) {
+            return none;
+        }
+        let mean = first / mass;
+        SliceMoments {
+            log_mass: peak + mass.ln(),
+            mean: origin + mean,
+            variance: (second / mass - mean * mean).max(0.0),
+        }
+    }
+
+    /// `s(t) exp(log)`.
+    fn root(&self, t: f64, log: f64, row: &mut [f64]) -> f64 {
+        let mut sum = 0.0;
+        for term in &self.terms {
+            let u = (t - term.centre) / term.deviation;
+            let exponent = term.height - 0.25 * u * u + log;
+            if exponent < -FAINT {
+                continue;
+            }
+            row_of_polynomials(u, row);
+            let parts = row.iter().zip(&term.coefficients);
+            let polynomial: f64 = if self.absolute {
+                parts.map(|(h, c)| (h * c).abs()).sum()
+            } else {
+                parts.map(|(h, c)| h * c).sum()
+            };
+            sum += polynomial * exponent.exp();
+        }
+        sum
+    }
+}
+
+/// Where one term's product with a likelihood has its mass.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    from: f64,
+    to: f64,
+    step: f64,
+    height: f64,
+}
+
+impl Stretch {
+    fn around(centre: f64, precision: f64, height: f64, [low, high]: [f64; 2]) -> Self {
+        let deviation = precision.sqrt().recip();
+        let reach = ENDS * deviation;
+        // Beyond an end only a tail is inside, and what counts of it is short: as far as the exponent falls by `ENDS^2 / 2`.
+        let (below, above) = ((low - centre).max(0.0), (centre - high).max(0.0));
+        Self {
+            from: low.max(centre - above.hypot(reach)),
+            to: high.min(centre + below.hypot(reach)),
+            step: PANEL * deviation,
+            height,
+        }
+    }
+}

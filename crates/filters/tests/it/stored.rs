@@ -1,0 +1,71 @@
+//! What is stored as text comes back to the bit whatever the parser of numbers does: no float stands as a number.
+
+use fewbits_core::factor::{InCell, Partition, Scalar, Value};
+use fewbits_core::number::Levels;
+use fewbits_core::{Cell, Gaussian, Link};
+use fewbits_densities::{GaussianCloud, Grid, KernelEstimate, Mixture, Particles, PlaneMass, PointMass};
+use fewbits_filters::ImmBelief;
+use fewbits_models::{Ar1, ContinuousLinear, LinearSensor, ReceivedPower, constant_velocity_2d};
+use fewbits_monte_carlo::Stream;
+use nalgebra::{Matrix2, Vector2};
+use rand::RngExt;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value as Json;
+use std::fmt::Debug;
+
+/// Whether no number of the tree has a fraction or an exponent: only whole numbers are read back exactly by every parser.
+fn holds_no_float(stored: &Json) -> bool {
+    match stored {
+        Json::Number(number) => !number.is_f64(),
+        Json::Array(all) => all.iter().all(holds_no_float),
+        Json::Object(all) => all.values().all(holds_no_float),
+        _ => true,
+    }
+}
+
+fn check<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
+    let stored = serde_json::to_value(value).unwrap();
+    assert!(holds_no_float(&stored), "{stored}");
+    assert_eq!(&serde_json::from_value::<T>(stored).unwrap(), value);
+    assert_eq!(&serde_json::from_str::<T>(&serde_json::to_string(value).unwrap()).unwrap(), value);
+}
+
+#[test]
+fn beliefs_factors_and_models_are_stored_without_floats() {
+    let mut rng = Stream::new(4).rng();
+    for _ in 0..200 {
+        let mut x: [f64; 8] = std::array::from_fn(|_| 4.0 * rng.random::<f64>() - 2.0);
+        let covariance = Matrix2::new(3.0 + x[0], x[1] / 3.0, x[1] / 3.0, 3.0 + x[2]);
+        let belief = Gaussian::new(Vector2::new(x[3], x[4]), covariance).unwrap();
+        check(&belief);
+        check(
+            &Link::new(0.3 + x[0] / 10.0, 0.2)
+                .unwrap()
+                .with_erasure(0.1 + x[1] / 30.0)
+                .unwrap(),
+        );
+        check(&Levels::new(x[0], x[0] + 1.0 / 3.0, 5).unwrap());
+        let cell = Cell::new(x[5], f64::INFINITY).unwrap();
+        check(&cell);
+        check(&Scalar::from(InCell::new(cell, 1.0 + x[0].abs(), 0.1, 0.7).unwrap()));
+        check(&Scalar::from(Value::scalar(x[0], 1.0 / 3.0).unwrap()));
+        check(&Scalar::from(Partition::new(vec![x[0]], vec![0.1, 0.9], 1.0 / 7.0).unwrap()));
+        let columns = [x[..4].to_vec(), x[4..].to_vec()];
+        let cloud = Particles::new(columns, &[0.0, -0.1, x[0], f64::NEG_INFINITY]).unwrap();
+        check(&cloud);
+        check(&GaussianCloud::new(cloud.clone(), covariance).unwrap());
+        check(&Mixture::single(&belief).unwrap());
+        let estimate = KernelEstimate::new(cloud, covariance).unwrap();
+        assert!(holds_no_float(&serde_json::to_value(&estimate).unwrap()));
+        check(&PointMass::normal(Grid::symmetric(6.0, 0.3).unwrap(), x[0], 1.0 / 3.0).unwrap());
+        check(&PlaneMass::normal(&(Matrix2::identity() * 0.7), &belief).unwrap());
+        check(&ImmBelief::new(vec![0.3, 0.7], vec![belief, belief]).unwrap());
+        x[0] = x[0].abs() / 2.0;
+        check(&Ar1::new(x[0], 1.0 / 3.0).unwrap());
+        check(&ContinuousLinear::ornstein_uhlenbeck(x[1], 1.0 / 3.0, x[0] + 0.1).unwrap());
+        check(&constant_velocity_2d(0.1 + x[0], 1.0 / 7.0).unwrap());
+        check(&LinearSensor::<2, 1>::scalar(Vector2::new(x[1], x[2]), 1.0 / 7.0).unwrap());
+        check(&ReceivedPower::<2>::new(Vector2::new(x[1], x[2]), [0, 1], 1.0 / 3.0, 0.7, 2.1, 1.0 / 7.0).unwrap());
+    }
+}

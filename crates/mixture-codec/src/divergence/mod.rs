@@ -1,0 +1,307 @@
+//! How far two densities are apart: four measures, and what each says about the others.
+//!
+//! With `f = ln p - ln q`:
+//!
+//! | measure | definition |
+//! |---|---|
+//! | `KL[p, q]` | `int p f` |
+//! | `L1[p, q]` | `int abs(p - q)`, at most 2 |
+//! | `ML[p, q]` | `sup abs(f)` |
+//! | `DR[p, q]` | `min_a sup abs(f + a) = (sup f - inf f) / 2` |
+//!
+//! `2 DR` is Hilbert's projective metric: it obeys the triangle inequality, and neither a Bayes update nor a Markov prediction
+//! makes it grow. As printed (minimum inside, maximum outside) it would be identically zero. For normalised densities
+//! `L1^2 <= 2 KL <= 2 ML` and `DR <= ML <= 2 DR`.
+//!
+//! On all of `R^d` the ML and DR between an estimate and anything wider than its kernels are infinite. What is computed at
+//! finitely many points is therefore called `*_plugin`: an estimate, never a certificate.
+
+pub mod plug_in;
+pub mod quadrature;
+
+use crate::Error;
+use fewbits_core::Gaussian;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::eigen::symmetric_eigen;
+use fewbits_numerics::error::probabilities;
+use fewbits_numerics::factored::Factored;
+use nalgebra::SMatrix;
+use serde::{Deserialize, Serialize};
+
+/// The four measures between two known laws.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Divergence {
+    /// Kullback-Leibler divergence in nats; infinite where `q` misses mass of `p`.
+    pub kl: f64,
+    /// Total absolute difference.
+    pub l1: f64,
+    /// Largest absolute log ratio.
+    pub ml: f64,
+    /// Half the range of the log ratio.
+    pub dr: f64,
+}
+
+/// The four measures between two discrete laws on the same points. Points that neither law gives mass are left out.
+///
+/// # Errors
+/// If the lengths differ or one is no probability vector.
+pub fn discrete(p: &[f64], q: &[f64]) -> Result<Divergence, Error> {
+    probabilities("p", p)?;
+    probabilities("q", q)?;
+    if p.len() != q.len() {
+        let expected = format!("{} probabilities, as `p`", p.len());
+        return Err(ArgumentError::new("q", format!("{} probabilities", q.len()), expected).into());
+    }
+    let (mut kl, mut l1) = (0.0, 0.0);
+    let (mut top, mut bottom) = (f64::NEG_INFINITY, f64::INFINITY);
+    // Where neither has mass the ratio is NaN, which maximum and minimum pass over.
+    for (p, q) in p.iter().zip(q) {
+        let f = log_ratio(*p, *q);
+        if *p > 0.0 {
+            kl += p * f;
+        }
+        l1 += (p - q).abs();
+        top = top.max(f);
+        bottom = bottom.min(f);
+    }
+    Ok(Divergence {
+        kl: kl.max(0.0),
+        l1,
+        ml: top.max(-bottom),
+        dr: 0.5 * (top - bottom),
+    })
+}
+
+/// `ln(p / q)`, accurate for nearly equal arguments.
+fn log_ratio(p: f64, q: f64) -> f64 {
+    if (p - q).abs() < 0.5 * q {
+        ((p - q) / q).ln_1p()
+    } else {
+        p.ln() - q.ln()
+    }
+}
+
+/// Largest KL of two normalised densities whose `DR` is given: `phi(2 DR)` with
+/// `phi(h) = ln((e^h - 1)/h) - 1 + h/(e^h - 1)`. Attained. Infinite for an infinite argument, 0 for a negative one.
+pub fn kl_from_dr(dr: f64) -> f64 {
+    phi(2.0 * dr)
+}
+
+/// Hoeffding's simpler bound `KL <= DR^2 / 2`.
+pub fn kl_from_dr_hoeffding(dr: f64) -> f64 {
+    0.5 * dr * dr
+}
+
+/// `L1 <= 2 tanh(DR / 2)`.
+pub fn l1_from_dr(dr: f64) -> f64 {
+    2.0 * (0.5 * dr).tanh()
+}
+
+/// `KL <= ML tanh(ML / 2)`.
+pub fn kl_from_ml(ml: f64) -> f64 {
+    ml * (0.5 * ml).tanh()
+}
+
+/// `ln((e^h - 1)/h) - 1 + h/(e^h - 1)`, without cancellation at either end.
+pub fn phi(h: f64) -> f64 {
+    if h == f64::INFINITY {
+        return h;
+    }
+    if h <= 0.0 {
+        return 0.0;
+    }
+    if h < 0.05 {
+        // The series about 0; the next term is below 1e-17.
+        let s = h * h;
+        return s * (1.0 / 8.0 - s * (1.0 / 576.0 - s * (1.0 / 25_920.0 - s / 1_075_200.0)));
+    }
+    let decay = (-h).exp();
+    let gone = -(-h).exp_m1();
+    h - h.ln() - 1.0 + gone.ln() + h * decay / gone
+}
+
+/// The printed accumulation of KL errors, `KL[p0, p1] + C KL[p1, p2]` with `C = max p0/p1`. **False**: with
+/// `p0 = (.6, .4), p1 = (.5, .5), p2 = (.49, .51)` it is .02038, below `KL[p0, p2] = .02434`.
+///
+/// # Errors
+/// As [`discrete`].
+pub fn kl_chain_printed(p0: &[f64], p1: &[f64], p2: &[f64]) -> Result<f64, Error> {
+    let (first, second) = (discrete(p0, p1)?, discrete(p1, p2)?);
+    let (_, most) = ratio_range(p0, p1);
+    Ok(first.kl + scaled(most, second.kl))
+}
+
+/// The corrected accumulation, `KL[p0, p2] <= KL[p0, p1] + C KL[p1, p2] + (C - c)/2 L1[p1, p2]` with `C` and `c` the largest and
+/// the smallest `p0/p1`.
+///
+/// # Errors
+/// As [`discrete`].
+pub fn kl_chain_corrected(p0: &[f64], p1: &[f64], p2: &[f64]) -> Result<f64, Error> {
+    let (first, second) = (discrete(p0, p1)?, discrete(p1, p2)?);
+    let (least, most) = ratio_range(p0, p1);
+    Ok(first.kl + scaled(most, second.kl) + scaled(0.5 * (most - least), second.l1))
+}
+
+/// `factor x`, where infinity times nothing is nothing.
+fn scaled(factor: f64, x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { factor * x }
+}
+
+/// Smallest and largest `p/q` over the points that either law gives mass.
+pub fn ratio_range(p: &[f64], q: &[f64]) -> (f64, f64) {
+    // 0/0 is NaN, which minimum and maximum pass over.
+    let ratios = p.iter().zip(q).map(|(p, q)| p / q);
+    ratios.fold((f64::INFINITY, 0.0), |(low, high), r| (r.min(low), r.max(high)))
+}
+
+/// `KL[N(0, a^2), N(0, b^2)] = ln(b/a) + a^2/(2 b^2) - 1/2`, for standard deviations above 0.
+///
+/// # Errors
+/// If one is not a finite number above 0.
+pub fn kl_centred_normals(a: f64, b: f64) -> Result<f64, Error> {
+    fewbits_numerics::error::positive("a", a)?;
+    fewbits_numerics::error::positive("b", b)?;
+    // With x = a^2/b^2 - 1 this is (x - ln(1 + x))/2.
+    let x = (a - b) * (a + b) / (b * b);
+    if x.abs() < 1e-3 {
+        return Ok(0.5 * x * x * (0.5 - x * (1.0 / 3.0 - x * (0.25 - x * (0.2 - x / 6.0)))));
+    }
+    Ok(0.5 * (x - x.ln_1p()))
+}
+
+/// `ln sup p/q` of two Gaussians, the logarithm of the amplification `C`: with `S_q - S_p` positive definite it is
+/// `(ln det S_q - ln det S_p + d' (S_q - S_p)^-1 d)/2`, `d` the difference of the means; `+inf` where `p` is the wider one in some
+/// direction; 0 for equal ones.
+///
+/// ML and DR need the infimum as well, which is `-inf` wherever the supremum is finite, unless the two are equal: between
+/// different Gaussians (and mixtures, whose widest components decide) over all of space both are infinite. Finite values exist for
+/// discrete laws ([`discrete`]) and on bounded sets alone.
+///
+/// # Errors
+/// If a covariance is not positive definite.
+pub fn log_largest_ratio<const D: usize>(p: &Gaussian<D>, q: &Gaussian<D>) -> Result<f64, Error> {
+    let own = Factored::new("p", p.covariance())?;
+    let other = Factored::new("q", q.covariance())?;
+    // Where p is standard, q has the eigenvalues 1 + gain.
+    let whiten = |m: &SMatrix<f64, D, D>| own.whitener * m * own.whitener.transpose();
+    let (values, vectors) = symmetric_eigen(whiten(q.covariance()));
+    let gap = vectors.transpose() * (own.whitener * (p.mean() - q.mean()));
+    let mut total = 2.0 * (other.half_log_det - own.half_log_det);
+    for (value, gap) in values.iter().zip(gap.iter()) {
+        let gain = value - 1.0;
+        if gain > EQUAL * value {
+            total += gap * gap / gain;
+        } else if gain < -EQUAL || gap.abs() > EQUAL.sqrt() {
+            return Ok(f64::INFINITY);
+        }
+    }
+    Ok(0.5 * total.max(0.0))
+}
+
+/// Variances that differ by less than this share count as equal.
+const EQUAL: f64 = 1e-12;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn phi_is_smooth_across_its_branches_and_bounded_by_hoeffding() {
+        let direct = |h: f64| (h.exp_m1() / h).ln() - 1.0 + h / h.exp_m1();
+        for h in [0.02, 0.049_99, 0.050_01, 0.3, 2.0, 30.0, 500.0] {
+            assert!((phi(h) - direct(h)).abs() < 2e-13 * h.max(1.0), "{h}");
+        }
+        assert!((phi(1e-6) / (1e-12 / 8.0) - 1.0).abs() < 1e-12);
+        // With 60 digits.
+        for (h, exact) in [
+            (0.003, 1.1249998593750281e-06),
+            (0.03, 0.00011249859377812439),
+            (0.049, 0.00030011499219889995),
+            (0.8, 0.07929884885810966),
+            (7.0, 4.0595665527344),
+        ] {
+            assert!((phi(h) / exact - 1.0).abs() < 1e-14, "{h} {}", phi(h));
+        }
+        assert!((phi(1e5) - (1e5 - 1e5_f64.ln() - 1.0)).abs() < 1e-9);
+        for h in [1e-8, 1e-3, 0.7, 5.0, 60.0] {
+            assert!(phi(h) <= h * h / 8.0);
+        }
+        assert_eq!((phi(0.0), phi(f64::INFINITY)), (0.0, f64::INFINITY));
+    }
+
+    #[test]
+    fn the_printed_chain_fails_on_a_coin_and_the_corrected_one_holds() {
+        let (p0, p1, p2) = ([0.6, 0.4], [0.5, 0.5], [0.49, 0.51]);
+        let truth = discrete(&p0, &p2).unwrap().kl;
+        assert!(kl_chain_printed(&p0, &p1, &p2).unwrap() < truth);
+        assert!(kl_chain_corrected(&p0, &p1, &p2).unwrap() >= truth);
+    }
+
+    #[test]
+    fn missing_mass_is_infinite_and_common_zeros_are_nothing() {
+        let d = discrete(&[0.5, 0.5, 0.0], &[1.0, 0.0, 0.0]).unwrap();
+        assert_eq!((d.kl, d.l1, d.ml, d.dr), (f64::INFINITY, 1.0, f64::INFINITY, f64::INFINITY));
+        assert_eq!(discrete(&[1.0, 0.0], &[1.0, 0.0]).unwrap().dr, 0.0);
+        assert!(discrete(&[0.5, 0.6], &[1.0, 0.0]).is_err() && discrete(&[1.0], &[0.5, 0.5]).is_err());
+    }
+
+    /// By `(x - ln(1 + x))/2 = x^2/2 int_0^1 u/(1 + x u) du`, whose integrand has no cancellation.
+    #[test]
+    fn normals_of_nearly_equal_width_lose_no_digits() {
+        let rule = fewbits_numerics::quadrature::Rule::gauss_legendre(20);
+        for (a, b) in [
+            (0.3, 0.7),
+            (1.9, 2.0),
+            (3.999, 4.0),
+            (1.000_3, 1.0),
+            (1.000_6, 1.0),
+            (1.1, 0.9),
+            (5.0, 0.2),
+        ] {
+            let x = (a - b) * (a + b) / (b * b);
+            let direct = 0.5 * x * x * rule.composite(0.0, 1.0, 400, |u| u / (1.0 + x * u));
+            let found: f64 = kl_centred_normals(a, b).unwrap();
+            assert!((found / direct - 1.0).abs() < 1e-11, "{a} {b}: {found} {direct}");
+        }
+        assert!(kl_centred_normals(0.0, 1.0).is_err() && kl_centred_normals(1.0, -1.0).is_err());
+    }
+
+    #[test]
+    fn nearly_equal_laws_lose_no_digits_and_very_different_ones_no_range() {
+        let e = 2.0_f64.powi(-30);
+        let d = discrete(&[0.5 + e, 0.5 - e], &[0.5, 0.5]).unwrap();
+        let x = 2.0 * e;
+        assert!((d.kl / (x * x / 2.0) - 1.0).abs() < 1e-6, "{d:?}");
+        assert!((d.ml / (x + x * x / 2.0) - 1.0).abs() < 1e-14 && (d.dr / x - 1.0).abs() < 1e-14 && d.l1 == x);
+        let d = discrete(&[0.1, 0.9], &[1e-310, 1.0]).unwrap();
+        assert!((d.ml - (0.1_f64.ln() - 1e-310_f64.ln())).abs() < 1e-9, "{d:?}");
+        let d = discrete(&[1e-20, 1.0], &[0.9, 0.1]).unwrap();
+        assert!((d.ml - (0.9_f64.ln() - 1e-20_f64.ln())).abs() < 1e-12 && (d.kl - 10.0_f64.ln()).abs() < 1e-12);
+        assert!((d.dr - 0.5 * (10.0_f64.ln() + d.ml)).abs() < 1e-12 && (d.l1 - 1.8).abs() < 1e-12);
+        let d = discrete(&[0.7, 0.3, 0.0, 0.0], &[0.2, 0.5, 0.3, 0.0]).unwrap();
+        assert!((d.kl - (0.7 * 3.5_f64.ln() + 0.3 * 0.6_f64.ln())).abs() < 1e-14 && (d.l1 - 1.0).abs() < 1e-14);
+        assert_eq!((d.ml, d.dr), (f64::INFINITY, f64::INFINITY));
+    }
+
+    #[test]
+    fn ratios_and_chains_where_laws_have_holes() {
+        assert_eq!(ratio_range(&[0.6, 0.4, 0.0, 0.0], &[0.5, 0.25, 0.25, 0.0]), (0.0, 1.6));
+        assert_eq!(ratio_range(&[0.6, 0.4], &[1.0, 0.0]), (0.6, f64::INFINITY));
+        // The second step loses nothing, however large its factor.
+        let (p0, p1) = ([0.5, 0.5], [1.0, 0.0]);
+        assert_eq!(kl_chain_printed(&p0, &p1, &p1).unwrap(), f64::INFINITY);
+        assert_eq!(kl_chain_corrected(&p0, &p1, &p1).unwrap(), f64::INFINITY);
+        let (p0, p1, p2) = ([0.75, 0.25, 0.0], [0.5, 0.3, 0.2], [0.4, 0.4, 0.2]);
+        let kl = |p: &[f64], q: &[f64]| discrete(p, q).unwrap().kl;
+        let chain = kl(&p0, &p1) + 1.5 * kl(&p1, &p2);
+        assert!((kl_chain_printed(&p0, &p1, &p2).unwrap() - chain).abs() < 1e-15);
+        assert!((kl_chain_corrected(&p0, &p1, &p2).unwrap() - chain - 0.75 * 0.2).abs() < 1e-15);
+        assert_eq!(
+            (kl_from_ml(f64::INFINITY), kl_from_dr(-0.3), kl_from_dr(f64::INFINITY)),
+            (f64::INFINITY, 0.0, f64::INFINITY)
+        );
+        let decay = (-1.4_f64).exp();
+        assert!((kl_from_ml(1.4) - 1.4 * (1.0 - decay) / (1.0 + decay)).abs() < 1e-15);
+    }
+}

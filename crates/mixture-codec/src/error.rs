@@ -1,0 +1,32 @@
+//! Errors of this crate.
+
+use fewbits_core::CodecError;
+use fewbits_numerics::ArgumentError;
+
+/// Why a mixture could not be reduced, measured, coded or decoded.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument out of range.
+    #[error(transparent)]
+    Argument(#[from] ArgumentError),
+    /// An error of the core: [`fewbits_core::Error::Impossible`] where no probability is left.
+    #[error(transparent)]
+    Core(#[from] fewbits_core::Error),
+    /// A mixture that does not fit its wire format, or bits that are no mixture.
+    #[error(transparent)]
+    Codec(#[from] CodecError),
+    /// Another error of the densities.
+    #[error(transparent)]
+    Density(fewbits_densities::Error),
+}
+
+impl From<fewbits_densities::Error> for Error {
+    fn from(error: fewbits_densities::Error) -> Self {
+        match error {
+            fewbits_densities::Error::Argument(argument) => Self::Argument(argument),
+            fewbits_densities::Error::Core(error) => Self::Core(error),
+            other => Self::Density(other),
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! From a kernel estimate of hundreds of particles to a Gaussian mixture in a few bytes.
+//!
+//! A particle filter that hands its belief to another node cannot send the particles: 500 of them in the plane are 32 kbit. This crate
+//! reduces the kernel estimate over them to a mixture of a few Gaussians, measures what was lost, and codes the mixture in about
+//! 30 bits a component.
+//!
+//! | task | use |
+//! |---|---|
+//! | few Gaussians for an estimate | [`Reduction`]; [`Reduction::default`] is the recommended method |
+//! | the message, as bits | [`wire::CodedMixture`] under a [`wire::WireFormat`] that both ends know |
+//! | the best message within a number of bits | [`wire::RateControl`] |
+//! | how far two densities are apart, estimated at points | [`plug_in`] |
+//! | the same integrated over all of space, in one to three dimensions | [`quadrature`] |
+//! | the same in closed form, and which measure bounds which | [`divergence`] |
+//! | single steps of a reduction | [`tree`], [`cut`], [`merge`], [`refine`] |
+//!
+//! The reduction has three steps. A tree over the particles is cut to 60 nodes by a closed-form bound. Pairs of nodes are merged, each
+//! time the pair with the smallest bound of the information lost. Expectation-maximisation towards the whole estimate improves the
+//! rest. The tree alone is the paper's method ([`Reduction::paper`]); it loses several times as much for as many components.
+//!
+//! ```
+//! use fewbits_core::Message;
+//! use fewbits_densities::{Bandwidth, KernelEstimate, Particles};
+//! use fewbits_mixture_codec::Reduction;
+//! use fewbits_mixture_codec::wire::{CodedMixture, WireFormat};
+//! let x: Vec<f64> = (0..100).map(|i| (f64::from(i) * 0.7).sin() + f64::from(i % 2)).collect();
+//! let estimate = KernelEstimate::fit(Particles::uniform([x])?, &Bandwidth::default())?;
+//! let format = WireFormat::around_origin(1.0, 0.25)?;
+//! let message = CodedMixture::new(&Reduction::default().reduce(&estimate, 2)?, &format, 0)?;
+//! assert!(message.to_bits(&format)?.bits() < 60);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Not here: the densities themselves (`fewbits-densities`), who sends a message to whom (`fewbits-handoff`).
+
+pub mod divergence;
+mod error;
+pub mod published;
+pub mod reduction;
+pub mod tree;
+pub mod wire;
+
+pub use divergence::plug_in::{Cubature, PlugIn};
+pub use divergence::{plug_in, quadrature};
+pub use error::Error;
+pub use reduction::cut::{Criterion, Cut, NodeErrors};
+pub use reduction::merge::MergeCost;
+pub use reduction::{Reduction, cut, merge, refine};
+pub use tree::{Split, Tree};

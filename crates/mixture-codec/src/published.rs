@@ -1,0 +1,33 @@
+//! What only reproduces a printed comparison. The recommended reduction is [`Reduction::default`](crate::Reduction::default).
+
+use crate::Error;
+use crate::divergence::plug_in::node_errors;
+use crate::reduction::cut::{Criterion, NodeErrors};
+use crate::tree::{Split, Tree};
+use fewbits_densities::KernelEstimate;
+
+/// The paper's reductions of one estimate under its three criteria, for the price of one evaluation of the tree.
+#[derive(Debug, Clone)]
+pub struct PaperReductions<const D: usize> {
+    /// The tree.
+    pub tree: Tree<D>,
+    /// Node errors under ML, KL and L1.
+    pub errors: [NodeErrors; 3],
+}
+
+impl<const D: usize> PaperReductions<D> {
+    /// The criteria in the order of [`errors`](Self::errors).
+    pub const CRITERIA: [Criterion; 3] = [Criterion::Ml, Criterion::Kl, Criterion::L1];
+
+    /// Builds the KD-tree and its errors.
+    ///
+    /// # Errors
+    /// Never for a valid estimate.
+    pub fn new(estimate: &KernelEstimate<D>) -> Result<Self, Error> {
+        let tree = Tree::new(estimate, Split::KD)?;
+        let plug_in = node_errors(estimate, &tree)?;
+        let of = |criterion| NodeErrors::from_plug_in(&tree, &plug_in, criterion);
+        let errors = [of(Criterion::Ml)?, of(Criterion::Kl)?, of(Criterion::L1)?];
+        Ok(Self { tree, errors })
+    }
+}

@@ -1,0 +1,275 @@
+//! Cuts of a tree: which nodes' Gaussians stand for the whole, by greed or by dynamic programming.
+
+use crate::divergence::plug_in::{PlugIn, node_errors};
+use crate::tree::ROOT;
+use crate::{Error, Tree};
+use fewbits_densities::{KernelEstimate, Mixture};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::factored::half_log_det;
+use serde::{Deserialize, Serialize};
+
+/// Which error a cut keeps small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Criterion {
+    /// The largest plug-in ML of a chosen node.
+    Ml,
+    /// The weighted sum of plug-in KLs; negative ones count as 0.
+    Kl,
+    /// The weighted sum of plug-in L1s.
+    L1,
+    /// The weighted sum of `(ln det S - ln det H)/2`, an upper bound of the KL in closed form: no kernels are evaluated.
+    LogDeterminant,
+}
+
+/// How the errors of the chosen nodes combine into a bound of the whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Combine {
+    Max,
+    Sum,
+}
+
+impl Combine {
+    fn of(self, a: f64, b: f64) -> f64 {
+        match self {
+            Self::Max => a.max(b),
+            Self::Sum => a + b,
+        }
+    }
+}
+
+/// Error of every node of a tree under one criterion, weights included where they belong.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeErrors {
+    values: Vec<f64>,
+    combine: Combine,
+}
+
+impl NodeErrors {
+    /// Errors under a criterion. All but [`Criterion::LogDeterminant`] cost `n^2/2` kernels; see [`NodeErrors::from_plug_in`] for
+    /// several criteria at the price of one.
+    ///
+    /// # Errors
+    /// Never for a tree of this estimate.
+    pub fn new<const D: usize>(
+        estimate: &KernelEstimate<D>,
+        tree: &Tree<D>,
+        criterion: Criterion,
+    ) -> Result<Self, Error> {
+        if criterion != Criterion::LogDeterminant {
+            let plug_in = node_errors(estimate, tree)?;
+            return Self::from_plug_in(tree, &plug_in, criterion);
+        }
+        let floor = estimate.kernel_factor().half_log_det;
+        let closed = tree.nodes().iter().map(|node| match node.children {
+            None => 0.0,
+            Some(_) => node.weight * (half_log_det(&node.covariance) - floor).max(0.0),
+        });
+        Ok(Self {
+            values: closed.collect(),
+            combine: Combine::Sum,
+        })
+    }
+
+    /// Errors under a criterion from the plug-in errors of all nodes.
+    ///
+    /// # Errors
+    /// If there is not one per node, or the criterion is not a plug-in one.
+    pub fn from_plug_in<const D: usize>(
+        tree: &Tree<D>,
+        plug_in: &[PlugIn],
+        criterion: Criterion,
+    ) -> Result<Self, Error> {
+        if plug_in.len() != tree.nodes().len() {
+            let expected = format!("{}, one per node", tree.nodes().len());
+            return Err(ArgumentError::new("plug_in", plug_in.len(), expected).into());
+        }
+        let nodes = tree.nodes().iter().zip(plug_in);
+        let (values, combine) = match criterion {
+            Criterion::Ml => (nodes.map(|(_, e)| e.ml_plugin).collect(), Combine::Max),
+            Criterion::Kl => (nodes.map(|(n, e)| n.weight * e.kl_plugin.max(0.0)).collect(), Combine::Sum),
+            Criterion::L1 => (nodes.map(|(n, e)| n.weight * e.l1_plugin).collect(), Combine::Sum),
+            Criterion::LogDeterminant => {
+                return Err(ArgumentError::new("criterion", "LogDeterminant", "ML, KL or L1").into());
+            }
+        };
+        Ok(Self { values, combine })
+    }
+
+    /// Error of one node; sums already carry the node's weight.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Bound `B(S)` of a cut: the largest error of its nodes or their sum.
+    pub fn bound(&self, cut: &[usize]) -> f64 {
+        cut.iter()
+            .filter_map(|s| self.values.get(*s))
+            .fold(0.0, |total, e| self.combine.of(total, *e))
+    }
+}
+
+/// A choice of nodes, one ancestor-or-self of every leaf, and its bound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cut {
+    /// The nodes, left to right.
+    pub nodes: Vec<usize>,
+    /// The error bound `B(S)` under the criterion of the cut.
+    pub bound: f64,
+}
+
+impl Cut {
+    /// The nodes' Gaussians, each with its node's weight.
+    ///
+    /// # Errors
+    /// If the cut is none of this tree.
+    pub fn mixture<const D: usize>(&self, tree: &Tree<D>) -> Result<Mixture<D>, Error> {
+        tree.check_cut(&self.nodes)?;
+        let components = self.nodes.iter().map(|s| tree.nodes()[*s].component());
+        Ok(Mixture::new(components.collect::<Result<_, _>>()?)?)
+    }
+}
+
+/// Splits the worst node again and again while at most `components` nodes result, and returns the best cut on the way
+/// (Algorithm 1 with errata: the budget is tested before the split is made, and the weight stands inside the maximum).
+///
+/// The bound is not monotone under splitting, so the best cut may have fewer nodes than allowed. Where every leaf is allowed, all
+/// leaves are returned: their error is 0.
+///
+/// # Errors
+/// If `components` is 0 or the errors are not of this tree.
+pub fn greedy<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: usize) -> Result<Cut, Error> {
+    at_least_one("components", components)?;
+    greedy_within(tree, errors, |_| 1.0, components as f64)
+}
+
+/// [`greedy`] with an additive price per node (a code length in bits, say) and a limit on the total. Children together must
+/// cost more than their parent. Where the leaves together are within the limit, they are the answer.
+///
+/// # Errors
+/// If the root alone is above the limit, or the errors are not of this tree.
+pub fn greedy_within<const D: usize>(
+    tree: &Tree<D>,
+    errors: &NodeErrors,
+    price: impl Fn(usize) -> f64,
+    limit: f64,
+) -> Result<Cut, Error> {
+    check(tree, errors)?;
+    let mut total = price(ROOT);
+    if !matches!(total.partial_cmp(&limit), Some(std::cmp::Ordering::Less | std::cmp::Ordering::Equal)) {
+        return Err(ArgumentError::new("limit", limit, format!("at least {total}, the price of the root")).into());
+    }
+    // Plug-in errors of inner nodes may be 0 or below by chance: a stop at the worst node would come too early.
+    let leaves = leaves(tree);
+    if leaves.nodes.iter().map(|leaf| price(*leaf)).sum::<f64>() <= limit {
+        return Ok(leaves);
+    }
+    let mut cut = vec![ROOT];
+    let mut best = Cut {
+        bound: errors.bound(&cut),
+        nodes: cut.clone(),
+    };
+    loop {
+        // The first of the largest, as ties go to the first.
+        let worst = (1..cut.len()).fold(0, |w, i| {
+            if errors.values[cut[i]] > errors.values[cut[w]] {
+                i
+            } else {
+                w
+            }
+        });
+        let Some([left, right]) = tree.nodes()[cut[worst]].children else {
+            return Ok(best);
+        };
+        total += price(left) + price(right) - price(cut[worst]);
+        if total.is_nan() || total > limit {
+            return Ok(best);
+        }
+        cut.splice(worst..=worst, [left, right]);
+        let bound = errors.bound(&cut);
+        if bound < best.bound {
+            best = Cut {
+                nodes: cut.clone(),
+                bound,
+            };
+        }
+    }
+}
+
+/// The cut of smallest bound among all with at most `components` nodes, by dynamic programming from the leaves up:
+/// `B(s, m) = min(e(s), min_a B(s_L, a) (+ or max) B(s_R, m - a))`. `O(n m^2)`. Where every leaf is allowed, all leaves are
+/// returned.
+///
+/// # Errors
+/// If `components` is 0 or the errors are not of this tree.
+pub fn optimal<const D: usize>(tree: &Tree<D>, errors: &NodeErrors, components: usize) -> Result<Cut, Error> {
+    at_least_one("components", components)?;
+    check(tree, errors)?;
+    let nodes = tree.nodes();
+    if components >= nodes[ROOT].range.len() {
+        return Ok(leaves(tree));
+    }
+    // For each node: the best bound with at most 1, 2, ... nodes, and how many of them go to the left child (0: no split).
+    let mut tables: Vec<Vec<(f64, usize)>> = vec![Vec::new(); nodes.len()];
+    for (index, node) in nodes.iter().enumerate().rev() {
+        let own = match node.children {
+            None => 0.0,
+            Some(_) => errors.values[index],
+        };
+        let most = node.range.len().min(components);
+        let mut table = vec![(own, 0); most];
+        if let Some([left, right]) = node.children {
+            for m in 2..=most {
+                let mut best = table[m - 2];
+                let (l, r) = (&tables[left], &tables[right]);
+                for a in m.saturating_sub(r.len()).max(1)..=l.len().min(m - 1) {
+                    let bound = errors.combine.of(l[a - 1].0, r[m - a - 1].0);
+                    if bound < best.0 {
+                        best = (bound, a);
+                    }
+                }
+                // A split found with fewer nodes keeps its own share: remember how many it used by looking it up below.
+                table[m - 1] = best;
+            }
+        }
+        tables[index] = table;
+    }
+    let mut cut = Vec::new();
+    let mut pending = vec![(ROOT, nodes[ROOT].range.len().min(components))];
+    while let Some((index, m)) = pending.pop() {
+        let table = &tables[index];
+        // The smallest number of nodes that reaches the same bound.
+        let m = (1..=m).find(|k| table[k - 1].0 <= table[m - 1].0).unwrap_or(m);
+        match (table[m - 1].1, nodes[index].children) {
+            (a, Some([left, right])) if a > 0 => {
+                pending.push((right, m - a));
+                pending.push((left, a));
+            }
+            _ => cut.push(index),
+        }
+    }
+    Ok(Cut {
+        bound: errors.bound(&cut),
+        nodes: cut,
+    })
+}
+
+/// The cut of all leaves, left to right: the estimate itself.
+fn leaves<const D: usize>(tree: &Tree<D>) -> Cut {
+    let nodes = tree.nodes();
+    let mut leaves: Vec<usize> = (0..nodes.len()).filter(|s| nodes[*s].children.is_none()).collect();
+    leaves.sort_by_key(|s| nodes[*s].range.start);
+    Cut {
+        nodes: leaves,
+        bound: 0.0,
+    }
+}
+
+fn check<const D: usize>(tree: &Tree<D>, errors: &NodeErrors) -> Result<(), Error> {
+    if errors.values.len() == tree.nodes().len() {
+        return Ok(());
+    }
+    let expected = format!("errors of {} nodes", tree.nodes().len());
+    Err(ArgumentError::new("errors", format!("errors of {} nodes", errors.values.len()), expected).into())
+}

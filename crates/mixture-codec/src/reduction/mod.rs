@@ -1,0 +1,118 @@
+//! From a kernel estimate to a mixture of few components: the methods of the paper, and a better one.
+
+pub mod cut;
+pub mod merge;
+mod refine;
+
+pub use refine::refine;
+
+use crate::Error;
+use crate::divergence::plug_in::Cubature;
+use crate::tree::{Split, Tree};
+use cut::{Criterion, NodeErrors, greedy, optimal};
+use fewbits_densities::{Component, KernelEstimate, Mixture};
+use fewbits_numerics::error::at_least_one;
+use merge::{MergeCost, merge};
+use serde::{Deserialize, Serialize};
+
+/// How an estimate is reduced to a given number of components.
+///
+/// ```
+/// use fewbits_mixture_codec::Reduction;
+/// use fewbits_densities::{Bandwidth, KernelEstimate, Particles};
+/// let x: Vec<f64> = (0..100).map(|i| (f64::from(i) * 0.7).sin() + f64::from(i % 2)).collect();
+/// let estimate = KernelEstimate::fit(Particles::uniform([x])?, &Bandwidth::default())?;
+/// let mixture = Reduction::default().reduce(&estimate, 3)?;
+/// assert!(mixture.len() <= 3 && (mixture.mean() - estimate.mean()).amax() < 1e-6);
+/// # Ok::<(), fewbits_densities::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Reduction {
+    /// The Gaussian of the same mean and covariance.
+    SingleGaussian,
+    /// A greedy cut of a tree (Algorithm 1 with errata); the paper's method with [`Split::KD`].
+    Greedy {
+        /// How the tree is built.
+        split: Split,
+        /// What is kept small.
+        criterion: Criterion,
+    },
+    /// The best cut of a tree.
+    Optimal {
+        /// How the tree is built.
+        split: Split,
+        /// What is kept small.
+        criterion: Criterion,
+    },
+    /// Pairwise merging of all kernels: `O(n^2)` costs, several times slower than the pipeline and no better.
+    Merging {
+        /// What a merge is charged.
+        cost: MergeCost,
+    },
+    /// A greedy cut to `cut` nodes in closed form, Runnalls merging, and expectation-maximisation with a floor.
+    Pipeline {
+        /// Nodes left by the cut.
+        cut: usize,
+        /// Iterations of expectation-maximisation.
+        iterations: usize,
+    },
+}
+
+impl Default for Reduction {
+    /// The recommended pipeline: a cut to 60 nodes and 15 iterations.
+    fn default() -> Self {
+        Self::Pipeline {
+            cut: 60,
+            iterations: 15,
+        }
+    }
+}
+
+impl Reduction {
+    /// The paper's method under one of its three criteria.
+    pub const fn paper(criterion: Criterion) -> Self {
+        Self::Greedy {
+            split: Split::KD,
+            criterion,
+        }
+    }
+
+    /// Reduces the estimate to at most `components` components. All methods but the pipeline keep mean and covariance exactly;
+    /// the pipeline keeps the mean to the accuracy of its cubature and the covariance up to its floor.
+    ///
+    /// # Errors
+    /// If `components` is 0.
+    pub fn reduce<const D: usize>(&self, estimate: &KernelEstimate<D>, components: usize) -> Result<Mixture<D>, Error> {
+        at_least_one("components", components)?;
+        match *self {
+            Self::SingleGaussian => {
+                let c = Component::new(1.0, estimate.mean(), estimate.covariance())?;
+                Ok(Mixture::new(vec![c])?)
+            }
+            Self::Greedy { split, criterion } => {
+                let tree = Tree::new(estimate, split)?;
+                let errors = NodeErrors::new(estimate, &tree, criterion)?;
+                greedy(&tree, &errors, components)?.mixture(&tree)
+            }
+            Self::Optimal { split, criterion } => {
+                let tree = Tree::new(estimate, split)?;
+                let errors = NodeErrors::new(estimate, &tree, criterion)?;
+                optimal(&tree, &errors, components)?.mixture(&tree)
+            }
+            Self::Merging { cost } => Ok(merge(&estimate.to_mixture()?, components, cost)?.mixture),
+            Self::Pipeline { cut, iterations } => {
+                let tree = Tree::new(estimate, Split::PRINCIPAL)?;
+                let errors = NodeErrors::new(estimate, &tree, Criterion::LogDeterminant)?;
+                let coarse = greedy(&tree, &errors, cut.max(components))?.mixture(&tree)?;
+                let merged = merge(&coarse, components, MergeCost::Runnalls)?.mixture;
+                let rule = if D <= 3 {
+                    Cubature::GaussHermite
+                } else {
+                    Cubature::Spherical
+                };
+                refine(estimate, &merged, iterations, rule)
+            }
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! Binary trees over the kernels of an estimate, with the moments of every node.
+
+use crate::Error;
+use fewbits_densities::{Component, KernelEstimate};
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::eigen::symmetric_eigen;
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// Along which direction a node is split.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Axis {
+    /// The coordinate axis with the largest weighted variance of the centres, the lowest on a tie: a KD-tree.
+    Widest,
+    /// The principal axis of the centres, in coordinates where the kernel is isotropic.
+    Principal,
+    /// The coordinate axes in turn. Much worse; kept for comparison.
+    Alternating,
+}
+
+/// Where a node is split along its direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum At {
+    /// The left child gets the first `ceil(n/2)` kernels.
+    CountMedian,
+    /// The left child gets kernels until it holds half of the weight, at least one and not all.
+    WeightMedian,
+}
+
+/// How a tree is built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Split {
+    /// Direction of a split.
+    pub axis: Axis,
+    /// Place of a split.
+    pub at: At,
+}
+
+impl Split {
+    /// The KD-tree of the paper.
+    pub const KD: Self = Self {
+        axis: Axis::Widest,
+        at: At::CountMedian,
+    };
+    /// Principal axes at the weight median: what the recommended reduction uses.
+    pub const PRINCIPAL: Self = Self {
+        axis: Axis::Principal,
+        at: At::WeightMedian,
+    };
+}
+
+/// A node: a contiguous run of kernels (in the tree's order) and their moments.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Node<const D: usize> {
+    /// Positions in [`Tree::order`].
+    pub range: Range<usize>,
+    /// Children, or `None` for a leaf.
+    pub children: Option<[usize; 2]>,
+    /// Total weight.
+    pub weight: f64,
+    /// Weighted mean of the centres.
+    pub mean: SVector<f64, D>,
+    /// Weighted covariance of the centres plus the kernel: the covariance of the node's density.
+    pub covariance: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> Node<D> {
+    /// The node's Gaussian.
+    ///
+    /// # Errors
+    /// Never for a node of a tree.
+    pub fn component(&self) -> Result<Component<D>, Error> {
+        Ok(Component::new(self.weight, self.mean, self.covariance)?)
+    }
+}
+
+/// A binary tree over the kernels of an estimate: `2 n - 1` nodes, the root first.
+///
+/// Moments go up by `w = w_L + w_R`, `m = (w_L m_L + w_R m_R)/w`, `S = sum_k (w_k/w)(S_k + (m_k - m)(m_k - m)')`, which never
+/// subtracts large numbers. Splitting is by position in a stable order, not by value, so duplicates of a resampled cloud do no
+/// harm. `O(n log^2 n)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tree<const D: usize> {
+    nodes: Vec<Node<D>>,
+    order: Vec<usize>,
+}
+
+/// The root.
+pub const ROOT: usize = 0;
+
+impl<const D: usize> Tree<D> {
+    /// Builds the tree. Kernels of weight zero are left out.
+    ///
+    /// # Errors
+    /// Never for a valid estimate; [`fewbits_core::Error::Impossible`] if every weight is zero.
+    pub fn new(estimate: &KernelEstimate<D>, split: Split) -> Result<Self, Error> {
+        let weights = estimate.particles().weights();
+        let order: Vec<usize> = (0..weights.len()).filter(|i| weights[*i] > 0.0).collect();
+        if order.is_empty() {
+            return Err(fewbits_core::Error::Impossible.into());
+        }
+        let mut tree = Self {
+            nodes: Vec::with_capacity(2 * order.len()),
+            order,
+        };
+        let mut keys = vec![0.0; weights.len()];
+        let whole = 0..tree.order.len();
+        tree.build(estimate, split, whole, 0, &mut keys);
+        Ok(tree)
+    }
+
+    /// Adds the node of `range` and all below it; returns its index. Depth is `O(log n)` at the count median and at most `n`
+    /// for wild weights, so the descent keeps its own stack.
+    fn build(
+        &mut self,
+        estimate: &KernelEstimate<D>,
+        split: Split,
+        whole: Range<usize>,
+        depth: usize,
+        keys: &mut [f64],
+    ) {
+        let mut pending = vec![(whole, depth, None::<(usize, usize)>)];
+        while let Some((range, depth, parent)) = pending.pop() {
+            let index = self.nodes.len();
+            if let Some((parent, side)) = parent
+                && let Some(children) = &mut self.nodes[parent].children
+            {
+                children[side] = index;
+            }
+            let mut node = Node {
+                range: range.clone(),
+                children: None,
+                weight: 0.0,
+                mean: SVector::zeros(),
+                covariance: *estimate.kernel(),
+            };
+            if range.len() > 1 {
+                node.children = Some([0, 0]);
+                let middle = self.part(estimate, split, range.clone(), depth, keys);
+                pending.push((middle..range.end, depth + 1, Some((index, 1))));
+                pending.push((range.start..middle, depth + 1, Some((index, 0))));
+            }
+            self.nodes.push(node);
+        }
+        // Children come after their parent, so going backwards meets them first.
+        for index in (0..self.nodes.len()).rev() {
+            self.fill_moments(estimate, index);
+        }
+    }
+
+    fn fill_moments(&mut self, estimate: &KernelEstimate<D>, index: usize) {
+        let (weight, mean, covariance) = match self.nodes[index].children {
+            None => {
+                let i = self.order[self.nodes[index].range.start];
+                let columns = estimate.particles().columns();
+                let centre = SVector::from_fn(|d, _| columns[d][i]);
+                (estimate.particles().weights()[i], centre, *estimate.kernel())
+            }
+            Some([left, right]) => {
+                let (l, r) = (&self.nodes[left], &self.nodes[right]);
+                let weight = l.weight + r.weight;
+                let (a, b) = (l.weight / weight, r.weight / weight);
+                let gap = r.mean - l.mean;
+                let between = gap * gap.transpose() * (a * b);
+                (weight, l.mean + gap * b, l.covariance * a + r.covariance * b + between)
+            }
+        };
+        let node = &mut self.nodes[index];
+        (node.weight, node.mean, node.covariance) = (weight, mean, covariance);
+    }
+
+    /// Orders the kernels of `range` along the split direction and returns the first position of the right child.
+    fn part(
+        &mut self,
+        estimate: &KernelEstimate<D>,
+        split: Split,
+        range: Range<usize>,
+        depth: usize,
+        keys: &mut [f64],
+    ) -> usize {
+        let weights = estimate.particles().weights();
+        let own = &mut self.order[range.clone()];
+        let raw = estimate.particles().columns();
+        let columns: [&[f64]; D] = match split.axis {
+            Axis::Principal => estimate.whitened_centres().each_ref().map(Vec::as_slice),
+            Axis::Widest | Axis::Alternating => raw,
+        };
+        let total: f64 = own.iter().map(|i| weights[*i]).sum();
+        let mean: [f64; D] =
+            std::array::from_fn(|d| own.iter().map(|i| weights[*i] * columns[d][*i]).sum::<f64>() / total);
+        let moment = |a: usize, b: usize, own: &[usize]| -> f64 {
+            own.iter()
+                .map(|i| weights[*i] * (columns[a][*i] - mean[a]) * (columns[b][*i] - mean[b]))
+                .sum::<f64>()
+                / total
+        };
+        let direction: SVector<f64, D> = match split.axis {
+            Axis::Widest => {
+                let spread: [f64; D] = std::array::from_fn(|d| moment(d, d, own));
+                let widest = (1..D).fold(0, |best, d| if spread[d] > spread[best] { d } else { best });
+                SVector::from_fn(|d, _| f64::from(u8::from(d == widest)))
+            }
+            Axis::Alternating => SVector::from_fn(|d, _| f64::from(u8::from(d == depth % D.max(1)))),
+            Axis::Principal => {
+                let scatter = SMatrix::<f64, D, D>::from_fn(|a, b| moment(a, b, own));
+                let (values, vectors) = symmetric_eigen(scatter);
+                vectors.column(values.imax()).into_owned()
+            }
+        };
+        for i in own.iter() {
+            keys[*i] = (0..D)
+                .filter(|d| direction[*d] != 0.0)
+                .map(|d| direction[d] * columns[d][*i])
+                .sum();
+        }
+        own.sort_by(|a, b| keys[*a].total_cmp(&keys[*b]).then(a.cmp(b)));
+        let left = match split.at {
+            At::CountMedian => own.len().div_ceil(2),
+            At::WeightMedian => {
+                let mut cumulative = 0.0;
+                let reached = own.iter().take_while(|i| {
+                    cumulative += weights[**i];
+                    cumulative < 0.5 * total
+                });
+                (reached.count() + 1).clamp(1, own.len() - 1)
+            }
+        };
+        range.start + left
+    }
+
+    /// The nodes: parents before their children, the root first.
+    pub fn nodes(&self) -> &[Node<D>] {
+        &self.nodes
+    }
+
+    /// The node at `index`, or `None` past the end.
+    pub fn node(&self, index: usize) -> Option<&Node<D>> {
+        self.nodes.get(index)
+    }
+
+    /// The kernels in the tree's order: those of a node are neighbours.
+    pub fn order(&self) -> &[usize] {
+        &self.order
+    }
+
+    /// The kernels under a node, by their number in the estimate, increasing; empty for a node that is not there.
+    pub fn members(&self, index: usize) -> Vec<usize> {
+        let mut members = self
+            .nodes
+            .get(index)
+            .map_or(Vec::new(), |node| self.order[node.range.clone()].to_vec());
+        members.sort_unstable();
+        members
+    }
+
+    /// Checks that `cut` holds one ancestor-or-self of every leaf.
+    ///
+    /// # Errors
+    /// If it does not.
+    pub fn check_cut(&self, cut: &[usize]) -> Result<(), Error> {
+        let mut ranges: Vec<Range<usize>> = Vec::with_capacity(cut.len());
+        for index in cut {
+            match self.nodes.get(*index) {
+                Some(node) => ranges.push(node.range.clone()),
+                None => {
+                    return Err(ArgumentError::new("cut", index, format!("nodes below {}", self.nodes.len())).into());
+                }
+            }
+        }
+        ranges.sort_by_key(|r| r.start);
+        let reached = ranges.iter().try_fold(0, |at, r| (r.start == at).then_some(r.end));
+        if reached == Some(self.order.len()) {
+            Ok(())
+        } else {
+            let expected = "exactly one ancestor-or-self of every leaf";
+            Err(ArgumentError::new("cut", format!("{cut:?}"), expected).into())
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! What both ends of a link agree on beforehand.
+
+use crate::Error;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::{all_finite, positive};
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+/// What both ends of a link know beforehand: where beliefs may lie, in which unit, and how finely they are told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "StoredFormat", into = "StoredFormat")]
+pub struct WireFormat<const D: usize> {
+    pub(super) centre: SVector<f64, D>,
+    pub(super) half_width: f64,
+    pub(super) unit: f64,
+    pub(super) resolutions: Vec<f64>,
+}
+
+impl<const D: usize> WireFormat<D> {
+    /// A format for beliefs whose mean lies within `half_width` of `centre` along each axis and whose standard deviations are
+    /// between `unit / 2981` and `2981 unit` (8 nepers), at one of the given resolutions: quantiser steps in standard deviations.
+    ///
+    /// # Errors
+    /// If a number is not finite; `half_width`, `unit` or a resolution is not above 0; a resolution is above 4 or below 1e-4; or
+    /// there is none or more than 16.
+    pub fn new(centre: SVector<f64, D>, half_width: f64, unit: f64, resolutions: &[f64]) -> Result<Self, Error> {
+        all_finite("centre", centre.as_slice())?;
+        positive("half_width", half_width)?;
+        positive("unit", unit)?;
+        if resolutions.is_empty() || resolutions.len() > 16 {
+            return Err(ArgumentError::new("resolutions", format!("{} numbers", resolutions.len()), "1 to 16").into());
+        }
+        for r in resolutions {
+            fewbits_numerics::error::within("resolutions", *r, 1e-4, 4.0)?;
+        }
+        Ok(Self {
+            centre,
+            half_width,
+            unit,
+            resolutions: resolutions.to_vec(),
+        })
+    }
+
+    /// A field of `40 unit` around the origin at one resolution.
+    ///
+    /// # Errors
+    /// As [`WireFormat::new`].
+    pub fn around_origin(unit: f64, resolution: f64) -> Result<Self, Error> {
+        Self::new(SVector::zeros(), 20.0 * positive("unit", unit)?, unit, &[resolution])
+    }
+
+    /// The resolutions, by their number in a message.
+    pub fn resolutions(&self) -> &[f64] {
+        &self.resolutions
+    }
+}
+
+/// The plain form in which a format is stored.
+#[derive(Serialize, Deserialize)]
+struct StoredFormat {
+    #[serde(with = "fewbits_numerics::stored")]
+    centre: Vec<f64>,
+    #[serde(with = "fewbits_numerics::stored")]
+    half_width: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    unit: f64,
+    #[serde(with = "fewbits_numerics::stored")]
+    resolutions: Vec<f64>,
+}
+
+impl<const D: usize> From<WireFormat<D>> for StoredFormat {
+    fn from(format: WireFormat<D>) -> Self {
+        Self {
+            centre: format.centre.as_slice().to_vec(),
+            half_width: format.half_width,
+            unit: format.unit,
+            resolutions: format.resolutions,
+        }
+    }
+}
+
+impl<const D: usize> TryFrom<StoredFormat> for WireFormat<D> {
+    type Error = Error;
+
+    fn try_from(stored: StoredFormat) -> Result<Self, Error> {
+        if stored.centre.len() != D {
+            return Err(ArgumentError::new("centre", format!("{:?}", stored.centre), format!("{D} numbers")).into());
+        }
+        let centre = SVector::from_fn(|i, _| stored.centre[i]);
+        Self::new(centre, stored.half_width, stored.unit, &stored.resolutions)
+    }
+}

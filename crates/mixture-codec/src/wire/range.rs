@@ -1,0 +1,400 @@
+//! Symbols through a range coder, ended to the bit.
+
+use super::table::{Found, Table};
+use constriction::UnwrapInfallible;
+use constriction::stream::queue::{EncoderSituation, RangeDecoder, RangeEncoder};
+use constriction::stream::{Decode, Encode};
+use fewbits_core::{BitReader, BitWriter, CodecError};
+
+/// Bits of one uniform digit.
+const DIGIT: u32 = 12;
+/// Scales above this many steps are coded in two parts, the lower bits uniformly.
+const LARGEST_SCALE: f64 = 64.0;
+/// Integers are coded up to this size.
+pub(super) const LARGEST: f64 = 2_147_483_648.0;
+
+/// What the law of one integer is, in steps of its quantiser.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Law {
+    /// `0..count`.
+    Uniform { count: u64 },
+    /// Around `location` with the given scale, any integer below 2^31 in size.
+    Logistic { location: f64, scale: f64 },
+}
+
+impl Law {
+    /// The logistic law's table and the number of low bits that are coded uniformly; `None` if the numbers are out of range.
+    fn table(location: f64, scale: f64) -> Option<(Table, u32)> {
+        let in_range = location.abs() < LARGEST && scale > 0.0 && scale < LARGEST;
+        let mut low = 0;
+        let (mut location, mut scale) = (location, scale.max(0.01));
+        while in_range && scale > LARGEST_SCALE {
+            // `n = 2 h + l` with a fair bit `l`: `h` has half of the location, less a quarter, and half of the scale.
+            (location, scale) = (0.5 * location - 0.25, 0.5 * scale);
+            low += 1;
+        }
+        in_range.then(|| (Table::logistic(location, scale), low))
+    }
+}
+
+fn out_of_range(what: &'static str, value: impl std::fmt::Display) -> CodecError {
+    CodecError::Invalid {
+        what,
+        value: value.to_string(),
+        expected: "a number within the range of the format",
+    }
+}
+
+/// Writes integers.
+pub(super) struct Writer {
+    encoder: RangeEncoder<u32, u64>,
+}
+
+impl Writer {
+    pub(super) fn new() -> Self {
+        Self {
+            encoder: RangeEncoder::new(),
+        }
+    }
+
+    fn put(&mut self, table: Table, index: u32) -> Result<(), CodecError> {
+        self.encoder
+            .encode_symbol(index, table)
+            .map_err(|_| out_of_range("symbol", index))
+    }
+
+    fn uniform(&mut self, value: u64, bits: u32) -> Result<(), CodecError> {
+        let mut left = bits;
+        while left > 0 {
+            let width = left.min(DIGIT);
+            left -= width;
+            let digit = (value >> left & ((1 << width) - 1)) as u32;
+            self.put(Table::Uniform { count: 1 << width }, digit)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn write(&mut self, law: &Law, n: i64) -> Result<(), CodecError> {
+        match *law {
+            Law::Uniform { count } => {
+                let (top, low) = digits(count);
+                let value = u64::try_from(n)
+                    .ok()
+                    .filter(|v| *v < count)
+                    .ok_or_else(|| out_of_range("symbol", n))?;
+                if top > 1 {
+                    self.put(Table::Uniform { count: top }, (value >> low) as u32)?;
+                }
+                self.uniform(value & ((1 << low) - 1), low)
+            }
+            Law::Logistic { location, scale } => {
+                let (table, low) = Law::table(location, scale).ok_or_else(|| out_of_range("scale", scale))?;
+                let (Table::Logistic { centre, half, .. }, Some(escape)) = (table, table.escape()) else {
+                    return Err(out_of_range("scale", scale));
+                };
+                let index = (n >> low) - centre + i64::from(half);
+                if (0..i64::from(escape)).contains(&index) {
+                    self.put(table, index as u32)?;
+                    self.uniform((n & ((1 << low) - 1)) as u64, low)
+                } else {
+                    let raw = u32::try_from(n + (LARGEST as i64)).map_err(|_| out_of_range("symbol", n))?;
+                    self.put(table, escape)?;
+                    self.uniform(u64::from(raw), 32)
+                }
+            }
+        }
+    }
+
+    /// Ends the code with the fewest bits that decode to the same symbols whatever follows them: at most two more than the
+    /// symbols' information.
+    pub(super) fn finish(self, writer: &mut BitWriter) -> Result<(), CodecError> {
+        const WHOLE: u128 = 1 << 64;
+        let (bulk, state, situation) = self.encoder.into_raw_parts();
+        let low = u128::from(state.lower());
+        let high = low + u128::from(state.range().get());
+        let mut length = 0;
+        let mut point = 0;
+        for bits in 0..=64 {
+            let unit = WHOLE >> bits;
+            point = low.div_ceil(unit) * unit;
+            length = bits;
+            if point + unit <= high {
+                break;
+            }
+        }
+        for word in bulk {
+            writer.write(u64::from(word), 32)?;
+        }
+        if let EncoderSituation::Inverted(count, first) = situation {
+            let (first, rest) = if point >= WHOLE {
+                (first.wrapping_add(1), 0)
+            } else {
+                (first, u32::MAX)
+            };
+            writer.write(u64::from(first), 32)?;
+            for _ in 1..count.get() {
+                writer.write(u64::from(rest), 32)?;
+            }
+        }
+        writer.write(((point % WHOLE) >> (64 - length)) as u64, length)
+    }
+}
+
+/// Number of symbols of the leading digit and bits below it, for a uniform law of `count` values, at least one.
+fn digits(count: u64) -> (u32, u32) {
+    let mut low = 0;
+    while (count - 1) >> low >= 1 << DIGIT {
+        low += 1;
+    }
+    ((((count - 1) >> low) + 1) as u32, low)
+}
+
+/// Reads integers back.
+pub(super) struct Reader {
+    decoder: RangeDecoder<u32, u64, constriction::backends::Cursor<u32, Vec<u32>>>,
+    available: usize,
+    /// Bits that the symbols so far took at least.
+    spent: usize,
+    /// The code of the symbols so far.
+    pub(super) canonical: Writer,
+}
+
+impl Reader {
+    /// A reader of what is left of `reader`, up to `most` bits, followed by zeros.
+    pub(super) fn new(reader: &BitReader<'_>, most: usize) -> Result<Self, CodecError> {
+        let mut reader = reader.clone();
+        let bits = reader.remaining().min(most);
+        let mut words = Vec::with_capacity(bits.div_ceil(32));
+        for from in (0..bits).step_by(32) {
+            let width = (bits - from).min(32) as u32;
+            words.push((reader.read(width)? << (32 - width)) as u32);
+        }
+        Ok(Self {
+            decoder: RangeDecoder::from_compressed(words).unwrap_infallible(),
+            available: bits,
+            spent: 0,
+            canonical: Writer::new(),
+        })
+    }
+
+    fn get(&mut self, table: Table) -> Result<u32, CodecError> {
+        let found = Found {
+            table: Some(&table),
+            ..Found::default()
+        };
+        let index = self
+            .decoder
+            .decode_symbol(&found)
+            .map_err(|_| out_of_range("code word", "past the last symbol"))?;
+        let (_, _, frequency) = found.place.get().ok_or_else(|| out_of_range("symbol", index))?;
+        // What the encoder would write for the same symbols.
+        self.canonical
+            .encoder
+            .encode_symbol(index, &found)
+            .map_err(|_| out_of_range("symbol", index))?;
+        // A symbol of frequency 2^k to 2^(k+1) takes over 15 - k bits. Beyond the end there is nothing left to decode.
+        self.spent += 15_usize.saturating_sub(frequency.ilog2() as usize);
+        if self.spent > self.available {
+            let requested = (self.spent - self.available) as u32;
+            return Err(CodecError::EndOfMessage {
+                requested,
+                available: 0,
+            });
+        }
+        Ok(index)
+    }
+
+    fn uniform(&mut self, bits: u32) -> Result<u64, CodecError> {
+        let mut value = 0;
+        let mut left = bits;
+        while left > 0 {
+            let width = left.min(DIGIT);
+            left -= width;
+            value = (value << width) + u64::from(self.get(Table::Uniform { count: 1 << width })?);
+        }
+        Ok(value)
+    }
+
+    pub(super) fn read(&mut self, law: &Law) -> Result<i64, CodecError> {
+        match *law {
+            Law::Uniform { count } => {
+                let (top, low) = digits(count);
+                let head = if top > 1 {
+                    u64::from(self.get(Table::Uniform { count: top })?)
+                } else {
+                    0
+                };
+                let value = (head << low) + self.uniform(low)?;
+                if value < count {
+                    Ok(value as i64)
+                } else {
+                    Err(out_of_range("symbol", value))
+                }
+            }
+            Law::Logistic { location, scale } => {
+                let (table, low) = Law::table(location, scale).ok_or_else(|| out_of_range("scale", scale))?;
+                let Table::Logistic { centre, half, .. } = table else {
+                    return Err(out_of_range("scale", scale));
+                };
+                let index = self.get(table)?;
+                if Some(index) == table.escape() {
+                    return Ok(self.uniform(32)? as i64 - LARGEST as i64);
+                }
+                let head = centre - i64::from(half) + i64::from(index);
+                Ok((head << low) + self.uniform(low)? as i64)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use rand::RngExt;
+    use rand::SeedableRng;
+
+    #[test]
+    fn laws_and_symbols_out_of_range_are_refused_and_the_last_within_are_not() {
+        let write = |law: Law, n: i64| {
+            let mut writer = Writer::new();
+            writer.write(&law, n)?;
+            let mut bits = BitWriter::new();
+            writer.finish(&mut bits)?;
+            let message = bits.finish();
+            let mut reader = Reader::new(&BitReader::new(&message), 1 << 10)?;
+            assert_eq!(reader.read(&law)?, n, "{law:?}");
+            Ok::<usize, CodecError>(message.bits())
+        };
+        let law = |location, scale| Law::Logistic { location, scale };
+        for bad in [
+            law(LARGEST, 1.0),
+            law(-LARGEST, 1.0),
+            law(0.0, LARGEST),
+            law(0.0, 0.0),
+            law(0.0, -1.0),
+            law(0.0, f64::NAN),
+            law(f64::NAN, 1.0),
+            law(f64::INFINITY, 1.0),
+            law(0.0, f64::INFINITY),
+        ] {
+            assert!(write(bad, 0).is_err(), "{bad:?}");
+            let empty = fewbits_core::BitString::default();
+            assert!(Reader::new(&BitReader::new(&empty), 99).unwrap().read(&bad).is_err(), "{bad:?}");
+        }
+        for good in [
+            law(LARGEST - 1.0, 1e-9),
+            law(-3.7, 0.9 * LARGEST),
+            law(0.3, 64.0),
+            law(0.3, 64.1),
+            law(-900.0, 7e5),
+        ] {
+            for n in [0, 7, -8, 123_456, (1 << 31) - 1, -1 << 31] {
+                write(good, n).unwrap();
+            }
+        }
+        assert!(write(law(0.3, 64.0), 1 << 31).is_err() && write(law(0.3, 64.0), -1 - (1 << 31)).is_err());
+        let uniform = |count| Law::Uniform { count };
+        for count in [
+            1,
+            2,
+            3,
+            4095,
+            4096,
+            4097,
+            8193,
+            1 << 24,
+            (1 << 24) + 1,
+            1 << 40,
+            (1 << 50) - 3,
+        ] {
+            for n in [0, count / 3, count - 1] {
+                let bits = write(uniform(count), n as i64).unwrap();
+                assert!((bits as f64) < (count as f64).log2() + 2.01, "{bits} bits for one of {count}");
+            }
+            assert!(write(uniform(count), count as i64).is_err() && write(uniform(count), -1).is_err());
+            // The leading digit is as long as a table allows.
+            let (top, low) = digits(count);
+            assert_eq!((u64::from(top), low), {
+                let low = (0..).find(|low| (count - 1) >> low < 4096).unwrap();
+                (((count - 1) >> low) + 1, low)
+            });
+        }
+        assert_eq!((digits(4096), digits(4097), digits(8193)), ((4096, 0), (2049, 1), (2049, 2)));
+    }
+
+    /// Beyond its end a message is zeros, but no more symbols come from it than it has bits for.
+    #[test]
+    fn nothing_is_read_past_the_end() {
+        let law = Law::Uniform { count: 1024 };
+        for bytes in [0, 1, 3, 8, 9] {
+            let message = fewbits_core::BitString::from_bytes(vec![0; bytes], 8 * bytes).unwrap();
+            let mut reader = Reader::new(&BitReader::new(&message), 1 << 10).unwrap();
+            let read = (0..1000).take_while(|_| reader.read(&law).is_ok()).count();
+            // A symbol of ten bits counts for nine at least.
+            assert_eq!(read, 8 * bytes / 9);
+            let mut few = Reader::new(&BitReader::new(&message), 10).unwrap();
+            assert_eq!((0..1000).take_while(|_| few.read(&law).is_ok()).count(), (8 * bytes).min(10) / 9);
+        }
+    }
+
+    #[test]
+    fn integers_of_every_size_come_back_and_the_length_is_near_the_information() {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
+        for round in 0..2000 {
+            let mut symbols = Vec::new();
+            let mut information = 0.0;
+            for _ in 0..rng.random_range(1..30) {
+                let law = if rng.random() {
+                    let width = rng.random_range(1..40);
+                    Law::Uniform {
+                        count: rng.random_range(1..1 << width),
+                    }
+                } else {
+                    let scale = 10.0_f64.powf(rng.random_range(-2.0..6.0));
+                    Law::Logistic {
+                        location: rng.random_range(-3.0..3.0) * scale,
+                        scale,
+                    }
+                };
+                let n = match law {
+                    Law::Uniform { count } => {
+                        information += (count as f64).log2() + 0.1;
+                        rng.random_range(0..count) as i64
+                    }
+                    Law::Logistic { location, scale } => {
+                        let u: f64 = rng.random_range(0.001..0.999);
+                        let n = (location + scale * (u / (1.0 - u)).ln()).round();
+                        let cdf = |x: f64| 1.0 / (1.0 + (-(x - location) / scale).exp());
+                        information += -(cdf(n + 0.5) - cdf(n - 0.5)).log2() + 0.3;
+                        if round % 7 == 0 {
+                            rng.random_range(-1 << 31..1 << 31)
+                        } else {
+                            n as i64
+                        }
+                    }
+                };
+                symbols.push((law, n));
+            }
+            let mut writer = Writer::new();
+            for (law, n) in &symbols {
+                writer.write(law, *n).unwrap();
+            }
+            let mut bits = BitWriter::new();
+            writer.finish(&mut bits).unwrap();
+            let length = bits.bits();
+            if round % 7 != 0 {
+                assert!((length as f64) < information + 2.5, "{length} bits for {information}");
+            }
+            // Whatever follows does not matter.
+            for _ in 0..40 {
+                bits.write(rng.random_range(0..2), 1).unwrap();
+            }
+            let message = bits.finish();
+            let mut reader = Reader::new(&BitReader::new(&message), 1 << 20).unwrap();
+            for (law, n) in &symbols {
+                assert_eq!(reader.read(law).unwrap(), *n, "{law:?}");
+            }
+        }
+    }
+}

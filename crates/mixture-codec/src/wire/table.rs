@@ -1,0 +1,264 @@
+//! Integer frequency tables: the same on every machine.
+
+use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
+use std::borrow::Borrow;
+use std::num::NonZeroU32;
+
+/// Bits of a frequency.
+pub(super) const PRECISION: usize = 16;
+/// Sum of all frequencies of a table.
+pub(super) const TOTAL: u32 = 1 << PRECISION;
+
+/// Frequency of the escape: about 11 bits.
+const ESCAPE: u32 = 32;
+/// A logistic table ends this many scales from its centre; what lies beyond is escaped.
+const REACH: f64 = 10.0;
+/// Share of the wide density in the mixture, and how much wider it is.
+const WIDE_SHARE: f64 = 0.01;
+const WIDE: f64 = 8.0;
+
+/// Cumulative frequencies of the symbols `0..count`, out of 2^16, every symbol at least 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Table {
+    /// `count` symbols, as equal as integers allow; `count` from 2 to 2^12.
+    Uniform { count: u32 },
+    /// Integers `centre - half ..= centre + half` under a logistic law of the given location and scale mixed with one 8 times
+    /// as wide, then the escape.
+    Logistic {
+        centre: i64,
+        half: u32,
+        location: f64,
+        scale: f64,
+    },
+}
+
+impl Table {
+    /// A logistic table; `scale` at most 64.
+    pub(super) fn logistic(location: f64, scale: f64) -> Self {
+        Self::Logistic {
+            centre: libm::round(location) as i64,
+            half: libm::ceil(REACH * scale) as u32 + 4,
+            location,
+            scale,
+        }
+    }
+
+    fn count(&self) -> u32 {
+        match *self {
+            Self::Uniform { count } => count,
+            Self::Logistic { half, .. } => 2 * half + 2,
+        }
+    }
+
+    /// Total frequency of the symbols below `index`, from a software exponential and IEEE arithmetic alone, so that every
+    /// machine gets the same bits.
+    fn cumulative(&self, index: u32) -> u32 {
+        match *self {
+            Self::Uniform { count } => index * TOTAL / count,
+            Self::Logistic {
+                centre,
+                half,
+                location,
+                scale,
+            } => {
+                let symbols = 2 * half + 1;
+                if index == 0 {
+                    0
+                } else if index >= symbols {
+                    if index == symbols { TOTAL - ESCAPE } else { TOTAL }
+                } else {
+                    let edge = (centre - i64::from(half) + i64::from(index)) as f64 - 0.5;
+                    let z = (edge - location) / scale;
+                    // `e^-z` is the eighth power of what the wide density needs.
+                    let wide = libm::exp(-z / WIDE);
+                    let fourth = (wide * wide) * (wide * wide);
+                    let share = (1.0 - WIDE_SHARE) / (1.0 + fourth * fourth) + WIDE_SHARE / (1.0 + wide);
+                    // One for every symbol, the rest by the law.
+                    index + (f64::from(TOTAL - ESCAPE - symbols) * share) as u32
+                }
+            }
+        }
+    }
+
+    /// The escape's index, if there is one.
+    pub(super) fn escape(&self) -> Option<u32> {
+        match *self {
+            Self::Uniform { .. } => None,
+            Self::Logistic { half, .. } => Some(2 * half + 1),
+        }
+    }
+}
+
+impl EntropyModel<PRECISION> for Table {
+    type Symbol = u32;
+    type Probability = u32;
+}
+
+impl EncoderModel<PRECISION> for Table {
+    fn left_cumulative_and_probability(&self, symbol: impl Borrow<u32>) -> Option<(u32, NonZeroU32)> {
+        let index = *symbol.borrow();
+        if index >= self.count() {
+            return None;
+        }
+        let left = self.cumulative(index);
+        NonZeroU32::new(self.cumulative(index + 1).saturating_sub(left)).map(|p| (left, p))
+    }
+}
+
+impl Table {
+    /// Where the symbol of a quantile will be, about: only the search's length depends on it.
+    fn guess(&self, quantile: u32) -> u32 {
+        match *self {
+            Self::Uniform { count } => (quantile * count / TOTAL).min(count - 1),
+            Self::Logistic {
+                centre,
+                half,
+                location,
+                scale,
+            } => {
+                let share = (f64::from(quantile) + 0.5) / f64::from(TOTAL);
+                let value = location + scale * (share / (1.0 - share)).ln();
+                (value.round() - centre as f64 + f64::from(half)).clamp(0.0, f64::from(2 * half + 1)) as u32
+            }
+        }
+    }
+
+    /// The symbol of a quantile, the cumulative frequency below it and its frequency.
+    pub(super) fn find(&self, quantile: u32) -> (u32, u32, NonZeroU32) {
+        // Brackets the last index whose cumulative frequency does not exceed the quantile, in growing strides from the guess.
+        let count = self.count();
+        let guess = self.guess(quantile);
+        let (mut low, mut high) = (guess, guess);
+        let (mut left, mut right) = (self.cumulative(guess), 0);
+        let mut stride = 1;
+        if left <= quantile {
+            while right <= quantile {
+                high = (high + stride).min(count);
+                right = self.cumulative(high);
+                if right <= quantile {
+                    (low, left) = (high, right);
+                }
+                stride *= 2;
+            }
+        } else {
+            while left > quantile {
+                (high, right) = (low, left);
+                low = low.saturating_sub(stride);
+                left = self.cumulative(low);
+                stride *= 2;
+            }
+        }
+        while high - low > 1 {
+            let middle = low + (high - low) / 2;
+            let cumulative = self.cumulative(middle);
+            if cumulative <= quantile {
+                (low, left) = (middle, cumulative);
+            } else {
+                (high, right) = (middle, cumulative);
+            }
+        }
+        (low, left, NonZeroU32::new(right - left).unwrap_or(NonZeroU32::MIN))
+    }
+}
+
+/// A symbol whose place in its table is known: encodes without looking it up, and tells what was decoded.
+#[derive(Debug, Default)]
+pub(super) struct Found<'a> {
+    pub(super) table: Option<&'a Table>,
+    pub(super) place: std::cell::Cell<Option<(u32, u32, NonZeroU32)>>,
+}
+
+impl EntropyModel<PRECISION> for &Found<'_> {
+    type Symbol = u32;
+    type Probability = u32;
+}
+
+impl EncoderModel<PRECISION> for &Found<'_> {
+    fn left_cumulative_and_probability(&self, _: impl Borrow<u32>) -> Option<(u32, NonZeroU32)> {
+        self.place.get().map(|(_, left, frequency)| (left, frequency))
+    }
+}
+
+impl DecoderModel<PRECISION> for &Found<'_> {
+    fn quantile_function(&self, quantile: u32) -> (u32, u32, NonZeroU32) {
+        let place = self.table.map_or((0, 0, NonZeroU32::MIN), |table| table.find(quantile));
+        self.place.set(Some(place));
+        place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// The search from the guess takes few steps where the symbols mostly are.
+    #[test]
+    fn guesses_are_near() {
+        let logistic = [(0.0, 0.3), (0.3, 0.5), (-7.6, 2.2), (1e6, 11.0), (0.5, 64.0)];
+        for (location, scale) in logistic {
+            let table = Table::logistic(location, scale);
+            for quantile in (TOTAL / 20..TOTAL - TOTAL / 20).step_by(97) {
+                let (guess, found) = (table.guess(quantile), table.find(quantile).0);
+                assert!(f64::from(guess.abs_diff(found)) <= 1.0 + 0.3 * scale, "{table:?} {quantile}: {guess} {found}");
+            }
+            assert!(table.guess(0) < table.count() && table.guess(TOTAL - 1) < table.count());
+        }
+        for count in [2, 3, 64, 1000, 4096] {
+            let table = Table::Uniform { count };
+            for quantile in (0..TOTAL).step_by(97).chain([TOTAL - 1]) {
+                let (guess, found) = (table.guess(quantile), table.find(quantile).0);
+                assert!(guess < count && guess.abs_diff(found) <= 1, "{table:?} {quantile}: {guess} {found}");
+            }
+        }
+    }
+
+    /// Against the logistic law and the wide one in their textbook form.
+    #[test]
+    fn frequencies_follow_the_law() {
+        for (location, scale) in [(0.0, 0.3), (0.4, 2.5), (-17.3, 30.0), (1e6, 64.0)] {
+            let table = Table::logistic(location, scale);
+            let Table::Logistic { centre, half, .. } = table else {
+                unreachable!()
+            };
+            assert_eq!((centre, half), (location.round() as i64, (10.0 * scale).ceil() as u32 + 4));
+            assert_eq!((table.count(), table.escape()), (2 * half + 2, Some(2 * half + 1)));
+            for index in 1..=2 * half {
+                let (_, frequency) = table.left_cumulative_and_probability(index).unwrap();
+                let cdf = |x: f64| 0.5 + 0.5 * (0.5 * (x - location) / scale).tanh();
+                let wide = |x: f64| 0.5 + 0.5 * (0.0625 * (x - location) / scale).tanh();
+                let at = (centre - i64::from(half) + i64::from(index)) as f64;
+                let share = 0.99 * (cdf(at + 0.5) - cdf(at - 0.5)) + 0.01 * (wide(at + 0.5) - wide(at - 0.5));
+                // The last symbol before the escape has what lies beyond it, too.
+                if index < 2 * half {
+                    let exact = 1.0 + share * f64::from(TOTAL - 32 - (2 * half + 1));
+                    assert!(
+                        (f64::from(frequency.get()) - exact).abs() < 1.01,
+                        "{table:?} {index}: {frequency} {exact}"
+                    );
+                }
+            }
+            assert!(table.left_cumulative_and_probability(table.count()).is_none());
+            assert_eq!(table.left_cumulative_and_probability(2 * half + 1).unwrap().1.get(), 32);
+        }
+        assert_eq!(Table::Uniform { count: 7 }.escape(), None);
+    }
+
+    #[test]
+    fn frequencies_are_positive_and_complete_and_quantiles_find_their_symbol() {
+        let logistic = [(0.0, 0.01), (0.3, 0.5), (-7.6, 2.2), (1e6, 11.0), (0.5, 64.0)];
+        let tables = logistic.map(|(l, s)| Table::logistic(l, s)).into_iter();
+        for table in tables.chain([2, 3, 64, 1000, 4096].map(|count| Table::Uniform { count })) {
+            let mut total = 0;
+            for index in 0..table.count() {
+                let (left, p) = table.left_cumulative_and_probability(index).unwrap();
+                assert_eq!(left, total);
+                total += p.get();
+                for quantile in [left, total - 1] {
+                    assert_eq!(table.find(quantile), (index, left, p), "{table:?}");
+                }
+            }
+            assert_eq!(total, TOTAL);
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Tests of the public interface.
+
+// Helpers fail loudly, as tests do.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod bounds;
+#[path = "../../../densities/tests/it/common.rs"]
+mod common;
+mod fixtures;
+mod merging;
+mod quadrature;
+mod reduction;
+mod wire;

@@ -1,0 +1,219 @@
+//! What both ends hold and move alike: the lattice, the bank, the predictors and the frequencies.
+
+use super::Config;
+use super::bank::{Ahead, Bank, LONGEST_GAP};
+use super::counts::{REPORTED, Residuals, Values};
+use super::lattice::Lattice;
+use super::law::Law;
+use crate::math::round;
+
+/// Ways to predict the next index: the bank's mean, the last index, the line through the last two.
+pub(super) const PREDICTORS: usize = 3;
+/// Share of the predictors' weights that is spread evenly after each slot.
+const PREDICTOR_SWITCHING: f64 = 0.01;
+/// The least factor of a predictor's weight in one slot, `2^-40`.
+const LEAST_FACTOR: f64 = 1.0 / (1_u64 << 40) as f64;
+/// Coders: the bank, the residuals' frequencies, the values' frequencies.
+pub(super) const CODERS: usize = 3;
+const FIRST_CODERS: [f64; CODERS] = [0.4, 0.4, 0.2];
+/// Share of the coders' weights that is spread evenly after each report.
+const CODER_SWITCHING: f64 = 0.02;
+/// Unwrapped indices of a circular signal are brought back beyond this size.
+const TURN: i64 = 1 << 38;
+
+/// Predictions are no larger: far beyond any index, and far from the ends of an `i64`.
+const FARTHEST: i64 = 1 << 42;
+
+/// The state that sensor and receiver share.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(try_from = "super::stored::StoredReplica", into = "super::stored::StoredReplica")
+)]
+pub struct Replica {
+    pub(super) lattice: Lattice,
+    pub(super) bank: Bank,
+    pub(super) last: i64,
+    pub(super) before: i64,
+    /// Slots between them.
+    pub(super) gap: u32,
+    pub(super) predictors: [f64; PREDICTORS],
+    pub(super) residuals: [Residuals; PREDICTORS],
+    pub(super) values: Values,
+    pub(super) coders: [f64; CODERS],
+}
+
+/// One slot ahead of the last update.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slot {
+    pub(super) ahead: Ahead,
+    candidates: [i64; PREDICTORS],
+    /// The predictor that is believed.
+    pub(super) pick: usize,
+    pub(super) prediction: i64,
+}
+
+impl Slot {
+    /// The prediction: silence means this index.
+    pub fn prediction(&self) -> i64 {
+        self.prediction
+    }
+}
+
+impl Replica {
+    /// Zeros: memory before the first sample, which [`restart`](Self::restart) makes a replica.
+    pub const UNSET: Self = Self {
+        lattice: Lattice::UNSET,
+        bank: Bank::UNSET,
+        last: 0,
+        before: 0,
+        gap: 0,
+        predictors: [0.0; PREDICTORS],
+        residuals: [Residuals::NONE; PREDICTORS],
+        values: Values::NONE,
+        coders: [0.0; CODERS],
+    };
+
+    /// A replica at index 0 of a lattice; the model `believed` has half of the weight, if there is one.
+    pub fn new(lattice: Lattice, believed: Option<usize>) -> Self {
+        let mut replica = Self::UNSET;
+        replica.restart(lattice, believed);
+        replica
+    }
+
+    /// As if made anew, in the memory that it has.
+    pub fn restart(&mut self, lattice: Lattice, believed: Option<usize>) {
+        self.move_to(lattice);
+        self.bank.restart(believed);
+        self.predictors = [1.0; PREDICTORS];
+        self.residuals.iter_mut().for_each(Residuals::clear);
+        self.coders = FIRST_CODERS;
+    }
+
+    /// The bank of models.
+    pub fn bank(&self) -> &Bank {
+        &self.bank
+    }
+
+    /// Takes the bank back to a copy of before: undoes [`predict`](Self::predict).
+    pub fn restore_bank(&mut self, saved: Bank) {
+        self.bank = saved;
+    }
+
+    /// The lattice of reconstructions.
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// The reconstruction of the last slot.
+    pub fn value(&self) -> f64 {
+        self.lattice.value(self.last)
+    }
+
+    /// The time update over `elapsed` slots.
+    pub fn predict(&mut self, elapsed: u32) -> Slot {
+        let ahead = self.bank.predict(elapsed);
+        let rounded = round(ahead.mean).clamp(-(FARTHEST as f64), FARTHEST as f64) as i64;
+        // The gap is at least one.
+        let (slots, gap) = (i64::from(ahead.slots), i64::from(self.gap.max(1)));
+        let rise = self.lattice.shortest(self.last - self.before) * slots + gap / 2;
+        let step = rise.checked_div_euclid(gap).unwrap_or(0);
+        let line = (self.last + step).clamp(-FARTHEST, FARTHEST);
+        let candidates = [rounded, self.last, line];
+        let mut picked = (0, rounded, self.predictors[0]);
+        for (i, (weight, candidate)) in self.predictors.iter().zip(candidates).enumerate().skip(1) {
+            if *weight >= picked.2 {
+                picked = (i, candidate, *weight);
+            }
+        }
+        Slot {
+            ahead,
+            candidates,
+            pick: picked.0,
+            prediction: picked.1,
+        }
+    }
+
+    /// The law of the residual of a report in this slot.
+    pub fn law<'a>(&'a self, slot: &'a Slot) -> Law<'a> {
+        Law::new(self, slot)
+    }
+
+    /// Frequencies of the residuals from the predictor that a slot believes.
+    pub(super) fn residuals(&self, slot: &Slot) -> &Residuals {
+        let [first, ..] = &self.residuals;
+        self.residuals.get(slot.pick).unwrap_or(first)
+    }
+
+    /// Everything that follows from a silent slot.
+    pub fn silent(&mut self, slot: &Slot) {
+        self.update(slot, slot.prediction, 1.0);
+    }
+
+    /// Everything that follows from the index of this slot; `outside` is the bank's probability of a report.
+    pub(super) fn update(&mut self, slot: &Slot, j: i64, outside: f64) {
+        let reported = j != slot.prediction;
+        let name = self.lattice.canonical(j);
+        let cell = self.bank.update(&slot.ahead, j);
+        if reported {
+            let from_bank = (cell / outside).clamp(1e-12, 1.0);
+            let silent = self.values.count(self.lattice.canonical(slot.prediction));
+            let seen = f64::from(self.values.total() - silent + REPORTED);
+            let from_values = (f64::from(self.values.count(name)) + f64::from(REPORTED) * from_bank) / seen;
+            let from_residuals = self.residuals(slot).probability(j - slot.prediction);
+            let found = [from_bank, from_residuals, from_values];
+            spread(&mut self.coders, found, CODER_SWITCHING);
+        }
+        let mut factors = [1.0; PREDICTORS];
+        let predictors = slot.candidates.iter().zip(&mut self.residuals);
+        for (factor, (candidate, residuals)) in factors.iter_mut().zip(predictors) {
+            let k = self.lattice.shortest(j - candidate);
+            if k != 0 {
+                *factor = residuals.probability(k).max(LEAST_FACTOR);
+                residuals.add(k);
+            }
+        }
+        spread(&mut self.predictors, factors, PREDICTOR_SWITCHING);
+        self.values.add(name, if reported { REPORTED } else { 1 });
+        (self.before, self.last, self.gap) = (self.last, j, slot.ahead.slots);
+        if let (Some(cells), true) = (self.lattice.cells(), j.abs() > TURN) {
+            let turns = j - j.checked_rem_euclid(cells).unwrap_or(0);
+            self.bank.shift(turns);
+            self.last -= turns;
+            self.before -= turns;
+        }
+    }
+
+    /// A sample that no lattice point represents becomes the origin of a new lattice. What was learned of residuals stays.
+    pub(super) fn move_to(&mut self, lattice: Lattice) {
+        self.lattice = lattice;
+        let best = self.bank.best();
+        self.bank.restart(Some(best));
+        self.values.clear();
+        (self.last, self.before, self.gap) = (0, 0, 1);
+    }
+
+    /// Whether numbers that were stored are those of a replica of this agreement.
+    pub fn is_valid(&self, config: &Config) -> bool {
+        let weights = self.predictors.iter().chain(&self.coders);
+        let indices = [self.last, self.before].iter().all(|j| j.abs() <= 2 * FARTHEST);
+        self.lattice.is_valid(config)
+            && (1..=LONGEST_GAP).contains(&self.gap)
+            && self.bank.is_valid()
+            && indices
+            && weights.into_iter().all(|w| *w > 0.0 && *w <= 1.0)
+    }
+}
+
+/// Bayes' rule, then an even share for every expert, so that none is ever given up.
+fn spread<const N: usize>(weights: &mut [f64; N], factors: [f64; N], share: f64) {
+    let mut total = 0.0;
+    for (weight, factor) in weights.iter_mut().zip(factors) {
+        *weight *= factor;
+        total += *weight;
+    }
+    for weight in weights.iter_mut() {
+        *weight = *weight / total * (1.0 - share) + share / N as f64;
+    }
+}

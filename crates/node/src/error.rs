@@ -1,0 +1,52 @@
+//! The error of this crate.
+
+use core::fmt;
+
+/// An argument that a sensor's half refuses; its state is then as it was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Error {
+    /// Name of the argument as the signature spells it.
+    pub name: &'static str,
+    /// The offending value.
+    pub value: f64,
+    /// What would have been accepted.
+    pub expected: &'static str,
+}
+
+impl Error {
+    #[cold]
+    pub(crate) const fn new(name: &'static str, value: f64, expected: &'static str) -> Self {
+        Self { name, value, expected }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "argument `{}` is {}: expected {}", self.name, self.value, self.expected)
+    }
+}
+
+impl core::error::Error for Error {}
+
+#[cfg(feature = "std")]
+impl From<Error> for fewbits_numerics::ArgumentError {
+    fn from(error: Error) -> Self {
+        Self::new(error.name, error.value, error.expected)
+    }
+}
+
+pub(crate) const fn finite(name: &'static str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(Error::new(name, value, "a finite number"))
+    }
+}
+
+pub(crate) const fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(Error::new(name, value, "a finite number above 0"))
+    }
+}

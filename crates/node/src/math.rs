@@ -1,0 +1,120 @@
+//! The exponential, and functions of the standard library that `core` lacks: its own with the feature `std`, those of `libm` without. All are exact or
+//! correctly rounded, so both give the same bits.
+
+#[cfg(feature = "std")]
+mod chosen {
+    pub(crate) fn ceil(x: f64) -> f64 {
+        x.ceil()
+    }
+
+    /// Halves away from zero.
+    pub(crate) fn round(x: f64) -> f64 {
+        x.round()
+    }
+
+    pub(crate) fn sqrt(x: f64) -> f64 {
+        x.sqrt()
+    }
+
+    pub(crate) fn remainder(x: f64, y: f64) -> f64 {
+        x % y
+    }
+}
+
+#[cfg(not(feature = "std"))]
+mod chosen {
+    pub(crate) use super::long_division as remainder;
+    pub(crate) use libm::{ceil, round, sqrt};
+}
+
+pub(crate) use chosen::{ceil, remainder, round, sqrt};
+
+/// The exponential of `numerics`, for loops that are compiled for vector instructions.
+#[cfg(feature = "std")]
+pub(crate) use fewbits_numerics::kernels::scalar::exp;
+
+/// The exponential of `numerics`, once in the program: with doubles in software it is long.
+#[cfg(not(feature = "std"))]
+#[inline(never)]
+pub(crate) fn exp(x: f64) -> f64 {
+    fewbits_numerics::kernels::scalar::exp(x)
+}
+
+/// The remainder in `[0, period)`, but for a tiny negative value, whose remainder rounds to the period.
+pub(crate) fn rem_euclid(value: f64, period: f64) -> f64 {
+    let rest = remainder(value, period);
+    if rest < 0.0 { rest + period } else { rest }
+}
+
+/// The remainder of `x / y` with the sign of `x`, exact, for finite `x` and `y > 0`: one subtraction per bit of the quotient. Slower than the
+/// library's and a tenth of its size.
+#[cfg(any(not(feature = "std"), test))]
+pub(crate) fn long_division(x: f64, y: f64) -> f64 {
+    const IMPLICIT: u64 = 1 << 52;
+    // Mantissa of 53 bits and exponent, so that the number is `mantissa 2^exponent` of the smallest number.
+    let parts = |bits: u64| {
+        let exponent = (bits >> 52) as i32;
+        let shift = (bits.leading_zeros() as i32 - 11).max(0);
+        match exponent {
+            0 => (bits << shift, -shift),
+            _ => (bits & (IMPLICIT - 1) | IMPLICIT, exponent - 1),
+        }
+    };
+    let ((mut rest, mut exponent), (divisor, last)) = (parts(x.abs().to_bits()), parts(y.to_bits()));
+    if x == 0.0 || exponent < last {
+        return x;
+    }
+    while exponent > last {
+        if rest >= divisor {
+            rest -= divisor;
+        }
+        // Below twice the divisor, which is below 2^53.
+        rest <<= 1;
+        exponent -= 1;
+    }
+    if rest >= divisor {
+        rest -= divisor;
+    }
+    if rest == 0 {
+        return 0.0_f64.copysign(x);
+    }
+    while rest < IMPLICIT && exponent > 0 {
+        rest <<= 1;
+        exponent -= 1;
+    }
+    // Exact: the remainder is a multiple of the smallest number.
+    rest >>= (-exponent).max(0);
+    // A mantissa without its highest bit is that of a subnormal number: the bits are in place.
+    f64::from_bits(((exponent.max(0) as u64) << 52) + rest).copysign(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{long_division, rem_euclid};
+    use std::vec::Vec;
+
+    #[test]
+    fn both_choices_give_the_same_bits() {
+        let mut values: Vec<f64> = [0.0, -0.0, 0.5, -0.5, 1.5, 2.5, 4_503_599_627_370_497.5, 1e300, 5e-324].to_vec();
+        let mut state = 1_u64;
+        for _ in 0..200_000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            values.push((state >> 40) as f64 / 64.0 - 1e5);
+            values.push(f64::from_bits(state ^ (state >> 29)));
+        }
+        let same = |a: f64, b: f64| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
+        for x in values {
+            assert!(same(x.ceil(), libm::ceil(x)), "{x}");
+            assert!(same(x.round(), libm::round(x)) && same(x.sqrt(), libm::sqrt(x)), "{x}");
+            if x.is_finite() {
+                assert_eq!(rem_euclid(x, 360.0), x.rem_euclid(360.0), "{x}");
+                for y in [360.0, 0.1, 1e300, 5e-324, 3e-310, f64::MIN_POSITIVE] {
+                    // The longest take 2,000 subtractions: only some of them.
+                    if (x.abs() / y) < 1e60 {
+                        assert!(same(long_division(x, y), x % y), "{x} {y}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Schemes that compare a sample with thresholds: sign bit, word, bit of a pattern.
+
+use crate::error::{Error, finite, positive};
+use crate::sample::Sample;
+
+/// Whether the sample reached the threshold; a tie did. The threshold of the Dymbo filter is the broadcast prediction.
+///
+/// # Errors
+/// If one of them is not finite.
+#[inline]
+pub fn sign_bit<T: Sample>(sample: T, threshold: T) -> Result<bool, Error> {
+    if !sample.is_finite() {
+        return Err(Error::new("measurement", sample.to_f64(), "a finite number"));
+    }
+    if !threshold.is_finite() {
+        return Err(Error::new("threshold", threshold.to_f64(), "a finite number"));
+    }
+    Ok(sample >= threshold)
+}
+
+/// Number of thresholds at or below the sample: the cell that holds it, if the thresholds increase. A threshold belongs to the cell above
+/// it; infinite samples fall into the outer cells.
+///
+/// # Errors
+/// If the sample is NaN.
+#[inline]
+pub fn cell_of<T: Sample>(thresholds: &[T], sample: T) -> Result<usize, Error> {
+    if sample.is_number() {
+        Ok(thresholds.partition_point(|threshold| *threshold <= sample))
+    } else {
+        Err(Error::new("measurement", sample.to_f64(), "a number"))
+    }
+}
+
+/// The bit of a pattern: the parity of [`cell_of`], for it changes at every threshold.
+///
+/// # Errors
+/// If the sample is NaN.
+#[inline]
+pub fn pattern_bit<T: Sample>(thresholds: &[T], sample: T) -> Result<bool, Error> {
+    Ok(cell_of(thresholds, sample)? % 2 == 1)
+}
+
+/// Cell of the innovation `(sample - mean) / deviation` among thresholds of the standard normal density.
+///
+/// # Errors
+/// If the sample or the mean is not finite, or the deviation not a number above 0.
+#[inline]
+pub fn innovation_cell(thresholds: &[f64], sample: f64, mean: f64, deviation: f64) -> Result<usize, Error> {
+    let scale = positive("deviation", deviation)?;
+    let innovation = (finite("measurement", sample)? - finite("prediction", mean)?) / scale;
+    Ok(thresholds.partition_point(|threshold| *threshold <= innovation))
+}
+
+/// [`innovation_cell`] without floating point: sample, mean and deviation are codes, the thresholds multiples of `2^-16` deviations.
+#[inline]
+pub fn innovation_cell_of_codes(thresholds: &[i32], sample: i32, mean: i32, deviation: u32) -> usize {
+    // Below 2^33 * 2^16 and 2^31 * 2^32: neither side can overflow.
+    let innovation = (i64::from(sample) - i64::from(mean)) << 16;
+    thresholds.partition_point(|threshold| i64::from(*threshold) * i64::from(deviation) <= innovation)
+}
+
+/// A designed quantizer: thresholds and the word of each cell, as `Export::to_rust` of `quantizer-design` writes them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantizer<'a, T> {
+    thresholds: &'a [T],
+    words: &'a [u16],
+    bits: u32,
+}
+
+impl<'a, T: Sample> Quantizer<'a, T> {
+    /// A quantizer of `thresholds.len() + 1` cells whose words have `bits` bits. Cells may share a word.
+    ///
+    /// # Errors
+    /// If `bits` is not in `1..=16`, there is not one word per cell, a word does not fit, or the thresholds are not finite and strictly
+    /// increasing.
+    pub fn new(thresholds: &'a [T], words: &'a [u16], bits: u32) -> Result<Self, Error> {
+        if !(1..=16).contains(&bits) {
+            return Err(Error::new("bits", f64::from(bits), "1 to 16"));
+        }
+        if words.len() != thresholds.len() + 1 {
+            return Err(Error::new("words", words.len() as f64, "one word per cell"));
+        }
+        if let Some(word) = words.iter().find(|word| u32::from(**word) >> bits != 0) {
+            return Err(Error::new("words", f64::from(*word), "words of so many bits"));
+        }
+        let mut before = None;
+        for threshold in thresholds {
+            if !threshold.is_finite() || before.is_some_and(|before| before >= *threshold) {
+                return Err(Error::new("thresholds", threshold.to_f64(), "finite and strictly increasing"));
+            }
+            before = Some(*threshold);
+        }
+        Ok(Self {
+            thresholds,
+            words,
+            bits,
+        })
+    }
+
+    /// Bits of a word.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// The word of a sample.
+    ///
+    /// # Errors
+    /// If the sample is NaN.
+    #[inline]
+    pub fn word(&self, sample: T) -> Result<u16, Error> {
+        let cell = cell_of(self.thresholds, sample)?;
+        // There is a word for every cell.
+        Ok(self.words.get(cell).copied().unwrap_or(0))
+    }
+}

@@ -1,0 +1,5 @@
+//! Tests of the sensor's halves against golden vectors, plain definitions and the encoder of before.
+
+mod golden;
+mod law;
+mod schemes;

@@ -1,0 +1,6 @@
+//! Small dense matrices and tridiagonal systems.
+
+pub mod eigen;
+pub mod factored;
+pub mod linalg;
+pub mod tridiagonal;

@@ -1,0 +1,68 @@
+//! The logarithm of a sum of exponentials whose terms arrive one after the other.
+
+/// `ln sum exp(term)`, without overflow. For terms in a slice see [`log_sum_exp`](crate::kernels::log_sum_exp).
+///
+/// ```
+/// let sum: fewbits_numerics::LogSum = [1000.0, 1000.0, f64::NEG_INFINITY].into_iter().collect();
+/// assert_eq!(sum.value(), 1000.0 + 2.0_f64.ln());
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct LogSum {
+    largest: f64,
+    /// Sum of all terms, divided by the exponential of the largest.
+    scaled: f64,
+}
+
+impl Default for LogSum {
+    fn default() -> Self {
+        Self {
+            largest: f64::NEG_INFINITY,
+            scaled: 0.0,
+        }
+    }
+}
+
+impl LogSum {
+    /// Adds `exp(term)`. Minus infinity adds nothing; NaN is taken as minus infinity; infinity makes the sum infinite.
+    #[inline]
+    pub fn add(&mut self, term: f64) {
+        if term > self.largest {
+            self.scaled = self.scaled * (self.largest - term).exp() + 1.0;
+            self.largest = term;
+        } else if term > f64::NEG_INFINITY && self.largest < f64::INFINITY {
+            self.scaled += (term - self.largest).exp();
+        }
+    }
+
+    /// The logarithm of the sum; minus infinity before the first term.
+    #[inline]
+    pub fn value(&self) -> f64 {
+        if self.largest.is_finite() {
+            self.largest + self.scaled.ln()
+        } else {
+            self.largest
+        }
+    }
+}
+
+impl FromIterator<f64> for LogSum {
+    fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Self {
+        let mut sum = Self::default();
+        terms.into_iter().for_each(|term| sum.add(term));
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::LogSum;
+
+    #[test]
+    fn infinities_and_nan_do_not_spread() {
+        let of = |terms: &[f64]| terms.iter().copied().collect::<LogSum>().value();
+        assert_eq!(of(&[]), f64::NEG_INFINITY);
+        assert_eq!(of(&[f64::NEG_INFINITY, f64::NAN]), f64::NEG_INFINITY);
+        assert_eq!(of(&[0.0, f64::INFINITY, 3.0, f64::INFINITY]), f64::INFINITY);
+        assert!((of(&[-1e4, -1e4 - 1.0, f64::NAN]) + 1e4 - (1.0 + (-1.0_f64).exp()).ln()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,5 @@
+//! Roots and maxima of functions of one variable.
+
+pub mod golden;
+pub mod newton;
+pub mod roots;

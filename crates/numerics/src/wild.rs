@@ -1,0 +1,51 @@
+//! Numbers to test with: what a caller may hand over by mistake, beside what makes sense.
+//!
+//! ```
+//! use fewbits_numerics::wild;
+//! assert!(wild::EXTREMES.iter().any(|x| x.is_nan()));
+//! // Random bits choose a number; bits of zero choose zero, so that failing cases shrink to simple ones.
+//! assert_eq!(wild::number(0), 0.0);
+//! ```
+
+/// No numbers, infinities, zeros of both signs, and the ends of the range, of its squares and of whole numbers.
+pub const EXTREMES: [f64; 20] = [
+    0.0,
+    f64::NAN,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    -0.0,
+    1.0,
+    -1.0,
+    1e300,
+    -1e300,
+    1e-300,
+    -1e-300,
+    f64::MAX,
+    f64::MIN,
+    f64::MIN_POSITIVE,
+    5e-324,
+    1e154,
+    -1e154,
+    1e-154,
+    1e16,
+    -1e16,
+];
+
+/// The number that 64 bits choose: one of [`EXTREMES`] in two of nine cases, uniform in `[-3, 3)` in three, positive and below 4 in
+/// three, and a power of ten from `1e-300` to `1e299` in one.
+pub fn number(bits: u64) -> f64 {
+    let (kind, rest) = (bits % 9, bits / 9);
+    // 2^64 / 9 is above 2^60: 52 bits of the rest are uniform.
+    let unit = (rest % (1 << 52)) as f64 / (1_u64 << 52) as f64;
+    match kind {
+        0 | 1 => EXTREMES[(rest % EXTREMES.len() as u64) as usize],
+        2..5 => 6.0 * unit - 3.0,
+        5..8 => 1e-3 + 4.0 * unit,
+        _ => 10.0_f64.powi((rest % 600) as i32 - 300),
+    }
+}
+
+/// A number for each of some bits.
+pub fn numbers<const N: usize>(bits: [u64; N]) -> [f64; N] {
+    bits.map(number)
+}

@@ -1,0 +1,293 @@
+//! The sensor's half of a quantized range, and what its levels say.
+
+use crate::Error;
+use crate::error::refuse;
+use crate::factor::RangeFactor;
+use crate::sensor::RangeNoise;
+use fewbits_core::{
+    BitReader, BitWriter, Cell, CodecError, Gaussian, Link, MeasurementNoise, Message, NumberFormat, Observation,
+    Scheme,
+};
+use fewbits_numerics::error::{ArgumentError, finite, positive};
+use fewbits_quantizers::{Labelling, Symbol};
+use nalgebra::{Matrix1, Vector1};
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+/// Where the cells of a quantized range lie: `L` equal cells on `centre +- half_width`, the first and the last continued to
+/// infinity.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RangeReference {
+    /// The reference range, in the middle of the cells.
+    pub centre: f64,
+    /// `N_f`, the range of an innovation of one; above zero.
+    pub half_width: f64,
+}
+
+impl RangeReference {
+    /// The reference about an expected measurement: its mean, and `loading` of its standard deviations to either side
+    /// ([`optimal_loading`](crate::optimal_loading)).
+    pub fn about(expected: &Gaussian<1>, loading: f64) -> Self {
+        Self {
+            centre: expected.mean()[0],
+            half_width: loading * expected.covariance()[0].sqrt(),
+        }
+    }
+
+    /// Edge `q` of `levels` cells, of `levels + 1`.
+    #[inline]
+    fn edge(&self, q: usize, levels: usize) -> f64 {
+        fewbits_node::edge(q as u32, levels as u32, self.centre, self.half_width)
+    }
+
+    pub(crate) fn check(&self) -> Result<(), ArgumentError> {
+        finite("centre", self.centre)?;
+        positive("half_width", self.half_width).map(|_| ())
+    }
+
+    /// The cell of a level with both ends finite: what the decoded interval is.
+    ///
+    /// # Errors
+    /// If the level is not below `levels`, the reference is none, or rounding closes the cell.
+    pub fn nominal_cell(&self, level: usize, levels: usize) -> Result<Cell, Error> {
+        self.check()?;
+        if level >= levels {
+            return refuse("level", level, format!("a level below {levels}"));
+        }
+        Ok(Cell::new(self.edge(level, levels), self.edge(level + 1, levels))?)
+    }
+}
+
+impl Message for RangeReference {
+    type Format = NumberFormat;
+
+    fn encode(&self, format: &NumberFormat, writer: &mut BitWriter) -> Result<(), CodecError> {
+        format.write(self.centre, writer)?;
+        format.write(self.half_width, writer)
+    }
+
+    fn decode(format: &NumberFormat, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        let centre = format.read(reader)?;
+        Ok(Self {
+            centre,
+            half_width: format.read(reader)?,
+        })
+    }
+}
+
+/// A sensor that reports in which of `L` equal cells around a reference its range lies: a [`Scheme`], so that every filter of
+/// the library tracks with it.
+///
+/// The innovation `I = (z - centre) / half_width` takes the cell `clamp(floor((I + 1) L / 2), 0, L - 1)`; a range on an edge
+/// belongs to the cell above. The reference is the scheme's feedback. Nodes that receive all reports and run the same
+/// deterministic filter compute it themselves and pay nothing for it ([`Encoder`](crate::Encoder)); otherwise it is broadcast.
+///
+/// ```
+/// use fewbits_core::factor::Factor;
+/// use fewbits_core::{Gaussian, Link, Observation, Scheme};
+/// use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference};
+/// let scheme = QuantizedRange::new(4, RangeNoise::from_snr_db(50.0)?)?;
+/// let reference = RangeReference { centre: 5.2, half_width: 3.05 };
+/// let level = scheme.level(4.9, &reference)?;
+/// let received = scheme.factor(&reference, &Observation::Received(level), &Link::PERFECT)?;
+/// let posterior = received.tilted(&Gaussian::scalar(5.0, 1.0)?)?;
+/// assert!(posterior.mean[0] < 5.0 && posterior.covariance[0] < 0.3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QuantizedRange {
+    labelling: Labelling,
+    noise: RangeNoise,
+    /// How a broadcast reference travels.
+    format: NumberFormat,
+    interval: IntervalRule,
+}
+
+/// Which finite interval message passing draws from when it receives a level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum IntervalRule {
+    /// The cell: `centre + half_width (q -+ Delta / 2)`.
+    #[default]
+    Correct,
+    /// Equation 3.18 as printed, `centre (1 + q -+ Delta / 2)`: scaled by the range and not by its innovation (erratum `mpa-1`).
+    Printed,
+}
+
+impl QuantizedRange {
+    /// A sensor with `levels` cells and the given noise; a reference that is broadcast costs 64 bits.
+    ///
+    /// # Errors
+    /// Unless there are 2 to 65536 levels.
+    pub fn new(levels: usize, noise: RangeNoise) -> Result<Self, Error> {
+        Ok(Self {
+            labelling: Labelling::natural(levels)?,
+            noise,
+            format: NumberFormat::Single,
+            interval: IntervalRule::Correct,
+        })
+    }
+
+    /// The same with another interval for message passing; factors keep the true cell.
+    #[must_use]
+    pub fn with_interval(self, interval: IntervalRule) -> Self {
+        Self { interval, ..self }
+    }
+
+    /// The same with other words on the wire, such as those of a Gray code.
+    #[must_use]
+    pub fn with_labelling(self, labelling: Labelling) -> Self {
+        Self { labelling, ..self }
+    }
+
+    /// The same with another format of a broadcast reference.
+    #[must_use]
+    pub fn with_format(self, format: NumberFormat) -> Self {
+        Self { format, ..self }
+    }
+
+    /// `L`.
+    pub fn levels(&self) -> usize {
+        self.labelling.levels()
+    }
+
+    /// Bits of a report.
+    pub fn bits(&self) -> u32 {
+        self.labelling.bits()
+    }
+
+    /// The noise of the range.
+    pub fn noise(&self) -> &RangeNoise {
+        &self.noise
+    }
+
+    /// The level of a range.
+    ///
+    /// # Errors
+    /// If the range is not finite, or the reference is none.
+    pub fn level(&self, range: f64, reference: &RangeReference) -> Result<Symbol, ArgumentError> {
+        let level = fewbits_node::range_level(range, reference.centre, reference.half_width, self.levels() as u32)?;
+        Ok(Symbol(level as usize))
+    }
+
+    /// What a level that arrived unharmed with probability `share` says.
+    fn cell_factor(&self, level: usize, reference: &RangeReference, share: f64) -> Result<RangeFactor, Error> {
+        let (levels, nominal) = (self.levels(), reference.nominal_cell(level, self.levels())?);
+        let lower = if level == 0 { f64::NEG_INFINITY } else { nominal.lower() };
+        let upper = if level + 1 == levels {
+            f64::INFINITY
+        } else {
+            nominal.upper()
+        };
+        let drawn_from = match self.interval {
+            IntervalRule::Correct => [nominal.lower(), nominal.upper()],
+            IntervalRule::Printed => [level, level + 1].map(|q| reference.centre * 2.0 * q as f64 / levels as f64),
+        };
+        RangeFactor::in_cell(Cell::new(lower, upper)?, drawn_from, share, self.noise)
+    }
+
+    /// What a received level says, over a perfect link.
+    ///
+    /// # Errors
+    /// If there is no such level, or the reference is none.
+    pub fn received(&self, level: Symbol, reference: &RangeReference) -> Result<RangeFactor, Error> {
+        self.cell_factor(level.0, reference, 1.0)
+    }
+}
+
+/// What a scheme reports.
+pub(crate) fn reported(error: Error) -> fewbits_core::Error {
+    match error {
+        Error::Argument(error) => error.into(),
+        Error::Core(error) => error,
+        other => ArgumentError::new("reference", other, "a reference of a quantized range").into(),
+    }
+}
+
+impl MeasurementNoise<1> for QuantizedRange {
+    fn noise_covariance_at(&self, range: &Vector1<f64>) -> Matrix1<f64> {
+        let deviation = self.noise.deviation(range[0]);
+        Matrix1::new(deviation * deviation)
+    }
+}
+
+impl Scheme<1> for QuantizedRange {
+    type State = ();
+    type Feedback = RangeReference;
+    type Report = Symbol;
+    type Factor = RangeFactor;
+
+    fn start(&self) {}
+
+    fn feedback_format(&self) -> NumberFormat {
+        self.format
+    }
+
+    fn report_format(&self) -> Labelling {
+        self.labelling.clone()
+    }
+
+    fn encode<R: Rng + ?Sized>(
+        &self,
+        _: &mut R,
+        (): &mut (),
+        measurement: &Vector1<f64>,
+        reference: &RangeReference,
+    ) -> Result<Option<Symbol>, fewbits_core::Error> {
+        Ok(Some(self.level(measurement[0], reference)?))
+    }
+
+    fn factor(
+        &self,
+        reference: &RangeReference,
+        observation: &Observation<Symbol>,
+        link: &Link,
+    ) -> Result<RangeFactor, fewbits_core::Error> {
+        let symbol = match observation {
+            Observation::Received(symbol) => *symbol,
+            missing => return RangeFactor::constant(link.delivery(missing), self.noise).map_err(reported),
+        };
+        let arrives = link.of_received()?;
+        if link.crossover() == 0.0 {
+            return self.cell_factor(symbol.0, reference, arrives).map_err(reported);
+        }
+        reference.check()?;
+        let (levels, word) = (self.levels(), |symbol: usize| self.labelling.word(symbol).map(u64::from));
+        let Some(received) = word(symbol.0) else {
+            let expected = format!("a symbol below {}", self.labelling.symbols());
+            return Err(ArgumentError::new("symbol", symbol.0, expected).into());
+        };
+        let given = |level: usize| {
+            let sent = word(level).unwrap_or(received);
+            arrives * link.word_probability(sent, received, self.bits())
+        };
+        let edges = (0..=levels).map(|q| reference.edge(q, levels)).collect();
+        Ok(RangeFactor::levels(edges, (0..levels).map(given).collect(), self.noise))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ties_go_up_and_beyond_the_ends_it_saturates() {
+        let scheme = QuantizedRange::new(4, RangeNoise::constant(0.1).unwrap()).unwrap();
+        let reference = RangeReference {
+            centre: 5.0,
+            half_width: 2.0,
+        };
+        let levels = [-1e300, 2.9, 3.0, 4.0, 5.0, 6.999, 7.0, 1e300].map(|z| scheme.level(z, &reference).unwrap().0);
+        assert_eq!(levels, [0, 0, 0, 1, 2, 3, 3, 3]);
+        assert!(scheme.level(f64::NAN, &reference).is_err());
+        let broken = RangeReference {
+            centre: 5.0,
+            half_width: 0.0,
+        };
+        assert!(scheme.level(5.0, &broken).is_err());
+        assert!(scheme.received(Symbol(4), &reference).is_err());
+        assert!(QuantizedRange::new(1, *scheme.noise()).is_err());
+    }
+}

@@ -1,0 +1,119 @@
+//! What it is worth to report a sample as one level or another, the other sensors and the decoder being as they are.
+//!
+//! With the decoder's scores held fixed every criterion is linear in the sensor's decisions, so the best level at a sample `y`
+//! is the largest of a few functions `D_z(y)`, on which the alternating algorithm rests.
+
+use crate::criterion::{Criterion, LOG_FLOOR};
+use crate::error::{Error, refuse};
+use crate::moments::{Table, moments};
+use crate::scene::Scene;
+use crate::system::{SensorGroup, System};
+use fewbits_quantizers::Channel;
+
+/// The logarithm that stands for the probability of what cannot happen: finite, so that a weight of zero removes it.
+const LOG_IMPOSSIBLE: f64 = -1e12;
+
+/// The group if it is a single sensor.
+pub(super) fn single_sensor(system: &System, group: usize) -> Result<&SensorGroup, Error> {
+    let entry = system.group(group)?;
+    match entry.sensors().len() {
+        1 => Ok(entry),
+        n => refuse("group", format!("{n} sensors"), "a group of a single sensor"),
+    }
+}
+
+/// `lambda_z(node) = sum_k w_k P(node | x_k) sum_t' P(t' | node) sum_t C[t, z] score(t', t, x_k)`, levels by nodes.
+///
+/// `others` holds the joint report probabilities of the other sensors and `symbols` this sensor's, both a row per report. The
+/// score is `ln p(t', t | x) / p(t', t)`, minus the squared error of the posterior mean, or minus one for a wrong decision.
+pub(super) fn level_gains(
+    scene: &Scene,
+    criterion: Criterion,
+    others: &Table,
+    symbols: &Table,
+    channel: &Channel,
+) -> Table {
+    let values = scene.values.len();
+    let mut log_likelihood = moments(&[others, symbols], &scene.given);
+    for q in &mut log_likelihood {
+        *q = q.max(LOG_FLOOR).ln();
+    }
+    gains_of(scene, criterion, others, channel, |at| &log_likelihood[at * values..(at + 1) * values])
+}
+
+/// As [`level_gains`], from the logarithms of the likelihoods: `log_likelihood(i)` is one number per value of the unknown, of
+/// the outcome `i = other * outputs + symbol`. Probabilities may underflow, their logarithms may not.
+pub(super) fn gains_of<'a>(
+    scene: &Scene,
+    criterion: Criterion,
+    others: &Table,
+    channel: &Channel,
+    log_likelihood: impl Fn(usize) -> &'a [f64],
+) -> Table {
+    let (nodes, values) = (scene.nodes(), scene.values.len());
+    let mut per_symbol = vec![0.0; channel.outputs() * nodes];
+    let mut score = vec![0.0; values];
+    for at in 0..others.rows() * channel.outputs() {
+        let (other, symbol) = (at / channel.outputs(), at % channel.outputs());
+        scores(scene, criterion, log_likelihood(at), &mut score);
+        let reports = others.row(other);
+        let out = &mut per_symbol[symbol * nodes..(symbol + 1) * nodes];
+        for ((feature, w), s) in scene.given.iter().zip(&scene.weights).zip(&score) {
+            let factor = w * s;
+            for (i, p) in feature.weights.iter().enumerate() {
+                out[feature.start + i] += factor * p * reports[feature.start + i];
+            }
+        }
+    }
+    let mut gains = vec![0.0; channel.inputs() * nodes];
+    for (z, row) in gains.chunks_exact_mut(nodes).enumerate() {
+        for (t, symbol) in per_symbol.chunks_exact(nodes).enumerate() {
+            let c = channel.probability(t, z);
+            if c != 0.0 {
+                row.iter_mut().zip(symbol).for_each(|(r, s)| *r += c * s);
+            }
+        }
+    }
+    Table::new(gains, nodes)
+}
+
+/// What the decoder's answer to one outcome is worth at each value of the unknown.
+fn scores(scene: &Scene, criterion: Criterion, log_likelihood: &[f64], out: &mut [f64]) {
+    // Relative to the most likely value, so that the largest number is 1.
+    let largest = log_likelihood.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        // An outcome that no value can cause.
+        out.fill(0.0);
+        return;
+    }
+    let relative = |l: &f64| (l - largest).exp();
+    let total: f64 = scene
+        .weights
+        .iter()
+        .zip(log_likelihood)
+        .map(|(w, l)| w * relative(l))
+        .sum();
+    match criterion {
+        Criterion::MutualInformation => {
+            let log_total = largest + total.max(LOG_FLOOR).ln();
+            for (o, l) in out.iter_mut().zip(log_likelihood) {
+                *o = (l - log_total).max(LOG_IMPOSSIBLE);
+            }
+        }
+        Criterion::MeanSquaredError => {
+            let terms = scene.weights.iter().zip(&scene.values).zip(log_likelihood);
+            let moment: f64 = terms.map(|((w, x), l)| w * (x - scene.mean) * relative(l)).sum();
+            let mean = scene.mean + if total > 0.0 { moment / total } else { 0.0 };
+            for (o, x) in out.iter_mut().zip(&scene.values) {
+                *o = -(x - mean) * (x - mean);
+            }
+        }
+        Criterion::BayesError => {
+            let joint = |k: usize| scene.weights[k].ln() + log_likelihood[k];
+            let best = (1..out.len()).fold(0, |best, k| if joint(k) > joint(best) { k } else { best });
+            for (k, o) in out.iter_mut().enumerate() {
+                *o = if k == best { 0.0 } else { -1.0 };
+            }
+        }
+    }
+}

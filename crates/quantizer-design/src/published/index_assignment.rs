@@ -1,0 +1,181 @@
+//! Which words, and how many cells, for sensors that report over a binary symmetric channel.
+//!
+//! Inverting the same bit of every word, or exchanging two bit positions, changes nothing on a symmetric channel. Up to that
+//! there are few assignments of words to the cells of a short quantizer (three for four cells and two bits: natural, Gray and
+//! one more), so they are all designed and compared. Fewer cells than words is an assignment too: behind a poor channel it is
+//! the best one, and the design of the full number of cells squeezes cells out.
+
+use crate::criterion::Criterion;
+use crate::design::{Design, joint};
+use crate::error::{Error, refuse};
+use crate::newton::Newton;
+use crate::scene::Scene;
+use crate::system::{SensorGroup, System};
+use fewbits_quantizers::Channel;
+use fewbits_quantizers::Labelling;
+use fewbits_quantizers::Quantizer;
+use fewbits_quantizers::lloyd_max;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
+
+/// Longest word whose assignments are enumerated: `8! / 48` of them.
+const MAX_BITS: u32 = 3;
+/// Largest number of classes combined over sensors.
+const MAX_COMBINATIONS: usize = 20_000;
+
+/// An assignment of words and the design found for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WordsDesign {
+    /// Word of each cell from left to right, for each group of the design.
+    pub words: Vec<Vec<u32>>,
+    /// The joint design with these words.
+    pub design: Design,
+}
+
+/// Whose words may differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Words {
+    /// All sensors use the same words.
+    Shared,
+    /// Each sensor may use its own.
+    PerSensor,
+}
+
+/// One representative of every class of injective assignments of `bits`-bit words to `cells` cells.
+///
+/// # Errors
+/// If `bits` is not in `1..=3` or `cells` is not in `2..=2^bits`.
+fn word_classes(bits: u32, cells: usize) -> Result<Vec<Vec<u32>>, Error> {
+    if !(1..=MAX_BITS).contains(&bits) {
+        return refuse("bits", bits, format!("a word length from 1 to {MAX_BITS}"));
+    }
+    if !(2..=1usize << bits).contains(&cells) {
+        return refuse("cells", cells, format!("2 to {} cells", 1 << bits));
+    }
+    let mut classes = BTreeSet::new();
+    let mut sequence = Vec::with_capacity(cells);
+    extend(bits, cells, &mut sequence, &mut classes);
+    Ok(classes.into_iter().collect())
+}
+
+fn extend(bits: u32, cells: usize, sequence: &mut Vec<u32>, classes: &mut BTreeSet<Vec<u32>>) {
+    if sequence.len() == cells {
+        classes.insert(representative(bits, sequence));
+        return;
+    }
+    for word in 0..1 << bits {
+        if !sequence.contains(&word) {
+            sequence.push(word);
+            extend(bits, cells, sequence, classes);
+            sequence.pop();
+        }
+        if sequence.is_empty() {
+            // Complementing bits brings any first word to 0.
+            return;
+        }
+    }
+}
+
+/// The smallest sequence that bit inversions and exchanges of bit positions lead to.
+fn representative(bits: u32, words: &[u32]) -> Vec<u32> {
+    let orders: &[&[u32]] = match bits {
+        1 => &[&[0]],
+        2 => &[&[0, 1], &[1, 0]],
+        _ => &[&[0, 1, 2], &[0, 2, 1], &[1, 0, 2], &[1, 2, 0], &[2, 0, 1], &[2, 1, 0]],
+    };
+    let images = orders.iter().map(|order| -> Vec<u32> {
+        let permuted = |w: u32| {
+            order
+                .iter()
+                .enumerate()
+                .map(|(to, from)| (w >> from & 1) << to)
+                .sum::<u32>()
+        };
+        words.iter().map(|w| permuted(w ^ words[0])).collect()
+    });
+    images.min().unwrap_or_else(|| words.to_vec())
+}
+
+/// Designs the sensors of `scene` for every class of assignments, best first.
+///
+/// Every sensor sends words of `bits` bits over its own binary symmetric channel of the given crossover. `cells` bounds the
+/// number of cells. Each design is the
+/// joint Newton optimum from Lloyd-Max quantizers of the samples; assignments whose design loses a cell or does not converge
+/// are left out, since one with fewer cells stands for them.
+///
+/// # Errors
+/// [`Error::Argument`] if `bits` is not in `1..=3`, `cells` not in `2..=2^bits`, or the crossover no probability up to 1/2; [`Error::TooLarge`] for more than
+/// 20000 combinations of mixed assignments.
+pub fn assign_words(
+    scene: &Scene,
+    bits: u32,
+    crossover: f64,
+    cells: RangeInclusive<usize>,
+    criterion: Criterion,
+    words: Words,
+) -> Result<Vec<WordsDesign>, Error> {
+    let mut classes = Vec::new();
+    for count in cells {
+        classes.extend(word_classes(bits, count)?);
+    }
+    let sensors = scene.sensors();
+    let combinations: Vec<Vec<usize>> = if words == Words::PerSensor {
+        let needed = (classes.len() as u64).saturating_pow(sensors as u32);
+        if needed > MAX_COMBINATIONS as u64 {
+            return Err(Error::TooLarge {
+                table: "list of assignments",
+                needed,
+                limit: MAX_COMBINATIONS as u64,
+            });
+        }
+        (0..sensors).fold(vec![Vec::new()], |lists: Vec<Vec<usize>>, n| {
+            let longer = |list: &Vec<usize>| {
+                // Sensors of one law may be exchanged: keep their classes in order.
+                let first = if n > 0 && scene.interchangeable(n - 1, n) {
+                    list[n - 1]
+                } else {
+                    0
+                };
+                (first..classes.len())
+                    .map(|c| [list.clone(), vec![c]].concat())
+                    .collect::<Vec<_>>()
+            };
+            lists.iter().flat_map(longer).collect()
+        })
+    } else {
+        (0..classes.len()).map(|c| vec![c; sensors]).collect()
+    };
+    let mut found = Vec::new();
+    for combination in combinations {
+        let mut groups = Vec::with_capacity(sensors);
+        for (n, class) in combination.iter().enumerate() {
+            let words = &classes[*class];
+            let labelling = Labelling::with_words(bits, words.clone())?;
+            let channel = Channel::binary_symmetric_with_gaps(&labelling, crossover)?;
+            let sample = lloyd_max::gaussian(words.len())?.affine(scene.sample_mean(), scene.sample_deviation(n))?;
+            groups.push(SensorGroup::new(Quantizer::from(&sample), channel, vec![n])?);
+        }
+        let words = combination.iter().map(|c| classes[*c].clone()).collect();
+        if let Ok(design) = joint(&System::new(scene.clone(), groups)?, criterion, &Newton::default()) {
+            found.push(WordsDesign { words, design });
+        }
+    }
+    found.sort_by(|a, b| (criterion.sense() * b.design.value).total_cmp(&(criterion.sense() * a.design.value)));
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn four_words_have_three_classes() {
+        let classes = word_classes(2, 4).unwrap();
+        assert_eq!(classes, [vec![0, 1, 2, 3], vec![0, 1, 3, 2], vec![0, 3, 1, 2]]);
+        assert_eq!(word_classes(2, 2).unwrap(), [vec![0, 1], vec![0, 3]]);
+        assert_eq!(word_classes(3, 8).unwrap().len(), 840);
+        assert!(word_classes(4, 4).is_err());
+        assert!(word_classes(2, 5).is_err());
+    }
+}

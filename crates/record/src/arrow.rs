@@ -1,0 +1,241 @@
+//! Blocks as Arrow record batches, and batches as rows.
+//!
+//! A batch has one field of time and one of 64-bit floats per column; `null` is a gap.
+//!
+//! | time base | field of time |
+//! |---|---|
+//! | numbered | `row`: 64-bit integers |
+//! | UTC with 0, 3, 6 or 9 decimals | `time`: timestamps in UTC of that unit |
+//! | any other | `time`: 64-bit integers, ticks; metadata `decimals` |
+
+use crate::block::{Block, Cells};
+use crate::error::Error;
+use crate::recorder::Recorder;
+use crate::schema::{Schema, TimeBase, TimeFormat};
+use arrow_array::cast::AsArray;
+use arrow_array::types::{
+    ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, TimestampMicrosecondType,
+    TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type, UInt16Type, UInt32Type,
+    UInt64Type,
+};
+use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, PrimitiveArray, RecordBatch};
+use arrow_schema::{DataType, Field, TimeUnit};
+use fewbits_numerics::ArgumentError;
+use std::collections::HashMap;
+use std::io::Write;
+use std::sync::Arc;
+
+/// Whole numbers up to this size are doubles.
+const MAX_WHOLE: i64 = 1 << 53;
+
+/// The unit of timestamps whose ticks have so many decimals.
+fn unit_of(time: TimeBase) -> Option<TimeUnit> {
+    match time {
+        TimeBase::Clock {
+            decimals,
+            format: TimeFormat::Utc,
+            ..
+        } => match decimals {
+            0 => Some(TimeUnit::Second),
+            3 => Some(TimeUnit::Millisecond),
+            6 => Some(TimeUnit::Microsecond),
+            9 => Some(TimeUnit::Nanosecond),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+fn decimals_of(unit: TimeUnit) -> u8 {
+    match unit {
+        TimeUnit::Second => 0,
+        TimeUnit::Millisecond => 3,
+        TimeUnit::Microsecond => 6,
+        TimeUnit::Nanosecond => 9,
+    }
+}
+
+impl Schema {
+    /// The fields of this recording's batches; units, and the decimals of ticks, as metadata.
+    pub fn to_arrow(&self) -> arrow_schema::Schema {
+        let time = match (self.time, unit_of(self.time)) {
+            (_, Some(unit)) => Field::new("time", DataType::Timestamp(unit, Some("UTC".into())), false),
+            (TimeBase::Clock { decimals, .. }, None) => {
+                let decimals = HashMap::from([("decimals".to_owned(), decimals.to_string())]);
+                Field::new("time", DataType::Int64, false).with_metadata(decimals)
+            }
+            (TimeBase::Numbered, None) => Field::new("row", DataType::Int64, false),
+        };
+        let columns = self.columns.iter().map(|column| {
+            let field = Field::new(&column.name, DataType::Float64, true);
+            if column.unit().is_empty() {
+                field
+            } else {
+                field.with_metadata(HashMap::from([("unit".to_owned(), column.unit().to_owned())]))
+            }
+        });
+        arrow_schema::Schema::new(std::iter::once(time).chain(columns).collect::<Vec<_>>())
+    }
+}
+
+impl Block {
+    /// The rows as a batch of the fields of [`Schema::to_arrow`]; columns that were not asked for are left out.
+    ///
+    /// # Errors
+    /// If the block is none of a recording of this schema.
+    pub fn to_record_batch(&self, schema: &Schema) -> Result<RecordBatch, Error> {
+        let fields = schema.to_arrow();
+        if self.columns.len() != schema.columns.len() {
+            let given = format!("{} columns", self.columns.len());
+            return Err(ArgumentError::new("schema", given, format!("{}", schema.columns.len())).into());
+        }
+        let ticks = || self.ticks.iter().copied();
+        let time: ArrayRef = match unit_of(schema.time) {
+            Some(TimeUnit::Second) => stamps::<TimestampSecondType>(ticks()),
+            Some(TimeUnit::Millisecond) => stamps::<TimestampMillisecondType>(ticks()),
+            Some(TimeUnit::Microsecond) => stamps::<TimestampMicrosecondType>(ticks()),
+            Some(TimeUnit::Nanosecond) => stamps::<TimestampNanosecondType>(ticks()),
+            None => Arc::new(Int64Array::from_iter_values(ticks())),
+        };
+        let asked = (0..self.columns.len()).filter(|i| self.columns[*i].len() == self.rows());
+        let kept: Vec<usize> = asked.collect();
+        let cells = kept
+            .iter()
+            .map(|i| Arc::new(self.columns[*i].iter().copied().collect::<Float64Array>()) as ArrayRef);
+        let arrays: Vec<ArrayRef> = std::iter::once(time).chain(cells).collect();
+        let places: Vec<usize> = std::iter::once(0).chain(kept.iter().map(|i| i + 1)).collect();
+        Ok(RecordBatch::try_new(Arc::new(fields.project(&places)?), arrays)?)
+    }
+}
+
+fn stamps<T: ArrowPrimitiveType<Native = i64>>(ticks: impl Iterator<Item = i64>) -> ArrayRef
+where
+    PrimitiveArray<T>: From<Vec<i64>> + TimeZoned,
+{
+    Arc::new(PrimitiveArray::<T>::from(ticks.collect::<Vec<i64>>()).in_utc())
+}
+
+/// Timestamps with a zone.
+trait TimeZoned {
+    fn in_utc(self) -> Self;
+}
+
+impl<T: arrow_array::types::ArrowTimestampType> TimeZoned for PrimitiveArray<T> {
+    fn in_utc(self) -> Self {
+        self.with_timezone("UTC")
+    }
+}
+
+/// The cells of an array of numbers, `None` for nulls.
+///
+/// # Errors
+/// If the array holds no numbers, or a whole number of more than 53 bits, which is no double.
+pub fn cells(name: &str, array: &dyn Array) -> Result<Cells, Error> {
+    fn of<T: ArrowPrimitiveType>(array: &dyn Array, number: impl Fn(T::Native) -> Option<f64>) -> Option<Cells> {
+        let cells = array.as_primitive::<T>().iter();
+        cells
+            .map(|cell| match cell {
+                None => Some(None),
+                Some(cell) => Some(Some(number(cell)?)),
+            })
+            .collect()
+    }
+    let refuse = |given: String, expected: &str| -> Error { ArgumentError::new("column", given, expected).into() };
+    let found = match array.data_type() {
+        DataType::Float64 => of::<Float64Type>(array, Some),
+        DataType::Float32 => of::<Float32Type>(array, |x| Some(x.into())),
+        DataType::Int8 => of::<Int8Type>(array, |x| Some(x.into())),
+        DataType::Int16 => of::<Int16Type>(array, |x| Some(x.into())),
+        DataType::Int32 => of::<Int32Type>(array, |x| Some(x.into())),
+        DataType::UInt8 => of::<UInt8Type>(array, |x| Some(x.into())),
+        DataType::UInt16 => of::<UInt16Type>(array, |x| Some(x.into())),
+        DataType::UInt32 => of::<UInt32Type>(array, |x| Some(x.into())),
+        DataType::Int64 => of::<Int64Type>(array, |x| (x.abs() <= MAX_WHOLE).then_some(x as f64)),
+        DataType::UInt64 => of::<UInt64Type>(array, |x| (x <= MAX_WHOLE as u64).then_some(x as f64)),
+        DataType::Boolean => Some(
+            array
+                .as_boolean()
+                .iter()
+                .map(|cell| cell.map(|yes| f64::from(u8::from(yes))))
+                .collect(),
+        ),
+        DataType::Null => Some(vec![None; array.len()]),
+        other => return Err(refuse(format!("`{name}` of {other}"), "numbers: leave the column out, or cast it")),
+    };
+    found.ok_or_else(|| refuse(format!("`{name}`"), "whole numbers of at most 53 bits: split the column"))
+}
+
+/// The times of an array as ticks of `decimals`: timestamps of any unit, or whole numbers, which are ticks already.
+///
+/// # Errors
+/// If the array holds no times, one is missing, or a tick does not fit.
+pub fn ticks(name: &str, array: &dyn Array, decimals: u8) -> Result<Vec<i64>, Error> {
+    let refuse = |given: String, expected: &str| -> Error { ArgumentError::new("time", given, expected).into() };
+    if array.null_count() > 0 {
+        return Err(refuse(format!("`{name}` with gaps"), "a time in every row"));
+    }
+    let (numbers, unit) = match array.data_type() {
+        DataType::Int64 => (array.as_primitive::<Int64Type>().values(), None),
+        DataType::Timestamp(unit, _) => {
+            let values = match unit {
+                TimeUnit::Second => array.as_primitive::<TimestampSecondType>().values(),
+                TimeUnit::Millisecond => array.as_primitive::<TimestampMillisecondType>().values(),
+                TimeUnit::Microsecond => array.as_primitive::<TimestampMicrosecondType>().values(),
+                TimeUnit::Nanosecond => array.as_primitive::<TimestampNanosecondType>().values(),
+            };
+            (values, Some(*unit))
+        }
+        other => return Err(refuse(format!("`{name}` of {other}"), "timestamps, or 64-bit integers")),
+    };
+    let shift = unit.map_or(0, |unit| i32::from(decimals) - i32::from(decimals_of(unit)));
+    let scale = 10_i64.checked_pow(shift.unsigned_abs());
+    let scaled = |tick: &i64| match shift {
+        0 => Some(*tick),
+        1.. => tick.checked_mul(scale?),
+        _ => Some(*tick)
+            .filter(|tick| scale.is_some_and(|scale| tick % scale == 0))
+            .zip(scale)
+            .map(|(t, s)| t / s),
+    };
+    let ticks: Option<Vec<i64>> = numbers.iter().map(scaled).collect();
+    ticks
+        .ok_or_else(|| refuse(format!("`{name}`"), &format!("times that are ticks of {decimals} decimals of a second")))
+}
+
+impl<W: Write> Recorder<W> {
+    /// The rows of a batch. Its columns are found by name: `time` (or `row`) and every column of the schema; others are not read.
+    /// Without times, rows follow the last one.
+    ///
+    /// # Errors
+    /// If a column is missing or holds no numbers, or as [`push`](Self::push). Rows before the one that was refused are in the recording.
+    pub fn push_batch(&mut self, batch: &RecordBatch) -> Result<(), Error> {
+        let array = |name: &str| {
+            batch.column_by_name(name).ok_or_else(|| {
+                let fields = batch.schema();
+                let existing: Vec<&str> = fields.fields().iter().map(|field| field.name().as_str()).collect();
+                Error::UnknownColumn {
+                    name: name.to_owned(),
+                    existing: existing.join(", "),
+                }
+            })
+        };
+        let ticks = match self.schema().time() {
+            TimeBase::Numbered => match batch.column_by_name("row") {
+                Some(rows) => ticks("row", rows, 0)?,
+                None => (0..batch.num_rows() as i64)
+                    .map(|i| self.next_tick().wrapping_add(i))
+                    .collect(),
+            },
+            TimeBase::Clock { decimals, .. } => ticks("time", array("time")?, decimals)?,
+        };
+        let names = self.schema().columns().iter().map(|column| column.name());
+        let columns: Vec<Cells> = names.map(|name| cells(name, array(name)?)).collect::<Result<_, _>>()?;
+        let mut row = Vec::with_capacity(columns.len());
+        for (i, tick) in ticks.into_iter().enumerate() {
+            row.clear();
+            row.extend(columns.iter().map(|cells| cells[i]));
+            self.push(tick, &row)?;
+        }
+        Ok(())
+    }
+}
