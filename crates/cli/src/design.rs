@@ -1,7 +1,8 @@
 //! `fewbits design`: quantizers of few bits for one unknown that several sensors measure.
 
 use crate::Ending;
-use crate::arguments::{Criterion, DesignOptions, Form, TableOptions};
+use crate::arguments::TableOptions;
+use crate::design_options::{Criterion, DesignOptions, Form};
 use crate::error::Error;
 use crate::input::Table;
 use crate::numbers::mean_and_deviation;

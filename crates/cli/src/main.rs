@@ -9,6 +9,7 @@ mod bounds;
 mod centre;
 mod clock;
 mod design;
+mod design_options;
 mod error;
 mod generate;
 mod info;

@@ -54,7 +54,7 @@ pub(crate) enum Cell {
 
 impl Cell {
     /// As text: the shortest that reads back as the same number; empty for a gap.
-    pub(crate) fn text(&self) -> String {
+    fn text(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
             Self::Whole(number) => number.to_string(),

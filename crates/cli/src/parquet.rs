@@ -2,7 +2,6 @@
 
 use crate::clock;
 use crate::error::Error;
-use crate::output::Cell;
 use arrow_array::cast::AsArray;
 use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::Field;
@@ -101,7 +100,10 @@ fn texts(batch: &RecordBatch) -> Vec<Vec<String>> {
             Some(_) => None,
         };
         if let Some(cells) = cells {
-            return cells.into_iter().map(|cell| Cell::Number(cell).text()).collect();
+            return cells
+                .into_iter()
+                .map(|cell| cell.map_or(String::new(), |value| format!("{value:?}")))
+                .collect();
         }
         match ticks(name, array, decimals.unwrap_or(clock::NANOSECONDS)) {
             Ok(ticks) => ticks.into_iter().map(|tick| clock::shown(tick, time)).collect(),

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod design;
+mod fleet;
 mod pages;
 mod track;
-mod fleet;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
