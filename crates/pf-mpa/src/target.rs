@@ -266,7 +266,7 @@ pub(crate) fn at_least_one_sensor(count: usize) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fewbits_filters::{ImmBelief, extended_kalman};
+    use fewbits_filters::{ImmBelief, assumed_density};
     use fewbits_monte_carlo::Stream;
 
     #[test]
@@ -317,7 +317,7 @@ mod tests {
             }
             let motion = target.motion(k, Manoeuvres::AsNoise).unwrap();
             if k == 0 {
-                let (own, expected) = (belief.moment_matched(), extended_kalman::predict(&motion, &start));
+                let (own, expected) = (belief.moment_matched(), assumed_density::predict(&motion, &start));
                 assert!((own.mean() - expected.mean()).amax() < 1e-14);
                 assert!((own.covariance() - expected.covariance()).amax() < 1e-14);
                 assert_eq!(expected.mean(), target.predict(&start, k, Manoeuvres::AsNoise).mean());

@@ -82,13 +82,13 @@ proptest! {
         let lossless = BlockCodec::lossless();
         let bytes = lossless.encode(&samples).unwrap();
         let back = lossless.decode(&bytes, samples.len()).unwrap();
-        prop_assert!(back.iter().zip(&samples).all(|(a, b)| a.to_bits() == b.to_bits()), "{:?} {:?}", samples, back);
+        prop_assert!(back.iter().zip(&samples).all(|(a, b)| f64::to_bits(*a) == f64::to_bits(*b)), "{:?} {:?}", samples, back);
         let _ = lossless.decode(&junk, samples.len());
         let Ok(config) = Config::new(delta) else { return Ok(()) };
         let codec = BlockCodec::new(config);
         if let Ok(bytes) = codec.encode(&samples) {
             for (a, b) in codec.decode(&bytes, samples.len()).unwrap().iter().zip(&samples) {
-                prop_assert!(a.to_bits() == b.to_bits() || (a - b).abs() <= delta, "{} {} {}", a, b, delta);
+                prop_assert!(f64::to_bits(*a) == f64::to_bits(*b) || (a - b).abs() <= delta, "{} {} {}", a, b, delta);
             }
         }
         let _ = codec.decode(&junk, samples.len());

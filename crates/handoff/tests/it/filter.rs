@@ -3,7 +3,8 @@
 use fewbits_core::factor::Value;
 use fewbits_core::{BitString, CodecError, Gaussian, Likelihood, Message, Observed};
 use fewbits_densities::{Bandwidth, Mixture, Particles};
-use fewbits_handoff::{Coded, Components, HandoffFilter, Handover, RateLimited, Reducer, StepError, Whole, trimmed};
+use fewbits_handoff::published::StepError;
+use fewbits_handoff::{Coded, Components, HandoffFilter, Handover, RateLimited, Reducer, Whole, trimmed};
 use fewbits_mixture_codec::Reduction;
 use fewbits_mixture_codec::wire::{CodedMixture, RateControl, WireFormat};
 use fewbits_models::{Ar1, ScalarSensor};

@@ -3,8 +3,10 @@
 use fewbits_core::factor::Value;
 use fewbits_core::laws::wild;
 use fewbits_core::{Gaussian, Observed};
-use fewbits_densities::{Criterion, Mixture, Particles, Reduction};
-use fewbits_handoff::{Components, HandoffFilter, StepError, Whole, trimmed};
+use fewbits_densities::{Mixture, Particles};
+use fewbits_handoff::published::StepError;
+use fewbits_handoff::{Components, HandoffFilter, Whole, trimmed};
+use fewbits_mixture_codec::{Criterion, Reduction};
 use fewbits_models::{Ar1, ScalarSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::Vector1;

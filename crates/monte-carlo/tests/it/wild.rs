@@ -25,7 +25,6 @@ proptest! {
             prop_assert!(all.mean().is_finite() && all.variance() >= 0.0, "{:?} {:?}: {:?}", x, y, all);
             prop_assert!(!all.standard_error().is_nan() && !all.estimate().value.is_nan(), "{:?}", all);
             prop_assert!(all.mean() < 0.0 || !all.root_mean().standard_error.is_nan(), "{:?}: {:?}", all, all.root_mean());
-            prop_assert!(!truth.is_finite() || all.count() < 2 || !all.z_score(truth).is_nan() || all.standard_error() == 0.0, "{:?} {}", all, truth);
         }
         if let Ok(difference) = paired_difference(&x, &y) {
             prop_assert!(!tame(&x) || !tame(&y) || difference.mean().is_finite(), "{:?} {:?}", x, y);

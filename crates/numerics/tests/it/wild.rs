@@ -1,7 +1,7 @@
 //! Wild arguments: every function returns a number, an error, or NaN where an argument is NaN.
 
 use fewbits_numerics::linalg::{definite_factor, semidefinite_factor, solve_semidefinite};
-use fewbits_numerics::normal::{self, bivariate_rectangle, truncated_moments};
+use fewbits_numerics::normal::{self, truncated_moments};
 use fewbits_numerics::{binomial, eigen, kernels, quadrature::Rule, roots, tridiagonal, wild};
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
@@ -14,8 +14,8 @@ fn wild() -> impl Strategy<Value = f64> {
 
 proptest! {
     #[test]
-    fn normal_functions_are_numbers(x in prop::array::uniform4(wild())) {
-        let [a, b, c, d] = x;
+    fn normal_functions_are_numbers(x in prop::array::uniform2(wild())) {
+        let [a, b] = x;
         for (name, value) in [
             ("pdf", normal::pdf(a)), ("log_pdf", normal::log_pdf(a)), ("cdf", normal::cdf(a)), ("log_cdf", normal::log_cdf(a)),
             ("erfcx", normal::erfcx(a)), ("mills", normal::inverse_mills(a)),
@@ -35,12 +35,6 @@ proptest! {
         }
         if let Ok(draw) = normal::sample_truncated(&mut Pcg64Mcg::seed_from_u64(1), a, b) {
             prop_assert!(draw.is_finite() && a <= draw && draw <= b, "{} {}: {}", a, b, draw);
-        }
-        if let Ok(mass) = bivariate_rectangle([a, b], [c, d], x[3]) {
-            prop_assert!((0.0..=1.0).contains(&mass), "{:?}: {}", x, mass);
-        }
-        if let Ok(mass) = bivariate_rectangle([a, b], [c, d], 0.5) {
-            prop_assert!((0.0..=1.0).contains(&mass), "{:?}: {}", x, mass);
         }
     }
 
