@@ -1,7 +1,7 @@
 //! Wild arguments: sources, grids, quantizers and banks answer numbers or errors.
 
 use fewbits_binary_patterns::baselines::bounded_mle;
-use fewbits_binary_patterns::bounds::{RemoteDistortion, centralised_bound, remote_distortion};
+use fewbits_binary_patterns::bounds::{centralised_bound, remote_distortion};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Bit, Decoder, Grid, PatternSensor, Source};
 use fewbits_core::{Link, Observation, Scheme, factor::Factor, laws::wild};
 use proptest::prelude::*;
@@ -54,18 +54,20 @@ proptest! {
     #[test]
     fn banks_answer_numbers(x in prop::array::uniform6(wild()), count in 1..3_usize) {
         for source in sources(x[0]) {
-            if let Ok(distortion) = remote_distortion(&source, x[1]) {
-                let RemoteDistortion { .. } = distortion;
+            if let Ok(distortion) = remote_distortion(&source, x[1])
+                && let Ok(error) = distortion.at(x[2])
+            {
+                prop_assert!(error.is_finite() && error >= 0.0, "{:?} {}: {}", source, x[2], error);
             }
             let mut breakpoints = x[2..2 + count].to_vec();
             breakpoints.sort_by(f64::total_cmp);
             let Ok(quantizer) = BinaryQuantizer::new(breakpoints) else { continue };
             let Ok(bank) = Bank::homogeneous_with_deviation(source, vec![quantizer; count], x[1]) else { continue };
             let seen: Vec<_> = (0..count).map(|i| if i == 0 { Observation::Received(Bit(true)) } else { Observation::Nothing }).collect();
-            for number in [bank.mmse(), bank.mse(Decoder::PosteriorMean), bank.posterior_mean(&seen), bank.posterior_squared_error(&seen, x[5])].into_iter().flatten() {
+            for number in [bank.mmse(), bank.mse(Decoder::Mmse), bank.posterior_mean(&seen), bank.posterior_squared_error(&seen, x[5])].into_iter().flatten() {
                 prop_assert!(!number.is_nan(), "{:?} {:?}", x, number);
             }
-            if let Ok(table) = bank.table(Decoder::PosteriorMean) {
+            if let Ok(table) = bank.table(Decoder::Mmse) {
                 for number in [table.decode(&seen), table.conditional_error(x[5]).map(|e| e.0 + e.1)].into_iter().flatten() {
                     prop_assert!(!number.is_nan(), "{:?} {:?}", x, number);
                 }

@@ -86,12 +86,17 @@ impl<const M: usize, F: Factor<M>> Factor<M> for Robust<F> {
         let log_evidence = self.mixed(own.log_evidence);
         let share = (own.log_evidence + self.log_genuine - log_evidence).exp();
         let offset = own.mean - prior.mean();
+        let mean = prior.mean() + offset * share;
+        let covariance = own.covariance * share
+            + prior.covariance() * (1.0 - share)
+            + offset * offset.transpose() * (share * (1.0 - share));
+        if !(log_evidence.is_finite() && mean.iter().chain(covariance.iter()).all(|x| x.is_finite())) {
+            return Err(Error::NotANumber { what: "the posterior" });
+        }
         Ok(Tilted {
             log_evidence,
-            mean: prior.mean() + offset * share,
-            covariance: own.covariance * share
-                + prior.covariance() * (1.0 - share)
-                + offset * offset.transpose() * (share * (1.0 - share)),
+            mean,
+            covariance,
         })
     }
 }

@@ -80,10 +80,11 @@ impl<const M: usize> Factor<M> for Value<M> {
         if !lengths_agree(means, log_weights) {
             return;
         }
-        if M == 1 {
+        let half_precision = 0.5 / self.noise_covariance().iter().next().unwrap_or(&0.0);
+        // Below 1e-308 a variance has no precision.
+        if M == 1 && half_precision.is_finite() {
             // A plain quadratic: kept free of branches so that it vectorises.
-            let value = self.value()[0];
-            let (half_precision, constant) = (0.5 / self.noise_covariance()[0], self.noise.log_peak());
+            let (value, constant) = (self.value()[0], self.noise.log_peak());
             vectorised(
                 #[inline(always)]
                 || {

