@@ -1,0 +1,378 @@
+//! The fusion centre's state machine.
+
+use crate::echo::{ReportLength, echo};
+use crate::frame::{Check, DecodeError, Frame, Kind, digest};
+use crate::note::Note;
+use crate::payload::Payload;
+use crate::sensor::Feedback;
+use crate::slot::{Schedule, Slot};
+use fewbits_core::{BitString, Observation};
+use serde::{Deserialize, Serialize};
+
+/// A sensor as its centre knows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Member {
+    /// How it learns what it must know.
+    pub feedback: Feedback,
+    /// Bits of its reports.
+    pub report: ReportLength,
+}
+
+/// Settings of a centre.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct CentreSettings {
+    /// The sensors, by number.
+    pub members: Vec<Member>,
+    /// When slots begin. Slots are counted from 1 on.
+    pub schedule: Schedule,
+    /// Nanoseconds from the beginning of a slot to its deadline: reports are awaited no longer.
+    pub deadline: u64,
+    /// What the check of a frame covers.
+    pub check: Check,
+    /// Whether reports are acknowledged by frames. A link that acknowledges by itself needs none.
+    pub acknowledges: bool,
+    /// Every so many slots a heartbeat goes to all where there is nothing else to send to all, so that clocks stay together; 0: never.
+    pub announce_every: u32,
+}
+
+impl CentreSettings {
+    /// Deadline at nine tenths of a slot, whole check, no acknowledgements, no heartbeats.
+    pub fn new(members: Vec<Member>, schedule: Schedule) -> Self {
+        Self {
+            members,
+            schedule,
+            deadline: schedule.period() / 10 * 9,
+            check: Check::Whole,
+            acknowledges: false,
+            announce_every: 0,
+        }
+    }
+}
+
+/// Timers of a centre.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum CentreTimer {
+    /// A slot begins.
+    SlotBegins,
+    /// Reports of the slot are awaited no longer.
+    Deadline,
+}
+
+/// To whom a frame goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recipient {
+    /// To all sensors.
+    All,
+    /// To the sensor of this number.
+    Sensor(usize),
+}
+
+/// What the driver must do, in order.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Action {
+    /// Predict into this slot, and call [`Centre::on_predicted`]. If the prediction fails, do nothing: the slot passes.
+    Predict {
+        /// The slot, counted from 1.
+        slot: u64,
+    },
+    /// Update with these observations, one per sensor: see [`update_or_drop`](crate::update_or_drop).
+    Update {
+        /// The slot.
+        slot: u64,
+        /// What was observed.
+        observed: Vec<Observation<BitString>>,
+    },
+    /// Send the bytes of a frame.
+    Send {
+        /// To whom.
+        to: Recipient,
+        /// The frame's bytes.
+        frame: Vec<u8>,
+    },
+    /// Set a timer; it must not fire early.
+    SetTimer {
+        /// When, in nanoseconds.
+        at: u64,
+        /// Which.
+        timer: CentreTimer,
+    },
+    /// Write down what was noticed of a sensor.
+    Note {
+        /// The sensor's number.
+        sensor: usize,
+        /// What was noticed.
+        note: Note,
+    },
+}
+
+/// The centre of a star: events in, [`Action`]s out.
+///
+/// ```text
+/// on_timer(slot begins) -> SetTimer (deadline, next slot), Predict
+/// on_predicted(feedback of each sensor, state) -> Send (feedback, echo or snapshot, each with a digest)
+/// on_frame(report of this slot and digest) -> kept, perhaps Send (acknowledgement)
+/// on_timer(deadline) -> Update
+/// ```
+/// A report of another slot is late; one of another digest rests on something else than was told: it is taken as lost. A second one is a
+/// duplicate. Slots that the driver slept through are passed over: their sensors were not asked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Centre {
+    settings: CentreSettings,
+    /// The last slot that began; 0 before the first.
+    slot: u64,
+    /// Whether reports are awaited.
+    open: bool,
+    /// Digests of what the sensors were told.
+    digests: Vec<u32>,
+    #[serde(with = "crate::centre::stored")]
+    observed: Vec<Observation<BitString>>,
+    /// The slot that `observed` is of, where the update of it is done and can be echoed.
+    echoed: Option<u64>,
+    /// Somebody asked for the whole state.
+    asked: bool,
+    /// The last slot in which each sensor sent anything that was for this centre.
+    heard: Vec<Option<Slot>>,
+}
+
+impl Centre {
+    /// A centre before its first slot. It is started by [`on_timer`](Self::on_timer) with [`CentreTimer::SlotBegins`].
+    pub fn new(settings: CentreSettings) -> Self {
+        let sensors = settings.members.len();
+        Self {
+            settings,
+            slot: 0,
+            open: false,
+            digests: vec![0; sensors],
+            observed: vec![Observation::Nothing; sensors],
+            echoed: Some(0),
+            asked: false,
+            heard: vec![None; sensors],
+        }
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &CentreSettings {
+        &self.settings
+    }
+
+    /// The last slot that began; 0 before the first.
+    pub fn slot(&self) -> u64 {
+        self.slot
+    }
+
+    /// The last slot in which a sensor sent anything.
+    pub fn heard(&self, sensor: usize) -> Option<Slot> {
+        self.heard.get(sensor).copied().flatten()
+    }
+
+    /// The centre after it has lost what it knew: it sends followers the whole state next.
+    pub fn on_memory_lost(&mut self) {
+        self.open = false;
+        self.asked = true;
+        self.echoed = None;
+    }
+
+    /// Goes on after the program was stopped in a slot: `slot` is the last that may have begun. Its reports are lost, and it does not begin again.
+    pub fn resume(&mut self, slot: u64) {
+        self.slot = self.slot.max(slot);
+        self.on_memory_lost();
+    }
+
+    /// A timer has fired.
+    pub fn on_timer(&mut self, now: u64, timer: CentreTimer, actions: &mut Vec<Action>) {
+        match timer {
+            CentreTimer::SlotBegins => self.on_slot_begins(now, actions),
+            CentreTimer::Deadline => self.on_deadline(actions),
+        }
+    }
+
+    fn on_slot_begins(&mut self, now: u64, actions: &mut Vec<Action>) {
+        // A deadline that fires late must not take the next slot's reports.
+        self.on_deadline(actions);
+        let schedule = &self.settings.schedule;
+        let count = schedule.count(now);
+        let next = schedule.start(count.max(self.slot) + 1);
+        actions.push(Action::SetTimer {
+            at: next,
+            timer: CentreTimer::SlotBegins,
+        });
+        if count <= self.slot {
+            return;
+        }
+        self.slot = count;
+        actions.push(Action::SetTimer {
+            at: schedule.start(count).saturating_add(self.settings.deadline),
+            timer: CentreTimer::Deadline,
+        });
+        actions.push(Action::Predict { slot: count });
+    }
+
+    /// The driver has predicted. `feedback` has what each sensor is told, empty for those that are told nothing; `state` is the
+    /// receiver's state before the prediction, where a sensor follows by echo.
+    pub fn on_predicted(&mut self, feedback: &[BitString], state: Option<&BitString>, actions: &mut Vec<Action>) {
+        let slot = Slot::of_count(self.slot);
+        let empty = BitString::default();
+        let told = |i: usize| feedback.get(i).unwrap_or(&empty);
+        let members = &self.settings.members;
+        let encode = |frame: Frame<'_>| {
+            let mut bytes = vec![0; frame.len()];
+            frame.encode(self.settings.check, &mut bytes);
+            bytes
+        };
+
+        // One frame for all where all are told the same.
+        let mut spoken = false;
+        let all_alike = members.iter().all(|member| member.feedback == Feedback::Told)
+            && (1..members.len()).all(|i| told(i) == told(0));
+        for (i, member) in members.iter().enumerate() {
+            let payload = match member.feedback {
+                Feedback::Told => Payload::from(told(i)),
+                _ => Payload::EMPTY,
+            };
+            let sum = digest(slot, payload);
+            self.digests[i] = sum;
+            if member.feedback != Feedback::Told || all_alike && i > 0 {
+                continue;
+            }
+            let to = if all_alike {
+                Recipient::All
+            } else {
+                Recipient::Sensor(i)
+            };
+            spoken |= all_alike;
+            let frame = encode(Frame::new(Kind::Feedback, slot, sum, payload));
+            actions.push(Action::Send { to, frame });
+        }
+
+        // Followers are told what was observed in the slot before, or the whole state.
+        let follows = |member: &Member| member.feedback == Feedback::Echoed;
+        if let Some(state) = state.filter(|_| members.iter().any(follows)) {
+            let sum = digest(slot.before(), Payload::from(state));
+            for (sum_of_member, _) in self.digests.iter_mut().zip(members).filter(|(_, m)| follows(m)) {
+                *sum_of_member = sum;
+            }
+            let lengths: Vec<_> = members.iter().map(|member| member.report).collect();
+            let connected = self.echoed.is_some_and(|of| of + 1 == self.slot) && !self.asked;
+            let told = match echo(&self.observed, &lengths) {
+                Ok(echo) if connected => (Kind::Echo, echo),
+                _ => (Kind::Snapshot, state.clone()),
+            };
+            self.asked = false;
+            spoken = true;
+            let frame = encode(Frame::new(told.0, slot, sum, Payload::from(&told.1)));
+            let to = Recipient::All;
+            actions.push(Action::Send { to, frame });
+        }
+
+        let every = u64::from(self.settings.announce_every);
+        if !spoken && every > 0 && self.slot.is_multiple_of(every) {
+            let frame = encode(Frame::new(Kind::Heartbeat, slot, 0, Payload::EMPTY));
+            let to = Recipient::All;
+            actions.push(Action::Send { to, frame });
+        }
+        self.observed.fill(Observation::Nothing);
+        self.echoed = None;
+        self.open = true;
+    }
+
+    fn on_deadline(&mut self, actions: &mut Vec<Action>) {
+        if !std::mem::take(&mut self.open) {
+            return;
+        }
+        self.echoed = Some(self.slot);
+        actions.push(Action::Update {
+            slot: self.slot,
+            observed: self.observed.clone(),
+        });
+    }
+
+    /// Bytes have arrived from a sensor, which the link has made sure of.
+    pub fn on_frame(&mut self, sensor: usize, bytes: &[u8], actions: &mut Vec<Action>) {
+        match Frame::decode(bytes, self.settings.check) {
+            Ok(frame) => self.on_decoded(sensor, &frame, actions),
+            Err(error) => {
+                if !matches!(error, DecodeError::Version { .. }) {
+                    self.on_damaged(sensor);
+                }
+                let note = error.into();
+                actions.push(Action::Note { sensor, note });
+            }
+        }
+    }
+
+    /// A frame of a sensor was damaged on its way: what it sent in this slot is lost, and is known to have been sent.
+    pub fn on_damaged(&mut self, sensor: usize) {
+        if let Some(observed) = self.observed.get_mut(sensor)
+            && self.open
+            && *observed == Observation::Nothing
+        {
+            *observed = Observation::Lost;
+        }
+    }
+
+    /// A frame has arrived from a sensor that the driver has decoded.
+    pub fn on_decoded(&mut self, sensor: usize, frame: &Frame<'_>, actions: &mut Vec<Action>) {
+        let (kind, slot) = (frame.kind, frame.slot);
+        let mut note = |note| actions.push(Action::Note { sensor, note });
+        let Some(member) = self.settings.members.get(sensor) else {
+            return note(Note::Unexpected { kind });
+        };
+        let observed = &mut self.observed[sensor];
+        match kind {
+            Kind::Request => {
+                self.asked = true;
+                note(Note::Disagreement { slot });
+            }
+            Kind::Heartbeat => note(Note::Heartbeat { slot }),
+            Kind::Report if slot != Slot::of_count(self.slot) || !self.open => return note(Note::Late { slot }),
+            Kind::Report if *observed != Observation::Nothing => note(Note::Duplicate { slot }),
+            Kind::Report if frame.digest != self.digests[sensor] => {
+                *observed = Observation::Lost;
+                note(Note::Disagreement { slot });
+            }
+            Kind::Report if !member.report.allows(frame.payload.bits()) => {
+                *observed = Observation::Lost;
+                note(Note::Malformed { slot });
+            }
+            Kind::Report => *observed = Observation::Received(frame.payload.into()),
+            kind => return note(Note::Unexpected { kind }),
+        }
+        self.heard[sensor] = Some(slot);
+        if kind == Kind::Report && self.settings.acknowledges {
+            let ack = Frame::new(Kind::Acknowledgement, slot, frame.digest, Payload::EMPTY);
+            let mut bytes = vec![0; ack.len()];
+            ack.encode(self.settings.check, &mut bytes);
+            let to = Recipient::Sensor(sensor);
+            actions.push(Action::Send { to, frame: bytes });
+        }
+    }
+}
+
+/// Observations for serde: bits as bytes and their number.
+pub(crate) mod stored {
+    use super::{BitString, Deserialize, Observation, Serialize};
+    use serde::{Deserializer, Serializer, de::Error};
+
+    pub(crate) fn serialize<S: Serializer>(observed: &[Observation<BitString>], to: S) -> Result<S::Ok, S::Error> {
+        let bytes = |o: &Observation<BitString>| o.clone().map(|bits| (bits.bytes().to_vec(), bits.bits()));
+        observed.iter().map(bytes).collect::<Vec<_>>().serialize(to)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Observation<BitString>>, D::Error> {
+        let stored = Vec::<Observation<(Vec<u8>, usize)>>::deserialize(from)?;
+        let bits = |observation| {
+            Ok(match observation {
+                Observation::Received((bytes, bits)) => {
+                    Observation::Received(BitString::from_bytes(bytes, bits).map_err(D::Error::custom)?)
+                }
+                Observation::Nothing => Observation::Nothing,
+                Observation::Lost => Observation::Lost,
+            })
+        };
+        stored.into_iter().map(bits).collect()
+    }
+}

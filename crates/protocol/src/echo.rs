@@ -1,0 +1,73 @@
+//! What a centre received in a slot, as those that follow it are told.
+
+use fewbits_core::{BitReader, BitString, BitWriter, CodecError, Observation};
+use serde::{Deserialize, Serialize};
+
+/// Bits of a report's length in an echo, where reports differ in length.
+const LENGTH_BITS: u32 = 16;
+
+/// Bits of a sensor's reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ReportLength {
+    /// All reports have so many bits.
+    Fixed(u32),
+    /// Up to 65,535 bits. In an echo the length goes before each.
+    Varying,
+}
+
+impl ReportLength {
+    /// Whether a report of so many bits can be one.
+    pub fn allows(self, bits: usize) -> bool {
+        match self {
+            Self::Fixed(expected) => bits == expected as usize,
+            Self::Varying => bits < 1 << LENGTH_BITS,
+        }
+    }
+}
+
+/// The echo of a slot: for each sensor `0` for nothing, `10` for lost, `11` and the report.
+///
+/// # Errors
+/// If a report has more than 65,535 bits.
+pub fn echo(observed: &[Observation<BitString>], lengths: &[ReportLength]) -> Result<BitString, CodecError> {
+    let mut writer = BitWriter::new();
+    for (observation, length) in observed.iter().zip(lengths) {
+        match observation {
+            Observation::Nothing => writer.write(0, 1)?,
+            Observation::Lost => writer.write(0b10, 2)?,
+            Observation::Received(report) => {
+                writer.write(0b11, 2)?;
+                if *length == ReportLength::Varying {
+                    writer.write(report.bits() as u64, LENGTH_BITS)?;
+                }
+                writer.append(report);
+            }
+        }
+    }
+    Ok(writer.finish())
+}
+
+/// Reads what [`echo`] wrote: one observation per length. Total.
+///
+/// # Errors
+/// If bits are missing or left over.
+pub fn reports_of(echo: &BitString, lengths: &[ReportLength]) -> Result<Vec<Observation<BitString>>, CodecError> {
+    let mut reader = BitReader::new(echo);
+    let mut observed = Vec::with_capacity(lengths.len());
+    for length in lengths {
+        observed.push(if !reader.read_bit()? {
+            Observation::Nothing
+        } else if !reader.read_bit()? {
+            Observation::Lost
+        } else {
+            let bits = match length {
+                ReportLength::Fixed(bits) => *bits as usize,
+                ReportLength::Varying => reader.read(LENGTH_BITS)? as usize,
+            };
+            Observation::Received(reader.read_message(bits)?)
+        });
+    }
+    reader.finish()?;
+    Ok(observed)
+}

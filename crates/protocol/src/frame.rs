@@ -1,0 +1,223 @@
+//! Frames: the bytes that travel, and their codec. `docs/wire.md` has the format byte by byte.
+
+use crate::payload::Payload;
+use crate::slot::Slot;
+use core::fmt;
+use crc::{CRC_16_XMODEM, Crc};
+
+/// The version of the wire format that this crate writes and reads.
+pub const VERSION: u8 = 1;
+/// Bytes of the header: version, kind and padding in one; slot in three; digest in four.
+pub const HEADER_BYTES: usize = 8;
+/// Bytes of the destination, which only a handover has, behind the header.
+pub const DESTINATION_BYTES: usize = 4;
+/// Bytes of the check at the end.
+pub const CHECK_BYTES: usize = 2;
+
+const VERSION_SHIFT: u32 = 6;
+const KIND_SHIFT: u32 = 3;
+const SUM: Crc<u16> = Crc::<u16>::new(&CRC_16_XMODEM);
+
+/// Kind of content of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
+#[repr(u8)]
+pub enum Kind {
+    /// What sensors are told before they measure.
+    Feedback = 0,
+    /// A sensor's report.
+    Report = 1,
+    /// What a fusion centre received in the slot before, for those that follow it.
+    Echo = 2,
+    /// The whole shared state after the slot before.
+    Snapshot = 3,
+    /// A request for a snapshot.
+    Request = 4,
+    /// A belief that travels on, and to whom.
+    Handover = 5,
+    /// A header alone: the sender works, and which slot it is.
+    Heartbeat = 6,
+    /// The frame of this slot and digest has arrived.
+    Acknowledgement = 7,
+}
+
+impl Kind {
+    const ALL: [Self; 8] = [
+        Self::Feedback,
+        Self::Report,
+        Self::Echo,
+        Self::Snapshot,
+        Self::Request,
+        Self::Handover,
+        Self::Heartbeat,
+        Self::Acknowledgement,
+    ];
+
+    /// Bytes of a frame of this kind besides its payload.
+    pub const fn overhead(self) -> usize {
+        self.header() + CHECK_BYTES
+    }
+
+    const fn header(self) -> usize {
+        match self {
+            Self::Handover => HEADER_BYTES + DESTINATION_BYTES,
+            _ => HEADER_BYTES,
+        }
+    }
+}
+
+/// What the check at the end of a frame covers. Both ends must be set alike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
+pub enum Check {
+    /// Header and payload: a frame with an inverted bit is lost.
+    #[default]
+    Whole,
+    /// The header only: bits of the payload may arrive inverted, and the receiver's factor knows how often.
+    Header,
+}
+
+/// A frame: a header by which two ends see whether they still agree, and a payload.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// Kind of content.
+    pub kind: Kind,
+    /// The slot that it belongs to.
+    pub slot: Slot,
+    /// Digest of what both ends must share for the payload to mean anything.
+    pub digest: u32,
+    /// To whom a handover goes in the end; 0 in others, where it does not travel.
+    pub destination: u32,
+    /// The message proper.
+    pub payload: Payload<'a>,
+}
+
+impl<'a> Frame<'a> {
+    /// A frame that is no handover.
+    pub fn new(kind: Kind, slot: Slot, digest: u32, payload: Payload<'a>) -> Self {
+        Self {
+            kind,
+            slot,
+            digest,
+            destination: 0,
+            payload,
+        }
+    }
+
+    /// Bytes that the frame takes.
+    pub fn len(&self) -> usize {
+        self.kind.overhead() + self.payload.bytes().len()
+    }
+
+    /// Never: a frame has a header at least.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Writes the frame to the beginning of `buffer` and returns the bytes written. `None` if they do not fit.
+    pub fn encode<'b>(&self, check: Check, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
+        let bytes = buffer.get_mut(..self.len())?;
+        let header = self.kind.header();
+        bytes[0] = VERSION << VERSION_SHIFT | (self.kind as u8) << KIND_SHIFT | self.payload.padding();
+        bytes[1..4].copy_from_slice(&self.slot.number().to_be_bytes()[1..]);
+        bytes[4..8].copy_from_slice(&self.digest.to_be_bytes());
+        if self.kind == Kind::Handover {
+            bytes[HEADER_BYTES..header].copy_from_slice(&self.destination.to_be_bytes());
+        }
+        let end = bytes.len() - CHECK_BYTES;
+        bytes[header..end].copy_from_slice(self.payload.bytes());
+        let covered = match check {
+            Check::Whole => end,
+            Check::Header => header,
+        };
+        let sum = SUM.checksum(&bytes[..covered]);
+        bytes[end..].copy_from_slice(&sum.to_be_bytes());
+        Some(bytes)
+    }
+
+    /// Reads a frame that takes all of `bytes`. Total: any bytes are a frame or an error.
+    ///
+    /// # Errors
+    /// If the bytes are of another version, too few, fail their check, or use bits that must be zero.
+    pub fn decode(bytes: &'a [u8], check: Check) -> Result<Self, DecodeError> {
+        let first = *bytes.first().ok_or(DecodeError::TooShort { found: 0 })?;
+        let version = first >> VERSION_SHIFT;
+        if version != VERSION {
+            return Err(DecodeError::Version { found: version });
+        }
+        // Three bits: always one of the eight.
+        let kind = Kind::ALL[usize::from(first >> KIND_SHIFT & 7)];
+        let padding = usize::from(first & 7);
+        let too_short = DecodeError::TooShort { found: bytes.len() };
+        let end = bytes.len().checked_sub(CHECK_BYTES).ok_or(too_short)?;
+        let header = kind.header();
+        let content = bytes.get(header..end).ok_or(too_short)?;
+        let covered = match check {
+            Check::Whole => end,
+            Check::Header => header,
+        };
+        if SUM.checksum(&bytes[..covered]).to_be_bytes() != bytes[end..] {
+            return Err(DecodeError::Check);
+        }
+        let bits = (8 * content.len()).checked_sub(padding).ok_or(DecodeError::Padding)?;
+        Ok(Self {
+            kind,
+            slot: Slot::of_count(u64::from(u32::from_be_bytes([0, bytes[1], bytes[2], bytes[3]]))),
+            digest: u32::from_be_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]),
+            destination: match kind {
+                Kind::Handover => u32::from_be_bytes([bytes[8], bytes[9], bytes[10], bytes[11]]),
+                _ => 0,
+            },
+            payload: Payload::new(content, bits).ok_or(DecodeError::Padding)?,
+        })
+    }
+}
+
+/// Why bytes are no frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DecodeError {
+    /// The frame is of another version of the format, 0 to 3. Nothing else of it was looked at.
+    Version {
+        /// The version.
+        found: u8,
+    },
+    /// Fewer bytes than header and check have.
+    TooShort {
+        /// Number of bytes.
+        found: usize,
+    },
+    /// The check at the end is not that of the bytes before.
+    Check,
+    /// More padding than payload, or padding that is not zero.
+    Padding,
+}
+
+impl fmt::Display for DecodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Version { found } => write!(f, "version of the frame is {found}: expected {VERSION}"),
+            Self::TooShort { found } => {
+                write!(f, "frame has {found} bytes: expected {} or more", HEADER_BYTES + CHECK_BYTES)
+            }
+            Self::Check => f.write_str("check of the frame is not that of its bytes"),
+            Self::Padding => f.write_str("padding of the frame is not zero, or more than its payload"),
+        }
+    }
+}
+
+impl core::error::Error for DecodeError {}
+
+/// Digest of 32 bits of what two ends share in a slot: FNV-1a of 64 bits over slot, number of bits and bytes, folded.
+///
+/// It finds ends that drifted apart. It is no protection against forgery, which is the link's.
+pub fn digest(slot: Slot, payload: Payload<'_>) -> u32 {
+    let add = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
+    let start = 0xcbf2_9ce4_8422_2325_u64;
+    let hash = u64::from(slot.number()).to_le_bytes().iter().fold(start, add);
+    let hash = (payload.bits() as u64).to_le_bytes().iter().fold(hash, add);
+    let hash = payload.bytes().iter().fold(hash, add);
+    (hash ^ hash >> 32) as u32
+}

@@ -1,0 +1,80 @@
+//! An estimator as the centre's machine needs it: bits in, bits out.
+
+use fewbits_core::{BitString, Observation};
+
+/// Any error of an estimator.
+pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
+
+/// An estimator at a fusion centre, slot by slot. Object-safe.
+///
+/// ```text
+/// slot k:  predict(k);  feedback(i) for each sensor i;  update(what was observed of each sensor that was asked)
+/// ```
+/// Laws: calls are functions of the state and their arguments, so that two ends with equal state stay equal; a call that fails leaves the
+/// state as it was; `restore(state())` changes nothing.
+pub trait Receiver {
+    /// Number of sensors.
+    fn sensors(&self) -> usize;
+
+    /// Moves on to slot `slot`, counted from the first, which is 1. Slots may be left out.
+    ///
+    /// # Errors
+    /// Those of the estimator.
+    fn predict(&mut self, slot: u64) -> Result<(), BoxError>;
+
+    /// What a sensor is told before it measures, from the prediction. Empty where there is nothing to tell.
+    ///
+    /// # Errors
+    /// Those of the scheme.
+    fn feedback(&self, sensor: usize) -> Result<BitString, BoxError>;
+
+    /// Takes in what was observed of sensors in the slot, in rising order of their numbers. Sensors that were not asked are left out.
+    ///
+    /// # Errors
+    /// If the observations are impossible together; others of the estimator.
+    fn update(&mut self, observed: &[(usize, Observation<BitString>)]) -> Result<(), BoxError>;
+
+    /// The estimate: mean and standard deviation of each coordinate.
+    fn estimate(&self) -> Vec<(f64, f64)>;
+
+    /// All that the estimator knows, exactly.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn state(&self) -> Result<BitString, BoxError>;
+
+    /// Goes on from a state. Total.
+    ///
+    /// # Errors
+    /// If the bits are no state of this estimator.
+    fn restore(&mut self, state: &BitString) -> Result<(), BoxError>;
+}
+
+/// How an update went.
+#[derive(Debug)]
+pub enum Outcome {
+    /// With all observations.
+    Used,
+    /// The observations were impossible together, and possible without the sensors of which nothing came: these count as not asked.
+    SilentDropped(BoxError),
+    /// Without any: the prediction stands.
+    Failed(BoxError),
+}
+
+/// Updates with what was observed; if that fails, without the sensors of which nothing came; if that fails too, not at all.
+///
+/// A sensor that is silent where its scheme had to speak contradicts a link that is thought to lose nothing. It is left out rather than
+/// taken as lost, since [`Observation::Lost`] says that it spoke.
+pub fn update_or_drop<R: Receiver + ?Sized>(receiver: &mut R, observed: &[Observation<BitString>]) -> Outcome {
+    let mut asked: Vec<_> = observed.iter().cloned().enumerate().collect();
+    let first = match receiver.update(&asked) {
+        Ok(()) => return Outcome::Used,
+        Err(error) => error,
+    };
+    let all = asked.len();
+    asked.retain(|(_, observation)| *observation != Observation::Nothing);
+    match asked.len() < all && receiver.update(&asked).is_ok() {
+        true => Outcome::SilentDropped(first),
+        false => Outcome::Failed(first),
+    }
+}

@@ -1,0 +1,389 @@
+//! The sensor's state machine.
+
+use crate::frame::{Check, Frame, Kind, digest};
+use crate::note::Note;
+use crate::payload::Payload;
+use crate::slot::{Schedule, Slot};
+
+/// How a sensor learns what it must know before it measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "std", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Feedback {
+    /// The centre sends it in full.
+    Told,
+    /// There is nothing to know: the sensor reports by the clock. Any frame of the centre sets the clock.
+    Clock,
+    /// The sensor runs the centre's filter too and is sent what the centre received. Where it no longer agrees, it asks for the whole state.
+    Echoed,
+}
+
+/// Settings of a sensor. Both ends must have the same `check` and feedback.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct SensorSettings {
+    /// How it learns what it must know.
+    pub feedback: Feedback,
+    /// What the check of a frame covers.
+    pub check: Check,
+    /// When slots begin. [`Feedback::Clock`] needs it; with it, other sensors refuse frames of another slot than the present one.
+    pub schedule: Option<Schedule>,
+    /// After so many silent slots in a row a heartbeat is sent; 0: never.
+    pub heartbeat_after: u32,
+    /// How often a report is sent again that was not acknowledged; 0: no acknowledgement is awaited.
+    pub repeats: u8,
+    /// Nanoseconds to an acknowledgement before a report is sent again.
+    pub patience: u64,
+}
+
+impl SensorSettings {
+    /// Whole check, no schedule, no heartbeat, no repeats.
+    pub fn new(feedback: Feedback) -> Self {
+        Self {
+            feedback,
+            check: Check::Whole,
+            schedule: None,
+            heartbeat_after: 0,
+            repeats: 0,
+            patience: 0,
+        }
+    }
+}
+
+/// Timers of a sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum SensorTimer {
+    /// A slot begins for a sensor that reports by the clock.
+    SlotBegins,
+    /// No acknowledgement has come in time.
+    Unacknowledged {
+        /// The report's slot.
+        slot: Slot,
+    },
+}
+
+/// What the driver must do next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Task<'a> {
+    /// Nothing.
+    Wait,
+    /// Measure, encode the report with this feedback, and call [`Sensor::on_sample`].
+    Sample {
+        /// The slot.
+        slot: Slot,
+        /// The feedback as it travelled; empty with [`Feedback::Clock`] and [`Feedback::Echoed`], where the driver's replica knows it.
+        feedback: Payload<'a>,
+    },
+    /// Bring the replica up to the end of the slot before `slot` by this payload, and call [`Sensor::on_followed`].
+    Follow {
+        /// The slot that begins.
+        slot: Slot,
+        /// [`Kind::Echo`]: what the centre received in the slot before. [`Kind::Snapshot`]: the state itself.
+        kind: Kind,
+        /// Echo or state.
+        payload: Payload<'a>,
+    },
+    /// Send this frame to the centre.
+    Send(Frame<'a>),
+    /// Send the last report again, the same bytes.
+    SendAgain,
+}
+
+/// What follows from an event: a task, perhaps a timer to set (time in nanoseconds), perhaps a note.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reaction<'a> {
+    /// What to do next.
+    pub task: Task<'a>,
+    /// A timer to set. Several may run at once. Late timers are harmless; none may fire early.
+    pub timer: Option<(u64, SensorTimer)>,
+    /// What was noticed.
+    pub note: Option<Note>,
+}
+
+impl Reaction<'static> {
+    const NOTHING: Self = Self {
+        task: Task::Wait,
+        timer: None,
+        note: None,
+    };
+}
+
+fn noted(note: Note) -> Reaction<'static> {
+    Reaction {
+        note: Some(note),
+        ..Reaction::NOTHING
+    }
+}
+
+/// Where a sensor is within a slot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+enum Stage {
+    /// Waits for a frame or the clock.
+    Idle,
+    /// The driver brings the replica up to date, which should have this digest.
+    Following { slot: Slot, digest: u32, kind: Kind },
+    /// The driver measures.
+    Sampling { slot: Slot, digest: u32 },
+    /// A report is out, and may be sent again so often.
+    Awaiting { slot: Slot, repeats: u8 },
+}
+
+/// A sensor of a star: events in, a [`Reaction`] out. It has no clock, no socket and no estimator; times are nanoseconds of any clock that
+/// does not go back.
+///
+/// ```text
+/// told:     on_frame(feedback) -> Sample;  on_sample(report or silence) -> Send
+/// clock:    on_timer(slot begins) -> Sample, next timer;  on_sample -> Send
+/// echoed:   on_frame(echo or snapshot) -> Follow;  on_followed(digest of the replica) -> Sample, or Send(request);  on_sample -> Send
+/// repeats:  on_sample -> Send, timer;  on_ack ends it;  on_timer -> SendAgain
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+pub struct Sensor {
+    settings: SensorSettings,
+    stage: Stage,
+    /// The last slot that it answered in, or began to.
+    answered: Option<Slot>,
+    /// The last slot whose beginning the replica was brought up to.
+    followed: Option<Slot>,
+    silent: u32,
+    /// When the next slot begins for a sensor that reports by the clock. Timers that were set before the clock was set fire earlier, and
+    /// are ignored.
+    begins_at: u64,
+}
+
+impl Sensor {
+    /// A sensor before its first slot. One that reports by the clock is started by [`on_timer`](Self::on_timer) with [`SensorTimer::SlotBegins`].
+    pub fn new(settings: SensorSettings) -> Self {
+        Self {
+            settings,
+            stage: Stage::Idle,
+            answered: None,
+            followed: None,
+            silent: 0,
+            begins_at: 0,
+        }
+    }
+
+    /// The settings. The schedule is as the centre's frames have set it.
+    pub fn settings(&self) -> &SensorSettings {
+        &self.settings
+    }
+
+    /// The last slot that it answered in.
+    pub fn answered(&self) -> Option<Slot> {
+        self.answered
+    }
+
+    /// The sensor after it has lost what it shared with the centre: an echo no longer helps it, a snapshot does. It does not answer a slot twice.
+    pub fn on_memory_lost(&mut self) {
+        self.followed = None;
+        self.stage = Stage::Idle;
+    }
+
+    /// Bytes have arrived.
+    pub fn on_frame<'a>(&mut self, now: u64, bytes: &'a [u8]) -> Reaction<'a> {
+        match Frame::decode(bytes, self.settings.check) {
+            Ok(frame) => self.on_decoded(now, frame),
+            Err(error) => noted(error.into()),
+        }
+    }
+
+    /// A frame has arrived that the driver has decoded.
+    pub fn on_decoded<'a>(&mut self, now: u64, frame: Frame<'a>) -> Reaction<'a> {
+        let slot = frame.slot;
+        let is_broadcast = match (self.settings.feedback, frame.kind) {
+            (_, Kind::Acknowledgement) => return self.on_ack(slot),
+            (Feedback::Told, Kind::Feedback) | (Feedback::Echoed, Kind::Echo | Kind::Snapshot) => true,
+            (Feedback::Clock, Kind::Feedback | Kind::Echo | Kind::Snapshot | Kind::Heartbeat) => false,
+            (_, Kind::Heartbeat) => return Reaction::NOTHING,
+            (_, kind) => return noted(Note::Unexpected { kind }),
+        };
+        if !is_broadcast {
+            return self.on_slot_announced(now, slot);
+        }
+        match self.answered {
+            Some(answered) if answered == slot => return noted(Note::Duplicate { slot }),
+            Some(answered) if !slot.is_after(answered) => return noted(Note::Late { slot }),
+            _ => {}
+        }
+        if let Some(schedule) = &self.settings.schedule
+            && slot != Slot::of_count(schedule.count(now))
+        {
+            return noted(Note::Late { slot });
+        }
+        if frame.kind != Kind::Feedback {
+            return self.follow(frame);
+        }
+        // The digest of told feedback is that of the feedback: under a check of the header it shows inverted bits.
+        if digest(slot, frame.payload) != frame.digest {
+            return noted(Note::Disagreement { slot });
+        }
+        self.sample(slot, frame.digest, frame.payload)
+    }
+
+    fn sample<'a>(&mut self, slot: Slot, digest: u32, feedback: Payload<'a>) -> Reaction<'a> {
+        self.answered = Some(slot);
+        self.stage = Stage::Sampling { slot, digest };
+        Reaction {
+            task: Task::Sample { slot, feedback },
+            ..Reaction::NOTHING
+        }
+    }
+
+    fn follow<'a>(&mut self, frame: Frame<'a>) -> Reaction<'a> {
+        let Frame { kind, slot, digest, .. } = frame;
+        // An echo tells of one slot: it helps a replica that stands at the beginning of that slot, and the first echo any that is new.
+        let connects = kind == Kind::Snapshot || self.followed == Some(slot.before()) || self.is_first(slot);
+        if !connects {
+            return self.disagree(slot);
+        }
+        self.stage = Stage::Following { slot, digest, kind };
+        let payload = frame.payload;
+        Reaction {
+            task: Task::Follow { slot, kind, payload },
+            ..Reaction::NOTHING
+        }
+    }
+
+    /// Slot 1 begins with what both ends were configured with.
+    fn is_first(&self, slot: Slot) -> bool {
+        slot == Slot::of_count(1) && self.answered.is_none()
+    }
+
+    /// Asks for the whole state.
+    fn disagree(&mut self, slot: Slot) -> Reaction<'static> {
+        self.followed = None;
+        self.stage = Stage::Idle;
+        Reaction {
+            task: Task::Send(Frame::new(Kind::Request, slot, 0, Payload::EMPTY)),
+            note: Some(Note::Disagreement { slot }),
+            timer: None,
+        }
+    }
+
+    /// The replica was brought up to date; `state` is the [`digest`] of its bits in the slot before. `None` if it could not be.
+    pub fn on_followed(&mut self, state: Option<u32>) -> Reaction<'static> {
+        let Stage::Following { slot, digest, kind } = self.stage else {
+            return noted(Note::Misuse);
+        };
+        if state != Some(digest) {
+            return self.disagree(slot);
+        }
+        let resynchronised = kind == Kind::Snapshot && self.followed != Some(slot.before());
+        self.followed = Some(slot);
+        Reaction {
+            note: resynchronised.then_some(Note::Resynchronised { slot }),
+            ..self.sample(slot, digest, Payload::EMPTY)
+        }
+    }
+
+    /// The driver has measured: the report, or `None` for silence (also where there was no measurement).
+    pub fn on_sample<'a>(&mut self, now: u64, report: Option<Payload<'a>>) -> Reaction<'a> {
+        let Stage::Sampling { slot, digest } = self.stage else {
+            return noted(Note::Misuse);
+        };
+        self.stage = Stage::Idle;
+        let Some(report) = report else {
+            self.silent = self.silent.saturating_add(1);
+            if self.settings.heartbeat_after == 0 || self.silent < self.settings.heartbeat_after {
+                return Reaction::NOTHING;
+            }
+            self.silent = 0;
+            return Reaction {
+                task: Task::Send(Frame::new(Kind::Heartbeat, slot, digest, Payload::EMPTY)),
+                ..Reaction::NOTHING
+            };
+        };
+        self.silent = 0;
+        let mut timer = None;
+        if self.settings.repeats > 0 {
+            let repeats = self.settings.repeats;
+            self.stage = Stage::Awaiting { slot, repeats };
+            timer = Some(self.unacknowledged_at(now, slot));
+        }
+        Reaction {
+            task: Task::Send(Frame::new(Kind::Report, slot, digest, report)),
+            timer,
+            note: None,
+        }
+    }
+
+    fn unacknowledged_at(&self, now: u64, slot: Slot) -> (u64, SensorTimer) {
+        (now.saturating_add(self.settings.patience), SensorTimer::Unacknowledged { slot })
+    }
+
+    /// The centre has acknowledged the report of a slot.
+    pub fn on_ack(&mut self, acknowledged: Slot) -> Reaction<'static> {
+        if matches!(self.stage, Stage::Awaiting { slot, .. } if slot == acknowledged) {
+            self.stage = Stage::Idle;
+        }
+        Reaction::NOTHING
+    }
+
+    /// A timer has fired.
+    pub fn on_timer(&mut self, now: u64, timer: SensorTimer) -> Reaction<'static> {
+        match timer {
+            SensorTimer::SlotBegins => self.on_slot_begins(now),
+            SensorTimer::Unacknowledged { slot } => match self.stage {
+                Stage::Awaiting { slot: own, repeats: 0 } if own == slot => {
+                    self.stage = Stage::Idle;
+                    noted(Note::Unacknowledged { slot })
+                }
+                Stage::Awaiting { slot: own, repeats } if own == slot => {
+                    let repeats = repeats - 1;
+                    self.stage = Stage::Awaiting { slot, repeats };
+                    Reaction {
+                        task: Task::SendAgain,
+                        timer: Some(self.unacknowledged_at(now, slot)),
+                        note: None,
+                    }
+                }
+                _ => Reaction::NOTHING,
+            },
+        }
+    }
+
+    fn on_slot_begins(&mut self, now: u64) -> Reaction<'static> {
+        let (Feedback::Clock, Some(schedule)) = (self.settings.feedback, self.settings.schedule) else {
+            return noted(Note::Misuse);
+        };
+        if now < self.begins_at {
+            return Reaction::NOTHING;
+        }
+        let count = schedule.count(now);
+        self.begins_at = schedule.start(count + 1);
+        let timer = Some((self.begins_at, SensorTimer::SlotBegins));
+        let slot = Slot::of_count(count);
+        // A clock that was set back meets a slot again: it is not answered twice.
+        if self.answered.is_some_and(|answered| !slot.is_after(answered)) {
+            return Reaction {
+                timer,
+                ..Reaction::NOTHING
+            };
+        }
+        Reaction {
+            timer,
+            ..self.sample(slot, digest(slot, Payload::EMPTY), Payload::EMPTY)
+        }
+    }
+
+    /// The centre has begun a slot: a sensor that reports by the clock sets it.
+    fn on_slot_announced(&mut self, now: u64, slot: Slot) -> Reaction<'static> {
+        let Some(schedule) = &mut self.settings.schedule else {
+            return Reaction::NOTHING;
+        };
+        schedule.synchronise(slot, now);
+        self.begins_at = schedule.start(schedule.count(now) + 1);
+        Reaction {
+            timer: Some((self.begins_at, SensorTimer::SlotBegins)),
+            ..Reaction::NOTHING
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Slot numbers of 24 bits, and the schedule that gives them times.
+
+use core::num::NonZeroU64;
+
+/// Bits of a slot number on the wire.
+pub const SLOT_BITS: u32 = 24;
+const MASK: u32 = (1 << SLOT_BITS) - 1;
+
+/// Number of a slot as it travels: counted modulo `2^24`.
+///
+/// Order is that of serial numbers: `a` is after `b` if `a - b` modulo `2^24` is from 1 to `2^23 - 1`. At ten slots a second numbers come again
+/// after 19 days, and two ends may be 9 days apart before they take old for new.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "std", serde(from = "u64", into = "u64"))]
+pub struct Slot(u32);
+
+impl Slot {
+    /// The slot of this count, modulo `2^24`.
+    pub fn of_count(count: u64) -> Self {
+        Self((count & u64::from(MASK)) as u32)
+    }
+
+    /// The number, below `2^24`.
+    pub fn number(self) -> u32 {
+        self.0
+    }
+
+    /// The slot before.
+    #[must_use]
+    pub fn before(self) -> Self {
+        Self(self.0.wrapping_sub(1) & MASK)
+    }
+
+    /// The slot after.
+    #[must_use]
+    pub fn after(self) -> Self {
+        Self(self.0.wrapping_add(1) & MASK)
+    }
+
+    /// Whether this slot is later than `other`.
+    pub fn is_after(self, other: Self) -> bool {
+        let ahead = self.0.wrapping_sub(other.0) & MASK;
+        ahead != 0 && ahead < 1 << (SLOT_BITS - 1)
+    }
+
+    /// The count with this slot number that is nearest to `count`.
+    pub fn nearest_count(self, count: u64) -> u64 {
+        let ahead = u64::from(self.0.wrapping_sub(count as u32) & MASK);
+        match ahead < 1 << (SLOT_BITS - 1) {
+            true => count.saturating_add(ahead),
+            false => count
+                .checked_sub((1 << SLOT_BITS) - ahead)
+                .unwrap_or_else(|| count.saturating_add(ahead)),
+        }
+    }
+}
+
+impl From<u64> for Slot {
+    fn from(count: u64) -> Self {
+        Self::of_count(count)
+    }
+}
+
+impl From<Slot> for u64 {
+    fn from(slot: Slot) -> Self {
+        u64::from(slot.0)
+    }
+}
+
+/// When slots begin, by the clock of one node: slot `k` at `origin + k period`. Times in nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
+pub struct Schedule {
+    origin: i128,
+    period: NonZeroU64,
+}
+
+impl Schedule {
+    /// Slots of `period` nanoseconds from time 0 on.
+    pub fn new(period: NonZeroU64) -> Self {
+        Self { origin: 0, period }
+    }
+
+    /// Length of a slot in nanoseconds.
+    pub fn period(&self) -> u64 {
+        self.period.get()
+    }
+
+    /// Count of the slot at a time; 0 before the first.
+    pub fn count(&self, now: u64) -> u64 {
+        u64::try_from((i128::from(now) - self.origin) / i128::from(self.period.get())).unwrap_or(0)
+    }
+
+    /// When the slot of a count begins.
+    pub fn start(&self, count: u64) -> u64 {
+        let start = self
+            .origin
+            .saturating_add(i128::from(count) * i128::from(self.period.get()));
+        u64::try_from(start.max(0)).unwrap_or(u64::MAX)
+    }
+
+    /// Takes over the centre's time: its slot `slot` begins now.
+    pub fn synchronise(&mut self, slot: Slot, now: u64) {
+        let count = slot.nearest_count(self.count(now));
+        self.origin = i128::from(now) - i128::from(count) * i128::from(self.period.get());
+    }
+}

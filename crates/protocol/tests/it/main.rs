@@ -1,0 +1,6 @@
+//! Integration tests of `fewbits-protocol`.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod centre;
+mod frame;
+mod sensor;
