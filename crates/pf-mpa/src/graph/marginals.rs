@@ -127,7 +127,7 @@ mod tests {
         let sizes: Vec<usize> = graph.variables.iter().map(|v| v.states).collect();
         let mut marginals: Vec<Vec<f64>> = sizes.iter().map(|s| vec![0.0; *s]).collect();
         let mut choice = vec![0; sizes.len()];
-        for _ in 0..sizes.iter().product() {
+        for _ in 0..sizes.iter().product::<usize>() {
             let place = |f: &Function| f.scope.iter().fold(0, |place, v| place * sizes[*v] + choice[*v]);
             let value: f64 = graph.functions.iter().map(|f| f.table[place(f)]).product();
             for (marginal, state) in marginals.iter_mut().zip(&choice) {
@@ -166,6 +166,6 @@ mod tests {
         assert_eq!(enumerated(&graph), Err(Error::IMPOSSIBLE));
         graph.function("again", &[a, b], &[1.0; 4]).unwrap();
         assert!(graph.marginals().is_err());
-        assert!(example().unwrap().marginals().is_err());
+        assert!(crate::graph::example().unwrap().marginals().is_err());
     }
 }
