@@ -52,7 +52,10 @@ const RUSTDOC: &str = "FEWBITS_RUSTDOC";
 pub fn as_rustdoc() -> Option<bool> {
     let rustdoc = std::env::var_os(RUSTDOC)?;
     let arguments = std::env::args_os().skip(1);
-    let status = Command::new(rustdoc).args(arguments).env("RUSTC_BOOTSTRAP", "1").status();
+    let status = Command::new(rustdoc)
+        .args(arguments)
+        .env("RUSTC_BOOTSTRAP", "1")
+        .status();
     Some(status.is_ok_and(|status| status.success()))
 }
 
@@ -82,7 +85,11 @@ pub fn run(options: &Options) -> Result<bool, Error> {
         let Some(library) = package.targets.iter().find(|t| t.is_lib()).filter(|_| !private) else {
             continue;
         };
-        let description = metadata.target_directory.as_std_path().join("doc").join(format!("{}.json", library.name));
+        let description = metadata
+            .target_directory
+            .as_std_path()
+            .join("doc")
+            .join(format!("{}.json", library.name));
         let listed = list(&description)?;
         let path = folder.join(format!("{}.txt", package.name));
         if !options.check {

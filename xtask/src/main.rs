@@ -39,9 +39,7 @@ fn main() -> ExitCode {
         Task::Alone(options) => xtask::alone::run(&options)
             .map(ended)
             .map_err(|error| error.to_string()),
-        Task::Api(options) => xtask::api::run(&options)
-            .map(ended)
-            .map_err(|error| error.to_string()),
+        Task::Api(options) => xtask::api::run(&options).map(ended).map_err(|error| error.to_string()),
         Task::Tidy => xtask::tidy::run().map(ended).map_err(|error| error.to_string()),
     };
     match done {

@@ -45,16 +45,16 @@ pub use fewbits_dymbo as dymbo;
 pub use fewbits_filters as filters;
 #[cfg(feature = "handoff")]
 pub use fewbits_handoff as handoff;
-#[cfg(feature = "filters")]
-pub use fewbits_models as models;
 #[cfg(feature = "link")]
 pub use fewbits_link as link;
+#[cfg(feature = "filters")]
+pub use fewbits_models as models;
 #[cfg(feature = "network")]
 pub use fewbits_network as network;
-#[cfg(feature = "link")]
-pub use fewbits_protocol as protocol;
 #[cfg(feature = "pf-mpa")]
 pub use fewbits_pf_mpa as pf_mpa;
+#[cfg(feature = "link")]
+pub use fewbits_protocol as protocol;
 #[cfg(feature = "quantizer-design")]
 pub use fewbits_quantizer_design as quantizer_design;
 #[cfg(feature = "quantizers")]

@@ -5,6 +5,8 @@ fewbits_numerics::errors! {
     pub enum Error wraps {
         /// What a word of the core refused; [`fewbits_core::Error::Impossible`] for an observation of probability zero.
         Core(#[from] fewbits_core::Error),
+        /// A model refused its parameters.
+        Model(#[from] fewbits_models::Error),
         /// A message that does not fit its format.
         Codec(#[from] fewbits_core::CodecError),
         /// A density that cannot be.

@@ -175,7 +175,10 @@ impl Run<'_> {
         let mut worlds: Vec<Vec<&Planned<'_>>> = Vec::new();
         for figure in planned {
             let world = figure.job.figure.world();
-            match worlds.iter_mut().find(|w| world.is_some() && w[0].job.figure.world() == world) {
+            match worlds
+                .iter_mut()
+                .find(|w| world.is_some() && w[0].job.figure.world() == world)
+            {
                 Some(shared) => shared.push(figure),
                 None => worlds.push(vec![figure]),
             }

@@ -1,8 +1,10 @@
 //! Wild arguments: beliefs are made of numbers or refused, answer numbers, and a failed step leaves them as they were.
 
 use fewbits_core::laws::wild;
-use fewbits_core::{Belief, Density, Gaussian};
-use fewbits_densities::{Bandwidth, Component, GaussianCloud, Grid, KernelEstimate, Mixture, Particles, PlaneMass, PointMass};
+use fewbits_core::{Density, Gaussian};
+use fewbits_densities::{
+    Bandwidth, Component, GaussianCloud, Grid, KernelEstimate, Mixture, Particles, PlaneMass, PointMass,
+};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;

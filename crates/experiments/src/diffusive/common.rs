@@ -285,7 +285,10 @@ pub(super) fn tracks(
     };
     let own = Kept::default();
     let kept = context.kept.unwrap_or(&own);
-    let missing: Vec<&Scheme> = schemes.iter().filter(|s| kept.get::<Vec<Track>>(&name(s)).is_none()).collect();
+    let missing: Vec<&Scheme> = schemes
+        .iter()
+        .filter(|s| kept.get::<Vec<Track>>(&name(s)).is_none())
+        .collect();
     let every = |trial: Trial| -> Result<Vec<Track>, Error> {
         let one = |scheme: &&Scheme| Ok(Track::of(&scheme.run(settings, trial)?, &scheme.example.source()));
         missing.iter().map(one).collect()

@@ -109,7 +109,7 @@ impl Fig6 {
         let typical = [0, 1, 2].map(|c| sums.mean(c));
         let bounds = (1..=STEPS).map(|t| {
             let [ml, kl] = [0, 1].map(|c| account(&typical[c], t));
-            let jackknifed = |c: usize, log: fn(&fewbits_handoff::Bounds) -> f64| Measured {
+            let jackknifed = |c: usize, log: fn(&fewbits_handoff::published::Bounds) -> f64| Measured {
                 value: log(&account(&typical[c], t)) / LN_10,
                 standard_error: sums.jackknife(runs, c, |steps| log(&account(steps, t)) / LN_10),
             };
@@ -162,7 +162,7 @@ impl Fig6 {
 }
 
 /// Bounds after `t` hand-overs.
-fn account(steps: &[StepError], t: usize) -> fewbits_handoff::Bounds {
+fn account(steps: &[StepError], t: usize) -> fewbits_handoff::published::Bounds {
     let first = steps[..t].iter().copied();
     first.collect::<Accounting>().bounds(Amplification::Ml)
 }

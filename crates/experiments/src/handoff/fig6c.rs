@@ -7,7 +7,8 @@ use super::world::{Reading, Walk};
 use crate::prelude::*;
 use fewbits_core::Columns;
 use fewbits_densities::{KernelEstimate, Mixture, Particles};
-use fewbits_handoff::{HandoffFilter, StepError, Whole};
+use fewbits_handoff::published::StepError;
+use fewbits_handoff::{HandoffFilter, Whole};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 

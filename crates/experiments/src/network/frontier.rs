@@ -206,13 +206,20 @@ impl Figure for Frontier {
                 }
                 let mut frontier: Vec<_> = here().filter(|r| best(r) == "yes").collect();
                 frontier.sort_by(|a, b| of(a).total_cmp(&of(b)));
-                let names = frontier.iter().map(|r| (of(r), r.rmse.value, r.setting.clone())).collect();
+                let names = frontier
+                    .iter()
+                    .map(|r| (of(r), r.rmse.value, r.setting.clone()))
+                    .collect();
                 // Steps: between two settings nothing is reached but the error of the cheaper one.
                 let corners = frontier.windows(2).map(|w| (of(w[1]), w[0].rmse.value));
                 let corners = corners.chain(frontier.last().map(|r| (of(r), r.rmse.value)));
                 let points = frontier.iter().map(|r| (of(r), r.rmse.value));
                 let steps = points.zip(corners).flat_map(|(at, corner)| [at, corner]).collect();
-                panels.push(panel.with(Layer::unbroken("nothing beats these", steps)).with(Layer::texts(names)));
+                panels.push(
+                    panel
+                        .with(Layer::unbroken("nothing beats these", steps))
+                        .with(Layer::texts(names)),
+                );
             }
         }
         Plot::grid(2, panels)

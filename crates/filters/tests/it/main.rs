@@ -4,12 +4,12 @@
 #![allow(clippy::unwrap_used)]
 
 mod contract;
-mod stored;
 mod failure;
 mod imm;
 mod particle;
 mod rao_blackwell;
 mod resample;
 mod state_noise;
+mod stored;
 mod tangent;
 mod wild;

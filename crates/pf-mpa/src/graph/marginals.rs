@@ -106,7 +106,7 @@ fn normalised(mut message: Vec<f64>) -> Result<Vec<f64>, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::{Function, example};
+    use crate::graph::Function;
     use proptest::prelude::*;
 
     fn random(states: [usize; 5], values: &[f64]) -> FactorGraph {

@@ -115,7 +115,10 @@ fn tracking_error<F: StateFilter<4>>(mut filter: F, start: &Gaussian<4>) -> f64 
         filter.predict(&mut rng, &dynamics, 1.0, &mut belief).unwrap();
         let (mean, covariance) = (belief.mean(), belief.covariance());
         let observed = places.map(|place| {
-            let sensor = RangeSensor::new(place.into(), noise).unwrap().on_axes(PLANE_POSITION).unwrap();
+            let sensor = RangeSensor::new(place.into(), noise)
+                .unwrap()
+                .on_axes(PLANE_POSITION)
+                .unwrap();
             let (range, jacobian) = (sensor.mean(&mean)[0], sensor.jacobian(&mean));
             let spread = (jacobian * covariance * jacobian.transpose())[0]
                 .sqrt()
