@@ -8,7 +8,7 @@ use faer::Mat;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
     /// Trapezoidal rule, then a backward difference (TR-BDF2): second order, with an embedded error of third order. Concentrations may
-    /// fall below zero by the error: [`Snapshot::lowest`] says how far.
+    /// fall below zero by the error: [`Snapshot::lowest`](crate::Snapshot::lowest) says how far.
     #[default]
     TrBdf2,
     /// Two implicit Euler steps of half the length; their difference from one whole step is the error. First order, never negative.

@@ -10,7 +10,7 @@ use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-/// One weighted Gaussian of a [`Mixture`], with its covariance factored once.
+/// One weighted Gaussian of a [`Mixture`](crate::Mixture), with its covariance factored once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Component<const D: usize> {
     pub(super) weight: f64,
@@ -20,7 +20,7 @@ pub struct Component<const D: usize> {
 }
 
 impl<const D: usize> Component<D> {
-    /// A component of any weight from 0 up: a [`Mixture`] normalises the weights of its components.
+    /// A component of any weight from 0 up: a [`Mixture`](crate::Mixture) normalises the weights of its components.
     ///
     /// # Errors
     /// If the weight is negative or not finite, the mean is not finite, or the covariance is not symmetric positive definite

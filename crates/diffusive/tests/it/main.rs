@@ -23,7 +23,6 @@ mod searches;
 mod series;
 mod slices;
 mod unknown_models;
-mod wild;
 
 use fewbits_diffusive::{RateModel, RateRange, Rule, SearchBox, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};

@@ -42,7 +42,7 @@ pub enum Event {
     Lost,
     /// Observations are likelier than they should be, or residuals alternate: a noise is overstated.
     NoiseOverstated,
-    /// The belief was replaced by the prior of [`FusionCentre::reacquire_from`].
+    /// The belief was replaced by the prior of [`FusionCentre::reacquire_from`](super::FusionCentre::reacquire_from).
     Reacquired,
 }
 

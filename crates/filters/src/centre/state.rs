@@ -87,7 +87,7 @@ impl StoredSlot {
 /// What a centre knows: everything but its models, its filter and its settings, which the program states again.
 ///
 /// Stored as bytes ([`to_bytes`](Self::to_bytes)) or by any format of serde, a centre that is restored goes on with the same bits, given the
-/// same random stream: floats are stored exactly whatever the format does ([`fewbits_numerics::stored`]).
+/// same random stream: floats are stored exactly whatever the format does ([`mod@fewbits_numerics::stored`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CentreState<B> {

@@ -4,4 +4,3 @@
 
 mod engine;
 mod random;
-mod wild;

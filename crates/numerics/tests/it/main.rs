@@ -4,4 +4,3 @@
 
 mod kernels;
 mod normal;
-mod wild;
