@@ -12,7 +12,7 @@
 //! | `cfwmd` | `cfwmd` | sensors that send only surprising measurements, and fusion that learns from their silence |
 //! | `diffusion` | `diffusion` | concentrations in rooms, walls and wind, by sparse factorisations |
 //! | `diffusive`, `topology` | `diffusive` | a diffusive source, found by a belief that walks the network |
-//! | `handoff` | `handoff` | a particle filter whose belief travels from leader to leader in a few bytes |
+//! | `handoff`, `mixture_codec` | `handoff` | a particle filter whose belief travels from leader to leader in a few bytes |
 //! | `quantizers` | `quantizers` | the quantizer a sensor holds, its words, Lloyd-Max tables |
 //! | `quantizer_design` | `quantizer-design` | joint design and decoding of distributed scalar quantizers |
 //! | `binary_patterns` | `binary-patterns` | one-bit quantizers with patterned cells |
@@ -20,6 +20,7 @@
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
 //! | `record` | `record` | files and frames of many columns within guaranteed errors |
 //! | `link`, `protocol` | `link` | a fusion centre and its sensors as processes: frames, keys, sockets |
+//! | `node` | `node` | the sensor's halves of all schemes, without the standard library |
 //! | `network` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
 
@@ -47,10 +48,14 @@ pub use fewbits_filters as filters;
 pub use fewbits_handoff as handoff;
 #[cfg(feature = "link")]
 pub use fewbits_link as link;
+#[cfg(feature = "handoff")]
+pub use fewbits_mixture_codec as mixture_codec;
 #[cfg(feature = "filters")]
 pub use fewbits_models as models;
 #[cfg(feature = "network")]
 pub use fewbits_network as network;
+#[cfg(feature = "node")]
+pub use fewbits_node as node;
 #[cfg(feature = "pf-mpa")]
 pub use fewbits_pf_mpa as pf_mpa;
 #[cfg(feature = "link")]
