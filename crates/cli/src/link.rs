@@ -18,6 +18,9 @@ const AHEAD: usize = 1024;
 /// The largest datagram.
 const MAX_DATAGRAM: usize = 1 << 16;
 
+/// Sends one datagram or packet.
+type Post = Box<dyn FnMut(&[u8]) -> std::io::Result<()>>;
+
 /// Where frames go.
 enum Way {
     /// A stream that keeps order and loses nothing: the header once, then frames. It is a recording without an index.
@@ -28,7 +31,7 @@ enum Way {
     },
     /// Frames one by one, any of which may be lost: the header in pieces before every so many.
     Frames {
-        post: Box<dyn FnMut(&[u8]) -> std::io::Result<()>>,
+        post: Post,
         address: String,
         header_every: u64,
         sent: u64,
