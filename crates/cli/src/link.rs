@@ -18,7 +18,7 @@ const AHEAD: usize = 1024;
 /// The largest datagram.
 const MAX_DATAGRAM: usize = 1 << 16;
 
-/// Sends one datagram or packet.
+/// Sends one frame.
 type Post = Box<dyn FnMut(&[u8]) -> std::io::Result<()>>;
 
 /// Where frames go.

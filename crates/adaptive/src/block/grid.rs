@@ -63,7 +63,7 @@ impl Grid {
     /// Neighbouring multiples of `1 / ten` within `delta` of their middle; `None` if there are too many to count.
     pub(super) fn width(delta: f64, ten: f64) -> Option<i64> {
         let neighbours = (2.0 * delta * ten * (1.0 - SLACK)).floor();
-        (neighbours < LARGEST_DIGITS).then_some(neighbours as i64 + 1)
+        (neighbours < LARGEST_DIGITS).then(|| neighbours as i64 + 1)
     }
 
     /// The grid of a bound for samples of any digits.

@@ -58,7 +58,8 @@ proptest! {
                         prop_assert!(sensor.estimate().is_finite(), "{} {:?}", sensor.estimate(), samples);
                         prop_assert_eq!(receiver.receive(word).ok(), Some(sensor.estimate()));
                     }
-                    Err(_) => prop_assert!(sensor == before, "changed by {}", sample),
+                    // What is stored is the state; scratch space is not.
+                    Err(_) => prop_assert_eq!(serde_json::to_string(&sensor).unwrap(), serde_json::to_string(&before).unwrap()),
                 }
             }
             if let Ok(estimate) = receiver.miss() {

@@ -4,4 +4,3 @@
 mod bounds;
 mod entry;
 mod fixtures;
-mod wild;

@@ -241,6 +241,9 @@ impl<const D: usize> Belief<D> for KernelEstimate<D> {
     }
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
         let drawn = states.each_mut().map(|column| &mut **column);
         self.particles().sample_columns(rng, drawn);
         let count = states.iter().map(|c| c.len()).min().unwrap_or(0);

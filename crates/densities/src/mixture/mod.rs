@@ -220,6 +220,9 @@ impl<const D: usize> Belief<D> for Mixture<D> {
     }
 
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
         let count = states.iter().map(|c| c.len()).min().unwrap_or(0);
         for k in 0..count {
             let draw = self.sample(rng);

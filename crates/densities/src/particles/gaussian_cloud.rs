@@ -92,6 +92,9 @@ impl<const D: usize> Belief<D> for GaussianCloud<D> {
 
     /// A particle by its weight, then its Gaussian.
     fn sample_columns<R: Rng + ?Sized>(&self, rng: &mut R, mut states: ColumnsMut<'_, D>) {
+        if !fewbits_core::columns::columns_agree(&mut states) {
+            return;
+        }
         let spread = Gaussian::from_trusted_parts(SVector::zeros(), self.covariance);
         spread.sample_columns(rng, states.each_mut().map(|column| &mut **column));
         let cumulative = Categorical::new(self.means.weights());

@@ -101,7 +101,7 @@ impl World {
     pub(super) fn ranges(&self, network: &Network, k: usize) -> Vec<f64> {
         let (x, y) = (self.track[k][0], self.track[k][1]);
         let sensors = network.sensors().iter().zip(&self.normals[k]);
-        let measure = |(s, normal): (&fewbits_pf_mpa::RangeSensor, &f64)| {
+        let measure = |(s, normal): (&RangeSensor, &f64)| {
             let d = s.distance(x, y);
             d + s.noise().deviation(d) * normal
         };

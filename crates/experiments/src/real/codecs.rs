@@ -114,7 +114,7 @@ impl Figure for Codecs {
         let references = REFERENCES.iter().flat_map(|(codec, bits)| {
             bits.iter().map(move |(percent, bits)| Reference {
                 percent: *percent,
-                codec: *codec,
+                codec,
                 bits: *bits,
             })
         });
