@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::store::Store;
 use fewbits_core::{BitString, Observation};
 use fewbits_protocol::{
-    Action, Centre, CentreSettings, CentreTimer, Feedback, Note, Outcome, Receiver, Recipient, update_or_drop,
+    Action, Centre, CentreSettings, CentreTimer, Feedback, Note, Outcome, Receiver, Recipient, update_asked,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -35,6 +35,8 @@ pub struct Step {
     /// What was observed of each sensor.
     #[serde(with = "fewbits_protocol::stored")]
     pub observed: Vec<Observation<BitString>>,
+    /// Whether each sensor was asked. One whose address is not known yet cannot be; that nothing comes of it says nothing.
+    pub asked: Vec<bool>,
     /// Mean and standard deviation of each coordinate.
     pub estimate: Vec<(f64, f64)>,
     /// Why the update did not use all observations.
@@ -42,14 +44,22 @@ pub struct Step {
 }
 
 impl Step {
-    /// A step whose update used all observations.
+    /// A step in which all sensors were asked, and whose update used all observations.
     pub fn new(slot: u64, observed: Vec<Observation<BitString>>, estimate: Vec<(f64, f64)>) -> Self {
         Self {
             slot,
+            asked: vec![true; observed.len()],
             observed,
             estimate,
             trouble: None,
         }
+    }
+
+    /// What was observed of the sensors that were asked.
+    pub fn observed_when_asked(&self) -> Vec<(usize, Observation<BitString>)> {
+        let all = self.observed.iter().cloned().enumerate();
+        all.filter(|(sensor, _)| self.asked.get(*sensor) != Some(&false))
+            .collect()
     }
 }
 
@@ -131,6 +141,8 @@ pub struct Station<R> {
     windows: Vec<ReplayWindow>,
     /// Envelopes sent to each sensor in this slot.
     sent: Vec<u64>,
+    /// Whether each sensor was asked in this slot.
+    asked: Vec<bool>,
     timers: BTreeMap<u64, Vec<CentreTimer>>,
     store: Option<Store>,
     counts: Counts,
@@ -201,6 +213,7 @@ impl<R: Receiver> Station<R> {
             places,
             windows,
             sent: vec![0; sensors],
+            asked: vec![false; sensors],
             timers: BTreeMap::from([(0, vec![CentreTimer::SlotBegins])]),
             store,
             counts: Counts::default(),
@@ -291,16 +304,14 @@ impl<R: Receiver> Station<R> {
                 },
                 Action::Predict { slot } => self.predict(slot, outputs)?,
                 Action::Update { slot, observed } => {
-                    let trouble = match update_or_drop(&mut self.receiver, &observed) {
+                    let mut step = Step::new(slot, observed, Vec::new());
+                    step.asked.clone_from(&self.asked);
+                    step.trouble = match update_asked(&mut self.receiver, step.observed_when_asked()) {
                         Outcome::Used => None,
                         Outcome::SilentDropped(error) => Some(format!("silent sensors were left out: {error}")),
                         Outcome::Failed(error) => Some(format!("nothing was used: {error}")),
                     };
-                    let estimate = self.receiver.estimate();
-                    let step = Step {
-                        trouble,
-                        ..Step::new(slot, observed, estimate)
-                    };
+                    step.estimate = self.receiver.estimate();
                     self.last = Some(step.clone());
                     self.save()?;
                     outputs.push(Output::Step(step));
@@ -315,6 +326,11 @@ impl<R: Receiver> Station<R> {
         // Before anything is sent it is known that the slot has begun.
         self.save()?;
         let members = &self.centre.settings().members;
+        // A sensor that must be told something, and whose address is not known, is not asked.
+        let reached = members.iter().zip(&self.peers);
+        self.asked = reached
+            .map(|(member, peer)| member.feedback == Feedback::Clock || peer.address.is_some())
+            .collect();
         let follows = members.iter().any(|member| member.feedback == Feedback::Echoed);
         let prepared = (|| {
             let state = if follows { Some(self.receiver.state()?) } else { None };

@@ -1,17 +1,25 @@
 #!/usr/bin/env bash
-# Looks at the live page of a running centre in headless Chromium, as wide as a phone: draws it and asks that its table is filled.
-# usage: live-page.sh http://HOST:PORT/ [picture.png]
+# Draws the live page of a running centre in headless Chromium, as wide as a phone, and asks that more stands on it than on the page without a centre.
+# usage: live-page.sh http://HOST:PORT/ picture.png
 set -eu
 browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
 if [ -z "$browser" ]; then
     echo "skipped: no Chromium (apt-get install chromium)"
     exit 0
 fi
-flags=(--headless --no-sandbox --disable-gpu --window-size=390,844 --virtual-time-budget=4000 --timeout=8000)
-if [ $# -gt 1 ]; then
-    "$browser" "${flags[@]}" --screenshot="$2" "$1" 2>/dev/null
+empty=$(mktemp -d)
+trap 'rm -rf "$empty"' EXIT
+# Not in virtual time, which never passes while the stream of events is open.
+draw() {
+    "$browser" --headless --no-sandbox --disable-gpu --window-size=390,844 --timeout=3000 --screenshot="$2" "$1" 2>/dev/null
+}
+curl --silent --fail "$1" > "$empty/page.html"
+draw "file://$empty/page.html" "$empty/page.png"
+draw "$1" "$2"
+without=$(stat -c %s "$empty/page.png")
+with=$(stat -c %s "$2")
+if [ "$with" -lt $((without * 3 / 2)) ]; then
+    echo "the page shows nothing: $with bytes with the centre, $without without"
+    exit 1
 fi
-page=$("$browser" "${flags[@]}" --dump-dom "$1" 2>/dev/null)
-grep -q '<td class="last">' <<<"$page" || { echo "the page shows no sensor"; exit 1; }
-grep -q 'bits/s' <<<"$page" || { echo "the page shows no rate"; exit 1; }
-echo "ok: the page shows its sensors"
+echo "ok: $with bytes with the centre, $without without"

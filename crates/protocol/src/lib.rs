@@ -56,6 +56,6 @@ pub use frame::{CHECK_BYTES, Check, DESTINATION_BYTES, DecodeError, Frame, HEADE
 pub use note::Note;
 pub use payload::Payload;
 #[cfg(feature = "std")]
-pub use receiver::{BoxError, Outcome, Receiver, update_or_drop};
+pub use receiver::{BoxError, Outcome, Receiver, update_asked, update_or_drop};
 pub use sensor::{Feedback, Reaction, Sensor, SensorSettings, SensorTimer, Task};
 pub use slot::{SLOT_BITS, Schedule, Slot};

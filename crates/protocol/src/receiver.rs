@@ -66,7 +66,14 @@ pub enum Outcome {
 /// A sensor that is silent where its scheme had to speak contradicts a link that is thought to lose nothing. It is left out rather than
 /// taken as lost, since [`Observation::Lost`] says that it spoke.
 pub fn update_or_drop<R: Receiver + ?Sized>(receiver: &mut R, observed: &[Observation<BitString>]) -> Outcome {
-    let mut asked: Vec<_> = observed.iter().cloned().enumerate().collect();
+    update_asked(receiver, observed.iter().cloned().enumerate().collect())
+}
+
+/// The same where only some sensors were asked: what was observed of these, in rising order of their numbers.
+pub fn update_asked<R: Receiver + ?Sized>(
+    receiver: &mut R,
+    mut asked: Vec<(usize, Observation<BitString>)>,
+) -> Outcome {
     let first = match receiver.update(&asked) {
         Ok(()) => return Outcome::Used,
         Err(error) => error,

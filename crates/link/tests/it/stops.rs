@@ -1,6 +1,6 @@
 //! A centre that is killed at any moment goes on without a wrong estimate.
 
-use crate::world::{Record, Reports, SENSORS, assert_replayed, peers, receiver, settings};
+use crate::world::{Reports, SENSORS, assert_replayed, peers, receiver, settings};
 use crate::worlds::sensors;
 use fewbits_link::{Output, Station, Step, Store, udp};
 use std::io::Write;
@@ -82,27 +82,27 @@ fn kill(times: u64) {
     }
     // A line that was cut off is written again by the next process, from the store.
     let text = std::fs::read_to_string(folder.path().join("journal")).unwrap();
-    let mut records: Vec<Record> = Vec::new();
+    let mut steps: Vec<Step> = Vec::new();
     for line in text.lines() {
         let Ok(step) = serde_json::from_str::<Step>(line) else {
             continue;
         };
-        match records.last() {
-            Some((slot, _, estimate)) if *slot == step.slot => assert_eq!(estimate, &step.estimate),
+        match steps.last() {
+            Some(last) if last.slot == step.slot => assert_eq!(last, &step),
             last => {
-                assert!(last.is_none_or(|(slot, ..)| *slot < step.slot));
-                records.push((step.slot, step.observed, step.estimate));
+                assert!(last.is_none_or(|last| last.slot < step.slot));
+                steps.push(step);
             }
         }
     }
-    let received = records
+    let received = steps
         .iter()
-        .flat_map(|(_, observed, _)| observed)
+        .flat_map(|step| &step.observed)
         .filter(|o| matches!(o, fewbits_core::Observation::Received(_)))
         .count();
-    println!("killed {times} times: {} steps, {received} reports", records.len());
-    assert!(records.len() as u64 > times && received > records.len());
-    assert_replayed(&mut receiver(Reports::Signs, 0.05), &records);
+    println!("killed {times} times: {} steps, {received} reports", steps.len());
+    assert!(steps.len() as u64 > times && received > steps.len());
+    assert_replayed(&mut receiver(Reports::Signs, 0.05), &steps);
 }
 
 #[test]

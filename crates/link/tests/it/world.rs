@@ -5,10 +5,10 @@ use fewbits_core::{BitString, Gaussian, Link, NumberFormat, Observation, SchemeN
 use fewbits_dymbo::SignBit;
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, Reporting};
-use fewbits_link::{FusionReceiver, Key, Peer};
+use fewbits_link::{FusionReceiver, Key, Peer, Step};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
-use fewbits_protocol::{CentreSettings, Feedback, Member, Receiver, ReportLength, Schedule, update_or_drop};
+use fewbits_protocol::{CentreSettings, Feedback, Member, Receiver, ReportLength, Schedule, update_asked};
 use nalgebra::Vector1;
 use std::num::NonZeroU64;
 
@@ -98,10 +98,10 @@ pub fn peers(sensors: u32) -> Vec<Peer> {
 pub type Record = (u64, Vec<Observation<BitString>>, Vec<(f64, f64)>);
 
 /// What a receiver that was never stopped makes of the same observations: to the bit.
-pub fn assert_replayed(receiver: &mut dyn Receiver, records: &[Record]) {
-    for (slot, observed, estimate) in records {
-        receiver.predict(*slot).unwrap();
-        update_or_drop(receiver, observed);
-        assert_eq!(&receiver.estimate(), estimate, "slot {slot}");
+pub fn assert_replayed(receiver: &mut dyn Receiver, steps: &[Step]) {
+    for step in steps {
+        receiver.predict(step.slot).unwrap();
+        update_asked(receiver, step.observed_when_asked());
+        assert_eq!(receiver.estimate(), step.estimate, "slot {}", step.slot);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::world::{Record, Reports, SENSORS, assert_replayed, key, measurement, node, peers, receiver, settings};
 use fewbits_core::BitString;
-use fewbits_link::{Output, SensorLink, Station, udp};
+use fewbits_link::{Output, SensorLink, Station, Step, udp};
 use fewbits_protocol::{Feedback, SensorSettings, Slot};
 use std::net::UdpSocket;
 use std::ops::ControlFlow;
@@ -114,11 +114,20 @@ fn over_udp(reports: Reports, steps: usize) {
     let loss = 1.0 - 0.94_f64.powi(2);
     let mut station =
         Station::new(settings(reports, 20_000_000, 10), receiver(reports, loss), peers(SENSORS), None).unwrap();
-    let mut records: Vec<Record> = Vec::new();
+    // All sensors have said where they are before the first slot.
+    let (mut known, mut buffer) = (std::collections::HashSet::new(), [0; 2048]);
+    socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    while known.len() < SENSORS as usize {
+        let (length, from) = socket.recv_from(&mut buffer).unwrap();
+        station.on_datagram(from, &buffer[..length], &mut Vec::new()).unwrap();
+        known.insert(from);
+    }
+    let mut records: Vec<Step> = Vec::new();
     udp::run_station(&socket, &mut station, |_, outputs| {
         for output in outputs {
             if let Output::Step(step) = output {
-                records.push((step.slot, step.observed.clone(), step.estimate.clone()));
+                assert!(step.asked.iter().all(|asked| *asked));
+                records.push(step.clone());
             }
         }
         if records.len() < steps {
@@ -135,12 +144,16 @@ fn over_udp(reports: Reports, steps: usize) {
     let lost = lossy.join().unwrap();
     let received = records
         .iter()
-        .flat_map(|(_, observed, _)| observed)
+        .flat_map(|step| &step.observed)
         .filter(|o| matches!(o, fewbits_core::Observation::Received(_)))
         .count();
     println!("{reports:?}: {received} of {} reports, {lost} datagrams lost", 10 * records.len());
     assert!(lost > 0 && received > records.len(), "{lost} lost, {received} received");
     assert_replayed(&mut receiver(reports, loss), &records);
+    let records: Vec<Record> = records
+        .into_iter()
+        .map(|step| (step.slot, step.observed, step.estimate))
+        .collect();
     without_a_network(reports, loss, &records);
     simulated(reports, loss, records);
 }
@@ -254,4 +267,22 @@ fn signs_over_udp_and_without_it() {
 #[test]
 fn censored_values_over_udp_and_without_it() {
     over_udp(Reports::Censored, 60);
+}
+
+#[test]
+fn sensors_that_are_not_reached_are_not_asked() {
+    use fewbits_protocol::Receiver;
+    // Censoring sensors, whose silence would say much.
+    let reports = Reports::Censored;
+    let mut station = Station::new(settings(reports, 10, 10), receiver(reports, 0.05), peers(SENSORS), None).unwrap();
+    let (mut alone, mut outputs) = (receiver(reports, 0.05), Vec::new());
+    for slot in 1..=5 {
+        station.on_time(10 * slot, &mut outputs).unwrap();
+        station.on_time(10 * slot + 9, &mut outputs).unwrap();
+        alone.predict(slot).unwrap();
+        let Some(Output::Step(step)) = outputs.pop() else {
+            panic!()
+        };
+        assert_eq!((step.asked, step.estimate), (vec![false; 10], alone.estimate()));
+    }
 }

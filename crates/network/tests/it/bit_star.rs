@@ -73,7 +73,8 @@ fn run(feedback: Feedback, setup: Setup) -> Simulator<BitStar<Counter, 1>> {
 }
 
 fn count(network: &Simulator<BitStar<Counter, 1>>, slot: u32) -> f64 {
-    network.nodes()[0].estimates()[slot as usize - 1].1[0].0
+    let estimates = network.nodes()[0].estimates();
+    estimates.iter().find(|(at, _)| *at == slot).unwrap().1[0].0
 }
 
 #[test]

@@ -45,9 +45,7 @@ type Arrives = dyn Fn(u32, usize) -> bool + Send + Sync;
 
 impl<R, const M: usize> fmt::Debug for BitStar<R, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("BitStar")
-            .field("members", &self.members)
-            .finish_non_exhaustive()
+        f.debug_struct("BitStar").finish_non_exhaustive()
     }
 }
 
@@ -62,10 +60,7 @@ pub enum BitNode<R, const M: usize> {
 
 impl<R, const M: usize> fmt::Debug for BitNode<R, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Centre(machine, ..) => f.debug_tuple("Centre").field(machine).finish_non_exhaustive(),
-            Self::Sensor(machine, ..) => f.debug_tuple("Sensor").field(machine).finish_non_exhaustive(),
-        }
+        f.debug_struct("BitNode").finish_non_exhaustive()
     }
 }
 
@@ -115,11 +110,9 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
 
     /// The same with losses that were recorded: a report reaches the centre only if `arrives(slot, sensor)`. The channel's losses come on top.
     #[must_use]
-    pub fn with_recorded_losses(self, arrives: impl Fn(u32, usize) -> bool + Send + Sync + 'static) -> Self {
-        Self {
-            arrives: Some(Arc::new(arrives)),
-            ..self
-        }
+    pub fn with_recorded_losses(mut self, arrives: impl Fn(u32, usize) -> bool + Send + Sync + 'static) -> Self {
+        self.arrives = Some(Arc::new(arrives));
+        self
     }
 
     /// The network before its first slot, on a field of one's own: node 0 is the centre, and every sensor must be in range of it.
@@ -209,9 +202,11 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
                     let slot = slot as u32;
                     match update_or_drop(receiver, &observed) {
                         Outcome::Used => {}
-                        Outcome::SilentDropped(error) | Outcome::Failed(error) => {
-                            context.note(failed(Stage::Update, slot, &error));
+                        Outcome::SilentDropped(error) => {
+                            let reason = error.to_string();
+                            context.note(Note::SilenceIgnored { slot, reason });
                         }
+                        Outcome::Failed(error) => context.note(failed(Stage::Update, slot, &error)),
                     }
                     estimates.push((slot, receiver.estimate()));
                 }
