@@ -2,19 +2,20 @@
 
 use super::common::{MI, MSE, breakpoints, bsc, lloyd, lloyd_system, name, scene};
 use crate::prelude::*;
-use fewbits_core::Link;
-use fewbits_quantizer_design::{
-    AllowedCells, Bits, Channel, Criterion, Newton, Quantizer, Request, SensorGroup, System, bounds, design, published,
-};
+use fewbits_quantizer_design::published::{self, Discovery};
+use fewbits_quantizer_design::{Channel, Criterion, Newton, Quantizer, SensorGroup, System, bounds, design};
 
 parameters! {
     pub struct Parameters {
         /// Random starts among contiguous quantizers.
         #[garde(range(min = 1, max = 10_000))]
         contiguous_starts: usize = 20 => quick 8,
-        /// Starts of the search for folded quantizers.
+        /// Random label sequences among folded quantizers.
         #[garde(range(min = 1, max = 10_000))]
         folded_starts: usize = 60 => quick 24,
+        /// Grid cells of a sensor in that search.
+        #[garde(range(min = 16, max = 1000))]
+        grid: usize = 160,
         /// Crossovers at which words are compared.
         #[garde(length(min = 1, max = 20), inner(range(min = 0.0, max = 0.45)))]
         crossovers: Vec<f64> = vec![0.001, 0.01, 0.05, 0.1, 0.2],
@@ -176,13 +177,12 @@ fn searches(p: &Parameters, context: &Context<'_>) -> Result<Vec<Search>, Error>
             let scene = scene(&[noise_sd; 2], rho)?;
             let start = lloyd_system(&scene, levels, |n| scene.sample_deviation(n))?;
             let contiguous = design::multi_start(&start, criterion, p.contiguous_starts, 1, &Newton::default())?;
-            let mut request = Request::estimation(scene.clone(), Bits::Each(levels.ilog2()), Link::PERFECT)
-                .with_cells(AllowedCells::Any)
-                .with_starts(p.folded_starts);
-            if criterion == MI {
-                request = request.by_information();
-            }
-            let folded = design::joint(request.run()?.best().system(), criterion, &Newton::default())?;
+            let settings = Discovery {
+                grid: p.grid,
+                starts: p.folded_starts,
+                ..Discovery::default()
+            };
+            let folded = published::discover(&contiguous.system, criterion, &settings)?;
             let bits = (levels as f64).log2();
             let bound = match rho {
                 0.0 => Some(bounds::ceo(scene.prior(), scene.noise(), &[bits; 2])?.distortion),

@@ -165,7 +165,7 @@ fn few_bits_and_a_learnt_speed_cost_little() {
         let [full, one, two] = &scores;
         println!("    1 bit {:.3}, 2 bits {:.3} of full", one.rms / full.rms, two.rms / full.rms);
         assert!(two.rms < 1.15 * full.rms && (2.0..3.0).contains(&two.bits), "{world:?}: {scores:?}");
-        assert!(one.rms < 1.7 * full.rms && (1.0..2.0).contains(&one.bits), "{world:?}: {scores:?}");
+        assert!(one.rms < 1.9 * full.rms && (1.0..2.0).contains(&one.bits), "{world:?}: {scores:?}");
     }
 }
 

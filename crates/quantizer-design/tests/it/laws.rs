@@ -1,13 +1,11 @@
 //! Laws that hold for every system of quantizers.
 
-use fewbits_core::Link;
 use fewbits_quantizer_design::decoder::MmseDecoder;
 use fewbits_quantizer_design::design;
 use fewbits_quantizer_design::published::{self, Separation};
 use fewbits_quantizer_design::system::SensorGroup;
 use fewbits_quantizer_design::{
-    AllowedCells, Bits, Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, Prior, Quantizer, Request,
-    Scene, System, bounds, lloyd_max,
+    Channel, Criterion, Error, JointTable, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, bounds, lloyd_max,
 };
 use proptest::prelude::*;
 
@@ -322,11 +320,14 @@ fn searches_find_what_local_steps_miss() {
     let escaped = design::joint(&start, MSE, &Newton::default()).unwrap();
     assert!(saddle.is_saddle() && !escaped.is_saddle());
     assert!((escaped.value - 0.595_035_725_000_632_5).abs() < 1e-9);
-    let request =
-        Request::estimation(start.scene().clone(), Bits::Each(1), Link::PERFECT).with_cells(AllowedCells::Any);
-    let folded = request.with_starts(10).run().unwrap().best().clone();
-    assert!((folded.value() - 0.559_245_993_323_162_8).abs() < 1e-8, "{}", folded.value());
-    assert!(folded.system().quantizers().iter().any(|q| !q.is_contiguous()));
+    let settings = published::Discovery {
+        starts: 8,
+        polished: 3,
+        ..published::Discovery::default()
+    };
+    let folded = published::discover(&start, MSE, &settings).unwrap();
+    assert!((folded.value - 0.559_245_993_323_162_8).abs() < 1e-8, "{}", folded.value);
+    assert!(folded.quantizers().iter().any(|q| !q.is_contiguous()));
 }
 
 #[test]
