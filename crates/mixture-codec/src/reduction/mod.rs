@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 /// let estimate = KernelEstimate::fit(Particles::uniform([x])?, &Bandwidth::default())?;
 /// let mixture = Reduction::default().reduce(&estimate, 3)?;
 /// assert!(mixture.len() <= 3 && (mixture.mean() - estimate.mean()).amax() < 1e-6);
-/// # Ok::<(), fewbits_densities::Error>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
