@@ -110,7 +110,7 @@ const SETTLED: f64 = 0.999;
 /// The probability that a common failure has struck.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
-pub(super) struct Outage(f64);
+pub(super) struct Outage(#[serde(with = "fewbits_numerics::stored")] f64);
 
 impl Outage {
     pub fn advance<'a>(&mut self, seconds: f64, failures: &Failures, sensors: impl Iterator<Item = &'a mut Presence>) {
