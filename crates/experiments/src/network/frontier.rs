@@ -206,10 +206,13 @@ impl Figure for Frontier {
                 }
                 let mut frontier: Vec<_> = here().filter(|r| best(r) == "yes").collect();
                 frontier.sort_by(|a, b| of(a).total_cmp(&of(b)));
-                let names = frontier
-                    .iter()
-                    .map(|r| (of(r), r.rmse.value, r.setting.clone()))
-                    .collect();
+                // Names nearer than a factor of 1.6 would hide one another.
+                let mut names: Vec<(f64, f64, String)> = Vec::new();
+                for row in &frontier {
+                    if names.last().is_none_or(|(x, _, _)| of(row) > 1.6 * x) {
+                        names.push((of(row), row.rmse.value, row.setting.clone()));
+                    }
+                }
                 // Steps: between two settings nothing is reached but the error of the cheaper one.
                 let corners = frontier.windows(2).map(|w| (of(w[1]), w[0].rmse.value));
                 let corners = corners.chain(frontier.last().map(|r| (of(r), r.rmse.value)));
