@@ -104,6 +104,9 @@ fn error_rates_of_every_form() {
         println!(
             "{form:?}: right refused {refusals} of {right}; rate 2.5 refused {by_rate}, converged {rate_converged} of 20; outside refused {by_place}, converged {place_converged} of 20, wrong {wrong}"
         );
+        assert!(50 * refusals as u64 <= right, "{form:?}: more than one right model in fifty is refused");
+        assert!(wrong <= 2, "{form:?}: {wrong} of 20 searches converge away from a source outside the box");
+        assert_eq!(rate_converged, 0, "{form:?}: a release rate out of range is believed");
     }
 }
 
