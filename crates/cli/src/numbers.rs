@@ -29,3 +29,34 @@ pub(crate) fn mean_and_deviation(option: &'static str, text: &str) -> Result<(f6
         .ok_or_else(|| Error::option(option, text, EXPECTED))?;
     Ok((number(option, mean, EXPECTED)?, above_zero(option, deviation, EXPECTED)?))
 }
+
+/// A size in as few digits as say it, four at most.
+pub(crate) fn short(number: f64) -> String {
+    if number == 0.0 || (1e-4..1e7).contains(&number.abs()) {
+        let digits = if number == 0.0 { 0 } else { (3 - number.abs().log10().floor() as i32).max(0) as usize };
+        let text = format!("{number:.digits$}");
+        if text.contains('.') {
+            return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+        }
+        return text;
+    }
+    format!("{number:.3e}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn sizes_in_few_digits() {
+        for (number, text) in [
+            (0.0, "0"),
+            (0.09500000000000242, "0.095"),
+            (120.0, "120"),
+            (12345.6, "12346"),
+            (3.2e-9, "3.200e-9"),
+        ] {
+            assert_eq!(short(number), text);
+        }
+    }
+}

@@ -3,7 +3,7 @@
 use crate::arguments::VerifyOptions;
 use crate::error::Error;
 use crate::input::Table;
-use crate::{Ending, bounds, clock, output};
+use crate::{Ending, bounds, clock, numbers, output};
 use fewbits_record::Playback;
 use serde::Serialize;
 
@@ -117,7 +117,8 @@ fn print(verdict: &Verdict) {
         } else {
             format!("FAILS in {} rows", column.failed)
         };
-        println!("{}: {} {state}, largest error {:e}", column.name, column.bound, column.largest_error);
+        let largest = numbers::short(column.largest_error);
+        println!("{}: {} {state}, largest error {largest}", column.name, column.bound);
         for failure in &column.first_failures {
             println!("  {failure}");
         }

@@ -133,21 +133,22 @@ pub(crate) fn encode(ticks: &[i64], grid: &Grid) -> (TimeKind, Vec<u8>) {
     (TimeKind::Raw, bytes)
 }
 
+/// The shorter of the exact ticks, as multiples of their common divisor, and ticks moved by at most the tolerance.
 fn coded(ticks: &[i64], grid: &Grid) -> Option<Vec<u8>> {
-    let (start, last) = (*ticks.first()?, *ticks.last()?);
-    let steps = ticks.len() as i128 - 1;
-    // Exact times share a divisor; others may move by the tolerance either way. Where the divisor is the coarser scale, whole seconds
-    // within a millisecond say, exact times are the shorter ones.
+    let start = *ticks.first()?;
     let divisor = ticks
         .iter()
         .fold(0, |d, tick| greatest_common_divisor(d, tick.abs_diff(start)))
         .max(1);
-    let freedom = 2 * grid.tolerance + 1;
-    let (scale, unit) = if divisor >= freedom {
-        (divisor, i128::from(divisor))
-    } else {
-        (freedom, 1)
-    };
+    let exact = coded_in(ticks, grid, divisor, i128::from(divisor));
+    let moved = (grid.tolerance > 0).then(|| coded_in(ticks, grid, 2 * grid.tolerance + 1, 1));
+    exact.into_iter().chain(moved.flatten()).min_by_key(Vec::len)
+}
+
+/// Ticks rounded to multiples of `scale` about a line whose slope is a multiple of `unit`.
+fn coded_in(ticks: &[i64], grid: &Grid, scale: u64, unit: i128) -> Option<Vec<u8>> {
+    let (start, last) = (*ticks.first()?, *ticks.last()?);
+    let steps = ticks.len() as i128 - 1;
     let mean = (i128::from(last) - i128::from(start)) / (steps.max(1) * unit) * unit;
     let numbers = ticks.iter().enumerate().map(|(row, tick)| {
         let rest = i128::from(*tick) - i128::from(start) - mean * row as i128;
