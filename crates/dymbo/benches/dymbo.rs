@@ -4,15 +4,13 @@
 
 use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_core::factor::{Factor, InCell};
-use fewbits_core::{Cell, Gaussian, Link, Message, Observation, Observed, OnAxes, Scheme, Sign};
+use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
 use fewbits_dymbo::{
     CellIndex, CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, SignBit, SignFilter,
 };
-use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
-use fewbits_filters::{MomentFilter, assumed_density};
-use fewbits_models::{ContinuousLinear, LinearSensor, ScalarSensor, constant_velocity_2d};
+use fewbits_models::{ScalarSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
-use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use nalgebra::{Matrix4, Vector4};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
@@ -125,51 +123,4 @@ fn exact_fusion_at_once(bencher: Bencher, sensors: usize) {
         .map(|i| Observation::Received(if i % 2 == 0 { Sign::Above } else { Sign::Below }))
         .collect();
     bencher.bench_local(|| filter.step(black_box(&belief), black_box(&bits)));
-}
-
-const SENSORS: u32 = 1000;
-
-/// A thousand one-bit sensors at a fusion centre. Over [`bare_updates_of_1000_bits`] it is what bits, presence and health cost.
-#[divan::bench(sample_size = 1, sample_count = 50)]
-fn centre_of_1000_bits(bencher: Bencher) {
-    let mut rng = Stream::new(1).rng();
-    let world = ContinuousLinear::nearly_constant_velocity(0.1).unwrap();
-    let prior = Gaussian::new(Vector2::zeros(), Matrix2::identity()).unwrap();
-    let mut centre = FusionCentre::new(&mut rng, world, MomentFilter, &prior).unwrap();
-    let sensing = OnAxes::<_, 2, 1>::new(LinearSensor::direct(1.0).unwrap(), [0]).unwrap();
-    let threshold = |_: &Gaussian<2>, m: &Gaussian<1>| m.mean()[0];
-    for number in 0..SENSORS {
-        let sensor = Reporting::new(sensing, SignBit::new(1.0).unwrap(), Link::PERFECT, threshold);
-        centre.join(number, sensor).unwrap();
-    }
-    let feedback = centre.feedback(0).unwrap();
-    let slots: Vec<Slot> = (0..SENSORS)
-        .map(|number| {
-            let bit = Sign::of(f64::from(number % 2), 0.5).unwrap().to_bits(&()).unwrap();
-            Slot::new(number, feedback.clone(), Observation::Received(bit))
-        })
-        .collect();
-    let start = centre.state();
-    bencher.bench_local(|| {
-        centre.restore(start.clone()).unwrap();
-        centre.receive(&mut rng, black_box(&slots)).unwrap()
-    });
-}
-
-#[divan::bench(sample_size = 1, sample_count = 50)]
-fn bare_updates_of_1000_bits(bencher: Bencher) {
-    let prior = Gaussian::new(Vector2::zeros(), Matrix2::identity()).unwrap();
-    let sensing = OnAxes::<_, 2, 1>::new(LinearSensor::direct(1.0).unwrap(), [0]).unwrap();
-    let scheme = SignBit::new(1.0).unwrap();
-    bencher.bench_local(|| {
-        let mut belief = prior;
-        for number in 0..SENSORS {
-            let bit = Observation::Received(Sign::of(f64::from(number % 2), 0.5).unwrap());
-            let factor = scheme.factor(black_box(&0.0), &bit, &Link::PERFECT).unwrap();
-            belief = assumed_density::update_through(&belief, &Observed::new(sensing, factor))
-                .unwrap()
-                .0;
-        }
-        belief
-    });
 }

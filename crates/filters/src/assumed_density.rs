@@ -72,6 +72,41 @@ pub fn step<const D: usize, const M: usize>(
     update_through(&predict(dynamics, belief), observed)
 }
 
+/// `ln p(observation | past)` and the mean of the noise-free measurement after the observation, minus before: [`update_through`] without
+/// the posterior of the state.
+///
+/// # Errors
+/// As [`update`].
+pub fn evidence_through<const D: usize, const M: usize>(
+    belief: &Gaussian<D>,
+    observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
+) -> Result<(f64, SVector<f64, M>), Error> {
+    let (predicted, jacobian) = (observed.sensing.mean(belief.mean()), observed.sensing.jacobian(belief.mean()));
+    let cross = times_transposed(belief.covariance(), &jacobian);
+    let prior = measured(predicted, &jacobian, &cross)?;
+    let tilted = observed.factor.tilted(&prior)?;
+    let correction = tilted.mean - prior.mean();
+    if !(tilted.log_evidence.is_finite() && correction.iter().all(|x| x.is_finite())) {
+        let what = "the evidence (from the belief, the sensing model or the factor)";
+        return Err(fewbits_core::Error::unlikely_or_no_number(tilted.log_evidence, what).into());
+    }
+    Ok((tilted.log_evidence, correction))
+}
+
+/// The law of the noise-free measurement, from `P H'`.
+fn measured<const D: usize, const M: usize>(
+    predicted: SVector<f64, M>,
+    matrix: &SMatrix<f64, M, D>,
+    cross: &SMatrix<f64, D, M>,
+) -> Result<Gaussian<M>, Error> {
+    let prior = Gaussian::from_symmetric_parts(predicted, congruence_of(matrix, cross));
+    if !prior.is_finite() {
+        let what = "the predicted measurement (from the belief or the sensing model)";
+        return Err(fewbits_core::Error::NotANumber { what }.into());
+    }
+    Ok(prior)
+}
+
 fn update_at<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     predicted: SVector<f64, M>,
@@ -79,11 +114,7 @@ fn update_at<const D: usize, const M: usize>(
     factor: &impl Factor<M>,
 ) -> Result<(Gaussian<D>, UpdateInfo<D, M>), Error> {
     let cross = times_transposed(belief.covariance(), matrix);
-    let prior = Gaussian::from_symmetric_parts(predicted, congruence_of(matrix, &cross));
-    if !prior.is_finite() {
-        let what = "the predicted measurement (from the belief or the sensing model)";
-        return Err(fewbits_core::Error::NotANumber { what }.into());
-    }
+    let prior = measured(predicted, matrix, &cross)?;
     let tilted = factor.tilted(&prior)?;
     let correction = tilted.mean - prior.mean();
     let gain = solve_semidefinite(prior.covariance(), &cross.transpose())?.transpose();

@@ -93,6 +93,13 @@ pub struct Conditioned<const D: usize> {
     pub belief: Gaussian<D>,
     /// `ln p(observation | past)`.
     pub log_likelihood: f64,
+}
+
+/// What one observation says about the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    /// `ln p(observation | past)`.
+    pub log_likelihood: f64,
     /// Mean of the first component of the noise-free measurement after the observation, minus before.
     pub correction: f64,
 }
@@ -104,6 +111,12 @@ pub trait StateLikelihood<const D: usize>: Likelihood<D> {
     /// # Errors
     /// [`fewbits_core::Error::Impossible`] if the observation has probability zero under the belief.
     fn condition(&self, belief: &Gaussian<D>) -> Result<Conditioned<D>, Error>;
+
+    /// How likely the observation is under a Gaussian, and where it moves the measurement.
+    ///
+    /// # Errors
+    /// As [`condition`](Self::condition).
+    fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error>;
 
     /// Whether the likelihood depends on this coordinate, near this state.
     fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool;
@@ -119,7 +132,14 @@ impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikeli
         Ok(Conditioned {
             belief: posterior,
             log_likelihood: info.log_likelihood,
-            correction: if M == 0 { 0.0 } else { info.correction[0] },
+        })
+    }
+
+    fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error> {
+        let (log_likelihood, correction) = assumed_density::evidence_through(belief, self)?;
+        Ok(Evidence {
+            log_likelihood,
+            correction: if M == 0 { 0.0 } else { correction[0] },
         })
     }
 

@@ -19,6 +19,8 @@ use serde::{Deserialize, Serialize};
 const DRIFT: f64 = 0.25;
 /// A term counts at most this much, so that one outlier is no alarm.
 const CLIP: f64 = 3.0;
+/// Differences of probabilities, or deviations of their logarithms, that count as none.
+const EQUAL: f64 = 1e-3;
 /// Sequences of a sensor.
 pub(super) const SEQUENCES: usize = 3;
 
@@ -30,25 +32,32 @@ pub(super) struct Residual {
 }
 
 impl Residual {
+    /// Of a bit of probability `share`, from the sign of its correction: the other bit has what is left of the probability, and corrections
+    /// average to nothing. `None` if there is no choice.
+    pub fn of_bit(share: f64, correction: f64) -> Option<Self> {
+        let other = (1.0 - share).max(f64::MIN_POSITIVE);
+        let size = (other / share).sqrt();
+        // Bits of equal probability have no surprise.
+        let surprise = if (share - other).abs() > EQUAL { size.copysign(other - share) } else { 0.0 };
+        (size.is_finite() && correction != 0.0).then_some(Self {
+            surprise,
+            residual: size.copysign(correction),
+        })
+    }
+
     /// Of a word, from `(ln p, correction)` of every word that could have come; the received one at `at`. `None` if there is no choice.
     pub fn of_word(words: &[(f64, f64)], at: usize) -> Option<Self> {
         let total: f64 = words.iter().map(|w| w.0.exp()).sum();
-        let shares = || {
-            words
-                .iter()
-                .map(|(log, correction)| (log.exp() / total, *log, *correction))
-        };
-        let mean = shares().map(|(p, _, c)| p * c).sum::<f64>();
-        let variance = shares().map(|(p, _, c)| p * (c - mean) * (c - mean)).sum::<f64>();
-        let log_mean = shares().filter(|s| s.0 > 0.0).map(|(p, log, _)| p * log).sum::<f64>();
-        let log_variance = shares()
-            .filter(|s| s.0 > 0.0)
-            .map(|(p, log, _)| p * (log - log_mean) * (log - log_mean))
-            .sum::<f64>();
+        let shares: Vec<f64> = words.iter().map(|w| w.0.exp() / total).collect();
+        let possible = || shares.iter().zip(words).filter(|(share, _)| **share > 0.0);
+        let average = |of: &dyn Fn(&(f64, f64)) -> f64| possible().map(|(share, word)| share * of(word)).sum::<f64>();
+        let (log_mean, mean) = (average(&|w| w.0), average(&|w| w.1));
+        let log_variance = average(&|w| (w.0 - log_mean) * (w.0 - log_mean));
+        let variance = average(&|w| (w.1 - mean) * (w.1 - mean));
         let (log, correction) = *words.get(at)?;
         let residual = (correction - mean) / variance.sqrt();
         // Words of equal probability have no surprise.
-        let surprise = if log_variance > 1e-6 {
+        let surprise = if log_variance > EQUAL * EQUAL {
             (log_mean - log) / log_variance.sqrt()
         } else {
             0.0

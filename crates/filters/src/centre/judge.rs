@@ -23,7 +23,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     ) -> Result<Watched, Error> {
         let evidence = |observation: &Observation<BitString>, working: f64| -> Result<Option<(f64, f64)>, Error> {
             let likelihood = member.sensor.likelihood(&slot.feedback, observation, working)?;
-            possible(likelihood.condition(predicted))
+            possible(likelihood.evidence(predicted))
         };
         match &slot.observation {
             Observation::Lost => Ok(Watched::Nothing),
@@ -32,7 +32,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                 Ok(Watched::Silence(silence.min(1.0)))
             }
             Observation::Received(bits) => {
-                let Some((log, correction)) = possible(likelihood.condition(predicted))? else {
+                let Some((log, correction)) = possible(likelihood.evidence(predicted))? else {
                     return Ok(Watched::Report(None));
                 };
                 if let Some(variance) = member.sensor.value_variance(predicted) {
@@ -43,11 +43,8 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
                     return Ok(Watched::Report(None));
                 }
                 if bits.bits() == 1 && member.always_speaks {
-                    // The other bit has what is left of the probability, and corrections average to nothing.
-                    let own = log.exp();
-                    let other = (member.sensor.arrival() * member.state.presence.working - own).max(f64::MIN_POSITIVE);
-                    let words = [(log, correction), (other.ln(), -correction * own / other)];
-                    return Ok(Watched::Report(Residual::of_word(&words, 0)));
+                    let arrives = member.sensor.arrival() * member.state.presence.working;
+                    return Ok(Watched::Report(Residual::of_bit(log.exp() / arrives, correction)));
                 }
                 let mut words = Vec::with_capacity(1 << bits.bits());
                 let mut at = 0;
@@ -171,10 +168,8 @@ pub(super) enum Watched {
 }
 
 /// Evidence and correction, `None` if the observation is impossible.
-fn possible<const D: usize>(
-    conditioned: Result<crate::contract::Conditioned<D>, Error>,
-) -> Result<Option<(f64, f64)>, Error> {
-    match conditioned {
+fn possible(found: Result<crate::contract::Evidence, Error>) -> Result<Option<(f64, f64)>, Error> {
+    match found {
         Ok(found) => Ok(Some((found.log_likelihood, found.correction))),
         Err(Error::Core(fewbits_core::Error::Impossible)) => Ok(None),
         Err(error) => Err(error),

@@ -95,7 +95,8 @@ impl Presence {
 
     /// A report arrived. `ln` of how much likelier a common failure makes that, and whether the sensor had been named dead.
     pub fn heard(&mut self) -> (f64, bool) {
-        let ratio = (self.struck.max(f64::MIN_POSITIVE) / self.alone.max(f64::MIN_POSITIVE)).ln();
+        let ratio = self.struck.max(f64::MIN_POSITIVE) / self.alone.max(f64::MIN_POSITIVE);
+        let ratio = if ratio == 1.0 { 0.0 } else { ratio.ln() };
         let news = self.named_dead;
         *self = Self::new();
         (ratio, news)

@@ -185,6 +185,9 @@ where
 /// `1 - (1 - loss) working`. A known loss needs a sensor that works.
 fn supposed(link: &Link, working: f64) -> Result<Link, Error> {
     within("working", working, 0.0, 1.0)?;
+    if working == 1.0 {
+        return Ok(*link);
+    }
     let loss = 1.0 - (1.0 - link.loss()) * working;
     let erasure = (link.erasure() * working).min(1.0 - loss);
     Ok(Link::new(loss, link.crossover())?.with_erasure(erasure)?)
