@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use divan::{Bencher, black_box};
-use fewbits_core::{BitString, Gaussian, Link, Message, Observation, Observed, OnAxes, Scheme, Sign};
+use fewbits_core::{BitString, Gaussian, Link, Observation, Observed, OnAxes, Scheme, Sign};
 use fewbits_dymbo::SignBit;
 use fewbits_filters::centre::{FusionCentre, Reporting, Slot};
 use fewbits_filters::{MomentFilter, assumed_density};

@@ -6,7 +6,7 @@ use divan::{AllocProfiler, Bencher, black_box};
 use fewbits_core::factor::{Factor, InCell};
 use fewbits_core::{Cell, Gaussian, Link, Observation, Sign};
 use fewbits_dymbo::{
-    CellIndex, CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, SignBit, SignFilter,
+    CellIndex, CountFusion, DymboFilter, MultibitFilter, ParallelFilter, ScalarFilter, ScalarPlant, SignFilter,
 };
 use fewbits_models::{ScalarSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
