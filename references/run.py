@@ -8,6 +8,7 @@
 """
 
 import csv
+import glob
 import importlib
 import os
 import sys
@@ -19,10 +20,10 @@ FROZEN = os.path.join(common.HERE, "frozen.csv")
 
 
 def program(system):
-    """The module of a system; `<system>_more.py`, where there is one, adds to its list."""
+    """The module of a system; files `<system>_<part>.py` add to its list."""
     module = importlib.import_module(system)
-    if os.path.exists(os.path.join(common.HERE, system + "_more.py")):
-        importlib.import_module(system + "_more")
+    for part in sorted(glob.glob(os.path.join(common.HERE, system + "_*.py"))):
+        importlib.import_module(os.path.basename(part)[:-3])
     return module
 
 
