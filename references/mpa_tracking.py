@@ -19,6 +19,16 @@ MEAN, COV = np.array([13, 17, 0, -0.6]), np.diag([0.04, 0.04, 0.01, 0.01])
 FIRST, CHANGE = np.array([0.7, 0.15, 0.15]), np.array([[0.6, 0.2, 0.2], [0.4, 0.5, 0.1], [0.4, 0.1, 0.5]])
 VALUES = JUMP * np.array([0, 1, -1])
 SPREAD = [JUMP**2 * (FIRST @ np.linalg.matrix_power(CHANGE, k))[1:].sum() for k in range(STEPS)]  # variance of a_k
+LAYOUTS = [np.array(layout).reshape(5, 2) for layout in (
+    (3.314263649845593, 9.98700152392207, 11.82697043722044, 1.516402150695002, 3.662669522394207, 17.70779841328665,
+     2.267570370775543, 3.335931089187364, 18.06991215925195, 12.19390467033489),
+    (7.641876227136238, 10.20502039245873, 12.93117314530239, 5.955558683700327, 3.483425311605196, 15.18471270107185,
+     13.06649051384471, 10.22288164269689, 15.70125584745385, 10.88335483966047),
+    (18.6564455073515, 4.681170303940808, 10.9671465315741, 9.705244544620978, 7.358947391088066, 11.64871547108278,
+     5.23542217001645, 15.4396483080127, 16.61200393316346, 3.317674082101319),
+    (9.40731772128888, 5.988608065606678, 2.496105959234363, 17.12699754850662, 8.739076456861037, 3.658443399317693,
+     13.12052243096639, 4.639888500184687, 17.22575941638718, 4.908668633533507),
+)]  # data of the figure, drawn once
 LOADING = {2: 1.596, 4: 1.991, 8: 2.344, 16: 2.682}
 
 
@@ -154,8 +164,8 @@ def guided(s, rng, mean, cov, updated, lo, hi, n):
 
 
 @lru_cache(None)
-def errors(method, s, confined=True, trials=TRIALS):
-    """Squared position errors [trial, step]."""
+def positions(method, s, confined=True, trials=TRIALS):
+    """Estimated positions [trial, step, 2]."""
     name, _, count = method.rpartition("-") if method[-1].isdigit() else (method, "", "0")
     count, rng = int(count), np.random.default_rng(zlib.crc32(method.encode()))
     truth, noise = tracks(confined, trials)
@@ -184,8 +194,8 @@ def errors(method, s, confined=True, trials=TRIALS):
                 cov[:, 2:, 2:], cov[:, :2, 2:], cov[:, 2:, :2] = old[1][:, 2:, 2:], 0, 0
             else:
                 mean, cov = updated
-        total.append(((mean[:, :2] - truth[:, k, :2]) ** 2).sum(1))
-    return np.array(total).T
+        total.append(mean[:, :2])
+    return np.swapaxes(total, 0, 1)
 
 
 def particles(name, n, s, rng, truth, noise):
@@ -209,14 +219,19 @@ def particles(name, n, s, rng, truth, noise):
         w = np.exp(logs - logs.max(1, keepdims=True))
         w /= w.sum(1, keepdims=True)
         mean = np.einsum("tn,tni->ti", w, x)
-        total.append(((mean[:, :2] - truth[:, k, :2]) ** 2).sum(1))
+        total.append(mean[:, :2])
         u = (np.arange(n) + rng.random((trials, 1))) / n
         index = np.array([np.minimum(np.searchsorted(np.cumsum(v), q), n - 1) for v, q in zip(w, u)])
         poor = 1 / (w**2).sum(1) < n / 2
         index = np.where(poor[:, None], index, np.arange(n))
         x, modes = np.take_along_axis(x, index[..., None], 1), np.take_along_axis(modes, index[..., None], 1)
         logs = np.where(poor[:, None], 0, np.log(np.maximum(w, 1e-300)))
-    return np.array(total).T
+    return np.swapaxes(total, 0, 1)
+
+
+def errors(method, s, confined=True, trials=TRIALS):
+    """Squared position errors [trial, step]."""
+    return ((positions(method, s, confined, trials) - tracks(confined, trials)[0][..., :2]) ** 2).sum(2)
 
 
 # From errors to values
@@ -236,6 +251,11 @@ def statistic(quantity, squares):
         return median(runs)
     lost = np.mean(runs > 4)
     return lost, np.sqrt((lost + 0.005) * (1 - lost) / len(runs))
+
+
+@lru_cache(None)
+def layout(number):
+    return Setting(50.0, 4, LAYOUTS[number])
 
 
 @lru_cache(None)
@@ -271,6 +291,11 @@ def by_speed(row):
     return method, setting("50dB-L4", speed=float(speed[1:]))
 
 
+def by_layout(row):
+    number, method = row.split(" ")
+    return method, layout(int(number[-1]))
+
+
 def by_encoder(row):
     encoder, point, method = row.split(" ")
     return method, setting(point, encoder)
@@ -285,6 +310,7 @@ for what in ("mse", "median", "lost"):
     for figure in ("mpa-table3-mse", "mpa-fig3-4", "mpa-fig3-5", "mpa-table3-low"):
         register(figure, what, r"^\d+dB-L\d+ " + METHODS, plain)
     register("mpa-table3-mse", "speed-" + what, "", by_speed)
+    register("mpa-table3-mse", "layout-" + what, METHODS, by_layout)
     register("mpa-table3-mse", "floor-" + what, METHODS, plain)
     register("mpa-encoder", what, "", by_encoder)
     register("mpa-encoder", "loading-" + what, "", by_loading)
