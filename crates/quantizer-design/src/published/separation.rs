@@ -3,6 +3,7 @@
 use crate::criterion::{Criterion, LOG_FLOOR};
 use crate::derivatives::Derivatives;
 use crate::error::{Error, refuse};
+use crate::deadline::Deadline;
 use crate::newton::{Newton, Objective, climb};
 use crate::problem::Problem;
 use crate::scene::{Noise, Prior, Scene};
@@ -85,7 +86,7 @@ pub fn separate(
         distance,
         problem: &problem,
     };
-    let found = climb(&objective, start.breakpoints(), sd, newton)?;
+    let found = climb(&objective, start.breakpoints(), sd, newton, Deadline::NEVER)?;
     let (p0, p1) = objective.distributions(&found.point);
     Ok((start.with_breakpoints(found.point)?, distance.of(&p0, &p1)))
 }

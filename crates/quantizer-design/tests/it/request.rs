@@ -218,7 +218,7 @@ fn shared_out_bits_are_the_best_of_all_shares() {
 fn random_scenes_are_no_worse_than_nelder_mead() {
     for i in 0..5 {
         let task = scenes::task(i, [1e-4, 1.0, 1e4][i as usize % 3], 3, 2).unwrap();
-        let (found, _) = task.solve(None).unwrap();
+        let found = task.solve(None).unwrap().solutions.best().clone();
         let reference = task.nelder_mead(Duration::from_millis(100)).unwrap();
         assert!(found.value() <= reference * (1.0 + 1e-9), "{}: {} {reference}", task.what, found.value());
     }

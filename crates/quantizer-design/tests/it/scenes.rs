@@ -3,7 +3,7 @@
 use super::nelder_mead;
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
-use fewbits_quantizer_design::solve::{Bits, Request, Solution};
+use fewbits_quantizer_design::solve::{Bits, Request, Solution, Solutions};
 use fewbits_quantizer_design::{
     Channel, Criterion, Error, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max,
 };
@@ -61,8 +61,19 @@ pub fn task(i: u64, scale: f64, max_sensors: usize, max_bits: u32) -> Result<Tas
     })
 }
 
+/// Designs, and how long they took.
+pub struct Found {
+    pub solutions: Solutions,
+    pub time: Duration,
+}
+
 impl Task {
-    pub fn solve(&self, limit: Option<Duration>) -> Result<(Solution, Duration), Box<dyn std::error::Error>> {
+    /// Squared error of a design on the full nodes.
+    pub fn exact(&self, solution: &Solution) -> Result<f64, Error> {
+        System::new(self.scene.clone(), solution.system().groups().to_vec())?.value(Criterion::MeanSquaredError)
+    }
+
+    pub fn solve(&self, limit: Option<Duration>) -> Result<Found, Box<dyn std::error::Error>> {
         let started = Instant::now();
         let mut request = Request::estimation(
             self.scene.clone(),
@@ -72,7 +83,10 @@ impl Task {
         if let Some(limit) = limit {
             request = request.with_time_limit(limit);
         }
-        Ok((request.run()?.best().clone(), started.elapsed()))
+        Ok(Found {
+            solutions: request.run()?,
+            time: started.elapsed(),
+        })
     }
 
     /// Least squared error that Nelder-Mead finds in the given time, from Lloyd-Max cells and random ones, with Gray and natural
