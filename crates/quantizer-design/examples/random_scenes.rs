@@ -63,5 +63,10 @@ fn compare(i: u64, limit: Duration) -> Result<String, Box<dyn std::error::Error>
         format!("{:.1e}", again * ratio * ratio / error - 1.0)
     };
     let certificate = found.solutions.best().certificate();
-    Ok(format!("{:.9} {:.3} {unit} {certificate:?} {}", error / reference, found.time.as_secs_f64(), task.what))
+    Ok(format!(
+        "{:.9} {:.3} {unit} {certificate:?} {}",
+        error / reference,
+        found.time.as_secs_f64(),
+        task.what
+    ))
 }

@@ -1,9 +1,9 @@
 //! Quantizers that keep two hypotheses apart, one sensor at a time (Poor and Thomas).
 
 use crate::criterion::{Criterion, LOG_FLOOR};
+use crate::deadline::Deadline;
 use crate::derivatives::Derivatives;
 use crate::error::{Error, refuse};
-use crate::deadline::Deadline;
 use crate::newton::{Newton, Objective, climb};
 use crate::problem::Problem;
 use crate::scene::{Noise, Prior, Scene};

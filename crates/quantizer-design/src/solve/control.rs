@@ -32,7 +32,6 @@ pub enum Stage {
 /// A part of the time limit, in the order in which the parts are used up. What one part leaves, the next may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Share {
-    Bits,
     SingleSensors,
     AllSensors,
     Refinement,
@@ -40,13 +39,12 @@ pub(super) enum Share {
 }
 
 impl Share {
-    /// The part of the limit after which this share ends.
+    /// The part of the time after which this share ends.
     fn end(self) -> f64 {
         match self {
-            Self::Bits => 0.4,
-            Self::SingleSensors => 0.5,
-            Self::AllSensors => 0.7,
-            Self::Refinement => 0.85,
+            Self::SingleSensors => 0.2,
+            Self::AllSensors => 0.5,
+            Self::Refinement => 0.75,
             Self::All => 1.0,
         }
     }
@@ -57,7 +55,8 @@ pub(super) struct Control<'a> {
     started: Instant,
     limit: Option<Duration>,
     deadline: Deadline,
-    last_share: Share,
+    /// The part of the limit that is used at all.
+    portion: f64,
     progress: Option<&'a mut dyn FnMut(Progress)>,
     pub(super) is_cut_short: bool,
     pub(super) steps: usize,
@@ -70,23 +69,33 @@ impl<'a> Control<'a> {
             started,
             limit,
             deadline: Deadline::after(started, limit),
-            last_share: Share::All,
+            portion: 1.0,
             progress,
             is_cut_short: false,
             steps: 0,
         }
     }
 
-    /// What follows must end with this share of the time, whatever it enters.
-    pub(super) fn end_with(&mut self, share: Share) {
-        self.last_share = share;
-        self.enter(share);
+    /// What follows shares this portion of the limit.
+    pub(super) fn end_with(&mut self, portion: f64) {
+        self.portion = portion;
+        self.enter(Share::All);
     }
 
     /// Goes on to another share of the time.
     pub(super) fn enter(&mut self, share: Share) {
-        let share = share.min(self.last_share);
-        self.deadline = Deadline::after(self.started, self.limit.map(|limit| limit.mul_f64(share.end())));
+        let end = |limit: Duration| limit.mul_f64(self.portion * share.end());
+        self.deadline = Deadline::after(self.started, self.limit.map(end));
+    }
+
+    /// Goes on to one of `parts` equal parts of what is left of a share.
+    pub(super) fn enter_part(&mut self, share: Share, parts: usize) {
+        let now = self.started.elapsed();
+        let end = |limit: Duration| {
+            let left = limit.mul_f64(self.portion * share.end()).saturating_sub(now);
+            now + left / parts as u32
+        };
+        self.deadline = Deadline::after(self.started, self.limit.map(end));
     }
 
     /// When the present share of the time ends.

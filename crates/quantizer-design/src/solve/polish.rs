@@ -13,8 +13,10 @@ use crate::system::System;
 const MAX_HESSIAN_WORK: f64 = 1e8;
 /// A design whose evaluation takes more multiplications than this stays on coarse nodes, where its value is known to 1e-5.
 const MAX_VALUE_WORK: f64 = 1e9;
-/// The same when the time is over; beyond [`MAX_VALUE_WORK`] on coarse nodes the value is then taken on rough ones.
+/// The same when the time is over.
 const LATE_VALUE_WORK: f64 = 1e8;
+/// When the time is over, and one evaluation on coarse nodes takes more than this, the value is taken on rough ones.
+const LATE_COARSE_WORK: f64 = 3e8;
 
 /// A design on the full nodes, or on fewer if it is too large.
 pub(super) struct Polished {
@@ -64,7 +66,7 @@ pub(super) fn polish(
         let outcomes = system.outcomes() as f64;
         let work = evaluation_work(scene, criterion, outcomes);
         let is_late = deadline.is_over();
-        if is_late && evaluation_work(&coarse, criterion, outcomes) > MAX_VALUE_WORK {
+        if is_late && evaluation_work(&coarse, criterion, outcomes) > LATE_COARSE_WORK {
             system = system_of(&scene.at(Resolution::Rough)?, participants, &cells, apart)?;
         } else if work > if is_late { LATE_VALUE_WORK } else { MAX_VALUE_WORK } {
             system = system_of(&coarse, participants, &cells, apart)?;

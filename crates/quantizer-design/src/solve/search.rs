@@ -117,7 +117,9 @@ pub(super) fn random_start(
         }
     }
     let fine = landscape.sample(sensor).quantiles(200);
-    let mut breakpoints: Vec<f64> = (1..words.len()).map(|_| fine[rng.random_range(0..fine.len())]).collect();
+    let mut breakpoints: Vec<f64> = (1..words.len())
+        .map(|_| fine[rng.random_range(0..fine.len())])
+        .collect();
     breakpoints.sort_by(f64::total_cmp);
     WordedCells { breakpoints, words }.on(&grid.edges)
 }

@@ -11,7 +11,7 @@
 //! Each step is a short search over all sensors. When its share of the time is over, each bit that is left goes to the sensor
 //! of the largest signal-to-noise ratio, where a bit counts as half of it.
 
-use super::control::{Control, Share};
+use super::control::Control;
 use super::participant::Participant;
 use super::request::{MAX_BITS, Request};
 use super::starts::Search;
@@ -19,12 +19,14 @@ use crate::criterion::AllowedCells;
 use crate::error::Error;
 use std::collections::BTreeMap;
 
+/// Portion of the time limit that sharing out may take.
+const SHARE: f64 = 0.4;
 /// Moves of single bits after which the shares stay.
 const MAX_MOVES: usize = 20;
 
 /// Bits of every sensor.
 pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Control<'_>) -> Result<Vec<u32>, Error> {
-    control.end_with(Share::Bits);
+    control.end_with(SHARE);
     let sensors = request.scene.sensors();
     let mut tried = Tried {
         request,
@@ -52,7 +54,7 @@ pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Contro
             _ => break,
         }
     }
-    control.end_with(Share::All);
+    control.end_with(1.0);
     Ok(bits)
 }
 
@@ -85,11 +87,7 @@ struct Tried<'a, 'b> {
 
 impl Tried<'_, '_> {
     /// The best of some shares, with its signed value; `None` if there is none or the time is over.
-    fn best_of(
-        &mut self,
-        shares: &[Vec<u32>],
-        control: &mut Control<'_>,
-    ) -> Result<Option<(f64, Vec<u32>)>, Error> {
+    fn best_of(&mut self, shares: &[Vec<u32>], control: &mut Control<'_>) -> Result<Option<(f64, Vec<u32>)>, Error> {
         let mut best: Option<(f64, Vec<u32>)> = None;
         for bits in shares {
             if !control.go_on() {
