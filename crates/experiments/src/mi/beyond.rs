@@ -5,7 +5,8 @@ use crate::prelude::*;
 use fewbits_core::Link;
 use fewbits_quantizer_design::design::Design;
 use fewbits_quantizer_design::{
-    AllowedCells, Bits, Channel, Criterion, Newton, Quantizer, Request, Scene, SensorGroup, System, bounds, design, published,
+    AllowedCells, Bits, Channel, Criterion, Newton, Quantizer, Request, Scene, SensorGroup, System, bounds, design,
+    published,
 };
 
 parameters! {

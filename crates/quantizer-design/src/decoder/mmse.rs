@@ -5,14 +5,11 @@ use crate::law::{Active, Reports};
 use crate::moments::{Table, dot};
 use crate::scene::{Feature, Scene};
 use crate::system::System;
-use crate::table::Layout;
+use crate::table::{JointTable, Layout};
 use fewbits_core::Observation;
 use fewbits_numerics::stored;
 use fewbits_quantizers::Symbol;
 use serde::{Deserialize, Serialize};
-
-/// Most numbers (outcomes times values of the unknown) that a decoder tabulates on the way to its entries.
-const ENTRY_LIMIT: u64 = 1 << 25;
 
 /// Posterior mean and variance of the unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -75,16 +72,12 @@ impl MmseDecoder {
         let allowed = system
             .clone()
             .with_outcome_limit(system.outcome_limit().max(limit as u64));
-        let reports = Reports::of(&allowed)?;
-        let needed = system.outcomes().saturating_mul(scene.values().len() as u64);
-        let entries = if needed <= ENTRY_LIMIT {
-            let likelihood = reports.moments(&scene.given);
-            likelihood
-                .chunks_exact(scene.values().len())
-                .map(|q| posterior(scene, q))
-                .collect()
-        } else {
-            Self::entries_by_moments(scene, &reports)
+        let entries = match JointTable::new(&allowed) {
+            Ok(table) => (0..table.outcomes())
+                .map(|outcome| posterior(scene, table.likelihood(outcome)))
+                .collect(),
+            Err(Error::TooLarge { .. }) => Self::entries_by_moments(scene, &Reports::of(&allowed)?),
+            Err(error) => return Err(error),
         };
         let symbols = (0..system.groups().len())
             .map(|g| {

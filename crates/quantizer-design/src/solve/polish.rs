@@ -25,8 +25,6 @@ pub(super) struct Polished {
     pub(super) cells: Vec<WordedCells>,
     pub(super) certificate: Certificate,
     pub(super) scope: Scope,
-    /// Whether an evaluation on the full nodes takes long.
-    pub(super) is_dear: bool,
 }
 
 /// Whether Newton's method on the full nodes is worth its time.
@@ -76,7 +74,6 @@ pub(super) fn polish(
             cells,
             certificate: Certificate::Unproved,
             scope,
-            is_dear: work > LATE_VALUE_WORK,
         })
     };
     let mut is_coarse = true;
@@ -105,7 +102,6 @@ pub(super) fn polish(
                     cells,
                     certificate: design.certificate,
                     scope: design.scope,
-                    is_dear: false,
                 });
             }
             Err(Error::VanishingCell { quantizer, cell, .. }) => {

@@ -96,9 +96,11 @@ impl Search<'_> {
         refined.retain(|p| best - p.value <= CLOSE * unit);
         let mut designs: Vec<Vec<WordedCells>> = refined.iter().map(cells_of).collect();
         if designs.is_empty() || work_is_large || control.is_cut_short {
-            // What the search has seen is rough or cut short: the exact values decide between its best and two plain designs.
+            // What the search has seen is rough or cut short: the exact values decide between its best and a plain design.
             designs.truncate(1);
-            designs.push(best_alone);
+            if designs.is_empty() {
+                designs.push(best_alone);
+            }
             designs.push(plain(scene, participants)?);
         }
         Ok(Searched {
