@@ -133,6 +133,12 @@ impl MmseDecoder {
         self.entries.is_empty()
     }
 
+    /// The estimate of every joint outcome, `None` for one that cannot be received. Outcomes are in the order of
+    /// [`JointTable::outcome`]: the first group slowest, and sensors that are alone in their groups by their symbols.
+    pub fn estimates(&self) -> impl ExactSizeIterator<Item = Option<Estimate>> + '_ {
+        self.entries.iter().map(|entry| Self::estimate(*entry).ok())
+    }
+
     /// The estimate from one observation per sensor. These sensors always report, so that nothing received, like an erasure, says
     /// nothing about the unknown.
     ///
@@ -219,6 +225,8 @@ mod tests {
         assert!((mean_variance - system.value(Criterion::MeanSquaredError).unwrap()).abs() < 1e-13);
         let mirrored = decoder.decode_symbols(&[0, 0]).unwrap().mean + decoder.decode_symbols(&[3, 3]).unwrap().mean;
         assert!(mirrored.abs() < 1e-14);
+        let listed: Vec<_> = decoder.estimates().collect();
+        assert_eq!(listed[4 + 2], Some(decoder.decode_symbols(&[1, 2]).unwrap()));
         assert!(decoder.decode_symbols(&[0]).is_err());
         assert!(decoder.decode_symbols(&[0, 4]).is_err());
         let json = serde_json::to_string(&decoder).unwrap();

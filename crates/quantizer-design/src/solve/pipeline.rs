@@ -6,7 +6,7 @@ use super::polish::{Polished, polish};
 use super::request::{Bits, MAX_BITS, MAX_TOTAL, Request};
 use super::share;
 use super::solution::{Solution, Solutions};
-use super::starts::{Search, plain};
+use super::starts::{Search, gray, plain};
 use crate::criterion::Criterion;
 use crate::error::{Error, refuse};
 
@@ -76,7 +76,7 @@ impl Request<'_> {
         control.enter(Share::All);
         if self.criterion == Criterion::BayesError {
             // The error probability has kinks and many flat places: the design of most information is a good start.
-            let cells = plain(&scene, &participants)?;
+            let cells = plain(&scene, &participants, gray)?;
             let deadline = control.deadline();
             let informed = polish(&scene, Criterion::MutualInformation, &participants, cells, false, deadline)?;
             searched.designs.push(informed.cells);

@@ -96,12 +96,13 @@ impl Search<'_> {
         refined.retain(|p| best - p.value <= CLOSE * unit);
         let mut designs: Vec<Vec<WordedCells>> = refined.iter().map(cells_of).collect();
         if designs.is_empty() || work_is_large || control.is_cut_short {
-            // What the search has seen is rough or cut short: the exact values decide between its best and a plain design.
+            // What the search has seen is rough or cut short: the exact values decide between its best and plain designs.
             designs.truncate(1);
             if designs.is_empty() {
                 designs.push(best_alone);
             }
-            designs.push(plain(scene, participants)?);
+            designs.push(plain(scene, participants, gray)?);
+            designs.push(plain(scene, participants, |level| level)?);
         }
         Ok(Searched {
             designs,
@@ -232,7 +233,7 @@ impl Search<'_> {
                 .map(|p| cells_of(p).remove(0))
                 .collect();
             if designs.is_empty() {
-                designs = plain(&own, &participants[n..=n])?;
+                designs = plain(&own, &participants[n..=n], gray)?;
             }
             found.push(designs);
             control.report(Stage::SingleSensors, n + 1, participants.len());
@@ -268,20 +269,25 @@ fn size_of(landscape: &Landscape, points: &[Point]) -> f64 {
     sizes.fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// Lloyd-Max cells of a normal sample with Gray words.
-pub(super) fn plain(scene: &Scene, participants: &[Participant]) -> Result<Vec<WordedCells>, Error> {
+/// Lloyd-Max cells of a normal sample with the word of each level.
+pub(super) fn plain(
+    scene: &Scene,
+    participants: &[Participant],
+    word: fn(usize) -> usize,
+) -> Result<Vec<WordedCells>, Error> {
     let of = |(n, participant): (usize, &Participant)| {
         let levels = 1usize << participant.bits;
         let lloyd = lloyd_max::gaussian(levels)?.affine(scene.sample_mean(), scene.sample_deviation(n))?;
         Ok(WordedCells {
             breakpoints: lloyd.breakpoints().to_vec(),
-            words: (0..levels).map(gray).collect(),
+            words: (0..levels).map(word).collect(),
         })
     };
     participants.iter().enumerate().map(of).collect()
 }
 
-fn gray(level: usize) -> usize {
+/// Gray words.
+pub(super) fn gray(level: usize) -> usize {
     level ^ (level >> 1)
 }
 
