@@ -1,7 +1,7 @@
 //! Eight one-bit sensors about a uniform unknown: the best linear patterns, then breakpoints off the grid.
 
 use fewbits_binary_patterns::search::{LinearSearch, free_breakpoints_of_masks};
-use fewbits_binary_patterns::{Bit, Decoder, Grid, Pattern, Source, bounds};
+use fewbits_binary_patterns::{Bit, Decoder, Grid, Source, bounds, linear_pattern};
 use fewbits_core::Observation;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let best = search.best()?;
     println!("masks {:?}, squared error {:.7}", best.masks, best.mse);
     for mask in &best.masks {
-        println!("  {mask}: {}", Pattern::linear(*mask, 3)?);
+        println!("  {mask}: {}", linear_pattern(*mask, 3)?);
     }
     let bank = search.bank(&best.masks)?;
     println!("no estimator is below {:.7}", bounds::optimal_weight_van_trees(&bank)?);

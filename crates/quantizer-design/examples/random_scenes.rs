@@ -1,46 +1,72 @@
-//! A hundred random scenes: the design on request against multi-start Nelder-Mead of the same time.
+//! A hundred random scenes: the design on request against multi-start Nelder-Mead of the same time, with time limits.
 //!
-//! `cargo run --release -p fewbits-quantizer-design --example random_scenes -- 100`
+//! `cargo run --release -p fewbits-quantizer-design --example random_scenes -- scenes.log 100 500 3000`: log file, number of
+//! scenes, limits in milliseconds. A scene with a line in the log is not run again. At the end the whole log is summed up.
 
 #[path = "../tests/it/nelder_mead.rs"]
 mod nelder_mead;
 #[path = "../tests/it/scenes.rs"]
 mod scenes;
 
+use std::io::Write;
+use std::time::Duration;
+
+/// A ratio above this is worse than Nelder-Mead.
+const WORSE: f64 = 1.0 + 1e-9;
+/// Relative difference of the values in two units that counts as one.
+const SAME: f64 = 1e-6;
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let mut number = |default: u64| arguments.next().map_or(Ok(default), |a| a.parse::<u64>());
-    let (count, first) = (number(100)?, number(0)?);
-    let limit = std::time::Duration::from_secs(5);
-    let (mut worse, mut failed, mut compared, mut unscaled) = (0, 0, 0, 0);
-    for i in first..first + count {
-        let scale = [1.0, 1e-4, 1e4][i as usize % 3];
-        let task = scenes::task(i, scale, 5, 4)?;
-        let (found, time) = match task.solve(Some(limit)) {
-            Ok(found) => found,
-            Err(error) => {
-                failed += 1;
-                println!("FAILED {}: {error}", task.what);
-                continue;
-            }
-        };
-        let reference = task.nelder_mead(time)?;
-        let ratio = found.value() / reference;
-        // The same scene in another unit, where that is quick.
-        let mut scaled = String::new();
-        if time.as_secs() < 3 {
-            let unit = [1e4, 1.0, 1e-4][i as usize % 3];
-            let other = scenes::task(i, unit, 5, 4)?.solve(Some(limit))?.0.value() * (scale / unit).powi(2);
-            compared += 1;
-            unscaled += u32::from((other / found.value() - 1.0).abs() > 1e-6);
-            scaled = format!(", scaled {:.1e}", other / found.value() - 1.0);
-        }
-        worse += u32::from(ratio > 1.0 + 1e-9);
-        let (seconds, certificate) = (time.as_secs_f64(), found.certificate());
-        println!("{:.5} of Nelder-Mead in {seconds:.2} s, {certificate:?}{scaled}  {}", ratio, task.what);
+    let path = arguments.next().unwrap_or("scenes.log".into());
+    let count: u64 = arguments.next().map_or(Ok(100), |a| a.parse())?;
+    let mut limits = arguments.map(|a| a.parse::<u64>()).collect::<Result<Vec<_>, _>>()?;
+    if limits.is_empty() {
+        limits = vec![500, 3000];
     }
+    let known = std::fs::read_to_string(&path).unwrap_or_default();
+    let mut log = std::fs::OpenOptions::new().create(true).append(true).open(&path)?;
+    for limit in limits {
+        for i in 0..count {
+            let key = format!("{limit} {i} ");
+            if !known.lines().any(|line| line.starts_with(&key)) {
+                let line = compare(i, Duration::from_millis(limit)).unwrap_or_else(|e| format!("failed {e}"));
+                writeln!(log, "{key}{line}")?;
+            }
+        }
+    }
+    let all = std::fs::read_to_string(&path)?;
+    let number = |line: &str, at: usize| line.split(' ').nth(at).and_then(|n| n.parse::<f64>().ok());
+    let with = |at: usize, test: &dyn Fn(f64) -> bool| all.lines().filter(|l| number(l, at).is_some_and(test)).count();
     println!(
-        "{count} scenes: {failed} failed, {worse} worse than Nelder-Mead of the same time, {unscaled} of {compared} depend on the unit"
+        "{} runs: {} failed, {} worse than Nelder-Mead of the same time, {} depend on the unit",
+        all.lines().count(),
+        with(2, &|_| true).abs_diff(all.lines().count()),
+        with(2, &|ratio| ratio > WORSE),
+        with(4, &|change| change.abs() > SAME),
     );
     Ok(())
+}
+
+/// Ratio of the squared errors, seconds, relative change in another unit (a dash where a limit was met), and what it was.
+fn compare(i: u64, limit: Duration) -> Result<String, Box<dyn std::error::Error>> {
+    let scale = |at: u64| [1.0, 1e-4, 1e4][at as usize % 3];
+    let task = scenes::task(i, scale(i), 5, 4)?;
+    let found = task.solve(Some(limit))?;
+    let error = task.exact(found.solutions.best())?;
+    let reference = task.nelder_mead(found.time)?;
+    let unit = if found.solutions.is_cut_short() {
+        "-".into()
+    } else {
+        let (other, ratio) = (scenes::task(i, scale(i + 1), 5, 4)?, scale(i) / scale(i + 1));
+        let again = other.exact(other.solve(Some(10 * limit))?.solutions.best())?;
+        format!("{:.1e}", again * ratio * ratio / error - 1.0)
+    };
+    let certificate = found.solutions.best().certificate();
+    Ok(format!(
+        "{:.9} {:.3} {unit} {certificate:?} {}",
+        error / reference,
+        found.time.as_secs_f64(),
+        task.what
+    ))
 }

@@ -106,7 +106,7 @@ impl<'a> Active<'a> {
                         let inside = normal::log_interval((lower(cell) - m) / self.sd, (edge(cell) - m) / self.sd);
                         inside + self.group.cell_transition(t, cell).ln()
                     });
-                    log_sum(&cells.collect::<Vec<_>>())
+                    kernels::log_sum_exp(&cells.collect::<Vec<_>>())
                 };
                 self.means.iter().map(law).collect()
             })
@@ -232,7 +232,7 @@ pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
         for feature in &scene.given {
             let logs = row[feature.start..].iter().zip(&feature.weights);
             let terms: Vec<f64> = logs.filter(|(_, w)| **w > 0.0).map(|(l, w)| l + w.ln()).collect();
-            out.push(log_sum(&terms));
+            out.push(kernels::log_sum_exp(&terms));
         }
     }
     Ok(out)
@@ -240,15 +240,6 @@ pub(crate) fn log_likelihoods(system: &System) -> Result<Vec<f64>, Error> {
 
 fn sums_of(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(x, y)| x + y).collect()
-}
-
-/// `ln sum exp`.
-fn log_sum(logs: &[f64]) -> f64 {
-    let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if largest == f64::NEG_INFINITY {
-        return largest;
-    }
-    largest + logs.iter().map(|l| (l - largest).exp()).sum::<f64>().ln()
 }
 
 /// All sums of an entry of `a` and an entry of `b`, the latter running faster.

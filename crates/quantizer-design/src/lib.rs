@@ -72,6 +72,7 @@ pub mod table;
 mod axis;
 mod compositions;
 mod criterion;
+mod deadline;
 mod derivatives;
 mod error;
 mod evaluate;

@@ -1,5 +1,6 @@
 //! Sums over nodes of products of per-group tables: where all the time is spent.
 
+use crate::deadline::Deadline;
 use crate::scene::Feature;
 
 /// Functions on the nodes, one a row.
@@ -52,33 +53,42 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 ///
 /// Layout of the result: rows of the first table slowest, features fastest.
 pub(crate) fn moments(tables: &[&Table], features: &[Feature]) -> Vec<f64> {
+    moments_until(tables, features, Deadline::NEVER).unwrap_or_default()
+}
+
+/// As [`moments`]; `None` if the time is over first.
+pub(crate) fn moments_until(tables: &[&Table], features: &[Feature], deadline: Deadline) -> Option<Vec<f64>> {
     let combinations: usize = tables.iter().map(|t| t.rows()).product();
     let mut out = Vec::with_capacity(combinations * features.len());
     if let Some((last, first)) = tables.split_last() {
         let ones = vec![1.0; last.nodes];
         let mut weighted = vec![0.0; last.nodes];
-        descend(first, last, features, &ones, &mut weighted, &mut out);
+        descend(first, last, features, deadline, &ones, &mut weighted, &mut out)?;
     }
-    out
+    Some(out)
 }
 
 fn descend(
     first: &[&Table],
     last: &Table,
     features: &[Feature],
+    deadline: Deadline,
     prefix: &[f64],
     weighted: &mut [f64],
     out: &mut Vec<f64>,
-) {
+) -> Option<()> {
     if let Some((table, rest)) = first.split_first() {
         let mut product = vec![0.0; prefix.len()];
         for r in 0..table.rows() {
             for ((p, x), y) in product.iter_mut().zip(prefix).zip(table.row(r)) {
                 *p = x * y;
             }
-            descend(rest, last, features, &product, weighted, out);
+            descend(rest, last, features, deadline, &product, weighted, out)?;
         }
-        return;
+        return Some(());
+    }
+    if deadline.is_over() {
+        return None;
     }
     let base = out.len();
     out.resize(base + last.rows() * features.len(), 0.0);
@@ -92,4 +102,5 @@ fn descend(
             out[base + r * features.len() + f] = dot(weighted, &last.row(r)[range.clone()]);
         }
     }
+    Some(())
 }

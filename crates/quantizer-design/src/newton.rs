@@ -1,5 +1,6 @@
 //! Newton's method with a spectrally modified Hessian, for breakpoints that must stay in order.
 
+use crate::deadline::Deadline;
 use crate::derivatives::Derivatives;
 use crate::error::Error;
 use nalgebra::{DVector, SymmetricEigen};
@@ -150,7 +151,7 @@ pub(crate) struct Stationary {
     pub(crate) evaluations: usize,
 }
 
-/// Climbs from `start`.
+/// Climbs from `start`; an iteration that the deadline cuts short has not converged.
 ///
 /// ```text
 /// repeat
@@ -166,6 +167,7 @@ pub(crate) fn climb(
     start: &[f64],
     scale: f64,
     newton: &Newton,
+    deadline: Deadline,
 ) -> Result<Stationary, Error> {
     newton.check()?;
     let blocks = objective.blocks();
@@ -174,6 +176,9 @@ pub(crate) fn climb(
     let mut last_step = f64::INFINITY;
     let mut escapes = 0;
     for iteration in 1..=newton.max_iterations {
+        if deadline.is_over() {
+            return Err(not_converged(iteration - 1, last_step));
+        }
         let here = objective.derivatives(&b);
         evaluations += 1;
         let unit = objective.unit(here.value);
@@ -229,19 +234,19 @@ pub(crate) fn climb(
             }
             share *= 0.5;
             if share < 1e-14 {
-                return Err(Error::NotConverged {
-                    algorithm: "Newton",
-                    iterations: iteration,
-                    change: longest,
-                });
+                return Err(not_converged(iteration, longest));
             }
         };
     }
-    Err(Error::NotConverged {
+    Err(not_converged(newton.max_iterations, last_step))
+}
+
+fn not_converged(iterations: usize, change: f64) -> Error {
+    Error::NotConverged {
         algorithm: "Newton",
-        iterations: newton.max_iterations,
-        change: last_step,
-    })
+        iterations,
+        change,
+    }
 }
 
 /// `b + off`, halved until in order.

@@ -23,28 +23,13 @@ pub fn check_mask(mask: Mask, bits: usize) -> Result<Mask, Error> {
     }
 }
 
-/// The pattern of a mask over `2^bits` cells: bit `l` is the parity of `mask & l`.
+/// The pattern of a mask over `2^bits` cells: bit `l` is the parity of `mask & l`. [`mask_of`] is the way back.
 ///
 /// # Errors
 /// As [`check_mask`].
 pub fn linear_pattern(mask: Mask, bits: usize) -> Result<Pattern, Error> {
     check_mask(mask, bits)?;
     Pattern::new((0..1u32 << bits).map(|l| (l & mask).count_ones() % 2 == 1).collect())
-}
-
-impl Pattern {
-    /// The linear pattern of a mask over `2^bits` cells; [`Pattern::mask`] is the way back.
-    ///
-    /// # Errors
-    /// As [`check_mask`].
-    pub fn linear(mask: Mask, bits: usize) -> Result<Self, Error> {
-        linear_pattern(mask, bits)
-    }
-
-    /// The mask of the pattern, if it is linear.
-    pub fn mask(&self) -> Option<Mask> {
-        mask_of(self)
-    }
 }
 
 /// Masks of the natural binary code, most significant digit first: `{4, 2, 1}` for three bits.
@@ -188,8 +173,8 @@ mod tests {
         assert_eq!(mask_of(&"010".parse().unwrap()), None);
         let grid = Grid::uniform(0.3, 4).unwrap();
         for mask in 1..16 {
-            let pattern = Pattern::linear(mask, 4).unwrap();
-            assert_eq!(pattern.mask(), Some(mask));
+            let pattern = linear_pattern(mask, 4).unwrap();
+            assert_eq!(mask_of(&pattern), Some(mask));
             assert_eq!(Pattern::of(&pattern.on(&grid).unwrap(), &grid), Some(pattern));
         }
         let off = crate::BinaryQuantizer::new(vec![0.01]).unwrap();

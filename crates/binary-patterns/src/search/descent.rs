@@ -41,7 +41,7 @@ pub struct Descent {
 }
 
 impl Descended {
-    /// The pattern of each sensor over `grid`, if its breakpoints are the grid's; a linear one has a [`mask`](Pattern::mask).
+    /// The pattern of each sensor over `grid`, if its breakpoints are the grid's; [`mask_of`](crate::mask_of) names a linear one.
     pub fn patterns(&self, grid: &Grid) -> Vec<Option<Pattern>> {
         self.sensors.iter().map(|s| Pattern::of(s.quantizer(), grid)).collect()
     }
@@ -316,7 +316,7 @@ impl<'a> Kernel<'a> {
 mod tests {
     use super::super::LinearSearch;
     use super::*;
-    use crate::{linear_pattern, rank};
+    use crate::{linear_pattern, mask_of, rank};
     use approx::assert_relative_eq;
 
     fn masks(grid: &Grid) -> Vec<BinaryQuantizer> {
@@ -344,7 +344,7 @@ mod tests {
             let chosen: Vec<u32> = found
                 .patterns(&grid)
                 .iter()
-                .map(|p| p.as_ref().unwrap().mask().unwrap())
+                .map(|p| mask_of(p.as_ref().unwrap()).unwrap())
                 .collect();
             assert_eq!(chosen, found.choice.iter().map(|&c| c as u32 + 1).collect::<Vec<_>>());
         }

@@ -7,7 +7,7 @@ use crate::decoding::decoder::moments;
 use crate::observation::bank::IMPOSSIBLE;
 use crate::observation::source::Nodes;
 use crate::patterns::linear::grid_bits;
-use crate::{Bank, BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source};
+use crate::{Bank, BinaryQuantizer, Grid, Mask, PatternSensor, Source, linear_pattern};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, non_negative};
@@ -94,7 +94,7 @@ pub fn free_breakpoints_of_masks(
     let bits = grid_bits(grid)?;
     let sensors = masks
         .iter()
-        .map(|mask| PatternSensor::with_deviation(Pattern::linear(*mask, bits)?.on(grid)?, noise_std))
+        .map(|mask| PatternSensor::with_deviation(linear_pattern(*mask, bits)?.on(grid)?, noise_std))
         .collect::<Result<Vec<_>, _>>()?;
     free_breakpoints(source, &sensors, jitter, starts)
 }
@@ -354,7 +354,7 @@ mod tests {
             let noise = source.noise_std(5.0).unwrap();
             let found = free_breakpoints_of_masks(&source, &grid, &[4, 4, 6], noise, 0.05, 2).unwrap();
             let start =
-                PatternSensor::with_deviation(Pattern::linear(4, 3).unwrap().on(&grid).unwrap(), noise).unwrap();
+                PatternSensor::with_deviation(linear_pattern(4, 3).unwrap().on(&grid).unwrap(), noise).unwrap();
             assert!(found.sensors.iter().any(|s| *s != start));
             (found.mse / (v * v), found.sensors[2].quantizer().breakpoints()[0] / v)
         };

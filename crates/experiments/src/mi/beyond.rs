@@ -2,20 +2,21 @@
 
 use super::common::{MI, MSE, breakpoints, bsc, lloyd, lloyd_system, name, scene};
 use crate::prelude::*;
-use fewbits_quantizer_design::published::{self, Discovery};
-use fewbits_quantizer_design::{Channel, Criterion, Newton, Quantizer, SensorGroup, System, bounds, design};
+use fewbits_core::Link;
+use fewbits_quantizer_design::design::Design;
+use fewbits_quantizer_design::{
+    AllowedCells, Bits, Channel, Criterion, Newton, Quantizer, Request, Scene, SensorGroup, System, bounds, design,
+    published,
+};
 
 parameters! {
     pub struct Parameters {
         /// Random starts among contiguous quantizers.
         #[garde(range(min = 1, max = 10_000))]
         contiguous_starts: usize = 20 => quick 8,
-        /// Random label sequences among folded quantizers.
+        /// Starts among folded quantizers, besides those with one sensor's cells running round or to and fro.
         #[garde(range(min = 1, max = 10_000))]
         folded_starts: usize = 60 => quick 24,
-        /// Grid cells of a sensor in that search.
-        #[garde(range(min = 16, max = 1000))]
-        grid: usize = 160,
         /// Crossovers at which words are compared.
         #[garde(length(min = 1, max = 20), inner(range(min = 0.0, max = 0.45)))]
         crossovers: Vec<f64> = vec![0.001, 0.01, 0.05, 0.1, 0.2],
@@ -169,6 +170,19 @@ fn listed<T: ToString>(numbers: impl IntoIterator<Item = T>, by: &str) -> String
     numbers.into_iter().map(|n| n.to_string()).collect::<Vec<_>>().join(by)
 }
 
+/// The best quantizers found when levels need not be intervals.
+fn folded(scene: &Scene, levels: usize, criterion: Criterion, starts: usize) -> Result<Design, Error> {
+    let request = Request::estimation(scene.clone(), Bits::Each(levels.ilog2()), Link::PERFECT)
+        .with_cells(AllowedCells::Any)
+        .with_starts(starts);
+    let request = match criterion {
+        Criterion::MutualInformation => request.by_information(),
+        Criterion::MeanSquaredError | Criterion::BayesError => request,
+    };
+    // Newton's method stays where it is, and has the curvature.
+    Ok(design::joint(request.run()?.best().system(), criterion, &Newton::default())?)
+}
+
 fn searches(p: &Parameters, context: &Context<'_>) -> Result<Vec<Search>, Error> {
     let mut rows = Vec::new();
     for (case, levels, noise_sd, rho, criteria) in SEARCHES {
@@ -177,12 +191,7 @@ fn searches(p: &Parameters, context: &Context<'_>) -> Result<Vec<Search>, Error>
             let scene = scene(&[noise_sd; 2], rho)?;
             let start = lloyd_system(&scene, levels, |n| scene.sample_deviation(n))?;
             let contiguous = design::multi_start(&start, criterion, p.contiguous_starts, 1, &Newton::default())?;
-            let settings = Discovery {
-                grid: p.grid,
-                starts: p.folded_starts,
-                ..Discovery::default()
-            };
-            let folded = published::discover(&contiguous.system, criterion, &settings)?;
+            let folded = folded(&scene, levels, criterion, p.folded_starts)?;
             let bits = (levels as f64).log2();
             let bound = match rho {
                 0.0 => Some(bounds::ceo(scene.prior(), scene.noise(), &[bits; 2])?.distortion),

@@ -5,14 +5,11 @@ use crate::law::{Active, Reports};
 use crate::moments::{Table, dot};
 use crate::scene::{Feature, Scene};
 use crate::system::System;
-use crate::table::Layout;
+use crate::table::{JointTable, Layout};
 use fewbits_core::Observation;
 use fewbits_numerics::stored;
 use fewbits_quantizers::Symbol;
 use serde::{Deserialize, Serialize};
-
-/// Most numbers (outcomes times values of the unknown) that a decoder tabulates on the way to its entries.
-const ENTRY_LIMIT: u64 = 1 << 25;
 
 /// Posterior mean and variance of the unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -75,16 +72,12 @@ impl MmseDecoder {
         let allowed = system
             .clone()
             .with_outcome_limit(system.outcome_limit().max(limit as u64));
-        let reports = Reports::of(&allowed)?;
-        let needed = system.outcomes().saturating_mul(scene.values().len() as u64);
-        let entries = if needed <= ENTRY_LIMIT {
-            let likelihood = reports.moments(&scene.given);
-            likelihood
-                .chunks_exact(scene.values().len())
-                .map(|q| posterior(scene, q))
-                .collect()
-        } else {
-            Self::entries_by_moments(scene, &reports)
+        let entries = match JointTable::new(&allowed) {
+            Ok(table) => (0..table.outcomes())
+                .map(|outcome| posterior(scene, table.likelihood(outcome)))
+                .collect(),
+            Err(Error::TooLarge { .. }) => Self::entries_by_moments(scene, &Reports::of(&allowed)?),
+            Err(error) => return Err(error),
         };
         let symbols = (0..system.groups().len())
             .map(|g| {
@@ -138,6 +131,12 @@ impl MmseDecoder {
     /// Whether there is no entry; never so.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
+    }
+
+    /// The estimate of every joint outcome, `None` for one that cannot be received. Outcomes are in the order of
+    /// [`JointTable::outcome`]: the first group slowest, and sensors that are alone in their groups by their symbols.
+    pub fn estimates(&self) -> impl ExactSizeIterator<Item = Option<Estimate>> + '_ {
+        self.entries.iter().map(|entry| Self::estimate(*entry).ok())
     }
 
     /// The estimate from one observation per sensor. These sensors always report, so that nothing received, like an erasure, says
@@ -226,6 +225,8 @@ mod tests {
         assert!((mean_variance - system.value(Criterion::MeanSquaredError).unwrap()).abs() < 1e-13);
         let mirrored = decoder.decode_symbols(&[0, 0]).unwrap().mean + decoder.decode_symbols(&[3, 3]).unwrap().mean;
         assert!(mirrored.abs() < 1e-14);
+        let listed: Vec<_> = decoder.estimates().collect();
+        assert_eq!(listed[4 + 2], Some(decoder.decode_symbols(&[1, 2]).unwrap()));
         assert!(decoder.decode_symbols(&[0]).is_err());
         assert!(decoder.decode_symbols(&[0, 4]).is_err());
         let json = serde_json::to_string(&decoder).unwrap();

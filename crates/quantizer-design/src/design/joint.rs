@@ -2,6 +2,7 @@
 
 use super::apart::{Opposed, halved, opposed};
 use crate::criterion::Criterion;
+use crate::deadline::Deadline;
 use crate::error::{Error, refuse};
 use crate::newton::{AtSaddle, Certificate, Newton, Objective, climb};
 use crate::problem::Problem;
@@ -97,13 +98,23 @@ impl Design {
 /// [`Error::NotConverged`]; [`Error::VanishingCell`] if a level is squeezed out, as happens behind poor channels;
 /// [`Error::TooLarge`] and [`Error::Argument`] as [`System::value`].
 pub fn joint(system: &System, criterion: Criterion, newton: &Newton) -> Result<Design, Error> {
+    joint_until(system, criterion, newton, Deadline::NEVER)
+}
+
+/// As [`joint`]; not converged if the time is over first.
+pub(crate) fn joint_until(
+    system: &System,
+    criterion: Criterion,
+    newton: &Newton,
+    deadline: Deadline,
+) -> Result<Design, Error> {
     let every = |system: &System| (0..system.groups().len()).collect::<Vec<_>>();
-    let mut design = optimise_groups(system, &every(system), criterion, newton)?;
+    let mut design = optimise_until(system, &every(system), criterion, newton, deadline)?;
     while newton.at_saddle == AtSaddle::StepOff && design.is_saddle() {
         let Some(apart) = design.leave_shared_saddle(criterion)? else {
             break;
         };
-        match optimise_groups(&apart, &every(&apart), criterion, newton) {
+        match optimise_until(&apart, &every(&apart), criterion, newton, deadline) {
             Ok(next) if criterion.sense() * (next.value - design.value) > 0.0 => {
                 design = Design {
                     iterations: design.iterations + next.iterations,
@@ -127,6 +138,16 @@ pub fn optimise_groups(
     criterion: Criterion,
     newton: &Newton,
 ) -> Result<Design, Error> {
+    optimise_until(system, active, criterion, newton, Deadline::NEVER)
+}
+
+fn optimise_until(
+    system: &System,
+    active: &[usize],
+    criterion: Criterion,
+    newton: &Newton,
+    deadline: Deadline,
+) -> Result<Design, Error> {
     if active.is_empty() {
         return refuse("active", "empty", "at least one group");
     }
@@ -135,7 +156,7 @@ pub fn optimise_groups(
     }
     let problem = Problem::new(system, criterion, active)?;
     let scale = breakpoint_scale(system, active);
-    let found = climb(&problem, &problem.start(), scale, newton)?;
+    let found = climb(&problem, &problem.start(), scale, newton, deadline)?;
     if let Some((quantizer, cell, probability)) = problem.rarest_cell(&found.point)
         && probability < VANISHED
     {

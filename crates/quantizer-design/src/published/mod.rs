@@ -1,4 +1,5 @@
-//! Algorithms of the publications, for comparison with their tables, and searches beside which a request is judged. To design quantizers, use [`Request`](crate::Request).
+//! Algorithms of the publications, for comparison with their tables, and searches beside which a request is judged. To design
+//! quantizers, use [`Request`](crate::Request).
 //!
 //! | item | source |
 //! |---|---|
@@ -6,20 +7,17 @@
 //! | [`best_contiguous`] | the best intervals of one sensor on a grid, by dynamic programming |
 //! | [`separate`], [`Separation`] | quantizers that keep two hypotheses apart (Poor and Thomas) |
 //! | [`assign_words`] | Table 4.5 for every assignment of words |
-//! | [`discover`] | cells of several intervals, by ascent over label sequences from many starts: slower than a request, and finds folded optima that it misses |
 //! | [`symmetry_breaking`] | where equal quantizers stop being an optimum |
 
 mod alternating;
 mod cells;
 mod dynamic_programme;
 mod index_assignment;
-mod multi_interval;
 mod separation;
 mod symmetry;
 
 pub use alternating::{Alternated, Alternating, alternate, alternating_step};
 pub use dynamic_programme::{MAX_CANDIDATES, best_contiguous};
 pub use index_assignment::{Words, WordsDesign, assign_words};
-pub use multi_interval::{Discovery, discover};
 pub use separation::{Separation, separate};
 pub use symmetry::symmetry_breaking;

@@ -1,6 +1,7 @@
 //! Quantizers that keep two hypotheses apart, one sensor at a time (Poor and Thomas).
 
 use crate::criterion::{Criterion, LOG_FLOOR};
+use crate::deadline::Deadline;
 use crate::derivatives::Derivatives;
 use crate::error::{Error, refuse};
 use crate::newton::{Newton, Objective, climb};
@@ -85,7 +86,7 @@ pub fn separate(
         distance,
         problem: &problem,
     };
-    let found = climb(&objective, start.breakpoints(), sd, newton)?;
+    let found = climb(&objective, start.breakpoints(), sd, newton, Deadline::NEVER)?;
     let (p0, p1) = objective.distributions(&found.point);
     Ok((start.with_breakpoints(found.point)?, distance.of(&p0, &p1)))
 }

@@ -1,6 +1,6 @@
 //! Thresholds as codes of an analogue-to-digital converter.
 
-use super::search::WordedCells;
+use super::participant::WordedCells;
 use super::solution::Solution;
 use crate::error::{Error, refuse};
 use fewbits_numerics::error::finite;

@@ -293,7 +293,8 @@ impl Export {
         text
     }
 
-    /// The design as constants of a Rust module without the standard library.
+    /// The design as constants of a Rust module without the standard library. With `fewbits-node` a sensor's word is
+    /// `WORDS_0[cell_of(&BREAKPOINTS_0, sample)?]`, or that of `THRESHOLDS_0` for the code of a converter.
     pub fn to_rust(&self) -> String {
         let mut text = String::from("// Quantizers and decoder, designed by fewbits.\n");
         let mut constant = |doc: &str, name: String, kind: &str, count: usize, values: String| {

@@ -5,9 +5,10 @@
 //! sensor need the quadrature nodes again: a change costs a few thousand multiplications.
 
 use crate::criterion::{Criterion, Scored};
+use crate::deadline::Deadline;
 use crate::error::Error;
 use crate::law::negative_entropy;
-use crate::moments::{Table, dot, moments};
+use crate::moments::{Table, dot, moments_until};
 use crate::scene::{Feature, Resolution, Scene};
 use fewbits_numerics::kernels;
 
@@ -237,8 +238,14 @@ impl Landscape {
         Table::new(symbols, nodes)
     }
 
-    /// The block of a sensor, given the symbols of all (its own are not used).
-    pub(super) fn block(&self, sensor: usize, grid: &Grid, symbols: &[Vec<Table>]) -> Block {
+    /// The block of a sensor, given the symbols of all (its own are not used); `None` if the time is over first.
+    pub(super) fn block(
+        &self,
+        sensor: usize,
+        grid: &Grid,
+        symbols: &[Vec<Table>],
+        deadline: Deadline,
+    ) -> Option<Block> {
         let mut total: Vec<f64> = Vec::new();
         for (s, scenario) in self.scenarios.iter().enumerate() {
             let others = symbols
@@ -247,17 +254,17 @@ impl Landscape {
                 .filter(|(n, _)| *n != sensor)
                 .map(|(_, t)| &t[s]);
             let tables: Vec<&Table> = others.chain([&grid.cells[s]]).collect();
-            let sums = moments(&tables, &scenario.features);
+            let sums = moments_until(&tables, &scenario.features, deadline)?;
             total.resize(sums.len(), 0.0);
             add_scaled(&mut total, scenario.weight, &sums);
         }
         let cells = grid.edges.len() + 1;
-        Block {
+        Some(Block {
             others: total.len() / (cells * self.width()),
             moments: total,
             cells,
             sensor,
-        }
+        })
     }
 
     /// The signed criterion without constants, and without what the other sensors add to a conditional entropy.
@@ -315,15 +322,21 @@ impl Landscape {
         negative_entropy(&symbols.values, &self.scenarios[0].scene.mass.weights)
     }
 
-    /// The value of a whole design.
-    pub(super) fn total(&self, grids: &[Grid], words: &[Words], symbols: &[Vec<Table>]) -> f64 {
+    /// The value of a whole design; `None` if the time is over first.
+    pub(super) fn total(
+        &self,
+        grids: &[Grid],
+        words: &[Words],
+        symbols: &[Vec<Table>],
+        deadline: Deadline,
+    ) -> Option<f64> {
         let last = grids.len() - 1;
-        let block = self.block(last, &grids[last], symbols);
+        let block = self.block(last, &grids[last], symbols, deadline)?;
         let mut value = self.value(&block, &grids[last], &words[last]);
         if self.scored.has_separable_entropy() {
             value += symbols[..last].iter().map(|s| self.own_entropy(&s[0])).sum::<f64>();
         }
-        value
+        Some(value)
     }
 
     /// Size against which a change of a value counts.

@@ -8,8 +8,10 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `request`, `solution` | question and answer |
-//! | `landscape`, `search` | the criterion on grids; cells and words searched together |
-//! | `pipeline`, `polish`, `share` | single sensors, all sensors, Newton's method; shares of a total |
+//! | `pipeline`, `control` | from the question to the answer; time limit and progress |
+//! | `participant`, `landscape` | sensors with cells and words; the criterion on grids |
+//! | `search`, `starts` | cells and words searched together; from which starts |
+//! | `polish`, `share` | Newton's method; shares of a total |
 //! | `adc`, `export`, `additive` | what leaves the library |
 //! | `robust` | other scenes than the one of the design |
 //!
@@ -20,8 +22,10 @@
 
 mod adc;
 mod additive;
+mod control;
 mod export;
 mod landscape;
+mod participant;
 mod pipeline;
 mod polish;
 mod request;
@@ -29,10 +33,12 @@ mod robust;
 mod search;
 mod share;
 mod solution;
+mod starts;
 
 pub use adc::{Adc, Rounded};
 pub use additive::AdditiveDecoder;
+pub use control::{Progress, Stage};
 pub use export::{Export, JSON_SCHEMA};
-pub use request::{Bits, MAX_BITS, Progress, Request, Stage};
+pub use request::{Bits, MAX_BITS, Request};
 pub use robust::{Minimax, Mismatch, Sensitivity, minimax};
 pub use solution::{Bound, BoundKind, SensorDesign, Solution, Solutions};

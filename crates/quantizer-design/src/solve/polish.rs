@@ -1,24 +1,24 @@
 //! Newton's method on the breakpoints of a design found on grids, on the full nodes; a cell that vanishes is merged.
 
-use super::pipeline::Participant;
-use super::search::WordedCells;
+use super::participant::{Participant, WordedCells, system_of};
 use crate::criterion::{Criterion, Scored};
-use crate::design::{Scope, joint};
+use crate::deadline::Deadline;
+use crate::design::{Scope, joint_until};
 use crate::error::Error;
 use crate::newton::{Certificate, Newton};
 use crate::scene::{Resolution, Scene};
-use crate::system::{SensorGroup, System};
-use fewbits_quantizers::{Channel, Quantizer};
+use crate::system::System;
 
 /// Newton's method is left out where the second derivatives take more multiplications than this.
 const MAX_HESSIAN_WORK: f64 = 1e8;
-/// The same after the time limit.
-const LATE_HESSIAN_WORK: f64 = 3e7;
-
 /// A design whose evaluation takes more multiplications than this stays on coarse nodes, where its value is known to 1e-5.
 const MAX_VALUE_WORK: f64 = 1e9;
+/// The same when the time is over.
+const LATE_VALUE_WORK: f64 = 1e8;
+/// When the time is over, and one evaluation on coarse nodes takes more than this, the value is taken on rough ones.
+const LATE_COARSE_WORK: f64 = 3e8;
 
-/// A design on the full nodes, or on coarse ones if it is too large.
+/// A design on the full nodes, or on fewer if it is too large.
 pub(super) struct Polished {
     pub(super) system: System,
     /// Cells and words of each participant.
@@ -28,12 +28,11 @@ pub(super) struct Polished {
 }
 
 /// Whether Newton's method on the full nodes is worth its time.
-pub(super) fn is_affordable(scene: &Scene, criterion: Criterion, outcomes: f64, is_late: bool) -> bool {
+pub(super) fn is_affordable(scene: &Scene, criterion: Criterion, outcomes: f64) -> bool {
     // A table as large as that of the outcomes for each sensor, twice, and for each pair.
     let sensors = scene.sensors() as f64;
     let tables = 1.0 + 2.0 * sensors + 0.5 * sensors * (sensors - 1.0);
-    let limit = if is_late { LATE_HESSIAN_WORK } else { MAX_HESSIAN_WORK };
-    tables * evaluation_work(scene, criterion, outcomes) <= limit
+    tables * evaluation_work(scene, criterion, outcomes) <= MAX_HESSIAN_WORK
 }
 
 /// Multiplications that one evaluation takes.
@@ -51,7 +50,7 @@ pub(super) fn polish(
     participants: &[Participant],
     mut cells: Vec<WordedCells>,
     apart: bool,
-    is_late: bool,
+    deadline: Deadline,
 ) -> Result<Polished, Error> {
     let scope = if apart {
         Scope::EverySensor
@@ -60,29 +59,34 @@ pub(super) fn polish(
     };
     // Most of the way goes on coarse nodes, which are a tenth as many.
     let coarse = scene.at(Resolution::Coarse)?;
+    let unproved = |cells: Vec<WordedCells>| {
+        let mut system = system_of(scene, participants, &cells, apart)?;
+        let outcomes = system.outcomes() as f64;
+        let work = evaluation_work(scene, criterion, outcomes);
+        let is_late = deadline.is_over();
+        if is_late && evaluation_work(&coarse, criterion, outcomes) > LATE_COARSE_WORK {
+            system = system_of(&scene.at(Resolution::Rough)?, participants, &cells, apart)?;
+        } else if work > if is_late { LATE_VALUE_WORK } else { MAX_VALUE_WORK } {
+            system = system_of(&coarse, participants, &cells, apart)?;
+        }
+        Ok(Polished {
+            system,
+            cells,
+            certificate: Certificate::Unproved,
+            scope,
+        })
+    };
     let mut is_coarse = true;
     loop {
         let system = system_of(if is_coarse { &coarse } else { scene }, participants, &cells, apart)?;
-        let unproved = |cells: Vec<WordedCells>| {
-            let mut system = system_of(scene, participants, &cells, apart)?;
-            if evaluation_work(scene, criterion, system.outcomes() as f64) > MAX_VALUE_WORK {
-                system = system_of(&coarse, participants, &cells, apart)?;
-            }
-            Ok(Polished {
-                system,
-                cells,
-                certificate: Certificate::Unproved,
-                scope,
-            })
-        };
-        if !is_affordable(system.scene(), criterion, system.outcomes() as f64, is_late) {
+        if deadline.is_over() || !is_affordable(system.scene(), criterion, system.outcomes() as f64) {
             return unproved(cells);
         }
         let newton = Newton {
             max_iterations: if is_coarse { 60 } else { 25 },
             ..Newton::default()
         };
-        match joint(&system, criterion, &newton) {
+        match joint_until(&system, criterion, &newton, deadline) {
             Ok(design) if design.system.groups().len() == system.groups().len() => {
                 for (group, designed) in design.system.groups().iter().enumerate() {
                     for n in system.groups()[group].sensors() {
@@ -93,12 +97,11 @@ pub(super) fn polish(
                     is_coarse = false;
                     continue;
                 }
-                let (certificate, scope) = (design.certificate, design.scope);
                 return Ok(Polished {
                     system: design.system,
                     cells,
-                    certificate,
-                    scope,
+                    certificate: design.certificate,
+                    scope: design.scope,
                 });
             }
             Err(Error::VanishingCell { quantizer, cell, .. }) => {
@@ -136,64 +139,6 @@ fn merge(cells: &mut WordedCells, cell: usize) -> bool {
         }
     }
     true
-}
-
-/// The system of these cells and words; symbols are the received words, and one more if a word may be missing.
-pub(super) fn system_of(
-    scene: &Scene,
-    participants: &[Participant],
-    cells: &[WordedCells],
-    apart: bool,
-) -> Result<System, Error> {
-    let mut groups: Vec<(usize, Vec<usize>)> = Vec::new();
-    for n in 0..participants.len() {
-        let alike = groups.iter_mut().find(|(first, _)| {
-            !apart
-                && cells[*first] == cells[n]
-                && participants[*first].law() == participants[n].law()
-                && scene.interchangeable(*first, n)
-        });
-        match alike {
-            Some((_, sensors)) => sensors.push(n),
-            None => groups.push((n, vec![n])),
-        }
-    }
-    let groups = groups.into_iter().map(|(first, sensors)| {
-        let (quantizer, channel) = parts_of(scene, first, &participants[first], &cells[first])?;
-        SensorGroup::new(quantizer, channel, sensors)
-    });
-    System::new(scene.clone(), groups.collect::<Result<_, _>>()?)
-}
-
-/// Quantizer and channel of one sensor. A sensor with a single cell gets a second one that is sent as the same word.
-fn parts_of(
-    scene: &Scene,
-    sensor: usize,
-    participant: &Participant,
-    cells: &WordedCells,
-) -> Result<(Quantizer, Channel), Error> {
-    let mut used: Vec<usize> = Vec::new();
-    let mut labels: Vec<usize> = Vec::new();
-    for word in &cells.words {
-        let at = used.iter().position(|u| u == word).unwrap_or(used.len());
-        if at == used.len() {
-            used.push(*word);
-        }
-        labels.push(at);
-    }
-    let mut breakpoints = cells.breakpoints.clone();
-    if used.len() == 1 {
-        used.push(used[0]);
-        (labels, breakpoints) = (vec![0, 1], vec![scene.sample_mean()]);
-        debug_assert!(sensor < scene.sensors());
-    }
-    let law = participant.law();
-    let rows: Vec<Vec<f64>> = law
-        .transition
-        .chunks_exact(law.words)
-        .map(|row| used.iter().map(|w| row[*w]).collect())
-        .collect();
-    Ok((Quantizer::with_labels(breakpoints, labels)?, Channel::from_rows(&rows)?))
 }
 
 #[cfg(test)]

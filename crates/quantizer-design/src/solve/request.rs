@@ -1,19 +1,18 @@
 //! What is asked of a design.
 
-use super::search::WordedCells;
-use super::solution::{Solution, Solutions};
-use super::{pipeline, share};
+use super::control::Progress;
+use super::participant::WordedCells;
 use crate::criterion::{AllowedCells, Criterion};
 use crate::error::{Error, refuse};
 use crate::scene::{Prior, Scene};
 use fewbits_core::Link;
 use fewbits_quantizers::quantizer::check_increasing;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Longest word of a sensor. More bits need no joint design: a Lloyd-Max quantizer loses next to nothing.
 pub const MAX_BITS: u32 = 6;
 /// Most bits that are shared out.
-const MAX_TOTAL: u32 = 40;
+pub(super) const MAX_TOTAL: u32 = 40;
 
 /// How many bits the sensors may send.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,32 +23,6 @@ pub enum Bits {
     PerSensor(Vec<u32>),
     /// All sensors together this many; who sends how many is part of the design.
     Total(u32),
-}
-
-/// How far a design has come, for a display.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
-    /// What is being done.
-    pub stage: Stage,
-    /// Parts of the stage that are done.
-    pub done: usize,
-    /// Parts of the stage.
-    pub parts: usize,
-    /// Time since the start.
-    pub elapsed: Duration,
-}
-
-/// A part of a design.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
-    /// Each sensor by itself.
-    SingleSensors,
-    /// All sensors together, from several starts.
-    AllSensors,
-    /// Finer breakpoints for the best few results.
-    Refinement,
-    /// Newton's method on the best few, with the certificate.
-    Certificate,
 }
 
 /// A design to be made: who measures what, how many bits each may send, over which links, and to what end.
@@ -143,8 +116,8 @@ impl<'a> Request<'a> {
         self
     }
 
-    /// Starts of the search over all sensors (default 60); fewer where a start is expensive. The result depends on nothing else
-    /// unless a time limit is met.
+    /// Starts of the search over all sensors (default 60), besides those with one sensor's cells folded where that is allowed; fewer
+    /// where a start is expensive. The result depends on nothing else unless a time limit is met.
     #[must_use]
     pub fn with_starts(mut self, starts: usize) -> Self {
         self.starts = starts.max(1);
@@ -177,7 +150,8 @@ impl<'a> Request<'a> {
         Ok(self)
     }
 
-    /// Ends the search after this time with the best design so far. The certificate of that design comes on top.
+    /// Ends the search after this time with the best design so far. Its value comes on top: a fraction of a second, or some seconds
+    /// for a million joint symbols with correlated unequal noise.
     #[must_use]
     pub fn with_time_limit(mut self, limit: Duration) -> Self {
         self.time_limit = Some(limit);
@@ -189,91 +163,5 @@ impl<'a> Request<'a> {
     pub fn with_progress(mut self, progress: &'a mut dyn FnMut(Progress)) -> Self {
         self.progress = Some(progress);
         self
-    }
-
-    /// Makes the design: several, best first.
-    ///
-    /// # Errors
-    /// If a number of bits is above [`MAX_BITS`], all are zero, their number is not that of the sensors, or more bits are to be
-    /// shared out than the sensors can send; [`Error::TooLarge`] if the sensors have more joint symbols than can be enumerated.
-    pub fn run(mut self) -> Result<Solutions, Error> {
-        let sensors = self.scene.sensors();
-        let mut control = Control::new(self.time_limit, self.progress.take());
-        let bits = match &self.bits {
-            Bits::Each(bits) => vec![*bits; sensors],
-            Bits::PerSensor(bits) => bits.clone(),
-            Bits::Total(total) => {
-                let most = (MAX_BITS * sensors as u32).min(MAX_TOTAL);
-                if !(1..=most).contains(total) {
-                    return refuse("bits", total, format!("1 to {most} bits in all"));
-                }
-                share::shared_out(&self, *total, &mut control)?
-            }
-        };
-        if bits.len() != sensors {
-            return refuse("bits", format!("{} numbers", bits.len()), format!("one per sensor, {sensors}"));
-        }
-        if let Some(bits) = bits.iter().find(|b| **b > MAX_BITS) {
-            return refuse("bits", bits, format!("at most {MAX_BITS} bits per sensor"));
-        }
-        for (bits, cells) in bits.iter().zip(self.start.iter().flatten()) {
-            if let Some(word) = cells.words.iter().find(|w| **w >= 1 << bits) {
-                return refuse("word", word, format!("a word of {bits} bits"));
-            }
-        }
-        if bits.iter().all(|b| *b == 0) {
-            return refuse("bits", "0 for every sensor", "at least one bit");
-        }
-        let mut found: Vec<Solution> = pipeline::solve(&self, &bits, &mut control)?;
-        let sense = self.criterion.sense();
-        found.sort_by(|a, b| (sense * b.value()).total_cmp(&(sense * a.value())));
-        Ok(Solutions::new(found, control.steps, control.stopped))
-    }
-}
-
-/// Time limit and progress of a running design.
-pub(super) struct Control<'a> {
-    started: Instant,
-    limit: Option<Duration>,
-    progress: Option<&'a mut dyn FnMut(Progress)>,
-    pub(super) stopped: bool,
-    pub(super) steps: usize,
-}
-
-impl<'a> Control<'a> {
-    pub(super) fn new(limit: Option<Duration>, progress: Option<&'a mut dyn FnMut(Progress)>) -> Self {
-        Self {
-            started: Instant::now(),
-            limit,
-            progress,
-            stopped: false,
-            steps: 0,
-        }
-    }
-
-    /// Whether there is time left.
-    pub(super) fn go_on(&mut self) -> bool {
-        if self.limit.is_some_and(|limit| self.started.elapsed() >= limit) {
-            self.stopped = true;
-        }
-        !self.stopped
-    }
-
-    /// Counts a step of the search. Whether there is time left for it.
-    pub(super) fn step(&mut self) -> bool {
-        self.steps += 1;
-        self.go_on()
-    }
-
-    pub(super) fn report(&mut self, stage: Stage, done: usize, parts: usize) {
-        let elapsed = self.started.elapsed();
-        if let Some(progress) = &mut self.progress {
-            progress(Progress {
-                stage,
-                done,
-                parts,
-                elapsed,
-            });
-        }
     }
 }

@@ -1,9 +1,10 @@
 //! Priors and noise that are not known exactly.
 
+use super::control::Control;
 use super::landscape::{Grid, Landscape, WordLaw};
-use super::pipeline::Participant;
+use super::participant::{Participant, WordedCells};
 use super::request::Request;
-use super::search::{WordedCells, cells_of, climb, grid_with, refine, spacing};
+use super::search::{cells_of, climb, grid_with, refine, spacing};
 use super::solution::{SensorDesign, Solution};
 use crate::criterion::{AllowedCells, Criterion};
 use crate::error::{Error, refuse};
@@ -256,10 +257,13 @@ fn best_cells(landscape: &Landscape, cells: &[WordedCells]) -> Vec<WordedCells> 
         .map(|n| grid_with(landscape, n, GRID, &cells[n].breakpoints))
         .collect();
     let words = cells.iter().zip(&grids).map(|(c, g)| c.on(&g.edges)).collect();
-    let mut point = climb(landscape, grids, words, AllowedCells::Intervals, &mut || true);
+    let control = &mut Control::new(None, None);
+    let Some(mut point) = climb(landscape, grids, words, AllowedCells::Intervals, control) else {
+        return cells.to_vec();
+    };
     let mut spacings: Vec<f64> = (0..cells.len()).map(|n| spacing(landscape, n, GRID)).collect();
     for _ in 0..3 {
-        point = refine(landscape, point, &mut spacings, AllowedCells::Intervals, &mut || true);
+        point = refine(landscape, point, &mut spacings, AllowedCells::Intervals, control);
     }
     cells_of(&point)
 }

@@ -16,8 +16,11 @@
 //! Every step raises the criterion or is not taken, and a word that no cell is best sent as is simply not used: nothing can
 //! fail to converge.
 
+use super::control::Control;
 use super::landscape::{Block, Grid, Landscape, REACH, Words};
+use super::participant::WordedCells;
 use crate::criterion::AllowedCells;
+use crate::deadline::Deadline;
 use crate::moments::Table;
 use fewbits_monte_carlo::Stream;
 use rand::RngExt;
@@ -33,6 +36,8 @@ const FINER: i32 = 3;
 /// Exchanges of words are left out if trying all of them once takes more multiplications than this.
 const MAX_EXCHANGE_WORK: f64 = 3e8;
 
+/// Points that are kept for the next stage.
+const KEPT: usize = 4;
 /// Rounds over the sensors, or over cells and words of one sensor, after which a climb ends.
 const MAX_ROUNDS: usize = 60;
 /// Sweeps after which a loop over cells or words ends.
@@ -44,41 +49,6 @@ pub(super) struct Point {
     pub(super) grids: Vec<Grid>,
     pub(super) words: Vec<Words>,
     pub(super) value: f64,
-}
-
-/// Breakpoints of the cells of a sensor, and the word of each.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct WordedCells {
-    pub(super) breakpoints: Vec<f64>,
-    pub(super) words: Vec<usize>,
-}
-
-impl WordedCells {
-    /// Runs of equal words on a grid.
-    pub(super) fn of(edges: &[f64], words: &[usize]) -> Self {
-        let changes: Vec<usize> = (1..words.len()).filter(|c| words[*c] != words[c - 1]).collect();
-        Self {
-            breakpoints: changes.iter().map(|c| edges[c - 1]).collect(),
-            words: std::iter::once(words[0])
-                .chain(changes.iter().map(|c| words[*c]))
-                .collect(),
-        }
-    }
-
-    /// The words of the cells of a grid, each that of its middle.
-    pub(super) fn on(&self, edges: &[f64]) -> Words {
-        (0..=edges.len())
-            .map(|c| {
-                let middle = match (c.checked_sub(1).map(|i| edges[i]), edges.get(c)) {
-                    (Some(low), Some(high)) => 0.5 * (low + high),
-                    (Some(low), None) => low.next_up(),
-                    (None, Some(high)) => high.next_down(),
-                    (None, None) => 0.0,
-                };
-                self.words[self.breakpoints.partition_point(|b| *b <= middle)]
-            })
-            .collect()
-    }
 }
 
 /// Cells and words of every sensor at a point.
@@ -122,8 +92,14 @@ pub(super) fn start(landscape: &Landscape, sensor: usize, grid: &Grid, words: &[
     worded.on(&grid.edges)
 }
 
-/// Starting words of random cells: a random number of them, at random places, in random order.
-pub(super) fn random_start(landscape: &Landscape, sensor: usize, grid: &Grid, stream: Stream) -> Words {
+/// Starting words of random cells: a random number of them, at random places, in random order. Folded cells are more than words.
+pub(super) fn random_start(
+    landscape: &Landscape,
+    sensor: usize,
+    grid: &Grid,
+    shape: AllowedCells,
+    stream: Stream,
+) -> Words {
     let mut rng = stream.rng();
     let all = landscape.laws[sensor].words;
     let count = rng.random_range((all / 2).max(2)..=all);
@@ -132,36 +108,52 @@ pub(super) fn random_start(landscape: &Landscape, sensor: usize, grid: &Grid, st
         words.swap(i, rng.random_range(0..=i));
     }
     words.truncate(count);
+    if shape == AllowedCells::Any && all > 1 {
+        // Each cell another word than the one before it.
+        let count = rng.random_range(count..=2 * all + 1);
+        while words.len() < count {
+            let step = rng.random_range(1..all);
+            words.push((words[words.len() - 1] + step) % all);
+        }
+    }
     let fine = landscape.sample(sensor).quantiles(200);
-    let mut breakpoints: Vec<f64> = (1..count).map(|_| fine[rng.random_range(0..fine.len())]).collect();
+    let mut breakpoints: Vec<f64> = (1..words.len())
+        .map(|_| fine[rng.random_range(0..fine.len())])
+        .collect();
     breakpoints.sort_by(f64::total_cmp);
     WordedCells { breakpoints, words }.on(&grid.edges)
 }
 
-/// Climbs from the words of a point until a round over the sensors gains nothing. `go_on` is asked before each sensor.
+/// Climbs from the words of a point until a round over the sensors gains nothing, or the time is over; `None` if there is no time
+/// to evaluate the first point.
 pub(super) fn climb(
     landscape: &Landscape,
     grids: Vec<Grid>,
     mut words: Vec<Words>,
     shape: AllowedCells,
-    go_on: &mut dyn FnMut() -> bool,
-) -> Point {
+    control: &mut Control<'_>,
+) -> Option<Point> {
+    let deadline = control.deadline();
     let mut symbols: Vec<Vec<Table>> = (0..grids.len())
         .map(|n| landscape.symbols(n, &grids[n], &words[n]))
         .collect();
-    let mut value = landscape.total(&grids, &words, &symbols);
+    let mut value = landscape.total(&grids, &words, &symbols, deadline)?;
     for _ in 0..MAX_ROUNDS {
         let before = value;
         for n in 0..grids.len() {
-            if !go_on() {
-                return Point { grids, words, value };
-            }
-            let block = landscape.block(n, &grids[n], &symbols);
+            let block = control
+                .step()
+                .then(|| landscape.block(n, &grids[n], &symbols, deadline))
+                .flatten();
+            let Some(block) = block else {
+                return Some(Point { grids, words, value });
+            };
             let mut sensor = Sensor {
                 landscape,
                 grid: &grids[n],
                 block: &block,
                 shape,
+                deadline,
                 value: landscape.value(&block, &grids[n], &words[n]),
                 words: std::mem::take(&mut words[n]),
             };
@@ -175,7 +167,7 @@ pub(super) fn climb(
             break;
         }
     }
-    Point { grids, words, value }
+    Some(Point { grids, words, value })
 }
 
 /// The point on finer grids about its breakpoints, a third as wide as `spacing`, climbed again.
@@ -184,7 +176,7 @@ pub(super) fn refine(
     point: Point,
     spacings: &mut [f64],
     shape: AllowedCells,
-    go_on: &mut dyn FnMut() -> bool,
+    control: &mut Control<'_>,
 ) -> Point {
     let (mut grids, mut words) = (Vec::new(), Vec::new());
     for (n, spacing) in spacings.iter_mut().enumerate() {
@@ -202,12 +194,20 @@ pub(super) fn refine(
         grids.push(landscape.grid(n, edges));
         *spacing /= f64::from(FINER);
     }
-    climb(landscape, grids, words, shape, go_on)
+    climb(landscape, grids, words, shape, control).unwrap_or(point)
 }
 
 /// The largest distance between neighbouring breakpoint candidates that matter: how far a breakpoint may be off.
 pub(super) fn spacing(landscape: &Landscape, sensor: usize, cells: usize) -> f64 {
     2.0 * EVEN_SHARE * REACH * landscape.sample(sensor).deviation / (cells / 2) as f64
+}
+
+/// The best points, those of nearly equal value once.
+pub(super) fn best_of(mut points: Vec<Point>, same: f64) -> Vec<Point> {
+    points.sort_by(|a, b| b.value.total_cmp(&a.value));
+    points.dedup_by(|b, a| (a.value - b.value).abs() <= same);
+    points.truncate(KEPT);
+    points
 }
 
 /// One sensor, the others as they are.
@@ -216,6 +216,7 @@ struct Sensor<'a> {
     grid: &'a Grid,
     block: &'a Block,
     shape: AllowedCells,
+    deadline: Deadline,
     words: Words,
     value: f64,
 }
@@ -228,7 +229,7 @@ impl Sensor<'_> {
             if self.exchange_work() <= MAX_EXCHANGE_WORK {
                 self.exchange_words();
             }
-            if self.value - before <= GAIN * self.landscape.unit(before) {
+            if self.value - before <= GAIN * self.landscape.unit(before) || self.deadline.is_over() {
                 return;
             }
         }
@@ -255,7 +256,7 @@ impl Sensor<'_> {
                 AllowedCells::Any => self.best_words(&worth),
                 AllowedCells::Intervals => self.best_intervals(&worth),
             };
-            if !self.accept(next) {
+            if !self.accept(next) || self.deadline.is_over() {
                 return;
             }
         }
@@ -302,7 +303,7 @@ impl Sensor<'_> {
             let mut changed = false;
             for a in 0..count {
                 for b in a + 1..count {
-                    if !used[a] && !used[b] {
+                    if !used[a] && !used[b] || self.deadline.is_over() {
                         continue;
                     }
                     renamed.swap(a, b);

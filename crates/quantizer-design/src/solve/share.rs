@@ -8,97 +8,119 @@
 //!     one bit from one sensor to another
 //! ```
 //!
-//! Each step is a short search over all sensors; equal sensors are tried once.
+//! Each step is a short search over all sensors. When its share of the time is over, each bit that is left goes to the sensor
+//! of the largest signal-to-noise ratio, where a bit counts as half of it.
 
-use super::pipeline::{Participant, search};
-use super::request::{Control, MAX_BITS, Request};
+use super::control::Control;
+use super::participant::Participant;
+use super::request::{MAX_BITS, Request};
+use super::starts::Search;
 use crate::criterion::AllowedCells;
 use crate::error::Error;
 use std::collections::BTreeMap;
 
+/// Portion of the time limit that sharing out may take.
+const SHARE: f64 = 0.4;
 /// Moves of single bits after which the shares stay.
 const MAX_MOVES: usize = 20;
 
 /// Bits of every sensor.
 pub(super) fn shared_out(request: &Request<'_>, total: u32, control: &mut Control<'_>) -> Result<Vec<u32>, Error> {
+    control.end_with(SHARE);
     let sensors = request.scene.sensors();
-    let mut known = BTreeMap::new();
-    let mut bits = vec![0; sensors];
-    for _ in 0..total {
-        let longer = (0..sensors).filter(|n| bits[*n] < MAX_BITS).map(|n| {
-            let mut bits = bits.clone();
-            bits[n] += 1;
-            bits
-        });
-        let Some((_, best)) = best_of(request, longer.collect(), &mut known, control)? else {
-            break;
-        };
-        bits = best;
-    }
-    let Some((mut value, _)) = best_of(request, vec![bits.clone()], &mut known, control)? else {
-        return Ok(bits);
+    let mut tried = Tried {
+        request,
+        values: BTreeMap::new(),
     };
+    let (mut bits, mut value) = (vec![0; sensors], f64::NEG_INFINITY);
+    for _ in 0..total {
+        let more: Vec<Vec<u32>> = (0..sensors)
+            .filter(|n| bits[*n] < MAX_BITS)
+            .map(|n| moved(&bits, None, n))
+            .collect();
+        (value, bits) = match tried.best_of(&more, control)? {
+            Some(best) => best,
+            None => (value, moved(&bits, None, next_sensor(request, &bits))),
+        };
+    }
     for _ in 0..MAX_MOVES {
         let pairs = (0..sensors).flat_map(|from| (0..sensors).map(move |to| (from, to)));
-        let moved = pairs
+        let exchanged: Vec<Vec<u32>> = pairs
             .filter(|(from, to)| from != to && bits[*from] > 0 && bits[*to] < MAX_BITS)
-            .map(|(from, to)| {
-                let mut bits = bits.clone();
-                bits[from] -= 1;
-                bits[to] += 1;
-                bits
-            });
-        match best_of(request, moved.collect(), &mut known, control)? {
+            .map(|(from, to)| moved(&bits, Some(from), to))
+            .collect();
+        match tried.best_of(&exchanged, control)? {
             Some((better, other)) if better > value => (value, bits) = (better, other),
             _ => break,
         }
-        if !control.go_on() {
-            break;
-        }
     }
+    control.end_with(1.0);
     Ok(bits)
 }
 
-/// The best of some shares, with its signed value.
-fn best_of(
-    request: &Request<'_>,
-    shares: Vec<Vec<u32>>,
-    known: &mut BTreeMap<Vec<u32>, f64>,
-    control: &mut Control<'_>,
-) -> Result<Option<(f64, Vec<u32>)>, Error> {
-    let mut best: Option<(f64, Vec<u32>)> = None;
-    for bits in shares {
-        let value = match known.get(&bits) {
-            Some(value) => *value,
-            None => {
-                let value = value_of(request, &bits, control)?;
-                known.insert(bits.clone(), value);
-                value
-            }
-        };
-        if best.as_ref().is_none_or(|b| value > b.0) {
-            best = Some((value, bits));
-        }
+/// One bit more for sensor `to`, from sensor `from` if there is one.
+fn moved(bits: &[u32], from: Option<usize>, to: usize) -> Vec<u32> {
+    let mut bits = bits.to_vec();
+    if let Some(from) = from {
+        bits[from] -= 1;
     }
-    Ok(best)
+    bits[to] += 1;
+    bits
 }
 
-fn value_of(request: &Request<'_>, bits: &[u32], control: &mut Control<'_>) -> Result<f64, Error> {
-    let sensors: Vec<usize> = (0..bits.len()).filter(|n| bits[*n] > 0).collect();
-    let participants: Vec<Participant> = sensors
-        .iter()
-        .map(|n| Participant {
-            sensor: *n,
-            bits: bits[*n],
-            link: request.links[*n],
-        })
-        .collect();
-    let scene = request.scene.subset(&sensors)?;
-    let found = search(&scene, request.criterion, &participants, AllowedCells::Intervals, (2, None), control)?;
-    // Too many joint symbols to compare: such a share is not taken.
-    Ok(if found.value.is_nan() {
-        f64::NEG_INFINITY
-    } else {
-        found.value
-    })
+/// The sensor of the largest signal-to-noise ratio, halved once for each bit that it has.
+fn next_sensor(request: &Request<'_>, bits: &[u32]) -> usize {
+    let scene = &request.scene;
+    let left = |n: usize| {
+        let ratio = scene.prior().deviation() / scene.noise().deviation(n);
+        ratio.ln() - f64::from(bits[n]) * std::f64::consts::LN_2
+    };
+    let open = (0..bits.len()).filter(|n| bits[*n] < MAX_BITS);
+    open.max_by(|a, b| left(*a).total_cmp(&left(*b))).unwrap_or(0)
+}
+
+/// The shares that were tried, with their signed values.
+struct Tried<'a, 'b> {
+    request: &'a Request<'b>,
+    values: BTreeMap<Vec<u32>, f64>,
+}
+
+impl Tried<'_, '_> {
+    /// The best of some shares, with its signed value; `None` if there is none or the time is over.
+    fn best_of(&mut self, shares: &[Vec<u32>], control: &mut Control<'_>) -> Result<Option<(f64, Vec<u32>)>, Error> {
+        let mut best: Option<(f64, Vec<u32>)> = None;
+        for bits in shares {
+            if !control.go_on() {
+                return Ok(None);
+            }
+            let value = match self.values.get(bits) {
+                Some(value) => *value,
+                None => {
+                    let value = self.value_of(bits, control)?;
+                    self.values.insert(bits.clone(), value);
+                    value
+                }
+            };
+            if best.as_ref().is_none_or(|b| value > b.0) {
+                best = Some((value, bits.clone()));
+            }
+        }
+        Ok(best)
+    }
+
+    fn value_of(&self, bits: &[u32], control: &mut Control<'_>) -> Result<f64, Error> {
+        let participants = Participant::all(bits, &self.request.links);
+        let sensors: Vec<usize> = participants.iter().map(|p| p.sensor).collect();
+        let search = Search {
+            scene: &self.request.scene.subset(&sensors)?,
+            criterion: self.request.criterion,
+            participants: &participants,
+            shape: AllowedCells::Intervals,
+            starts: 2,
+            given: None,
+        };
+        let value = search.run(control)?.value;
+        // Too many joint symbols to compare: such a share is not taken.
+        Ok(if value.is_nan() { f64::NEG_INFINITY } else { value })
+    }
 }

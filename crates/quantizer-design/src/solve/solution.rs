@@ -1,8 +1,6 @@
 //! What a design is: cells and words of every sensor, what they are worth, and how sure that is.
 
-use super::pipeline::{Participant, missing};
-use super::request::Request;
-use super::search::WordedCells;
+use super::participant::{Participant, WordedCells, missing, system_of};
 use crate::bounds;
 use crate::criterion::Criterion;
 use crate::decoder::MmseDecoder;
@@ -121,7 +119,7 @@ pub struct Solution {
 
 impl Solution {
     pub(super) fn new(
-        request: &Request<'_>,
+        criterion: Criterion,
         participants: &[Participant],
         system: System,
         cells: Vec<WordedCells>,
@@ -135,7 +133,7 @@ impl Solution {
             words: cells.words,
             link: p.link,
         });
-        Self::assembled(request.criterion, system, sensors.collect(), certificate, scope)
+        Self::assembled(criterion, system, sensors.collect(), certificate, scope)
     }
 
     pub(super) fn assembled(
@@ -173,7 +171,7 @@ impl Solution {
     }
 
     /// Value of the criterion: squared units, nats, or a probability. Exact to 1e-12, or to 1e-5 for a design with so many joint
-    /// symbols and nodes that one evaluation would take seconds.
+    /// symbols and nodes that one evaluation would take seconds; to some parts in a thousand if, besides, a time limit is over.
     pub fn value(&self) -> f64 {
         self.value
     }
@@ -258,7 +256,7 @@ impl Solution {
         }
         let participants = self.participants();
         let apart = self.system.groups().len() == self.sensors.len();
-        let system = super::polish::system_of(self.system.scene(), &participants, &cells, apart)?;
+        let system = system_of(self.system.scene(), &participants, &cells, apart)?;
         let sensors = self.sensors.iter().zip(cells).map(|(s, c)| SensorDesign {
             breakpoints: c.breakpoints,
             words: c.words,
@@ -282,7 +280,7 @@ impl Solution {
             let expected = format!("{}, those that take part", self.sensors.len());
             return refuse("scene", format!("{} sensors", scene.sensors()), expected);
         }
-        super::polish::system_of(scene, &self.participants(), &self.cells(), true)
+        system_of(scene, &self.participants(), &self.cells(), true)
     }
 
     /// Cells and words of every sensor.

@@ -2,12 +2,41 @@
 
 use std::time::{Duration, Instant};
 
-/// The least value found from `start` with first steps of size `step`, until the simplex is small or the time is over.
-pub fn minimise(f: &mut dyn FnMut(&[f64]) -> f64, start: &[f64], step: f64, until: Instant) -> f64 {
+/// A span of time that the thread spends on the processor, or on the clock where the system does not tell.
+pub struct Stopwatch {
+    clock: Instant,
+    processor: Option<Duration>,
+}
+
+impl Stopwatch {
+    pub fn start() -> Self {
+        Self {
+            clock: Instant::now(),
+            processor: on_processor(),
+        }
+    }
+
+    pub fn elapsed(&self) -> Duration {
+        match (self.processor, on_processor()) {
+            (Some(start), Some(end)) => end.saturating_sub(start),
+            _ => self.clock.elapsed(),
+        }
+    }
+}
+
+/// Time of this thread on the processor so far.
+fn on_processor() -> Option<Duration> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    text.split(' ').next()?.parse().ok().map(Duration::from_nanos)
+}
+
+/// The least value found from `start` with first steps of size `step`, until the simplex is small or the time is
+/// over.
+pub fn minimise(f: &mut dyn FnMut(&[f64]) -> f64, start: &[f64], step: f64, is_over: &dyn Fn() -> bool) -> f64 {
     let n = start.len();
     let mut simplex: Vec<(f64, Vec<f64>)> = vec![(f(start), start.to_vec())];
     for i in 0..n {
-        if Instant::now() >= until {
+        if is_over() {
             return simplex.iter().map(|c| c.0).fold(f64::INFINITY, f64::min);
         }
         let mut corner = start.to_vec();
@@ -17,7 +46,7 @@ pub fn minimise(f: &mut dyn FnMut(&[f64]) -> f64, start: &[f64], step: f64, unti
     for _ in 0..400 * n {
         simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (best, worst) = (simplex[0].0, simplex[n].0);
-        if Instant::now() >= until || worst - best <= 1e-10 * best.abs() {
+        if is_over() || worst - best <= 1e-10 * best.abs() {
             break;
         }
         let centre: Vec<f64> = (0..n)
@@ -51,9 +80,4 @@ pub fn minimise(f: &mut dyn FnMut(&[f64]) -> f64, start: &[f64], step: f64, unti
         }
     }
     simplex.iter().map(|c| c.0).fold(f64::INFINITY, f64::min)
-}
-
-/// Until when a search of this length may go on.
-pub fn deadline(time: Duration) -> Instant {
-    Instant::now() + time
 }

@@ -1,14 +1,14 @@
 //! Random scenes, and multi-start Nelder-Mead on them.
 
-use super::nelder_mead;
+use super::nelder_mead::{Stopwatch, minimise};
 use fewbits_core::Link;
 use fewbits_monte_carlo::Stream;
-use fewbits_quantizer_design::solve::{Bits, Request, Solution};
+use fewbits_quantizer_design::solve::{Bits, Request, Solution, Solutions};
 use fewbits_quantizer_design::{
     Channel, Criterion, Error, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max,
 };
 use rand::RngExt;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A scene with its task.
 pub struct Task {
@@ -61,9 +61,20 @@ pub fn task(i: u64, scale: f64, max_sensors: usize, max_bits: u32) -> Result<Tas
     })
 }
 
+/// Designs, and the processor time that they took.
+pub struct Found {
+    pub solutions: Solutions,
+    pub time: Duration,
+}
+
 impl Task {
-    pub fn solve(&self, limit: Option<Duration>) -> Result<(Solution, Duration), Box<dyn std::error::Error>> {
-        let started = Instant::now();
+    /// Squared error of a design on the full nodes.
+    pub fn exact(&self, solution: &Solution) -> Result<f64, Error> {
+        System::new(self.scene.clone(), solution.system().groups().to_vec())?.value(Criterion::MeanSquaredError)
+    }
+
+    pub fn solve(&self, limit: Option<Duration>) -> Result<Found, Box<dyn std::error::Error>> {
+        let watch = Stopwatch::start();
         let mut request = Request::estimation(
             self.scene.clone(),
             Bits::PerSensor(self.bits.clone()),
@@ -72,13 +83,17 @@ impl Task {
         if let Some(limit) = limit {
             request = request.with_time_limit(limit);
         }
-        Ok((request.run()?.best().clone(), started.elapsed()))
+        Ok(Found {
+            solutions: request.run()?,
+            time: watch.elapsed(),
+        })
     }
 
-    /// Least squared error that Nelder-Mead finds in the given time, from Lloyd-Max cells and random ones, with Gray and natural
+    /// Least squared error that Nelder-Mead finds in the given processor time, from Lloyd-Max cells and random ones, with Gray and natural
     /// words in turn.
     pub fn nelder_mead(&self, time: Duration) -> Result<f64, Error> {
-        let until = nelder_mead::deadline(time);
+        let watch = Stopwatch::start();
+        let is_over = || watch.elapsed() >= time;
         let mut best = f64::INFINITY;
         for start in 0.. {
             let mut rng = Stream::new(7).named("nelder-mead").indexed(start).rng();
@@ -119,8 +134,8 @@ impl Task {
                 moved.unwrap_or(f64::INFINITY)
             };
             let step = 0.15 * self.scene.sample_deviation(0);
-            best = best.min(nelder_mead::minimise(&mut error, &at, step, until));
-            if Instant::now() >= until {
+            best = best.min(minimise(&mut error, &at, step, &is_over));
+            if is_over() {
                 break;
             }
         }

@@ -1,0 +1,20 @@
+//! When a computation must end.
+
+use std::time::{Duration, Instant};
+
+/// The instant at which a computation must end, if there is one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Deadline(Option<Instant>);
+
+impl Deadline {
+    pub(crate) const NEVER: Self = Self(None);
+
+    /// So long after an instant; never without a limit, or if the limit is longer than the clock can count.
+    pub(crate) fn after(start: Instant, limit: Option<Duration>) -> Self {
+        Self(limit.and_then(|limit| start.checked_add(limit)))
+    }
+
+    pub(crate) fn is_over(self) -> bool {
+        self.0.is_some_and(|end| Instant::now() >= end)
+    }
+}
