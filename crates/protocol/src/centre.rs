@@ -194,7 +194,7 @@ impl Centre {
         self.on_deadline(actions);
         let schedule = &self.settings.schedule;
         let count = schedule.count(now);
-        let next = schedule.start(count.max(self.slot) + 1);
+        let next = schedule.start(count.max(self.slot).saturating_add(1));
         actions.push(Action::SetTimer {
             at: next,
             timer: CentreTimer::SlotBegins,
