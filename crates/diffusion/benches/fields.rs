@@ -17,7 +17,13 @@ fn main() {
 fn transport(scheme: Scheme) -> Transport {
     let grid = Grid::uniform(&[SIDE, SIDE], 0.1).unwrap();
     let wall = |cell: usize| grid.place(cell)[0] == SIDE / 3 && grid.place(cell)[1] < SIDE / 2;
-    let cells = (0..SIDE * SIDE).map(|cell| if wall(cell) { Cell::Blocked(Boundary::Closed) } else { Cell::Free });
+    let cells = (0..SIDE * SIDE).map(|cell| {
+        if wall(cell) {
+            Cell::Blocked(Boundary::Closed)
+        } else {
+            Cell::Free
+        }
+    });
     let closed = [Boundary::Closed; 2];
     let cells: Vec<Cell> = cells.collect();
     let domain = Domain::new(grid, &cells, [[Boundary::Inflow, Boundary::Outflow], closed, closed]).unwrap();
@@ -44,7 +50,10 @@ fn plain_lu_unit(bencher: Bencher) {
                 triplets.push(Triplet::new(cell - 1, cell, -1.0));
                 diagonal += 1.0;
             }
-            for other in [line.checked_sub(1), Some(line + 1).filter(|l| *l < SIDE)].into_iter().flatten() {
+            for other in [line.checked_sub(1), Some(line + 1).filter(|l| *l < SIDE)]
+                .into_iter()
+                .flatten()
+            {
                 triplets.push(Triplet::new(other * SIDE + column, cell, -1.0));
                 diagonal += 1.0;
             }
@@ -66,7 +75,9 @@ fn factor(bencher: Bencher, scheme: Scheme) {
 /// The matrix, ordering, factorisation and 50 adjoint solutions.
 #[divan::bench(args = [Scheme::Upwind, Scheme::ExponentialFitting], sample_count = 5, sample_size = 1)]
 fn field_of_50_sensors(bencher: Bencher, scheme: Scheme) {
-    let points: Vec<[f64; 3]> = (0..50).map(|i| [0.45 + 0.55 * f64::from(i), 0.45 + 0.5 * f64::from(i * 7 % 50), 0.0]).collect();
+    let points: Vec<[f64; 3]> = (0..50)
+        .map(|i| [0.45 + 0.55 * f64::from(i), 0.45 + 0.5 * f64::from(i * 7 % 50), 0.0])
+        .collect();
     bencher
         .with_inputs(|| transport(scheme))
         .bench_refs(|transport| SensorField::steady(transport, &points).unwrap());

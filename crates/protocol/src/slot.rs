@@ -96,7 +96,7 @@ impl Schedule {
     pub fn start(&self, count: u64) -> u64 {
         let start = self
             .origin
-            .saturating_add(i128::from(count) * i128::from(self.period.get()));
+            .saturating_add(i128::from(count).saturating_mul(i128::from(self.period.get())));
         u64::try_from(start.max(0)).unwrap_or(u64::MAX)
     }
 

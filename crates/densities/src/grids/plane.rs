@@ -255,6 +255,9 @@ impl Density<2> for PlaneMass {
             return f64::NEG_INFINITY;
         };
         let at = inverse * state - Vector2::new(self.first[0] as f64, self.first[1] as f64);
+        if state.iter().all(|x| x.is_finite()) && !at.iter().all(|x| x.is_finite()) {
+            return f64::NEG_INFINITY;
+        }
         let below = at.map(f64::floor);
         let share = at - below;
         let mut value = 0.0;

@@ -14,8 +14,13 @@ fn wild() -> impl Strategy<Value = f64> {
 }
 
 fn boundary(which: u8, leak: f64) -> Boundary {
-    [Boundary::Closed, Boundary::Absorbing, Boundary::Leaking(leak), Boundary::Inflow, Boundary::Outflow]
-        [usize::from(which % 5)]
+    [
+        Boundary::Closed,
+        Boundary::Absorbing,
+        Boundary::Leaking(leak),
+        Boundary::Inflow,
+        Boundary::Outflow,
+    ][usize::from(which % 5)]
 }
 
 fn finite(numbers: &[f64]) -> bool {
@@ -28,7 +33,14 @@ fn domain(x: &[f64], which: [u8; 6]) -> Option<Domain> {
     if which[0] % 2 == 0 {
         edges.iter_mut().for_each(|axis| axis.sort_by(f64::total_cmp));
     }
-    let grid = [Grid::new(&edges), Grid::uniform(&[3, 3], x[0]), Grid::uniform(&[3, 3], 0.5)].into_iter().flatten().next()?;
+    let grid = [
+        Grid::new(&edges),
+        Grid::uniform(&[3, 3], x[0]),
+        Grid::uniform(&[3, 3], 0.5),
+    ]
+    .into_iter()
+    .flatten()
+    .next()?;
     let cells: Vec<Cell> = (0..grid.cells())
         .map(|i| match which[i % 6] % 4 {
             0 => Cell::Blocked(boundary(which[i % 6] / 4, x[5])),

@@ -42,7 +42,11 @@ fn refused(
         misfits += usize::from(outcome.status == Status::Misfit);
         if outcome.status == Status::Converged {
             converged += 1;
-            wrong += usize::from((outcome.estimate().unwrap().mean() - truth.source).norm() > 1.0);
+            let off = (outcome.estimate().unwrap().mean() - truth.source).norm() > 1.0;
+            if off {
+                println!("WRONG {form:?} seed {seed} steps {} fit {:?}", outcome.steps.len(), outcome.fit());
+            }
+            wrong += usize::from(off);
         }
     }
     (misfits, converged, wrong)

@@ -210,17 +210,33 @@ fn extremes_stay_finite() {
 #[test]
 fn winds_beyond_the_range_of_squares_are_refused() {
     let air = |k: f64, wind: f64| Air::new(k, Vector3::new(wind, 0.0, 0.0), Ground::Impermeable);
-    for (k, wind) in [(40.0, 1e167), (40.0, -1e61), (1e-61, 1.0), (1e300, 1.0), (40.0, f64::NAN)] {
+    for (k, wind) in [
+        (40.0, 1e167),
+        (40.0, -1e61),
+        (1e-61, 1.0),
+        (1e300, 1.0),
+        (40.0, f64::NAN),
+    ] {
         assert!(air(k, wind).is_err(), "{k} {wind}");
     }
     assert!(air(40.0, 1.0).unwrap().with_closest(1e-61).is_err());
-    for (k, wind, closest) in [(1e-60, 1e60, 1e-60), (1e60, 1e60, 1e60), (1e60, 1e-60, 1e-60), (1e-60, 0.0, 1e-60)] {
+    for (k, wind, closest) in [
+        (1e-60, 1e60, 1e-60),
+        (1e60, 1e60, 1e60),
+        (1e60, 1e-60, 1e-60),
+        (1e-60, 0.0, 1e-60),
+    ] {
         let air = air(k, wind).unwrap().with_closest(closest).unwrap();
         for distance in [-f64::MAX, -1e60, -1.0, 0.0, 1e-300, 1.0, 1e60, 1e100, f64::MAX] {
             for age in [5e-324, 1e-60, 1.0, 1e60, f64::MAX, f64::INFINITY] {
                 let (field, source) = (Vector3::new(distance, 0.0, 0.0), Vector3::zeros());
                 let g = air.source_gradient(&field, &source, age);
-                let numbers = [g.value, g.gradient.x, g.gradient.y, air.concentration(&field, &source, age)];
+                let numbers = [
+                    g.value,
+                    g.gradient.x,
+                    g.gradient.y,
+                    air.concentration(&field, &source, age),
+                ];
                 assert!(numbers.iter().all(|x| x.is_finite()), "{air:?} {distance} {age}: {numbers:?}");
             }
         }

@@ -8,7 +8,10 @@ use fewbits_numerics::wild;
 
 /// Random cases: as many as a property of `proptest` draws.
 fn cases() -> usize {
-    std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(256)
+    std::env::var("PROPTEST_CASES")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(256)
 }
 
 struct Wild(Signal);
@@ -31,7 +34,10 @@ fn halves_answer_or_refuse() {
         assert_eq!(sign_bit(sample, a).is_ok(), sample.is_finite() && a.is_finite());
         assert!(cell_of(&[a, b], sample).is_ok_and(|cell| cell <= 2) || sample.is_nan());
         assert_eq!(pattern_bit(&[a, b], sample).is_ok(), !sample.is_nan());
-        assert!(innovation_cell(&[a, b], sample, c, d).is_ok_and(|cell| cell <= 2) || !(sample.is_finite() && c.is_finite() && d.is_finite() && d > 0.0));
+        assert!(
+            innovation_cell(&[a, b], sample, c, d).is_ok_and(|cell| cell <= 2)
+                || !(sample.is_finite() && c.is_finite() && d.is_finite() && d > 0.0)
+        );
         let levels = (wild.0.random() % 9) as u32;
         if let Ok(level) = range_level(sample, a, b, levels) {
             assert!(level < levels, "{sample} {a} {b} {levels}");
@@ -59,7 +65,9 @@ fn encoders_keep_their_promise_or_refuse() {
     let mut wild = Wild(Signal::new(25));
     for _ in 0..cases().div_ceil(8) {
         let [delta, period, finer] = wild.numbers();
-        let Ok(config) = Config::new(delta).or_else(|_| Config::exact(delta)) else { continue };
+        let Ok(config) = Config::new(delta).or_else(|_| Config::exact(delta)) else {
+            continue;
+        };
         let config = config.circular(period).unwrap_or(config);
         let config = config.with_delta(finer).unwrap_or(config);
         let mut encoder = Encoder::new(config);
@@ -67,7 +75,9 @@ fn encoders_keep_their_promise_or_refuse() {
             let (sample, elapsed) = (wild.number(), (wild.0.random() % 3) as u32);
             let before = (encoder.reconstruction(), encoder.slot(), encoder.sequence());
             match encoder.encode_after(elapsed, sample) {
-                Ok(_) => assert!(sample.is_finite() && elapsed > 0 && encoder.reconstruction().is_none_or(f64::is_finite)),
+                Ok(_) => {
+                    assert!(sample.is_finite() && elapsed > 0 && encoder.reconstruction().is_none_or(f64::is_finite))
+                }
                 Err(_) => assert_eq!((encoder.reconstruction(), encoder.slot(), encoder.sequence()), before),
             }
         }

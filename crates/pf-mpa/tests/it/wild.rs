@@ -18,11 +18,15 @@ fn wild() -> impl Strategy<Value = f64> {
 }
 
 fn noise(x: [f64; 2]) -> RangeNoise {
-    [RangeNoise::new(x[0], x[1]), RangeNoise::constant(x[0]), RangeNoise::from_snr_db(x[1])]
-        .into_iter()
-        .flatten()
-        .next()
-        .unwrap_or_else(|| RangeNoise::constant(0.1).unwrap())
+    [
+        RangeNoise::new(x[0], x[1]),
+        RangeNoise::constant(x[0]),
+        RangeNoise::from_snr_db(x[1]),
+    ]
+    .into_iter()
+    .flatten()
+    .next()
+    .unwrap_or_else(|| RangeNoise::constant(0.1).unwrap())
 }
 
 fn check(factor: &RangeFactor, at: f64, prior: Option<&Gaussian<1>>) {
@@ -31,9 +35,17 @@ fn check(factor: &RangeFactor, at: f64, prior: Option<&Gaussian<1>>) {
     if let Some(prior) = prior
         && let Ok(tilted) = factor.tilted(prior)
     {
-        assert!(tilted.mean[0].is_finite() && tilted.covariance[0] >= 0.0 && tilted.log_evidence.is_finite(), "{factor:?} {prior:?}: {tilted:?}");
+        assert!(
+            tilted.mean[0].is_finite() && tilted.covariance[0] >= 0.0 && tilted.log_evidence.is_finite(),
+            "{factor:?} {prior:?}: {tilted:?}"
+        );
     }
-    assert!(factor.reconstruction().is_none_or(|(m, v)| m.is_finite() && !v.is_nan()), "{factor:?}");
+    assert!(
+        factor
+            .reconstruction()
+            .is_none_or(|(m, v)| m.is_finite() && !v.is_nan()),
+        "{factor:?}"
+    );
 }
 
 proptest! {
@@ -87,16 +99,29 @@ proptest! {
 }
 
 /// One step of a tracker from the belief that it starts with.
-fn step<T: Tracker>(tracker: &T, target: &Target, prior: &Gaussian<4>, observed: &[fewbits_pf_mpa::Ranged]) -> Result<(), TestCaseError>
+fn step<T: Tracker>(
+    tracker: &T,
+    target: &Target,
+    prior: &Gaussian<4>,
+    observed: &[fewbits_pf_mpa::Ranged],
+) -> Result<(), TestCaseError>
 where
     T::Belief: Clone + PartialEq + std::fmt::Debug,
     T::Workspace: Default,
 {
     let mut rng = Stream::new(3).rng();
-    let Ok(before) = tracker.start(&mut rng, target, prior) else { return Ok(()) };
+    let Ok(before) = tracker.start(&mut rng, target, prior) else {
+        return Ok(());
+    };
     let mut belief = before.clone();
     match tracker.step_in_place(&mut rng, target, 1, &mut belief, observed, &mut T::Workspace::default()) {
-        Ok(info) => prop_assert!(tracker.estimate(&belief).is_finite() && info.log_likelihood.is_none_or(|log| !log.is_nan()), "{:?} {:?} {:?}", prior, observed, info),
+        Ok(info) => prop_assert!(
+            tracker.estimate(&belief).is_finite() && info.log_likelihood.is_none_or(|log| !log.is_nan()),
+            "{:?} {:?} {:?}",
+            prior,
+            observed,
+            info
+        ),
         Err(_) => prop_assert_eq!(belief, before),
     }
     Ok(())

@@ -22,11 +22,24 @@ fn feedback(which: u64) -> Feedback {
 }
 
 fn length(which: u64) -> ReportLength {
-    if which.is_multiple_of(2) { ReportLength::Varying } else { ReportLength::Fixed((which % 40) as u32) }
+    if which.is_multiple_of(2) {
+        ReportLength::Varying
+    } else {
+        ReportLength::Fixed((which % 40) as u32)
+    }
 }
 
 fn kind(which: u64) -> Kind {
-    let all = [Kind::Feedback, Kind::Report, Kind::Echo, Kind::Snapshot, Kind::Request, Kind::Heartbeat, Kind::Handover, Kind::Acknowledgement];
+    let all = [
+        Kind::Feedback,
+        Kind::Report,
+        Kind::Echo,
+        Kind::Snapshot,
+        Kind::Request,
+        Kind::Heartbeat,
+        Kind::Handover,
+        Kind::Acknowledgement,
+    ];
     all[(which % all.len() as u64) as usize]
 }
 
