@@ -59,8 +59,12 @@ impl<'a> Steady<'a> {
         self.transport.net_outflow(releases)?;
         let mut columns = Mat::from_fn(releases.len(), 1, |i, _| releases[i]);
         self.factor.solve(Direction::Forward, &mut columns);
-        all_finite("concentration", columns.col_as_slice(0))?;
-        Ok(columns.col_as_slice(0).to_vec())
+        let mut found = columns.col_as_slice(0).to_vec();
+        all_finite("concentration", &found)?;
+        if releases.iter().all(|release| *release >= 0.0) {
+            raise(&mut found);
+        }
+        Ok(found)
     }
 
     /// For each sensor the concentration that it measures, kg/m^3 per kg/s, of a source in each free cell: one adjoint solution.
@@ -80,10 +84,20 @@ impl<'a> Steady<'a> {
             }
             self.factor.solve(Direction::Adjoint, &mut columns);
             for j in 0..group.len() {
-                all_finite("response", columns.col_as_slice(j))?;
-                fields.push(columns.col_as_slice(j).to_vec());
+                let mut found = columns.col_as_slice(j).to_vec();
+                all_finite("response", &found)?;
+                raise(&mut found);
+                fields.push(found);
             }
         }
         Ok(fields)
+    }
+}
+
+/// Sets to zero what rounding left below zero of a field that cannot be negative.
+fn raise(field: &mut [f64]) {
+    let rounding = -f64::EPSILON * field.iter().copied().fold(0.0, f64::max);
+    for c in field.iter_mut().filter(|c| (rounding..0.0).contains(*c)) {
+        *c = 0.0;
     }
 }

@@ -52,8 +52,8 @@ fn domain(x: &[f64], which: [u8; 6]) -> Option<Domain> {
 }
 
 proptest! {
-    // Each case factors matrices: one case in 4.
-    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(4), ..ProptestConfig::default() })]
+    // Each case factors matrices: one case in 8.
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.div_ceil(8), ..ProptestConfig::default() })]
     #[test]
     fn fields_are_numbers_or_refused(x in prop::array::uniform20(wild()), which in prop::array::uniform6(any::<u8>())) {
         let Some(domain) = domain(&x, which) else { return Ok(()) };
