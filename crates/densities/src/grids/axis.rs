@@ -41,7 +41,7 @@ impl TryFrom<Stored> for Grid {
 const MOST: usize = 1_000_000;
 
 /// Largest size of a node: squares of its distances are still finite.
-const FARTHEST: f64 = 1e150;
+pub(super) const FARTHEST: f64 = 1e150;
 
 impl Grid {
     /// Moments of a density at the nodes are finite: no square overflows, no density of a node overflows, and nodes are not the same

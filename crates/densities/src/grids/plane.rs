@@ -1,5 +1,6 @@
 //! A density over the plane.
 
+use super::axis::FARTHEST;
 use super::line::{TRIANGULAR_VARIANCE, absorb, check_density, triangular};
 use crate::Error;
 use crate::particles::weights::Categorical;
@@ -83,6 +84,9 @@ impl PlaneMass {
         belief: &Gaussian<2>,
         fill: impl FnOnce(&Self, &mut [f64]),
     ) -> Result<Self, Error> {
+        if !(belief.mean().amax() <= FARTHEST && belief.covariance().amax() <= FARTHEST * FARTHEST) {
+            return Err(fewbits_core::Error::Impossible.into());
+        }
         let refuse = || ArgumentError::new("basis", format!("{basis:?}"), "a regular matrix");
         let inverse = basis.try_inverse().ok_or_else(refuse)?;
         let (centre, spread) = (inverse * belief.mean(), inverse * belief.covariance() * inverse.transpose());

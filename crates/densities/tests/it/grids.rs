@@ -263,3 +263,12 @@ fn density_at_the_largest_number_is_zero() {
     }
     assert!(line.log_density(&Vector1::new(f64::NAN)).is_nan());
 }
+
+/// Defect: the moments of a lattice over a covariance near the largest number were infinite.
+#[test]
+fn beliefs_whose_squares_overflow_are_impossible() {
+    let belief =
+        Gaussian::new(Vector2::new(-1.6, 1e154), Matrix2::from_diagonal(&Vector2::new(1.8, f64::MAX))).unwrap();
+    let basis = Matrix2::from_diagonal(&belief.standard_deviations());
+    assert_eq!(PlaneMass::normal(&basis, &belief).unwrap_err(), Error::Core(CoreError::Impossible));
+}

@@ -162,7 +162,7 @@ pub fn kl_centred_normals(a: f64, b: f64) -> Result<f64, Error> {
     fewbits_numerics::error::positive("a", a)?;
     fewbits_numerics::error::positive("b", b)?;
     // With x = a^2/b^2 - 1 this is (x - ln(1 + x))/2. Quotients first: squares may leave the range of numbers.
-    let x = ((a - b) / b) * ((a + b) / b);
+    let x = ((a - b) / b) * (a / b + 1.0);
     if x.abs() < 1e-3 {
         return Ok(0.5 * x * x * (0.5 - x * (1.0 / 3.0 - x * (0.25 - x * (0.2 - x / 6.0)))));
     }
@@ -258,6 +258,7 @@ mod tests {
             (1e-200, 1e-200),
             (1e200, 2e200),
             (5e-324, f64::MAX),
+            (1e300, f64::MAX),
         ] {
             let found: f64 = kl_centred_normals(a, b).unwrap();
             let ratio: f64 = a / b;

@@ -109,7 +109,8 @@ proptest! {
                 _ => { sensor.on_memory_lost(); continue }
             };
             if let Some((at, _)) = reaction.timer {
-                prop_assert!(event == 7 || at >= a, "{} before {}", at, a);
+                // Beyond the last count that a schedule holds, slots begin no more.
+                prop_assert!(event == 7 || at >= a || a > u64::MAX / 2, "{} before {}", at, a);
             }
             if let Task::Sample { slot, .. } = reaction.task {
                 prop_assert_eq!(sensor.answered(), Some(slot));
