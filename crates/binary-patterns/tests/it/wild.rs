@@ -65,6 +65,9 @@ proptest! {
             {
                 prop_assert!(bound >= 0.0, "{:?} {}: {}", source, x[1], bound);
             }
+            if !(0.02..50.0).contains(&(x[1] / x[0])) {
+                continue;
+            }
             let mut breakpoints = x[2..2 + count].to_vec();
             breakpoints.sort_by(f64::total_cmp);
             let Ok(quantizer) = BinaryQuantizer::new(breakpoints) else { continue };

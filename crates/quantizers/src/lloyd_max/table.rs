@@ -123,7 +123,7 @@ impl LloydMax {
             breakpoints,
             centroids,
             probabilities: self.probabilities.clone(),
-            mean_squared_error: deviation * deviation * self.mean_squared_error,
+            mean_squared_error: deviation * (deviation * self.mean_squared_error),
         })
     }
 
