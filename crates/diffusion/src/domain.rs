@@ -1,8 +1,9 @@
 //! Which cells are free, and what bounds them.
 
+use crate::grid::LARGEST;
 use crate::{Error, Grid};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::non_negative;
+use fewbits_numerics::error::within;
 
 /// What happens to the substance at a face between a free cell and what is not free.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,15 +99,11 @@ impl Domain {
     /// The domain of a grid whose cells are given in the grid's order; `sides[axis]` are the boundaries of its lower and upper end.
     ///
     /// # Errors
-    /// If the number of cells is not that of the grid, a leak is negative or not finite, or [`Error::NoFreeCell`].
+    /// If the number of cells is not that of the grid, a leak is negative or above 1e30 m/s, or [`Error::NoFreeCell`].
     pub fn new(grid: Grid, cells: &[Cell], sides: [[Boundary; 2]; 3]) -> Result<Self, Error> {
         if cells.len() != grid.cells() {
-            return Err(ArgumentError::new(
-                "cells",
-                cells.len(),
-                format!("{}, one for each cell of the grid", grid.cells()),
-            )
-            .into());
+            let expected = format!("{}, one for each cell of the grid", grid.cells());
+            return Err(ArgumentError::new("cells", cells.len(), expected).into());
         }
         let of_cells = cells.iter().filter_map(|cell| match cell {
             Cell::Free => None,
@@ -114,7 +111,7 @@ impl Domain {
         });
         for boundary in of_cells.chain(sides.as_flattened()) {
             if let Boundary::Leaking(leak) = boundary {
-                non_negative("leak", *leak)?;
+                within("leak", *leak, 0.0, LARGEST)?;
             }
         }
         let is_free = |cell: &Cell| !matches!(cell, Cell::Blocked(_));
@@ -133,14 +130,10 @@ impl Domain {
             for axis in 0..grid.dimension() {
                 let (area, half) = (grid.face_area(&at, axis), 0.5 * grid.width(axis, at[axis]));
                 for upper in [false, true] {
-                    let beyond = if upper {
-                        at[axis] + 1 < counts[axis]
-                    } else {
-                        at[axis] > 0
-                    };
-                    let boundary = if beyond {
-                        let mut next = at;
-                        next[axis] = if upper { at[axis] + 1 } else { at[axis] - 1 };
+                    let mut next = at;
+                    // Below the first cell it is beyond the last.
+                    next[axis] = if upper { at[axis] + 1 } else { at[axis].wrapping_sub(1) };
+                    let boundary = if next[axis] < counts[axis] {
                         let other = grid.index(next);
                         match cells[other] {
                             Cell::Blocked(boundary) => boundary,

@@ -71,34 +71,4 @@ pub enum Error {
         /// The smallest step tried, s.
         step: f64,
     },
-    /// A plan has a character without meaning.
-    #[error("the plan has {character:?} in line {line}, column {column}: expected one of . # L A I O")]
-    PlanCharacter {
-        /// The character.
-        character: char,
-        /// Line, from 0.
-        line: usize,
-        /// Column, from 0.
-        column: usize,
-    },
-    /// The lines of a plan differ in length.
-    #[error("line {line} of the plan has {found} cells: expected {expected}")]
-    PlanLine {
-        /// Line, from 0.
-        line: usize,
-        /// Its number of cells.
-        found: usize,
-        /// The number of cells of line 0.
-        expected: usize,
-    },
-    /// A picture is not a plain PBM (`P1`) of the stated size.
-    #[error(
-        "the picture is not a plain PBM: {found} pixels, expected `P1`, width, height and {expected} pixels of 0 or 1"
-    )]
-    Picture {
-        /// Number of pixels that could be read.
-        found: usize,
-        /// Width times height, 0 if the header cannot be read.
-        expected: usize,
-    },
 }

@@ -44,11 +44,8 @@ impl SensorField {
     /// # Errors
     /// If a point is outside or blocked, or the transport has no steady state.
     pub fn steady(transport: &Transport, points: &[[f64; 3]]) -> Result<Self, Error> {
-        let responses = Steady::new(transport)?
-            .adjoint(&patches(transport, points)?)?
-            .into_iter()
-            .map(|field| vec![field])
-            .collect();
+        let fields = Steady::new(transport)?.adjoint(&patches(transport, points)?)?;
+        let responses = fields.into_iter().map(|field| vec![field]).collect();
         Self::with(transport, points, vec![f64::INFINITY], responses)
     }
 
@@ -64,14 +61,10 @@ impl SensorField {
         control: StepControl,
     ) -> Result<Self, Error> {
         let mut by_sensor = vec![Vec::with_capacity(ages.len()); points.len()];
-        for fields in Transient::new(transport)
-            .with_control(control)?
-            .step_responses(&patches(transport, points)?, ages)?
-        {
-            by_sensor
-                .iter_mut()
-                .zip(fields)
-                .for_each(|(sensor, field)| sensor.push(field));
+        let mut transient = Transient::new(transport).with_control(control)?;
+        for fields in transient.step_responses(&patches(transport, points)?, ages)? {
+            let pairs = by_sensor.iter_mut().zip(fields);
+            pairs.for_each(|(sensor, field)| sensor.push(field));
         }
         Self::with(transport, points, ages.to_vec(), by_sensor)
     }
@@ -132,48 +125,37 @@ impl SensorField {
         let number = self.domain.number(own)?;
         let (at, centre, axes) = (grid.place(own), grid.centre(own), grid.dimension());
         let (mut corners, mut position, mut widths, mut upwards) = ([number; 8], [0.0; 3], [1.0; 3], [true; 3]);
-        let mut within = [false; 3];
+        let mut next = at;
         for axis in 0..axes {
             upwards[axis] = point[axis] >= centre[axis];
-            let next = if upwards[axis] {
+            // Below the first cell it is beyond the last.
+            next[axis] = if upwards[axis] {
                 at[axis] + 1
             } else {
                 at[axis].wrapping_sub(1)
             };
-            within[axis] = next < grid.counts()[axis];
-            if within[axis] {
-                widths[axis] = 0.5 * (grid.width(axis, at[axis]) + grid.width(axis, next));
+            if next[axis] < grid.counts()[axis] {
+                widths[axis] = 0.5 * (grid.width(axis, at[axis]) + grid.width(axis, next[axis]));
                 position[axis] = (point[axis] - centre[axis]).abs() / widths[axis];
             }
         }
         // A corner counts if it is free and joined to the own cell through free corners; otherwise another corner stands for it.
         let mut joined = [true, false, false, false, false, false, false, false];
         for corner in 1..1_usize << axes {
+            let moved = || (0..axes).filter(|axis| corner >> axis & 1 == 1);
             let mut cell = at;
-            let mut inside = true;
-            let mut reachable = false;
-            let mut nearer = corner & (corner - 1);
-            for axis in (0..axes).filter(|axis| corner >> axis & 1 == 1) {
-                inside &= within[axis];
-                cell[axis] = if upwards[axis] {
-                    at[axis] + 1
-                } else {
-                    at[axis].wrapping_sub(1)
-                };
-                let without = corner ^ (1 << axis);
-                reachable |= joined[without];
-                // Prefer a corner with a value of its own: along a wall the field is that of the near side.
-                if joined[without] {
-                    nearer = without;
-                }
-            }
-            let free = if inside {
-                self.domain.number(grid.index(cell))
-            } else {
-                None
-            };
-            joined[corner] = reachable && free.is_some();
-            corners[corner] = free.filter(|_| reachable).unwrap_or(corners[nearer]);
+            moved().for_each(|axis| cell[axis] = next[axis]);
+            // Prefer a corner with a value of its own: along a wall the field is that of the near side.
+            let near = moved()
+                .map(|axis| corner ^ (1 << axis))
+                .filter(|without| joined[*without])
+                .next_back();
+            let inside = moved().all(|axis| next[axis] < grid.counts()[axis]);
+            let free = near
+                .filter(|_| inside)
+                .and_then(|_| self.domain.number(grid.index(cell)));
+            joined[corner] = free.is_some();
+            corners[corner] = free.unwrap_or(corners[near.unwrap_or(corner & (corner - 1))]);
         }
         Some(Stencil {
             corners,
@@ -184,23 +166,36 @@ impl SensorField {
         })
     }
 
-    /// Value and gradient of a response at a point.
-    fn interpolate(&self, sensor: usize, point: &Vector3<f64>, age: f64) -> SourceGradient {
+    /// Calls `f` with the value and gradient of a response at a point for each age.
+    fn interpolate(&self, sensor: usize, point: &Vector3<f64>, ages: &[f64], mut f: impl FnMut(usize, SourceGradient)) {
         const NOTHING: SourceGradient = SourceGradient {
             value: 0.0,
             gradient: Vector3::new(0.0, 0.0, 0.0),
         };
-        let mut result = NOTHING;
-        let (Some(stencil), Some(fields)) = (self.stencil(&(*point).into()), self.responses.get(sensor)) else {
-            return result;
-        };
-        for (field, weight) in self.about(age).into_iter().filter(|pair| pair.1 > 0.0) {
-            let (value, gradient) = stencil.apply(&fields[field]);
-            result.value += weight * value;
-            result.gradient += weight * gradient;
+        let known = self.stencil(&(*point).into()).zip(self.responses.get(sensor));
+        let mut before: Option<([(usize, f64); 2], SourceGradient)> = None;
+        for (k, age) in ages.iter().enumerate() {
+            let about = self.about(*age);
+            let mut result = NOTHING;
+            match (&known, before) {
+                // Ages between which the field stands: a steady one, or the last.
+                (_, Some((same, found))) if same == about => result = found,
+                (Some((stencil, fields)), _) => {
+                    for (field, weight) in about.into_iter().filter(|pair| pair.1 > 0.0) {
+                        let (value, gradient) = stencil.apply(&fields[field]);
+                        result.value += weight * value;
+                        result.gradient += weight * gradient;
+                    }
+                }
+                (None, _) => {}
+            }
+            // Steps in time may leave an error below zero.
+            if result.value < 0.0 {
+                result = NOTHING;
+            }
+            before = Some((about, result));
+            f(k, result);
         }
-        // Steps in time may leave an error below zero.
-        if result.value < 0.0 { NOTHING } else { result }
     }
 }
 
@@ -221,17 +216,13 @@ impl Stencil {
     fn apply(&self, field: &[f64]) -> (f64, Vector3<f64>) {
         let (mut value, mut gradient) = (0.0, Vector3::zeros());
         for corner in 0..1_usize << self.axes {
-            let factor = |axis: usize| {
-                if corner >> axis & 1 == 1 {
-                    self.position[axis]
-                } else {
-                    1.0 - self.position[axis]
-                }
-            };
+            let beyond = |axis: usize| corner >> axis & 1 == 1;
+            let near = |axis: usize| 1.0 - self.position[axis];
+            let factor = |axis: usize| if beyond(axis) { self.position[axis] } else { near(axis) };
             let c = field[self.corners[corner]];
             value += c * (0..self.axes).map(factor).product::<f64>();
             for axis in 0..self.axes {
-                let outwards = (corner >> axis & 1 == 1) == self.upwards[axis];
+                let outwards = beyond(axis) == self.upwards[axis];
                 let others: f64 = (0..self.axes).filter(|other| *other != axis).map(factor).product();
                 gradient[axis] += if outwards { c } else { -c } * others / self.widths[axis];
             }
@@ -255,11 +246,22 @@ impl SourceModel for SensorField {
     }
 
     fn concentration(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> f64 {
-        self.interpolate(receptor.index, source, age).value
+        self.source_gradient(receptor, source, age).value
+    }
+
+    /// One stencil for all ages, one value for all of a steady field.
+    fn concentrations(&self, receptor: &Receptor, source: &Vector3<f64>, ages: &[f64], out: &mut [f64]) {
+        let count = ages.len().min(out.len());
+        self.interpolate(receptor.index, source, &ages[..count], |k, found| out[k] = found.value);
     }
 
     fn source_gradient(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> SourceGradient {
-        self.interpolate(receptor.index, source, age)
+        let mut found = None;
+        self.interpolate(receptor.index, source, &[age], |_, gradient| found = Some(gradient));
+        found.unwrap_or(SourceGradient {
+            value: 0.0,
+            gradient: Vector3::zeros(),
+        })
     }
 
     /// From the range of the response over the cells of the square and one more on each side; within a cell, its share of that.
@@ -294,7 +296,7 @@ impl SourceModel for SensorField {
                 }
             }
         }
-        (most - least).max(0.0) * (2.0 * half_width / narrowest).min(1.0)
+        (most - least).max(0.0) * (2.0 * half_width / narrowest).min(1.0).max(0.0)
     }
 
     /// True if the square holds a part of a free cell.

@@ -5,7 +5,7 @@ use crate::solver::{Direction, Solver};
 use crate::{Boundary, Domain, Error};
 use faer::Mat;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, positive};
+use fewbits_numerics::error::{positive, within};
 
 /// What is done with a wind that is not free of divergence on the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +40,8 @@ pub struct PotentialFlow {
 
 /// Net flow out of a cell that is accepted, relative to the largest flow through a face.
 const MAX_DIVERGENCE: f64 = 1e-10;
+/// Largest flow through a face, m^3/s.
+const MAX_FLOW: f64 = 1e90;
 
 impl Flow {
     /// No wind.
@@ -59,7 +61,7 @@ impl Flow {
     /// The wind whose velocity, m/s, is a function of the point, m. It is evaluated at the centres of faces.
     ///
     /// # Errors
-    /// If a velocity is not finite; [`Error::Divergence`] where divergence is refused.
+    /// If a velocity is not finite, or a flow above 1e90 m^3/s; [`Error::Divergence`] where divergence is refused.
     pub fn from_velocity(
         domain: &Domain,
         velocity: impl Fn([f64; 3]) -> [f64; 3],
@@ -115,8 +117,9 @@ impl Flow {
     }
 
     fn treated(mut self, domain: &Domain, divergence: Divergence) -> Result<Self, Error> {
-        all_finite("velocity", &self.inside)?;
-        all_finite("velocity", &self.edge)?;
+        for flow in self.inside.iter().chain(&self.edge) {
+            within("flow", *flow, -MAX_FLOW, MAX_FLOW)?;
+        }
         if divergence == Divergence::Project {
             let before = self.largest();
             let net: Vec<f64> = self.divergence(domain).iter().map(|net| -net).collect();
@@ -139,10 +142,8 @@ impl Flow {
     }
 
     pub(crate) fn largest(&self) -> f64 {
-        self.inside
-            .iter()
-            .chain(&self.edge)
-            .fold(0.0, |most, flow| flow.abs().max(most))
+        let all = self.inside.iter().chain(&self.edge);
+        all.fold(0.0, |most, flow| flow.abs().max(most))
     }
 
     /// Refuses a wind of another domain or with divergence.
@@ -150,36 +151,28 @@ impl Flow {
         let found = [self.inside.len(), self.edge.len()];
         let expected = [domain.faces.len(), domain.edge_faces.len()];
         if found != expected {
-            return Err(ArgumentError::new(
-                "flow",
-                format!("of {found:?} faces"),
-                format!("a flow of this domain's {expected:?}"),
-            )
-            .into());
+            let expected = format!("a flow of this domain's {expected:?}");
+            return Err(ArgumentError::new("flow", format!("of {found:?} faces"), expected).into());
         }
         let largest = self.largest();
         let net = self.divergence(domain);
-        let worst = (0..net.len())
-            .max_by(|a, b| net[*a].abs().total_cmp(&net[*b].abs()))
-            .unwrap_or(0);
-        if net[worst].abs() > MAX_DIVERGENCE * largest {
-            let cell = domain.grid().place(domain.free()[worst]);
-            return Err(Error::Divergence {
-                cell,
-                net: net[worst],
-                largest,
-            });
+        let worst = net
+            .into_iter()
+            .enumerate()
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        match worst.filter(|(_, net)| net.abs() > MAX_DIVERGENCE * largest) {
+            None => Ok(()),
+            Some((number, net)) => {
+                let cell = domain.grid().place(domain.free()[number]);
+                Err(Error::Divergence { cell, net, largest })
+            }
         }
-        Ok(())
     }
 
     /// Flow through the upper face of a free cell across an axis, m^3/s; 0 at walls.
     pub fn above(&self, domain: &Domain, number: usize, axis: usize) -> f64 {
-        let inside = domain
-            .faces
-            .iter()
-            .zip(&self.inside)
-            .filter(|(face, _)| face.cells[0] == number && face.axis == axis);
+        let inside = domain.faces.iter().zip(&self.inside);
+        let inside = inside.filter(|(face, _)| face.cells[0] == number && face.axis == axis);
         let edge = domain.edge_faces.iter().zip(&self.edge);
         let edge = edge.filter(|(face, _)| face.cell == number && face.axis == axis && face.upper);
         inside.map(|pair| pair.1).chain(edge.map(|pair| pair.1)).sum()
@@ -205,23 +198,18 @@ impl PotentialFlow {
     /// (m^3/s; m^2/s in a plane) passes.
     ///
     /// # Errors
-    /// If `total` is not a positive number; [`Error::NoPassage`] if no connected part touches both.
+    /// If `total` is not a positive number up to 1e90; [`Error::NoPassage`] if no connected part touches both.
     pub fn new(domain: &Domain, total: f64) -> Result<Self, Error> {
-        positive("total", total)?;
+        within("total", positive("total", total)?, 0.0, MAX_FLOW)?;
         let mut supply = vec![0.0; domain.free().len()];
-        let inflows = || {
-            domain
-                .edge_faces
-                .iter()
-                .filter(|face| face.boundary == Boundary::Inflow)
-        };
+        let edges = || domain.edge_faces.iter();
+        let inflows = || edges().filter(|face| face.boundary == Boundary::Inflow);
         for face in inflows() {
             supply[face.cell] += face.area / face.half;
         }
         let mut potential = solve_potential(domain, supply)?;
-        let passing: f64 = inflows()
-            .map(|face| face.area / face.half * (1.0 - potential[face.cell]))
-            .sum();
+        let carried = |face: &EdgeFace| face.area / face.half * (1.0 - potential[face.cell]);
+        let passing: f64 = inflows().map(carried).sum();
         let conductances: f64 = inflows().map(|face| face.area / face.half).sum();
         // A part with inflows only has potential one but for rounding.
         if passing.is_nan() || passing <= 1e-12 * conductances {
@@ -231,12 +219,13 @@ impl PotentialFlow {
         potential.iter_mut().for_each(|phi| *phi *= difference);
         let fall = |face: &Face| conductance(face) * (potential[face.cells[0]] - potential[face.cells[1]]);
         let flow = Flow::through(domain, fall, |face| {
-            let outside = if face.boundary == Boundary::Inflow {
-                difference
-            } else {
-                0.0
-            };
-            face.area / face.half * (potential[face.cell] - outside)
+            let inside = potential[face.cell];
+            face.area / face.half
+                * if face.boundary == Boundary::Inflow {
+                    inside - difference
+                } else {
+                    inside
+                }
         });
         flow.check(domain)?;
         Ok(Self {
@@ -286,9 +275,7 @@ fn solve_potential(domain: &Domain, supply: Vec<f64>) -> Result<Vec<f64>, Error>
         columns[(face.cells[1], 0)] += rate[1] * potential[face.cells[0]];
     }
     factor.solve(Direction::Forward, &mut columns);
-    potential
-        .iter_mut()
-        .zip(columns.col_as_slice(0))
-        .for_each(|(phi, change)| *phi += change);
+    let changes = potential.iter_mut().zip(columns.col_as_slice(0));
+    changes.for_each(|(phi, change)| *phi += change);
     Ok(potential)
 }

@@ -2,7 +2,11 @@
 
 use crate::Error;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, at_least_one, positive};
+use fewbits_numerics::error::{at_least_one, positive, within};
+
+/// Largest coordinate, diffusivity, velocity and decay in SI units, and the reciprocal of the smallest width and diffusivity: what is
+/// formed of them stays far from the ends of the range of numbers.
+pub(crate) const LARGEST: f64 = 1e30;
 
 /// Boxes of any widths side by side along one, two or three axes.
 ///
@@ -18,14 +22,17 @@ impl Grid {
     /// A grid from the edges of its cells, m, along one to three axes: one more edge than cells, increasing.
     ///
     /// # Errors
-    /// If there are not one to three axes, an axis has fewer than two edges, or edges are not finite and increasing.
+    /// If there are not one to three axes, an axis has fewer than two edges, an edge is beyond 1e30 m, or edges do not increase by at
+    /// least 1e-30 m.
     pub fn new(edges: &[Vec<f64>]) -> Result<Self, Error> {
         if !(1..=3).contains(&edges.len()) {
             return Err(ArgumentError::new("edges", format!("{} axes", edges.len()), "one to three axes").into());
         }
         for axis in edges {
-            all_finite("edges", axis)?;
-            if axis.len() < 2 || axis.windows(2).any(|pair| pair[0] >= pair[1]) {
+            for edge in axis {
+                within("edges", *edge, -LARGEST, LARGEST)?;
+            }
+            if axis.len() < 2 || axis.windows(2).any(|pair| pair[1] - pair[0] < LARGEST.recip()) {
                 return Err(ArgumentError::new("edges", format!("{axis:?}"), "two or more increasing numbers").into());
             }
         }

@@ -1,6 +1,7 @@
 //! Floor plans as text.
 
 use crate::{Boundary, Cell, Domain, Error, Grid};
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, positive};
 
 /// A floor plan: one character per square.
@@ -34,7 +35,7 @@ impl Plan {
     /// Reads a plan: empty lines are skipped, and blanks that begin every line.
     ///
     /// # Errors
-    /// [`Error::PlanCharacter`], [`Error::PlanLine`], or [`Error::NoFreeCell`] if there is no line.
+    /// If a character has no meaning or lines differ in length; [`Error::NoFreeCell`] if there is no line.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
         let indent = lines
@@ -50,19 +51,14 @@ impl Plan {
                     ' ' => squares.push('.'),
                     '.' | '#' | 'L' | 'A' | 'I' | 'O' => squares.push(character),
                     '\r' => {}
-                    _ => {
-                        return Err(Error::PlanCharacter {
-                            character,
-                            line,
-                            column,
-                        });
-                    }
+                    _ => return Err(without_meaning(character, [column, line])),
                 }
             }
             let found = squares.len() - before;
             let expected = *columns.get_or_insert(found);
             if found != expected {
-                return Err(Error::PlanLine { line, found, expected });
+                let shown = format!("{found} squares in line {line}");
+                return Err(ArgumentError::new("plan", shown, format!("{expected}, as in line 0")).into());
             }
         }
         let columns = columns.ok_or(Error::NoFreeCell)?;
@@ -73,45 +69,31 @@ impl Plan {
     /// the picture's edge is closed there; use [`Plan::with`] for openings.
     ///
     /// # Errors
-    /// [`Error::Picture`] if the text is no such picture.
+    /// If the text is no such picture.
     pub fn from_pbm(text: &str) -> Result<Self, Error> {
         let uncommented = text.lines().map(|line| line.split('#').next().unwrap_or(""));
         let words: Vec<&str> = uncommented.flat_map(str::split_ascii_whitespace).collect();
-        let unreadable = Error::Picture { found: 0, expected: 0 };
-        let [magic, width, height, pixels @ ..] = words.as_slice() else {
-            return Err(unreadable);
+        let size = |i: usize| words.get(i)?.parse::<usize>().ok().filter(|n| *n > 0);
+        let (Some(columns), Some(lines), Some(&"P1")) = (size(1), size(2), words.first()) else {
+            return Err(ArgumentError::new("picture", "no plain PBM", "`P1`, width and height").into());
         };
-        let size = |word: &str| word.parse::<usize>().ok().filter(|n| *n > 0);
-        let (Some(columns), Some(lines), "P1") = (size(width), size(height), *magic) else {
-            return Err(unreadable);
-        };
-        let squares: Vec<char> = pixels.iter().flat_map(|word| word.chars()).collect();
-        let expected = columns.checked_mul(lines).ok_or(unreadable)?;
-        if squares.len() != expected || squares.iter().any(|pixel| !matches!(pixel, '0' | '1')) {
-            return Err(Error::Picture {
-                found: squares.len(),
-                expected,
-            });
+        let pixels = || words[3..].iter().flat_map(|word| word.chars());
+        if columns.checked_mul(lines) != Some(pixels().count()) || pixels().any(|pixel| !matches!(pixel, '0' | '1')) {
+            let shown = format!("{} pixels", pixels().count());
+            return Err(ArgumentError::new("picture", shown, format!("{columns} times {lines} of 0 or 1")).into());
         }
-        let squares = squares
-            .into_iter()
-            .map(|pixel| if pixel == '1' { '#' } else { '.' })
-            .collect();
+        let squares = pixels().map(|pixel| if pixel == '1' { '#' } else { '.' }).collect();
         Ok(Self { columns, squares })
     }
 
     /// The plan with another character in some squares, given by column and line.
     ///
     /// # Errors
-    /// [`Error::PlanCharacter`] if it has no meaning or a square is outside the plan.
+    /// If it has no meaning or a square is outside the plan.
     pub fn with(mut self, character: char, squares: impl IntoIterator<Item = [usize; 2]>) -> Result<Self, Error> {
         for [column, line] in squares {
             if column >= self.columns || line >= self.lines() || !".#LAIO".contains(character) {
-                return Err(Error::PlanCharacter {
-                    character,
-                    line,
-                    column,
-                });
+                return Err(without_meaning(character, [column, line]));
             }
             self.squares[line * self.columns + column] = character;
         }
@@ -128,27 +110,12 @@ impl Plan {
         self.squares.len() / self.columns
     }
 
-    /// The cells of a square, for leaking walls of the given velocity.
-    fn cell(character: char, leak: f64) -> Cell {
-        match character {
-            '#' => Cell::Blocked(Boundary::Closed),
-            'L' => Cell::Blocked(Boundary::Leaking(leak)),
-            'A' => Cell::Blocked(Boundary::Absorbing),
-            'I' => Cell::Open(Boundary::Inflow),
-            'O' => Cell::Open(Boundary::Outflow),
-            _ => Cell::Free,
-        }
-    }
-
     /// The plan's domain: squares of `width` metres in `split` by `split` cells each; leaking walls take `leak` m/s.
     ///
     /// # Errors
     /// If `width` is not positive, `split` is zero, `leak` is negative, or all squares are walls.
     pub fn domain(&self, width: f64, split: usize, leak: f64) -> Result<Domain, Error> {
-        at_least_one("split", split)?;
-        let grid =
-            Grid::uniform(&[self.columns * split, self.lines() * split], positive("width", width)? / split as f64)?;
-        self.on(grid, split, leak)
+        self.on(width, split, leak, &[])
     }
 
     /// The plan as a section in the first two axes, extended over `layers` layers of cells along the third, as thick as cells are wide.
@@ -156,17 +123,30 @@ impl Plan {
     /// # Errors
     /// As [`Plan::domain`], or if `layers` is zero.
     pub fn extruded(&self, width: f64, split: usize, leak: f64, layers: usize) -> Result<Domain, Error> {
-        at_least_one("split", split)?;
-        let counts = [self.columns * split, self.lines() * split, layers];
-        self.on(Grid::uniform(&counts, positive("width", width)? / split as f64)?, split, leak)
+        self.on(width, split, leak, &[layers])
     }
 
-    fn on(&self, grid: Grid, split: usize, leak: f64) -> Result<Domain, Error> {
-        let square = |cell: usize| {
+    fn on(&self, width: f64, split: usize, leak: f64, layers: &[usize]) -> Result<Domain, Error> {
+        at_least_one("split", split)?;
+        let counts = [[self.columns * split, self.lines() * split].as_slice(), layers].concat();
+        let grid = Grid::uniform(&counts, positive("width", width)? / split as f64)?;
+        let cell = |cell: usize| {
             let [column, line, _] = grid.place(cell);
-            Self::cell(self.squares[line / split * self.columns + column / split], leak)
+            match self.squares[line / split * self.columns + column / split] {
+                '#' => Cell::Blocked(Boundary::Closed),
+                'L' => Cell::Blocked(Boundary::Leaking(leak)),
+                'A' => Cell::Blocked(Boundary::Absorbing),
+                'I' => Cell::Open(Boundary::Inflow),
+                'O' => Cell::Open(Boundary::Outflow),
+                _ => Cell::Free,
+            }
         };
-        let cells: Vec<Cell> = (0..grid.cells()).map(square).collect();
+        let cells: Vec<Cell> = (0..grid.cells()).map(cell).collect();
         Domain::new(grid, &cells, [[Boundary::Closed; 2]; 3])
     }
+}
+
+fn without_meaning(character: char, [column, line]: [usize; 2]) -> Error {
+    let shown = format!("{character:?} in line {line}, column {column}");
+    ArgumentError::new("plan", shown, "one of . # L A I O in a square of the plan").into()
 }

@@ -73,11 +73,8 @@ fn potential(count: usize, faces: &[Face], rates: &[[f64; 2]]) -> Option<Vec<f64
             let cell = part[next];
             next += 1;
             for (other, face) in neighbours.of(cell) {
-                let change = if faces[*face].cells[0] == cell {
-                    -fall(*face)
-                } else {
-                    fall(*face)
-                };
+                let upwards = faces[*face].cells[0] == cell;
+                let change = if upwards { -fall(*face) } else { fall(*face) };
                 if psi[*other].is_nan() {
                     psi[*other] = psi[cell] + change;
                     part.push(*other);
@@ -89,10 +86,8 @@ fn potential(count: usize, faces: &[Face], rates: &[[f64; 2]]) -> Option<Vec<f64
                 }
             }
         }
-        let ends = part
-            .iter()
-            .map(|cell| psi[*cell])
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        let values = part.iter().map(|cell| psi[*cell]);
+        let ends = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
         if ends[1] - ends[0] > MAX_SPREAD {
             return None;
         }

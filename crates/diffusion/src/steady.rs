@@ -3,7 +3,7 @@
 use crate::solver::{Direction, Factor};
 use crate::{Error, Patch, Transport};
 use faer::Mat;
-use fewbits_numerics::error::finite;
+use fewbits_numerics::error::{all_finite, finite};
 
 /// A source: a patch and its rate, kg/s.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,11 +43,9 @@ impl<'a> Steady<'a> {
         for source in sources {
             finite("rate", source.rate)?;
             self.transport.check_patch(&source.patch)?;
-            source
-                .patch
-                .shares
-                .iter()
-                .for_each(|(cell, share)| right[*cell] += share * source.rate);
+            for (cell, share) in &source.patch.shares {
+                right[*cell] += share * source.rate;
+            }
         }
         self.from_amounts(&right)
     }
@@ -55,19 +53,24 @@ impl<'a> Steady<'a> {
     /// The concentration with the given release in each free cell, kg/s.
     ///
     /// # Errors
-    /// If there is not one release for each free cell, or one is not finite.
+    /// If there is not one release for each free cell, or a release or a concentration is not finite.
     pub fn from_amounts(&self, releases: &[f64]) -> Result<Vec<f64>, Error> {
         // The same conditions as for a field.
         self.transport.net_outflow(releases)?;
         let mut columns = Mat::from_fn(releases.len(), 1, |i, _| releases[i]);
         self.factor.solve(Direction::Forward, &mut columns);
-        Ok(columns.col_as_slice(0).to_vec())
+        let mut found = columns.col_as_slice(0).to_vec();
+        all_finite("concentration", &found)?;
+        if releases.iter().all(|release| *release >= 0.0) {
+            raise(&mut found);
+        }
+        Ok(found)
     }
 
     /// For each sensor the concentration that it measures, kg/m^3 per kg/s, of a source in each free cell: one adjoint solution.
     ///
     /// # Errors
-    /// If a patch is of another domain.
+    /// If a patch is of another domain, or a response is not finite.
     pub fn adjoint(&self, sensors: &[Patch]) -> Result<Vec<Vec<f64>>, Error> {
         let count = self.transport.volumes.len();
         let mut fields = Vec::with_capacity(sensors.len());
@@ -75,14 +78,26 @@ impl<'a> Steady<'a> {
             let mut columns = Mat::zeros(count, group.len());
             for (j, sensor) in group.iter().enumerate() {
                 self.transport.check_patch(sensor)?;
-                sensor
-                    .shares
-                    .iter()
-                    .for_each(|(cell, share)| columns[(*cell, j)] += share);
+                for (cell, share) in &sensor.shares {
+                    columns[(*cell, j)] += share;
+                }
             }
             self.factor.solve(Direction::Adjoint, &mut columns);
-            fields.extend((0..group.len()).map(|j| columns.col_as_slice(j).to_vec()));
+            for j in 0..group.len() {
+                let mut found = columns.col_as_slice(j).to_vec();
+                all_finite("response", &found)?;
+                raise(&mut found);
+                fields.push(found);
+            }
         }
         Ok(fields)
+    }
+}
+
+/// Sets to zero what rounding left below zero of a field that cannot be negative.
+fn raise(field: &mut [f64]) {
+    let rounding = -f64::EPSILON * field.iter().copied().fold(0.0, f64::max);
+    for c in field.iter_mut().filter(|c| (rounding..0.0).contains(*c)) {
+        *c = 0.0;
     }
 }

@@ -79,10 +79,8 @@ impl<'a> Stepper<'a> {
                     let mut out = Mat::zeros(rows, columns);
                     for j in 0..columns {
                         transport.apply(direction, c.col_as_slice(j), out.col_as_slice_mut(j));
-                        out.col_as_slice_mut(j)
-                            .iter_mut()
-                            .zip(source.col_as_slice(j))
-                            .for_each(|(out, s)| *out = s - *out);
+                        let pairs = out.col_as_slice_mut(j).iter_mut().zip(source.col_as_slice(j));
+                        pairs.for_each(|(out, s)| *out = s - *out);
                     }
                     out
                 };
@@ -170,18 +168,10 @@ impl State {
 
 /// The largest error of a column over the largest number of that column, over all columns.
 fn relative_error(error: &Mat<f64>, values: &Mat<f64>) -> f64 {
-    let size = |column: &[f64]| {
-        column
-            .iter()
-            .fold(0.0, |most: f64, x| if x.is_nan() { f64::INFINITY } else { most.max(x.abs()) })
-    };
+    let larger = |most: f64, x: &f64| if x.is_nan() { f64::INFINITY } else { most.max(x.abs()) };
     let of_column = |j: usize| {
-        let error = size(error.col_as_slice(j));
-        if error == 0.0 {
-            0.0
-        } else {
-            error / size(values.col_as_slice(j))
-        }
+        let error = error.col_as_slice(j).iter().fold(0.0, larger);
+        error / values.col_as_slice(j).iter().fold(f64::MIN_POSITIVE, larger)
     };
     (0..error.ncols()).map(of_column).fold(0.0, f64::max)
 }

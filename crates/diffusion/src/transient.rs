@@ -66,6 +66,8 @@ pub struct Transient<'a> {
 
 /// A step this far below the interval does not change the time any more.
 const MIN_SHARE_EXPONENT: i32 = -45;
+/// Most steps of an interval: rounding may keep the error just below the tolerance however short the steps are.
+const MAX_STEPS: usize = 200_000;
 /// A step is doubled if its error is below the tolerance over this: the error grows eightfold, and half of that is margin.
 const DOUBLING_MARGIN: f64 = 16.0;
 
@@ -101,7 +103,7 @@ impl<'a> Transient<'a> {
     ///
     /// # Errors
     /// If `initial` has not one number for each free cell, instants do not increase from above 0, a rate is not finite, a release stops
-    /// before it starts or starts before 0, a patch is of another domain, [`Error::Factorisation`] or [`Error::StepTooSmall`].
+    /// before it starts or starts before 0, a patch is of another domain, a concentration is not, [`Error::Factorisation`] or [`Error::StepTooSmall`].
     pub fn run(&mut self, initial: &[f64], releases: &[Release], times: &[f64]) -> Result<Vec<Snapshot>, Error> {
         // Checks number and finiteness.
         self.stepper.transport.net_outflow(initial)?;
@@ -123,15 +125,13 @@ impl<'a> Transient<'a> {
         let unit = common_unit(&instants);
         let (mut now, mut active, mut snapshots) = (0.0, vec![false; releases.len()], Vec::new());
         for (k, end) in instants.into_iter().enumerate() {
-            let before =
-                std::mem::replace(&mut active, releases.iter().map(|r| r.start <= now && now < r.stop).collect());
+            let before = active;
+            active = releases.iter().map(|r| r.start <= now && now < r.stop).collect();
             let mut source = Mat::zeros(initial.len(), 1);
             for (release, _) in releases.iter().zip(&active).filter(|pair| *pair.1) {
-                release
-                    .patch
-                    .shares
-                    .iter()
-                    .for_each(|(cell, share)| source[(*cell, 0)] += share * release.rate);
+                for (cell, share) in &release.patch.shares {
+                    source[(*cell, 0)] += share * release.rate;
+                }
             }
             if k == 0 || before != active {
                 state.wanted = self.first_step(&state.concentration, &source);
@@ -139,6 +139,8 @@ impl<'a> Transient<'a> {
             self.advance(Direction::Forward, &mut state, &source, end - now, unit)?;
             now = end;
             if times.contains(&now) {
+                all_finite("concentration", state.concentration.col_as_slice(0))?;
+                all_finite("dose", state.dose.col_as_slice(0))?;
                 snapshots.push(Snapshot {
                     time: now,
                     concentration: state.concentration.col_as_slice(0).to_vec(),
@@ -165,10 +167,9 @@ impl<'a> Transient<'a> {
         let mut source = Mat::zeros(count, sensors.len());
         for (j, sensor) in sensors.iter().enumerate() {
             self.stepper.transport.check_patch(sensor)?;
-            sensor
-                .shares
-                .iter()
-                .for_each(|(cell, share)| source[(*cell, j)] += share);
+            for (cell, share) in &sensor.shares {
+                source[(*cell, j)] += share;
+            }
         }
         let mut state = State::new(Mat::zeros(count, sensors.len()));
         state.wanted = self.first_step(&state.concentration, &source);
@@ -177,8 +178,9 @@ impl<'a> Transient<'a> {
         for age in ages {
             self.advance(Direction::Adjoint, &mut state, &source, age - now, unit)?;
             now = *age;
-            let columns = 0..sensors.len();
-            responses.push(columns.map(|j| state.concentration.col_as_slice(j).to_vec()).collect());
+            let columns = || (0..sensors.len()).map(|j| state.concentration.col_as_slice(j));
+            columns().try_for_each(|column| all_finite("response", column))?;
+            responses.push(columns().map(<[f64]>::to_vec).collect());
         }
         Ok(responses)
     }
@@ -231,8 +233,12 @@ impl<'a> Transient<'a> {
         while length(level) > state.wanted && level > MIN_SHARE_EXPONENT {
             (left, level) = (left * 2, level - 1);
         }
+        let first = state.steps;
         while left > 0 {
             let step = length(level);
+            if state.steps - first > MAX_STEPS {
+                return Err(Error::StepTooSmall { step });
+            }
             let (next, dose, error) = self.stepper.step(direction, &state.concentration, source, step)?;
             if error.is_nan() || error > tolerance {
                 if level <= MIN_SHARE_EXPONENT {

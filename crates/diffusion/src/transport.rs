@@ -1,10 +1,10 @@
 //! Diffusion, wind and decay on a domain: the matrix.
 
-use crate::domain::{EdgeFace, Face};
+use crate::grid::LARGEST;
 use crate::solver::{Direction, Solver};
 use crate::{Boundary, Domain, Error, Flow, Patch};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, non_negative, positive};
+use fewbits_numerics::error::{all_finite, within};
 use std::sync::{Arc, OnceLock};
 
 /// How the flux through a face depends on the concentrations beside it.
@@ -83,7 +83,7 @@ pub struct Transport {
 }
 
 /// Where a substance goes: amounts per second, or amounts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Budget {
     /// Integral of the field, kg (kg s for a dose).
     pub mass: f64,
@@ -110,7 +110,7 @@ impl Transport {
     /// The transport with the given diffusivity (m^2/s) and decay (1/s) in the free cells, by the given wind.
     ///
     /// # Errors
-    /// If a diffusivity is not positive, a decay is negative, their number or the flow is not that of the domain,
+    /// If a diffusivity is not in `[1e-30, 1e30]`, a decay not in `[0, 1e30]`, their number or the flow is not that of the domain,
     /// [`Error::Divergence`], or [`Error::Backflow`].
     pub fn new(
         domain: impl Into<Arc<Domain>>,
@@ -121,58 +121,38 @@ impl Transport {
     ) -> Result<Self, Error> {
         let domain = domain.into();
         flow.check(&domain)?;
-        let diffusivity = values("diffusivity", diffusivity.into(), domain.free().len(), positive)?;
-        let decay = values("decay", decay.into(), domain.free().len(), non_negative)?;
+        let diffusivity = values("diffusivity", diffusivity.into(), domain.free().len(), LARGEST.recip())?;
+        let decay = values("decay", decay.into(), domain.free().len(), 0.0)?;
         let volumes = domain.volumes();
-        let mut diagonal: Vec<f64> = decay
-            .iter()
-            .zip(&volumes)
-            .map(|(decay, volume)| decay * volume)
-            .collect();
+        let mut diagonal: Vec<f64> = decay.iter().zip(&volumes).map(|(decay, v)| decay * v).collect();
         let mut rates = Vec::with_capacity(domain.faces.len());
-        for (
-            Face {
-                cells, area, halves, ..
-            },
-            flow,
-        ) in domain.faces.iter().zip(&flow.inside)
-        {
+        for (face, flow) in domain.faces.iter().zip(&flow.inside) {
+            let [low, high] = face.cells;
             // Two half cells in series.
-            let conductance = area / (halves[0] / diffusivity[cells[0]] + halves[1] / diffusivity[cells[1]]);
+            let conductance = face.area / (face.halves[0] / diffusivity[low] + face.halves[1] / diffusivity[high]);
             let rate = scheme.weights(flow / conductance).map(|weight| conductance * weight);
-            diagonal[cells[0]] += rate[0];
-            diagonal[cells[1]] += rate[1];
+            diagonal[low] += rate[0];
+            diagonal[high] += rate[1];
             rates.push(rate);
         }
         let (largest, mut edge_rates) = (flow.largest(), Vec::with_capacity(domain.edge_faces.len()));
-        for (
-            EdgeFace {
-                cell,
-                area,
-                half,
-                boundary,
-                ..
-            },
-            flow,
-        ) in domain.edge_faces.iter().zip(&flow.edge)
-        {
-            let conductance = area * diffusivity[*cell] / half;
-            let rate = match boundary {
+        for (face, flow) in domain.edge_faces.iter().zip(&flow.edge) {
+            let half_resistance = face.half / diffusivity[face.cell];
+            let conductance = face.area / half_resistance;
+            let rate = match face.boundary {
                 Boundary::Closed | Boundary::Leaking(0.0) => [0.0; 2],
                 Boundary::Absorbing => [conductance, 0.0],
-                Boundary::Leaking(leak) => [area / (leak.recip() + half / diffusivity[*cell]), 0.0],
+                Boundary::Leaking(leak) => [face.area / (leak.recip() + half_resistance), 0.0],
                 Boundary::Inflow => scheme.weights(flow / conductance).map(|weight| conductance * weight),
                 Boundary::Outflow if largest == 0.0 => [conductance, 0.0],
                 // Rounding may leave a flow just below zero.
                 Boundary::Outflow if *flow >= -1e-10 * largest => [flow.max(0.0), 0.0],
                 Boundary::Outflow => {
-                    return Err(Error::Backflow {
-                        cell: domain.grid().place(domain.free()[*cell]),
-                        flow: *flow,
-                    });
+                    let cell = domain.grid().place(domain.free()[face.cell]);
+                    return Err(Error::Backflow { cell, flow: *flow });
                 }
             };
-            diagonal[*cell] += rate[0];
+            diagonal[face.cell] += rate[0];
             edge_rates.push(rate);
         }
         Ok(Self {
@@ -215,11 +195,8 @@ impl Transport {
         }
         for (face, rate) in self.domain.faces.iter().zip(&self.rates) {
             let [low, high] = face.cells;
-            let [up, down] = if direction == Direction::Forward {
-                *rate
-            } else {
-                [rate[1], rate[0]]
-            };
+            let forward = direction == Direction::Forward;
+            let [up, down] = if forward { *rate } else { [rate[1], rate[0]] };
             out[high] -= up * x[low];
             out[low] -= down * x[high];
         }
@@ -255,10 +232,7 @@ impl Transport {
         let mut budget = Budget {
             mass: contents().sum(),
             decayed: contents().zip(&self.decay).map(|(amount, decay)| amount * decay).sum(),
-            absorbed: 0.0,
-            leaked: 0.0,
-            inflow: 0.0,
-            outflow: 0.0,
+            ..Budget::default()
         };
         for (face, rate) in self.domain.edge_faces.iter().zip(&self.edge_rates) {
             let leaves = rate[0] * concentration[face.cell];
@@ -311,26 +285,17 @@ impl Transport {
     }
 }
 
-fn values(
-    name: &'static str,
-    given: PerCell,
-    count: usize,
-    check: impl Fn(&'static str, f64) -> Result<f64, ArgumentError>,
-) -> Result<Vec<f64>, Error> {
+fn values(name: &'static str, given: PerCell, count: usize, least: f64) -> Result<Vec<f64>, Error> {
     let values = match given {
         PerCell::Constant(value) => vec![value; count],
         PerCell::Each(values) => values,
     };
     if values.len() != count {
-        return Err(ArgumentError::new(
-            name,
-            format!("{} values", values.len()),
-            format!("{count}, one for each free cell"),
-        )
-        .into());
+        let (given, expected) = (format!("{} values", values.len()), format!("{count}, one for each free cell"));
+        return Err(ArgumentError::new(name, given, expected).into());
     }
     for value in &values {
-        check(name, *value)?;
+        within(name, *value, least, LARGEST)?;
     }
     Ok(values)
 }

@@ -8,11 +8,15 @@ use serde::{Deserialize, Serialize};
 /// If the model is right, source and samples are one draw of the prior and the model, and a draw of the posterior has the same law
 /// together with these samples. A single draw's sum is then chi-squared with one degree of freedom per sample, and the average over
 /// the posterior has the same mean and less spread. Averaging over the posterior counts no parameters and needs no Gaussian belief.
+///
+/// Where a mixture of Gaussians was received, the distance of the position from it counts as two numbers more: its samples are gone, but
+/// a belief that every node moves far is wrong. The squared distance from the nearest Gaussian, in its deviations, is no larger than
+/// chi-squared with two degrees of freedom if belief and model are right.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// The sum. About `samples` if the model is right.
     pub chi_squared: f64,
-    /// Number of samples.
+    /// Number of samples, and two for every mixture that was received.
     pub samples: usize,
 }
 

@@ -49,9 +49,10 @@ impl Posterior {
         let target = Target::new(prior, likelihood)?;
         let cells = Cells::cover(&target, around.lower, around.upper, per_axis, options)?;
         let (rates, chi_squared) = target.rates_and_fit(&cells);
+        let (moved, coordinates) = target.conflict(&cells);
         let fit = Fit {
-            chi_squared,
-            samples: likelihood.samples(),
+            chi_squared: chi_squared + moved,
+            samples: likelihood.samples() + coordinates,
         };
         Ok(Self { cells, rates, fit })
     }

@@ -1,10 +1,13 @@
 //! The release rate, known or integrated out.
 
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, finite, non_negative, positive};
+use fewbits_numerics::error::{all_finite, non_negative, positive, within};
 use fewbits_numerics::kernels;
 use fewbits_numerics::normal::{LN_SQRT_2PI, log_interval, truncated_moments};
 use serde::{Deserialize, Serialize};
+
+/// Largest rate, and largest sample and response over the noise: products of their squares are finite.
+const LARGEST: f64 = 1e60;
 
 /// A uniform prior of the release rate, kg/s.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -18,10 +21,10 @@ impl RateRange {
     /// Rates between `low` and `high`, kg/s.
     ///
     /// # Errors
-    /// If `low` is negative, or `high` is not finite and above it.
+    /// If `low` is negative, or `high` is not above it or beyond 1e60.
     pub fn new(low: f64, high: f64) -> Result<Self, ArgumentError> {
         non_negative("low", low)?;
-        finite("high", high)?;
+        within("high", high, 0.0, LARGEST)?;
         if high > low {
             Ok(Self { low, high })
         } else {
@@ -74,10 +77,10 @@ pub enum RateModel {
 
 impl RateModel {
     /// # Errors
-    /// If a known rate is not a positive number.
+    /// If a known rate is not a positive number up to 1e60.
     pub(crate) fn check(&self) -> Result<(), ArgumentError> {
         match self {
-            Self::Known(rate) => positive("rate", *rate).map(|_| ()),
+            Self::Known(rate) => within("rate", positive("rate", *rate)?, 0.0, LARGEST).map(|_| ()),
             _ => Ok(()),
         }
     }
@@ -122,7 +125,7 @@ impl RateSums {
     /// The sums of samples `y` (without bias) and responses `a` under noise of standard deviation `noise`.
     ///
     /// # Errors
-    /// If the lengths differ or are zero, a number is not finite, or `noise` is not positive.
+    /// If the lengths differ or are zero, `noise` is not positive, or a sample or response is not finite or beyond 1e60 `noise`.
     pub fn of(samples: &[f64], responses: &[f64], noise: f64) -> Result<Self, ArgumentError> {
         positive("noise", noise)?;
         all_finite("samples", samples)?;
@@ -136,7 +139,10 @@ impl RateSums {
             ..Self::default()
         };
         for (y, a) in samples.iter().zip(responses) {
-            let (y, a) = (y / noise, a / noise);
+            let (y, a) = (
+                within("samples over noise", y / noise, -LARGEST, LARGEST)?,
+                within("responses over noise", a / noise, -LARGEST, LARGEST)?,
+            );
             sums.response += a * a;
             sums.correlation += a * y;
             sums.energy += y * y;
@@ -282,12 +288,13 @@ pub fn log_sample_marginal(sample: f64, response: f64, noise: f64, range: &RateR
 pub(crate) fn log_sample_uncut(sample: f64, response: f64, noise: f64, range: &RateRange) -> (f64, Option<(f64, f64)>) {
     let width = range.high - range.low;
     let reach = response * width / noise;
-    let y = sample / noise;
+    // Differences before quotients: the quotients may be infinite.
+    let residual = |rate: f64| (sample - rate * response) / noise;
     if reach < 1e-10 {
         // A response far below the noise: the sample is noise about the mean response.
-        let d = y - range.middle() * response / noise;
+        let d = residual(range.middle());
         return (-0.5 * d * d - LN_SQRT_2PI - noise.ln(), None);
     }
-    let ends = (y - range.high * response / noise, y - range.low * response / noise);
+    let ends = (residual(range.high), residual(range.low));
     (-(response * width).ln(), Some(ends))
 }

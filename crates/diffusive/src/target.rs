@@ -102,6 +102,31 @@ impl<'a, M: SourceModel> Target<'a, M> {
         })
     }
 
+    /// Expected squared distance of the position from the nearest Gaussian of a mixture that was received, in its deviations, and the
+    /// number of coordinates: how far these samples move the belief. Nothing for other priors.
+    ///
+    /// If the belief and the model are right, the position is one draw of the mixture: the distance from its own Gaussian is
+    /// chi-squared with two degrees of freedom, and the nearest is no farther.
+    pub(crate) fn conflict(&self, cells: &Cells<2>) -> (f64, usize) {
+        if matches!(self.prior, Prior::Exact(_)) || self.lobes.is_empty() {
+            return (0.0, 0);
+        }
+        let precisions: Vec<[f64; 3]> = self.lobes.iter().map(|lobe| lobe.precision(0.0)).collect();
+        let [x, y] = cells.columns();
+        let at = |i: usize| {
+            let distances = self.lobes.iter().zip(&precisions);
+            let distances = distances.map(|(lobe, p)| quadratic(p, &(Vector2::new(x[i], y[i]) - lobe.mean)));
+            distances.fold(f64::INFINITY, f64::min)
+        };
+        let sum = cells
+            .weights()
+            .iter()
+            .enumerate()
+            .map(|(i, weight)| weight * at(i))
+            .sum();
+        (sum, 2)
+    }
+
     /// Mean and variance of the rate at every cell, where it is unknown and shared, and the expected sum of squared residuals over
     /// the noise variance.
     pub(crate) fn rates_and_fit(&self, cells: &Cells<2>) -> (Option<RateMoments>, f64) {

@@ -14,11 +14,15 @@ use nalgebra::{Matrix4, Vector2};
 /// noise. The second term is what the size of the noise says.
 ///
 /// # Errors
-/// If the distance is not above zero.
+/// If the distance is not above zero, or the information is no number.
 pub fn range_information(noise: &RangeNoise, distance: f64) -> Result<f64, Error> {
     positive("distance", distance)?;
     let (sigma, slope) = (noise.deviation(distance), noise.slope(distance));
-    Ok((1.0 + 2.0 * slope * slope) / (sigma * sigma))
+    information((1.0 + 2.0 * slope * slope) / (sigma * sigma))
+}
+
+fn information(value: f64) -> Result<f64, Error> {
+    Ok(fewbits_numerics::error::non_negative("information", value)?)
 }
 
 /// Fisher information about the distance of the level of a quantized range: `sum_q (dP_q/dd)^2 / P_q`, the outer cells open.
@@ -27,7 +31,7 @@ pub fn range_information(noise: &RangeNoise, distance: f64) -> Result<f64, Error
 /// noise falls, though the error that can be reached does not. At high signal-to-noise ratios the bound is loose.
 ///
 /// # Errors
-/// If the distance is not above zero, there are fewer than two levels, or the reference is none.
+/// If the distance is not above zero, there are fewer than two levels, the reference is none, or the information is no number.
 pub fn level_information(
     reference: &RangeReference,
     levels: usize,
@@ -59,7 +63,7 @@ pub fn level_information(
         }
         lower = upper;
     }
-    Ok(sum)
+    information(sum)
 }
 
 fn log_inside(a: f64, b: f64) -> f64 {

@@ -165,6 +165,9 @@ impl Tracker for GuidedGaussian {
                 (guide, info)
             }
         };
+        if !next.is_finite() {
+            return Err(Error::IMPOSSIBLE);
+        }
         *belief = next;
         Ok(info)
     }

@@ -194,7 +194,7 @@ impl Centre {
         self.on_deadline(actions);
         let schedule = &self.settings.schedule;
         let count = schedule.count(now);
-        let next = schedule.start(count.max(self.slot) + 1);
+        let next = schedule.start(count.max(self.slot).saturating_add(1));
         actions.push(Action::SetTimer {
             at: next,
             timer: CentreTimer::SlotBegins,
@@ -255,7 +255,7 @@ impl Centre {
                 *sum_of_member = sum;
             }
             let lengths: Vec<_> = members.iter().map(|member| member.report).collect();
-            let connected = self.echoed.is_some_and(|of| of + 1 == self.slot) && !self.asked;
+            let connected = self.echoed.is_some_and(|of| of.checked_add(1) == Some(self.slot)) && !self.asked;
             let told = match echo(&self.observed, &lengths) {
                 Ok(echo) if connected => (Kind::Echo, echo),
                 _ => (Kind::Snapshot, state.clone()),

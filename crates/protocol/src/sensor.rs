@@ -357,7 +357,7 @@ impl Sensor {
             return Reaction::NOTHING;
         }
         let count = schedule.count(now);
-        self.begins_at = schedule.start(count + 1);
+        self.begins_at = schedule.start(count.saturating_add(1));
         let timer = Some((self.begins_at, SensorTimer::SlotBegins));
         let slot = Slot::of_count(count);
         // A clock that was set back meets a slot again: it is not answered twice.
@@ -379,7 +379,7 @@ impl Sensor {
             return Reaction::NOTHING;
         };
         schedule.synchronise(slot, now);
-        self.begins_at = schedule.start(schedule.count(now) + 1);
+        self.begins_at = schedule.start(schedule.count(now).saturating_add(1));
         Reaction {
             timer: Some((self.begins_at, SensorTimer::SlotBegins)),
             ..Reaction::NOTHING

@@ -47,12 +47,11 @@ impl Slot {
     /// The count with this slot number that is nearest to `count`.
     pub fn nearest_count(self, count: u64) -> u64 {
         let ahead = u64::from(self.0.wrapping_sub(count as u32) & MASK);
-        match ahead < 1 << (SLOT_BITS - 1) {
-            true => count.saturating_add(ahead),
-            false => count
-                .checked_sub((1 << SLOT_BITS) - ahead)
-                .unwrap_or_else(|| count.saturating_add(ahead)),
-        }
+        let behind = (1 << SLOT_BITS) - ahead;
+        // At the ends of the range there is one on one side only.
+        let (later, earlier) = (count.checked_add(ahead), count.checked_sub(behind));
+        let nearer = if ahead < behind { later } else { earlier };
+        nearer.or(earlier).or(later).unwrap_or(count)
     }
 }
 
@@ -89,14 +88,15 @@ impl Schedule {
 
     /// Count of the slot at a time; 0 before the first.
     pub fn count(&self, now: u64) -> u64 {
-        u64::try_from((i128::from(now) - self.origin) / i128::from(self.period.get())).unwrap_or(0)
+        let count = (i128::from(now) - self.origin) / i128::from(self.period.get());
+        u64::try_from(count.max(0)).unwrap_or(u64::MAX)
     }
 
     /// When the slot of a count begins.
     pub fn start(&self, count: u64) -> u64 {
         let start = self
             .origin
-            .saturating_add(i128::from(count) * i128::from(self.period.get()));
+            .saturating_add(i128::from(count).saturating_mul(i128::from(self.period.get())));
         u64::try_from(start.max(0)).unwrap_or(u64::MAX)
     }
 

@@ -46,7 +46,7 @@ impl Grid {
         let cells = 1usize << bits_in_range(bits)?;
         // Symmetric by construction: the edge in the middle is exactly zero.
         let breakpoints = (1..cells)
-            .map(|l| half_width * (2.0 * l as f64 - cells as f64) / cells as f64)
+            .map(|l| half_width * ((2.0 * l as f64 - cells as f64) / cells as f64))
             .collect();
         Ok(Self { breakpoints })
     }

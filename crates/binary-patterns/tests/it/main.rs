@@ -4,3 +4,4 @@
 mod bounds;
 mod entry;
 mod fixtures;
+mod wild;

@@ -102,7 +102,8 @@ impl<F: Fn(&[f64], &mut [f64])> Posterior<F> {
                 .filter(|i| values[*i] > peak - DROP)
                 .map(|i| places[i])
         };
-        let finest = features.iter().map(|f| f.1).fold(1.0, f64::min) / 64.0;
+        // A width may underflow; a step of zero would never end.
+        let finest = (features.iter().map(|f| f.1).fold(1.0, f64::min) / 64.0).max(f64::MIN_POSITIVE);
         let low = posterior.edge(counted().fold(mode, f64::min), -finest, peak - DROP);
         let high = posterior.edge(counted().fold(mode, f64::max), finest, peak - DROP);
         let mut breaks = vec![low, mode, high];

@@ -312,3 +312,20 @@ fn a_nan_likelihood_is_blamed_on_the_likelihood() {
         assert_eq!(tilted, Err(Error::Impossible));
     }
 }
+
+/// Defect: a width that underflows made the search for the posterior's edge endless.
+#[test]
+fn feature_without_width_is_integrated() {
+    let prior = Gaussian::scalar(0.0, 1.0).unwrap();
+    let step = Feature {
+        location: 7.0,
+        width: 0.0,
+    };
+    let half_line = |at: &[f64], logs: &mut [f64]| {
+        for (x, log) in at.iter().zip(logs) {
+            *log += if *x >= 7.0 { 0.0 } else { f64::NEG_INFINITY };
+        }
+    };
+    let tilted = tilted_by_quadrature(&prior, [step], half_line).unwrap();
+    assert!((tilted.log_evidence - normal::log_cdf(-7.0)).abs() < 1e-6, "{tilted:?}");
+}

@@ -30,26 +30,42 @@ impl TryFrom<Stored> for Grid {
     type Error = Error;
 
     fn try_from(stored: Stored) -> Result<Self, Error> {
-        let (lower, spacing) = (finite("lower", stored.lower)?, positive("spacing", stored.spacing)?);
-        if !(2..=MOST).contains(&stored.points) || !(lower + spacing * stored.points as f64).is_finite() {
+        if !(2..=MOST).contains(&stored.points) {
             return Err(ArgumentError::new("points", stored.points, format!("2 to {MOST} nodes")).into());
         }
-        Ok(Self {
-            lower,
-            spacing,
-            points: stored.points,
-        })
+        Self::of_nodes(finite("lower", stored.lower)?, stored.spacing, stored.points)
     }
 }
 
 /// Most nodes of a grid.
 const MOST: usize = 1_000_000;
 
+/// Largest size of a node: squares of its distances are still finite.
+pub(super) const FARTHEST: f64 = 1e150;
+
 impl Grid {
+    /// Moments of a density at the nodes are finite: no square overflows, no density of a node overflows, and nodes are not the same
+    /// number.
+    fn of_nodes(lower: f64, spacing: f64, points: usize) -> Result<Self, Error> {
+        let grid = Self {
+            lower,
+            spacing: positive("spacing", spacing)?,
+            points,
+        };
+        let farthest = lower.abs().max(grid.node(points).abs());
+        if !(farthest <= FARTHEST && spacing >= f64::MIN_POSITIVE && spacing > 2.0 * f64::EPSILON * farthest) {
+            let expected = "a normal number that tells nodes apart, and nodes within 1e150 of 0";
+            let given = format!("{spacing} from {lower}");
+            return Err(ArgumentError::new("spacing", given, expected).into());
+        }
+        Ok(grid)
+    }
+
     /// Nodes from `lower` to `upper` or just beyond, `spacing` apart.
     ///
     /// # Errors
-    /// If bounds are not finite or not increasing, the spacing is not positive, or there are more than a million nodes.
+    /// If bounds are not increasing or not within 1e150 of 0, the spacing is not positive or below the rounding of a bound, or there
+    /// are more than a million nodes.
     pub fn new(lower: f64, upper: f64, spacing: f64) -> Result<Self, Error> {
         finite("lower", lower)?;
         finite("upper", upper)?;
@@ -59,11 +75,7 @@ impl Grid {
             let expected = "an interval that holds 1 to a million spacings";
             return Err(ArgumentError::new("grid", format!("[{lower}, {upper}] by {spacing}"), expected).into());
         }
-        Ok(Self {
-            lower,
-            spacing,
-            points: intervals as usize + 1,
-        })
+        Self::of_nodes(lower, spacing, intervals as usize + 1)
     }
 
     /// Nodes symmetric about zero, zero included, out to `half_width` or just beyond.

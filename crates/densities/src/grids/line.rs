@@ -230,6 +230,9 @@ impl Density<1> for PointMass {
     /// Linear between the nodes, zero outside.
     fn log_density(&self, state: &Vector1<f64>) -> f64 {
         let at = (state[0] - self.grid.node(0)) / self.grid.spacing();
+        if at.is_infinite() {
+            return f64::NEG_INFINITY;
+        }
         let below = at.floor();
         let value = |i: f64| {
             let inside = i >= 0.0 && i < self.density.len() as f64;

@@ -1,5 +1,6 @@
 //! A density over the plane.
 
+use super::axis::FARTHEST;
 use super::line::{TRIANGULAR_VARIANCE, absorb, check_density, triangular};
 use crate::Error;
 use crate::particles::weights::Categorical;
@@ -83,6 +84,9 @@ impl PlaneMass {
         belief: &Gaussian<2>,
         fill: impl FnOnce(&Self, &mut [f64]),
     ) -> Result<Self, Error> {
+        if !(belief.mean().amax() <= FARTHEST && belief.covariance().amax() <= FARTHEST * FARTHEST) {
+            return Err(fewbits_core::Error::Impossible.into());
+        }
         let refuse = || ArgumentError::new("basis", format!("{basis:?}"), "a regular matrix");
         let inverse = basis.try_inverse().ok_or_else(refuse)?;
         let (centre, spread) = (inverse * belief.mean(), inverse * belief.covariance() * inverse.transpose());
@@ -255,6 +259,9 @@ impl Density<2> for PlaneMass {
             return f64::NEG_INFINITY;
         };
         let at = inverse * state - Vector2::new(self.first[0] as f64, self.first[1] as f64);
+        if state.iter().all(|x| x.is_finite()) && !at.iter().all(|x| x.is_finite()) {
+            return f64::NEG_INFINITY;
+        }
         let below = at.map(f64::floor);
         let share = at - below;
         let mut value = 0.0;

@@ -5,6 +5,7 @@ use fewbits_core::{Columns, Gaussian};
 use fewbits_numerics::error::{all_finite, non_negative};
 use fewbits_numerics::factored::Factored;
 use fewbits_numerics::kernels::vectorised;
+use fewbits_numerics::linalg::symmetrised;
 use fewbits_numerics::normal::LN_SQRT_2PI;
 use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
@@ -32,7 +33,7 @@ impl<const D: usize> Component<D> {
         Ok(Self {
             weight,
             mean,
-            covariance: (covariance + covariance.transpose()) * 0.5,
+            covariance: symmetrised(&covariance),
             factor,
         })
     }
@@ -85,6 +86,12 @@ impl<const D: usize> Component<D> {
             #[inline(always)]
             || self.factor.log_forms(&self.mean, offset, columns, out),
         );
+        // Distances beyond the range of numbers meet as infinities.
+        for (i, log) in out.iter_mut().enumerate().filter(|(_, log)| log.is_nan()) {
+            if columns.iter().all(|column| column[i].is_finite()) {
+                *log = f64::NEG_INFINITY;
+            }
+        }
     }
 
     pub(super) fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> SVector<f64, D> {

@@ -250,3 +250,25 @@ fn lattices_that_cannot_be_are_refused_by_name() {
     assert!((flat.moments().covariance()[(0, 0)] - 0.25 * 840.0 / 12.0).abs() < 1e-9);
     assert!((flat.density()[7] - 4.0 / 841.0).abs() < 1e-15);
 }
+
+/// Defect: the density at a distance whose quotient by the spacing overflows was NaN.
+#[test]
+fn density_at_the_largest_number_is_zero() {
+    let line = PointMass::normal(Grid::symmetric(6.0, 0.25).unwrap(), 0.0, 1.0).unwrap();
+    let belief = Gaussian::new(Vector2::zeros(), Matrix2::identity()).unwrap();
+    let plane = PlaneMass::normal(&(Matrix2::identity() * 0.5), &belief).unwrap();
+    for x in [f64::MAX, f64::MIN] {
+        assert_eq!(line.log_density(&Vector1::new(x)), f64::NEG_INFINITY);
+        assert_eq!(plane.log_density(&Vector2::new(0.1, x)), f64::NEG_INFINITY);
+    }
+    assert!(line.log_density(&Vector1::new(f64::NAN)).is_nan());
+}
+
+/// Defect: the moments of a lattice over a covariance near the largest number were infinite.
+#[test]
+fn beliefs_whose_squares_overflow_are_impossible() {
+    let belief =
+        Gaussian::new(Vector2::new(-1.6, 1e154), Matrix2::from_diagonal(&Vector2::new(1.8, f64::MAX))).unwrap();
+    let basis = Matrix2::from_diagonal(&belief.standard_deviations());
+    assert_eq!(PlaneMass::normal(&basis, &belief).unwrap_err(), Error::Core(CoreError::Impossible));
+}

@@ -1,8 +1,10 @@
 //! Wild arguments: beliefs are made of numbers or refused, answer numbers, and a failed step leaves them as they were.
 
-use fewbits_core::Density;
 use fewbits_core::laws::wild;
-use fewbits_densities::{Bandwidth, Component, GaussianCloud, KernelEstimate, Mixture, Particles};
+use fewbits_core::{Density, Gaussian};
+use fewbits_densities::{
+    Bandwidth, Component, GaussianCloud, Grid, KernelEstimate, Mixture, Particles, PlaneMass, PointMass,
+};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
@@ -73,6 +75,38 @@ proptest! {
         }
         if let Ok(cloud) = GaussianCloud::new(cloud.clone(), covariance) {
             let _ = cloud.gaussian();
+        }
+    }
+
+    #[test]
+    fn grids_hold_numbers_and_survive_failed_steps(x in prop::array::uniform8(wild())) {
+        // The number of nodes is the width over the spacing; a grid of more than a few thousand is not the point here.
+        let modest = (x[1] - x[0]).abs() < 2000.0 * x[2].abs();
+        let grid = if modest { Grid::new(x[0], x[1], x[2]).ok() } else { None }.unwrap_or(Grid::symmetric(6.0, 0.25).unwrap());
+        for before in [PointMass::new(grid, |t| -t * t * x[3]), PointMass::normal(grid, x[3], x[4])].into_iter().flatten() {
+            prop_assert!(before.mean().is_finite() && before.variance() >= 0.0, "{:?}", before);
+            let mut density = before.clone();
+            match density.update_with(|t| if t > x[5] { x[6] } else { x[7] }) {
+                Ok(log) => prop_assert!(log.is_finite() && density.mean().is_finite(), "{:?}", density),
+                Err(_) => prop_assert_eq!(&density, &before),
+            }
+            if let Ok(log) = density.clone().reweight(&vec![x[6]; grid.points()]) {
+                prop_assert!(log.is_finite());
+            }
+        }
+        let Ok(belief) = Gaussian::new(Vector2::new(x[0], x[1]), Matrix2::new(x[2].abs(), 0.0, 0.0, x[3].abs())) else { return Ok(()) };
+        if let Ok(before) = PlaneMass::normal(&Matrix2::identity(), &Gaussian::new(Vector2::new(0.3, -1.0), Matrix2::identity()).unwrap()) {
+            let mut plane = before.clone();
+            match plane.update_with(|t| if t[0] > x[5] { x[6] } else { x[7] }) {
+                Ok(log) => prop_assert!(log.is_finite() && plane.moments().is_finite()),
+                Err(_) => prop_assert_eq!(&plane, &before),
+            }
+        }
+        // As many nodes as the deviations ask for of a lattice of the belief's own size.
+        let basis = Matrix2::from_diagonal(&belief.standard_deviations());
+        if let Ok(plane) = PlaneMass::normal(&basis, &belief) {
+            prop_assert!(plane.moments().is_finite(), "{:?}", belief);
+            check(&plane, [x[5], x[6]]);
         }
     }
 }

@@ -19,3 +19,4 @@ mod refusals;
 mod slab;
 mod sphere;
 mod two_media;
+mod wild;

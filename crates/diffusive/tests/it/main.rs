@@ -16,6 +16,7 @@ mod diffusion_entries;
 mod envelopes;
 mod fit;
 mod fixtures;
+mod gridded;
 mod laplace;
 mod laws;
 mod messages;
@@ -23,6 +24,7 @@ mod searches;
 mod series;
 mod slices;
 mod unknown_models;
+mod wild;
 
 use fewbits_diffusive::{RateModel, RateRange, Rule, SearchBox, SourceSensor};
 use fewbits_models::diffusion::{Air, Ground};

@@ -202,7 +202,9 @@ impl Scheme {
         search.rule = self.rule;
         search.most_nodes = self.most_nodes;
         search.wire = self.wire;
-        // The figures count the searches that reach the threshold, as the paper does, and those of them that are wrong.
+        // The figures compare the share of searches that reach the threshold, and their nodes and errors, with references of a program
+        // that never refuses a model. A refused search would count as one that stopped short, most often where a form is shown to stop
+        // in the wrong place (`converged_wrong`).
         search.refusal = None;
         if self.form != Form::Raw {
             // What is projected need not be exact to seven digits.

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use fewbits_densities::{Component, Mixture};
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::at_least_one;
 use fewbits_numerics::factored::{Factored, half_log_det};
 use fewbits_numerics::normal::LN_SQRT_2PI;
@@ -61,7 +62,8 @@ impl<const D: usize> Part<D> {
 /// Merges the cheapest pair again and again until at most `components` are left.
 ///
 /// # Errors
-/// If `components` is 0, or the covariance of the whole is singular to working precision ([`MergeCost::Salmond`]).
+/// If `components` is 0, the joint covariance of two components leaves the range of numbers, or that of the whole is singular to
+/// working precision ([`MergeCost::Salmond`]).
 pub fn merge<const D: usize>(mixture: &Mixture<D>, components: usize, cost: MergeCost) -> Result<Merged<D>, Error> {
     at_least_one("components", components)?;
     let parts: Vec<Part<D>> = mixture
@@ -84,6 +86,11 @@ pub fn merge<const D: usize>(mixture: &Mixture<D>, components: usize, cost: Merg
         }
         MergeCost::Williams => williams(parts, components),
     };
+    if parts.len() > components {
+        // No pair that is left has a finite price.
+        let given = format!("{} components that cannot be joined", parts.len());
+        return Err(ArgumentError::new("mixture", given, "components whose joint covariances are finite").into());
+    }
     let merged = parts.iter().map(|p| Component::new(p.weight, p.mean, p.covariance));
     Ok(Merged {
         mixture: Mixture::new(merged.collect::<Result<_, _>>()?)?,

@@ -10,4 +10,5 @@ mod fixtures;
 mod merging;
 mod quadrature;
 mod reduction;
+mod wild;
 mod wire;

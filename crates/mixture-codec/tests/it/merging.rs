@@ -1,7 +1,7 @@
 //! Merging against its definitions: every pair priced anew by closed forms.
 
 use crate::common::random_mixture;
-use fewbits_densities::Mixture;
+use fewbits_densities::{Component, Mixture};
 use fewbits_mixture_codec::merge::{MergeCost, merge};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Vector2};
@@ -84,4 +84,13 @@ fn the_cheapest_pair_is_merged_at_the_price_of_the_definition() {
             check(MergeCost::Williams, (slow, error), 1e-10 * overlap(&original, &original));
         }
     }
+}
+
+/// Defect: components whose joint covariance overflows stayed apart, and there were more than was asked for.
+#[test]
+fn components_that_cannot_be_joined_are_refused() {
+    let at = |x: f64| Component::new(0.5, Vector2::new(x, 0.0), Matrix2::identity()).unwrap();
+    let mixture = Mixture::new(vec![at(-1e200), at(1e200)]).unwrap();
+    assert_eq!(merge(&mixture, 2, MergeCost::Runnalls).unwrap().mixture.len(), 2);
+    assert!(merge(&mixture, 1, MergeCost::Runnalls).is_err());
 }

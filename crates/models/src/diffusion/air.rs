@@ -6,7 +6,7 @@ use super::space::{ImpulseResponse, Space, step_response};
 use crate::Error;
 use crate::source_model::{Homogeneous, Receptor, SourceGradient, SourceModel};
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, positive};
+use fewbits_numerics::error::{positive, within};
 use fewbits_numerics::kernels::scalar::exp;
 use fewbits_numerics::normal::erfcx;
 use nalgebra::Vector3;
@@ -15,6 +15,10 @@ use std::f64::consts::PI;
 /// Distances below this many metres count as this: the concentration has a pole at the source.
 pub const CLOSEST: f64 = 1e-3;
 const SQRT_PI: f64 = 1.772_453_850_905_516;
+/// Largest size, in SI units, of diffusivity, wind, distance and age, and the smallest of those that divide: no product of a closed
+/// form overflows. Beyond that distance there is no concentration; an age beyond it is the steady state.
+const LARGEST: f64 = 1e60;
+const SMALLEST: f64 = 1e-60;
 
 /// What bounds the air below.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,11 +53,13 @@ impl Air {
     /// Air of the given diffusivity (m^2/s) and wind (m/s).
     ///
     /// # Errors
-    /// If `diffusivity` is not positive, `wind` is not finite, or it blows across the ground: compose a [`Space`] then, where
-    /// the wall law says which flux it is about.
+    /// If `diffusivity` is not in `[1e-60, 1e60]`, a component of `wind` not in `[-1e60, 1e60]`, or it blows across the ground:
+    /// compose a [`Space`] then, where the wall law says which flux it is about.
     pub fn new(diffusivity: f64, wind: Vector3<f64>, ground: Ground) -> Result<Self, Error> {
-        positive("diffusivity", diffusivity)?;
-        all_finite("wind", wind.as_slice())?;
+        within("diffusivity", positive("diffusivity", diffusivity)?, SMALLEST, LARGEST)?;
+        for component in wind.iter() {
+            within("wind", *component, -LARGEST, LARGEST)?;
+        }
         let open = |v| Axis::open(diffusivity)?.with_wind(v, Flux::Total);
         let vertical = match ground {
             Ground::None => open(wind.z)?,
@@ -76,10 +82,10 @@ impl Air {
     /// The same with another distance, in metres, below which distances count as this one (1 mm unless told).
     ///
     /// # Errors
-    /// If `closest` is not a positive number.
+    /// If `closest` is not in `[1e-60, 1e60]`.
     pub fn with_closest(self, closest: f64) -> Result<Self, Error> {
         Ok(Self {
-            closest: positive("closest", closest)?,
+            closest: within("closest", closest, SMALLEST, LARGEST)?,
             ..self
         })
     }
@@ -130,12 +136,21 @@ impl Air {
         self.ground != Ground::None
     }
 
+    /// The age that closed forms take; `None` if there is no concentration: before the release, below the ground, or too far.
+    fn counted_age(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> Option<f64> {
+        let below = self.has_ground() && (field.z < 0.0 || source.z < 0.0);
+        if age < SMALLEST || below || (field - source).amax() > LARGEST {
+            return None;
+        }
+        Some(if age > LARGEST { LARGEST } else { age })
+    }
+
     /// Concentration at `field`, kg/m^3 per kg/s, of a source at `source` that has released for `age` seconds. Zero at age zero
     /// and before, and below the ground.
     pub fn concentration(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> f64 {
-        if age <= 0.0 || (self.has_ground() && (field.z < 0.0 || source.z < 0.0)) {
+        let Some(age) = self.counted_age(field, source, age) else {
             return 0.0;
-        }
+        };
         let Some(sign) = self.image() else {
             return step_response(&self.space, field, source, age, self.closest);
         };
@@ -156,13 +171,12 @@ impl Air {
     /// The derivative with respect to the height of a source **on** the ground is the one-sided limit, 0 over impermeable
     /// ground. Over permeable ground the gradient is a central difference of relative step 1e-5, good to about eight digits.
     pub fn source_gradient(&self, field: &Vector3<f64>, source: &Vector3<f64>, age: f64) -> SourceGradient {
-        let none = SourceGradient {
-            value: 0.0,
-            gradient: Vector3::zeros(),
+        let Some(age) = self.counted_age(field, source, age) else {
+            return SourceGradient {
+                value: 0.0,
+                gradient: Vector3::zeros(),
+            };
         };
-        if age <= 0.0 || (self.has_ground() && (field.z < 0.0 || source.z < 0.0)) {
-            return none;
-        }
         let Some(sign) = self.image() else {
             return self.numeric_gradient(field, source, age);
         };
@@ -237,7 +251,7 @@ impl Air {
         let drift = self.speed * age;
         let (minus, plus) = ((r - drift) * narrowness, (r + drift) * narrowness);
         // |d - v t|^2 = minus^2 spread^2 + 2 (r V - v.d) t, without the cancellation of the difference of vectors.
-        let lag = (along - r * self.speed) * self.half_resistance;
+        let lag = ((along - r * self.speed) * self.half_resistance).min(0.0);
         let g = exp(lag - minus * minus);
         let near = g * erfcx(minus.abs());
         // erfc(-x) = 2 - erfc(x).
@@ -307,15 +321,16 @@ impl SourceModel for Air {
     /// that over ground.
     fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64 {
         let here = self.concentration(&receptor.place, source, age);
-        if age <= 0.0 {
+        if age < SMALLEST {
             return here;
         }
+        let age = age.min(LARGEST);
         let reach = std::f64::consts::SQRT_2 * half_width;
         let offset = receptor.place - source;
         let near = offset
             .z
             .hypot((offset.x.hypot(offset.y) - reach).max(0.0))
-            .max(self.closest);
+            .clamp(self.closest, LARGEST);
         let far = offset.norm() + reach;
         let slope = near.recip() + 2.0 * far / (4.0 * self.diffusivity * age) + self.speed / self.diffusivity;
         let downwind = self.wind.try_normalize(0.0).unwrap_or_else(Vector3::x);

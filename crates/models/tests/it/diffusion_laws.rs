@@ -205,3 +205,45 @@ fn extremes_stay_finite() {
     assert_eq!(space.green(&Vector3::zeros(), &Vector3::zeros(), -1.0), 0.0);
     assert!(Axis::open(0.0).is_err() && Air::new(-1.0, Vector3::zeros(), Ground::None).is_err());
 }
+
+/// Defect: a wind of 1e167 m/s had concentrations that were no numbers.
+#[test]
+fn winds_beyond_the_range_of_squares_are_refused() {
+    let air = |k: f64, wind: f64| Air::new(k, Vector3::new(wind, 0.0, 0.0), Ground::Impermeable);
+    for (k, wind) in [
+        (40.0, 1e167),
+        (40.0, -1e61),
+        (1e-61, 1.0),
+        (1e300, 1.0),
+        (40.0, f64::NAN),
+    ] {
+        assert!(air(k, wind).is_err(), "{k} {wind}");
+    }
+    assert!(air(40.0, 1.0).unwrap().with_closest(1e-61).is_err());
+    for (k, wind, closest) in [
+        (1e-60, 1e60, 1e-60),
+        (1e60, 1e60, 1e60),
+        (1e60, 1e-60, 1e-60),
+        (1e-60, 0.0, 1e-60),
+    ] {
+        let air = air(k, wind).unwrap().with_closest(closest).unwrap();
+        for distance in [-f64::MAX, -1e60, -1.0, 0.0, 1e-300, 1.0, 1e60, 1e100, f64::MAX] {
+            for age in [5e-324, 1e-60, 1.0, 1e60, f64::MAX, f64::INFINITY] {
+                let (field, source) = (Vector3::new(distance, 0.0, 0.0), Vector3::zeros());
+                let g = air.source_gradient(&field, &source, age);
+                let numbers = [
+                    g.value,
+                    g.gradient.x,
+                    g.gradient.y,
+                    air.concentration(&field, &source, age),
+                ];
+                assert!(numbers.iter().all(|x| x.is_finite()), "{air:?} {distance} {age}: {numbers:?}");
+            }
+        }
+    }
+    // An infinite age is the steady state: exp(-(r - x) v / 2 k) / (2 pi k r) above impermeable ground.
+    let windy = air(40.0, 20.0).unwrap();
+    let steady = windy.concentration(&Vector3::new(-3.0, 4.0, 0.0), &Vector3::zeros(), f64::INFINITY);
+    let expected = (-(5.0 + 3.0) * 20.0_f64 / 80.0).exp() / (2.0 * std::f64::consts::PI * 40.0 * 5.0);
+    assert!((steady / expected - 1.0).abs() < 1e-12, "{steady} {expected}");
+}

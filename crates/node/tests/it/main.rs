@@ -5,3 +5,4 @@
 mod golden;
 mod law;
 mod schemes;
+mod wild;

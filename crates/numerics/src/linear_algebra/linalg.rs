@@ -154,14 +154,14 @@ const PIVOT: f64 = 1e-11;
 /// singular to rounding. Rows are scaled by their standard deviations first, so that no unit matters.
 ///
 /// # Errors
-/// If `S` is no covariance.
+/// If `S` is no covariance, or the solution is not finite: an argument is not, or the quotient overflows.
 pub fn solve_semidefinite<const D: usize, const N: usize>(
     covariance: &SMatrix<f64, D, D>,
     right: &SMatrix<f64, D, N>,
 ) -> Result<SMatrix<f64, D, N>, ArgumentError> {
     if D == 1 {
         let v = covariance[0];
-        return Ok(if v > 0.0 { right / v } else { SMatrix::zeros() });
+        return finite_solution(if v > 0.0 { right / v } else { SMatrix::zeros() });
     }
     let scale = covariance
         .diagonal()
@@ -188,7 +188,14 @@ pub fn solve_semidefinite<const D: usize, const N: usize>(
             factor * gram.solve(&gram.solve(&(factor.transpose() * right)))
         }
     };
-    Ok(SMatrix::from_fn(|i, j| solution[(i, j)] * scale[i]))
+    finite_solution(SMatrix::from_fn(|i, j| solution[(i, j)] * scale[i]))
+}
+
+fn finite_solution<const D: usize, const N: usize>(
+    solution: SMatrix<f64, D, N>,
+) -> Result<SMatrix<f64, D, N>, ArgumentError> {
+    error::all_finite("solution", solution.as_slice())?;
+    Ok(solution)
 }
 
 #[cfg(test)]
@@ -246,6 +253,18 @@ mod tests {
         assert_eq!(line.unwrap(), SMatrix::<f64, 1, 3>::repeat(0.5));
         let nothing = solve_semidefinite(&SMatrix::<f64, 1, 1>::new(0.0), &SMatrix::<f64, 1, 1>::new(0.0));
         assert_eq!(nothing.unwrap()[0], 0.0);
+    }
+
+    /// Defect: an indefinite matrix beside a column near the largest number gave NaN.
+    #[test]
+    fn solution_beyond_the_largest_number_is_an_error() {
+        let indefinite = Matrix2::new(-1.0, -3.0, -3.0, 0.028);
+        assert!(solve_semidefinite(&indefinite, &Vector2::new(-3.0, f64::MIN)).is_err());
+        let small = Matrix2::new(1e-10, 0.0, 0.0, 1.0);
+        assert!(solve_semidefinite(&small, &Vector2::new(1e300, 1.0)).is_err());
+        assert!(solve_semidefinite(&small, &Vector2::new(f64::NAN, 1.0)).is_err());
+        assert!(solve_semidefinite(&SMatrix::<f64, 1, 1>::new(0.1), &SMatrix::<f64, 1, 1>::new(f64::MAX)).is_err());
+        assert_eq!(solve_semidefinite(&small, &Vector2::new(1e290, 1.0)).unwrap()[1], 1.0);
     }
 
     /// Defect: one large entry hid an asymmetry, so that draws and gains used different covariances.

@@ -94,8 +94,18 @@ fn closed_form(lower: f64, upper: f64) -> TruncatedMoments {
     }
 }
 
+/// Width of a cell over which the density is constant to rounding and the variance underflows.
+const POINT: f64 = 1e-160;
+
 /// The cell `[lower, lower + width)`.
 fn by_quadrature(lower: f64, width: f64) -> TruncatedMoments {
+    if width < POINT {
+        return TruncatedMoments {
+            log_probability: log_pdf(lower) + width.ln(),
+            mean: lower + 0.5 * width,
+            variance: 0.0,
+        };
+    }
     // Where the density changes by less than a factor of 8, sixteen nodes are exact to rounding.
     let rule = if width * (lower.abs() + width) < 2.0 {
         gauss_legendre::<16>()

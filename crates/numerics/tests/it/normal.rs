@@ -197,3 +197,17 @@ fn a_cell_ten_billion_deviations_out_still_has_moments() {
         assert!((cell.variance * edge * edge - 1.0).abs() < 1e-9, "{cell:?}");
     }
 }
+
+/// Defect: the moments of a cell whose width is the smallest number were NaN.
+#[test]
+fn cells_of_the_smallest_width_are_points() {
+    for (lower, upper) in [(-0.0, 5e-324), (-5e-324, 0.0), (0.0, 1e-200), (1e-150, 1e-150 + 1e-165)] {
+        let moments = truncated_moments(lower, upper).unwrap();
+        assert!(
+            lower <= moments.mean && moments.mean <= upper && moments.variance == 0.0,
+            "{lower} {upper}: {moments:?}"
+        );
+        let expected = (upper - lower).ln() - 0.5 * std::f64::consts::TAU.ln();
+        assert!((moments.log_probability - expected).abs() < 1e-12, "{lower} {upper}: {moments:?}");
+    }
+}

@@ -11,3 +11,4 @@ mod grid;
 mod laws;
 mod products;
 mod recording;
+mod wild;

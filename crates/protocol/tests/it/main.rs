@@ -4,3 +4,4 @@
 mod centre;
 mod frame;
 mod sensor;
+mod wild;

@@ -305,6 +305,14 @@ mod tests {
         assert!((four / (0.01 * (1.0 - std::f64::consts::FRAC_2_PI)) - 1.0).abs() < 1e-9);
     }
 
+    /// Defect: outer centroids were infinite.
+    #[test]
+    fn centroids_beyond_the_largest_number_are_refused() {
+        let widest = Normal::with_deviation(0.0, f64::MAX).unwrap();
+        assert!(design(&widest, 3).is_err());
+        assert!(gaussian(3).unwrap().affine(0.0, f64::MAX).is_err());
+    }
+
     #[test]
     fn bad_arguments_are_named() {
         assert!(gaussian(1).unwrap_err().to_string().contains("levels"));

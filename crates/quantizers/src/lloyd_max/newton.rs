@@ -4,6 +4,7 @@ use super::table::LloydMax;
 use crate::density::{CellMoments, Density, edges};
 use crate::error::Error;
 use crate::quantizer::{check_increasing, increasing};
+use fewbits_numerics::error::all_finite;
 use fewbits_numerics::tridiagonal;
 
 /// Newton steps below this share of the narrowest cell leave, squared, an error below rounding.
@@ -184,6 +185,7 @@ fn finish(density: &impl Density, b: &[f64], cells: &[CellMoments]) -> Result<Ll
     }
     let breakpoints: Vec<f64> = b.iter().map(|b| centre + b).collect();
     check_increasing(&breakpoints)?;
+    all_finite("centroids", &centroids)?;
     Ok(LloydMax {
         breakpoints,
         centroids,

@@ -109,18 +109,21 @@ impl LloydMax {
     /// The quantizer of `mean + deviation X`, where this one is the quantizer of `X`.
     ///
     /// # Errors
-    /// If `mean` is not finite, `deviation` is not a positive number, or the mean is so large that breakpoints coincide.
+    /// If `mean` is not finite, `deviation` is not a positive number, the mean is so large that breakpoints coincide,
+    /// or a centroid leaves the range of numbers.
     pub fn affine(&self, mean: f64, deviation: f64) -> Result<Self, Error> {
         finite("mean", mean)?;
         positive("deviation", deviation)?;
         let map = |v: &[f64]| -> Vec<f64> { v.iter().map(|x| mean + deviation * x).collect() };
         let breakpoints = map(&self.breakpoints);
         check_increasing(&breakpoints)?;
+        let centroids = map(&self.centroids);
+        all_finite("centroids", &centroids)?;
         Ok(Self {
             breakpoints,
-            centroids: map(&self.centroids),
+            centroids,
             probabilities: self.probabilities.clone(),
-            mean_squared_error: deviation * deviation * self.mean_squared_error,
+            mean_squared_error: deviation * (deviation * self.mean_squared_error),
         })
     }
 

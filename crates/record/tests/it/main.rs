@@ -13,3 +13,4 @@ mod random;
 mod reading;
 mod resuming;
 mod times;
+mod wild;
