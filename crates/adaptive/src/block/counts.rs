@@ -20,49 +20,60 @@ const SIZES: u64 = NODES as u64 - 2;
 /// Differences are told apart up to this size.
 const STEPS: i64 = 4;
 /// Contexts of the last two differences, and of the last index.
-const PAIRS: usize = ((2 * STEPS + 1) * (2 * STEPS + 1)) as usize;
+const PAIRS: usize = 128;
+const _: () = assert!((2 * STEPS + 1) * (2 * STEPS + 1) <= PAIRS as i64);
 const VALUES: usize = 256;
 /// Occurrences after which a count forgets.
-const MOST_SEEN: u32 = 40;
+const MOST_SEEN: u16 = 40;
 
-/// Probability of `true` in units of `2^-22`, and below it how often the decision was seen.
+/// Probability of `true` in units of `2^-16`, and how often the decision was seen.
 #[derive(Debug, Clone, Copy)]
-struct Count(u32);
+struct Count {
+    one: u16,
+    seen: u16,
+}
 
-/// `2^16 / (n + 1.6)`.
-const SHARES: [u32; MOST_SEEN as usize + 1] = {
+/// `2^15 / (n + 1.6)`.
+const SHARES: [i32; MOST_SEEN as usize + 1] = {
     let mut shares = [0; MOST_SEEN as usize + 1];
     let mut seen = 0;
     while seen < shares.len() {
-        shares[seen] = 655_360 / (10 * seen as u32 + 16);
+        shares[seen] = 327_680 / (10 * seen as i32 + 16);
         seen += 1;
     }
     shares
 };
 
-impl Count {
-    const NEW: Self = Self(1 << 31);
+/// Probabilities stay this far from certainty.
+const LEAST: u16 = 32;
 
-    #[inline(always)]
-    fn one(self) -> u32 {
-        self.0 >> 16
-    }
+impl Count {
+    const NEW: Self = Self { one: 1 << 15, seen: 0 };
 
     #[inline(always)]
     fn learn(&mut self, bit: bool) {
-        let (seen, one) = (self.0 & 1023, self.0 >> 10);
-        let target = if bit { (1 << 22) - 1 } else { 0 };
-        let change = (i64::from(target) - i64::from(one)) * i64::from(SHARES[seen as usize]) >> 16;
-        let one = (i64::from(one) + change) as u32;
-        self.0 = one << 10 | (seen + 1).min(MOST_SEEN);
+        let (one, seen) = (i32::from(self.one), self.seen.min(MOST_SEEN));
+        let target = if bit { i32::from(u16::MAX) } else { 0 };
+        let moved = one + ((target - one) * SHARES[usize::from(seen)] >> 15);
+        self.one = (moved as u16).clamp(LEAST, u16::MAX - LEAST);
+        self.seen = (seen + 1).min(MOST_SEEN);
     }
+}
+
+/// One decision by two counts.
+#[inline(always)]
+fn decide<C: Coder>(coder: &mut C, a: &mut Count, b: &mut Count, bit: bool) -> bool {
+    let bit = coder.bit((u32::from(a.one) + u32::from(b.one)) / 2, bit);
+    a.learn(bit);
+    b.learn(bit);
+    bit
 }
 
 /// The state that both ends hold.
 #[derive(Debug, Clone)]
 pub(super) struct Counts {
-    pairs: Vec<[Count; NODES]>,
-    values: Vec<[Count; NODES]>,
+    pairs: Box<[[Count; NODES]; PAIRS]>,
+    values: Box<[[Count; NODES]; VALUES]>,
     /// Whether differences of differences are told.
     second: bool,
     last: i64,
@@ -77,8 +88,8 @@ impl Counts {
     /// After the first index.
     pub(super) fn new(first: i64, second: bool) -> Self {
         Self {
-            pairs: vec![[Count::NEW; NODES]; PAIRS],
-            values: vec![[Count::NEW; NODES]; VALUES],
+            pairs: Box::new([[Count::NEW; NODES]; PAIRS]),
+            values: Box::new([[Count::NEW; NODES]; VALUES]),
             second,
             last: first,
             slope: 0,
@@ -109,24 +120,20 @@ impl Counts {
         let context = |d: i64| ((d >> k).clamp(-STEPS, STEPS) + STEPS) as usize;
         let pair = context(self.told[0]) * (2 * STEPS + 1) as usize + context(self.told[1]);
         let value = (self.last >> k) as usize % VALUES;
-        let (pair, value) = (&mut self.pairs[pair], &mut self.values[value]);
-        let mut decide = |coder: &mut C, node: usize, bit: bool| {
-            let (a, b) = (&mut pair[node], &mut value[node]);
-            let one = ((a.one() + b.one()) / 2).clamp(32, 65_504);
-            let bit = coder.bit(one, bit);
-            a.learn(bit);
-            b.learn(bit);
-            bit
-        };
+        let (pair, value) = (&mut self.pairs[pair % PAIRS], &mut self.values[value]);
         let d = wanted.map_or(0, |index| index - expected);
         let cell = d >> k;
-        let difference = if decide(coder, 0, cell == 0) {
+        let difference = if decide(coder, &mut pair[0], &mut value[0], cell == 0) {
             0
         } else {
-            let up = decide(coder, 1, cell > 0);
+            let up = decide(coder, &mut pair[1], &mut value[1], cell > 0);
             let wanted = cell.unsigned_abs();
             let mut size = 1;
-            while size <= SIZES && decide(coder, 1 + size as usize, wanted > size) {
+            while size <= SIZES {
+                let node = (1 + size as usize) % NODES;
+                if !decide(coder, &mut pair[node], &mut value[node], wanted > size) {
+                    break;
+                }
                 size += 1;
             }
             if size > SIZES {

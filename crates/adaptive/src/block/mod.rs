@@ -43,6 +43,7 @@ mod priors;
 use crate::{Config, Error};
 use fewbits_core::CodecError;
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::kernels::vectorised;
 use grid::{Bytes, DECIMALS, Grid, unzigzag};
 use head::{CIRCLE, Coding, Head, LINE, SAMPLES, invalid, write_head};
 pub use indices::JOINT_COLUMNS;
@@ -237,6 +238,7 @@ impl BlockCodec {
     }
 
     /// Whether a reconstruction keeps the bound.
+    #[inline(always)]
     fn is_within(&self, value: f64, sample: f64) -> bool {
         match self.accuracy {
             Accuracy::Lossless => value.to_bits() == sample.to_bits(),
@@ -256,18 +258,22 @@ impl BlockCodec {
         let mut exceptions = Vec::new();
         let mut indices = Vec::with_capacity(samples.len());
         let mut last = None;
-        for (row, sample) in samples.iter().enumerate() {
-            let near = last.unwrap_or(0);
-            match grid
-                .index(*sample, near)
-                .filter(|index| self.is_within(grid.value(*index), *sample))
-            {
-                Some(index) => last = Some(index),
-                None => exceptions.push((row, *sample)),
-            }
-            // Before the first ordinary sample, its index is not known yet.
-            indices.push(last);
-        }
+        // Instructions that round are among the vector instructions.
+        vectorised(
+            #[inline(always)]
+            || {
+                for (row, sample) in samples.iter().enumerate() {
+                    let near = last.unwrap_or(0);
+                    let index = grid.index(*sample, near);
+                    match index.filter(|index| self.is_within(grid.value(*index), *sample)) {
+                        Some(index) => last = Some(index),
+                        None => exceptions.push((row, *sample)),
+                    }
+                    // Before the first ordinary sample, its index is not known yet.
+                    indices.push(last);
+                }
+            },
+        );
         let first = indices.iter().find_map(|index| *index).unwrap_or(0);
         (indices.into_iter().map(|index| index.unwrap_or(first)).collect(), exceptions)
     }

@@ -7,7 +7,7 @@
 //!
 //! ```text
 //! E = exp(-|d| / s),  C = exp(1 / 2s):   P(cell) = E (C - 1/C) / ((1 + E C)(1 + E / C))
-//! w <- w P(cell) / sum;   (x, v) <- (x, v) + d (g0, g1);   w <- (1 - 0.005) w + 0.005 / 24 before the next slot
+//! w <- w P(cell) / sum;   (x, v) <- (x, v) + d (g0, g1);   w <- (1 - 0.005) w + 0.005 / 24
 //! ```
 //!
 //! All is in `f32`, which small processors have in hardware: positions are relative to the last index, so nothing is lost by it. Only IEEE
@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 /// Number of models.
 pub const MODELS: usize = 24;
-/// Share of the weights that is spread evenly before each slot.
+/// Share of the weights that is spread evenly after each slot.
 const SWITCHING: f32 = 0.005;
 /// Standard deviation of the sensing noise, in steps, beyond that of the cell.
 pub(super) const NOISE: f32 = 0.15;
@@ -169,9 +169,6 @@ impl Bank {
     /// The time update over `elapsed` slots.
     pub(super) fn predict(&mut self, elapsed: u32) -> Ahead {
         let slots = elapsed.clamp(1, LONGEST_GAP);
-        for w in &mut self.w {
-            *w = *w * (1.0 - SWITCHING) + SWITCHING / MODELS as f32;
-        }
         let families = self.x.chunks_exact_mut(SCALES).zip(self.v.chunks_exact_mut(SCALES));
         for ((x, v), decay) in families.zip(DECAYS).skip(1) {
             for _ in 0..slots {
@@ -196,30 +193,45 @@ impl Bank {
         for w in &self.w {
             total += w;
         }
-        let inverse = 1.0 / total;
+        let inverse = (1.0 - SWITCHING) / total;
         for w in &mut self.w {
-            *w *= inverse;
+            *w = *w * inverse + SWITCHING / MODELS as f32;
         }
         total
     }
 
-    /// Each model's probability below `edge`, which is so many steps from the last index, times its weight; accurate relative to itself.
-    pub fn below(&self, ahead: &Ahead, edge: f32) -> [f32; MODELS] {
-        self.tails(ahead, edge, 1.0)
-    }
-
-    /// The same above `edge`.
-    pub fn above(&self, ahead: &Ahead, edge: f32) -> [f32; MODELS] {
-        self.tails(ahead, edge, -1.0)
-    }
-
-    fn tails(&self, ahead: &Ahead, edge: f32, side: f32) -> [f32; MODELS] {
-        let mut tails = [0.0; MODELS];
+    /// The probabilities below `at - 1/2` and above `at + 1/2`, where `at` is so many steps from the last index; each is accurate relative
+    /// to itself.
+    pub(super) fn outside(&self, ahead: &Ahead, at: f32) -> [f32; 2] {
+        let mut sums = [0.0; 2];
         let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
-        for (family, ((tails, x), w)) in tails.as_chunks_mut().0.iter_mut().zip(x).zip(w).enumerate() {
-            ahead.with_family(family, |shape| set_tails(tails, &shape.sharpness, edge, side, x, w));
+        for (family, (x, w)) in x.iter().zip(w).enumerate() {
+            ahead.with_family(family, |shape| {
+                let mut tails = [[0.0; SCALES]; 2];
+                set_both_tails(&mut tails, shape, at, x, w);
+                for (sum, tails) in sums.iter_mut().zip(&tails) {
+                    tails.iter().for_each(|tail| *sum += tail);
+                }
+            });
         }
-        tails
+        sums
+    }
+
+    /// The probability below `edge` (above it, if `side` is -1), each model's times `scale` as a whole number: a sum that falls nowhere
+    /// where none of its terms does.
+    pub(super) fn counted(&self, ahead: &Ahead, edge: f32, side: f32, scale: f32) -> u32 {
+        let mut sum = 0_u32;
+        let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
+        for (family, (x, w)) in x.iter().zip(w).enumerate() {
+            ahead.with_family(family, |shape| {
+                let mut tails = [0.0; SCALES];
+                set_tails(&mut tails, &shape.sharpness, edge, side, x, w);
+                for tail in tails {
+                    sum = sum.wrapping_add((tail * scale) as u32);
+                }
+            });
+        }
+        sum
     }
 }
 
@@ -236,6 +248,24 @@ fn update_family(shape: &Family, step: f32, x: &mut Eight, v: &mut Eight, w: &mu
                 x[m] += shape.gain_x[m] * d - step;
                 v[m] += shape.gain_v[m] * d;
                 w[m] *= greater(evidence, LEAST);
+            }
+        },
+    );
+}
+
+/// Tails of eight models below and above the cell at `at`.
+fn set_both_tails(tails: &mut [Eight; 2], shape: &Family, at: f32, x: &Eight, w: &Eight) {
+    vectorised(
+        #[inline(always)]
+        || {
+            let [below, above] = tails;
+            for m in 0..SCALES {
+                let z = (x[m] - (at - 0.5)) * shape.sharpness[m];
+                let low = power(greater(lesser(z, FARTHEST), -FARTHEST));
+                // The odds one step further.
+                let high = low * shape.narrowing[m] * shape.narrowing[m];
+                below[m] = w[m] / (1.0 + low);
+                above[m] = w[m] * high / (1.0 + high);
             }
         },
     );

@@ -15,7 +15,6 @@
 //! rounding of the exponentials (`3e-7` of a term, which is at most a quarter of its model's weight) can make them fall: by three units at
 //! most. The four units that each residual has are more.
 
-use super::bank::MODELS;
 use super::counts::REPORTED;
 use super::replica::{Replica, Slot};
 
@@ -42,18 +41,13 @@ pub struct Law<'a> {
     outside: f32,
     /// What the models' tails are multiplied by before they are added as whole numbers: a power of two.
     scale: f32,
-    /// One over that probability as a whole number, in units of a frequency.
+    /// What makes a frequency of such a sum: of all of a report's probability, `2^24`.
     inverse: f32,
     /// The shares of it below and above the prediction, as frequencies.
     lower: u32,
     upper: u32,
     /// Count of the prediction among the values.
     silent: u32,
-}
-
-/// The sum of a few tails as a whole number: of the same terms it never falls where none of them does.
-fn counted(tails: &[f32; MODELS], scale: f32) -> u32 {
-    tails.iter().map(|tail| (tail * scale) as u32).sum()
 }
 
 /// A symbol's place among the frequencies.
@@ -96,22 +90,20 @@ impl<'a> Law<'a> {
     #[cfg_attr(not(feature = "std"), inline(never))]
     pub(super) fn new(replica: &'a Replica, slot: &'a Slot) -> Self {
         let at = (slot.prediction - replica.last) as f32;
-        let below = replica.bank.below(&slot.ahead, at - 0.5);
-        let above = replica.bank.above(&slot.ahead, at + 0.5);
-        let outside: f32 = below.iter().chain(&above).sum();
-        // To 2^28 up to 2^29: the sums stay below 2^30. The exponent is above that of 2^-60, where tails are flat.
+        let [lower, upper] = replica.bank.outside(&slot.ahead, at);
+        let outside = lower + upper;
+        // To 2^28 up to 2^29: the sums stay below 2^30. The exponent is above that of 2^-61, where tails are flat.
         let scale = f32::from_bits((282 - (outside.to_bits() >> 23)).clamp(1, 254) << 23);
-        let [lower, upper] = [below, above].map(|tails| counted(&tails, scale));
-        let inverse = TOTAL as f32 / ((lower + upper).max(1) as f32);
-        let lower = ((lower as f32 * inverse) as u32).min(TOTAL);
+        let share = |tail: f32| (tail / outside * TOTAL as f32) as u32;
+        let lower = share(lower).min(TOTAL);
         Self {
             replica,
             slot,
             outside,
             scale,
-            inverse,
+            inverse: TOTAL as f32 / (outside * scale),
             lower,
-            upper: ((upper as f32 * inverse) as u32).min(TOTAL - lower),
+            upper: share(upper).min(TOTAL - lower),
             silent: replica.values.count(replica.lattice.canonical(slot.prediction)),
         }
     }
@@ -121,9 +113,10 @@ impl<'a> Law<'a> {
         self.outside
     }
 
-    /// A tail of the bank as its share of a report's probability, as a frequency of at most `most`.
-    fn share(&self, tails: &[f32; MODELS], most: u32) -> u32 {
-        ((counted(tails, self.scale) as f32 * self.inverse) as u32).min(most)
+    /// The bank's probability below an edge (above it, if `side` is -1) as its share of a report's, a frequency of at most `most`.
+    fn share(&self, edge: f32, side: f32, most: u32) -> u32 {
+        let counted = self.replica.bank.counted(&self.slot.ahead, edge, side, self.scale);
+        ((counted as f32 * self.inverse) as u32).min(most)
     }
 
     /// The residual of a symbol; of the escape, one beyond the last.
@@ -180,11 +173,11 @@ impl<'a> Law<'a> {
         let bank = if symbol == ESCAPE {
             TOTAL
         } else if k < 0 {
-            self.share(&replica.bank.below(&slot.ahead, edge), self.lower)
+            self.share(edge, 1.0, self.lower)
         } else if k == 1 {
             TOTAL - self.upper
         } else {
-            TOTAL - self.share(&replica.bank.above(&slot.ahead, edge), self.upper)
+            TOTAL - self.share(edge, -1.0, self.upper)
         };
         let frequency = |share: f32| ((share * TOTAL as f32) as u32).min(TOTAL);
         let residuals = frequency(replica.residuals(slot).below(k));
