@@ -77,7 +77,7 @@ static int check(const char *folder, const char *name)
     size_t size = file ? fread(data, 1, sizeof data, file) : 0;
     if (file)
         fclose(file);
-    if (size < 12 || memcmp(data, "fbgv\1", 5) != 0)
+    if (size < 12 || memcmp(data, "fbgv\2", 5) != 0)
         return printf("%s: no golden vectors\n", path), 1;
     int scheme = data[5], width = data[6] | data[7] << 8, records = data[8] | data[9] << 8;
     if ((scheme == 14 || scheme == 15) && fewbits_encoder_init(&encoder, scheme == 14 ? 0.01 : 0.5, scheme == 14 ? 0 : 360, scheme == 14 ? 4 : 0, 1000) != 0)

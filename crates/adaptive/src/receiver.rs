@@ -117,7 +117,7 @@ impl Receiver {
     pub fn model_weights(&self) -> [f64; MODELS] {
         self.replica
             .as_ref()
-            .map_or([1.0 / MODELS as f64; MODELS], |replica| *replica.bank().weights())
+            .map_or([1.0 / MODELS as f64; MODELS], |replica| replica.bank().weights().map(f64::from))
     }
 
     /// What arrived one slot after the last.

@@ -39,7 +39,7 @@ pub(crate) fn apply(
     config: &Config,
     replica: &mut Replica,
     slot: &Slot,
-    outside: f64,
+    outside: f32,
 ) -> Result<(), CodecError> {
     let applied = content.apply(config, replica, slot, outside);
     applied.map_err(|error| CodecError::Invalid {

@@ -97,7 +97,7 @@ impl Sensor {
     pub fn model_weights(&self) -> [f64; MODELS] {
         self.encoder
             .replica()
-            .map_or([1.0 / MODELS as f64; MODELS], |replica| *replica.bank().weights())
+            .map_or([1.0 / MODELS as f64; MODELS], |replica| replica.bank().weights().map(f64::from))
     }
 
     /// Makes the next report a refresh. Without effect unless the configuration is resilient.

@@ -48,6 +48,7 @@ extern crate std;
 
 pub mod adaptive;
 pub mod censor;
+pub mod elementary;
 mod error;
 pub mod golden;
 mod math;

@@ -1,4 +1,4 @@
-//! The exponential, and functions of the standard library that `core` lacks: its own with the feature `std`, those of `libm` without. All are exact or
+//! Functions of the standard library that `core` lacks: its own with the feature `std`, those of `libm` without. All are exact or
 //! correctly rounded, so both give the same bits.
 
 #[cfg(feature = "std")]
@@ -16,29 +16,27 @@ mod chosen {
         x.sqrt()
     }
 
+    pub(crate) fn sqrt_f32(x: f32) -> f32 {
+        x.sqrt()
+    }
+
     pub(crate) fn remainder(x: f64, y: f64) -> f64 {
         x % y
+    }
+
+    pub(crate) fn ratio(n: u32, d: u32) -> f64 {
+        f64::from(n) / f64::from(d)
     }
 }
 
 #[cfg(not(feature = "std"))]
 mod chosen {
     pub(crate) use super::long_division as remainder;
-    pub(crate) use libm::{ceil, round, sqrt};
+    pub(crate) use super::ratio_bit_by_bit as ratio;
+    pub(crate) use libm::{ceil, round, sqrt, sqrtf as sqrt_f32};
 }
 
-pub(crate) use chosen::{ceil, remainder, round, sqrt};
-
-/// The exponential of `numerics`, for loops that are compiled for vector instructions.
-#[cfg(feature = "std")]
-pub(crate) use fewbits_numerics::kernels::scalar::exp;
-
-/// The exponential of `numerics`, once in the program: with doubles in software it is long.
-#[cfg(not(feature = "std"))]
-#[inline(never)]
-pub(crate) fn exp(x: f64) -> f64 {
-    fewbits_numerics::kernels::scalar::exp(x)
-}
+pub(crate) use chosen::{ceil, ratio, remainder, round, sqrt, sqrt_f32};
 
 /// The remainder in `[0, period)`, but for a tiny negative value, whose remainder rounds to the period.
 pub(crate) fn rem_euclid(value: f64, period: f64) -> f64 {
@@ -88,9 +86,31 @@ pub(crate) fn long_division(x: f64, y: f64) -> f64 {
     f64::from_bits(((exponent.max(0) as u64) << 52) + rest).copysign(x)
 }
 
+/// `n / d` correctly rounded, for `d > 0`, one subtraction per bit: a tenth of the size of a division of doubles.
+#[cfg(any(not(feature = "std"), test))]
+pub(crate) fn ratio_bit_by_bit(n: u32, d: u32) -> f64 {
+    let (Some(whole), Some(mut rest)) = (n.checked_div(d), n.checked_rem(d)) else {
+        return 0.0;
+    };
+    if n == 0 {
+        return 0.0;
+    }
+    // The 53 bits of the quotient, and one by which to round.
+    let (mut bits, mut exponent) = (u64::from(whole), 1023 + 53);
+    while bits >> 53 == 0 {
+        let is_one = rest >> 31 == 1 || rest << 1 >= d;
+        rest = (rest << 1).wrapping_sub(if is_one { d } else { 0 });
+        bits = bits << 1 | u64::from(is_one);
+        exponent -= 1_u64;
+    }
+    let upwards = bits & 1 == 1 && (rest != 0 || bits & 2 != 0);
+    // The highest bit of the mantissa adds one to the exponent.
+    f64::from_bits(((exponent - 1) << 52) + (bits >> 1) + u64::from(upwards))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{long_division, rem_euclid};
+    use super::{long_division, ratio_bit_by_bit, rem_euclid};
     use std::vec::Vec;
 
     #[test]
@@ -105,7 +125,13 @@ mod tests {
         let same = |a: f64, b: f64| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
         for x in values {
             assert!(same(x.ceil(), libm::ceil(x)), "{x}");
+            let (n, d) = ((x.to_bits() >> 32) as u32, (x.to_bits() as u32 >> 7).max(1));
+            for (n, d) in [(n, d), (d, n.max(1)), (n >> 27, d & 15 | 1)] {
+                assert!(same(ratio_bit_by_bit(n, d), f64::from(n) / f64::from(d)), "{n} / {d}");
+            }
             assert!(same(x.round(), libm::round(x)) && same(x.sqrt(), libm::sqrt(x)), "{x}");
+            let single = x as f32;
+            assert!(same(single.sqrt().into(), libm::sqrtf(single).into()), "{x}");
             if x.is_finite() {
                 assert_eq!(rem_euclid(x, 360.0), x.rem_euclid(360.0), "{x}");
                 for y in [360.0, 0.1, 1e300, 5e-324, 3e-310, f64::MIN_POSITIVE] {

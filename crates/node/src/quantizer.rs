@@ -48,8 +48,9 @@ pub fn pattern_bit<T: Sample>(thresholds: &[T], sample: T) -> Result<bool, Error
 #[inline]
 pub fn innovation_cell(thresholds: &[f64], sample: f64, mean: f64, deviation: f64) -> Result<usize, Error> {
     let scale = positive("deviation", deviation)?;
-    let innovation = (finite("measurement", sample)? - finite("prediction", mean)?) / scale;
-    Ok(thresholds.partition_point(|threshold| *threshold <= innovation))
+    let innovation = finite("measurement", sample)? - finite("prediction", mean)?;
+    // Products, for a division in software takes more room than all else.
+    Ok(thresholds.partition_point(|threshold| threshold * scale <= innovation))
 }
 
 /// [`innovation_cell`] without floating point: sample, mean and deviation are codes, the thresholds multiples of `2^-16` deviations.

@@ -1,16 +1,18 @@
 //! The level of a range: equal cells about a reference.
 
 use crate::error::{Error, finite, positive};
+use crate::math::ratio;
 
 /// Edge `q` of `levels` equal cells on `centre +- half_width`; edge 0 and edge `levels` are those of the nominal cells, which are
 /// continued to infinity.
 #[inline]
 pub fn edge(q: u32, levels: u32, centre: f64, half_width: f64) -> f64 {
-    centre + half_width * (2.0 * f64::from(q) / f64::from(levels) - 1.0)
+    let share = ratio(q, levels);
+    centre + half_width * (share + share - 1.0)
 }
 
-/// Level of a range: `clamp(floor((I + 1) levels / 2), 0, levels - 1)` with `I = (range - centre) / half_width`, moved where rounding
-/// would part it from the edges of [`edge`]. A range on an edge belongs to the cell above.
+/// Level of a range: `clamp(floor((I + 1) levels / 2), 0, levels - 1)` with `I = (range - centre) / half_width`, by comparison with the edges of
+/// [`edge`], so that rounding parts it from none. A range on an edge belongs to the cell above.
 ///
 /// # Errors
 /// If the range or the centre is not finite, the half width not above 0, or there are no levels.
@@ -21,14 +23,15 @@ pub fn range_level(range: f64, centre: f64, half_width: f64, levels: u32) -> Res
     let Some(last) = levels.checked_sub(1) else {
         return Err(Error::new("levels", 0.0, "at least one level"));
     };
-    let share = ((range - centre) / half_width + 1.0) * 0.5 * f64::from(levels);
-    // The conversion takes what is below zero, and NaN, as 0, and saturates.
-    let mut level = (share as u32).min(last);
-    while level < last && range >= edge(level + 1, levels, centre, half_width) {
-        level += 1;
-    }
-    while level > 0 && range < edge(level, levels, centre, half_width) {
-        level -= 1;
+    // Bisection of the edges: without division, which is long in software.
+    let (mut level, mut highest) = (0, last);
+    while level < highest {
+        let middle = highest - (highest - level) / 2;
+        if range >= edge(middle, levels, centre, half_width) {
+            level = middle;
+        } else {
+            highest = middle - 1;
+        }
     }
     Ok(level)
 }

@@ -1,7 +1,7 @@
 //! The stored form of a checked type, and floats that are stored exactly whatever the format does.
 //!
 //! Some text formats print a float exactly and read it back one unit in the last place off. `#[serde(with = "fewbits_numerics::stored")]`
-//! on a field of type `f64`, a matrix, or an `Option`, `Vec`, array or pair of [`Floats`], writes text formats' floats as text, the
+//! on a field of type `f64` or `f32`, a matrix, or an `Option`, `Vec`, array or pair of [`Floats`], writes text formats' floats as text, the
 //! shortest that reads back exactly (`"0.1"`), and those of binary formats as they are. Plain numbers are read too.
 //!
 //! ```
@@ -95,6 +95,19 @@ impl Floats for f64 {
 
     fn read(form: Exact) -> Option<Self> {
         Some(form.0)
+    }
+}
+
+/// As the same number in `f64`.
+impl Floats for f32 {
+    type Form = Exact;
+
+    fn form(&self) -> Exact {
+        Exact((*self).into())
+    }
+
+    fn read(form: Exact) -> Option<Self> {
+        Some(form.0 as Self)
     }
 }
 

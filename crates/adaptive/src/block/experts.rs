@@ -1,13 +1,8 @@
 //! Laws of the next index: what each expert says about the probability below and above an edge.
 //!
-//! Positions are relative to the last index. All laws are logistic, as those of [`fewbits_node::adaptive::Bank`], whose 24 filters [`Filters`] runs in
-//! `f32`.
+//! Positions are relative to the last index. All laws are logistic, as those of [`Filters`](super::filters::Filters).
 
-use super::elementary::exp2;
-use super::priors::FILTER_WEIGHTS;
-use fewbits_node::adaptive::{DECAYS, MODELS, SCALES, steady_gains};
-use fewbits_numerics::kernels::vectorised;
-use std::sync::LazyLock;
+use fewbits_node::elementary::exp2;
 
 /// Probability below and above an edge, each accurate relative to itself.
 #[derive(Debug, Clone, Copy, Default)]
@@ -17,137 +12,15 @@ pub(super) struct Tails {
 }
 
 /// `log2 e`: logistic laws are written in powers of two.
-const LOG2_E: f64 = std::f64::consts::LOG2_E;
+const LOG2_E: f32 = std::f32::consts::LOG2_E;
 /// Beyond this many doublings a tail is flat.
-const FLAT: f32 = 60.0;
-/// Share of the weights that is spread evenly before each slot.
-const SWITCHING: f32 = 0.005;
-/// The least evidence of one slot, and the least weight: far above the smallest normal number.
-const LEAST_EVIDENCE: f32 = 1e-12;
-const LEAST_WEIGHT: f32 = 1e-18;
-
-struct Gains {
-    sharpness: [f32; MODELS],
-    position: [f32; MODELS],
-    velocity: [f32; MODELS],
-}
-
-static GAINS: LazyLock<Gains> = LazyLock::new(|| {
-    let mut gains = Gains {
-        sharpness: [0.0; MODELS],
-        position: [0.0; MODELS],
-        velocity: [0.0; MODELS],
-    };
-    for m in 0..MODELS {
-        let [sharpness, position, velocity] = steady_gains(m);
-        gains.sharpness[m] = (sharpness * LOG2_E) as f32;
-        gains.position[m] = position as f32;
-        gains.velocity[m] = velocity as f32;
-    }
-    gains
-});
-
-/// The bank of filters, weighted by what they predicted.
-#[derive(Debug, Clone)]
-pub(super) struct Filters {
-    position: [f32; MODELS],
-    velocity: [f32; MODELS],
-    weight: [f32; MODELS],
-}
-
-/// The sum in eight lanes, then of the lanes: an order that vectorises.
-#[inline(always)]
-fn sum(terms: &[f32; MODELS]) -> f32 {
-    let mut lanes = [0.0_f32; 8];
-    for chunk in terms.chunks_exact(8) {
-        for (lane, term) in lanes.iter_mut().zip(chunk) {
-            *lane += term;
-        }
-    }
-    ((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7]))
-}
-
-impl Filters {
-    pub(super) fn new() -> Self {
-        Self {
-            position: [0.0; MODELS],
-            velocity: [0.0; MODELS],
-            weight: FILTER_WEIGHTS,
-        }
-    }
-
-    /// The time update; returns the mean.
-    #[inline(always)]
-    pub(super) fn predict(&mut self) -> f32 {
-        let mut terms = [0.0; MODELS];
-        for m in 0..MODELS {
-            self.weight[m] = self.weight[m] * (1.0 - SWITCHING) + SWITCHING / MODELS as f32;
-            self.velocity[m] *= DECAYS[m / SCALES] as f32;
-            self.position[m] += self.velocity[m];
-            terms[m] = self.weight[m] * self.position[m];
-        }
-        sum(&terms)
-    }
-
-    #[inline(always)]
-    pub(super) fn tails(&self, edge: f32) -> Tails {
-        let sharpness = &GAINS.sharpness;
-        vectorised(
-            #[inline(always)]
-            || {
-                let (mut below, mut above) = ([0.0; MODELS], [0.0; MODELS]);
-                for m in 0..MODELS {
-                    let e = exp2(((self.position[m] - edge) * sharpness[m]).clamp(-FLAT, FLAT));
-                    let share = self.weight[m] / (1.0 + e);
-                    below[m] = share;
-                    above[m] = e * share;
-                }
-                Tails {
-                    below: sum(&below),
-                    above: sum(&above),
-                }
-            },
-        )
-    }
-
-    /// The measurement update with an index `step` from the last one, which becomes the origin.
-    #[inline(always)]
-    pub(super) fn update(&mut self, step: f32) {
-        let gains = &*GAINS;
-        vectorised(
-            #[inline(always)]
-            || {
-                let mut evidence = [0.0; MODELS];
-                for m in 0..MODELS {
-                    let residual = step - self.position[m];
-                    let z = (residual.abs() * gains.sharpness[m]).min(FLAT);
-                    let half = 0.5 * gains.sharpness[m];
-                    let (wide, narrow) = (exp2(half - z), exp2(-half - z));
-                    evidence[m] =
-                        self.weight[m] * ((wide - narrow) / ((1.0 + wide) * (1.0 + narrow))).max(LEAST_EVIDENCE);
-                    self.position[m] += gains.position[m] * residual - step;
-                    self.velocity[m] += gains.velocity[m] * residual;
-                }
-                let inverse = 1.0 / sum(&evidence);
-                for m in 0..MODELS {
-                    self.weight[m] = (evidence[m] * inverse).max(LEAST_WEIGHT);
-                }
-            },
-        );
-    }
-
-    #[cfg(test)]
-    pub(super) fn total(&self) -> f32 {
-        sum(&self.weight)
-    }
-}
-
+pub(super) const FLAT: f32 = 60.0;
 /// Mean absolute error of a prediction, fading with the past.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Track {
     pub(super) at: f32,
     pub(super) error: f32,
-    seen: f32,
+    sharpness: f32,
 }
 
 /// Weight of the newest error once many were seen.
@@ -158,22 +31,32 @@ impl Track {
         Self {
             at: 0.0,
             error: 1.0,
-            seen: 0.0,
+            sharpness: Self::sharpness(1.0),
         }
     }
 
+    /// Of the logistic law with a mean absolute error.
     #[inline(always)]
-    pub(super) fn update(&mut self, step: f32) {
-        self.seen += 1.0;
-        let rate = (1.0 / (self.seen + 0.5)).max(FADING);
+    fn sharpness(error: f32) -> f32 {
+        LOG2_E / (0.72 * error + 0.06)
+    }
+
+    /// Weight of the newest of so many errors.
+    #[inline(always)]
+    pub(super) fn rate(seen: f32) -> f32 {
+        (1.0 / (seen + 0.5)).max(FADING)
+    }
+
+    #[inline(always)]
+    pub(super) fn update(&mut self, step: f32, rate: f32) {
         self.error += ((step - self.at).abs() - self.error) * rate;
+        self.sharpness = Self::sharpness(self.error);
     }
 
     /// A logistic law about the prediction with the mean absolute error of the past.
     #[inline(always)]
     pub(super) fn tails(&self, edge: f32) -> Tails {
-        let sharpness = LOG2_E as f32 / (0.72 * self.error + 0.06);
-        let e = exp2(((self.at - edge) * sharpness).clamp(-FLAT, FLAT));
+        let e = exp2(((self.at - edge) * self.sharpness).clamp(-FLAT, FLAT));
         let below = 1.0 / (1.0 + e);
         Tails {
             below,
@@ -259,11 +142,20 @@ const CHANGED: u32 = 8;
 /// Weight of the filters' law among the counts.
 const PRIOR: f32 = 12.0;
 
-/// How often each index occurred: for signals whose values return. A binary indexed tree.
+/// Counts in all after which no more are taken.
+const MOST_COUNTED: u32 = 1 << 31;
+/// Indices whose counts are summed one by one.
+const BLOCK: usize = 32;
+
+/// How often each index occurred: for signals whose values return.
 #[derive(Debug, Clone)]
 pub(super) struct Frequencies {
-    sums: Vec<u32>,
+    counts: Vec<[u32; BLOCK]>,
+    /// Counts below each block.
+    below: [u32; WINDOW / BLOCK],
     total: u32,
+    /// One over the total and the prior.
+    inverse: f32,
     cells: Option<i64>,
     /// The index at the window's start.
     start: i64,
@@ -274,34 +166,43 @@ impl Frequencies {
     pub(super) fn new(first: i64, cells: Option<i64>) -> Self {
         let cells = cells.filter(|cells| *cells <= WINDOW as i64);
         Self {
-            sums: vec![0; WINDOW + 1],
+            counts: vec![[0; BLOCK]; WINDOW / BLOCK],
+            below: [0; WINDOW / BLOCK],
             total: 0,
+            inverse: 1.0 / PRIOR,
             cells,
             start: if cells.is_some() { 0 } else { first - WINDOW as i64 / 2 },
         }
     }
 
+    #[inline(always)]
     pub(super) fn add(&mut self, index: i64, changed: bool) {
         let offset = self.cells.map_or(index - self.start, |cells| index.rem_euclid(cells));
-        if !(0..WINDOW as i64).contains(&offset) {
+        if !(0..WINDOW as i64).contains(&offset) || self.total >= MOST_COUNTED {
             return;
         }
         let weight = if changed { CHANGED } else { 1 };
-        let mut node = offset as usize + 1;
-        while node <= WINDOW {
-            self.sums[node] = self.sums[node].wrapping_add(weight);
-            node += node & node.wrapping_neg();
+        let (block, place) = (offset as usize / BLOCK, offset as usize % BLOCK);
+        self.counts[block][place] += weight;
+        // All of them, so that the loop vectorises.
+        for (b, below) in (0_i32..).zip(&mut self.below) {
+            *below += if b > block as i32 { weight } else { 0 };
         }
-        self.total = self.total.wrapping_add(weight);
+        self.total += weight;
+        self.inverse = 1.0 / (self.total as f32 + PRIOR);
     }
 
     /// Counts in the window below an offset from its start.
+    #[inline(always)]
     fn prefix(&self, offset: i64) -> u32 {
-        let mut node = offset.clamp(0, WINDOW as i64) as usize;
-        let mut sum = 0_u32;
-        while node > 0 {
-            sum = sum.wrapping_add(self.sums[node]);
-            node &= node - 1;
+        if offset >= WINDOW as i64 {
+            return self.total;
+        }
+        let offset = offset.max(0) as usize;
+        let (block, place) = (offset / BLOCK, (offset % BLOCK) as i32);
+        let mut sum = self.below[block];
+        for (i, count) in (0_i32..).zip(&self.counts[block]) {
+            sum += if i < place { *count } else { 0 };
         }
         sum
     }
@@ -326,10 +227,9 @@ impl Frequencies {
     #[inline(always)]
     pub(super) fn tails(&self, edge: i64, centre: i64, filters: Tails) -> Tails {
         let below = self.below(edge, centre);
-        let inverse = 1.0 / (self.total as f32 + PRIOR);
         Tails {
-            below: (below as f32 + PRIOR * filters.below) * inverse,
-            above: ((self.total - below) as f32 + PRIOR * filters.above) * inverse,
+            below: (below as f32 + PRIOR * filters.below) * self.inverse,
+            above: ((self.total - below) as f32 + PRIOR * filters.above) * self.inverse,
         }
     }
 }
@@ -337,21 +237,6 @@ impl Frequencies {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn filter_tails_sum_to_their_weights() {
-        let mut filters = Filters::new();
-        for i in 0..2000_i16 {
-            filters.predict();
-            let step = f32::from(i % 7 - 3) * if i % 100 == 0 { 1e9 } else { 1.0 };
-            for edge in [-1e6, -2.5, 0.5, 3.5, 1e6] {
-                let tails = filters.tails(edge);
-                assert!((tails.below + tails.above - filters.total()).abs() < 1e-4, "{i}");
-            }
-            filters.update(step);
-            assert!((filters.total() - 1.0).abs() < 1e-4 && filters.position.iter().all(|x| x.is_finite()));
-        }
-    }
 
     #[test]
     fn frequencies_count_as_brute_force_does() {

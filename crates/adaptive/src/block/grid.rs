@@ -27,6 +27,7 @@ pub(super) enum Grid {
 }
 
 /// The digits of a number of so many decimals, if it is one to the last bit.
+#[inline(always)]
 fn digits(sample: f64, ten: f64) -> Option<i64> {
     let whole = (sample * ten).round();
     (whole.abs() < LARGEST_DIGITS && (whole / ten).to_bits() == sample.to_bits()).then_some(whole as i64)
@@ -94,12 +95,17 @@ impl Grid {
     }
 
     /// The reconstruction of an index.
+    #[inline(always)]
     pub(super) fn value(&self, index: i64) -> f64 {
         match self {
             Self::Decimal { decimals, width } => {
                 // Twice the digits of the middle, which may be half of one.
-                let twice = 2 * i128::from(*width) * i128::from(index) + i128::from(*width) - 1;
-                0.5 * twice as f64 / TENS[usize::from(*decimals)]
+                let short = width.checked_mul(index).and_then(|middle| middle.checked_mul(2)?.checked_add(width - 1));
+                let twice = match short {
+                    Some(twice) => twice as f64,
+                    None => (2 * i128::from(*width) * i128::from(index) + i128::from(*width) - 1) as f64,
+                };
+                0.5 * twice / TENS[usize::from(*decimals)]
             }
             Self::Stepped { decimals, unit, origin } => {
                 (i128::from(*origin) + i128::from(*unit) * i128::from(index)) as f64 / TENS[usize::from(*decimals)]
@@ -114,6 +120,7 @@ impl Grid {
 
     /// The index of a sample, on a circle the name nearest to `near`; `None` if it is out of reach. Whether the reconstruction is
     /// within the bound is for the caller to check.
+    #[inline(always)]
     pub(super) fn index(&self, sample: f64, near: i64) -> Option<i64> {
         let whole = |x: f64| (x.abs() < super::model::LARGEST as f64).then(|| x.round() as i64);
         match self {

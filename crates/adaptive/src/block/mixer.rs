@@ -5,7 +5,7 @@
 //! w_i <- w_i + rate (bit - p) s_i   the gradient of the code length
 //! ```
 
-use super::elementary::{log2, squash};
+use fewbits_node::elementary::{log2, squash};
 use super::priors::MIXER_WEIGHTS;
 use std::sync::LazyLock;
 
@@ -66,16 +66,35 @@ static LOG_ODDS: LazyLock<Box<[f32; 4096]>> = LazyLock::new(|| {
     }))
 });
 
-/// Log odds of two shares of a probability.
+/// Log odds of two shares of a probability, for each expert.
 #[inline(always)]
-pub(super) fn log_odds(yes: f32, no: f32) -> f32 {
+pub(super) fn log_odds(yes: [f32; EXPERTS], no: [f32; EXPERTS]) -> [f32; EXPERTS] {
     const LEAST: f32 = 1e-9;
-    (log2(yes.max(LEAST)) - log2(no.max(LEAST))).clamp(-12.0, 12.0)
+    let mut odds = [0.0; EXPERTS];
+    for e in 0..EXPERTS {
+        odds[e] = yes[e].max(LEAST) / no[e].max(LEAST);
+    }
+    for odds in &mut odds {
+        *odds = log2(*odds).clamp(-12.0, 12.0);
+    }
+    odds
 }
+
+/// `2^16 / (2 n + 3)`: the share, in units of `2^-15`, by which a context that was seen `n` times follows its next outcome.
+const SHARES: [i32; MOST_SEEN as usize + 1] = {
+    let mut shares = [0; MOST_SEEN as usize + 1];
+    let mut seen = 0;
+    while seen < shares.len() {
+        shares[seen] = (1 << 16) / (2 * seen as i32 + 3);
+        seen += 1;
+    }
+    shares
+};
 
 /// Contexts, experts' inputs and weights.
 #[derive(Debug, Clone)]
 pub(super) struct Mixer {
+    log_odds: &'static [f32; 4096],
     slots: Vec<Slot>,
     mask: usize,
     /// Hashes of the contexts of this slot.
@@ -85,6 +104,8 @@ pub(super) struct Mixer {
     pub(super) weights: Box<[f32; WEIGHTS]>,
     decisions: [u32; CLASSES],
     class: usize,
+    /// Slots of the decision looked up, and where they are kept.
+    held: [Slot; CONTEXTS],
     chosen: [usize; CONTEXTS],
     inputs: [f32; CONTEXTS],
     rows: [usize; CONTEXTS],
@@ -96,6 +117,7 @@ impl Mixer {
     pub(super) fn new(rows: usize) -> Self {
         let size = (2 * rows).next_power_of_two().clamp(1 << 9, 1 << 14);
         Self {
+            log_odds: &LOG_ODDS,
             slots: vec![Slot::default(); CONTEXTS * size],
             mask: size - 1,
             contexts: [0; CONTEXTS],
@@ -103,6 +125,7 @@ impl Mixer {
             weights: Box::new(MIXER_WEIGHTS),
             decisions: [0; CLASSES],
             class: 0,
+            held: [Slot::default(); CONTEXTS],
             chosen: [0; CONTEXTS],
             inputs: [0.0; CONTEXTS],
             rows: [0; CONTEXTS],
@@ -110,45 +133,44 @@ impl Mixer {
         }
     }
 
-    /// The slot of a hash: one of two neighbours; if neither is of this hash, the less seen is given up.
+    /// Finds what the contexts say about the decision `node`, of a class. The experts' inputs can be computed while memory is waited for.
+    ///
+    /// Decisions of one context lie side by side, sixteen in a line of the cache. A slot is one of two neighbours; if neither is of this
+    /// context, the less seen is given up. Written without branches, for which one it is cannot be foreseen.
     #[inline(always)]
-    fn find(&mut self, context: usize, hash: u32) -> usize {
-        let base = context * (self.mask + 1);
-        let first = base + (hash as usize & self.mask);
-        let check = (hash >> 24) as u8 | 1;
-        if self.slots[first].check == check {
-            return first;
+    pub(super) fn look_up(&mut self, node: u32, class: usize) {
+        self.class = class;
+        let far = (node >> 4).wrapping_mul(0x9E37_79B1);
+        for c in 0..CONTEXTS {
+            let hash = (self.contexts[c] ^ far).wrapping_mul(0x85EB_CA6B);
+            let hash = hash ^ hash >> 15;
+            let first = c * (self.mask + 1) + ((hash ^ node & 15) as usize & self.mask);
+            let second = first ^ 1;
+            let check = ((hash >> 24) ^ node << 1) as u8 | 1;
+            let (a, b) = (self.slots[first], self.slots[second]);
+            let is_second = a.check != check && (b.check == check || b.seen < a.seen);
+            let slot = if is_second { b } else { a };
+            self.chosen[c] = if is_second { second } else { first };
+            let known = slot.check == check;
+            self.held[c] = Slot {
+                one: slot.one,
+                seen: if known { slot.seen } else { 0 },
+                check,
+            };
         }
-        let second = first ^ 1;
-        if self.slots[second].check == check {
-            return second;
-        }
-        let given_up = if self.slots[first].seen <= self.slots[second].seen {
-            first
-        } else {
-            second
-        };
-        self.slots[given_up] = Slot {
-            one: 1 << 15,
-            seen: 0,
-            check,
-        };
-        given_up
     }
 
-    /// Probability that the decision `node`, of a class, is `true`: in units of `2^-16`, in `1..2^16`.
+    /// Probability that the decision looked up is `true`: in units of `2^-16`, in `1..2^16`.
     #[inline(always)]
-    pub(super) fn predict(&mut self, node: u32, class: usize) -> u32 {
-        let table = &**LOG_ODDS;
-        let start = class * STRIDE;
-        self.class = class;
-        let salt = (node + 1).wrapping_mul(0x9E37_79B1);
+    pub(super) fn predict(&mut self) -> u32 {
+        let table = self.log_odds;
+        let start = self.class * STRIDE;
         let mut sum = CONSTANT * self.weights[start + STRIDE - 1];
+        for e in 0..EXPERTS {
+            sum += self.weights[start + CONTEXTS * CONFIDENCES + e] * self.experts[e];
+        }
         for c in 0..CONTEXTS {
-            let hash = (self.contexts[c] ^ salt).wrapping_mul(0x85EB_CA6B);
-            let at = self.find(c, hash ^ hash >> 15);
-            let slot = self.slots[at];
-            self.chosen[c] = at;
+            let slot = self.held[c];
             self.rows[c] = start + c * CONFIDENCES + usize::from(CONFIDENCE[usize::from(slot.seen)]);
             self.inputs[c] = if slot.seen == 0 {
                 0.0
@@ -156,9 +178,6 @@ impl Mixer {
                 table[usize::from(slot.one >> 4)]
             };
             sum += self.weights[self.rows[c]] * self.inputs[c];
-        }
-        for e in 0..EXPERTS {
-            sum += self.weights[start + CONTEXTS * CONFIDENCES + e] * self.experts[e];
         }
         self.p = squash(sum.clamp(-FARTHEST, FARTHEST));
         ((self.p * 65536.0) as u32).clamp(1, 65535)
@@ -181,12 +200,13 @@ impl Mixer {
         // A context seen for the first time starts from what all others said.
         let mixed = ((self.p * 65536.0) as i32).clamp(256, 65280);
         let target = if bit { 65535 } else { 0 };
-        for at in self.chosen {
-            let slot = &mut self.slots[at];
+        for c in 0..CONTEXTS {
+            let slot = &mut self.held[c];
             let one = if slot.seen == 0 { mixed } else { i32::from(slot.one) };
-            let moved = one + (target - one) * 2 / (2 * i32::from(slot.seen) + 3);
+            let moved = one + (target - one) * SHARES[usize::from(slot.seen)] / (1 << 15);
             slot.one = moved.clamp(16, 65520) as u16;
             slot.seen = (slot.seen + 1).min(MOST_SEEN);
+            self.slots[self.chosen[c]] = *slot;
         }
     }
 }

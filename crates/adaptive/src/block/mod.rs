@@ -19,48 +19,41 @@
 //!
 //! | part | bytes | when |
 //! |---|---|---|
-//! | head | 1 | always: low 4 bits the grid (0 to 12: decimals of the samples; 13: line; 14: circle; 15: the samples themselves), then 2 bits the coding (0: models; 1: pco; 2: as they are), 1 bit joint, 1 bit whether a second byte follows |
+//! | head | 1 | always: low 4 bits the grid (0 to 12: decimals of the samples; 13: line; 14: circle; 15: the samples themselves), then 2 bits the coding (0: models; 1: pco; 2: as they are; 3: counts), 1 bit joint, 1 bit whether a second byte follows |
 //! | second | 1 | bit 0: exceptions; bit 1: steps; bit 2: anchor |
 //! | steps | 2 varints | unit and origin (zigzag) in units of the last decimal |
 //! | anchor | 8 | a point of the line, little-endian; otherwise zero is one |
 //! | exceptions | varints and 8 each | number; rows since the last one; the sample |
-//! | indices | the rest | models: 6 bits length and as many bits of the first index (zigzag), then decisions (`block/model.rs`), all arithmetic coded; pco: its standalone format |
+//! | indices | the rest | models: 6 bits length and as many bits of the first index (zigzag), then decisions (`block/model.rs`), all arithmetic coded; counts: the same with a bit behind the first index (1: differences of differences) and other decisions (`block/counts.rs`); pco: its standalone format |
 //!
 //! There is no checksum, no length and no number of rows: a container holds all three. An arithmetic code has no redundancy: most
 //! truncated or damaged blocks decode to wrong samples. Trailing bytes are refused.
 
 mod coder;
-mod elementary;
+mod counts;
 mod experts;
+mod filters;
 mod grid;
+mod head;
+mod indices;
 mod mixer;
 mod model;
 mod priors;
 
 use crate::{Config, Error};
-use coder::{Coder, Reader, Writer};
 use fewbits_core::CodecError;
 use fewbits_numerics::ArgumentError;
-use grid::{Bytes, DECIMALS, Grid, push_varint, unzigzag, zigzag};
-use model::Model;
-use pco::data_types::Number;
-use pco::standalone::{DecompressorItem, FileDecompressor, simple_compress};
-use pco::{ChunkConfig, DeltaSpec};
+use fewbits_numerics::kernels::vectorised;
+use grid::{Bytes, DECIMALS, Grid, unzigzag};
+use head::{CIRCLE, Coding, Head, LINE, SAMPLES, invalid, write_head};
+pub use indices::JOINT_COLUMNS;
+use indices::{Others, from_pco_bytes, raw_samples, read_counts, read_models, smallest_pco, with_counts, with_models};
 
-/// Other columns that a joint block uses.
-pub const JOINT_COLUMNS: usize = 3;
 /// Rows from which an anchor of eight bytes is worth it.
 const ANCHORED_ROWS: usize = 1024;
 /// Bits per sample from which pco is tried beside the models, and from which the samples themselves are.
 const FINE: usize = 4;
 const VERY_FINE: usize = 16;
-/// Grids without decimals.
-const LINE: u8 = 13;
-const CIRCLE: u8 = 14;
-const SAMPLES: u8 = 15;
-/// Bits of the length of the first index.
-const FIRST_LENGTH: u32 = 6;
-
 /// How much time a block may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -68,7 +61,7 @@ pub enum Effort {
     /// Mixed models, and pco where the bound is fine: the fewest bits.
     #[default]
     Thorough,
-    /// Only pco, with the best of three orders of differences: faster, at more bits (`docs/adaptive.md` has both).
+    /// Counts in few contexts, and pco where the bound is fine: faster, at more bits (`docs/adaptive.md` has both).
     Fast,
 }
 
@@ -78,39 +71,11 @@ enum Accuracy {
     Lossless,
 }
 
-/// How the indices are coded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Coding {
-    Models,
-    Pco,
-    Raw,
-}
-
 /// Writes and reads blocks. Both ends hold the same accuracy; [`Effort`] is the writer's choice alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockCodec {
     accuracy: Accuracy,
     effort: Effort,
-}
-
-/// What was read before the indices.
-struct Head {
-    grid: Option<Grid>,
-    coding: Coding,
-    joint: bool,
-    exceptions: Vec<(usize, f64)>,
-}
-
-fn invalid(what: &'static str, value: impl ToString, expected: &'static str) -> CodecError {
-    CodecError::Invalid {
-        what,
-        value: value.to_string(),
-        expected,
-    }
-}
-
-fn from_pco(error: impl std::fmt::Display) -> CodecError {
-    invalid("pco block", error, "what a writer of as many rows wrote")
 }
 
 impl BlockCodec {
@@ -180,6 +145,9 @@ impl BlockCodec {
                     keep(with_models(&grid, &indices, &exceptions, Some(&others))?, &mut best);
                 }
             }
+            if self.effort == Effort::Fast {
+                keep(with_counts(&grid, &indices, &exceptions)?, &mut best);
+            }
             if best.as_ref().is_none_or(|b| b.len() > FINE * samples.len() / 8) {
                 let mut bytes = Vec::new();
                 write_head(&grid, Coding::Pco, false, &exceptions, &mut bytes);
@@ -235,6 +203,7 @@ impl BlockCodec {
                 let others = head.joint.then(|| Others::new(others));
                 read_models(rest, rows, &grid, others.as_ref())?
             }
+            Coding::Counts => read_counts(rest, rows)?,
             _ => from_pco_bytes::<i64>(rest, rows)?,
         };
         let mut samples: Vec<f64> = indices.into_iter().map(|index| grid.value(index)).collect();
@@ -269,6 +238,7 @@ impl BlockCodec {
     }
 
     /// Whether a reconstruction keeps the bound.
+    #[inline(always)]
     fn is_within(&self, value: f64, sample: f64) -> bool {
         match self.accuracy {
             Accuracy::Lossless => value.to_bits() == sample.to_bits(),
@@ -288,18 +258,22 @@ impl BlockCodec {
         let mut exceptions = Vec::new();
         let mut indices = Vec::with_capacity(samples.len());
         let mut last = None;
-        for (row, sample) in samples.iter().enumerate() {
-            let near = last.unwrap_or(0);
-            match grid
-                .index(*sample, near)
-                .filter(|index| self.is_within(grid.value(*index), *sample))
-            {
-                Some(index) => last = Some(index),
-                None => exceptions.push((row, *sample)),
-            }
-            // Before the first ordinary sample, its index is not known yet.
-            indices.push(last);
-        }
+        // Instructions that round are among the vector instructions.
+        vectorised(
+            #[inline(always)]
+            || {
+                for (row, sample) in samples.iter().enumerate() {
+                    let near = last.unwrap_or(0);
+                    let index = grid.index(*sample, near);
+                    match index.filter(|index| self.is_within(grid.value(*index), *sample)) {
+                        Some(index) => last = Some(index),
+                        None => exceptions.push((row, *sample)),
+                    }
+                    // Before the first ordinary sample, its index is not known yet.
+                    indices.push(last);
+                }
+            },
+        );
         let first = indices.iter().find_map(|index| *index).unwrap_or(0);
         (indices.into_iter().map(|index| index.unwrap_or(first)).collect(), exceptions)
     }
@@ -311,6 +285,7 @@ impl BlockCodec {
             (0, 0..SAMPLES) => Coding::Models,
             (1, _) => Coding::Pco,
             (2, SAMPLES) => Coding::Raw,
+            (3, 0..SAMPLES) => Coding::Counts,
             _ => return Err(invalid("head", head, "a grid and a coding that belong together")),
         };
         let [second] = if head & 128 == 0 { [0] } else { bytes.array()? };
@@ -375,149 +350,4 @@ fn check_rows(rows: usize, others: &[&[f64]]) -> Result<(), ArgumentError> {
         Some(other) => Err(ArgumentError::new("others", other.len(), format!("{rows} rows"))),
         None => Ok(()),
     }
-}
-
-fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &[(usize, f64)], bytes: &mut Vec<u8>) {
-    let (kind, own) = match grid {
-        Grid::Decimal { decimals, .. } => (*decimals, 0),
-        Grid::Stepped { decimals, .. } => (*decimals, 2),
-        Grid::Line { anchor, .. } => (LINE, if *anchor == 0.0 { 0 } else { 4 }),
-        Grid::Circle { .. } => (CIRCLE, 0),
-    };
-    let coding = match coding {
-        Coding::Models => 0,
-        Coding::Pco => 1,
-        Coding::Raw => 2,
-    };
-    let second = own | u8::from(!exceptions.is_empty());
-    bytes.push(kind | coding << 4 | u8::from(joint) << 6 | u8::from(second != 0) << 7);
-    if second != 0 {
-        bytes.push(second);
-    }
-    grid.write(bytes);
-    if !exceptions.is_empty() {
-        push_varint(bytes, exceptions.len() as u64);
-        let mut next = 0;
-        for (row, sample) in exceptions {
-            push_varint(bytes, (row - next) as u64);
-            bytes.extend_from_slice(&sample.to_le_bytes());
-            next = row + 1;
-        }
-    }
-}
-
-/// Differences of other columns from row to row, in units of their mean size: the same numbers at both ends.
-struct Others<'a> {
-    columns: Vec<(&'a [f64], f64)>,
-}
-
-impl<'a> Others<'a> {
-    fn new(others: &[&'a [f64]]) -> Self {
-        let columns = others.iter().take(JOINT_COLUMNS).map(|column| {
-            let sizes = column.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-            let (mut sum, mut count) = (0.0, 0.0);
-            for size in sizes.filter(|size| *size > 0.0 && *size < 1e100) {
-                sum += size;
-                count += 1.0;
-            }
-            (*column, if sum > 0.0 { count / sum } else { 0.0 })
-        });
-        Self {
-            columns: columns.collect(),
-        }
-    }
-
-    fn at(&self, row: usize) -> [f64; JOINT_COLUMNS] {
-        let mut found = [0.0; JOINT_COLUMNS];
-        for (found, (column, scale)) in found.iter_mut().zip(&self.columns) {
-            let step = (column[row] - column[row - 1]) * scale;
-            // What is not finite says nothing; the clamp bounds what a wild value does to least squares.
-            *found = if step.is_finite() { step.clamp(-1e6, 1e6) } else { 0.0 };
-        }
-        found
-    }
-}
-
-fn with_models(
-    grid: &Grid,
-    indices: &[i64],
-    exceptions: &[(usize, f64)],
-    others: Option<&Others<'_>>,
-) -> Result<Vec<u8>, CodecError> {
-    let mut bytes = Vec::with_capacity(64 + indices.len() / 2);
-    write_head(grid, Coding::Models, others.is_some(), exceptions, &mut bytes);
-    let mut writer = Writer::new(bytes);
-    let first = indices.first().copied().unwrap_or(0);
-    let length = u64::BITS - zigzag(first).leading_zeros();
-    writer.raw(u64::from(length), FIRST_LENGTH);
-    writer.raw(zigzag(first), length);
-    let mut model = Model::new(indices.len(), first, grid.cells(), others.is_some());
-    for (row, index) in indices.iter().enumerate().skip(1) {
-        let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
-        model.code(&mut writer, Some(*index), steps)?;
-    }
-    Ok(writer.finish())
-}
-
-fn read_models(bytes: &[u8], rows: usize, grid: &Grid, others: Option<&Others<'_>>) -> Result<Vec<i64>, CodecError> {
-    let mut reader = Reader::new(bytes);
-    let length = reader.raw(0, FIRST_LENGTH) as u32;
-    let first = unzigzag(reader.raw(0, length));
-    if first.unsigned_abs() > model::LARGEST as u64 {
-        return Err(invalid("first index", first, "at most 2^46 in size"));
-    }
-    let mut indices = vec![first];
-    let mut model = Model::new(rows, first, grid.cells(), others.is_some());
-    for row in 1..rows {
-        let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
-        indices.push(model.code(&mut reader, None, steps)?);
-        if reader.overran() {
-            break;
-        }
-    }
-    reader.finish()?;
-    Ok(indices)
-}
-
-/// Orders of differences that are tried beside pco's own choice, which is far off for few distinct indices.
-const ORDERS: [usize; 2] = [0, 1];
-
-fn smallest_pco<T: Number>(numbers: &[T]) -> Result<Vec<u8>, CodecError> {
-    let mut best = simple_compress(numbers, &ChunkConfig::default()).map_err(from_pco)?;
-    for order in ORDERS {
-        let config = ChunkConfig::default().with_delta_spec(DeltaSpec::TryConsecutive(order));
-        let bytes = simple_compress(numbers, &config).map_err(from_pco)?;
-        if bytes.len() < best.len() {
-            best = bytes;
-        }
-    }
-    Ok(best)
-}
-
-fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, CodecError> {
-    let (samples, rest) = bytes.as_chunks::<8>();
-    if samples.len() != rows || !rest.is_empty() {
-        return Err(invalid("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
-    }
-    Ok(samples.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
-}
-
-/// Numbers of a pco stream: as many as rows, and nothing after them.
-fn from_pco_bytes<T: Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, CodecError> {
-    let mut numbers = vec![T::default(); rows];
-    let mut room = numbers.as_mut_slice();
-    let (file, mut rest) = FileDecompressor::new(bytes).map_err(from_pco)?;
-    while let DecompressorItem::Chunk(mut chunk) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)? {
-        let count = chunk.n();
-        let (next, later) = room
-            .split_at_mut_checked(count)
-            .ok_or_else(|| from_pco(format!("{count} rows more")))?;
-        chunk.read(next).map_err(from_pco)?;
-        (room, rest) = (later, chunk.into_src());
-    }
-    // The footer of pco is one byte.
-    if !room.is_empty() || rest.len() != 1 {
-        return Err(from_pco(format!("{} rows too few, {} bytes left", room.len(), rest.len())));
-    }
-    Ok(numbers)
 }

@@ -8,8 +8,9 @@
 //! ```
 
 use super::coder::Coder;
-use super::elementary::{log2, round};
-use super::experts::{Filters, Frequencies, LeastSquares, Tails, Track};
+use fewbits_node::elementary::{log2, round};
+use super::experts::{Frequencies, LeastSquares, Tails, Track};
+use super::filters::Filters;
 use super::mixer::{EXPERTS, Mixer, log_odds};
 use fewbits_core::CodecError;
 
@@ -78,7 +79,7 @@ fn hash(a: u32, b: u32) -> u32 {
         .rotate_left(13)
 }
 
-fn damaged(value: i64) -> CodecError {
+pub(super) fn damaged(value: i64) -> CodecError {
     CodecError::Invalid {
         what: "index",
         value: value.to_string(),
@@ -108,7 +109,9 @@ impl Model {
         }
     }
 
-    /// Codes the next index: `wanted` at the writer, `None` at the reader. `others`: differences of other columns.
+    /// Codes the next index: `wanted` at the writer, `None` at the reader. `others`: differences of other columns. For loops under
+    /// [`vectorised`](fewbits_numerics::kernels::vectorised).
+    #[inline(always)]
     pub(super) fn code<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -120,7 +123,7 @@ impl Model {
         if index.abs() > LARGEST {
             return Err(damaged(index));
         }
-        self.learn(index);
+        self.learn(index, grid.k == 0 && index == grid.centre);
         Ok(index)
     }
 
@@ -174,8 +177,14 @@ impl Model {
     /// What each expert says about an edge: the first index above it.
     #[inline(always)]
     fn tails(&self, grid: Grid, edge: i64) -> [Tails; EXPERTS] {
+        let filters = self.filters.tails((edge - self.last) as f32 - 0.5);
+        self.tails_beside(grid, edge, filters)
+    }
+
+    /// The same where what the filters say is known.
+    #[inline(always)]
+    fn tails_beside(&self, grid: Grid, edge: i64, filters: Tails) -> [Tails; EXPERTS] {
         let at = (edge - self.last) as f32 - 0.5;
-        let filters = self.filters.tails(at);
         [
             filters,
             self.recursion.tails(at),
@@ -187,8 +196,8 @@ impl Model {
     }
 
     #[inline(always)]
-    fn decide_one<C: Coder>(&mut self, coder: &mut C, node: u32, class: usize, wanted: bool) -> bool {
-        let p = self.mixer.predict(node, class);
+    fn decide_one<C: Coder>(&mut self, coder: &mut C, wanted: bool) -> bool {
+        let p = self.mixer.predict();
         let bit = coder.bit(p, wanted);
         self.mixer.update(bit);
         bit
@@ -197,17 +206,22 @@ impl Model {
     /// Sets the experts' inputs from the shares of the two outcomes.
     #[inline(always)]
     fn inputs(&mut self, shares: impl Fn(usize) -> (f32, f32)) {
-        let experts = if self.joint.is_some() { EXPERTS } else { EXPERTS - 1 };
-        for e in 0..experts {
-            let (yes, no) = shares(e);
-            self.mixer.experts[e] = log_odds(yes, no);
+        let (mut yes, mut no) = ([0.0; EXPERTS], [0.0; EXPERTS]);
+        for e in 0..EXPERTS {
+            (yes[e], no[e]) = shares(e);
+        }
+        self.mixer.experts = log_odds(yes, no);
+        if self.joint.is_none() {
+            self.mixer.experts[EXPERTS - 1] = 0.0;
         }
     }
 
     #[inline(always)]
     fn decide<C: Coder>(&mut self, coder: &mut C, grid: Grid, wanted: Option<i64>) -> Result<i64, CodecError> {
+        self.mixer.look_up(0, 0);
         let (first, next) = (grid.first(0), grid.first(1));
-        let (low, high) = (self.tails(grid, first), self.tails(grid, next));
+        let [below, above] = self.filters.cell((first - self.last) as f32 - 0.5, grid.k);
+        let (low, high) = (self.tails_beside(grid, first, below), self.tails_beside(grid, next, above));
         self.inputs(|e| {
             let outside = low[e].below + high[e].above;
             // Of the forms of the share inside, the one that cancels least.
@@ -220,11 +234,12 @@ impl Model {
             };
             (inside, outside)
         });
-        if self.decide_one(coder, 0, 0, wanted.is_some_and(|j| (first..next).contains(&j))) {
+        if self.decide_one(coder, wanted.is_some_and(|j| (first..next).contains(&j))) {
             return Ok(self.low_bits(coder, grid, first, wanted));
         }
+        self.mixer.look_up(1, 1);
         self.inputs(|e| (high[e].above, low[e].below));
-        let up = self.decide_one(coder, 1, 1, wanted.is_some_and(|j| j >= next));
+        let up = self.decide_one(coder, wanted.is_some_and(|j| j >= next));
         let side = |tails: &Tails| if up { tails.above } else { tails.below };
         let is_beyond = |edge: i64| wanted.is_some_and(|j| if up { j >= edge } else { j < edge });
 
@@ -236,12 +251,13 @@ impl Model {
             if begin + width > LARGEST >> grid.k << 2 {
                 return Err(damaged(i64::MAX));
             }
+            let node = MAGNITUDES + 2 * count.min(18) as u32 + u32::from(up);
+            self.mixer.look_up(node, CLASS_MAGNITUDES + count.min(3));
             let edge = grid.edge(begin + width, up);
             let tails = self.tails(grid, edge);
             far = tails.each_ref().map(side);
             self.inputs(|e| (far[e], near[e] - far[e]));
-            let node = MAGNITUDES + 2 * count.min(18) as u32 + u32::from(up);
-            if !self.decide_one(coder, node, CLASS_MAGNITUDES + count.min(3), is_beyond(edge)) {
+            if !self.decide_one(coder, is_beyond(edge)) {
                 break;
             }
             near = far;
@@ -254,11 +270,12 @@ impl Model {
         // Inwards, by bisection.
         let (mut end, mut depth) = (begin + width, 0);
         while end - begin > 1 {
+            self.mixer.look_up(INSIDE + depth, CLASS_INSIDE);
             let middle = begin + (end - begin) / 2;
             let edge = grid.edge(middle, up);
             let between = self.tails(grid, edge).each_ref().map(side);
             self.inputs(|e| (between[e] - far[e], near[e] - between[e]));
-            if self.decide_one(coder, INSIDE + depth, CLASS_INSIDE, is_beyond(edge)) {
+            if self.decide_one(coder, is_beyond(edge)) {
                 (begin, near) = (middle, between);
             } else {
                 (end, far) = (middle, between);
@@ -274,6 +291,7 @@ impl Model {
     fn low_bits<C: Coder>(&mut self, coder: &mut C, grid: Grid, first: i64, wanted: Option<i64>) -> i64 {
         let mut index = first;
         for level in 0..grid.k.min(MODELLED) {
+            self.mixer.look_up(LOW + level, CLASS_LOW);
             let half = 1 << (grid.k - level - 1);
             let [a, b, c] = [index, index + half, index + 2 * half].map(|edge| self.tails(grid, edge));
             self.inputs(|e| {
@@ -283,7 +301,7 @@ impl Model {
                     (b[e].above - c[e].above, a[e].above - b[e].above)
                 }
             });
-            if self.decide_one(coder, LOW + level, CLASS_LOW, wanted.is_some_and(|j| j >= index + half)) {
+            if self.decide_one(coder, wanted.is_some_and(|j| j >= index + half)) {
                 index += half;
             }
         }
@@ -292,19 +310,21 @@ impl Model {
         index + coder.raw(value, left) as i64
     }
 
+    /// `inside`: the index is the cell of width one that was asked for first.
     #[inline(always)]
-    fn learn(&mut self, index: i64) {
+    fn learn(&mut self, index: i64, inside: bool) {
         let step = index - self.last;
         let at = step as f32;
+        let rate = Track::rate(self.seen as f32);
         for track in [&mut self.mean, &mut self.hold, &mut self.recursion] {
-            track.update(at);
+            track.update(at, rate);
         }
         self.squares.update(step as f64);
         if let Some((track, squares)) = &mut self.joint {
-            track.update(at);
+            track.update(at, rate);
             squares.update(step as f64);
         }
-        self.filters.update(at);
+        self.filters.update(at, inside);
         self.frequencies.add(index, step != 0);
         self.past.rotate_right(1);
         self.past[0] = step;

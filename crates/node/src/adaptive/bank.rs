@@ -7,49 +7,51 @@
 //!
 //! ```text
 //! E = exp(-|d| / s),  C = exp(1 / 2s):   P(cell) = E (C - 1/C) / ((1 + E C)(1 + E / C))
-//! w <- w P(cell) / sum;   (x, v) <- (x, v) + d (g0, g1);   w <- (1 - 0.005) w + 0.005 / 24 before the next slot
+//! w <- w P(cell) / sum;   (x, v) <- (x, v) + d (g0, g1);   w <- (1 - 0.005) w + 0.005 / 24
 //! ```
 //!
-//! Only IEEE arithmetic, square roots and the exponential of `numerics` (the same bits on every machine) are used, sums in a
+//! All is in `f32`, which small processors have in hardware: positions are relative to the last index, so nothing is lost by it. Only IEEE
+//! arithmetic, square roots and the power of [`elementary`](crate::elementary) (the same bits on every machine) are used, sums in a
 //! fixed order: two ends that see the same indices hold the same bits. Models are taken eight at a time, one family, which fills vector
 //! registers where there are any and needs little memory where there are none.
 
 use super::steady::{STEADY, UPDATED};
-use crate::math::{exp, sqrt};
+use crate::elementary::{exp2, greater, lesser, power};
+use crate::math::sqrt_f32;
 use fewbits_numerics::kernels::vectorised;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Number of models.
 pub const MODELS: usize = 24;
-/// Share of the weights that is spread evenly before each slot.
-const SWITCHING: f64 = 0.005;
+/// Share of the weights that is spread evenly after each slot.
+const SWITCHING: f32 = 0.005;
 /// Standard deviation of the sensing noise, in steps, beyond that of the cell.
-pub(super) const NOISE: f64 = 0.15;
+pub(super) const NOISE: f32 = 0.15;
 /// Variance of an index as a measurement.
-pub(super) const CELL: f64 = NOISE * NOISE + 1.0 / 12.0;
-/// `sqrt(3) / pi`: scale of the logistic law with standard deviation one.
-const LOGISTIC: f64 = 0.551_328_895_421_792_1;
+pub(super) const CELL: f32 = NOISE * NOISE + 1.0 / 12.0;
+/// `pi / sqrt(3) log2 e`: doublings in one standard deviation of the logistic law.
+const DOUBLINGS: f32 = 2.6167593;
 /// Per-slot factors of the velocities; zero is the random walk.
-pub const DECAYS: [f64; 3] = [0.0, 0.6, 0.95];
+pub const DECAYS: [f32; 3] = [0.0, 0.6, 0.95];
 /// Models of one family, by increasing scale.
 pub const SCALES: usize = MODELS / DECAYS.len();
-/// Beyond this many scales the tails are flat.
-const FARTHEST: f64 = 50.0;
+/// Beyond this many doublings the tails are flat.
+const FARTHEST: f32 = 60.0;
 /// The least evidence, so that a wild value does not decide everything.
-const LEAST: f64 = 1e-15;
+const LEAST: f32 = 1e-15;
 /// Longer gaps between samples count as this many slots.
 pub(super) const LONGEST_GAP: u32 = 64;
 
 /// Standard deviation of the driving noise of a scale, in steps of `2 delta`.
-pub(super) fn noise_of(scale: usize) -> f64 {
-    f64::from_bits((1023 - 6 + 2 * scale as u64) << 52)
+pub(super) fn noise_of(scale: usize) -> f32 {
+    f32::from_bits((127 - 6 + 2 * scale as u32) << 23)
 }
 
 /// A covariance of position and velocity: `[xx, xv, vv]`.
-pub(super) type Covariance = [f64; 3];
+pub(super) type Covariance = [f32; 3];
 
-pub(super) fn propagate([a, b, d]: Covariance, decay: f64, q: f64) -> Covariance {
+pub(super) fn propagate([a, b, d]: Covariance, decay: f32, q: f32) -> Covariance {
     if decay == 0.0 {
         return [a + q, 0.0, 0.0];
     }
@@ -60,13 +62,13 @@ pub(super) fn propagate([a, b, d]: Covariance, decay: f64, q: f64) -> Covariance
 /// What follows from the predicted covariances of one family.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Family {
-    /// One over the scale of the predictive law.
-    pub(super) sharpness: [f64; SCALES],
-    /// `exp(1 / 2s)` and its inverse.
-    pub(super) widening: [f64; SCALES],
-    pub(super) narrowing: [f64; SCALES],
-    pub(super) gain_x: [f64; SCALES],
-    pub(super) gain_v: [f64; SCALES],
+    /// Doublings of the odds of the predictive law in one step.
+    pub(super) sharpness: [f32; SCALES],
+    /// The odds of half a step, and their inverse.
+    pub(super) widening: [f32; SCALES],
+    pub(super) narrowing: [f32; SCALES],
+    pub(super) gain_x: [f32; SCALES],
+    pub(super) gain_v: [f32; SCALES],
 }
 
 impl Family {
@@ -80,9 +82,8 @@ impl Family {
 
     pub(super) fn set(&mut self, m: usize, [a, b, _]: Covariance) {
         let total = a + CELL;
-        let s = sqrt(a + NOISE * NOISE) * LOGISTIC;
-        self.sharpness[m] = 1.0 / s;
-        self.widening[m] = exp(0.5 / s);
+        self.sharpness[m] = DOUBLINGS / sqrt_f32(a + NOISE * NOISE);
+        self.widening[m] = exp2(0.5 * self.sharpness[m]);
         self.narrowing[m] = 1.0 / self.widening[m];
         self.gain_x[m] = a / total;
         self.gain_v[m] = b / total;
@@ -101,28 +102,29 @@ impl Family {
     }
 }
 
-/// Of a model one slot ahead: one over the scale of its predictive law, and its gains of position and velocity. Zeros beyond the last.
-pub fn steady_gains(model: usize) -> [f64; 3] {
+/// Of a model one slot ahead: doublings of the odds of its predictive law in one step, and its gains of position and velocity. Zeros beyond
+/// the last.
+pub fn steady_gains(model: usize) -> [f32; 3] {
     let scale = model % SCALES;
     STEADY
         .get(model / SCALES)
         .map_or([0.0; 3], |family| [family.sharpness[scale], family.gain_x[scale], family.gain_v[scale]])
 }
 
-/// Positions, velocities and weights of the models, in steps of the lattice.
+/// Positions from the last index, velocities and weights of the models, in steps of the lattice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Bank {
     #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
-    x: [f64; MODELS],
+    x: [f32; MODELS],
     #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
-    v: [f64; MODELS],
+    v: [f32; MODELS],
     #[cfg_attr(feature = "serde", serde(with = "fewbits_numerics::stored"))]
-    w: [f64; MODELS],
+    w: [f32; MODELS],
 }
 
 /// Eight models in place.
-type Eight = [f64; SCALES];
+type Eight = [f32; SCALES];
 
 impl Bank {
     /// Zeros, so that memory before the first sample is cleared and not copied from flash.
@@ -136,14 +138,14 @@ impl Bank {
     pub(super) fn restart(&mut self, believed: Option<usize>) {
         *self = Self::UNSET;
         let one = believed.filter(|best| *best < MODELS);
-        self.w.fill(if one.is_some() { 0.5 } else { 1.0 } / MODELS as f64);
+        self.w.fill(if one.is_some() { 0.5 } else { 1.0 } / MODELS as f32);
         if let Some(weight) = one.and_then(|best| self.w.get_mut(best)) {
             *weight += 0.5;
         }
     }
 
     /// Weights of the models.
-    pub fn weights(&self) -> &[f64; MODELS] {
+    pub fn weights(&self) -> &[f32; MODELS] {
         &self.w
     }
 
@@ -167,9 +169,6 @@ impl Bank {
     /// The time update over `elapsed` slots.
     pub(super) fn predict(&mut self, elapsed: u32) -> Ahead {
         let slots = elapsed.clamp(1, LONGEST_GAP);
-        for w in &mut self.w {
-            *w = *w * (1.0 - SWITCHING) + SWITCHING / MODELS as f64;
-        }
         let families = self.x.chunks_exact_mut(SCALES).zip(self.v.chunks_exact_mut(SCALES));
         for ((x, v), decay) in families.zip(DECAYS).skip(1) {
             for _ in 0..slots {
@@ -183,95 +182,106 @@ impl Bank {
         Ahead { slots, mean }
     }
 
-    /// Moves the origin of the indices.
-    pub(super) fn shift(&mut self, by: i64) {
-        self.x.iter_mut().for_each(|x| *x -= by as f64);
-    }
-
-    /// The measurement update with index `j`; returns the probability of its cell.
-    pub(super) fn update(&mut self, ahead: &Ahead, j: i64) -> f64 {
-        let at = j as f64;
+    /// The measurement update with the index `step` from the last, from which positions are counted then; returns the probability of its
+    /// cell.
+    pub(super) fn update(&mut self, ahead: &Ahead, step: f32) -> f32 {
         let (x, v, w) = (self.x.as_chunks_mut().0, self.v.as_chunks_mut().0, self.w.as_chunks_mut().0);
         for (family, ((x, v), w)) in x.iter_mut().zip(v).zip(w).enumerate() {
-            ahead.with_family(family, |shape| update_family(shape, at, x, v, w));
+            ahead.with_family(family, |shape| update_family(shape, step, x, v, w));
         }
         let mut total = 0.0;
         for w in &self.w {
             total += w;
         }
-        let inverse = 1.0 / total;
+        let inverse = (1.0 - SWITCHING) / total;
         for w in &mut self.w {
-            // Never zero: the next switching is relative to a positive number, however unlikely.
-            *w = (*w * inverse).max(f64::MIN_POSITIVE);
+            *w = *w * inverse + SWITCHING / MODELS as f32;
         }
         total
     }
 
-    /// Probability below `edge`, accurate relative to itself.
-    pub fn below(&self, ahead: &Ahead, edge: f64) -> f64 {
-        self.tail(ahead, edge, 1.0)
-    }
-
-    /// Probability above `edge`, accurate relative to itself.
-    pub fn above(&self, ahead: &Ahead, edge: f64) -> f64 {
-        self.tail(ahead, edge, -1.0)
-    }
-
-    fn tail(&self, ahead: &Ahead, edge: f64, side: f64) -> f64 {
-        let mut sum = 0.0;
+    /// The probabilities below `at - 1/2` and above `at + 1/2`, where `at` is so many steps from the last index; each is accurate relative
+    /// to itself.
+    pub(super) fn outside(&self, ahead: &Ahead, at: f32) -> [f32; 2] {
+        let mut sums = [0.0; 2];
         let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
         for (family, (x, w)) in x.iter().zip(w).enumerate() {
-            ahead.with_family(family, |shape| add_tail(&mut sum, &shape.sharpness, edge, side, x, w));
+            ahead.with_family(family, |shape| {
+                let mut tails = [[0.0; SCALES]; 2];
+                set_both_tails(&mut tails, shape, at, x, w);
+                for (sum, tails) in sums.iter_mut().zip(&tails) {
+                    tails.iter().for_each(|tail| *sum += tail);
+                }
+            });
+        }
+        sums
+    }
+
+    /// The probability below `edge` (above it, if `side` is -1), each model's times `scale` as a whole number: a sum that falls nowhere
+    /// where none of its terms does.
+    pub(super) fn counted(&self, ahead: &Ahead, edge: f32, side: f32, scale: f32) -> u32 {
+        let mut sum = 0_u32;
+        let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
+        for (family, (x, w)) in x.iter().zip(w).enumerate() {
+            ahead.with_family(family, |shape| {
+                let mut tails = [0.0; SCALES];
+                set_tails(&mut tails, &shape.sharpness, edge, side, x, w);
+                for tail in tails {
+                    sum = sum.wrapping_add((tail * scale) as u32);
+                }
+            });
         }
         sum
     }
 }
 
-/// Moves eight models to index `at`, and multiplies their weights by what they predicted.
-fn update_family(shape: &Family, at: f64, x: &mut Eight, v: &mut Eight, w: &mut Eight) {
+/// Moves eight models to the index `step` from the last, and multiplies their weights by what they predicted.
+fn update_family(shape: &Family, step: f32, x: &mut Eight, v: &mut Eight, w: &mut Eight) {
     vectorised(
         #[inline(always)]
         || {
             for m in 0..SCALES {
-                let d = at - x[m];
-                let e = exp(-(d.abs() * shape.sharpness[m]).min(FARTHEST));
+                let d = step - x[m];
+                let e = power(-lesser(d.abs() * shape.sharpness[m], FARTHEST));
                 let (wide, narrow) = (shape.widening[m], shape.narrowing[m]);
                 let evidence = e * (wide - narrow) / ((1.0 + e * wide) * (1.0 + e * narrow));
-                x[m] += shape.gain_x[m] * d;
+                x[m] += shape.gain_x[m] * d - step;
                 v[m] += shape.gain_v[m] * d;
-                w[m] *= evidence.max(LEAST);
+                w[m] *= greater(evidence, LEAST);
             }
         },
     );
 }
 
-/// Tail of one model, `z` scales from its edge.
-#[inline(always)]
-fn tail_of(z: f64, weight: f64) -> f64 {
-    weight / (1.0 + exp(z.clamp(-FARTHEST, FARTHEST)))
+/// Tails of eight models below and above the cell at `at`.
+fn set_both_tails(tails: &mut [Eight; 2], shape: &Family, at: f32, x: &Eight, w: &Eight) {
+    vectorised(
+        #[inline(always)]
+        || {
+            let [below, above] = tails;
+            for m in 0..SCALES {
+                let z = (x[m] - (at - 0.5)) * shape.sharpness[m];
+                let low = power(greater(lesser(z, FARTHEST), -FARTHEST));
+                // The odds one step further.
+                let high = low * shape.narrowing[m] * shape.narrowing[m];
+                below[m] = w[m] / (1.0 + low);
+                above[m] = w[m] * high / (1.0 + high);
+            }
+        },
+    );
 }
 
-/// Adds the tails of eight models, the first first.
-fn add_tail(sum: &mut f64, sharpness: &Eight, edge: f64, side: f64, x: &Eight, w: &Eight) {
-    // Where there are vector registers, all terms first.
-    if cfg!(feature = "std") {
-        let mut terms = [0.0; SCALES];
-        vectorised(
-            #[inline(always)]
-            || {
-                for m in 0..SCALES {
-                    terms[m] = tail_of(side * (x[m] - edge) * sharpness[m], w[m]);
-                }
-            },
-        );
-        for term in terms {
-            *sum += term;
-        }
-    } else {
-        for m in 0..SCALES {
-            *sum += tail_of(side * (x[m] - edge) * sharpness[m], w[m]);
-        }
-    }
+/// Tails of eight models.
+fn set_tails(tails: &mut Eight, sharpness: &Eight, edge: f32, side: f32, x: &Eight, w: &Eight) {
+    vectorised(
+        #[inline(always)]
+        || {
+            for m in 0..SCALES {
+                let z = side * (x[m] - edge) * sharpness[m];
+                tails[m] = w[m] / (1.0 + power(greater(lesser(z, FARTHEST), -FARTHEST)));
+            }
+        },
+    );
 }
 
 /// A slot ahead of the last update.
@@ -279,7 +289,7 @@ fn add_tail(sum: &mut f64, sharpness: &Eight, edge: f64, side: f64, x: &Eight, w
 pub struct Ahead {
     pub(super) slots: u32,
     /// Mean of the bank.
-    pub(super) mean: f64,
+    pub(super) mean: f32,
 }
 
 impl Ahead {
@@ -303,31 +313,42 @@ impl Ahead {
 mod tests {
     use super::*;
 
-    /// Iterates the covariances of each model to their fixed point: the tables hold the same bits.
+    /// Iterates the covariances of each model to their fixed point, in `f64`: the tables hold it.
     #[test]
     fn tables_are_the_fixed_point() {
+        let is = |stored: f32, exact: f64| (f64::from(stored) - exact).abs() <= 6e-8 * exact.abs();
+        let noise = 0.15 * 0.15;
         for (m, updated) in UPDATED.iter().enumerate() {
-            let (decay, q) = (DECAYS[m / SCALES], noise_of(m % SCALES) * noise_of(m % SCALES));
+            let (decay, q) = ([0.0, 0.6, 0.95][m / SCALES], 4.0_f64.powi(2 * (m % SCALES) as i32 - 6));
+            let cell = noise + 1.0 / 12.0;
             let mut p = [1.0, 0.0, if decay == 0.0 { 0.0 } else { q }];
-            let mut predicted = p;
+            let mut ahead = p;
             for _ in 0..20_000 {
-                predicted = propagate(p, decay, q);
-                let [a, b, d] = predicted;
-                let (g0, g1) = (a / (a + CELL), b / (a + CELL));
-                let next = [a - g0 * a, b - g0 * b, d - g1 * b];
-                let settled = next.iter().zip(&p).all(|(n, o)| (n - o).abs() <= 1e-14 * o.abs());
-                p = next;
-                if settled {
-                    break;
-                }
+                let [a, b, d] = p;
+                ahead = match decay {
+                    0.0 => [a + q, 0.0, 0.0],
+                    _ => {
+                        let speed = decay * decay * d + q;
+                        [a + 2.0 * decay * b + speed, decay * b + speed, speed]
+                    }
+                };
+                let [a, b, d] = ahead;
+                let (g0, g1) = (a / (a + cell), b / (a + cell));
+                p = [a - g0 * a, b - g0 * b, d - g1 * b];
             }
-            assert_eq!(p, *updated, "model {m}");
-            let mut shape = Family::EMPTY;
-            shape.set(m % SCALES, predicted);
+            assert!(updated.iter().zip(p).all(|(stored, exact)| is(*stored, exact)), "model {m}");
             let (k, table) = (m % SCALES, &STEADY[m / SCALES]);
-            assert_eq!((shape.sharpness[k], shape.widening[k]), (table.sharpness[k], table.widening[k]), "model {m}");
-            assert_eq!((shape.narrowing[k], shape.gain_x[k]), (table.narrowing[k], table.gain_x[k]), "model {m}");
-            assert_eq!(shape.gain_v[k], table.gain_v[k], "model {m}");
+            let sharpness = std::f64::consts::PI / (3.0 * (ahead[0] + noise)).sqrt() * std::f64::consts::LOG2_E;
+            assert!(is(table.sharpness[k], sharpness), "model {m}");
+            assert!(is(table.widening[k], (0.5 * sharpness).exp2()), "model {m}");
+            assert!(is(table.narrowing[k], (-0.5 * sharpness).exp2()), "model {m}");
+            assert!(is(table.gain_x[k], ahead[0] / (ahead[0] + cell)), "model {m}");
+            assert!(is(table.gain_v[k], ahead[1] / (ahead[0] + cell)), "model {m}");
+            // What is computed for gaps is the same within rounding.
+            let mut shape = Family::EMPTY;
+            shape.set(k, propagate(*updated, DECAYS[m / SCALES], noise_of(k) * noise_of(k)));
+            assert!((f64::from(shape.sharpness[k]) / sharpness - 1.0).abs() < 1e-6, "model {m}");
+            assert!((f64::from(shape.gain_x[k]) * (ahead[0] + cell) / ahead[0] - 1.0).abs() < 1e-6, "model {m}");
         }
     }
 }

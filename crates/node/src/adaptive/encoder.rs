@@ -197,6 +197,8 @@ impl Encoder {
         Ok(Lattice::reduce(&self.config, sample))
     }
 
+    /// Apart on small processors, so that silence does not take its memory on the stack.
+    #[cfg_attr(not(feature = "std"), inline(never))]
     fn refresh(&mut self, sample: f64) -> Report {
         let mut packet = header(&self.config, self.sequence, true);
         push_number(&mut packet, sample);

@@ -1,6 +1,6 @@
 //! The law of a report: integer frequencies that both ends compute alike.
 //!
-//! Residuals `k` in `-4096..=4096` but 0, in increasing order, and an escape share `2^24` units: each has two, the escape 256,
+//! Residuals `k` in `-4096..=4096` but 0, in increasing order, and an escape share `2^24` units: each has four, the escape 256,
 //! the rest is theirs by a mixture of three coders (the bank's predictive law, the frequencies of residuals, the frequencies of
 //! values), weighted by what they predicted:
 //!
@@ -9,7 +9,11 @@
 //! ```
 //!
 //! The mixture loses at most `log2(1 / weight)` bits in all against the best of the three, and a little at each change of the
-//! best. Two units each are more than the rounding of the cumulative sums, so every residual keeps a frequency above zero.
+//! best.
+//!
+//! Cumulative frequencies must rise. The tails of the bank's models are `f32`, but they are added and mixed as whole numbers, so that only the
+//! rounding of the exponentials (`3e-7` of a term, which is at most a quarter of its model's weight) can make them fall: by three units at
+//! most. The four units that each residual has are more.
 
 use super::counts::REPORTED;
 use super::replica::{Replica, Slot};
@@ -24,16 +28,24 @@ pub const ESCAPE: u32 = 2 * REACH as u32;
 /// Least frequency of the escape: 16 bits.
 const ESCAPE_SHARE: u32 = 256;
 /// Least frequency of a residual.
-const EACH: u32 = 2;
+const EACH: u32 = 4;
+/// The coders' weights are this in all.
+const WEIGHTS: u32 = 1 << 16;
 
 /// Frequencies of the symbols of one slot.
 #[derive(Debug, Clone, Copy)]
 pub struct Law<'a> {
     replica: &'a Replica,
     slot: &'a Slot,
-    /// The bank's probability of an index other than the prediction, below it and above it.
-    lower: f64,
-    upper: f64,
+    /// The bank's probability of an index other than the prediction.
+    outside: f32,
+    /// What the models' tails are multiplied by before they are added as whole numbers: a power of two.
+    scale: f32,
+    /// What makes a frequency of such a sum: of all of a report's probability, `2^24`.
+    inverse: f32,
+    /// The shares of it below and above the prediction, as frequencies.
+    lower: u32,
+    upper: u32,
     /// Count of the prediction among the values.
     silent: u32,
 }
@@ -74,20 +86,37 @@ impl Place {
 }
 
 impl<'a> Law<'a> {
+    // Apart on small processors, so that its memory on the stack is given back.
+    #[cfg_attr(not(feature = "std"), inline(never))]
     pub(super) fn new(replica: &'a Replica, slot: &'a Slot) -> Self {
-        let p = slot.prediction as f64;
+        let at = (slot.prediction - replica.last) as f32;
+        let [lower, upper] = replica.bank.outside(&slot.ahead, at);
+        let outside = lower + upper;
+        // To 2^28 up to 2^29: the sums stay below 2^30. The exponent is above that of 2^-61, where tails are flat.
+        let scale = f32::from_bits((282 - (outside.to_bits() >> 23)).clamp(1, 254) << 23);
+        let share = |tail: f32| (tail / outside * TOTAL as f32) as u32;
+        let lower = share(lower).min(TOTAL);
         Self {
             replica,
             slot,
-            lower: replica.bank.below(&slot.ahead, p - 0.5),
-            upper: replica.bank.above(&slot.ahead, p + 0.5),
+            outside,
+            scale,
+            inverse: TOTAL as f32 / (outside * scale),
+            lower,
+            upper: share(upper).min(TOTAL - lower),
             silent: replica.values.count(replica.lattice.canonical(slot.prediction)),
         }
     }
 
     /// The bank's probability of a report.
-    pub fn bank_outside(&self) -> f64 {
-        self.lower + self.upper
+    pub fn bank_outside(&self) -> f32 {
+        self.outside
+    }
+
+    /// The bank's probability below an edge (above it, if `side` is -1) as its share of a report's, a frequency of at most `most`.
+    fn share(&self, edge: f32, side: f32, most: u32) -> u32 {
+        let counted = self.replica.bank.counted(&self.slot.ahead, edge, side, self.scale);
+        ((counted as f32 * self.inverse) as u32).min(most)
     }
 
     /// The residual of a symbol; of the escape, one beyond the last.
@@ -140,22 +169,28 @@ impl<'a> Law<'a> {
         }
         let (replica, slot) = (self.replica, self.slot);
         let k = Self::residual(symbol);
-        let (edge, outside) = ((slot.prediction + k) as f64 - 0.5, self.bank_outside());
+        let edge = (slot.prediction - replica.last + k) as f32 - 0.5;
         let bank = if symbol == ESCAPE {
-            1.0
+            TOTAL
         } else if k < 0 {
-            replica.bank.below(&slot.ahead, edge) / outside
+            self.share(edge, 1.0, self.lower)
         } else if k == 1 {
-            1.0 - self.upper / outside
+            TOTAL - self.upper
         } else {
-            1.0 - replica.bank.above(&slot.ahead, edge) / outside
+            TOTAL - self.share(edge, -1.0, self.upper)
         };
-        let residuals = replica.residuals(slot).below(k);
-        let seen = f64::from(replica.values.total() - self.silent + REPORTED);
-        let values = (f64::from(self.values_below(k)) + f64::from(REPORTED) * bank) / seen;
-        let [a, b, c] = replica.coders;
-        let share = (a * bank + b * residuals + c * values).clamp(0.0, 1.0);
-        EACH * symbol + (f64::from(TOTAL - EACH * ESCAPE - ESCAPE_SHARE) * share) as u32
+        let frequency = |share: f32| ((share * TOTAL as f32) as u32).min(TOTAL);
+        let residuals = frequency(replica.residuals(slot).below(k));
+        let seen = (replica.values.total() - self.silent + REPORTED) as f32;
+        let from_bank = bank as f32 * (REPORTED as f32 / TOTAL as f32);
+        let values = frequency((self.values_below(k) as f32 + from_bank) / seen);
+        let [a, b, _] = replica.coders.map(|weight| (weight * WEIGHTS as f32) as u32);
+        let a = a.min(WEIGHTS);
+        let b = b.min(WEIGHTS - a);
+        let mixed = [(a, bank), (b, residuals), (WEIGHTS - a - b, values)];
+        let share: u64 = mixed.iter().map(|(weight, share)| u64::from(*weight) * u64::from(*share)).sum();
+        let free = u64::from(TOTAL - EACH * ESCAPE - ESCAPE_SHARE);
+        EACH * symbol + ((free * (share >> 16)) >> PRECISION) as u32
     }
 
     /// Where a symbol lies.

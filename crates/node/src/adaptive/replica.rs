@@ -5,24 +5,26 @@ use super::bank::{Ahead, Bank, LONGEST_GAP};
 use super::counts::{REPORTED, Residuals, Values};
 use super::lattice::Lattice;
 use super::law::Law;
-use crate::math::round;
+use crate::elementary::{greater, lesser, round};
 
 /// Ways to predict the next index: the bank's mean, the last index, the line through the last two.
 pub(super) const PREDICTORS: usize = 3;
 /// Share of the predictors' weights that is spread evenly after each slot.
-const PREDICTOR_SWITCHING: f64 = 0.01;
+const PREDICTOR_SWITCHING: f32 = 0.01;
 /// The least factor of a predictor's weight in one slot, `2^-40`.
-const LEAST_FACTOR: f64 = 1.0 / (1_u64 << 40) as f64;
+const LEAST_FACTOR: f32 = 1.0 / (1_u64 << 40) as f32;
 /// Coders: the bank, the residuals' frequencies, the values' frequencies.
 pub(super) const CODERS: usize = 3;
-const FIRST_CODERS: [f64; CODERS] = [0.4, 0.4, 0.2];
+const FIRST_CODERS: [f32; CODERS] = [0.4, 0.4, 0.2];
 /// Share of the coders' weights that is spread evenly after each report.
-const CODER_SWITCHING: f64 = 0.02;
+const CODER_SWITCHING: f32 = 0.02;
 /// Unwrapped indices of a circular signal are brought back beyond this size.
 const TURN: i64 = 1 << 38;
 
 /// Predictions are no larger: far beyond any index, and far from the ends of an `i64`.
 const FARTHEST: i64 = 1 << 42;
+/// Steps from the last index to the bank's mean are within this: where `f32` still has halves, and rounds to even.
+const FARTHEST_STEP: f32 = 4e6;
 
 /// The state that sensor and receiver share.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,10 +40,10 @@ pub struct Replica {
     pub(super) before: i64,
     /// Slots between them.
     pub(super) gap: u32,
-    pub(super) predictors: [f64; PREDICTORS],
+    pub(super) predictors: [f32; PREDICTORS],
     pub(super) residuals: [Residuals; PREDICTORS],
     pub(super) values: Values,
-    pub(super) coders: [f64; CODERS],
+    pub(super) coders: [f32; CODERS],
 }
 
 /// One slot ahead of the last update.
@@ -114,7 +116,8 @@ impl Replica {
     /// The time update over `elapsed` slots.
     pub fn predict(&mut self, elapsed: u32) -> Slot {
         let ahead = self.bank.predict(elapsed);
-        let rounded = round(ahead.mean).clamp(-(FARTHEST as f64), FARTHEST as f64) as i64;
+        let step = round(greater(lesser(ahead.mean, FARTHEST_STEP), -FARTHEST_STEP)) as i32;
+        let rounded = (self.last + i64::from(step)).clamp(-FARTHEST, FARTHEST);
         // The gap is at least one.
         let (slots, gap) = (i64::from(ahead.slots), i64::from(self.gap.max(1)));
         let rise = self.lattice.shortest(self.last - self.before) * slots + gap / 2;
@@ -152,15 +155,15 @@ impl Replica {
     }
 
     /// Everything that follows from the index of this slot; `outside` is the bank's probability of a report.
-    pub(super) fn update(&mut self, slot: &Slot, j: i64, outside: f64) {
+    pub(super) fn update(&mut self, slot: &Slot, j: i64, outside: f32) {
         let reported = j != slot.prediction;
         let name = self.lattice.canonical(j);
-        let cell = self.bank.update(&slot.ahead, j);
+        let cell = self.bank.update(&slot.ahead, (j - self.last) as f32);
         if reported {
-            let from_bank = (cell / outside).clamp(1e-12, 1.0);
+            let from_bank = greater(lesser(cell / outside, 1.0), 1e-12);
             let silent = self.values.count(self.lattice.canonical(slot.prediction));
-            let seen = f64::from(self.values.total() - silent + REPORTED);
-            let from_values = (f64::from(self.values.count(name)) + f64::from(REPORTED) * from_bank) / seen;
+            let seen = (self.values.total() - silent + REPORTED) as f32;
+            let from_values = (self.values.count(name) as f32 + REPORTED as f32 * from_bank) / seen;
             let from_residuals = self.residuals(slot).probability(j - slot.prediction);
             let found = [from_bank, from_residuals, from_values];
             spread(&mut self.coders, found, CODER_SWITCHING);
@@ -170,7 +173,7 @@ impl Replica {
         for (factor, (candidate, residuals)) in factors.iter_mut().zip(predictors) {
             let k = self.lattice.shortest(j - candidate);
             if k != 0 {
-                *factor = residuals.probability(k).max(LEAST_FACTOR);
+                *factor = greater(residuals.probability(k), LEAST_FACTOR);
                 residuals.add(k);
             }
         }
@@ -179,7 +182,6 @@ impl Replica {
         (self.before, self.last, self.gap) = (self.last, j, slot.ahead.slots);
         if let (Some(cells), true) = (self.lattice.cells(), j.abs() > TURN) {
             let turns = j - j.checked_rem_euclid(cells).unwrap_or(0);
-            self.bank.shift(turns);
             self.last -= turns;
             self.before -= turns;
         }
@@ -207,13 +209,13 @@ impl Replica {
 }
 
 /// Bayes' rule, then an even share for every expert, so that none is ever given up.
-fn spread<const N: usize>(weights: &mut [f64; N], factors: [f64; N], share: f64) {
+fn spread<const N: usize>(weights: &mut [f32; N], factors: [f32; N], share: f32) {
     let mut total = 0.0;
     for (weight, factor) in weights.iter_mut().zip(factors) {
         *weight *= factor;
         total += *weight;
     }
     for weight in weights.iter_mut() {
-        *weight = *weight / total * (1.0 - share) + share / N as f64;
+        *weight = *weight / total * (1.0 - share) + share / N as f32;
     }
 }

@@ -69,7 +69,7 @@ impl Content {
     ///
     /// # Errors
     /// If no sensor says this; the replica is then as it was.
-    pub fn apply(&self, config: &Config, replica: &mut Replica, slot: &Slot, outside: f64) -> Result<(), Error> {
+    pub fn apply(&self, config: &Config, replica: &mut Replica, slot: &Slot, outside: f32) -> Result<(), Error> {
         match self {
             Self::Near(k) | Self::Far(k) => {
                 let j = slot.prediction + k;

@@ -17,11 +17,11 @@ pub(super) struct StoredReplica {
     before: i64,
     gap: u32,
     #[serde(with = "fewbits_numerics::stored")]
-    predictors: [f64; PREDICTORS],
+    predictors: [f32; PREDICTORS],
     residuals: [StoredResiduals; PREDICTORS],
     values: StoredValues,
     #[serde(with = "fewbits_numerics::stored")]
-    coders: [f64; CODERS],
+    coders: [f32; CODERS],
 }
 
 #[derive(Serialize, Deserialize)]

@@ -139,7 +139,7 @@ SCHEMES = {
 failed = False
 for name, (number, width, record) in SCHEMES.items():
     signal = Signal()
-    expected = b"fbgv" + struct.pack("<BBHI", 1, number, width, 300) + b"".join(record(signal) for _ in range(300))
+    expected = b"fbgv" + struct.pack("<BBHI", 2, number, width, 300) + b"".join(record(signal) for _ in range(300))
     with open(f"{sys.argv[1]}/{name}.bin", "rb") as file:
         if file.read() != expected:
             print(f"{name}: not as defined")

@@ -1,0 +1,64 @@
+//! What stands before a block's indices.
+
+use super::grid::{Grid, push_varint};
+use fewbits_core::CodecError;
+
+/// Grids without decimals.
+pub(super) const LINE: u8 = 13;
+pub(super) const CIRCLE: u8 = 14;
+pub(super) const SAMPLES: u8 = 15;
+
+/// How the indices are coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Coding {
+    Models,
+    Pco,
+    Raw,
+    Counts,
+}
+
+/// What was read before the indices.
+pub(super) struct Head {
+    pub(super) grid: Option<Grid>,
+    pub(super) coding: Coding,
+    pub(super) joint: bool,
+    pub(super) exceptions: Vec<(usize, f64)>,
+}
+
+pub(super) fn invalid(what: &'static str, value: impl ToString, expected: &'static str) -> CodecError {
+    CodecError::Invalid {
+        what,
+        value: value.to_string(),
+        expected,
+    }
+}
+
+pub(super) fn write_head(grid: &Grid, coding: Coding, joint: bool, exceptions: &[(usize, f64)], bytes: &mut Vec<u8>) {
+    let (kind, own) = match grid {
+        Grid::Decimal { decimals, .. } => (*decimals, 0),
+        Grid::Stepped { decimals, .. } => (*decimals, 2),
+        Grid::Line { anchor, .. } => (LINE, if *anchor == 0.0 { 0 } else { 4 }),
+        Grid::Circle { .. } => (CIRCLE, 0),
+    };
+    let coding = match coding {
+        Coding::Models => 0,
+        Coding::Pco => 1,
+        Coding::Raw => 2,
+        Coding::Counts => 3,
+    };
+    let second = own | u8::from(!exceptions.is_empty());
+    bytes.push(kind | coding << 4 | u8::from(joint) << 6 | u8::from(second != 0) << 7);
+    if second != 0 {
+        bytes.push(second);
+    }
+    grid.write(bytes);
+    if !exceptions.is_empty() {
+        push_varint(bytes, exceptions.len() as u64);
+        let mut next = 0;
+        for (row, sample) in exceptions {
+            push_varint(bytes, (row - next) as u64);
+            bytes.extend_from_slice(&sample.to_le_bytes());
+            next = row + 1;
+        }
+    }
+}

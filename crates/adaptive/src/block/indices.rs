@@ -1,0 +1,188 @@
+//! The indices of a block as bytes, in each of the codings, and back.
+
+use super::coder::{Coder, Reader, Writer};
+use super::counts::Counts;
+use super::grid::{Grid, unzigzag, zigzag};
+use super::head::{Coding, invalid, write_head};
+use super::model::{LARGEST, Model};
+use fewbits_core::CodecError;
+use fewbits_numerics::kernels::vectorised;
+use pco::data_types::Number;
+use pco::standalone::{DecompressorItem, FileDecompressor, simple_compress};
+use pco::{ChunkConfig, DeltaSpec};
+
+/// Other columns that a joint block uses.
+pub const JOINT_COLUMNS: usize = 3;
+/// Bits of the length of the first index.
+const FIRST_LENGTH: u32 = 6;
+
+fn from_pco(error: impl std::fmt::Display) -> CodecError {
+    invalid("pco block", error, "what a writer of as many rows wrote")
+}
+
+/// Differences of other columns from row to row, in units of their mean size: the same numbers at both ends.
+pub(super) struct Others<'a> {
+    columns: Vec<(&'a [f64], f64)>,
+}
+
+impl<'a> Others<'a> {
+    pub(super) fn new(others: &[&'a [f64]]) -> Self {
+        let columns = others.iter().take(JOINT_COLUMNS).map(|column| {
+            let sizes = column.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+            let (mut sum, mut count) = (0.0, 0.0);
+            for size in sizes.filter(|size| *size > 0.0 && *size < 1e100) {
+                sum += size;
+                count += 1.0;
+            }
+            (*column, if sum > 0.0 { count / sum } else { 0.0 })
+        });
+        Self {
+            columns: columns.collect(),
+        }
+    }
+
+    fn at(&self, row: usize) -> [f64; JOINT_COLUMNS] {
+        let mut found = [0.0; JOINT_COLUMNS];
+        for (found, (column, scale)) in found.iter_mut().zip(&self.columns) {
+            let step = (column[row] - column[row - 1]) * scale;
+            // What is not finite says nothing; the clamp bounds what a wild value does to least squares.
+            *found = if step.is_finite() { step.clamp(-1e6, 1e6) } else { 0.0 };
+        }
+        found
+    }
+}
+
+fn write_first(writer: &mut Writer, indices: &[i64]) -> i64 {
+    let first = indices.first().copied().unwrap_or(0);
+    let length = u64::BITS - zigzag(first).leading_zeros();
+    writer.raw(u64::from(length), FIRST_LENGTH);
+    writer.raw(zigzag(first), length);
+    first
+}
+
+fn read_first(reader: &mut Reader<'_>) -> Result<i64, CodecError> {
+    let length = reader.raw(0, FIRST_LENGTH) as u32;
+    let first = unzigzag(reader.raw(0, length));
+    if first.unsigned_abs() > LARGEST as u64 {
+        return Err(invalid("first index", first, "at most 2^46 in size"));
+    }
+    Ok(first)
+}
+
+pub(super) fn with_models(
+    grid: &Grid,
+    indices: &[i64],
+    exceptions: &[(usize, f64)],
+    others: Option<&Others<'_>>,
+) -> Result<Vec<u8>, CodecError> {
+    let mut bytes = Vec::with_capacity(64 + indices.len() / 2);
+    write_head(grid, Coding::Models, others.is_some(), exceptions, &mut bytes);
+    let mut writer = Writer::new(bytes);
+    let first = write_first(&mut writer, indices);
+    let mut model = Model::new(indices.len(), first, grid.cells(), others.is_some());
+    vectorised(
+        #[inline(always)]
+        || {
+            for (row, index) in indices.iter().enumerate().skip(1) {
+                let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
+                model.code(&mut writer, Some(*index), steps)?;
+            }
+            Ok::<(), CodecError>(())
+        },
+    )?;
+    Ok(writer.finish())
+}
+
+pub(super) fn read_models(bytes: &[u8], rows: usize, grid: &Grid, others: Option<&Others<'_>>) -> Result<Vec<i64>, CodecError> {
+    let mut reader = Reader::new(bytes);
+    let first = read_first(&mut reader)?;
+    let mut indices = vec![first];
+    let mut model = Model::new(rows, first, grid.cells(), others.is_some());
+    vectorised(
+        #[inline(always)]
+        || {
+            for row in 1..rows {
+                let steps = others.map_or([0.0; JOINT_COLUMNS], |others| others.at(row));
+                indices.push(model.code(&mut reader, None, steps)?);
+                if reader.overran() {
+                    break;
+                }
+            }
+            Ok::<(), CodecError>(())
+        },
+    )?;
+    reader.finish()?;
+    Ok(indices)
+}
+
+pub(super) fn with_counts(grid: &Grid, indices: &[i64], exceptions: &[(usize, f64)]) -> Result<Vec<u8>, CodecError> {
+    let mut bytes = Vec::with_capacity(64 + indices.len() / 2);
+    write_head(grid, Coding::Counts, false, exceptions, &mut bytes);
+    let mut writer = Writer::new(bytes);
+    let first = write_first(&mut writer, indices);
+    let second = Counts::prefers_second(indices);
+    writer.raw(u64::from(second), 1);
+    let mut counts = Counts::new(first, second);
+    for index in indices.iter().skip(1) {
+        counts.code(&mut writer, Some(*index))?;
+    }
+    Ok(writer.finish())
+}
+
+pub(super) fn read_counts(bytes: &[u8], rows: usize) -> Result<Vec<i64>, CodecError> {
+    let mut reader = Reader::new(bytes);
+    let first = read_first(&mut reader)?;
+    let mut counts = Counts::new(first, reader.raw(0, 1) == 1);
+    let mut indices = vec![first];
+    for _ in 1..rows {
+        indices.push(counts.code(&mut reader, None)?);
+        if reader.overran() {
+            break;
+        }
+    }
+    reader.finish()?;
+    Ok(indices)
+}
+
+/// Orders of differences that are tried beside pco's own choice, which is far off for few distinct indices.
+const ORDERS: [usize; 2] = [0, 1];
+
+pub(super) fn smallest_pco<T: Number>(numbers: &[T]) -> Result<Vec<u8>, CodecError> {
+    let mut best = simple_compress(numbers, &ChunkConfig::default()).map_err(from_pco)?;
+    for order in ORDERS {
+        let config = ChunkConfig::default().with_delta_spec(DeltaSpec::TryConsecutive(order));
+        let bytes = simple_compress(numbers, &config).map_err(from_pco)?;
+        if bytes.len() < best.len() {
+            best = bytes;
+        }
+    }
+    Ok(best)
+}
+
+pub(super) fn raw_samples(bytes: &[u8], rows: usize) -> Result<Vec<f64>, CodecError> {
+    let (samples, rest) = bytes.as_chunks::<8>();
+    if samples.len() != rows || !rest.is_empty() {
+        return Err(invalid("block", format!("{} bytes", bytes.len()), "8 bytes per row"));
+    }
+    Ok(samples.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
+}
+
+/// Numbers of a pco stream: as many as rows, and nothing after them.
+pub(super) fn from_pco_bytes<T: Number + Default>(bytes: &[u8], rows: usize) -> Result<Vec<T>, CodecError> {
+    let mut numbers = vec![T::default(); rows];
+    let mut room = numbers.as_mut_slice();
+    let (file, mut rest) = FileDecompressor::new(bytes).map_err(from_pco)?;
+    while let DecompressorItem::Chunk(mut chunk) = file.chunk_decompressor::<T, _>(rest).map_err(from_pco)? {
+        let count = chunk.n();
+        let (next, later) = room
+            .split_at_mut_checked(count)
+            .ok_or_else(|| from_pco(format!("{count} rows more")))?;
+        chunk.read(next).map_err(from_pco)?;
+        (room, rest) = (later, chunk.into_src());
+    }
+    // The footer of pco is one byte.
+    if !room.is_empty() || rest.len() != 1 {
+        return Err(from_pco(format!("{} rows too few, {} bytes left", room.len(), rest.len())));
+    }
+    Ok(numbers)
+}
