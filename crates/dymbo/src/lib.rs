@@ -46,6 +46,7 @@
 //! Not here: energy (`fewbits-network`), the true state, any choice of which sensor reports.
 
 pub mod chain;
+mod centre;
 mod error;
 mod filter;
 mod first_message;
@@ -61,6 +62,7 @@ pub mod steady;
 pub mod tree;
 mod vector;
 
+pub use centre::{ParallelEstimator, ScalarEstimator};
 pub use error::Error;
 pub use filter::{DymboFilter, ScalarFilter, StepInfo};
 pub use first_message::{

@@ -35,7 +35,8 @@ pub struct Step {
     /// What was observed of each sensor.
     #[serde(with = "fewbits_protocol::stored")]
     pub observed: Vec<Observation<BitString>>,
-    /// Whether each sensor was asked. One whose address is not known yet cannot be; that nothing comes of it says nothing.
+    /// Whether each sensor was asked, and answered what it was asked. One whose address is not known yet cannot be asked; that nothing comes
+    /// of it says nothing.
     pub asked: Vec<bool>,
     /// Mean and standard deviation of each coordinate.
     pub estimate: Vec<(f64, f64)>,
@@ -304,8 +305,11 @@ impl<R: Receiver> Station<R> {
                 },
                 Action::Predict { slot } => self.predict(slot, outputs)?,
                 Action::Update { slot, observed } => {
-                    let mut step = Step::new(slot, observed, Vec::new());
-                    step.asked.clone_from(&self.asked);
+                    let asked = self.asked.iter().zip(&observed);
+                    let asked = asked.map(|(asked, observed)| *asked && observed.is_some()).collect();
+                    let observed = observed.into_iter().map(|o| o.unwrap_or(Observation::Nothing));
+                    let mut step = Step::new(slot, observed.collect(), Vec::new());
+                    step.asked = asked;
                     step.trouble = match update_asked(&mut self.receiver, step.observed_when_asked()) {
                         Outcome::Used => None,
                         Outcome::SilentDropped(error) => Some(format!("silent sensors were left out: {error}")),

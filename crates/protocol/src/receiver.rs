@@ -65,11 +65,17 @@ pub enum Outcome {
 ///
 /// A sensor that is silent where its scheme had to speak contradicts a link that is thought to lose nothing. It is left out rather than
 /// taken as lost, since [`Observation::Lost`] says that it spoke.
-pub fn update_or_drop<R: Receiver + ?Sized>(receiver: &mut R, observed: &[Observation<BitString>]) -> Outcome {
-    update_asked(receiver, observed.iter().cloned().enumerate().collect())
+///
+/// `observed` has one item per sensor; `None` is no observation.
+pub fn update_or_drop<R: Receiver + ?Sized>(
+    receiver: &mut R,
+    observed: &[Option<Observation<BitString>>],
+) -> Outcome {
+    let asked = observed.iter().cloned().enumerate();
+    update_asked(receiver, asked.filter_map(|(sensor, o)| Some((sensor, o?))).collect())
 }
 
-/// The same where only some sensors were asked: what was observed of these, in rising order of their numbers.
+/// The same with what was observed of the sensors that were asked, in rising order of their numbers.
 pub fn update_asked<R: Receiver + ?Sized>(
     receiver: &mut R,
     mut asked: Vec<(usize, Observation<BitString>)>,

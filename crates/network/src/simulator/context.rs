@@ -2,10 +2,11 @@
 
 use super::core::{SimulatorCore, Ticket};
 use super::queue::EventKind;
-use crate::error::Error;
+use crate::error::{Cause, Error};
 use crate::medium::{Field, Frame};
 use crate::note::Note;
 use crate::units::{Instant, Seconds, SensorId};
+use serde::{Serialize, de::DeserializeOwned};
 
 /// Behaviour of the nodes: one small state machine per node, all under one protocol.
 ///
@@ -63,6 +64,24 @@ pub trait Protocol {
     /// # Errors
     /// What ends the run.
     fn on_restart(&self, node: &mut Self::Node, context: &mut Context<'_>) -> Result<(), Error>;
+}
+
+/// A protocol whose nodes can be stored in a snapshot.
+pub trait Storable: Protocol {
+    /// A node as it is stored.
+    type Stored: Serialize + DeserializeOwned;
+
+    /// The node as it is stored.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn store(&self, node: &Self::Node) -> Result<Self::Stored, Cause>;
+
+    /// The node with this index as it was stored.
+    ///
+    /// # Errors
+    /// If what was stored is no such node.
+    fn revive(&self, index: usize, stored: Self::Stored) -> Result<Self::Node, Cause>;
 }
 
 /// A node's view of the network while it handles an event.

@@ -13,7 +13,7 @@ mod summary;
 pub(crate) mod transmission;
 
 pub use self::core::Ticket;
-pub use context::{Context, Protocol};
+pub use context::{Context, Protocol, Storable};
 pub use ledger::{Account, Faults, Ledger, Totals};
 pub use log::{Acknowledgement, Detail, Entry, Log, Reception, Transmission};
 pub use setup::{Batching, Fault, FaultKind, Setup};
@@ -28,8 +28,6 @@ use fewbits_core::BitString;
 use fewbits_numerics::ArgumentError;
 use log::{unreadable, unwritable};
 use queue::{Arrival, Event, EventKind};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use std::io::{Read, Write};
 
 /// A network at some instant.
@@ -287,9 +285,12 @@ impl<P: Protocol> Simulator<P> {
     /// [`Error::Unwritable`].
     pub fn snapshot(&self, to: impl Write) -> Result<(), Error>
     where
-        P::Node: Serialize,
+        P: Storable,
     {
-        ciborium::into_writer(&(&self.nodes, &self.core.state), to).map_err(unwritable)
+        let nodes = self.nodes.iter().map(|node| self.protocol.store(node));
+        let nodes = nodes.collect::<Result<Vec<_>, _>>();
+        let nodes = nodes.map_err(|source| Error::Unwritable { source })?;
+        ciborium::into_writer(&(nodes, &self.core.state), to).map_err(unwritable)
     }
 
     /// A run as it was when the snapshot was taken, under the same protocol, field and setup.
@@ -298,9 +299,13 @@ impl<P: Protocol> Simulator<P> {
     /// [`Error::Unreadable`] if it is no snapshot; [`Error::SnapshotOfOtherNetwork`]; as [`Simulator::new`].
     pub fn restore(protocol: P, field: Field, setup: Setup, from: impl Read) -> Result<Self, Error>
     where
-        P::Node: DeserializeOwned,
+        P: Storable,
     {
-        let (nodes, state): (Vec<P::Node>, State) = ciborium::from_reader(from).map_err(unreadable)?;
+        let (nodes, state): (Vec<P::Stored>, State) = ciborium::from_reader(from).map_err(unreadable)?;
+        let nodes = nodes.into_iter().enumerate();
+        let nodes = nodes.map(|(index, node)| protocol.revive(index, node));
+        let nodes = nodes.collect::<Result<_, _>>();
+        let nodes = nodes.map_err(|source| Error::Unreadable { source })?;
         let mut restored = Self::new(protocol, nodes, field, setup)?;
         restored.core.resume(state)?;
         Ok(restored)

@@ -7,7 +7,7 @@ use fewbits_monte_carlo::Stream;
 use fewbits_network::{
     BitNode, BitStar, Channel, Fault, FaultKind, Field, Measurements, Note, Seconds, SensorId, Setup, Simulator,
 };
-use fewbits_protocol::{BoxError, Feedback, Receiver, ReportLength};
+use fewbits_protocol::{BoxError, Feedback, Member, Receiver, ReportLength};
 use nalgebra::{SVector, Vector1};
 use rand::Rng;
 
@@ -16,7 +16,7 @@ const SLOTS: u32 = 200;
 
 /// Counts reports of one bit; the state is slot and count.
 #[derive(Debug, Default)]
-struct Counter {
+pub struct Counter {
     slot: u64,
     count: u64,
 }
@@ -53,7 +53,7 @@ impl Receiver for Counter {
 }
 
 /// Sends one bit in every slot.
-struct Speaker;
+pub struct Speaker;
 
 impl SensorNode<1> for Speaker {
     fn report(&mut self, _: &mut dyn Rng, _: &SVector<f64, 1>, _: &BitString) -> Result<Option<BitString>, Error> {
@@ -88,6 +88,23 @@ fn every_report_arrives_over_a_perfect_channel() {
 }
 
 #[test]
+fn a_sensor_that_is_told_nothing_reports_beside_those_that_are() {
+    let measured = Measurements::from_fn(6, |_, _| Some(Vector1::new(0.0)));
+    let node = |_| -> Box<dyn SensorNode<1>> { Box::new(Speaker) };
+    let (start, length) = (|| Ok(Counter::default()), ReportLength::Fixed(1));
+    let star = BitStar::new(start, Feedback::Told, length, node, measured, clock(), Stream::new(1)).unwrap();
+    let clocked = Member {
+        feedback: Feedback::Clock,
+        report: length,
+    };
+    assert!(star.clone().with_member(3, clocked).is_err());
+    let mut network = star.with_member(1, clocked).unwrap().simulate(10.0, setup(1)).unwrap();
+    network.run_until(clock().end(6)).unwrap();
+    assert_eq!(count(&network, 6), 18.0);
+    assert!(network.log().entries.is_empty());
+}
+
+#[test]
 fn followers_come_back_after_losses_and_restarts() {
     let restart = |slot: f64, node: u32| Fault {
         at: Seconds::new(slot * clock().period().value()).unwrap(),
@@ -108,7 +125,7 @@ fn followers_come_back_after_losses_and_restarts() {
     // The centre began anew after slot 100. Frames pass two links of 10 % loss, and a missed echo costs a slot more.
     let reports = count(&network, SLOTS) - count(&network, 102);
     assert!(reports > 0.5 * 98.0 * SENSORS as f64, "{reports}");
-    assert!(matches!(network.nodes()[1], BitNode::Sensor(..)));
+    assert!(matches!(network.nodes()[1], BitNode::Sensor(_)));
 }
 
 #[test]
