@@ -4,9 +4,9 @@
 //!
 //! | question | item |
 //! |---|---|
-//! | where the nodes are, who is in range of whom | [`Field`] |
+//! | where the nodes are, who is in range of whom | [`Field`]: positions, or a list of links as CSV |
 //! | what a frame costs | [`Radio`] (one for all, or one per node), [`Account`], [`Ledger`] |
-//! | what happens to frames and nodes | [`Channel`], [`Loss`] (one for all, or one per link), [`Fault`] |
+//! | what happens to frames and nodes | [`Channel`], [`Loss`] (one for all, or one per link), [`Fault`], clocks that drift ([`Setup::drift`]) |
 //! | sensors around a fusion centre | [`BitStar`]: any `Receiver` of `fewbits-protocol`, any `SensorNode` of `fewbits-core` |
 //! | a belief that travels | [`Walk`]: any `Leader` of `fewbits-protocol` |
 //! | what the sensors measure | [`Measurements`]: a table, an iterator or a closure |
@@ -46,7 +46,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: contention for the channel (an ideal schedule divides the air, see [`Simulator`]), clock drift, new estimation mathematics.
+//! Not here: contention for the channel (an ideal schedule divides the air, see [`Simulator`]), estimation mathematics.
 
 mod clock;
 mod error;

@@ -71,11 +71,12 @@ const SLOT_BITS: u32 = 64;
 
 /// A [`Receiver`] made of an [`Estimator`]. Its state is the slot in 64 bits and the belief.
 ///
-/// Slots that were left out are predicted through. Bits that are no report of the scheme were sent and not understood: they are taken as
+/// The start holds before the first slot that is predicted, whichever that is. Slots that are left out later are predicted through. Bits that are no report of the scheme were sent and not understood: they are taken as
 /// [`Observation::Lost`]. A step that gives an estimate which is not finite fails, and leaves the state as it was.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverBits<E: Estimator> {
     estimator: E,
+    /// The last slot that was predicted; 0 before the first.
     slot: u64,
     belief: E::Belief,
 }
@@ -117,7 +118,8 @@ impl<E: Estimator> Receiver for OverBits<E> {
 
     fn predict(&mut self, slot: u64) -> Result<(), BoxError> {
         let mut predicted = None;
-        for slot in self.slot + 1..=slot {
+        let first = if self.slot == 0 { slot } else { self.slot.saturating_add(1) };
+        for slot in first..=slot {
             predicted = Some(self.estimator.predict(slot, predicted.as_ref().unwrap_or(&self.belief))?);
         }
         if let Some(predicted) = predicted {

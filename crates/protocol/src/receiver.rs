@@ -50,6 +50,36 @@ pub trait Receiver {
     fn restore(&mut self, state: &BitString) -> Result<(), BoxError>;
 }
 
+impl<R: Receiver + ?Sized> Receiver for Box<R> {
+    fn sensors(&self) -> usize {
+        (**self).sensors()
+    }
+
+    fn predict(&mut self, slot: u64) -> Result<(), BoxError> {
+        (**self).predict(slot)
+    }
+
+    fn feedback(&self, sensor: usize) -> Result<BitString, BoxError> {
+        (**self).feedback(sensor)
+    }
+
+    fn update(&mut self, observed: &[(usize, Observation<BitString>)]) -> Result<(), BoxError> {
+        (**self).update(observed)
+    }
+
+    fn estimate(&self) -> Vec<(f64, f64)> {
+        (**self).estimate()
+    }
+
+    fn state(&self) -> Result<BitString, BoxError> {
+        (**self).state()
+    }
+
+    fn restore(&mut self, state: &BitString) -> Result<(), BoxError> {
+        (**self).restore(state)
+    }
+}
+
 /// How an update went.
 #[derive(Debug)]
 pub enum Outcome {

@@ -388,7 +388,7 @@ impl World<4, LinearGaussian<4, 2>> {
             centre: f64::from(measured.mean()[0] as f32),
             half_width: f64::from((loading * measured.covariance()[0].sqrt()) as f32),
         };
-        let centre = mixed(self.dynamics, self.start, sensors.clone(), scheme, asked);
+        let centre = mixed(self.dynamics, self.start, sensors.clone(), scheme.clone(), asked);
         self.over_star_of(&sensors, Halves::new(centre, talk.feedback(), bits(m), each(scheme)), stream, slots)
     }
 }

@@ -4,7 +4,7 @@ use super::core::{BufferPool, SimulatorCore};
 use super::log::{Detail, Entry, Reception, Transmission};
 use super::queue::Arrival;
 use crate::error::Error;
-use crate::medium::{Check, Frame, Loss, ReceivedCopy, Stored, Transceiver};
+use crate::medium::{Check, Frame, Kind, Loss, ReceivedCopy, Stored, Transceiver};
 use crate::units::{Bits, Joules, SensorId};
 use fewbits_core::BitString;
 use rand::Rng;
@@ -286,6 +286,11 @@ fn replayed(recorded: Option<Entry>, attempt: &Attempt<'_>, transmission: usize)
 }
 
 fn payload_bits(frame: &Stored) -> u64 {
-    let overhead = Frame::kind_of(&frame.0).map_or(0, Frame::overhead);
+    let overhead = match Frame::kind_of(&frame.0) {
+        // The header of the frame within is no payload.
+        Some(Kind::Relayed) => Frame::overhead(Kind::Relayed) + Frame::overhead(Kind::Report),
+        Some(kind) => Frame::overhead(kind),
+        None => 0,
+    };
     (frame.0.bits() as u64).saturating_sub(u64::from(overhead))
 }

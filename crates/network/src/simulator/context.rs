@@ -97,9 +97,9 @@ impl Context<'_> {
         self.node
     }
 
-    /// The time.
+    /// The time by the node's own clock.
     pub fn now(&self) -> Instant {
-        self.core.state.now
+        self.core.local(self.node, self.core.state.now)
     }
 
     /// Positions and neighbours of all nodes.
@@ -107,8 +107,9 @@ impl Context<'_> {
         &self.core.field
     }
 
-    /// Sets a timer; one in the past fires now.
+    /// Sets a timer by the node's own clock; one in the past fires now.
     pub fn at(&mut self, time: Instant, token: u32) {
+        let time = self.core.when(self.node, time);
         self.core.schedule(time, self.node, EventKind::Timer(token));
     }
 

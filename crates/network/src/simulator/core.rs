@@ -153,6 +153,31 @@ impl SimulatorCore {
         Ok(())
     }
 
+    /// The time by a node's own clock.
+    #[inline]
+    pub(super) fn local(&self, node: SensorId, time: Instant) -> Instant {
+        match self.setup.drift.get(&node) {
+            None => time,
+            // A rate of at least -1/2: no clock goes back.
+            Some(rate) => Instant(time.0.saturating_add_signed((time.0 as f64 * rate).round() as i64)),
+        }
+    }
+
+    /// The first instant at which a node's own clock shows this time.
+    pub(super) fn when(&self, node: SensorId, local: Instant) -> Instant {
+        let Some(rate) = self.setup.drift.get(&node) else {
+            return local;
+        };
+        let mut time = Instant((local.0 as f64 / (1.0 + rate)) as u64);
+        while time.0 > 0 && self.local(node, Instant(time.0 - 1)) >= local {
+            time.0 -= 1;
+        }
+        while self.local(node, time) < local {
+            time.0 += 1;
+        }
+        time
+    }
+
     #[inline]
     pub(super) fn schedule(&mut self, time: Instant, node: SensorId, kind: EventKind) {
         self.state.queue.push(time.max(self.state.now), node, kind);

@@ -59,12 +59,13 @@ impl<P: Protocol> Simulator<P> {
         })
     }
 
-    /// Starts a node's first timer.
+    /// Starts a node's first timer, by its own clock.
     ///
     /// # Errors
     /// [`Error::UnknownNode`]; [`Error::Unheard`] if there are other nodes and none is in range.
     pub fn start(&mut self, node: SensorId, at: Instant, token: u32) -> Result<(), Error> {
         self.core.field.check_heard(node)?;
+        let at = self.core.when(node, at);
         self.core.schedule(at, node, EventKind::Timer(token));
         Ok(())
     }

@@ -6,7 +6,7 @@ use crate::medium::{Channel, Check, Field, Loss, Radio};
 use crate::units::{Seconds, SensorId};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, within};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -74,6 +74,8 @@ pub struct Setup {
     pub batching: Batching,
     /// What the check of a report covers. Other frames are checked whole.
     pub report_check: Check,
+    /// Rates of the nodes' clocks, less one: a clock with 1e-5 gains 10 us in a second. Others are exact.
+    pub drift: BTreeMap<SensorId, f64>,
     /// Faults of the nodes.
     pub faults: Vec<Fault>,
     /// How much is logged.
@@ -94,6 +96,7 @@ impl Setup {
             ack_timeout: None,
             batching: Batching::NONE,
             report_check: Check::Whole,
+            drift: BTreeMap::new(),
             faults: Vec::new(),
             detail: Detail::Notes,
             stream,
@@ -136,6 +139,10 @@ impl Setup {
         for ((from, to), loss) in &self.link_loss {
             field.check_link(*from, *to)?;
             loss.checked()?;
+        }
+        for (node, rate) in &self.drift {
+            field.check(*node)?;
+            within("drift", *rate, -0.5, 0.5)?;
         }
         for fault in &self.faults {
             field.check(fault.node)?;

@@ -103,9 +103,10 @@ fn one_to_eight_bits_a_sample() {
                 mean(&belief)
             })
             .collect();
+        let scheme = filter.scheme();
         let estimator = ScalarEstimator { filter, start: start() };
         let of = |feedback| {
-            let (length, nodes) = (ReportLength::Fixed(bits as u32), each(filter.scheme()));
+            let (length, nodes) = (ReportLength::Fixed(bits as u32), each(scheme));
             star(estimator.clone(), feedback, length, nodes, measurements.clone())
         };
         let (estimates, price) = run(of(Feedback::Told));

@@ -3,4 +3,5 @@
 
 mod centre;
 mod frame;
+mod handover;
 mod sensor;

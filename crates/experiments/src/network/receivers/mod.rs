@@ -4,6 +4,8 @@ mod followers;
 mod look_up;
 mod mixed;
 mod send_all;
+#[cfg(test)]
+mod tests;
 
 pub(super) use followers::Followers;
 pub(super) use look_up::{LookUp, Patterns};

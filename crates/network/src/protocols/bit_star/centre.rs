@@ -31,7 +31,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
                     let frame = simulated(&frame)?;
                     match to {
                         Recipient::All => context.broadcast(&frame)?,
-                        Recipient::Sensor(i) => drop(context.send(SensorId(i as u32 + 1), &frame)?),
+                        Recipient::Sensor(i) => self.send_down(context, SensorId(i as u32 + 1), &frame)?,
                     }
                 }
                 Action::Predict { slot } if slot > u64::from(slots) => {}

@@ -1,9 +1,12 @@
 //! A star whose nodes run the state machines of `fewbits-protocol`: the machines of real sensors.
 //!
-//! `centre` and `sensor` do what the machines ask for, `node` has what they hold, `translation` their frames and notes.
+//! `driver` hands the simulator's events to the machines, `centre` and `sensor` do what these ask for, `relay` passes frames on, `node` has what
+//! they hold, `translation` their frames and notes.
 
 mod centre;
+mod driver;
 mod node;
+mod relay;
 mod sensor;
 pub(crate) mod translation;
 
@@ -13,21 +16,19 @@ use crate::clock::Clock;
 use crate::error::Error;
 use crate::measurements::Measurements;
 use crate::medium::{Field, Frame, Kind};
-use crate::note::Note;
 use crate::simulator::transmission::air_time;
-use crate::simulator::{Context, Protocol, Setup, Simulator, Storable};
-use crate::units::{Bits, SensorId};
-use fewbits_core::SensorNode;
+use crate::simulator::{Setup, Simulator};
+use crate::units::{Bits, Instant, Seconds, SensorId};
+use fewbits_core::{Scheme, SchemeNode, SensorNode};
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{
-    BoxError, Centre, CentreSettings, CentreTimer, Feedback, Member, Receiver, ReportLength, Sensor,
-    SensorSettings, SensorTimer, Slot,
+    BoxError, Centre, CentreSettings, Feedback, Member, Receiver, ReportLength, Sensor, SensorSettings,
 };
 use nalgebra::SVector;
-use node::{Failures, StoredNode};
+use node::Failures;
 use std::fmt;
-use std::sync::Arc;
-use translation::machine_frame;
+use std::sync::{Arc, OnceLock};
+use relay::Routes;
 
 const CENTRE: SensorId = SensorId(0);
 /// Timers of nodes: a slot begins; the deadline of a centre, or a missing acknowledgement (with the slot above) of a sensor.
@@ -45,7 +46,6 @@ const OTHER: u32 = 1;
 /// The nodes are driven as `fewbits-link` drives them over sockets. The receiver of a real centre and the sensors' halves run here unchanged.
 /// Where an update fails (nothing came over a link that is thought to lose nothing), the sensors of which nothing came are left out, and that is
 /// noted. A node that fails in more than half of the slots ends the run.
-#[derive(Clone)]
 pub struct BitStar<R, const M: usize> {
     receiver: Arc<MakeReceiver<R>>,
     members: Vec<Member>,
@@ -54,6 +54,24 @@ pub struct BitStar<R, const M: usize> {
     clock: Clock,
     stream: Stream,
     arrives: Option<Arc<Arrives>>,
+    routes: Option<Arc<OnceLock<Routes>>>,
+    announce_every: u32,
+    /// Offset of the first sensor that reports by the clock, and from one to the next.
+    offsets: [Seconds; 2],
+}
+
+impl<R, const M: usize> Clone for BitStar<R, M> {
+    fn clone(&self) -> Self {
+        Self {
+            receiver: self.receiver.clone(),
+            members: self.members.clone(),
+            node: self.node.clone(),
+            measurements: self.measurements.clone(),
+            arrives: self.arrives.clone(),
+            routes: self.routes.clone(),
+            ..*self
+        }
+    }
 }
 
 type MakeReceiver<R> = dyn Fn() -> Result<R, BoxError> + Send + Sync;
@@ -96,7 +114,29 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             clock,
             stream,
             arrives: None,
+            routes: None,
+            announce_every: 0,
+            offsets: [Seconds::ZERO; 2],
         })
+    }
+
+    /// A star whose sensors are told what they must know and all report by one scheme.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of_scheme<C>(
+        receiver: impl Fn() -> Result<R, BoxError> + Send + Sync + 'static,
+        scheme: C,
+        measurements: impl Into<Measurements<SVector<f64, M>>>,
+        clock: Clock,
+        stream: Stream,
+    ) -> Result<Self, Error>
+    where
+        C: Scheme<M> + Clone + Send + Sync + 'static,
+        C::State: 'static,
+    {
+        let node = move |_| -> Box<dyn SensorNode<M>> { Box::new(SchemeNode::new(scheme.clone())) };
+        Self::new(receiver, Feedback::Told, ReportLength::Varying, node, measurements, clock, stream)
     }
 
     /// The same where one sensor (the first is 0) learns what it must know, or reports, in another way.
@@ -117,6 +157,33 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         self
     }
 
+    /// The same where sensors out of range of the centre send through others, along shortest routes. What the centre sends to all is passed on by
+    /// every sensor on whose way others are; a frame that is passed on has the sensor's number and a header of its own besides.
+    #[must_use]
+    pub fn relaying(mut self) -> Self {
+        self.routes = Some(Arc::default());
+        self
+    }
+
+    /// The same where the centre sends a heartbeat every so many slots in which it sends nothing else to all, by which sensors set their clocks.
+    #[must_use]
+    pub fn announcing(self, every: u32) -> Self {
+        Self {
+            announce_every: every,
+            ..self
+        }
+    }
+
+    /// The same where the first sensor that reports by the clock does so `first` after the slot's beginning, and each other `spacing` after the one
+    /// before it. A clock may be ahead by `first`.
+    #[must_use]
+    pub fn reporting_at(self, first: Seconds, spacing: Seconds) -> Self {
+        Self {
+            offsets: [first, spacing],
+            ..self
+        }
+    }
+
     /// The slots.
     pub fn clock(&self) -> &Clock {
         &self.clock
@@ -131,18 +198,32 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         self.simulate_on(field, setup)
     }
 
-    /// The network before its first slot, on a field of one's own: node 0 is the centre, and every sensor must be in range of it.
+    /// The network before its first slot, on a field of one's own: node 0 is the centre, and every sensor must reach it, directly or by
+    /// [`relaying`](Self::relaying).
     ///
     /// # Errors
-    /// If the setup is out of range, the field has not one node per sensor and one for the centre; [`Error::OutOfRange`] if a sensor does not
-    /// reach the centre; [`Error::SlotTooShort`] if a slot has no time for a report of every sensor.
+    /// If the setup is out of range, the field has not one node per sensor and one for the centre; [`Error::OutOfRange`] or
+    /// [`Error::Disconnected`] if a sensor does not reach the centre; [`Error::SlotTooShort`] if a slot has no time for a report of every sensor.
     pub fn simulate_on(self, field: Field, setup: Setup) -> Result<Simulator<Self>, Error> {
-        for sensor in 1..=self.members.len() as u32 {
-            field.check_link(SensorId(sensor), CENTRE)?;
-        }
-        self.check_fits(&setup)?;
+        let sensors = 1..=self.members.len() as u32;
+        let hops = match self.routes {
+            Some(_) => {
+                field.routes(CENTRE)?;
+                let hops = |sensor| self.routes(&field).map_or(1, |routes| routes.hops(sensor));
+                sensors.map(hops).collect()
+            }
+            None => {
+                for sensor in sensors {
+                    field.check_link(SensorId(sensor), CENTRE)?;
+                }
+                vec![1; self.members.len()]
+            }
+        };
+        self.check_fits(&setup, &hops)?;
+        let mut settings = CentreSettings::new(self.members.clone(), self.clock.schedule());
+        settings.announce_every = self.announce_every;
         let mut nodes = vec![BitNode::Centre(Box::new(CentreNode {
-            machine: Centre::new(CentreSettings::new(self.members.clone(), self.clock.schedule())),
+            machine: Centre::new(settings),
             receiver: self.started()?,
             estimates: Vec::new(),
             failures: Failures::default(),
@@ -150,22 +231,35 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         for (i, member) in self.members.iter().enumerate() {
             let mut settings = SensorSettings::new(member.feedback);
             settings.schedule = Some(self.clock.schedule());
+            settings.offset = self.offset(i);
             nodes.push(BitNode::Sensor(Box::new(SensingNode {
                 machine: Sensor::new(settings),
                 half: (self.node)(i),
                 counted: 0,
                 replica: self.replica(i)?,
+                passed: 0,
                 failures: Failures::default(),
             })));
         }
         let first = self.clock.start(1);
-        let clocked = |(_, member): &(u32, &Member)| member.feedback == Feedback::Clock;
-        let clocked: Vec<_> = (1..).zip(&self.members).filter(clocked).map(|(node, _)| node).collect();
+        let clocked = |(_, member): &(usize, &Member)| member.feedback == Feedback::Clock;
+        let clocked = self.members.iter().enumerate().filter(clocked);
+        let starts: Vec<_> = clocked
+            .map(|(i, _)| (SensorId(i as u32 + 1), Instant(first.0.saturating_add(self.offset(i)))))
+            .collect();
         let mut simulator = Simulator::new(self, nodes, field, setup)?;
-        for node in [0].into_iter().chain(clocked) {
-            simulator.start(SensorId(node), first, SLOT_BEGINS)?;
+        for (node, at) in [(CENTRE, first)].into_iter().chain(starts) {
+            simulator.start(node, at, SLOT_BEGINS)?;
         }
         Ok(simulator)
+    }
+
+    /// From the beginning of a slot until a sensor that reports by the clock measures, in nanoseconds.
+    fn offset(&self, sensor: usize) -> u64 {
+        let before = self.members.iter().take(sensor);
+        let before = before.filter(|member| member.feedback == Feedback::Clock).count();
+        let [first, spacing] = self.offsets;
+        (0..before).fold(Instant::default().after(first), |at, _| at.after(spacing)).0
     }
 
     /// The estimator before its first slot.
@@ -181,7 +275,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
 
     /// Checks that a slot has time for what the centre sends in the first slot, and for a report of each sensor. Echoes are counted with a bit
     /// per sensor, reports without payload, since their lengths are not known beforehand.
-    fn check_fits(&self, setup: &Setup) -> Result<(), Error> {
+    fn check_fits(&self, setup: &Setup, hops: &[usize]) -> Result<(), Error> {
         let mut receiver = self.started()?;
         let (told, state) = self
             .predict(&mut receiver, 1)
@@ -195,11 +289,14 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             bodies.truncate(1);
         }
         bodies.extend(state.map(|_| u64::from(Frame::overhead(Kind::Echo)) + told.len() as u64));
-        bodies.extend(told.iter().map(|_| u64::from(Frame::overhead(Kind::Report))));
+        let (report, relayed) = (u64::from(Frame::overhead(Kind::Report)), u64::from(Frame::overhead(Kind::Relayed)));
+        for hops in hops.iter().copied() {
+            bodies.extend(std::iter::repeat_n(report + if hops > 1 { relayed } else { 0 }, hops));
+        }
         let frames = bodies.len();
         let mut needed = air_time(&setup.radio, bodies.into_iter().map(Bits));
         if setup.retries.is_some() {
-            needed += std::iter::repeat_n(setup.radio.answer_time(), told.len()).sum();
+            needed += std::iter::repeat_n(setup.radio.answer_time(), hops.iter().sum()).sum();
         }
         let available = self.clock.reporting_time();
         if needed > available {
@@ -210,139 +307,5 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             });
         }
         Ok(())
-    }
-}
-
-impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
-    type Node = BitNode<R, M>;
-
-    fn on_timer(&self, node: &mut Self::Node, context: &mut Context<'_>, token: u32) -> Result<(), Error> {
-        let now = context.now().0;
-        match node {
-            BitNode::Centre(centre) => {
-                let timer = match token {
-                    SLOT_BEGINS => CentreTimer::SlotBegins,
-                    _ => CentreTimer::Deadline,
-                };
-                if timer == CentreTimer::SlotBegins && centre.machine.slot() >= u64::from(self.measurements.slots()) {
-                    return Ok(());
-                }
-                let mut actions = Vec::new();
-                centre.machine.on_timer(now, timer, &mut actions);
-                self.carry_out(centre, context, actions)
-            }
-            BitNode::Sensor(sensor) => {
-                let timer = match token {
-                    SLOT_BEGINS => SensorTimer::SlotBegins,
-                    _ => SensorTimer::Unacknowledged {
-                        slot: Slot::of_count(u64::from(token >> 1)),
-                    },
-                };
-                if timer == SensorTimer::SlotBegins && self.clock.slot(context.now()) > self.measurements.slots() {
-                    return Ok(());
-                }
-                let reaction = sensor.machine.on_timer(now, timer);
-                self.react(sensor, context, reaction)
-            }
-        }
-    }
-
-    fn on_frame(
-        &self,
-        node: &mut Self::Node,
-        context: &mut Context<'_>,
-        from: SensorId,
-        frame: &Frame,
-    ) -> Result<(), Error> {
-        let Some(decoded) = machine_frame(frame) else {
-            context.note(Note::Malformed);
-            return Ok(());
-        };
-        match node {
-            BitNode::Centre(centre) => {
-                let Some(sensor) = from.index().checked_sub(1) else {
-                    return Ok(());
-                };
-                let recorded = self.arrives.as_ref().filter(|_| frame.kind == Kind::Report);
-                if recorded.is_some_and(|arrives| !arrives(frame.slot, sensor)) {
-                    return Ok(());
-                }
-                let mut actions = Vec::new();
-                centre.machine.on_decoded(sensor, &decoded, &mut actions);
-                self.carry_out(centre, context, actions)
-            }
-            // Frames of other sensors are in range, and for the centre.
-            BitNode::Sensor(_) if from != CENTRE => Ok(()),
-            BitNode::Sensor(sensor) => {
-                let reaction = sensor.machine.on_decoded(context.now().0, decoded);
-                self.react(sensor, context, reaction)
-            }
-        }
-    }
-
-    /// Slots tell whose report it was: it is known to be lost.
-    fn on_damaged(&self, node: &mut Self::Node, _: &mut Context<'_>, from: SensorId) -> Result<(), Error> {
-        if let (BitNode::Centre(centre), Some(sensor)) = (node, from.index().checked_sub(1)) {
-            centre.machine.on_damaged(sensor);
-        }
-        Ok(())
-    }
-
-    /// The centre begins with what it knew before the first slot; a sensor knows that it must ask.
-    fn on_restart(&self, node: &mut Self::Node, context: &mut Context<'_>) -> Result<(), Error> {
-        match node {
-            BitNode::Centre(centre) => {
-                centre.receiver = self.started()?;
-                centre.machine.on_memory_lost();
-            }
-            BitNode::Sensor(sensor) => {
-                let index = context.id().index() - 1;
-                (sensor.half, sensor.counted) = ((self.node)(index), 0);
-                sensor.replica = self.replica(index)?;
-                sensor.machine.on_memory_lost();
-            }
-        }
-        Ok(())
-    }
-}
-
-impl<R: Receiver, const M: usize> Storable for BitStar<R, M> {
-    type Stored = StoredBitNode;
-
-    fn store(&self, node: &Self::Node) -> Result<StoredBitNode, BoxError> {
-        node.stored()
-    }
-
-    fn revive(&self, index: usize, stored: StoredBitNode) -> Result<Self::Node, BoxError> {
-        match (index.checked_sub(1), stored.0) {
-            (None, StoredNode::Centre(machine, state, estimates, failures)) => {
-                let mut receiver = (self.receiver)()?;
-                receiver.restore(&state.0)?;
-                Ok(BitNode::Centre(Box::new(CentreNode {
-                    machine,
-                    receiver,
-                    estimates,
-                    failures,
-                })))
-            }
-            (Some(sensor), StoredNode::Sensor(machine, memory, counted, state, failures))
-                if sensor < self.members.len() =>
-            {
-                let (mut half, mut replica) = ((self.node)(sensor), self.replica(sensor)?);
-                half.restore(&memory.0)?;
-                if let (Some(replica), Some(state)) = (&mut replica, &state) {
-                    replica.restore(&state.0)?;
-                }
-                Ok(BitNode::Sensor(Box::new(SensingNode {
-                    machine,
-                    half,
-                    counted,
-                    replica,
-                    failures,
-                })))
-            }
-            (Some(_), StoredNode::Sensor(..)) => Err("more sensors than the star has".into()),
-            _ => Err("a centre where a sensor is, or a sensor where the centre is".into()),
-        }
     }
 }

@@ -37,6 +37,8 @@ pub struct SensingNode<R, const M: usize> {
     /// The last slot that the half knows of.
     pub(super) counted: u32,
     pub(super) replica: Option<R>,
+    /// The last slot whose broadcast it passed on.
+    pub(super) passed: u32,
     pub(super) failures: Failures,
 }
 
@@ -49,7 +51,7 @@ pub struct StoredBitNode(pub(super) StoredNode);
 #[serde(rename_all = "kebab-case")]
 pub(super) enum StoredNode {
     Centre(Centre, Stored, Vec<SlotEstimate>, Failures),
-    Sensor(Sensor, Stored, u32, Option<Stored>, Failures),
+    Sensor(Sensor, Stored, [u32; 2], Option<Stored>, Failures),
 }
 
 impl<R, const M: usize> fmt::Debug for BitNode<R, M> {
@@ -120,7 +122,7 @@ impl<R: Receiver, const M: usize> BitNode<R, M> {
             Self::Sensor(sensor) => StoredNode::Sensor(
                 sensor.machine.clone(),
                 Stored(sensor.half.stored().ok_or("the sensor's half is of a kind that cannot be stored")?),
-                sensor.counted,
+                [sensor.counted, sensor.passed],
                 sensor
                     .replica
                     .as_ref()

@@ -32,7 +32,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         match reaction.task {
             // The radio repeats by itself.
             Task::Wait | Task::SendAgain => Ok(()),
-            Task::Send(frame) => context.send(CENTRE, &of(&frame)).map(drop),
+            Task::Send(frame) => self.send_up(context, &of(&frame)),
             Task::Follow { slot, kind, payload } => {
                 let followed = |replica| self.followed(replica, slot, kind, payload.into()).ok();
                 let state = sensor.replica.as_mut().and_then(followed);

@@ -38,6 +38,11 @@ pub(crate) fn machine_frame(frame: &Frame) -> Option<machines::Frame<'_>> {
     Some(machines::Frame::new(*kind, slot, frame.digest, Payload::from(&frame.payload)))
 }
 
+/// Whether sensors send frames of this kind to the centre, and not the other way.
+pub(super) fn goes_up(kind: Kind) -> bool {
+    matches!(kind, Kind::Report | Kind::Request | Kind::Beacon)
+}
+
 pub(crate) fn failed(stage: Stage, slot: u32, error: &machines::BoxError) -> Note {
     let reason = in_full(&**error);
     Note::Failed { stage, slot, reason }
