@@ -5,7 +5,8 @@ use crate::error::Error;
 use crate::store::Store;
 use fewbits_core::{BitString, Observation};
 use fewbits_protocol::{
-    Action, Centre, CentreSettings, CentreTimer, Feedback, Note, Outcome, Receiver, Recipient, update_asked,
+    Action, Centre, CentreSettings, CentreTimer, Feedback, Note, Outcome, Receiver, Recipient, SensorHealth,
+    update_asked,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -42,6 +43,9 @@ pub struct Step {
     pub estimate: Vec<(f64, f64)>,
     /// Why the update did not use all observations.
     pub trouble: Option<String>,
+    /// How each sensor is judged after it; empty if the estimator does not judge them.
+    #[serde(default)]
+    pub health: Vec<SensorHealth>,
 }
 
 impl Step {
@@ -53,6 +57,7 @@ impl Step {
             observed,
             estimate,
             trouble: None,
+            health: Vec::new(),
         }
     }
 
@@ -316,6 +321,7 @@ impl<R: Receiver> Station<R> {
                         Outcome::Failed(error) => Some(format!("nothing was used: {error}")),
                     };
                     step.estimate = self.receiver.estimate();
+                    step.health = self.receiver.health();
                     self.last = Some(step.clone());
                     self.save()?;
                     outputs.push(Output::Step(step));

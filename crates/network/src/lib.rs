@@ -7,6 +7,7 @@
 //! | where the nodes are, who is in range of whom | [`Field`]: positions, or a list of links as CSV |
 //! | what a frame costs | [`Radio`] (one for all, or one per node), [`Account`], [`Ledger`] |
 //! | what happens to frames and nodes | [`Channel`], [`Loss`] (one for all, or one per link), [`Fault`], clocks that drift ([`Setup::drift`]) |
+//! | who sends when | an ideal schedule, or carrier sense with collisions ([`Access`]) |
 //! | sensors around a fusion centre | [`BitStar`]: any `Receiver` of `fewbits-protocol`, any `SensorNode` of `fewbits-core` |
 //! | a belief that travels | [`Walk`]: any `Leader` of `fewbits-protocol` |
 //! | what the sensors measure | [`Measurements`]: a table, an iterator or a closure |
@@ -46,7 +47,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: contention for the channel (an ideal schedule divides the air, see [`Simulator`]), estimation mathematics.
+//! Not here: estimation mathematics.
 
 mod clock;
 mod error;
@@ -67,7 +68,7 @@ pub use medium::{
 pub use note::{Note, Stage};
 pub use protocols::{BitNode, BitStar, CentreNode, SensingNode, SlotEstimate, StoredBitNode, Walk, WalkNode};
 pub use simulator::{
-    Account, Acknowledgement, Batching, Context, Detail, Entry, EstimateError, Fault, FaultKind, Faults, Ledger, Log,
+    Access, Account, Acknowledgement, Batching, CarrierSense, Context, Detail, Entry, EstimateError, Fault, FaultKind, Faults, Ledger, Log,
     Protocol, Reception, Setup, Simulator, Storable, Summary, Ticket, Totals, Transmission,
 };
 pub use units::{Bits, Instant, Joules, Seconds, SensorId, Watts};

@@ -1,6 +1,7 @@
 //! An estimator as the centre's machine needs it: bits in, bits out.
 
 use fewbits_core::{BitString, Observation};
+use serde::{Deserialize, Serialize};
 
 /// Any error of an estimator.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
@@ -37,6 +38,11 @@ pub trait Receiver {
     /// The estimate: mean and standard deviation of each coordinate.
     fn estimate(&self) -> Vec<(f64, f64)>;
 
+    /// How each sensor is judged, by their numbers. Empty for an estimator that does not judge them.
+    fn health(&self) -> Vec<SensorHealth> {
+        Vec::new()
+    }
+
     /// All that the estimator knows, exactly.
     ///
     /// # Errors
@@ -48,6 +54,17 @@ pub trait Receiver {
     /// # Errors
     /// If the bits are no state of this estimator.
     fn restore(&mut self, state: &BitString) -> Result<(), BoxError>;
+}
+
+/// How an estimator judges one sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SensorHealth {
+    /// Probability that it works.
+    pub working: f64,
+    /// It is taken for dead.
+    pub dead: bool,
+    /// Its reports are not used at present, since they do not fit the model.
+    pub excluded: bool,
 }
 
 impl<R: Receiver + ?Sized> Receiver for Box<R> {
@@ -69,6 +86,10 @@ impl<R: Receiver + ?Sized> Receiver for Box<R> {
 
     fn estimate(&self) -> Vec<(f64, f64)> {
         (**self).estimate()
+    }
+
+    fn health(&self) -> Vec<SensorHealth> {
+        (**self).health()
     }
 
     fn state(&self) -> Result<BitString, BoxError> {

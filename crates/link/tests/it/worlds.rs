@@ -125,7 +125,7 @@ fn over_udp(reports: Reports, steps: usize) {
     let settings = settings(reports, 20_000_000, count as usize);
     let mut station = Station::new(settings, receiver(reports, loss), peers(count), None).unwrap();
     // All sensors have said where they are before the first slot.
-    let (mut known, mut buffer) = (std::collections::HashSet::new(), [0; 2048]);
+    let (mut known, mut buffer) = (HashSet::new(), [0; 2048]);
     socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
     while known.len() < count as usize {
         let (length, from) = socket.recv_from(&mut buffer).unwrap();

@@ -222,12 +222,18 @@ impl SimulatorCore {
             .state
             .now
             .after(self.setup.radio_of(attempt.from).duration(attempt.size.air));
+        let busy = self.collide(attempt.from);
+        let mut arrivals = Vec::new();
         if receptions.is_empty() && attempt.to.is_some() {
             self.state.ledger.faults.lost += 1;
         }
         for reception in receptions {
             if reception.copies.is_empty() {
                 self.state.ledger.faults.lost += 1;
+            }
+            if self.is_garbled(&busy, reception.to) {
+                self.state.ledger.faults.lost += 1;
+                continue;
             }
             for copy in &reception.copies {
                 let at = on_air.after(copy.delay);
@@ -236,10 +242,14 @@ impl SimulatorCore {
                     let from = attempt.from;
                     // One answer for all frames of a batch.
                     let answer = answer.take();
-                    self.deliver(at, reception.to, Arrival { from, answer, bits });
+                    let place = self.deliver(at, reception.to, Arrival { from, answer, bits });
+                    if self.contends() {
+                        arrivals.push((reception.to, place));
+                    }
                 }
             }
         }
+        self.occupy(attempt.from, self.state.now, attempt.size.air, arrivals);
     }
 
     fn is_intact(&self, frames: &[Stored], copy: &ReceivedCopy) -> bool {

@@ -3,6 +3,7 @@
 //! `core` has the state that nodes cannot read, `transmission` puts frames on air.
 
 mod attempt;
+mod contention;
 mod context;
 mod core;
 mod ledger;
@@ -16,7 +17,7 @@ pub use self::core::Ticket;
 pub use context::{Context, Protocol, Storable};
 pub use ledger::{Account, Faults, Ledger, Totals};
 pub use log::{Acknowledgement, Detail, Entry, Log, Reception, Transmission};
-pub use setup::{Batching, Fault, FaultKind, Setup};
+pub use setup::{Access, Batching, CarrierSense, Fault, FaultKind, Setup};
 pub use summary::{EstimateError, Summary};
 
 use self::core::{SimulatorCore, State};
@@ -32,7 +33,8 @@ use std::io::{Read, Write};
 
 /// A network at some instant.
 ///
-/// The air is divided by an ideal schedule: a transmission begins when the air is free about its sender and about all nodes that hear it. Requests are
+/// The air is divided by an ideal schedule ([`Access::Scheduled`]) or by carrier sense ([`Access::CarrierSense`]). By the schedule a transmission begins when the air
+/// is free about its sender and about all nodes that hear it; requests are
 /// served in the order in which they were made, and who waits sleeps. Acknowledgements follow their frames after a turnaround.
 #[derive(Debug)]
 pub struct Simulator<P: Protocol> {

@@ -124,7 +124,7 @@ fn repetitions_and_acknowledgements_are_charged() {
 }
 
 /// Every node sends one frame of one bit to node 0 at each timer.
-struct Chatter;
+pub struct Chatter;
 
 impl Protocol for Chatter {
     type Node = u32;
