@@ -1,7 +1,7 @@
 //! Events of the simulator as those of the machines, and nodes as a snapshot has them.
 
 use super::node::{BitNode, CentreNode, SensingNode, StoredBitNode, StoredNode};
-use super::translation::machine_frame;
+use super::translation::{is_for_all, machine_frame};
 use super::{BitStar, CENTRE, SLOT_BEGINS};
 use crate::error::Error;
 use crate::medium::{Frame, Kind};
@@ -35,7 +35,10 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
                         slot: Slot::of_count(u64::from(token >> 1)),
                     },
                 };
-                if timer == SensorTimer::SlotBegins && self.clock.slot(context.now()) > self.measurements.slots() {
+                // By the sensor's own clock, as the centre's frames have set it.
+                let settings = sensor.machine.settings();
+                let count = settings.schedule.map_or(0, |s| s.count(now.saturating_sub(settings.offset)));
+                if timer == SensorTimer::SlotBegins && count > u64::from(self.measurements.slots()) {
                     return Ok(());
                 }
                 let reaction = sensor.machine.on_timer(now, timer);
@@ -52,6 +55,7 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
         frame: &Frame,
     ) -> Result<(), Error> {
         let unwrapped;
+        let addressed = frame.kind == Kind::Relayed;
         let (from, frame) = match frame.kind {
             Kind::Relayed => match self.relay(context, frame)? {
                 Some((origin, inner)) => {
@@ -71,6 +75,10 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
                 let Some(sensor) = from.index().checked_sub(1) else {
                     return Ok(());
                 };
+                // A relay's broadcast: what the centre has sent itself.
+                if !addressed && self.routes.is_some() && is_for_all(frame.kind) {
+                    return Ok(());
+                }
                 let recorded = self.arrives.as_ref().filter(|_| frame.kind == Kind::Report);
                 if recorded.is_some_and(|arrives| !arrives(frame.slot, sensor)) {
                     return Ok(());
@@ -82,7 +90,9 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
             // Frames of other sensors are in range, and for the centre.
             BitNode::Sensor(_) if from != CENTRE && from != self.parent(context) => Ok(()),
             BitNode::Sensor(sensor) => {
-                self.pass_on(sensor, context, from, frame)?;
+                if !addressed {
+                    self.pass_on(sensor, context, from, frame)?;
+                }
                 let reaction = sensor.machine.on_decoded(context.now().0, decoded);
                 self.react(sensor, context, reaction)
             }

@@ -1,7 +1,7 @@
 //! Frames over several hops: what sensors pass on for others.
 
 use super::node::SensingNode;
-use super::translation::goes_up;
+use super::translation::{goes_up, is_for_all};
 use super::{BitStar, CENTRE};
 use crate::error::Error;
 use crate::medium::{Check, Field, Frame, Kind};
@@ -126,8 +126,7 @@ impl<R, const M: usize> BitStar<R, M> {
         frame: &Frame,
     ) -> Result<(), Error> {
         let passes = |routes: &Routes| routes.passes[context.id().index()] && from == routes.parent(context.id());
-        let told_all = matches!(frame.kind, Kind::Question | Kind::Echo | Kind::Snapshot | Kind::Beacon);
-        if told_all && frame.slot > sensor.passed && self.routes(context.field()).is_some_and(passes) {
+        if is_for_all(frame.kind) && frame.slot > sensor.passed && self.routes(context.field()).is_some_and(passes) {
             sensor.passed = frame.slot;
             context.broadcast(frame)?;
         }

@@ -24,7 +24,10 @@ pub(crate) fn of(frame: &machines::Frame<'_>) -> Frame {
         .iter()
         .find(|(_, kind)| *kind == frame.kind)
         .map_or(Kind::Beacon, |(kind, _)| *kind);
-    Frame::new(kind, frame.slot.number(), frame.digest, frame.payload.into())
+    Frame {
+        destination: frame.destination,
+        ..Frame::new(kind, frame.slot.number(), frame.digest, frame.payload.into())
+    }
 }
 
 pub(crate) fn simulated(bytes: &[u8]) -> Result<Frame, Error> {
@@ -35,12 +38,20 @@ pub(crate) fn simulated(bytes: &[u8]) -> Result<Frame, Error> {
 pub(crate) fn machine_frame(frame: &Frame) -> Option<machines::Frame<'_>> {
     let (_, kind) = KINDS.iter().find(|(kind, _)| *kind == frame.kind)?;
     let slot = Slot::of_count(u64::from(frame.slot));
-    Some(machines::Frame::new(*kind, slot, frame.digest, Payload::from(&frame.payload)))
+    Some(machines::Frame {
+        destination: frame.destination,
+        ..machines::Frame::new(*kind, slot, frame.digest, Payload::from(&frame.payload))
+    })
 }
 
 /// Whether sensors send frames of this kind to the centre, and not the other way.
 pub(super) fn goes_up(kind: Kind) -> bool {
     matches!(kind, Kind::Report | Kind::Request | Kind::Beacon)
+}
+
+/// Whether the centre sends frames of this kind to all sensors.
+pub(super) fn is_for_all(kind: Kind) -> bool {
+    matches!(kind, Kind::Question | Kind::Echo | Kind::Snapshot | Kind::Beacon)
 }
 
 pub(crate) fn failed(stage: Stage, slot: u32, error: &machines::BoxError) -> Note {
