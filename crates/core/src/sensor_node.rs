@@ -92,7 +92,9 @@ impl<C: Scheme<M>, const M: usize> SensorNode<M> for SchemeNode<C, M> {
     fn restore(&mut self, memory: &BitString) -> Result<(), Error> {
         match (size_of::<C::State>(), memory.bits()) {
             (0, 0) => Ok(()),
-            (_, bits) => Err(ArgumentError::new("memory", format!("{bits} bits"), "none, of a scheme without memory").into()),
+            (_, bits) => {
+                Err(ArgumentError::new("memory", format!("{bits} bits"), "none, of a scheme without memory").into())
+            }
         }
     }
 }

@@ -45,8 +45,8 @@
 //!
 //! Not here: energy (`fewbits-network`), the true state, any choice of which sensor reports.
 
-pub mod chain;
 mod centre;
+pub mod chain;
 mod error;
 mod filter;
 mod first_message;

@@ -68,7 +68,7 @@ pub use medium::{
 pub use note::{Note, Stage};
 pub use protocols::{BitNode, BitStar, CentreNode, SensingNode, SlotEstimate, StoredBitNode, Walk, WalkNode};
 pub use simulator::{
-    Access, Account, Acknowledgement, Batching, CarrierSense, Context, Detail, Entry, EstimateError, Fault, FaultKind, Faults, Ledger, Log,
-    Protocol, Reception, Setup, Simulator, Storable, Summary, Ticket, Totals, Transmission,
+    Access, Account, Acknowledgement, Batching, CarrierSense, Context, Detail, Entry, EstimateError, Fault, FaultKind,
+    Faults, Ledger, Log, Protocol, Reception, Setup, Simulator, Storable, Summary, Ticket, Totals, Transmission,
 };
 pub use units::{Bits, Instant, Joules, Seconds, SensorId, Watts};

@@ -295,7 +295,8 @@ impl Centre {
 
     fn usable(&self) -> Vec<Option<Observation<BitString>>> {
         let all = self.observed.iter().zip(&self.unusable);
-        all.map(|(observed, unusable)| (!unusable).then(|| observed.clone())).collect()
+        all.map(|(observed, unusable)| (!unusable).then(|| observed.clone()))
+            .collect()
     }
 
     /// Bytes have arrived from a sensor, which the link has made sure of.

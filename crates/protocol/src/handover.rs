@@ -271,7 +271,9 @@ impl Bearer {
         let Some(at) = self.pending.iter().position(|pending| pending.name == name) else {
             return;
         };
-        let Pending { destination, belief, .. } = self.pending.remove(at);
+        let Pending {
+            destination, belief, ..
+        } = self.pending.remove(at);
         let note = Note::Retained { slot: name.0 };
         let with = destination;
         errands.push(Errand::Note { with, note });

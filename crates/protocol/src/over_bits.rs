@@ -106,7 +106,9 @@ impl<E: Estimator> OverBits<E> {
         let estimate = self.estimator.estimate(&belief);
         match estimate.iter().position(|(mean, _)| !mean.is_finite()) {
             None => Ok(belief),
-            Some(i) => Err(format!("the estimate is {} in coordinate {i}: expected a finite number", estimate[i].0).into()),
+            Some(i) => {
+                Err(format!("the estimate is {} in coordinate {i}: expected a finite number", estimate[i].0).into())
+            }
         }
     }
 }
@@ -118,9 +120,16 @@ impl<E: Estimator> Receiver for OverBits<E> {
 
     fn predict(&mut self, slot: u64) -> Result<(), BoxError> {
         let mut predicted = None;
-        let first = if self.slot == 0 { slot } else { self.slot.saturating_add(1) };
+        let first = if self.slot == 0 {
+            slot
+        } else {
+            self.slot.saturating_add(1)
+        };
         for slot in first..=slot {
-            predicted = Some(self.estimator.predict(slot, predicted.as_ref().unwrap_or(&self.belief))?);
+            predicted = Some(
+                self.estimator
+                    .predict(slot, predicted.as_ref().unwrap_or(&self.belief))?,
+            );
         }
         if let Some(predicted) = predicted {
             self.belief = self.finite(predicted)?;

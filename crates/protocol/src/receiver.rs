@@ -118,10 +118,7 @@ pub enum Outcome {
 /// taken as lost, since [`Observation::Lost`] says that it spoke.
 ///
 /// `observed` has one item per sensor; `None` is no observation.
-pub fn update_or_drop<R: Receiver + ?Sized>(
-    receiver: &mut R,
-    observed: &[Option<Observation<BitString>>],
-) -> Outcome {
+pub fn update_or_drop<R: Receiver + ?Sized>(receiver: &mut R, observed: &[Option<Observation<BitString>>]) -> Outcome {
     let asked = observed.iter().cloned().enumerate();
     update_asked(receiver, asked.filter_map(|(sensor, o)| Some((sensor, o?))).collect())
 }

@@ -386,7 +386,9 @@ impl Sensor {
         schedule.synchronise(slot, now);
         // The slot that is announced is reported in, too, unless that was done before the clock was set back.
         let offset = self.settings.offset;
-        self.begins_at = schedule.start(schedule.count(now.saturating_sub(offset)) + 1).saturating_add(offset);
+        self.begins_at = schedule
+            .start(schedule.count(now.saturating_sub(offset)) + 1)
+            .saturating_add(offset);
         Reaction {
             timer: Some((self.begins_at, SensorTimer::SlotBegins)),
             ..Reaction::NOTHING

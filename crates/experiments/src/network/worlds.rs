@@ -10,9 +10,7 @@ use fewbits_cfwmd::centre::CensoringEstimator;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::factor::Value;
-use fewbits_core::{
-    Belief, Gaussian, LinearDynamics, Link, NumberFormat, Observed, SchemeNode, Sensing, SensorNode,
-};
+use fewbits_core::{Belief, Gaussian, LinearDynamics, Link, NumberFormat, Observed, SchemeNode, Sensing, SensorNode};
 use fewbits_densities::Mixture;
 use fewbits_dymbo::{
     CountFusion, InnovationWord, MultibitFilter, ParallelEstimator, ParallelFilter, Prediction, ScalarEstimator,

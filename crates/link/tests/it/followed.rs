@@ -36,11 +36,13 @@ impl Message for Followed {
         }
         let what = "receivers";
         let expected = "stored receivers";
-        serde_json::from_slice(&bytes).map(Self).map_err(|error| CodecError::Invalid {
-            what,
-            value: error.to_string(),
-            expected,
-        })
+        serde_json::from_slice(&bytes)
+            .map(Self)
+            .map_err(|error| CodecError::Invalid {
+                what,
+                value: error.to_string(),
+                expected,
+            })
     }
 }
 
@@ -78,7 +80,11 @@ impl Estimator for Average {
         Ok(belief)
     }
     fn estimate(&self, belief: &Followed) -> Vec<(f64, f64)> {
-        let tracked = belief.0.iter().map(Receiver::tracked).filter(|tracked| tracked.synchronised);
+        let tracked = belief
+            .0
+            .iter()
+            .map(Receiver::tracked)
+            .filter(|tracked| tracked.synchronised);
         let values: Vec<f64> = tracked.filter_map(|tracked| tracked.value).collect();
         vec![(values.iter().sum::<f64>() / values.len().max(1) as f64, values.len() as f64)]
     }

@@ -37,7 +37,13 @@ fn page_shows_past_and_coming_slots() {
         ];
         let mut step = Step::new(slot, observed.to_vec(), vec![(1.5, 0.25)]);
         let (working, excluded) = (0.25, false);
-        step.health = [false, true, false].map(|dead| SensorHealth { working, dead, excluded }).to_vec();
+        step.health = [false, true, false]
+            .map(|dead| SensorHealth {
+                working,
+                dead,
+                excluded,
+            })
+            .to_vec();
         step
     };
     page.show(&step(41), Counts::default());

@@ -1,14 +1,14 @@
 //! The same scenario over UDP through a lossy relay, without any network, and in the simulator: the same estimates for the same losses.
 
 use crate::world::{Record, Reports, SENSORS, assert_replayed, key, measurement, node, peers, receiver, settings};
-use std::collections::HashSet;
-use std::sync::Mutex;
 use fewbits_core::BitString;
 use fewbits_link::{Output, SensorLink, Station, Step, udp};
 use fewbits_protocol::{Feedback, SensorSettings, Slot};
+use std::collections::HashSet;
 use std::net::UdpSocket;
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -209,7 +209,9 @@ fn simulated(reports: Reports, loss: f64, records: Vec<Record>, asked: Arc<HashS
         .unwrap()
         .with_recorded_losses(move |slot, sensor| recorded[slot as usize - 1][sensor]);
     let setup = Setup::new(Radio::cc2420(0.0).unwrap(), stream);
-    let mut network = star.simulate_on(Field::star(reports.sensors() as usize, 10.0).unwrap(), setup).unwrap();
+    let mut network = star
+        .simulate_on(Field::star(reports.sensors() as usize, 10.0).unwrap(), setup)
+        .unwrap();
     network
         .run_until(Instant(u64::from(slots + 1) * 1_000_000_000))
         .unwrap();

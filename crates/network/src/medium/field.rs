@@ -57,7 +57,9 @@ impl Field {
             let ends = node().zip(node()).filter(|(a, b)| a.max(b) < &MOST_NODES);
             let (a, b) = ends.ok_or_else(|| refused("two nodes below 2^24, and perhaps metres"))?;
             let metres = cells.next().map_or(Ok(1.0), str::parse::<f64>);
-            let metres = metres.ok().filter(|metres| metres.is_finite() && *metres > 0.0 && cells.next().is_none());
+            let metres = metres
+                .ok()
+                .filter(|metres| metres.is_finite() && *metres > 0.0 && cells.next().is_none());
             let metres = metres.ok_or_else(|| refused("metres above 0 as its third and last cell"))?;
             if a == b || lengths.insert((a.min(b), a.max(b)), metres).is_some() {
                 return Err(refused("each link once, between two nodes").into());

@@ -40,7 +40,9 @@ impl SimulatorCore {
         let exponent = sense.least.saturating_add(outgoing.heard).min(sense.most);
         // The last index tells these streams from those of frames.
         let stream = self.air.indexed(u64::from(outgoing.from.0)).indexed(u64::from(number));
-        let stream = stream.indexed(u64::from(outgoing.attempts)).indexed(2 + u64::from(outgoing.heard));
+        let stream = stream
+            .indexed(u64::from(outgoing.attempts))
+            .indexed(2 + u64::from(outgoing.heard));
         let units = stream.fast_rng().random_range(0..1_u32 << exponent.min(16));
         let wait = sense.unit.value() * f64::from(units);
         let at = self.state.now.after(crate::units::Seconds::trusted(wait));
@@ -55,7 +57,11 @@ impl SimulatorCore {
             return false;
         };
         let now = self.state.now;
-        let mut audible = self.state.on_air.iter().filter(|one| one.end > now && one.start.after(sense.blind) <= now);
+        let mut audible = self
+            .state
+            .on_air
+            .iter()
+            .filter(|one| one.end > now && one.start.after(sense.blind) <= now);
         audible.any(|one| one.from == node || self.reaches(one.from, node))
     }
 

@@ -150,7 +150,10 @@ impl SimulatorCore {
             && state.queue.is_consistent(known)
             && state.batches.keys().all(|(from, to)| reached(*from, *to))
             && state.outgoing.values().all(|frame| reached(frame.from, frame.to))
-            && state.on_air.iter().all(|one| known(one.from) && one.arrivals.iter().all(|(to, _)| known(*to)))
+            && state
+                .on_air
+                .iter()
+                .all(|one| known(one.from) && one.arrivals.iter().all(|(to, _)| known(*to)))
             && state.bursts.keys().all(|(from, to)| known(*from) && known(*to));
         if !consistent {
             return Err(Error::SnapshotOfOtherNetwork {

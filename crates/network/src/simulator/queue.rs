@@ -159,7 +159,9 @@ impl Queue {
 
     /// Destroys bits on their way. True if there were any.
     pub(crate) fn destroy(&mut self, place: u32) -> bool {
-        self.arrivals.get_mut(place as usize).is_some_and(|arrival| arrival.take().is_some())
+        self.arrivals
+            .get_mut(place as usize)
+            .is_some_and(|arrival| arrival.take().is_some())
     }
 
     /// Takes what has arrived; nothing if it was destroyed.

@@ -4,8 +4,8 @@ use crate::worlds::{Counted, clock, counted, scalar, setup};
 use fewbits_core::{BitString, Link};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{
-    BitStar, Channel, Check, Clock, Context, Error, Fault, FaultKind, Field, Frame, Instant, Kind, Loss, Note, Protocol,
-    Radio, Seconds, SensorId, Setup, Simulator, Walk,
+    BitStar, Channel, Check, Clock, Context, Error, Fault, FaultKind, Field, Frame, Instant, Kind, Loss, Note,
+    Protocol, Radio, Seconds, SensorId, Setup, Simulator, Walk,
 };
 use fewbits_protocol::{BoxError, Feedback, Lead, Leader};
 use fewbits_topology::Deployment;

@@ -5,7 +5,8 @@ use crate::worlds::{clock, setup};
 use fewbits_core::{BitString, Error, Observation, SensorNode};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{
-    BitNode, BitStar, Channel, Detail, Fault, FaultKind, Field, Frame, Kind, Measurements, Note, Seconds, SensorId, Setup, Simulator,
+    BitNode, BitStar, Channel, Detail, Fault, FaultKind, Field, Frame, Kind, Measurements, Note, Seconds, SensorId,
+    Setup, Simulator,
 };
 use fewbits_protocol::{BoxError, Feedback, Member, Receiver, ReportLength};
 use nalgebra::{SVector, Vector1};
@@ -169,7 +170,10 @@ fn sensors_out_of_range_report_through_others() {
         }
     }
     let apart = Field::from_csv("0,1\n2,3").unwrap();
-    let refused = speakers(Feedback::Told, 5, 3).relaying().simulate_on(apart, setup(1)).err();
+    let refused = speakers(Feedback::Told, 5, 3)
+        .relaying()
+        .simulate_on(apart, setup(1))
+        .err();
     assert!(matches!(refused, Some(fewbits_network::Error::Disconnected { reached: 2, .. })));
 }
 
@@ -181,13 +185,20 @@ fn relayed_frames_survive_losses_and_strangers() {
         retries: Some(2),
         ..setup(3)
     };
-    let mut network = speakers(Feedback::Echoed, 200, 3).relaying().simulate_on(line, setup).unwrap();
+    let mut network = speakers(Feedback::Echoed, 200, 3)
+        .relaying()
+        .simulate_on(line, setup)
+        .unwrap();
     for (to, sensor) in (0..4).flat_map(|to| [0, 1, 3, 9].map(|sensor| (to, sensor))) {
-        let report = Frame::new(Kind::Report, 7, 1, BitString::default()).relayed(sensor).unwrap();
+        let report = Frame::new(Kind::Report, 7, 1, BitString::default())
+            .relayed(sensor)
+            .unwrap();
         let twice = report.relayed(sensor).unwrap();
         for frame in [report, twice] {
             let bits = frame.to_bits(fewbits_network::Check::Whole).unwrap();
-            network.inject(clock().start(7), SensorId(to ^ 1), SensorId(to), bits).unwrap();
+            network
+                .inject(clock().start(7), SensorId(to ^ 1), SensorId(to), bits)
+                .unwrap();
         }
     }
     network.run_until(clock().end(200)).unwrap();

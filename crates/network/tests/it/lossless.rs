@@ -190,7 +190,8 @@ fn censoring_sensors_and_all_send() {
         let nodes = estimator.clone();
         let node = move |i| -> Box<dyn SensorNode<1>> { Box::new(nodes.node(i)) };
         let length = ReportLength::Fixed(format.bits());
-        let (estimates, price) = run(star(estimator.clone(), Feedback::Told, length, node.clone(), measurements.clone()));
+        let (estimates, price) =
+            run(star(estimator.clone(), Feedback::Told, length, node.clone(), measurements.clone()));
         assert_eq!(estimates, alone);
         let down = 64 * SLOTS as u64 * if with_covariance { 14 } else { 4 };
         assert_eq!(price, Price { up: sent, down });

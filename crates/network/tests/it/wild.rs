@@ -1,7 +1,7 @@
 //! Wild arguments: times, energies, losses and frames are numbers, or refused.
 
-use fewbits_core::laws::wild;
 use fewbits_core::BitString;
+use fewbits_core::laws::wild;
 use fewbits_network::{
     Bits, Channel, Check, Clock, Field, Frame, Instant, Joules, Kind, Log, Radio, Seconds, Watts, digest,
 };

@@ -18,7 +18,10 @@ fn belief(byte: u8) -> BitString {
 fn led(bearer: &mut Bearer, slot: u64, next: u32, byte: u8) -> ((Slot, u32), Vec<u8>) {
     let mut errands = Vec::new();
     bearer.on_timer(slot * PERIOD, &mut errands);
-    assert!(matches!(&errands[..], [Errand::Lead { slot: at, .. }] if *at == Slot::of_count(slot)), "{errands:?}");
+    assert!(
+        matches!(&errands[..], [Errand::Lead { slot: at, .. }] if *at == Slot::of_count(slot)),
+        "{errands:?}"
+    );
     let lead = Lead {
         message: belief(byte),
         next: Some(next),
@@ -57,7 +60,13 @@ fn a_belief_goes_round_over_a_relay() {
     // A copy is noted, by both.
     for (bearer, from) in [(&mut relay, 0), (&mut last, 1)] {
         let again = arrive(bearer, 1, from, &frame);
-        assert!(matches!(&again[..], [Errand::Note { note: Note::Duplicate { .. }, .. }]));
+        assert!(matches!(
+            &again[..],
+            [Errand::Note {
+                note: Note::Duplicate { .. },
+                ..
+            }]
+        ));
     }
     // An early timer starts nothing.
     let mut errands = Vec::new();
@@ -87,7 +96,16 @@ fn who_gives_up_leads_and_says_so() {
     arrive(&mut second, 1, 0, &frame);
     let (_, other) = led(&mut second, 2, 0, 9);
     let met = arrive(&mut first, 2, 1, &other);
-    assert!(matches!(&met[..], [Errand::Note { note: Note::Disagreement { .. }, .. }, Errand::SetTimer { .. }]));
+    assert!(matches!(
+        &met[..],
+        [
+            Errand::Note {
+                note: Note::Disagreement { .. },
+                ..
+            },
+            Errand::SetTimer { .. }
+        ]
+    ));
     assert_eq!(first.leads(), Some(Slot::of_count(3)));
     // Nothing is pending that was acknowledged or given up.
     errands.clear();

@@ -4,4 +4,5 @@
 mod centre;
 mod frame;
 mod handover;
+mod over_bits;
 mod sensor;

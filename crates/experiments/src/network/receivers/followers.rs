@@ -156,7 +156,8 @@ impl SensorNode<1> for FollowedNode {
         measurement: &Vector1<f64>,
         _: &BitString,
     ) -> Result<Option<BitString>, fewbits_core::Error> {
-        let refused = |error: &dyn std::fmt::Display| ArgumentError::new("measurement", measurement[0], error.to_string());
+        let refused =
+            |error: &dyn std::fmt::Display| ArgumentError::new("measurement", measurement[0], error.to_string());
         let report = self.0.encode(measurement[0]).map_err(|error| refused(&error))?;
         let bits = report.map(|report| report.packet.to_bits(&())).transpose();
         Ok(bits.map_err(|error| refused(&error))?)

@@ -97,7 +97,9 @@ fn patterns_have_the_variance_given_the_bits() {
     let patterns = Patterns::new(1, table, variance).unwrap();
     let predicted = patterns.predict(1, &patterns.start()).unwrap();
     assert!((predicted.covariance()[0] - variance).abs() < 1e-12);
-    let after = patterns.update(1, &predicted, &[(0, Observation::Received(Bit(true)))]).unwrap();
+    let after = patterns
+        .update(1, &predicted, &[(0, Observation::Received(Bit(true)))])
+        .unwrap();
     let share = 2.0 / std::f64::consts::PI * variance * variance / (variance + 1.0);
     assert!((after.mean()[0].abs() - share.sqrt()).abs() < 1e-9, "{after:?}");
     assert!((after.covariance()[0] - (variance - share)).abs() < 1e-9, "{after:?}");

@@ -37,7 +37,9 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
                 };
                 // By the sensor's own clock, as the centre's frames have set it.
                 let settings = sensor.machine.settings();
-                let count = settings.schedule.map_or(0, |s| s.count(now.saturating_sub(settings.offset)));
+                let count = settings
+                    .schedule
+                    .map_or(0, |s| s.count(now.saturating_sub(settings.offset)));
                 if timer == SensorTimer::SlotBegins && count > u64::from(self.measurements.slots()) {
                     return Ok(());
                 }

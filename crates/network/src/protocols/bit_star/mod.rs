@@ -26,9 +26,9 @@ use fewbits_protocol::{
 };
 use nalgebra::SVector;
 use node::Failures;
+use relay::Routes;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
-use relay::Routes;
 
 const CENTRE: SensorId = SensorId(0);
 /// Timers of nodes: a slot begins; the deadline of a centre, or a missing acknowledgement (with the slot above) of a sensor.
@@ -259,7 +259,9 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         let before = self.members.iter().take(sensor);
         let before = before.filter(|member| member.feedback == Feedback::Clock).count();
         let [first, spacing] = self.offsets;
-        (0..before).fold(Instant::default().after(first), |at, _| at.after(spacing)).0
+        (0..before)
+            .fold(Instant::default().after(first), |at, _| at.after(spacing))
+            .0
     }
 
     /// The estimator before its first slot.

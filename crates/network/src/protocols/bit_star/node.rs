@@ -121,7 +121,12 @@ impl<R: Receiver, const M: usize> BitNode<R, M> {
             ),
             Self::Sensor(sensor) => StoredNode::Sensor(
                 sensor.machine.clone(),
-                Stored(sensor.half.stored().ok_or("the sensor's half is of a kind that cannot be stored")?),
+                Stored(
+                    sensor
+                        .half
+                        .stored()
+                        .ok_or("the sensor's half is of a kind that cannot be stored")?,
+                ),
                 [sensor.counted, sensor.passed],
                 sensor
                     .replica
