@@ -55,6 +55,7 @@
 //! Not here: the radio, the truth, and design of the quantizer behind a value.
 
 pub mod censored;
+pub mod centre;
 pub mod ellipsoid;
 mod error;
 pub mod information;

@@ -76,6 +76,11 @@ impl<S: Sensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> Netwo
         &self.link
     }
 
+    /// How values travel.
+    pub fn format(&self) -> NumberFormat {
+        self.format
+    }
+
     /// The rule of sensor `i` weighed with `S = R + H P H'`, `P` the fusion centre's (or a scheduled) predicted covariance and
     /// `H` the Jacobian at the prediction.
     ///

@@ -23,6 +23,23 @@ pub trait SensorNode<const M: usize> {
         measurement: &SVector<f64, M>,
         feedback: &BitString,
     ) -> Result<Option<BitString>, Error>;
+
+    /// Slots have passed in which the sensor was not asked. A sensor whose rule depends on the slot counts them; others do nothing.
+    fn skip(&mut self, _slots: u64) {}
+
+    /// What the sensor remembers, for a driver that stores it. `None` if this kind of sensor cannot be stored.
+    fn stored(&self) -> Option<BitString> {
+        None
+    }
+
+    /// Goes on from what [`stored`](Self::stored) returned.
+    ///
+    /// # Errors
+    /// If this kind of sensor cannot be stored, or the bits are no memory of it.
+    fn restore(&mut self, memory: &BitString) -> Result<(), Error> {
+        let expected = "a kind of sensor that can be stored";
+        Err(ArgumentError::new("memory", format!("{} bits", memory.bits()), expected).into())
+    }
 }
 
 /// The sensor's half of a scheme, with its memory.
@@ -65,5 +82,19 @@ impl<C: Scheme<M>, const M: usize> SensorNode<M> for SchemeNode<C, M> {
         Ok(bits
             .transpose()
             .map_err(|error| ArgumentError::new("report", error, "a report that fits its format"))?)
+    }
+
+    /// No bits, for a scheme without memory; `None` for others.
+    fn stored(&self) -> Option<BitString> {
+        (size_of::<C::State>() == 0).then(BitString::default)
+    }
+
+    fn restore(&mut self, memory: &BitString) -> Result<(), Error> {
+        match (size_of::<C::State>(), memory.bits()) {
+            (0, 0) => Ok(()),
+            (_, bits) => {
+                Err(ArgumentError::new("memory", format!("{bits} bits"), "none, of a scheme without memory").into())
+            }
+        }
     }
 }

@@ -77,6 +77,7 @@ mod record;
 mod select;
 mod sensor;
 mod target;
+mod walk;
 
 pub use belief::{JointBelief, PositionBelief, Prior, SearchBox};
 pub use chain::{Outcome, Search, Status, Step};
@@ -91,3 +92,4 @@ pub use rate::{RateModel, RateRange, RateSums, log_sample_marginal};
 pub use record::Record;
 pub use select::{Rule, Selector};
 pub use sensor::SourceSensor;
+pub use walk::SourceChain;

@@ -45,6 +45,7 @@
 //!
 //! Not here: energy (`fewbits-network`), the true state, any choice of which sensor reports.
 
+mod centre;
 pub mod chain;
 mod error;
 mod filter;
@@ -61,6 +62,7 @@ pub mod steady;
 pub mod tree;
 mod vector;
 
+pub use centre::{ParallelEstimator, ScalarEstimator};
 pub use error::Error;
 pub use filter::{DymboFilter, ScalarFilter, StepInfo};
 pub use first_message::{

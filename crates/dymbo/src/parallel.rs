@@ -131,11 +131,23 @@ impl ParallelFilter {
         belief: &Gaussian<1>,
         observations: &[Observation<Sign>],
     ) -> Result<(Gaussian<1>, StepInfo), Error> {
+        self.update(&self.plant.predict(belief), observations)
+    }
+
+    /// Corrects a predicted belief with what was observed of the sensors, whose threshold was the mean of that belief.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    pub fn update(
+        &self,
+        predicted: &Gaussian<1>,
+        observations: &[Observation<Sign>],
+    ) -> Result<(Gaussian<1>, StepInfo), Error> {
         if observations.len() != self.sensors {
             let expected = format!("{}, one per sensor", self.sensors);
             return Err(ArgumentError::new("observations", observations.len(), expected).into());
         }
-        let predicted = self.plant.predict(belief);
+        let predicted = *predicted;
         let (mean, p) = (predicted.mean()[0], predicted.covariance()[0]);
         let received = || observations.iter().filter_map(Observation::received);
         let bits = received().count();

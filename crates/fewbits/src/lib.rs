@@ -21,7 +21,7 @@
 //! | `record` | `record` | files and frames of many columns within guaranteed errors |
 //! | `link`, `protocol` | `link` | a fusion centre and its sensors as processes: frames, keys, sockets |
 //! | `node` | `node` | the sensor's halves of all schemes, without the standard library |
-//! | `network` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
+//! | `network`, `protocol` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |
 
 pub use fewbits_core as core;
@@ -58,7 +58,7 @@ pub use fewbits_network as network;
 pub use fewbits_node as node;
 #[cfg(feature = "pf-mpa")]
 pub use fewbits_pf_mpa as pf_mpa;
-#[cfg(feature = "link")]
+#[cfg(any(feature = "link", feature = "network"))]
 pub use fewbits_protocol as protocol;
 #[cfg(feature = "quantizer-design")]
 pub use fewbits_quantizer_design as quantizer_design;

@@ -6,6 +6,7 @@
 //!
 //! - [`HandoffFilter`]: one leader's step, from the mixture that was received to the one that is sent. How the belief is reduced
 //!   is a [`Reducer`]: to a number of components, to a number of bits, or a type of your own.
+//! - [`Leaders`]: the same as bits from node to node, over any network that runs the walks of `fewbits-protocol`.
 //! - [`published::Accounting`]: what the losses of all steps say about the error at the end, by the bounds as printed, corrected and
 //!   tightened.
 //!
@@ -35,9 +36,11 @@
 
 mod error;
 mod filter;
+mod leaders;
 pub mod published;
 mod reducer;
 
 pub use error::Error;
 pub use filter::{HandoffFilter, HandoffInfo, trimmed};
+pub use leaders::Leaders;
 pub use reducer::{Coded, Components, Handover, RateLimited, Reducer, Whole};

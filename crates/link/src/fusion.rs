@@ -4,7 +4,7 @@ use fewbits_core::{BitString, Observation};
 use fewbits_filters::centre::{CentreState, FusionCentre, Slot};
 use fewbits_filters::contract::StateFilter;
 use fewbits_monte_carlo::Stream;
-use fewbits_protocol::{BoxError, Receiver};
+use fewbits_protocol::{BoxError, Receiver, SensorHealth};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// A [`FusionCentre`] that advances by a period per slot. Sensors are numbered in rising order of their numbers there.
@@ -84,6 +84,18 @@ where
         let estimate = self.centre.estimate();
         let deviation = |i: usize| estimate.covariance()[(i, i)].max(0.0).sqrt();
         (0..D).map(|i| (estimate.mean()[i], deviation(i))).collect()
+    }
+
+    fn health(&self) -> Vec<SensorHealth> {
+        let judged = self.numbers.iter().map(|number| {
+            Some(SensorHealth {
+                working: self.centre.working(*number).ok()?,
+                dead: self.centre.is_named_dead(*number).ok()?,
+                excluded: self.centre.is_excluded(*number).ok()?,
+            })
+        });
+        // All numbers are those of sensors that have joined.
+        judged.collect::<Option<_>>().unwrap_or_default()
     }
 
     fn state(&self) -> Result<BitString, BoxError> {

@@ -1,4 +1,4 @@
-//! A page that shows a running centre: estimates with their band, the last reports of each sensor, bits per second, refusals.
+//! A page that shows a running centre: estimates with their band, the last reports and the health of each sensor, bits per second, refusals.
 //!
 //! The page is one file without scripts from elsewhere. It is fed by server-sent events, and shows the last [`HISTORY`] slots to whoever opens it later.
 
@@ -10,6 +10,7 @@ use axum::response::Html;
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::routing::get;
 use fewbits_core::Observation;
+use fewbits_protocol::SensorHealth;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -34,6 +35,7 @@ struct Shown<'a> {
     observed: Vec<i64>,
     numbers: &'a [u32],
     trouble: Option<&'a str>,
+    health: &'a [SensorHealth],
     counts: Counts,
 }
 
@@ -106,6 +108,7 @@ impl LivePage {
             observed: observed.collect(),
             numbers: &self.numbers,
             trouble: step.trouble.as_deref(),
+            health: &step.health,
             counts,
         };
         let Ok(text) = serde_json::to_string(&shown) else {

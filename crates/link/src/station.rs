@@ -5,7 +5,8 @@ use crate::error::Error;
 use crate::store::Store;
 use fewbits_core::{BitString, Observation};
 use fewbits_protocol::{
-    Action, Centre, CentreSettings, CentreTimer, Feedback, Note, Outcome, Receiver, Recipient, update_asked,
+    Action, Centre, CentreSettings, CentreTimer, Feedback, Note, Outcome, Receiver, Recipient, SensorHealth,
+    update_asked,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -35,12 +36,16 @@ pub struct Step {
     /// What was observed of each sensor.
     #[serde(with = "fewbits_protocol::stored")]
     pub observed: Vec<Observation<BitString>>,
-    /// Whether each sensor was asked. One whose address is not known yet cannot be; that nothing comes of it says nothing.
+    /// Whether each sensor was asked, and answered what it was asked. One whose address is not known yet cannot be asked; that nothing comes
+    /// of it says nothing.
     pub asked: Vec<bool>,
     /// Mean and standard deviation of each coordinate.
     pub estimate: Vec<(f64, f64)>,
     /// Why the update did not use all observations.
     pub trouble: Option<String>,
+    /// How each sensor is judged after it; empty if the estimator does not judge them.
+    #[serde(default)]
+    pub health: Vec<SensorHealth>,
 }
 
 impl Step {
@@ -52,6 +57,7 @@ impl Step {
             observed,
             estimate,
             trouble: None,
+            health: Vec::new(),
         }
     }
 
@@ -304,14 +310,18 @@ impl<R: Receiver> Station<R> {
                 },
                 Action::Predict { slot } => self.predict(slot, outputs)?,
                 Action::Update { slot, observed } => {
-                    let mut step = Step::new(slot, observed, Vec::new());
-                    step.asked.clone_from(&self.asked);
+                    let asked = self.asked.iter().zip(&observed);
+                    let asked = asked.map(|(asked, observed)| *asked && observed.is_some()).collect();
+                    let observed = observed.into_iter().map(|o| o.unwrap_or(Observation::Nothing));
+                    let mut step = Step::new(slot, observed.collect(), Vec::new());
+                    step.asked = asked;
                     step.trouble = match update_asked(&mut self.receiver, step.observed_when_asked()) {
                         Outcome::Used => None,
                         Outcome::SilentDropped(error) => Some(format!("silent sensors were left out: {error}")),
                         Outcome::Failed(error) => Some(format!("nothing was used: {error}")),
                     };
                     step.estimate = self.receiver.estimate();
+                    step.health = self.receiver.health();
                     self.last = Some(step.clone());
                     self.save()?;
                     outputs.push(Output::Step(step));

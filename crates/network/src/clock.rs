@@ -3,7 +3,9 @@
 use crate::units::{Instant, Seconds};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{positive, within};
+use fewbits_protocol::Schedule;
 use serde::{Deserialize, Serialize};
+use std::num::NonZeroU64;
 
 /// The slots that all nodes share: slot `k` begins at `k` periods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,6 +52,12 @@ impl Clock {
     /// The end of a slot, before the next begins.
     pub fn end(&self, slot: u32) -> Instant {
         Instant(self.start(slot.saturating_add(1)).0.saturating_sub(1))
+    }
+
+    /// The slots as the machines of the protocol have them.
+    pub(crate) fn schedule(&self) -> Schedule {
+        // A period is a microsecond or more.
+        Schedule::new(NonZeroU64::new(self.period).unwrap_or(NonZeroU64::MIN))
     }
 
     /// The slot of an instant.

@@ -81,24 +81,6 @@ pub enum Error {
     /// A message that does not fit its format.
     #[error("message does not fit its format: {0}")]
     Codec(#[from] CodecError),
-    /// The echo of a slot does not decode to the reports that it was made of: reports do not say where they end, and the estimator says that they
-    /// do ([`Estimator::report_end`](crate::Estimator::report_end)).
-    #[error("reports do not say where they end: the echo of slot {slot} does not decode to them")]
-    UnreadableEcho {
-        /// The slot.
-        slot: u32,
-    },
-    /// What was observed has probability zero under the belief.
-    #[error("the observation is impossible under the belief")]
-    Impossible,
-    /// An update gave a number that is not finite.
-    #[error("the estimate is {value} in coordinate {coordinate}: expected a finite number")]
-    NotFinite {
-        /// Which coordinate.
-        coordinate: usize,
-        /// Its value.
-        value: f64,
-    },
     /// An estimator or scheme failed for another reason than an impossible observation.
     #[error("{name} failed")]
     Estimator {
@@ -107,23 +89,6 @@ pub enum Error {
         /// What it reported.
         source: Cause,
     },
-    /// A leader that has no reading in its slot.
-    #[error("{node} has no reading in slot {slot}")]
-    NoReading {
-        /// The leader.
-        node: SensorId,
-        /// The slot.
-        slot: u32,
-    },
-    /// A handover whose content is not what the walker sends: other records, another kind of message.
-    #[error("the handover is none of this walk: expected {expected}")]
-    ForeignHandover {
-        /// What was expected.
-        expected: &'static str,
-    },
-    /// A walker's step that ended without an estimate.
-    #[error("the step gave no estimate")]
-    NoEstimate,
     /// A log or snapshot that cannot be written.
     #[error("the run cannot be written")]
     Unwritable {
@@ -165,15 +130,20 @@ impl Error {
 
     /// The message with those of all sources, as one line of a log.
     pub fn in_full(&self) -> String {
-        let mut text = self.to_string();
-        let mut source = std::error::Error::source(self);
-        while let Some(error) = source {
-            text.push_str(": ");
-            text.push_str(&error.to_string());
-            source = error.source();
-        }
-        text
+        in_full(self)
     }
+}
+
+/// The message of an error with those of all sources.
+pub(crate) fn in_full(error: &(dyn std::error::Error + 'static)) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(error) = source {
+        text.push_str(": ");
+        text.push_str(&error.to_string());
+        source = error.source();
+    }
+    text
 }
 
 impl From<fewbits_topology::Error> for Error {
@@ -182,26 +152,6 @@ impl From<fewbits_topology::Error> for Error {
             fewbits_topology::Error::NoSuchNode { node, nodes } => Self::UnknownNode { node, nodes },
             fewbits_topology::Error::Argument(error) => Self::Argument(error),
             other => Self::estimator("topology", other),
-        }
-    }
-}
-
-impl From<fewbits_core::Error> for Error {
-    fn from(error: fewbits_core::Error) -> Self {
-        match error {
-            fewbits_core::Error::Impossible => Self::Impossible,
-            fewbits_core::Error::Argument(error) => Self::Argument(error),
-            other => Self::estimator("update", other),
-        }
-    }
-}
-
-impl From<fewbits_filters::Error> for Error {
-    fn from(error: fewbits_filters::Error) -> Self {
-        match error {
-            fewbits_filters::Error::Core(error) => error.into(),
-            fewbits_filters::Error::Argument(error) => Self::Argument(error),
-            other => Self::estimator("filter", other),
         }
     }
 }

@@ -4,13 +4,13 @@
 //!
 //! | question | item |
 //! |---|---|
-//! | where the nodes are, who is in range of whom | [`Field`] |
+//! | where the nodes are, who is in range of whom | [`Field`]: positions, or a list of links as CSV |
 //! | what a frame costs | [`Radio`] (one for all, or one per node), [`Account`], [`Ledger`] |
-//! | what happens to frames and nodes | [`Channel`], [`Loss`] (one for all, or one per link), [`Fault`] |
-//! | how sensors and centre talk | [`Star`] (told, or following by echo), [`Walk`] (a belief that travels) |
-//! | the machines and bytes of real sensors | [`BitStar`]: any `Receiver` of `fewbits-protocol`, any `SensorNode` |
+//! | what happens to frames and nodes | [`Channel`], [`Loss`] (one for all, or one per link), [`Fault`], clocks that drift ([`Setup::drift`]) |
+//! | who sends when | an ideal schedule, or carrier sense with collisions ([`Access`]) |
+//! | sensors around a fusion centre | [`BitStar`]: any `Receiver` of `fewbits-protocol`, any `SensorNode` of `fewbits-core` |
+//! | a belief that travels | [`Walk`]: any `Leader` of `fewbits-protocol` |
 //! | what the sensors measure | [`Measurements`]: a table, an iterator or a closure |
-//! | what runs over it | [`Estimator`], [`Walker`]; the library's own in [`estimators`]; any `Scheme` with any filter by [`Reporting`](estimators::Reporting) |
 //! | what happened | [`Summary`]; [`Log`]: written, read, replayed; [`Simulator::snapshot`] and [`restore`](Simulator::restore) |
 //! | a protocol of one's own | [`Protocol`], [`Simulator`] |
 //!
@@ -24,32 +24,33 @@
 //! random stream of its own. So a run is a function of its arguments, to the byte.
 //!
 //! ```
-//! use fewbits_core::Gaussian;
-//! use fewbits_dymbo::{DymboFilter, ScalarPlant};
+//! use fewbits_core::{Gaussian, SchemeNode, SensorNode};
+//! use fewbits_dymbo::{DymboFilter, ScalarEstimator, ScalarFilter, ScalarPlant};
 //! use fewbits_monte_carlo::Stream;
-//! use fewbits_network::estimators::DymboEstimator;
-//! use fewbits_network::{Clock, Radio, Seconds, Setup, Star};
+//! use fewbits_network::{BitStar, Clock, Radio, Seconds, Setup};
+//! use fewbits_protocol::{Feedback, OverBits, ReportLength};
 //! use nalgebra::Vector1;
 //!
 //! let filter = DymboFilter::new(ScalarPlant::new(0.9, 0.5, 1.0)?);
-//! let estimator = DymboEstimator { filter, start: Gaussian::scalar(0.0, 2.63)? };
+//! let start = Gaussian::scalar(0.0, 2.63)?;
+//! let centre = move || Ok(OverBits::new(ScalarEstimator { filter, start }));
+//! let node = move |_| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(filter.scheme())) };
 //! let measurements = [1.2, 0.8, 1.9, 2.4].map(|z| vec![Vector1::new(z)]).to_vec();
 //! let clock = Clock::new(Seconds::new(1.0)?)?;
-//! let star = Star::echoed(estimator, measurements, clock, Stream::new(1))?;
+//! let star =
+//!     BitStar::new(centre, Feedback::Echoed, ReportLength::Fixed(1), node, measurements, clock, Stream::new(1))?;
 //! let mut network = star.simulate(10.0, Setup::new(Radio::cc2420(0.0)?, Stream::new(2)))?;
 //! network.run_until(clock.end(4))?;
 //! let sensor = network.ledger().accounts()[1];
 //! assert_eq!((sensor.payload.0, sensor.air.0), (4, 4 * 201));
-//! assert!(network.nodes()[0].estimates()[3][0] > 0.5);
+//! assert!(network.nodes()[0].means()[3][0] > 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: contention for the channel (an ideal schedule divides the air, see [`Simulator`]), clock drift, new estimation mathematics.
+//! Not here: estimation mathematics.
 
 mod clock;
 mod error;
-mod estimator;
-pub mod estimators;
 mod measurements;
 mod medium;
 mod note;
@@ -59,16 +60,15 @@ mod units;
 
 pub use clock::Clock;
 pub use error::{Cause, Error};
-pub use estimator::{Estimator, Replicable, ReportEnd, gaussian_bits, gaussian_of};
 pub use measurements::Measurements;
 pub use medium::{
     CC2420_OUTPUT, Channel, Check, FRAGMENT_OVERHEAD, Field, Frame, Kind, Loss, Radio, ReceivedCopy, Stored,
     TWO_AA_CELLS, Transceiver, digest,
 };
 pub use note::{Note, Stage};
-pub use protocols::{BitNode, BitStar, Centre, Feedback, Lead, Sensor, Star, StarNode, Walk, WalkNode, Walker};
+pub use protocols::{BitNode, BitStar, CentreNode, SensingNode, SlotEstimate, StoredBitNode, Walk, WalkNode};
 pub use simulator::{
-    Account, Acknowledgement, Batching, Context, Detail, Entry, EstimateError, Fault, FaultKind, Faults, Ledger, Log,
-    Protocol, Reception, Setup, Simulator, Summary, Ticket, Totals, Transmission,
+    Access, Account, Acknowledgement, Batching, CarrierSense, Context, Detail, Entry, EstimateError, Fault, FaultKind,
+    Faults, Ledger, Log, Protocol, Reception, Setup, Simulator, Storable, Summary, Ticket, Totals, Transmission,
 };
 pub use units::{Bits, Instant, Joules, Seconds, SensorId, Watts};

@@ -2,11 +2,9 @@
 
 use crate::error::Error;
 use fewbits_numerics::error::refuse;
+use fewbits_protocol::SLOT_BITS;
 use std::fmt;
 use std::sync::Arc;
-
-/// Slots that the header of a frame can number.
-pub(crate) const MAX_SLOTS: u32 = (1 << 29) - 1;
 
 /// Measurements of all sensors in all slots: a table or a function. Any of them may be missing.
 ///
@@ -66,8 +64,8 @@ impl<M> Measurements<M> {
         {
             return refuse("measurements", slot.len(), format!("{sensors} in every slot, one per sensor"));
         }
-        if self.slots() > MAX_SLOTS {
-            return refuse("measurements", self.slots(), "fewer than 2^29 slots");
+        if self.slots() >= 1 << (SLOT_BITS - 1) {
+            return refuse("measurements", self.slots(), "fewer than 2^23 slots");
         }
         Ok(())
     }

@@ -78,12 +78,12 @@ pub enum Action {
         /// The slot, counted from 1.
         slot: u64,
     },
-    /// Update with these observations, one per sensor: see [`update_or_drop`](crate::update_or_drop).
+    /// Update with these observations, one item per sensor: see [`update_or_drop`](crate::update_or_drop).
     Update {
         /// The slot.
         slot: u64,
-        /// What was observed.
-        observed: Vec<Observation<BitString>>,
+        /// What was observed; `None` of a sensor that answered other feedback than it was sent.
+        observed: Vec<Option<Observation<BitString>>>,
     },
     /// Send the bytes of a frame.
     Send {
@@ -116,7 +116,7 @@ pub enum Action {
 /// on_frame(report of this slot and digest) -> kept, perhaps Send (acknowledgement)
 /// on_timer(deadline) -> Update
 /// ```
-/// A report of another slot is late; one of another digest rests on something else than was told: it is taken as lost. A second one is a
+/// A report of another slot is late; one of another digest rests on something else than was told, and is no observation. A second one is a
 /// duplicate. Slots that the driver slept through are passed over: their sensors were not asked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Centre {
@@ -129,6 +129,8 @@ pub struct Centre {
     digests: Vec<u32>,
     #[serde(with = "crate::centre::stored")]
     observed: Vec<Observation<BitString>>,
+    /// Sensors whose answer rests on something else than they were told in the slot.
+    unusable: Vec<bool>,
     /// The slot that `observed` is of, where the update of it is done and can be echoed.
     echoed: Option<u64>,
     /// Somebody asked for the whole state.
@@ -147,6 +149,7 @@ impl Centre {
             open: false,
             digests: vec![0; sensors],
             observed: vec![Observation::Nothing; sensors],
+            unusable: vec![false; sensors],
             echoed: Some(0),
             asked: false,
             heard: vec![None; sensors],
@@ -256,7 +259,7 @@ impl Centre {
             }
             let lengths: Vec<_> = members.iter().map(|member| member.report).collect();
             let connected = self.echoed.is_some_and(|of| of.checked_add(1) == Some(self.slot)) && !self.asked;
-            let told = match echo(&self.observed, &lengths) {
+            let told = match echo(&self.usable(), &lengths) {
                 Ok(echo) if connected => (Kind::Echo, echo),
                 _ => (Kind::Snapshot, state.clone()),
             };
@@ -274,6 +277,7 @@ impl Centre {
             actions.push(Action::Send { to, frame });
         }
         self.observed.fill(Observation::Nothing);
+        self.unusable.fill(false);
         self.echoed = None;
         self.open = true;
     }
@@ -285,8 +289,14 @@ impl Centre {
         self.echoed = Some(self.slot);
         actions.push(Action::Update {
             slot: self.slot,
-            observed: self.observed.clone(),
+            observed: self.usable(),
         });
+    }
+
+    fn usable(&self) -> Vec<Option<Observation<BitString>>> {
+        let all = self.observed.iter().zip(&self.unusable);
+        all.map(|(observed, unusable)| (!unusable).then(|| observed.clone()))
+            .collect()
     }
 
     /// Bytes have arrived from a sensor, which the link has made sure of.
@@ -330,7 +340,7 @@ impl Centre {
             Kind::Report if slot != Slot::of_count(self.slot) || !self.open => return note(Note::Late { slot }),
             Kind::Report if *observed != Observation::Nothing => note(Note::Duplicate { slot }),
             Kind::Report if frame.digest != self.digests[sensor] => {
-                *observed = Observation::Lost;
+                (*observed, self.unusable[sensor]) = (Observation::Lost, true);
                 note(Note::Disagreement { slot });
             }
             Kind::Report if !member.report.allows(frame.payload.bits()) => {

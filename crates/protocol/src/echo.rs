@@ -26,17 +26,18 @@ impl ReportLength {
     }
 }
 
-/// The echo of a slot: for each sensor `0` for nothing, `10` for lost, `11` and the report.
+/// The echo of a slot: for each sensor `0` for nothing, `100` for lost, `101` for no observation, `11` and the report.
 ///
 /// # Errors
 /// If a report has more than 65,535 bits.
-pub fn echo(observed: &[Observation<BitString>], lengths: &[ReportLength]) -> Result<BitString, CodecError> {
+pub fn echo(observed: &[Option<Observation<BitString>>], lengths: &[ReportLength]) -> Result<BitString, CodecError> {
     let mut writer = BitWriter::new();
     for (observation, length) in observed.iter().zip(lengths) {
         match observation {
-            Observation::Nothing => writer.write(0, 1)?,
-            Observation::Lost => writer.write(0b10, 2)?,
-            Observation::Received(report) => {
+            Some(Observation::Nothing) => writer.write(0, 1)?,
+            Some(Observation::Lost) => writer.write(0b100, 3)?,
+            None => writer.write(0b101, 3)?,
+            Some(Observation::Received(report)) => {
                 writer.write(0b11, 2)?;
                 if *length == ReportLength::Varying {
                     writer.write(report.bits() as u64, LENGTH_BITS)?;
@@ -48,24 +49,27 @@ pub fn echo(observed: &[Observation<BitString>], lengths: &[ReportLength]) -> Re
     Ok(writer.finish())
 }
 
-/// Reads what [`echo`] wrote: one observation per length. Total.
+/// Reads what [`echo`] wrote: one item per length. Total.
 ///
 /// # Errors
 /// If bits are missing or left over.
-pub fn reports_of(echo: &BitString, lengths: &[ReportLength]) -> Result<Vec<Observation<BitString>>, CodecError> {
+pub fn reports_of(
+    echo: &BitString,
+    lengths: &[ReportLength],
+) -> Result<Vec<Option<Observation<BitString>>>, CodecError> {
     let mut reader = BitReader::new(echo);
     let mut observed = Vec::with_capacity(lengths.len());
     for length in lengths {
         observed.push(if !reader.read_bit()? {
-            Observation::Nothing
+            Some(Observation::Nothing)
         } else if !reader.read_bit()? {
-            Observation::Lost
+            (!reader.read_bit()?).then_some(Observation::Lost)
         } else {
             let bits = match length {
                 ReportLength::Fixed(bits) => *bits as usize,
                 ReportLength::Varying => reader.read(LENGTH_BITS)? as usize,
             };
-            Observation::Received(reader.read_message(bits)?)
+            Some(Observation::Received(reader.read_message(bits)?))
         });
     }
     reader.finish()?;

@@ -6,6 +6,8 @@
 //! | [`Sensor`] | a sensor is written: for a simulator, a process or a microcontroller |
 //! | `Centre` (feature `std`) | a fusion centre is written |
 //! | `Receiver` (feature `std`) | an estimator is to run under a `Centre`: feedback, reports and state are bits |
+//! | `Estimator`, `OverBits` (feature `std`) | the same for an estimator in types |
+//! | `Leader`, `Bearer` (feature `std`) | a belief is to travel from leader to leader |
 //!
 //! The central choice: **a machine takes events and returns what to do; it does nothing itself.** Bytes that came, timers that fired and samples
 //! that were taken go in with the time. Frames to send, timers to set and notes come out. So the same code runs in the simulator of
@@ -41,7 +43,11 @@ mod centre;
 #[cfg(feature = "std")]
 mod echo;
 mod frame;
+#[cfg(feature = "std")]
+mod handover;
 mod note;
+#[cfg(feature = "std")]
+mod over_bits;
 mod payload;
 #[cfg(feature = "std")]
 mod receiver;
@@ -53,9 +59,13 @@ pub use centre::{Action, Centre, CentreSettings, CentreTimer, Member, Recipient,
 #[cfg(feature = "std")]
 pub use echo::{ReportLength, echo, reports_of};
 pub use frame::{CHECK_BYTES, Check, DESTINATION_BYTES, DecodeError, Frame, HEADER_BYTES, Kind, VERSION, digest};
+#[cfg(feature = "std")]
+pub use handover::{Bearer, Errand, Lead, Leader};
 pub use note::Note;
+#[cfg(feature = "std")]
+pub use over_bits::{Estimator, OverBits, moments};
 pub use payload::Payload;
 #[cfg(feature = "std")]
-pub use receiver::{BoxError, Outcome, Receiver, update_asked, update_or_drop};
+pub use receiver::{BoxError, Outcome, Receiver, SensorHealth, update_asked, update_or_drop};
 pub use sensor::{Feedback, Reaction, Sensor, SensorSettings, SensorTimer, Task};
 pub use slot::{SLOT_BITS, Schedule, Slot};

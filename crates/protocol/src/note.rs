@@ -50,6 +50,11 @@ pub enum Note {
         /// The slot.
         slot: Slot,
     },
+    /// A handover was given up: whoever sent it leads on.
+    Retained {
+        /// The slot in which its receiver was to lead.
+        slot: Slot,
+    },
     /// A sensor was silent for a while and says that it works.
     Heartbeat {
         /// The slot.
@@ -82,6 +87,7 @@ impl fmt::Display for Note {
             Self::Disagreement { slot } => write!(f, "disagreement, slot {}", slot.number()),
             Self::Resynchronised { slot } => write!(f, "resynchronised, slot {}", slot.number()),
             Self::Unacknowledged { slot } => write!(f, "report not acknowledged, slot {}", slot.number()),
+            Self::Retained { slot } => write!(f, "handover given up, slot {}", slot.number()),
             Self::Heartbeat { slot } => write!(f, "heartbeat, slot {}", slot.number()),
             Self::Misuse => f.write_str("input that was not asked for"),
         }

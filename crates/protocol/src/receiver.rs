@@ -1,6 +1,7 @@
 //! An estimator as the centre's machine needs it: bits in, bits out.
 
 use fewbits_core::{BitString, Observation};
+use serde::{Deserialize, Serialize};
 
 /// Any error of an estimator.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
@@ -37,6 +38,11 @@ pub trait Receiver {
     /// The estimate: mean and standard deviation of each coordinate.
     fn estimate(&self) -> Vec<(f64, f64)>;
 
+    /// How each sensor is judged, by their numbers. Empty for an estimator that does not judge them.
+    fn health(&self) -> Vec<SensorHealth> {
+        Vec::new()
+    }
+
     /// All that the estimator knows, exactly.
     ///
     /// # Errors
@@ -48,6 +54,51 @@ pub trait Receiver {
     /// # Errors
     /// If the bits are no state of this estimator.
     fn restore(&mut self, state: &BitString) -> Result<(), BoxError>;
+}
+
+/// How an estimator judges one sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SensorHealth {
+    /// Probability that it works.
+    pub working: f64,
+    /// It is taken for dead.
+    pub dead: bool,
+    /// Its reports are not used at present, since they do not fit the model.
+    pub excluded: bool,
+}
+
+impl<R: Receiver + ?Sized> Receiver for Box<R> {
+    fn sensors(&self) -> usize {
+        (**self).sensors()
+    }
+
+    fn predict(&mut self, slot: u64) -> Result<(), BoxError> {
+        (**self).predict(slot)
+    }
+
+    fn feedback(&self, sensor: usize) -> Result<BitString, BoxError> {
+        (**self).feedback(sensor)
+    }
+
+    fn update(&mut self, observed: &[(usize, Observation<BitString>)]) -> Result<(), BoxError> {
+        (**self).update(observed)
+    }
+
+    fn estimate(&self) -> Vec<(f64, f64)> {
+        (**self).estimate()
+    }
+
+    fn health(&self) -> Vec<SensorHealth> {
+        (**self).health()
+    }
+
+    fn state(&self) -> Result<BitString, BoxError> {
+        (**self).state()
+    }
+
+    fn restore(&mut self, state: &BitString) -> Result<(), BoxError> {
+        (**self).restore(state)
+    }
 }
 
 /// How an update went.
@@ -65,11 +116,14 @@ pub enum Outcome {
 ///
 /// A sensor that is silent where its scheme had to speak contradicts a link that is thought to lose nothing. It is left out rather than
 /// taken as lost, since [`Observation::Lost`] says that it spoke.
-pub fn update_or_drop<R: Receiver + ?Sized>(receiver: &mut R, observed: &[Observation<BitString>]) -> Outcome {
-    update_asked(receiver, observed.iter().cloned().enumerate().collect())
+///
+/// `observed` has one item per sensor; `None` is no observation.
+pub fn update_or_drop<R: Receiver + ?Sized>(receiver: &mut R, observed: &[Option<Observation<BitString>>]) -> Outcome {
+    let asked = observed.iter().cloned().enumerate();
+    update_asked(receiver, asked.filter_map(|(sensor, o)| Some((sensor, o?))).collect())
 }
 
-/// The same where only some sensors were asked: what was observed of these, in rising order of their numbers.
+/// The same with what was observed of the sensors that were asked, in rising order of their numbers.
 pub fn update_asked<R: Receiver + ?Sized>(
     receiver: &mut R,
     mut asked: Vec<(usize, Observation<BitString>)>,

@@ -30,6 +30,9 @@ pub struct SensorSettings {
     pub check: Check,
     /// When slots begin. [`Feedback::Clock`] needs it; with it, other sensors refuse frames of another slot than the present one.
     pub schedule: Option<Schedule>,
+    /// Nanoseconds from the beginning of a slot until a sensor that reports by the clock measures. A clock may be ahead by as much, and sensors
+    /// with offsets of their own do not send at once.
+    pub offset: u64,
     /// After so many silent slots in a row a heartbeat is sent; 0: never.
     pub heartbeat_after: u32,
     /// How often a report is sent again that was not acknowledged; 0: no acknowledgement is awaited.
@@ -39,12 +42,13 @@ pub struct SensorSettings {
 }
 
 impl SensorSettings {
-    /// Whole check, no schedule, no heartbeat, no repeats.
+    /// Whole check, no schedule, no offset, no heartbeat, no repeats.
     pub fn new(feedback: Feedback) -> Self {
         Self {
             feedback,
             check: Check::Whole,
             schedule: None,
+            offset: 0,
             heartbeat_after: 0,
             repeats: 0,
             patience: 0,
@@ -356,8 +360,9 @@ impl Sensor {
         if now < self.begins_at {
             return Reaction::NOTHING;
         }
-        let count = schedule.count(now);
-        self.begins_at = schedule.start(count.saturating_add(1));
+        let offset = self.settings.offset;
+        let count = schedule.count(now.saturating_sub(offset));
+        self.begins_at = schedule.start(count.saturating_add(1)).saturating_add(offset);
         let timer = Some((self.begins_at, SensorTimer::SlotBegins));
         let slot = Slot::of_count(count);
         // A clock that was set back meets a slot again: it is not answered twice.
@@ -379,7 +384,10 @@ impl Sensor {
             return Reaction::NOTHING;
         };
         schedule.synchronise(slot, now);
-        self.begins_at = schedule.start(schedule.count(now).saturating_add(1));
+        // The slot that is announced is reported in, too, unless that was done before the clock was set back.
+        let offset = self.settings.offset;
+        let next = schedule.count(now.saturating_sub(offset)).saturating_add(1);
+        self.begins_at = schedule.start(next).saturating_add(offset);
         Reaction {
             timer: Some((self.begins_at, SensorTimer::SlotBegins)),
             ..Reaction::NOTHING

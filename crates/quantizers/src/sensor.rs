@@ -5,9 +5,9 @@ use crate::labelling::{Labelling, Symbol};
 use crate::quantizer::Quantizer;
 use crate::refuse;
 use fewbits_core::factor::{Constant, Scalar};
-use fewbits_core::nalgebra::SVector;
+use fewbits_core::nalgebra::{SMatrix, SVector};
 use fewbits_core::rand::Rng;
-use fewbits_core::{Link, Observation, Scheme};
+use fewbits_core::{Link, MeasurementNoise, Observation, Scheme};
 use fewbits_numerics::error::positive;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
@@ -74,6 +74,12 @@ impl QuantizingSensor {
     /// Variance of the noise in the samples.
     pub fn noise_variance(&self) -> f64 {
         self.noise_variance
+    }
+}
+
+impl MeasurementNoise<1> for QuantizingSensor {
+    fn noise_covariance_at(&self, _: &SVector<f64, 1>) -> SMatrix<f64, 1, 1> {
+        [[self.noise_variance]].into()
     }
 }
 

@@ -59,6 +59,31 @@ impl Graph {
         Ok(Self { starts, neighbours })
     }
 
+    /// Joins the given pairs of `nodes` nodes, in both directions. A pair may be given more than once.
+    ///
+    /// # Errors
+    /// If a node of a pair does not exist, or is joined to itself.
+    pub fn of_edges(nodes: usize, edges: impl IntoIterator<Item = (u32, u32)>) -> Result<Self, Error> {
+        let mut lists = vec![Vec::new(); nodes];
+        for (a, b) in edges {
+            if a == b {
+                return Err(ArgumentError::new("edges", format!("{a} to {b}"), "two different nodes").into());
+            }
+            for (from, to) in [(a, b), (b, a)] {
+                let node = from as usize;
+                lists.get_mut(node).ok_or(Error::NoSuchNode { node, nodes })?.push(to);
+            }
+        }
+        let (mut starts, mut neighbours) = (vec![0], Vec::new());
+        for mut list in lists {
+            list.sort_unstable();
+            list.dedup();
+            neighbours.append(&mut list);
+            starts.push(neighbours.len());
+        }
+        Ok(Self { starts, neighbours })
+    }
+
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.starts.len() - 1

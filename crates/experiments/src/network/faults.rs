@@ -2,11 +2,11 @@
 
 use super::worlds::{self, RADIUS};
 use crate::prelude::*;
-use fewbits_core::{Belief, Dynamics, Gaussian, Link, Sensing};
-use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
+use fewbits_core::{Belief, Dynamics, Gaussian, Link, SchemeNode, Sensing, SensorNode};
+use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant};
 use fewbits_models::{Ar1, LinearSensor};
-use fewbits_network::estimators::ParallelDymboEstimator;
-use fewbits_network::{Channel, Fault, FaultKind, Loss, Seconds, SensorId, Setup, Star};
+use fewbits_network::{BitStar, Channel, Fault, FaultKind, Loss, Seconds, SensorId, Setup};
+use fewbits_protocol::{Feedback, OverBits, ReportLength};
 use nalgebra::Vector1;
 
 const SENSORS: usize = 4;
@@ -109,13 +109,13 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
     };
     let filter = ParallelFilter::new(ScalarPlant::new(a, q, 1.0)?, SENSORS, CountFusion::Exact)?;
     let filter = filter.with_link(Link::lossy(lost.min(0.99))?);
-    let estimator = ParallelDymboEstimator::new(filter, start)?;
+    let estimator = ParallelEstimator::new(filter, start)?;
+    let feedback = if point.echoed { Feedback::Echoed } else { Feedback::Told };
+    let scheme = estimator.scheme();
+    let node = move |_| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(scheme)) };
+    let centre = move || Ok(OverBits::new(estimator.clone()));
     let own = stream.named("filter");
-    let star = if point.echoed {
-        Star::echoed(estimator, measurements, clock, own)
-    } else {
-        Star::told(estimator, measurements, clock, own)
-    };
+    let star = BitStar::new(centre, feedback, ReportLength::Fixed(1), node, measurements, clock, own);
     let setup = Setup {
         channel,
         faults,
@@ -130,8 +130,8 @@ fn run(point: &Point, stream: Stream, slots: usize) -> Result<[f64; 4], Error> {
         answers = network.nodes()[restarted.index()].answered() == Some(middle + recovery);
     }
     network.run_until(clock.end(slots as u32))?;
-    let estimates = network.nodes()[0].estimates();
-    let squared = truths.iter().zip(estimates).skip(WARM_UP);
+    let estimates = network.nodes()[0].means();
+    let squared = truths.iter().zip(&estimates).skip(WARM_UP);
     let gap = |(truth, estimate): (&f64, &Vec<f64>)| (truth - estimate.first().copied().unwrap_or(0.0)).powi(2);
     let count = slots.saturating_sub(WARM_UP).max(1) as f64;
     let noted = network.ledger().faults().disagreements as f64;

@@ -3,6 +3,7 @@
 mod faults;
 mod frontier;
 mod lifetime;
+mod receivers;
 mod scale;
 mod schemes;
 mod worlds;

@@ -9,6 +9,15 @@ pub(super) enum Talk {
     Echoed,
 }
 
+impl Talk {
+    pub(super) fn feedback(self) -> fewbits_protocol::Feedback {
+        match self {
+            Self::Told => fewbits_protocol::Feedback::Told,
+            Self::Echoed => fewbits_protocol::Feedback::Echoed,
+        }
+    }
+}
+
 /// A scheme with its setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Scheme {

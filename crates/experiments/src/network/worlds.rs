@@ -2,26 +2,28 @@
 //!
 //! A scheme that is added is in all figures: give it a [`Scheme`], its label, and an arm of [`World::run`].
 
+use super::receivers::{Followers, LookUp, Patterns, SendAll, mixed};
 use super::schemes::{Scheme, Talk};
 use crate::prelude::*;
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
+use fewbits_cfwmd::centre::CensoringEstimator;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::threshold::Budget;
 use fewbits_core::factor::Value;
-use fewbits_core::{Belief, Gaussian, LinearDynamics, Link, NumberFormat, Observed, Sensing};
+use fewbits_core::{Belief, Gaussian, LinearDynamics, Link, NumberFormat, Observed, SchemeNode, Sensing, SensorNode};
 use fewbits_densities::Mixture;
-use fewbits_dymbo::{CountFusion, InnovationWord, MultibitFilter, ParallelFilter, Prediction, ScalarPlant};
-use fewbits_filters::{MomentFilter, kalman};
-use fewbits_handoff::{Coded, HandoffFilter};
+use fewbits_dymbo::{
+    CountFusion, InnovationWord, MultibitFilter, ParallelEstimator, ParallelFilter, Prediction, ScalarEstimator,
+    ScalarFilter, ScalarPlant,
+};
+use fewbits_filters::kalman;
+use fewbits_handoff::{Coded, HandoffFilter, Leaders};
 use fewbits_mixture_codec::Reduction;
 use fewbits_mixture_codec::wire::WireFormat;
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, PLANE_POSITION, constant_velocity_2d};
-use fewbits_network::estimators::{
-    CensoringEstimator, DymboEstimator, Followers, Leaders, LookUp, ParallelDymboEstimator, Patterns, Reporting,
-    SendAll,
-};
-use fewbits_network::{Clock, Field, Ledger, Radio, Replicable, Seconds, SensorId, Setup, Star, Walk};
+use fewbits_network::{BitStar, Clock, Field, Ledger, Radio, Seconds, SensorId, Setup, Walk};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
+use fewbits_protocol::{BoxError, Estimator, Feedback, OverBits, Receiver, ReportLength};
 use fewbits_quantizer_design::{Criterion, Newton, Scene, System, design};
 use fewbits_quantizers::{Labelling, Quantizer, QuantizingSensor, lloyd_max};
 use nalgebra::{Matrix4, SVector, Vector1, Vector4};
@@ -98,6 +100,53 @@ pub(super) struct World<const D: usize, G> {
 type Truths<const D: usize> = Vec<SVector<f64, D>>;
 type Measurements = Vec<Vec<Vector1<f64>>>;
 
+/// Both halves of a scheme over bits, and how its sensors learn what they must know.
+struct Halves<R, C, N> {
+    centre: C,
+    feedback: Feedback,
+    report: ReportLength,
+    node: N,
+    receiver: std::marker::PhantomData<R>,
+}
+
+impl<R, C, N> Halves<R, C, N>
+where
+    R: Receiver,
+    C: Fn() -> Result<R, BoxError> + Send + Sync + 'static,
+    N: Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static,
+{
+    fn new(centre: C, feedback: Feedback, report: ReportLength, node: N) -> Self {
+        Self {
+            centre,
+            feedback,
+            report,
+            node,
+            receiver: std::marker::PhantomData,
+        }
+    }
+}
+
+/// The receiver of an estimator in types, before its first slot.
+fn over_bits<E>(e: E) -> impl Fn() -> Result<OverBits<E>, BoxError> + Send + Sync + 'static
+where
+    E: Estimator + Clone + Send + Sync + 'static,
+{
+    move || Ok(OverBits::new(e.clone()))
+}
+
+/// The sensors' half of a scheme without memory.
+fn each<C>(scheme: C) -> impl Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static
+where
+    C: fewbits_core::Scheme<1> + Clone + Send + Sync + 'static,
+    C::State: 'static,
+{
+    move |_| Box::new(SchemeNode::new(scheme.clone()))
+}
+
+fn bits(bits: usize) -> ReportLength {
+    ReportLength::Fixed(bits as u32)
+}
+
 /// The scalar world, in its stationary state.
 pub(super) fn scalar() -> Result<World<1, Ar1>, Error> {
     let dynamics = Ar1::new(COEFFICIENT, PROCESS)?;
@@ -129,17 +178,17 @@ pub(super) fn plane() -> Result<World<4, LinearGaussian<4, 2>>, Error> {
     })
 }
 
-/// The question of an innovation word under unit noise.
-fn asked(expected: &Gaussian<1>) -> Prediction {
+/// What a word of the innovation is told.
+fn asked(measured: &Gaussian<1>) -> Prediction {
     Prediction {
-        mean: expected.mean()[0],
-        deviation: (expected.covariance()[0] + 1.0).sqrt(),
+        mean: measured.mean()[0],
+        deviation: measured.covariance()[0].sqrt(),
     }
 }
 
 fn nothing(_: &Gaussian<1>) {}
 
-impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
+impl<const D: usize, G: LinearDynamics<D> + Clone + Send + Sync + 'static> World<D, G> {
     /// The least squared error of all measurements, by the Kalman filter that has them all: before and after those of a slot.
     pub(super) fn everything(&self) -> Result<[f64; 2], Error> {
         let of = |b: &Gaussian<D>| self.counted.iter().map(|i| b.covariance()[(*i, *i)]).sum();
@@ -177,63 +226,57 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
         pairs.map(error).sum::<f64>() / count
     }
 
-    fn over_star<E>(&self, e: E, talk: Talk, stream: Stream, slots: usize) -> Result<Bill, Error>
+    fn over_star<R, C, N>(&self, halves: Halves<R, C, N>, stream: Stream, slots: usize) -> Result<Bill, Error>
     where
-        E: Replicable<Measurement = Vector1<f64>>,
+        R: Receiver,
+        C: Fn() -> Result<R, BoxError> + Send + Sync + 'static,
+        N: Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static,
     {
-        self.over_star_of(&self.sensors, e, talk, stream, slots)
+        self.over_star_of(&self.sensors, halves, stream, slots)
     }
 
     /// The same with measurements of other sensors.
-    fn over_star_of<E>(
+    fn over_star_of<R, C, N>(
         &self,
         sensors: &[impl Sensing<D, 1>],
-        e: E,
-        talk: Talk,
+        halves: Halves<R, C, N>,
         stream: Stream,
         slots: usize,
     ) -> Result<Bill, Error>
     where
-        E: Replicable<Measurement = Vector1<f64>>,
+        R: Receiver,
+        C: Fn() -> Result<R, BoxError> + Send + Sync + 'static,
+        N: Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static,
     {
         let (truths, mut measurements) = self.draw(sensors, stream, slots);
-        measurements.iter_mut().for_each(|slot| slot.truncate(e.sensors()));
-        let clock = clock()?;
-        let own = stream.named("filter");
-        let star = match talk {
-            Talk::Told => Star::told(e, measurements, clock, own),
-            Talk::Echoed => Star::echoed(e, measurements, clock, own),
-        };
+        let reporting = (halves.centre)().map_err(Error::Failed)?.sensors();
+        measurements.iter_mut().for_each(|slot| slot.truncate(reporting));
+        let (clock, own) = (clock()?, stream.named("filter"));
+        let Halves {
+            centre,
+            feedback,
+            report,
+            node,
+            ..
+        } = halves;
+        let star = BitStar::new(centre, feedback, report, node, measurements, clock, own);
         let mut network = star.and_then(|star| star.simulate(RADIUS, setup(stream)?))?;
         network.run_until(clock.end(slots as u32))?;
-        let squared = self.squared(&truths, network.nodes()[0].estimates());
+        let squared = self.squared(&truths, &network.nodes()[0].means());
         Ok(Bill::of(network.ledger(), 1, squared, slots))
-    }
-
-    fn words(&self, bits: usize) -> Result<impl Replicable<Measurement = Vector1<f64>> + use<D, G>, Error> {
-        Ok(Reporting {
-            dynamics: self.dynamics.clone(),
-            sensors: self.sensors.clone(),
-            scheme: InnovationWord::new(1.0, bits)?,
-            link: Link::PERFECT,
-            filter: MomentFilter,
-            broadcast: asked as fn(&Gaussian<1>) -> Prediction,
-            start: self.start,
-        })
     }
 
     fn censors(
         &self,
         threshold: f64,
-        format: NumberFormat,
         shared: bool,
         slots: usize,
     ) -> Result<CensoringEstimator<G, LinearSensor<D, 1>, D, 1>, Error> {
-        let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT)?;
+        let network = Network::new(self.sensors.clone(), threshold, Link::PERFECT)?.with_format(self.fine);
         if shared {
-            return Ok(CensoringEstimator::told(network, format, self.dynamics.clone(), self.start));
+            return Ok(CensoringEstimator::told(network, self.dynamics.clone(), self.start));
         }
-        Ok(CensoringEstimator::own(network, format, self.dynamics.clone(), self.start, slots)?)
+        Ok(CensoringEstimator::own(network, self.dynamics.clone(), self.start, slots)?)
     }
 
     fn handed(&self, components: usize, resolution: f64, stream: Stream, slots: usize) -> Result<Bill, Error> {
@@ -250,7 +293,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
             format,
             resolution: 0,
         };
-        let leaders: Vec<_> = (0..slots).map(|k| SensorId((k % SENSORS) as u32)).collect();
+        let leaders: Vec<_> = (0..slots).map(|k| (k % SENSORS) as u32).collect();
         let walker = Leaders {
             filter: HandoffFilter::new(300, reducer)?,
             dynamics: self.dynamics.clone(),
@@ -259,7 +302,7 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
             leaders,
         };
         let clock = clock()?;
-        let walk = Walk::new(walker, clock, slots as u32, stream.named("filter"));
+        let walk = Walk::new(walker, clock, slots as u32, stream.named("filter"))?;
         let field = Field::ring(SENSORS, RADIUS)?;
         let run = || -> Result<_, fewbits_network::Error> {
             let mut network = walk.simulate(field, SensorId(0), setup(stream)?)?;
@@ -279,22 +322,25 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
     /// A scheme that both worlds have; none if only the scalar one does.
     fn shared(&self, scheme: Scheme, stream: Stream, slots: usize) -> Result<Option<Bill>, Error> {
         Ok(Some(match scheme {
-            Scheme::Words { bits, talk } => self.over_star(self.words(bits)?, talk, stream, slots)?,
+            Scheme::Words { bits: m, talk } => {
+                let scheme = InnovationWord::new(1.0, m)?;
+                let centre = mixed(self.dynamics.clone(), self.start, self.sensors.clone(), scheme, asked);
+                self.over_star(Halves::new(centre, talk.feedback(), bits(m), each(scheme)), stream, slots)?
+            }
             Scheme::Censored { messages, shared, talk } => {
                 let threshold = Budget::new(messages, SENSORS).and_then(|b| b.threshold(1))?;
-                self.over_star(self.censors(threshold, self.fine, shared, slots)?, talk, stream, slots)?
+                let censors = self.censors(threshold, shared, slots)?;
+                let nodes = censors.clone();
+                let node = move |i| -> Box<dyn SensorNode<1>> { Box::new(nodes.node(i)) };
+                let length = bits(self.fine.bits() as usize);
+                self.over_star(Halves::new(over_bits(censors), talk.feedback(), length, node), stream, slots)?
             }
             Scheme::AllSend { coarse } => {
-                let all = Reporting {
-                    dynamics: self.dynamics.clone(),
-                    sensors: self.sensors.clone(),
-                    scheme: SendAll::new(1.0, if coarse { self.coarse } else { self.fine })?,
-                    link: Link::PERFECT,
-                    filter: MomentFilter,
-                    broadcast: nothing as fn(&Gaussian<1>),
-                    start: self.start,
-                };
-                self.over_star(all, Talk::Told, stream, slots)?
+                let format = if coarse { self.coarse } else { self.fine };
+                let scheme = SendAll::new(1.0, format)?;
+                let centre = mixed(self.dynamics.clone(), self.start, self.sensors.clone(), scheme.clone(), nothing);
+                let length = bits(format.bits() as usize);
+                self.over_star(Halves::new(centre, Feedback::Clock, length, each(scheme)), stream, slots)?
             }
             Scheme::Handoff { components, resolution } => self.handed(components, resolution, stream, slots)?,
             Scheme::Followed { delta } => {
@@ -305,7 +351,9 @@ impl<const D: usize, G: LinearDynamics<D> + Clone> World<D, G> {
                     config: fewbits_adaptive::Config::new(delta)?,
                     start: self.start,
                 };
-                self.over_star(followers, Talk::Told, stream, slots)?
+                let node = followers.nodes();
+                let centre = over_bits(followers);
+                self.over_star(Halves::new(centre, Feedback::Clock, ReportLength::Varying, node), stream, slots)?
             }
             _ => return Ok(None),
         }))
@@ -322,7 +370,7 @@ impl World<4, LinearGaussian<4, 2>> {
     }
 
     /// Range sensors of unit noise at [`FAR`] on the axes: to first order each has the coordinate that the world's own sensors have.
-    fn ranges(&self, bits: usize, talk: Talk, stream: Stream, slots: usize) -> Result<Bill, Error> {
+    fn ranges(&self, m: usize, talk: Talk, stream: Stream, slots: usize) -> Result<Bill, Error> {
         let noise = RangeNoise::constant(1.0)?;
         let places = [[-FAR, 0.0], [0.0, -FAR], [FAR, 0.0], [0.0, FAR]];
         let sensor = |place: [f64; 2]| {
@@ -331,21 +379,15 @@ impl World<4, LinearGaussian<4, 2>> {
                 .map_err(Error::failed)
         };
         let sensors = places.map(sensor).into_iter().collect::<Result<Vec<_>, _>>()?;
-        let loading = optimal_loading(1 << bits)?;
-        let ranges = Reporting {
-            dynamics: self.dynamics,
-            sensors: sensors.clone(),
-            scheme: QuantizedRange::new(1 << bits, noise)?,
-            link: Link::PERFECT,
-            filter: MomentFilter,
-            // In single precision, as it travels.
-            broadcast: move |expected: &Gaussian<1>| RangeReference {
-                centre: f64::from(expected.mean()[0] as f32),
-                half_width: f64::from((loading * (expected.covariance()[0] + 1.0).sqrt()) as f32),
-            },
-            start: self.start,
+        let loading = optimal_loading(1 << m)?;
+        let scheme = QuantizedRange::new(1 << m, noise)?;
+        // In single precision, as it travels.
+        let asked = move |measured: &Gaussian<1>| RangeReference {
+            centre: f64::from(measured.mean()[0] as f32),
+            half_width: f64::from((loading * measured.covariance()[0].sqrt()) as f32),
         };
-        self.over_star_of(&sensors, ranges, talk, stream, slots)
+        let centre = mixed(self.dynamics, self.start, sensors.clone(), scheme.clone(), asked);
+        self.over_star_of(&sensors, Halves::new(centre, talk.feedback(), bits(m), each(scheme)), stream, slots)
     }
 }
 
@@ -357,26 +399,31 @@ impl World<1, Ar1> {
         let plant = ScalarPlant::new(COEFFICIENT, PROCESS, 1.0)?;
         let (start, deviation) = (self.start, self.start.standard_deviations()[0]);
         let scene = || Scene::gaussian_with_deviations(deviation, &[1.0; SENSORS]).map_err(Error::failed);
-        let table = |system: &System| {
+        let table = |system: &System, levels: usize| {
             let look_up = LookUp::new(system, 10_000)?;
-            self.over_star(look_up, Talk::Told, stream, slots)
+            let schemes = look_up.schemes().to_vec();
+            let node = move |i: usize| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(schemes[i].clone())) };
+            let length = bits(levels.next_power_of_two().trailing_zeros() as usize);
+            self.over_star(Halves::new(over_bits(look_up), Feedback::Clock, length, node), stream, slots)
         };
         match scheme {
             Scheme::SignBits { sensors, talk } => {
-                let filter = ParallelFilter::new(plant, sensors, CountFusion::Exact)?;
-                let counted = ParallelDymboEstimator::new(filter, start)?;
-                self.over_star(counted, talk, stream, slots)
+                let counted = ParallelEstimator::new(ParallelFilter::new(plant, sensors, CountFusion::Exact)?, start)?;
+                let node = each(counted.scheme());
+                self.over_star(Halves::new(over_bits(counted), talk.feedback(), bits(1), node), stream, slots)
             }
-            Scheme::Word { bits, talk } => {
-                let filter = MultibitFilter::new(plant, bits)?;
-                self.over_star(DymboEstimator { filter, start }, talk, stream, slots)
+            Scheme::Word { bits: m, talk } => {
+                let filter = MultibitFilter::new(plant, m)?;
+                let node = each(filter.scheme());
+                let single = over_bits(ScalarEstimator { filter, start });
+                self.over_star(Halves::new(single, talk.feedback(), bits(m), node), stream, slots)
             }
             Scheme::Information { levels } => {
                 let from = System::lloyd_max(scene()?, levels)?;
                 let best = design::joint(&from, Criterion::MutualInformation, &Newton::default());
-                table(&best?.system)
+                table(&best?.system, levels)
             }
-            Scheme::LloydMax { levels } => table(&System::lloyd_max(scene()?, levels)?),
+            Scheme::LloydMax { levels } => table(&System::lloyd_max(scene()?, levels)?, levels),
             Scheme::Patterned => {
                 let edges = [vec![0.0], vec![-1.0, 1.0], vec![0.0], vec![-1.5, 0.0, 1.5]];
                 let sensor = |edges: Vec<f64>| {
@@ -386,24 +433,19 @@ impl World<1, Ar1> {
                 let sensors: Vec<_> = edges.into_iter().map(sensor).collect::<Result<_, _>>()?;
                 let source = Source::gaussian_with_deviation(deviation)?;
                 let table = Bank::new(source, sensors.clone()).and_then(|bank| bank.table(Decoder::Mmse));
-                let patterns = Patterns::new(sensors, table?, deviation * deviation);
-                self.over_star(patterns?, Talk::Told, stream, slots)
+                let patterns = over_bits(Patterns::new(sensors.len(), table?, deviation * deviation)?);
+                let node = move |i: usize| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(sensors[i].clone())) };
+                self.over_star(Halves::new(patterns, Feedback::Clock, bits(1), node), stream, slots)
             }
             Scheme::Filtered { levels } => {
                 let spread = (deviation * deviation + 1.0).sqrt();
                 let design = lloyd_max::gaussian(levels).and_then(|design| design.affine(0.0, spread));
                 let quantizer = Quantizer::from(&design?);
                 let labels = Labelling::gray(levels)?;
-                let reporting = Reporting {
-                    dynamics: self.dynamics,
-                    sensors: self.sensors.clone(),
-                    scheme: QuantizingSensor::with_variance(quantizer, labels, 1.0)?,
-                    link: Link::PERFECT,
-                    filter: MomentFilter,
-                    broadcast: nothing as fn(&Gaussian<1>),
-                    start,
-                };
-                self.over_star(reporting, Talk::Told, stream, slots)
+                let scheme = QuantizingSensor::with_variance(quantizer, labels, 1.0)?;
+                let centre = mixed(self.dynamics, start, self.sensors.clone(), scheme.clone(), nothing);
+                let length = bits(levels.trailing_zeros() as usize);
+                self.over_star(Halves::new(centre, Feedback::Clock, length, each(scheme)), stream, slots)
             }
             other => {
                 Err(fewbits_numerics::ArgumentError::new("scheme", other.family(), "one of the scalar world").into())

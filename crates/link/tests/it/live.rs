@@ -3,6 +3,7 @@
 use crate::world::SENSORS;
 use fewbits_core::{BitString, Observation};
 use fewbits_link::{Counts, LivePage, Step};
+use fewbits_protocol::SensorHealth;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
@@ -34,7 +35,16 @@ fn page_shows_past_and_coming_slots() {
             Observation::Nothing,
             Observation::Lost,
         ];
-        Step::new(slot, observed.to_vec(), vec![(1.5, 0.25)])
+        let mut step = Step::new(slot, observed.to_vec(), vec![(1.5, 0.25)]);
+        let (working, excluded) = (0.25, false);
+        step.health = [false, true, false]
+            .map(|dead| SensorHealth {
+                working,
+                dead,
+                excluded,
+            })
+            .to_vec();
+        step
     };
     page.show(&step(41), Counts::default());
     let html = read_until(&mut ask(&page, "/"), "</html>");
@@ -43,6 +53,7 @@ fn page_shows_past_and_coming_slots() {
     let past = read_until(&mut events, "}\n");
     assert!(past.contains("text/event-stream") && past.contains("\"slot\":41"), "{past}");
     assert!(past.contains("\"observed\":[1,-1,-2]") && past.contains("[1.5,0.25]"), "{past}");
+    assert!(past.contains("{\"working\":0.25,\"dead\":true,\"excluded\":false}"), "{past}");
     page.show(&step(42), Counts::default());
     assert!(read_until(&mut events, "}\n").contains("\"slot\":42"));
 }

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod attacks;
+mod followed;
 #[cfg(feature = "live")]
 mod live;
 mod stops;

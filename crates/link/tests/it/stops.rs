@@ -60,7 +60,7 @@ fn kill(times: u64) {
     // A port that was free a moment ago.
     let address = udp::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let stop = Arc::new(AtomicBool::new(false));
-    let threads = sensors(Reports::Signs, address, &stop);
+    let threads = sensors(Reports::Signs, address, &stop, &Default::default());
     for i in 0..times {
         let mut child = Command::new(std::env::current_exe().unwrap())
             .args(["--exact", "stops::centre_process", "--nocapture"])

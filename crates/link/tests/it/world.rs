@@ -2,13 +2,13 @@
 
 use fewbits_cfwmd::scheme::{CovarianceFeedback, Prediction};
 use fewbits_core::{BitString, Gaussian, Link, NumberFormat, Observation, SchemeNode, SensorNode};
-use fewbits_dymbo::SignBit;
+use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant, SignBit};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, Reporting};
 use fewbits_link::{FusionReceiver, Key, Peer, Step};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
-use fewbits_protocol::{CentreSettings, Feedback, Member, Receiver, ReportLength, Schedule, update_asked};
+use fewbits_protocol::{CentreSettings, Feedback, Member, OverBits, Receiver, ReportLength, Schedule, update_asked};
 use nalgebra::Vector1;
 use std::num::NonZeroU64;
 
@@ -21,9 +21,33 @@ pub enum Reports {
     Signs,
     /// The value if it is far enough from the prediction: CFwMD.
     Censored,
+    /// The sign of the innovation, of four sensors that are fused together: Dymbo with K = 4.
+    Counted,
+    /// The measurement within half a unit, by sensors that know no model: the adaptive codec.
+    Followed,
 }
 
-pub fn receiver(reports: Reports, loss: f64) -> FusionReceiver<1, MomentFilter> {
+impl Reports {
+    pub fn sensors(self) -> u32 {
+        if self == Self::Counted { 4 } else { SENSORS }
+    }
+}
+
+pub fn receiver(reports: Reports, loss: f64) -> Box<dyn Receiver> {
+    match reports {
+        Reports::Signs | Reports::Censored => Box::new(mixed(reports, loss)),
+        Reports::Counted => {
+            let plant = ScalarPlant::new(0.95, 0.975, 1.0).unwrap();
+            let filter = ParallelFilter::new(plant, 4, CountFusion::Exact).unwrap();
+            let filter = filter.with_link(Link::lossy(loss).unwrap());
+            let prior = Gaussian::scalar(0.0, 10.0).unwrap();
+            Box::new(OverBits::new(ParallelEstimator::new(filter, prior).unwrap()))
+        }
+        Reports::Followed => Box::new(OverBits::new(crate::followed::Average)),
+    }
+}
+
+fn mixed(reports: Reports, loss: f64) -> FusionReceiver<1, MomentFilter> {
     let model = ContinuousLinear::ornstein_uhlenbeck(0.0, 20.0, 10.0).unwrap();
     let sensing = LinearSensor::direct(1.0).unwrap();
     let prior = Gaussian::scalar(0.0, 10.0).unwrap();
@@ -35,7 +59,7 @@ pub fn receiver(reports: Reports, loss: f64) -> FusionReceiver<1, MomentFilter> 
                 let ask = |_: &Gaussian<1>, m: &Gaussian<1>| m.mean()[0];
                 centre.join(number, Reporting::new(sensing, SignBit::new(1.0).unwrap(), link, ask))
             }
-            Reports::Censored => {
+            _ => {
                 let ask = |state: &Gaussian<1>, _: &Gaussian<1>| Prediction(*state);
                 centre.join(number, Reporting::new(sensing, censored(), link, ask))
             }
@@ -51,7 +75,8 @@ fn censored() -> CovarianceFeedback<LinearSensor<1, 1>, 1, 1> {
 
 pub fn node(reports: Reports) -> Box<dyn SensorNode<1> + Send> {
     match reports {
-        Reports::Signs => Box::new(SchemeNode::new(SignBit::new(1.0).unwrap())),
+        Reports::Signs | Reports::Counted => Box::new(SchemeNode::new(SignBit::new(1.0).unwrap())),
+        Reports::Followed => Box::new(crate::followed::node()),
         Reports::Censored => Box::new(SchemeNode::new(censored())),
     }
 }
@@ -68,8 +93,8 @@ pub fn measurement(sensor: u32, slot: u32) -> Vector1<f64> {
 
 pub fn settings(reports: Reports, period: u64, sensors: usize) -> CentreSettings {
     let report = match reports {
-        Reports::Signs => ReportLength::Fixed(1),
-        Reports::Censored => ReportLength::Varying,
+        Reports::Signs | Reports::Counted => ReportLength::Fixed(1),
+        Reports::Censored | Reports::Followed => ReportLength::Varying,
     };
     let member = Member {
         feedback: Feedback::Told,

@@ -2,17 +2,29 @@
 
 use crate::error::Error;
 use crate::units::SensorId;
+use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, positive};
 use fewbits_topology::{Deployment, Graph, Hops};
 use nalgebra::Vector2;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Nodes in the plane with radios of one range.
+/// Nodes that a list of links may name.
+const MOST_NODES: u32 = 1 << 24;
+
+/// Nodes, and who is in range of whom: by positions in the plane and radios of one range, or by a list of links.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    positions: Vec<Vector2<f64>>,
+    nodes: Nodes,
     graph: Graph,
     range: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Nodes {
+    Positions(Vec<Vector2<f64>>),
+    /// Lengths of the links, from the smaller number to the larger.
+    Links(BTreeMap<(u32, u32), f64>),
 }
 
 impl Field {
@@ -23,8 +35,42 @@ impl Field {
     pub fn new(deployment: &Deployment, range: f64) -> Result<Self, Error> {
         Ok(Self {
             graph: Graph::within(deployment.positions(), range)?,
-            positions: deployment.positions().to_vec(),
+            nodes: Nodes::Positions(deployment.positions().to_vec()),
             range,
+        })
+    }
+
+    /// The nodes of a list of links as CSV: `from,to,metres` in each line. Node numbers count from 0; each link holds in both directions. Metres
+    /// may be left out and are 1 then. A first line that does not begin with a digit is a header; empty lines are skipped.
+    ///
+    /// # Errors
+    /// If a line is no link, joins a node to itself or stands twice, or there is none.
+    pub fn from_csv(links: &str) -> Result<Self, Error> {
+        let mut lengths = BTreeMap::new();
+        for (number, line) in (1..).zip(links.lines().map(str::trim)) {
+            if line.is_empty() || number == 1 && !line.starts_with(|c: char| c.is_ascii_digit()) {
+                continue;
+            }
+            let refused = |expected| ArgumentError::new("links", format!("`{line}` in line {number}"), expected);
+            let mut cells = line.split(',').map(str::trim);
+            let mut node = || cells.next().and_then(|cell| cell.parse::<u32>().ok());
+            let ends = node().zip(node()).filter(|(a, b)| a.max(b) < &MOST_NODES);
+            let (a, b) = ends.ok_or_else(|| refused("two nodes below 2^24, and perhaps metres"))?;
+            let metres = cells.next().map_or(Ok(1.0), str::parse::<f64>);
+            let metres = metres
+                .ok()
+                .filter(|metres| metres.is_finite() && *metres > 0.0 && cells.next().is_none());
+            let metres = metres.ok_or_else(|| refused("metres above 0 as its third and last cell"))?;
+            if a == b || lengths.insert((a.min(b), a.max(b)), metres).is_some() {
+                return Err(refused("each link once, between two nodes").into());
+            }
+        }
+        let last = lengths.keys().map(|(_, b)| *b).max();
+        let last = last.ok_or_else(|| ArgumentError::new("links", "none", "one link or more"))?;
+        Ok(Self {
+            graph: Graph::of_edges(last as usize + 1, lengths.keys().copied())?,
+            range: lengths.values().copied().fold(0.0, f64::max),
+            nodes: Nodes::Links(lengths),
         })
     }
 
@@ -49,20 +95,23 @@ impl Field {
     /// If there is no node or the radius is not a positive number.
     pub fn ring(nodes: usize, radius: f64) -> Result<Self, Error> {
         let star = Self::star(nodes, radius)?;
-        Self::new(&Deployment::given(star.positions[1..].to_vec())?, star.range)
+        match &star.nodes {
+            Nodes::Positions(positions) => Self::new(&Deployment::given(positions[1..].to_vec())?, star.range),
+            Nodes::Links(_) => Ok(star),
+        }
     }
 
     /// Number of nodes.
     pub fn len(&self) -> usize {
-        self.positions.len()
+        self.graph.len()
     }
 
     /// Never true: a deployment has at least one node.
     pub fn is_empty(&self) -> bool {
-        self.positions.is_empty()
+        self.graph.is_empty()
     }
 
-    /// Range of the radios, metres.
+    /// Range of the radios, metres; the longest link of a list.
     pub fn range(&self) -> f64 {
         self.range
     }
@@ -72,9 +121,12 @@ impl Field {
         &self.graph
     }
 
-    /// Distance between two nodes that exist, metres.
+    /// Distance between two nodes that exist, metres; the range where a list has no link between them.
     pub(crate) fn distance(&self, from: u32, to: u32) -> f64 {
-        (self.positions[from as usize] - self.positions[to as usize]).norm()
+        match &self.nodes {
+            Nodes::Positions(positions) => (positions[from as usize] - positions[to as usize]).norm(),
+            Nodes::Links(lengths) => *lengths.get(&(from.min(to), from.max(to))).unwrap_or(&self.range),
+        }
     }
 
     /// # Errors
@@ -134,6 +186,26 @@ impl Field {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_list_of_links_is_a_field() {
+        let field = Field::from_csv("from,to,metres\n0, 1, 12.5\n\n2,1\n").unwrap();
+        assert_eq!((field.len(), field.range(), field.distance(1, 0), field.distance(1, 2)), (3, 12.5, 12.5, 1.0));
+        assert!(field.check_link(SensorId(0), SensorId(2)).is_err() && field.routes(SensorId(0)).is_ok());
+        for (text, part) in [
+            ("", "none"),
+            ("0,1\n1;2", "`1;2` in line 2"),
+            ("0,1,-3", "metres above 0"),
+            ("0,1,nan", "metres above 0"),
+            ("0,1,2,3", "third and last"),
+            ("3,3", "each link once"),
+            ("0,1\n1,0", "each link once"),
+            ("0,4000000000", "below 2^24"),
+        ] {
+            let error = Field::from_csv(text).unwrap_err().to_string();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
 
     #[test]
     fn what_is_no_network_is_refused() {

@@ -24,9 +24,11 @@ pub enum Kind {
     Handover,
     /// A digest alone.
     Beacon,
+    /// A whole frame that other nodes pass on, and the sensor that it is from or for.
+    Relayed,
 }
 
-const KINDS: [Kind; 7] = [
+const KINDS: [Kind; 8] = [
     Kind::Question,
     Kind::Report,
     Kind::Echo,
@@ -34,6 +36,7 @@ const KINDS: [Kind; 7] = [
     Kind::Request,
     Kind::Handover,
     Kind::Beacon,
+    Kind::Relayed,
 ];
 const KIND_BITS: u32 = 3;
 const SLOT_BITS: u32 = 29;
@@ -42,7 +45,13 @@ const FIXED_BITS: u32 = KIND_BITS + SLOT_BITS + DIGEST_BITS;
 const DESTINATION_BITS: u32 = 32;
 const CHECK_BITS: u32 = 16;
 
-/// A frame: 64 bits of header (96 for a handover, which names its destination), the payload, a check of 16 bits.
+impl Kind {
+    fn is_addressed(self) -> bool {
+        matches!(self, Self::Handover | Self::Relayed)
+    }
+}
+
+/// A frame: 64 bits of header (96 for a handover or a relayed frame, which name a node), the payload, a check of 16 bits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
     /// Kind of content.
@@ -51,7 +60,7 @@ pub struct Frame {
     pub slot: u32,
     /// Digest of the state that both ends must share for the payload to mean anything.
     pub digest: u32,
-    /// To whom a handover goes in the end; 0 for others.
+    /// To whom a handover goes in the end; the sensor that a relayed frame is from or for; 0 for others.
     pub destination: u32,
     /// The message proper.
     pub payload: BitString,
@@ -69,9 +78,20 @@ impl Frame {
         }
     }
 
+    /// This frame as other nodes pass it on; `sensor` is whom it is from or for.
+    ///
+    /// # Errors
+    /// As [`to_bits`](Self::to_bits).
+    pub fn relayed(&self, sensor: u32) -> Result<Self, CodecError> {
+        Ok(Self {
+            destination: sensor,
+            ..Self::new(Kind::Relayed, self.slot, self.digest, self.to_bits(Check::Whole)?)
+        })
+    }
+
     /// Bits of the header of a frame of this kind.
     pub fn header_bits(kind: Kind) -> u32 {
-        FIXED_BITS + if kind == Kind::Handover { DESTINATION_BITS } else { 0 }
+        FIXED_BITS + if kind.is_addressed() { DESTINATION_BITS } else { 0 }
     }
 
     /// Bits of a frame of this kind besides its payload.
@@ -100,7 +120,7 @@ impl Frame {
         }
         let start = (kind as u64) << SLOT_BITS | u64::from(self.slot);
         writer.write(start << DIGEST_BITS | u64::from(self.digest), FIXED_BITS)?;
-        if self.kind == Kind::Handover {
+        if self.kind.is_addressed() {
             writer.write(u64::from(self.destination), DESTINATION_BITS)?;
         }
         let header = writer.bits();
@@ -122,11 +142,11 @@ impl Frame {
         let mut reader = BitReader::new(bits);
         let fixed = reader.read(FIXED_BITS)?;
         let kind = (fixed >> (SLOT_BITS + DIGEST_BITS)) as usize;
-        let kind = *KINDS.get(kind).ok_or_else(|| invalid("kind", kind, "below 7"))?;
+        let kind = *KINDS.get(kind).ok_or_else(|| invalid("kind", kind, "below 8"))?;
         let slot = (fixed >> DIGEST_BITS) as u32 & ((1 << SLOT_BITS) - 1);
         let digest = fixed as u32;
         let destination = match kind {
-            Kind::Handover => reader.read(DESTINATION_BITS)? as u32,
+            kind if kind.is_addressed() => reader.read(DESTINATION_BITS)? as u32,
             _ => 0,
         };
         let length = reader
@@ -219,11 +239,11 @@ mod tests {
     proptest! {
         #[test]
         fn frames_come_back_and_any_bits_are_a_frame_or_an_error(
-            payload in bit_string(), slot in 0_u32..1 << 29, digest in any::<u32>(), kind in 0_usize..7, noise in bit_string(),
+            payload in bit_string(), slot in 0_u32..1 << 29, digest in any::<u32>(), kind in 0_usize..8, noise in bit_string(),
             flip in any::<prop::sample::Index>(),
         ) {
             let mut frame = Frame::new(KINDS[kind], slot, digest, payload);
-            if frame.kind == Kind::Handover {
+            if frame.kind.is_addressed() {
                 frame.destination = digest;
             }
             for check in [Check::Whole, Check::Header] {

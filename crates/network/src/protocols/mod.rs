@@ -1,10 +1,7 @@
-//! Who talks to whom: protocols over the simulator that run any [`Estimator`](crate::Estimator) or [`Walker`].
+//! Who talks to whom: drivers that run the machines of `fewbits-protocol` over the simulator.
 
 pub(crate) mod bit_star;
-pub(crate) mod slot;
-pub(crate) mod star;
 pub(crate) mod walk;
 
-pub use bit_star::{BitNode, BitStar};
-pub use star::{Centre, Feedback, Sensor, Star, StarNode};
-pub use walk::{Lead, Walk, WalkNode, Walker};
+pub use bit_star::{BitNode, BitStar, CentreNode, SensingNode, SlotEstimate, StoredBitNode};
+pub use walk::{Walk, WalkNode};

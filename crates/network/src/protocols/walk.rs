@@ -1,82 +1,41 @@
-//! A belief that travels: from leader to leader, or along a chain of nodes, hop by hop.
+//! A belief that travels, from leader to leader or along a chain of nodes, hop by hop: the machines of `fewbits-protocol` over the simulated radio.
 
+use super::bit_star::translation::{machine_frame, noted, simulated};
 use crate::clock::Clock;
-use crate::error::Error;
-use crate::measurements::MAX_SLOTS;
-use crate::medium::{Field, Frame, Kind, Stored, digest};
+use crate::error::{Cause, Error, in_full};
+use crate::medium::{Field, Frame};
 use crate::note::{Note, Stage};
-use crate::protocols::slot::shared;
-use crate::simulator::{Context, Protocol, Setup, Simulator, Ticket};
-use crate::units::SensorId;
-use fewbits_core::BitString;
+use crate::simulator::{Context, Protocol, Setup, Simulator, Storable, Ticket};
+use crate::units::{Instant, SensorId};
 use fewbits_monte_carlo::Stream;
-use rand_pcg::Pcg64Dxsm;
+use fewbits_numerics::error::refuse;
+use fewbits_protocol::{Bearer, Errand, Leader, SLOT_BITS, Slot};
 use serde::{Deserialize, Serialize};
 
-/// Timer: the slot of a leader begins.
-const LEAD: u32 = 0;
-
-/// What a leader does with the belief that it was handed.
-pub trait Walker {
-    /// One leader's step: measure, update, choose who leads next. The first leader has no message.
-    ///
-    /// # Errors
-    /// If the message is no belief, or the measurement is impossible under it: the leader then keeps what it had.
-    fn lead(&self, rng: &mut Pcg64Dxsm, slot: u32, node: SensorId, message: Option<&BitString>) -> Result<Lead, Error>;
-}
-
-/// What a leader's step gives.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Lead {
-    /// The belief as it travels on.
-    pub message: BitString,
-    /// Who leads next; nobody ends the walk.
-    pub next: Option<SensorId>,
-    /// The estimate.
-    pub estimate: Vec<f64>,
-}
-
-/// A belief that walks over the network under a [`Walker`].
+/// A belief that walks over the network under a [`Leader`].
 ///
 /// ```text
 /// slot k, leader:  belief = lead(message);  send it to the next leader, hop by hop along a shortest route, named slot k + 1
 ///         others:  a handover for somebody else goes on; one for oneself makes a leader; a second one of its slot is noted
 /// ```
 /// With acknowledgements, a node that gives up a handover leads itself and notes it ([`Note::Retained`]): should the belief have arrived all the same,
-/// there are two leaders from then on, and where they meet the log has the disagreement. A node that leads already keeps the belief that has seen
-/// more slots.
+/// there are two leaders from then on, and where they meet the log has the disagreement. A leader draws from a stream of its slot.
 #[derive(Debug, Clone)]
-pub struct Walk<W> {
-    walker: W,
+pub struct Walk<L> {
+    leader: L,
     clock: Clock,
     stream: Stream,
     last_slot: u32,
 }
 
 /// A node of a [`Walk`].
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct WalkNode {
-    /// The slot in which it leads, and the belief that it was handed.
-    leading: Option<(u32, Option<Stored>)>,
-    /// Slot and digest of the last handover that it took.
-    taken: Option<(u32, u32)>,
-    /// Slot and digest of the last handover that it passed on.
-    passed: Option<(u32, u32)>,
-    /// Handovers that it sent and that are not acknowledged yet.
-    pending: Vec<PendingHandover>,
-    estimates: Vec<(u32, Vec<f64>)>,
-}
-
-/// A handover that was sent and is not acknowledged yet.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct PendingHandover {
-    ticket: Ticket,
-    to: SensorId,
-    /// The slot in which its receiver is to lead.
-    slot: u32,
-    belief: Stored,
+pub struct WalkNode {
+    bearer: Bearer,
+    /// Handovers on their way, by the radio's tickets.
+    tickets: Vec<(Ticket, (Slot, u32))>,
+    estimates: Vec<(u32, Vec<f64>)>,
 }
 
 impl WalkNode {
@@ -87,24 +46,25 @@ impl WalkNode {
 
     /// The slot in which it leads, if it does.
     pub fn leads(&self) -> Option<u32> {
-        self.leading.as_ref().map(|(slot, _)| *slot)
+        self.bearer.leads().map(Slot::number)
     }
 }
 
-impl<W: Walker> Walk<W> {
-    /// A walk of at most `slots` steps; `stream` is what the walker draws from.
-    pub fn new(walker: W, clock: Clock, slots: u32, stream: Stream) -> Self {
-        Self {
-            walker,
+impl<L: Leader> Walk<L> {
+    /// A walk of at most `slots` steps, fewer than 2^23; `stream` is what leaders draw from.
+    ///
+    /// # Errors
+    /// If there are more slots.
+    pub fn new(leader: L, clock: Clock, slots: u32, stream: Stream) -> Result<Self, Error> {
+        if slots >= 1 << (SLOT_BITS - 1) {
+            return refuse("slots", slots, "fewer than 2^23");
+        }
+        Ok(Self {
+            leader,
             clock,
             stream,
-            last_slot: slots.min(MAX_SLOTS),
-        }
-    }
-
-    /// The walker.
-    pub fn walker(&self) -> &W {
-        &self.walker
+            last_slot: slots,
+        })
     }
 
     /// The slots.
@@ -119,52 +79,73 @@ impl<W: Walker> Walk<W> {
     pub fn simulate(self, field: Field, first: SensorId, setup: Setup) -> Result<Simulator<Self>, Error> {
         field.check(first)?;
         field.routes(first)?;
-        let clock = self.clock;
-        let mut nodes = vec![WalkNode::default(); field.len()];
-        nodes[first.index()].leading = Some((1, None));
+        let (clock, acknowledged) = (self.clock, setup.retries.is_some());
+        let node = |id: usize| {
+            let bearer = Bearer::new(id as u32, clock.schedule(), u64::from(self.last_slot), acknowledged);
+            WalkNode {
+                bearer: if id == first.index() { bearer.first() } else { bearer },
+                tickets: Vec::new(),
+                estimates: Vec::new(),
+            }
+        };
+        let nodes = (0..field.len()).map(node).collect();
         let mut simulator = Simulator::new(self, nodes, field, setup)?;
-        simulator.start(first, clock.start(1), LEAD)?;
+        simulator.start(first, clock.start(1), 0)?;
         Ok(simulator)
     }
 
-    fn lead(&self, node: &mut WalkNode, context: &mut Context<'_>) -> Result<(), Error> {
-        // A timer that was set for an earlier handover must not start a slot that is still to come.
-        let Some((slot, message)) = node
-            .leading
-            .take_if(|(slot, _)| self.clock.start(*slot) <= context.now())
-        else {
-            return Ok(());
-        };
-        let mut rng = shared(self.stream, "lead", slot);
-        let message_bits = message.as_ref().map(|stored| &stored.0);
-        let step = match self.walker.lead(&mut rng, slot, context.id(), message_bits) {
-            Ok(step) => step,
-            Err(error) => {
-                self.stay(node, context, slot + 1, message);
-                return self.failed(context, slot, &error);
+    fn carry_out(&self, node: &mut WalkNode, context: &mut Context<'_>, mut errands: Vec<Errand>) -> Result<(), Error> {
+        let now = context.now().0;
+        while !errands.is_empty() {
+            let mut next = Vec::new();
+            for errand in errands {
+                match errand {
+                    Errand::SetTimer { at } => context.at(Instant(at), 0),
+                    Errand::Note { with, note } => context.note(noted(SensorId(with), note)),
+                    Errand::Send {
+                        destination,
+                        name,
+                        frame,
+                    } => match hop(context, destination)? {
+                        Some(hop) => {
+                            let ticket = context.send_now(hop, &simulated(&frame)?)?;
+                            if context.has_acknowledgements() {
+                                node.tickets.push((ticket, name));
+                            }
+                        }
+                        None => node.bearer.on_give_up(now, name, &mut next),
+                    },
+                    Errand::Lead { slot, message } => {
+                        let slot = slot.number();
+                        let mut rng = self.stream.named("lead").indexed(u64::from(slot)).rng();
+                        match self
+                            .leader
+                            .lead(&mut rng, u64::from(slot), context.id().0, message.as_ref())
+                        {
+                            Ok(lead) => {
+                                node.estimates.push((slot, lead.estimate.clone()));
+                                node.bearer.on_led(now, lead, &mut next);
+                            }
+                            Err(error) => {
+                                node.bearer.on_failed(now, &mut next);
+                                self.failed(context, slot, error)?;
+                            }
+                        }
+                    }
+                }
             }
-        };
-        node.estimates.push((slot, step.estimate));
-        let Some(next) = step.next else { return Ok(()) };
-        let belief = Stored(step.message);
-        if next == context.id() {
-            self.stay(node, context, slot + 1, Some(belief));
-            return Ok(());
+            errands = next;
         }
-        if slot >= self.last_slot {
-            return Ok(());
-        }
-        let frame = Frame {
-            destination: next.0,
-            ..Frame::new(Kind::Handover, slot + 1, digest(u64::from(slot + 1), &belief.0), belief.0)
-        };
-        self.pass(node, context, frame)
+        Ok(())
     }
 
     /// Notes that a leader's step failed. Leaders change, so failures count over the whole run.
-    fn failed(&self, context: &mut Context<'_>, slot: u32, error: &Error) -> Result<(), Error> {
-        let (stage, reason) = (Stage::Lead, error.in_full());
-        let last = Note::Failed { stage, slot, reason };
+    fn failed(&self, context: &mut Context<'_>, slot: u32, error: Cause) -> Result<(), Error> {
+        let last = Note::Failed {
+            stage: Stage::Lead,
+            slot,
+            reason: in_full(&*error),
+        };
         context.note(last.clone());
         if context.failures() > u64::from(self.last_slot / 2) {
             return Err(Error::MostSlotsFailed {
@@ -176,66 +157,26 @@ impl<W: Walker> Walk<W> {
         }
         Ok(())
     }
-
-    /// Leads in a slot to come.
-    fn stay(&self, node: &mut WalkNode, context: &mut Context<'_>, slot: u32, message: Option<Stored>) {
-        if slot <= self.last_slot {
-            node.leading = Some((slot, message));
-            context.at(self.clock.start(slot), LEAD);
-        }
-    }
-
-    /// Takes a belief that another node was to lead with, or that another node has sent. Where this node leads already, the belief that has seen more
-    /// slots stays, of equals the one that is here.
-    fn take_over(&self, node: &mut WalkNode, context: &mut Context<'_>, with: SensorId, slot: u32, belief: Stored) {
-        if let Some(leads) = node.leads() {
-            context.note(Note::Disagreement { with, slot });
-            if leads >= slot {
-                return;
-            }
-        }
-        self.stay(node, context, slot, Some(belief));
-    }
-
-    /// Sends a handover one hop further. Without a route this node keeps it.
-    fn pass(&self, node: &mut WalkNode, context: &mut Context<'_>, frame: Frame) -> Result<(), Error> {
-        let (id, destination, slot) = (context.id(), frame.destination, frame.slot);
-        let field = context.field();
-        field.check(SensorId(destination))?;
-        let hop = if field.graph().neighbours(id.index()).binary_search(&destination).is_ok() {
-            Some(destination)
-        } else {
-            let routes = field.graph().hops_from(destination as usize)?;
-            routes.parent(id.index()).map(|hop| hop as u32)
-        };
-        let Some(hop) = hop.map(SensorId) else {
-            self.keep(node, context, SensorId(destination), slot, Stored(frame.payload));
-            return Ok(());
-        };
-        let ticket = context.send_now(hop, &frame)?;
-        if context.has_acknowledgements() {
-            node.pending.push(PendingHandover {
-                ticket,
-                to: hop,
-                slot,
-                belief: Stored(frame.payload),
-            });
-        }
-        Ok(())
-    }
-
-    /// Keeps a belief that could not be handed over.
-    fn keep(&self, node: &mut WalkNode, context: &mut Context<'_>, with: SensorId, slot: u32, belief: Stored) {
-        context.note(Note::Retained { slot });
-        self.take_over(node, context, with, slot, belief);
-    }
 }
 
-impl<W: Walker> Protocol for Walk<W> {
+/// The neighbour that is next on a shortest route to a node; `None` if there is no route.
+fn hop(context: &Context<'_>, destination: u32) -> Result<Option<SensorId>, Error> {
+    let (id, field) = (context.id(), context.field());
+    field.check(SensorId(destination))?;
+    if field.graph().neighbours(id.index()).binary_search(&destination).is_ok() {
+        return Ok(Some(SensorId(destination)));
+    }
+    let routes = field.graph().hops_from(destination as usize)?;
+    Ok(routes.parent(id.index()).map(|hop| SensorId(hop as u32)))
+}
+
+impl<L: Leader> Protocol for Walk<L> {
     type Node = WalkNode;
 
     fn on_timer(&self, node: &mut WalkNode, context: &mut Context<'_>, _: u32) -> Result<(), Error> {
-        self.lead(node, context)
+        let mut errands = Vec::new();
+        node.bearer.on_timer(context.now().0, &mut errands);
+        self.carry_out(node, context, errands)
     }
 
     fn on_frame(
@@ -245,57 +186,49 @@ impl<W: Walker> Protocol for Walk<W> {
         from: SensorId,
         frame: &Frame,
     ) -> Result<(), Error> {
-        let slot = frame.slot;
         let known = (frame.destination as usize) < context.field().len();
-        if frame.kind != Kind::Handover || !known {
+        let Some(decoded) = machine_frame(frame).filter(|_| known) else {
             context.note(Note::Malformed);
             return Ok(());
-        }
-        if digest(u64::from(slot), &frame.payload) != frame.digest {
-            context.note(Note::Disagreement { with: from, slot });
-            return Ok(());
-        }
-        let own = frame.destination == context.id().0;
-        let last = if own { &mut node.taken } else { &mut node.passed };
-        match *last {
-            Some(seen) if seen == (slot, frame.digest) => {
-                context.note(Note::Duplicate);
-                return Ok(());
-            }
-            Some((seen, _)) if own && slot == seen => {
-                context.note(Note::Disagreement { with: from, slot });
-                return Ok(());
-            }
-            Some((seen, _)) if own && slot < seen => {
-                context.note(Note::Late);
-                return Ok(());
-            }
-            _ => *last = Some((slot, frame.digest)),
-        }
-        if !own {
-            return self.pass(node, context, frame.clone());
-        }
-        self.take_over(node, context, from, slot, Stored(frame.payload.clone()));
-        Ok(())
+        };
+        let mut errands = Vec::new();
+        node.bearer.on_decoded(context.now().0, from.0, &decoded, &mut errands);
+        self.carry_out(node, context, errands)
     }
 
     fn on_ack(&self, node: &mut WalkNode, _: &mut Context<'_>, ticket: Ticket) -> Result<(), Error> {
-        node.pending.retain(|handover| handover.ticket != ticket);
+        if let Some(at) = node.tickets.iter().position(|(sent, _)| *sent == ticket) {
+            node.bearer.on_ack(node.tickets.remove(at).1);
+        }
         Ok(())
     }
 
     fn on_give_up(&self, node: &mut WalkNode, context: &mut Context<'_>, ticket: Ticket) -> Result<(), Error> {
-        if let Some(at) = node.pending.iter().position(|handover| handover.ticket == ticket) {
-            let handover = node.pending.remove(at);
-            self.keep(node, context, handover.to, handover.slot, handover.belief);
-        }
-        Ok(())
+        let Some(at) = node.tickets.iter().position(|(sent, _)| *sent == ticket) else {
+            return Ok(());
+        };
+        let mut errands = Vec::new();
+        node.bearer
+            .on_give_up(context.now().0, node.tickets.remove(at).1, &mut errands);
+        self.carry_out(node, context, errands)
     }
 
     /// The belief is gone if it was here.
     fn on_restart(&self, node: &mut WalkNode, _: &mut Context<'_>) -> Result<(), Error> {
-        node.leading = None;
-        node.pending.clear();
+        node.bearer.on_memory_lost();
+        node.tickets.clear();
         Ok(())
+    }
+}
+
+impl<L: Leader> Storable for Walk<L> {
+    type Stored = WalkNode;
+
+    fn store(&self, node: &WalkNode) -> Result<WalkNode, Cause> {
+        Ok(node.clone())
+    }
+
+    fn revive(&self, _: usize, stored: WalkNode) -> Result<WalkNode, Cause> {
+        Ok(stored)
     }
 }

@@ -4,7 +4,7 @@ use super::core::{BufferPool, SimulatorCore};
 use super::log::{Detail, Entry, Reception, Transmission};
 use super::queue::Arrival;
 use crate::error::Error;
-use crate::medium::{Check, Frame, Loss, ReceivedCopy, Stored, Transceiver};
+use crate::medium::{Check, Frame, Kind, Loss, ReceivedCopy, Stored, Transceiver};
 use crate::units::{Bits, Joules, SensorId};
 use fewbits_core::BitString;
 use rand::Rng;
@@ -222,12 +222,18 @@ impl SimulatorCore {
             .state
             .now
             .after(self.setup.radio_of(attempt.from).duration(attempt.size.air));
+        let busy = self.collide(attempt.from);
+        let mut arrivals = Vec::new();
         if receptions.is_empty() && attempt.to.is_some() {
             self.state.ledger.faults.lost += 1;
         }
         for reception in receptions {
             if reception.copies.is_empty() {
                 self.state.ledger.faults.lost += 1;
+            }
+            if self.is_garbled(&busy, reception.to) {
+                self.state.ledger.faults.lost += 1;
+                continue;
             }
             for copy in &reception.copies {
                 let at = on_air.after(copy.delay);
@@ -236,10 +242,14 @@ impl SimulatorCore {
                     let from = attempt.from;
                     // One answer for all frames of a batch.
                     let answer = answer.take();
-                    self.deliver(at, reception.to, Arrival { from, answer, bits });
+                    let place = self.deliver(at, reception.to, Arrival { from, answer, bits });
+                    if self.contends() {
+                        arrivals.push((reception.to, place));
+                    }
                 }
             }
         }
+        self.occupy(attempt.from, self.state.now, attempt.size.air, arrivals);
     }
 
     fn is_intact(&self, frames: &[Stored], copy: &ReceivedCopy) -> bool {
@@ -286,6 +296,11 @@ fn replayed(recorded: Option<Entry>, attempt: &Attempt<'_>, transmission: usize)
 }
 
 fn payload_bits(frame: &Stored) -> u64 {
-    let overhead = Frame::kind_of(&frame.0).map_or(0, Frame::overhead);
+    let overhead = match Frame::kind_of(&frame.0) {
+        // The header of the frame within is no payload.
+        Some(Kind::Relayed) => Frame::overhead(Kind::Relayed) + Frame::overhead(Kind::Report),
+        Some(kind) => Frame::overhead(kind),
+        None => 0,
+    };
     (frame.0.bits() as u64).saturating_sub(u64::from(overhead))
 }

@@ -2,10 +2,11 @@
 
 use super::core::{SimulatorCore, Ticket};
 use super::queue::EventKind;
-use crate::error::Error;
+use crate::error::{Cause, Error};
 use crate::medium::{Field, Frame};
 use crate::note::Note;
 use crate::units::{Instant, Seconds, SensorId};
+use serde::{Serialize, de::DeserializeOwned};
 
 /// Behaviour of the nodes: one small state machine per node, all under one protocol.
 ///
@@ -65,6 +66,24 @@ pub trait Protocol {
     fn on_restart(&self, node: &mut Self::Node, context: &mut Context<'_>) -> Result<(), Error>;
 }
 
+/// A protocol whose nodes can be stored in a snapshot.
+pub trait Storable: Protocol {
+    /// A node as it is stored.
+    type Stored: Serialize + DeserializeOwned;
+
+    /// The node as it is stored.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn store(&self, node: &Self::Node) -> Result<Self::Stored, Cause>;
+
+    /// The node with this index as it was stored.
+    ///
+    /// # Errors
+    /// If what was stored is no such node.
+    fn revive(&self, index: usize, stored: Self::Stored) -> Result<Self::Node, Cause>;
+}
+
 /// A node's view of the network while it handles an event.
 #[derive(Debug)]
 pub struct Context<'a> {
@@ -78,9 +97,9 @@ impl Context<'_> {
         self.node
     }
 
-    /// The time.
+    /// The time by the node's own clock.
     pub fn now(&self) -> Instant {
-        self.core.state.now
+        self.core.local(self.node, self.core.state.now)
     }
 
     /// Positions and neighbours of all nodes.
@@ -88,8 +107,9 @@ impl Context<'_> {
         &self.core.field
     }
 
-    /// Sets a timer; one in the past fires now.
+    /// Sets a timer by the node's own clock; one in the past fires now.
     pub fn at(&mut self, time: Instant, token: u32) {
+        let time = self.core.when(self.node, time);
         self.core.schedule(time, self.node, EventKind::Timer(token));
     }
 

@@ -3,6 +3,7 @@
 //! [`Simulator`](super::Simulator) takes events from here; [`Context`](super::Context) is the part that a protocol may use. What is sent is in
 //! `transmission`.
 
+use super::contention::OnAir;
 use super::ledger::{Account, Ledger};
 use super::log::{Detail, Entry, Log, Reception};
 use super::queue::{Arrival, Event, EventKind, Queue};
@@ -43,6 +44,9 @@ pub(super) struct Outgoing {
     pub(super) tickets: Vec<Ticket>,
     /// Attempts so far.
     pub(super) attempts: u32,
+    /// How often its sender has heard others in the present attempt.
+    #[serde(default)]
+    pub(super) heard: u32,
     /// The sender is awake from the attempt before.
     pub(super) sender_awake: bool,
     /// The receiver is awake from the attempt before.
@@ -66,6 +70,9 @@ pub(super) struct State {
     /// Batches and outgoing frames are numbered together.
     pub(super) next_number: u32,
     pub(super) next_ticket: u64,
+    /// Transmissions that others may hear; only under carrier sense.
+    #[serde(default)]
+    pub(super) on_air: Vec<OnAir>,
     pub(super) bursts: BTreeMap<(SensorId, SensorId), BurstState>,
     /// Transmissions and acknowledgements so far.
     pub(super) transmissions: usize,
@@ -107,6 +114,7 @@ impl SimulatorCore {
                 outgoing: BTreeMap::new(),
                 next_number: 0,
                 next_ticket: 0,
+                on_air: Vec::new(),
                 bursts: BTreeMap::new(),
                 transmissions: 0,
                 ledger: Ledger::new(nodes),
@@ -142,6 +150,10 @@ impl SimulatorCore {
             && state.queue.is_consistent(known)
             && state.batches.keys().all(|(from, to)| reached(*from, *to))
             && state.outgoing.values().all(|frame| reached(frame.from, frame.to))
+            && state
+                .on_air
+                .iter()
+                .all(|one| known(one.from) && one.arrivals.iter().all(|(to, _)| known(*to)))
             && state.bursts.keys().all(|(from, to)| known(*from) && known(*to));
         if !consistent {
             return Err(Error::SnapshotOfOtherNetwork {
@@ -151,6 +163,31 @@ impl SimulatorCore {
         }
         self.state = state;
         Ok(())
+    }
+
+    /// The time by a node's own clock.
+    #[inline]
+    pub(super) fn local(&self, node: SensorId, time: Instant) -> Instant {
+        match self.setup.drift.get(&node) {
+            None => time,
+            // A rate of at least -1/2: no clock goes back.
+            Some(rate) => Instant(time.0.saturating_add_signed((time.0 as f64 * rate).round() as i64)),
+        }
+    }
+
+    /// The first instant at which a node's own clock shows this time.
+    pub(super) fn when(&self, node: SensorId, local: Instant) -> Instant {
+        let Some(rate) = self.setup.drift.get(&node) else {
+            return local;
+        };
+        let mut time = Instant((local.0 as f64 / (1.0 + rate)) as u64);
+        while time.0 > 0 && self.local(node, Instant(time.0 - 1)) >= local {
+            time.0 -= 1;
+        }
+        while self.local(node, time) < local {
+            time.0 += 1;
+        }
+        time
     }
 
     #[inline]
@@ -238,8 +275,8 @@ impl SimulatorCore {
         self.note(node, Note::Died);
     }
 
-    pub(super) fn deliver(&mut self, at: Instant, to: SensorId, arrival: Arrival) {
-        self.state.queue.deliver(at.max(self.state.now), to, arrival);
+    pub(super) fn deliver(&mut self, at: Instant, to: SensorId, arrival: Arrival) -> u32 {
+        self.state.queue.deliver(at.max(self.state.now), to, arrival)
     }
 
     /// A node whose batteries are empty dies. If it has only idled since, it died when they were.

@@ -3,6 +3,7 @@
 //! `core` has the state that nodes cannot read, `transmission` puts frames on air.
 
 mod attempt;
+mod contention;
 mod context;
 mod core;
 mod ledger;
@@ -13,10 +14,10 @@ mod summary;
 pub(crate) mod transmission;
 
 pub use self::core::Ticket;
-pub use context::{Context, Protocol};
+pub use context::{Context, Protocol, Storable};
 pub use ledger::{Account, Faults, Ledger, Totals};
 pub use log::{Acknowledgement, Detail, Entry, Log, Reception, Transmission};
-pub use setup::{Batching, Fault, FaultKind, Setup};
+pub use setup::{Access, Batching, CarrierSense, Fault, FaultKind, Setup};
 pub use summary::{EstimateError, Summary};
 
 use self::core::{SimulatorCore, State};
@@ -28,13 +29,12 @@ use fewbits_core::BitString;
 use fewbits_numerics::ArgumentError;
 use log::{unreadable, unwritable};
 use queue::{Arrival, Event, EventKind};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use std::io::{Read, Write};
 
 /// A network at some instant.
 ///
-/// The air is divided by an ideal schedule: a transmission begins when the air is free about its sender and about all nodes that hear it. Requests are
+/// The air is divided by an ideal schedule ([`Access::Scheduled`]) or by carrier sense ([`Access::CarrierSense`]). By the schedule a transmission begins when the air
+/// is free about its sender and about all nodes that hear it; requests are
 /// served in the order in which they were made, and who waits sleeps. Acknowledgements follow their frames after a turnaround.
 #[derive(Debug)]
 pub struct Simulator<P: Protocol> {
@@ -61,12 +61,13 @@ impl<P: Protocol> Simulator<P> {
         })
     }
 
-    /// Starts a node's first timer.
+    /// Starts a node's first timer, by its own clock.
     ///
     /// # Errors
     /// [`Error::UnknownNode`]; [`Error::Unheard`] if there are other nodes and none is in range.
     pub fn start(&mut self, node: SensorId, at: Instant, token: u32) -> Result<(), Error> {
         self.core.field.check_heard(node)?;
+        let at = self.core.when(node, at);
         self.core.schedule(at, node, EventKind::Timer(token));
         Ok(())
     }
@@ -287,9 +288,12 @@ impl<P: Protocol> Simulator<P> {
     /// [`Error::Unwritable`].
     pub fn snapshot(&self, to: impl Write) -> Result<(), Error>
     where
-        P::Node: Serialize,
+        P: Storable,
     {
-        ciborium::into_writer(&(&self.nodes, &self.core.state), to).map_err(unwritable)
+        let nodes = self.nodes.iter().map(|node| self.protocol.store(node));
+        let nodes = nodes.collect::<Result<Vec<_>, _>>();
+        let nodes = nodes.map_err(|source| Error::Unwritable { source })?;
+        ciborium::into_writer(&(nodes, &self.core.state), to).map_err(unwritable)
     }
 
     /// A run as it was when the snapshot was taken, under the same protocol, field and setup.
@@ -298,9 +302,13 @@ impl<P: Protocol> Simulator<P> {
     /// [`Error::Unreadable`] if it is no snapshot; [`Error::SnapshotOfOtherNetwork`]; as [`Simulator::new`].
     pub fn restore(protocol: P, field: Field, setup: Setup, from: impl Read) -> Result<Self, Error>
     where
-        P::Node: DeserializeOwned,
+        P: Storable,
     {
-        let (nodes, state): (Vec<P::Node>, State) = ciborium::from_reader(from).map_err(unreadable)?;
+        let (nodes, state): (Vec<P::Stored>, State) = ciborium::from_reader(from).map_err(unreadable)?;
+        let nodes = nodes.into_iter().enumerate();
+        let nodes = nodes.map(|(index, node)| protocol.revive(index, node));
+        let nodes = nodes.collect::<Result<_, _>>();
+        let nodes = nodes.map_err(|source| Error::Unreadable { source })?;
         let mut restored = Self::new(protocol, nodes, field, setup)?;
         restored.core.resume(state)?;
         Ok(restored)

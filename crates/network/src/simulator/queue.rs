@@ -143,8 +143,8 @@ impl Queue {
         }
     }
 
-    /// Bits that arrive at a node.
-    pub(crate) fn deliver(&mut self, at: Instant, to: SensorId, arrival: Arrival) {
+    /// Bits that arrive at a node. Returns the place where they are kept.
+    pub(crate) fn deliver(&mut self, at: Instant, to: SensorId, arrival: Arrival) -> u32 {
         let arrival = Some(arrival);
         let place = if let Some(place) = self.free.pop() {
             self.arrivals[place as usize] = arrival;
@@ -154,13 +154,21 @@ impl Queue {
             (self.arrivals.len() - 1) as u32
         };
         self.push(at, to, EventKind::Arrival(place));
+        place
     }
 
-    /// Takes what has arrived.
+    /// Destroys bits on their way. True if there were any.
+    pub(crate) fn destroy(&mut self, place: u32) -> bool {
+        self.arrivals
+            .get_mut(place as usize)
+            .is_some_and(|arrival| arrival.take().is_some())
+    }
+
+    /// Takes what has arrived; nothing if it was destroyed.
     pub(crate) fn take(&mut self, place: u32) -> Option<Arrival> {
-        let arrival = self.arrivals.get_mut(place as usize)?.take()?;
+        let arrival = self.arrivals.get_mut(place as usize)?.take();
         self.free.push(place);
-        Some(arrival)
+        arrival
     }
 
     /// Whether a queue that was read is in order and among nodes that exist.

@@ -6,7 +6,7 @@ use crate::medium::{Channel, Check, Field, Loss, Radio};
 use crate::units::{Seconds, SensorId};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::at_least_one;
+use fewbits_numerics::error::{at_least_one, within};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -26,6 +26,54 @@ impl Batching {
     pub const NONE: Self = Self {
         max_frames: 1,
         hold: Seconds::ZERO,
+    };
+}
+
+/// How nodes share the air.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Access {
+    /// An ideal schedule: a transmission begins when the air is free about its sender and about all nodes that hear it. Nothing collides.
+    #[default]
+    Scheduled,
+    /// Nodes wait at random, listen, and send if they hear nobody: see [`CarrierSense`].
+    CarrierSense(CarrierSense),
+}
+
+/// Carrier sense with random waits: the unslotted CSMA-CA of IEEE 802.15.4.
+///
+/// ```text
+/// e = least
+/// repeat tries times:  wait 0 to 2^e - 1 units;  if nobody is heard: send;  e = min(e + 1, most)
+/// the frame is lost
+/// ```
+/// A transmission that began less than `blind` ago is not heard. What two nodes send at once is lost at every node in range of both, and at a node that sends
+/// itself. Acknowledgements are sent without listening; they are heard and destroy other frames, and are not destroyed themselves. A replay
+/// needs the seed of the run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CarrierSense {
+    /// Unit of waiting.
+    pub unit: Seconds,
+    /// Exponent of the first wait.
+    pub least: u32,
+    /// Largest exponent, at most 16.
+    pub most: u32,
+    /// How often to listen, at least once.
+    pub tries: u32,
+    /// From listening to sending.
+    pub blind: Seconds,
+}
+
+impl CarrierSense {
+    /// The defaults of IEEE 802.15.4 at 2.4 GHz: units of 320 us, exponents 3 to 5, five tries, a turnaround of 192 us.
+    pub const IEEE_802_15_4: Self = Self {
+        unit: Seconds::trusted(320e-6),
+        least: 3,
+        most: 5,
+        tries: 5,
+        blind: Seconds::trusted(192e-6),
     };
 }
 
@@ -70,10 +118,14 @@ pub struct Setup {
     /// From the end of a frame until its sender gives up waiting for the acknowledgement. `None`: one nanosecond more than an acknowledgement needs
     /// over a channel with the fixed delay of `channel` and no jitter.
     pub ack_timeout: Option<Seconds>,
+    /// How nodes share the air.
+    pub access: Access,
     /// Whether frames to one receiver are sent together.
     pub batching: Batching,
     /// What the check of a report covers. Other frames are checked whole.
     pub report_check: Check,
+    /// Rates of the nodes' clocks, less one: a clock with 1e-5 gains 10 us in a second. Others are exact.
+    pub drift: BTreeMap<SensorId, f64>,
     /// Faults of the nodes.
     pub faults: Vec<Fault>,
     /// How much is logged.
@@ -92,8 +144,10 @@ impl Setup {
             link_loss: BTreeMap::new(),
             retries: None,
             ack_timeout: None,
+            access: Access::Scheduled,
             batching: Batching::NONE,
             report_check: Check::Whole,
+            drift: BTreeMap::new(),
             faults: Vec::new(),
             detail: Detail::Notes,
             stream,
@@ -136,6 +190,14 @@ impl Setup {
         for ((from, to), loss) in &self.link_loss {
             field.check_link(*from, *to)?;
             loss.checked()?;
+        }
+        if let Access::CarrierSense(sense) = self.access {
+            at_least_one("tries", sense.tries as usize)?;
+            within("most", f64::from(sense.most), f64::from(sense.least), 16.0)?;
+        }
+        for (node, rate) in &self.drift {
+            field.check(*node)?;
+            within("drift", *rate, -0.5, 0.5)?;
         }
         for fault in &self.faults {
             field.check(fault.node)?;

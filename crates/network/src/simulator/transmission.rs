@@ -101,8 +101,12 @@ impl SimulatorCore {
             return Ok(());
         }
         let size = self.size(from, frames);
-        let start = self.book(from, size.air, acknowledged);
-        if !acknowledged && start == self.state.now {
+        let contends = self.contends();
+        let start = match contends {
+            true => self.state.now,
+            false => self.book(from, size.air, acknowledged),
+        };
+        if !contends && !acknowledged && start == self.state.now {
             self.attempt(&Attempt {
                 from,
                 to,
@@ -122,9 +126,14 @@ impl SimulatorCore {
             frames: frames.to_vec(),
             tickets: tickets.to_vec(),
             attempts: 0,
+            heard: 0,
             sender_awake: false,
             receiver_awake: false,
         };
+        if contends {
+            self.contend(number, outgoing);
+            return Ok(());
+        }
         self.state.outgoing.insert(number, outgoing);
         self.transmit_at(start, from, number)
     }
@@ -146,8 +155,17 @@ impl SimulatorCore {
         self.drain(from);
         let acknowledged = self.is_acknowledged(to);
         let size = self.size(from, &outgoing.frames);
-        let sends = self.listens(from);
+        let mut sends = self.listens(from);
         let mut listened = false;
+        if sends && self.hears_others(from) {
+            outgoing.heard += 1;
+            if outgoing.heard < self.tries() {
+                self.contend(number, outgoing);
+                return Ok(());
+            }
+            sends = false;
+        }
+        outgoing.heard = 0;
         if sends {
             listened = self.attempt(&Attempt {
                 from,
@@ -201,6 +219,12 @@ impl SimulatorCore {
                 .remove(&number)
                 .map_or_else(Vec::new, |frame| frame.tickets));
         }
+        if self.contends() {
+            if let Some(outgoing) = self.state.outgoing.remove(&number) {
+                self.contend(number, outgoing);
+            }
+            return Ok(Vec::new());
+        }
         let air = self.size(from, &outgoing.frames).air;
         let start = self.book(from, air, true);
         // Who must wait for the air sleeps until then.
@@ -237,6 +261,8 @@ impl SimulatorCore {
             }
         }
         self.state.transmissions += 1;
+        let begins = self.state.now.after(radio.turnaround);
+        self.occupy(by, begins, radio.acknowledgement, Vec::new());
         let sending = radio.turn() + radio.transmit(radio.acknowledgement, self.field.distance(by.0, to.0));
         let account = &mut self.state.ledger.accounts[by.index()];
         account.acknowledgements = account.acknowledgements.wrapping_add(1);

@@ -1,29 +1,22 @@
 //! What no honest node would send, and arguments that make no sense.
 
-use crate::worlds::{clock, counted, scalar, setup};
+use crate::worlds::{Counted, clock, counted, scalar, setup};
 use fewbits_core::{BitString, Link};
 use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::ParallelDymboEstimator;
 use fewbits_network::{
-    Channel, Check, Clock, Context, Error, Fault, FaultKind, Field, Frame, Instant, Kind, Lead, Loss, Note, Protocol,
-    Radio, Seconds, SensorId, Setup, Simulator, Star, Walk, Walker,
+    BitStar, Channel, Check, Clock, Context, Error, Fault, FaultKind, Field, Frame, Instant, Kind, Loss, Note,
+    Protocol, Radio, Seconds, SensorId, Setup, Simulator, Walk,
 };
+use fewbits_protocol::{BoxError, Feedback, Lead, Leader};
 use fewbits_topology::Deployment;
 use nalgebra::Vector2;
 use proptest::prelude::*;
-use rand_pcg::Pcg64Dxsm;
+use rand::Rng;
 
 const SLOTS: u32 = 8;
 
-type Feedback = fn(
-    ParallelDymboEstimator,
-    Vec<Vec<nalgebra::Vector1<f64>>>,
-    Clock,
-    Stream,
-) -> Result<Star<ParallelDymboEstimator>, Error>;
-
-fn star(feedback: Feedback) -> Star<ParallelDymboEstimator> {
-    feedback(counted(Link::PERFECT), scalar(3, SLOTS as usize, 1), clock(), Stream::new(1)).unwrap()
+fn star(feedback: Feedback) -> Counted {
+    counted(Link::PERFECT, feedback, scalar(3, SLOTS as usize, 1))
 }
 
 fn frame(kind: usize, slot: u32, digest: u32, payload: &[u8], less: usize) -> Frame {
@@ -51,7 +44,7 @@ proptest! {
         ),
         echoed in any::<bool>(),
     ) {
-        let star = star(if echoed { Star::echoed } else { Star::told });
+        let star = star(if echoed { Feedback::Echoed } else { Feedback::Told });
         let mut network = star.simulate(10.0, setup(1)).unwrap();
         let at = |t: f64| Instant::default().after(Seconds::new(t).unwrap());
         let mut bad = 0;
@@ -66,7 +59,7 @@ proptest! {
         }
         network.run_until(clock().end(SLOTS + 2)).unwrap();
         prop_assert!(network.ledger().faults().damaged >= bad);
-        let estimates = network.nodes()[0].estimates();
+        let estimates = network.nodes()[0].means();
         prop_assert_eq!(estimates.len(), SLOTS as usize);
         prop_assert!(estimates.iter().flatten().all(|x| x.is_finite()));
     }
@@ -74,8 +67,8 @@ proptest! {
 
 #[test]
 fn truncated_messages_are_counted_and_the_estimate_is_that_without_them() {
-    let mut network = star(Star::told).simulate(10.0, setup(1)).unwrap();
-    let mut honest = star(Star::told).simulate(10.0, setup(1)).unwrap();
+    let mut network = star(Feedback::Told).simulate(10.0, setup(1)).unwrap();
+    let mut honest = star(Feedback::Told).simulate(10.0, setup(1)).unwrap();
     for bits in 0..80 {
         let cut = BitString::from_bytes(vec![0x20; 10], bits).unwrap();
         network
@@ -118,11 +111,11 @@ impl Protocol for Sender {
 /// Never leads anywhere.
 struct Nowhere;
 
-impl Walker for Nowhere {
-    fn lead(&self, _: &mut Pcg64Dxsm, _: u32, _: SensorId, _: Option<&BitString>) -> Result<Lead, Error> {
+impl Leader for Nowhere {
+    fn lead(&self, _: &mut dyn Rng, _: u64, _: u32, _: Option<&BitString>) -> Result<Lead, BoxError> {
         Ok(Lead {
             message: BitString::default(),
-            next: Some(SensorId(7)),
+            next: Some(7),
             estimate: Vec::new(),
         })
     }
@@ -177,7 +170,7 @@ fn what_makes_no_sense_is_refused_by_name() {
         ..Channel::PERFECT
     };
     assert!(Simulator::new(Sender, vec![(); 3], field(), Setup { channel, ..setup(1) }).is_err());
-    let walk = || Walk::new(Nowhere, clock(), 3, Stream::new(1));
+    let walk = || Walk::new(Nowhere, clock(), 3, Stream::new(1)).unwrap();
     let lost = walk().simulate(field(), SensorId(0), setup(1)).err();
     assert!(matches!(
         lost,
@@ -197,7 +190,12 @@ fn what_makes_no_sense_is_refused_by_name() {
         .unwrap();
     let nowhere = nowhere.run_until(clock().end(3));
     assert!(matches!(nowhere, Err(Error::UnknownNode { node: 7, nodes: 3 })));
-    let perfect = || counted(Link::PERFECT);
-    assert!(Star::told(perfect(), scalar(2, 4, 1), clock(), Stream::new(1)).is_err());
+    assert!(Walk::new(Nowhere, clock(), 1 << 23, Stream::new(1)).is_err());
+    // Two measurements a slot of three sensors.
+    let centre = || Ok(crate::bit_star::Counter::default());
+    let node = |_| -> Box<dyn fewbits_core::SensorNode<1>> { Box::new(crate::bit_star::Speaker) };
+    let length = fewbits_protocol::ReportLength::Fixed(1);
+    let star = BitStar::new(centre, Feedback::Told, length, node, scalar(2, 4, 1), clock(), Stream::new(1));
+    assert!(matches!(star, Err(Error::Argument(_))));
     assert!(Clock::new(Seconds::ZERO).is_err() && Clock::new(Seconds::new(1e9).unwrap()).is_err());
 }

@@ -5,9 +5,10 @@ use crate::worlds::{clock, setup};
 use fewbits_core::{BitString, Error, Observation, SensorNode};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{
-    BitNode, BitStar, Channel, Fault, FaultKind, Field, Measurements, Note, Seconds, SensorId, Setup, Simulator,
+    BitNode, BitStar, Channel, Detail, Fault, FaultKind, Field, Frame, Kind, Measurements, Note, Seconds, SensorId,
+    Setup, Simulator,
 };
-use fewbits_protocol::{BoxError, Feedback, Receiver, ReportLength};
+use fewbits_protocol::{BoxError, Feedback, Member, Receiver, ReportLength};
 use nalgebra::{SVector, Vector1};
 use rand::Rng;
 
@@ -16,7 +17,7 @@ const SLOTS: u32 = 200;
 
 /// Counts reports of one bit; the state is slot and count.
 #[derive(Debug, Default)]
-struct Counter {
+pub struct Counter {
     slot: u64,
     count: u64,
 }
@@ -53,7 +54,7 @@ impl Receiver for Counter {
 }
 
 /// Sends one bit in every slot.
-struct Speaker;
+pub struct Speaker;
 
 impl SensorNode<1> for Speaker {
     fn report(&mut self, _: &mut dyn Rng, _: &SVector<f64, 1>, _: &BitString) -> Result<Option<BitString>, Error> {
@@ -88,6 +89,23 @@ fn every_report_arrives_over_a_perfect_channel() {
 }
 
 #[test]
+fn a_sensor_that_is_told_nothing_reports_beside_those_that_are() {
+    let measured = Measurements::from_fn(6, |_, _| Some(Vector1::new(0.0)));
+    let node = |_| -> Box<dyn SensorNode<1>> { Box::new(Speaker) };
+    let (start, length) = (|| Ok(Counter::default()), ReportLength::Fixed(1));
+    let star = BitStar::new(start, Feedback::Told, length, node, measured, clock(), Stream::new(1)).unwrap();
+    let clocked = Member {
+        feedback: Feedback::Clock,
+        report: length,
+    };
+    assert!(star.clone().with_member(3, clocked).is_err());
+    let mut network = star.with_member(1, clocked).unwrap().simulate(10.0, setup(1)).unwrap();
+    network.run_until(clock().end(6)).unwrap();
+    assert_eq!(count(&network, 6), 18.0);
+    assert!(network.log().entries.is_empty());
+}
+
+#[test]
 fn followers_come_back_after_losses_and_restarts() {
     let restart = |slot: f64, node: u32| Fault {
         at: Seconds::new(slot * clock().period().value()).unwrap(),
@@ -108,7 +126,107 @@ fn followers_come_back_after_losses_and_restarts() {
     // The centre began anew after slot 100. Frames pass two links of 10 % loss, and a missed echo costs a slot more.
     let reports = count(&network, SLOTS) - count(&network, 102);
     assert!(reports > 0.5 * 98.0 * SENSORS as f64, "{reports}");
-    assert!(matches!(network.nodes()[1], BitNode::Sensor(..)));
+    assert!(matches!(network.nodes()[1], BitNode::Sensor(_)));
+}
+
+fn speakers(feedback: Feedback, slots: u32, sensors: usize) -> BitStar<Counter, 1> {
+    assert_eq!(sensors, SENSORS);
+    let measured = Measurements::from_fn(slots, |_, _| Some(Vector1::new(0.0)));
+    let node = |_| -> Box<dyn SensorNode<1>> { Box::new(Speaker) };
+    let start = || Ok(Counter::default());
+    BitStar::new(start, feedback, ReportLength::Fixed(1), node, measured, clock(), Stream::new(1)).unwrap()
+}
+
+/// A line: the centre, and three sensors of which each reaches only the next.
+#[test]
+fn sensors_out_of_range_report_through_others() {
+    let line = || Field::from_csv("0,1,10\n1,2,10\n2,3,10").unwrap();
+    for feedback in [Feedback::Told, Feedback::Clock, Feedback::Echoed] {
+        let star = speakers(feedback, 20, 3);
+        let refused = star.clone().simulate_on(line(), setup(1)).err();
+        assert!(matches!(refused, Some(fewbits_network::Error::OutOfRange { from: 2, to: 0 })));
+        let logged = Setup {
+            detail: Detail::Everything,
+            ..setup(1)
+        };
+        let mut network = star.relaying().simulate_on(line(), logged).unwrap();
+        network.run_until(clock().end(20)).unwrap();
+        assert_eq!(network.log().notes().count(), 0, "{feedback:?}");
+        assert_eq!(count(&network, 20), 60.0, "{feedback:?}");
+        conserves(network.ledger());
+        // In a slot: reports over one, two and three hops; what is for one sensor over as many, what is for all once from each that passes it on.
+        let down = match feedback {
+            Feedback::Told => 1 + 2 + 3,
+            Feedback::Clock => 0,
+            _ => 3,
+        };
+        assert_eq!(network.log().transmissions().count(), 20 * (6 + down), "{feedback:?}");
+        // A report of one bit is payload of every node that sends it.
+        let sensors = &network.ledger().accounts()[1..];
+        if feedback == Feedback::Clock {
+            assert_eq!(sensors.iter().map(|account| account.payload.0).collect::<Vec<_>>(), [60, 40, 20]);
+            // Alone 201 bits; on its way 112 of a header of its own besides, and the check within.
+            assert_eq!(sensors[2].air.0, 20 * (201 + 112));
+        }
+    }
+    let apart = Field::from_csv("0,1\n2,3").unwrap();
+    let refused = speakers(Feedback::Told, 5, 3)
+        .relaying()
+        .simulate_on(apart, setup(1))
+        .err();
+    assert!(matches!(refused, Some(fewbits_network::Error::Disconnected { reached: 2, .. })));
+}
+
+#[test]
+fn relayed_frames_survive_losses_and_strangers() {
+    let line = Field::from_csv("0,1\n1,2\n2,3").unwrap();
+    let setup = Setup {
+        channel: Channel::lossy(0.1).unwrap(),
+        retries: Some(2),
+        ..setup(3)
+    };
+    let mut network = speakers(Feedback::Echoed, 200, 3)
+        .relaying()
+        .simulate_on(line, setup)
+        .unwrap();
+    for (to, sensor) in (0..4).flat_map(|to| [0, 1, 3, 9].map(|sensor| (to, sensor))) {
+        let report = Frame::new(Kind::Report, 7, 1, BitString::default())
+            .relayed(sensor)
+            .unwrap();
+        let twice = report.relayed(sensor).unwrap();
+        for frame in [report, twice] {
+            let bits = frame.to_bits(fewbits_network::Check::Whole).unwrap();
+            network
+                .inject(clock().start(7), SensorId(to ^ 1), SensorId(to), bits)
+                .unwrap();
+        }
+    }
+    network.run_until(clock().end(200)).unwrap();
+    conserves(network.ledger());
+    // Nearly all hops succeed with two repetitions; broadcasts are not repeated and pass up to three lossy links.
+    assert!(count(&network, 200) > 0.6 * 600.0, "{}", count(&network, 200));
+}
+
+/// Clocks that gain or lose two parts in a thousand.
+#[test]
+fn heartbeats_keep_drifting_clocks_in_their_slots() {
+    let seconds = |s| Seconds::new(s).unwrap();
+    let run = |every: u32, rate: f64| {
+        let star = speakers(Feedback::Clock, 600, 3).announcing(every);
+        let star = star.reporting_at(seconds(0.1), seconds(0.1));
+        let setup = Setup {
+            drift: [(SensorId(1), rate), (SensorId(2), -rate)].into(),
+            ..setup(1)
+        };
+        let mut network = star.simulate(10.0, setup).unwrap();
+        network.run_until(clock().end(600)).unwrap();
+        (count(&network, 600), network.ledger().faults().late)
+    };
+    // The first is 0.1 s ahead after 50 slots, and early from then on. The second is 0.7 s behind after 349, and misses the deadline.
+    let (received, late) = run(0, 2e-3);
+    assert!((990.0..1006.0).contains(&received) && (795..807).contains(&late), "{received} {late}");
+    assert_eq!(run(10, 2e-3), (1800.0, 0));
+    assert_eq!(run(0, 0.0), (1800.0, 0));
 }
 
 #[test]

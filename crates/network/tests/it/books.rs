@@ -1,15 +1,15 @@
 //! The ledger's laws.
 
-use crate::worlds::{clock, counted, plane, plane_sensors, plane_start, scalar, setup};
+use crate::worlds::{clock, counted, plane, plane_sensors, plane_start, scalar, setup, star};
+use fewbits_cfwmd::centre::CensoringEstimator;
 use fewbits_cfwmd::network::Network;
-use fewbits_core::{BitString, Link, NumberFormat};
+use fewbits_core::{BitString, Link, SensorNode};
 use fewbits_models::constant_velocity_2d;
-use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::CensoringEstimator;
 use fewbits_network::{
     Batching, Bits, Channel, Context, Detail, Error, Field, Frame, Instant, Joules, Kind, Ledger, Loss, Protocol,
-    Radio, Seconds, SensorId, Setup, Simulator, Star,
+    Radio, Seconds, SensorId, Setup, Simulator,
 };
+use fewbits_protocol::{Feedback, ReportLength};
 use proptest::prelude::*;
 
 pub fn near(a: Joules, b: Joules) -> bool {
@@ -49,7 +49,7 @@ proptest! {
             ..setup(seed)
         };
         let link = Link::lossy(0.5).unwrap();
-        let star = Star::told(counted(link), scalar(3, 6, seed), clock(), Stream::new(seed)).unwrap();
+        let star = counted(link, Feedback::Told, scalar(3, 6, seed));
         let mut network = star.simulate(10.0, setup).unwrap();
         network.run_until(clock().end(6)).unwrap();
         conserves(network.ledger());
@@ -76,8 +76,10 @@ fn silence_costs_nothing_on_air() {
     // A threshold that nothing crosses: the sensors hear the centre and are silent.
     let network = Network::new(plane_sensors(), 1e6, Link::PERFECT).unwrap();
     let dynamics = constant_velocity_2d(1.0, 0.05).unwrap();
-    let estimator = CensoringEstimator::own(network, NumberFormat::Double, dynamics, plane_start(), 10).unwrap();
-    let star = Star::told(estimator, plane(10), clock(), Stream::new(1)).unwrap();
+    let estimator = CensoringEstimator::own(network, dynamics, plane_start(), 10).unwrap();
+    let nodes = estimator.clone();
+    let node = move |i| -> Box<dyn SensorNode<1>> { Box::new(nodes.node(i)) };
+    let star = star(estimator, Feedback::Told, ReportLength::Fixed(64), node, plane(10));
     let mut network = star.simulate(10.0, setup(1)).unwrap();
     network.run_until(clock().end(10)).unwrap();
     for sensor in &network.ledger().accounts()[1..] {
@@ -88,7 +90,7 @@ fn silence_costs_nothing_on_air() {
 
 #[test]
 fn a_frame_costs_what_the_data_sheet_says() {
-    let star = Star::told(counted(Link::PERFECT), scalar(3, 1, 1), clock(), Stream::new(1)).unwrap();
+    let star = counted(Link::PERFECT, Feedback::Told, scalar(3, 1, 1));
     let mut network = star.simulate(10.0, setup(1)).unwrap();
     network.run_until(clock().end(1)).unwrap();
     let sensor = network.ledger().accounts()[1];
@@ -108,7 +110,7 @@ fn repetitions_and_acknowledgements_are_charged() {
             retries,
             ..setup(3)
         };
-        let star = Star::told(counted(Link::lossy(0.5).unwrap()), scalar(3, 30, 1), clock(), Stream::new(1)).unwrap();
+        let star = counted(Link::lossy(0.5).unwrap(), Feedback::Told, scalar(3, 30, 1));
         let mut network = star.simulate(10.0, setup).unwrap();
         network.run_until(clock().end(30)).unwrap();
         conserves(network.ledger());
@@ -122,7 +124,7 @@ fn repetitions_and_acknowledgements_are_charged() {
 }
 
 /// Every node sends one frame of one bit to node 0 at each timer.
-struct Chatter;
+pub struct Chatter;
 
 impl Protocol for Chatter {
     type Node = u32;
@@ -171,7 +173,7 @@ fn frames_that_wait_for_company_share_preamble_and_header() {
 fn batteries_end() {
     let mut radio = Radio::cc2420(0.0).unwrap();
     radio.battery = Some(Joules::new(1.0).unwrap());
-    let star = Star::told(counted(Link::lossy(0.5).unwrap()), scalar(3, 300, 1), clock(), Stream::new(1)).unwrap();
+    let star = counted(Link::lossy(0.5).unwrap(), Feedback::Told, scalar(3, 300, 1));
     let mut network = star.simulate(10.0, Setup { radio, ..setup(1) }).unwrap();
     network.run_until(clock().end(300)).unwrap();
     // 7.4 mW idle alone end it after 135 s.
@@ -186,7 +188,7 @@ fn a_centre_on_the_mains_outlives_its_sensors() {
     let mut radio = Radio::cc2420(0.0).unwrap();
     radio.battery = Some(Joules::new(1.0).unwrap());
     let radios = [(SensorId(0), radio.on_mains())].into();
-    let star = Star::told(counted(Link::lossy(0.5).unwrap()), scalar(3, 300, 1), clock(), Stream::new(1)).unwrap();
+    let star = counted(Link::lossy(0.5).unwrap(), Feedback::Told, scalar(3, 300, 1));
     let mut network = star
         .simulate(
             10.0,

@@ -11,6 +11,7 @@ mod acknowledgements;
 mod attacks;
 mod bit_star;
 mod books;
+mod contention;
 mod defects;
 mod faults;
 mod lossless;

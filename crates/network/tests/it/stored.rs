@@ -1,11 +1,11 @@
 //! Logs and snapshots: written, read, replayed, continued; the same bytes on any number of threads.
 
-use crate::worlds::{clock, counted, scalar, setup};
+use crate::worlds::{Counted, clock, counted, scalar, setup};
 use fewbits_core::Link;
-use fewbits_monte_carlo::Stream;
 use fewbits_network::{
-    Channel, Detail, Error, Fault, FaultKind, Field, Log, Loss, Seconds, SensorId, Setup, Simulator, Star,
+    Channel, Detail, Error, Fault, FaultKind, Field, Log, Loss, Seconds, SensorId, Setup, Simulator,
 };
+use fewbits_protocol::Feedback;
 use proptest::prelude::*;
 use rayon::prelude::*;
 
@@ -51,12 +51,11 @@ fn faulty(seed: u64) -> Setup {
     }
 }
 
-fn star() -> Star<fewbits_network::estimators::ParallelDymboEstimator> {
-    let link = Link::lossy(0.4).unwrap();
-    Star::echoed(counted(link), scalar(3, SLOTS as usize, 1), clock(), Stream::new(1)).unwrap()
+fn star() -> Counted {
+    counted(Link::lossy(0.4).unwrap(), Feedback::Echoed, scalar(3, SLOTS as usize, 1))
 }
 
-fn network(seed: u64) -> Simulator<Star<fewbits_network::estimators::ParallelDymboEstimator>> {
+fn network(seed: u64) -> Simulator<Counted> {
     star().simulate(10.0, faulty(seed)).unwrap()
 }
 
@@ -80,8 +79,7 @@ fn a_log_is_read_back_and_replayed() {
     assert_eq!(bytes(again.log()), stored);
     assert_eq!((again.ledger(), again.nodes()[0].estimates()), (first.ledger(), first.nodes()[0].estimates()));
     // A run that is not the log's own says so.
-    let other = Star::echoed(counted(Link::lossy(0.4).unwrap()), scalar(3, SLOTS as usize, 2), clock(), Stream::new(1))
-        .unwrap();
+    let other = counted(Link::lossy(0.4).unwrap(), Feedback::Echoed, scalar(3, SLOTS as usize, 2));
     let mut other = other.simulate(10.0, faulty(1)).unwrap().replaying(&log);
     assert!(matches!(other.run_until(clock().end(SLOTS)), Err(Error::LeftLog { .. })));
 }

@@ -1,14 +1,15 @@
 //! Truths and measurements, the same for an estimator alone and over a network.
 
-use fewbits_core::factor::{Constant, Partition, Scalar};
-use fewbits_core::{Dynamics, Error, Gaussian, Link, NumberFormat, Observation, Scheme, Sensing, Sign};
-use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant};
+use fewbits_core::{
+    Dynamics, FullValue, Gaussian, Link, NumberFormat, Observation, Observed, Scheme, SchemeNode, Sensing, SensorNode,
+};
+use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter, ScalarPlant};
+use fewbits_filters::assumed_density;
 use fewbits_models::{Ar1, LinearSensor, constant_velocity_2d};
 use fewbits_monte_carlo::Stream;
-use fewbits_network::estimators::ParallelDymboEstimator;
-use fewbits_network::{Clock, Radio, Seconds, Setup};
-use nalgebra::{Matrix4, Vector1, Vector4};
-use rand::Rng;
+use fewbits_network::{BitStar, Clock, Measurements, Radio, Seconds, Setup};
+use fewbits_protocol::{BoxError, Estimator, Feedback, OverBits, ReportLength, moments};
+use nalgebra::{Matrix4, SVector, Vector1, Vector4};
 
 pub fn plant() -> ScalarPlant {
     ScalarPlant::new(0.9, 0.5, 1.0).unwrap()
@@ -67,52 +68,81 @@ pub fn setup(seed: u64) -> Setup {
 }
 
 /// Three one-bit sensors over a link that is known to be faulty.
-pub fn counted(link: Link) -> ParallelDymboEstimator {
-    let filter = ParallelFilter::new(plant(), 3, CountFusion::Linear)
-        .unwrap()
-        .with_link(link);
-    ParallelDymboEstimator::new(filter, start()).unwrap()
+pub type Counted = BitStar<OverBits<ParallelEstimator>, 1>;
+
+pub fn counted(link: Link, feedback: Feedback, measurements: impl Into<Measurements<Vector1<f64>>>) -> Counted {
+    let filter = ParallelFilter::new(plant(), 3, CountFusion::Linear).unwrap();
+    let estimator = ParallelEstimator::new(filter.with_link(link), start()).unwrap();
+    let nodes = each(estimator.scheme());
+    star(estimator, feedback, ReportLength::Fixed(1), nodes, measurements)
 }
 
-/// The stranger's scheme of `docs/own-scheme.md`.
+/// The sensors' halves of a scheme.
+pub fn each<C>(scheme: C) -> impl Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static
+where
+    C: Scheme<1> + Clone + Send + Sync + 'static,
+    C::State: 'static,
+{
+    move |_| Box::new(SchemeNode::new(scheme.clone()))
+}
+
+pub fn star<E, const M: usize>(
+    estimator: E,
+    feedback: Feedback,
+    report: ReportLength,
+    node: impl Fn(usize) -> Box<dyn SensorNode<M>> + Send + Sync + 'static,
+    measurements: impl Into<Measurements<SVector<f64, M>>>,
+) -> BitStar<OverBits<E>, M>
+where
+    E: Estimator + Clone + Send + Sync + 'static,
+{
+    let centre = move || Ok(OverBits::new(estimator.clone()));
+    BitStar::new(centre, feedback, report, node, measurements, clock(), Stream::new(1)).unwrap()
+}
+
+/// The Kalman filter of three sensors that send every measurement over a known link.
 #[derive(Debug, Clone)]
-pub struct TwoSided {
-    pub reach: f64,
-    pub noise_variance: f64,
-}
+pub struct AllSend(pub Link);
 
-impl Scheme<1> for TwoSided {
-    type State = ();
-    type Feedback = f64;
-    type Report = Sign;
-    type Factor = Scalar;
+impl Estimator for AllSend {
+    type Belief = Gaussian<1>;
+    type Feedback = ();
+    type Report = f64;
 
-    fn start(&self) {}
-
-    fn feedback_format(&self) -> NumberFormat {
+    fn sensors(&self) -> usize {
+        3
+    }
+    fn start(&self) -> Gaussian<1> {
+        start()
+    }
+    fn predict(&self, _: u64, belief: &Gaussian<1>) -> Result<Gaussian<1>, BoxError> {
+        Ok(plant().predict(belief))
+    }
+    fn feedback(&self, _: &Gaussian<1>, _: usize) -> Result<(), BoxError> {
+        Ok(())
+    }
+    fn update(
+        &self,
+        _: u64,
+        predicted: &Gaussian<1>,
+        observed: &[(usize, Observation<f64>)],
+    ) -> Result<Gaussian<1>, BoxError> {
+        let mut belief = *predicted;
+        for (_, observation) in observed {
+            let factor = FullValue::new(1.0)?.factor(&(), observation, &self.0)?;
+            let observed = Observed::new(LinearSensor::<1, 1>::direct(1.0)?, factor);
+            belief = assumed_density::update_through(&belief, &observed)?.0;
+        }
+        Ok(belief)
+    }
+    fn estimate(&self, belief: &Gaussian<1>) -> Vec<(f64, f64)> {
+        moments(belief)
+    }
+    fn belief_format(&self) -> NumberFormat {
         NumberFormat::Double
     }
-
-    fn report_format(&self) {}
-
-    fn encode<R: Rng + ?Sized>(
-        &self,
-        _: &mut R,
-        (): &mut (),
-        measurement: &Vector1<f64>,
-        prediction: &f64,
-    ) -> Result<Option<Sign>, Error> {
-        Ok(Some(Sign::of((measurement[0] - prediction).abs(), self.reach)?))
-    }
-
-    fn factor(&self, prediction: &f64, observation: &Observation<Sign>, link: &Link) -> Result<Scalar, Error> {
-        let received = match observation {
-            Observation::Received(sign) => *sign,
-            missing => return Ok(Constant::of_delivery(missing, link).into()),
-        };
-        let given = |sent: Sign| link.arrival() * link.word_probability(sent as u64, received as u64, 1);
-        let edges = vec![prediction - self.reach, prediction + self.reach];
-        let given_cell = [Sign::Above, Sign::Below, Sign::Above].map(given).to_vec();
-        Ok(Partition::new(edges, given_cell, self.noise_variance)?.into())
+    fn feedback_format(&self, _: usize) {}
+    fn report_format(&self, _: usize) -> NumberFormat {
+        NumberFormat::Double
     }
 }

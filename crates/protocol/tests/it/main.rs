@@ -3,5 +3,7 @@
 
 mod centre;
 mod frame;
+mod handover;
+mod over_bits;
 mod sensor;
 mod wild;

@@ -1,76 +1,88 @@
-//! A star whose nodes run the state machines of `fewbits-protocol`: the machines, and the bytes, of real sensors.
+//! A star whose nodes run the state machines of `fewbits-protocol`: the machines of real sensors.
+//!
+//! `driver` hands the simulator's events to the machines, `centre` and `sensor` do what these ask for, `relay` passes frames on, `node` has what
+//! they hold, `translation` their frames and notes.
 
-mod translation;
+mod centre;
+mod driver;
+mod node;
+mod relay;
+mod sensor;
+pub(crate) mod translation;
 
-use super::star::CENTRE;
+pub use node::{BitNode, CentreNode, SensingNode, SlotEstimate, StoredBitNode};
+
 use crate::clock::Clock;
 use crate::error::Error;
 use crate::measurements::Measurements;
 use crate::medium::{Field, Frame, Kind};
-use crate::note::{Note, Stage};
-use crate::simulator::{Context, Protocol, Setup, Simulator};
-use crate::units::{Instant, SensorId};
-use fewbits_core::{BitString, SensorNode};
+use crate::simulator::transmission::air_time;
+use crate::simulator::{Setup, Simulator};
+use crate::units::{Bits, Instant, Seconds, SensorId};
+use fewbits_core::{Scheme, SchemeNode, SensorNode};
 use fewbits_monte_carlo::Stream;
-use fewbits_numerics::error::refuse;
-use fewbits_protocol as machines;
 use fewbits_protocol::{
-    Action, Centre, CentreSettings, CentreTimer, Feedback, Member, Outcome, Payload, Reaction, Receiver, Recipient,
-    ReportLength, Schedule, Sensor, SensorSettings, SensorTimer, Slot, Task, reports_of, update_or_drop,
+    BoxError, Centre, CentreSettings, Feedback, Member, Receiver, ReportLength, Sensor, SensorSettings,
 };
 use nalgebra::SVector;
+use node::Failures;
+use relay::Routes;
 use std::fmt;
-use std::num::NonZeroU64;
-use std::sync::Arc;
-use translation::{failed, machine_frame, noted, of, simulated};
+use std::sync::{Arc, OnceLock};
 
+const CENTRE: SensorId = SensorId(0);
 /// Timers of nodes: a slot begins; the deadline of a centre, or a missing acknowledgement (with the slot above) of a sensor.
 const SLOT_BEGINS: u32 = 0;
 const OTHER: u32 = 1;
 
-/// A fusion centre (node 0) and its sensors, of which nothing is known but bits: any [`Receiver`] at the centre, any [`SensorNode`] at the sensors.
+/// A fusion centre (node 0) and its sensors (nodes 1, 2, ...), of which nothing is known but bits: any [`Receiver`] at the centre, any
+/// [`SensorNode`] at the sensors.
 ///
+/// ```text
+/// slot k, centre:  predict;  broadcast feedback or echo, with a digest
+///         sensor:  check the digest;  measure;  report, with the digest of what it was told
+///         centre, at the deadline:  update with the reports of the right slot and digest
+/// ```
 /// The nodes are driven as `fewbits-link` drives them over sockets. The receiver of a real centre and the sensors' halves run here unchanged.
+/// Where an update fails (nothing came over a link that is thought to lose nothing), the sensors of which nothing came are left out, and that is
+/// noted. A node that fails in more than half of the slots ends the run.
 pub struct BitStar<R, const M: usize> {
-    receiver: Arc<dyn Fn() -> Result<R, machines::BoxError> + Send + Sync>,
+    receiver: Arc<MakeReceiver<R>>,
     members: Vec<Member>,
-    node: Arc<dyn Fn(usize) -> Box<dyn SensorNode<M>> + Send + Sync>,
+    node: Arc<MakeNode<M>>,
     measurements: Measurements<SVector<f64, M>>,
     clock: Clock,
     stream: Stream,
     arrives: Option<Arc<Arrives>>,
+    routes: Option<Arc<OnceLock<Routes>>>,
+    announce_every: u32,
+    /// Offset of the first sensor that reports by the clock, and from one to the next.
+    offsets: [Seconds; 2],
 }
 
+impl<R, const M: usize> Clone for BitStar<R, M> {
+    fn clone(&self) -> Self {
+        Self {
+            receiver: self.receiver.clone(),
+            members: self.members.clone(),
+            node: self.node.clone(),
+            measurements: self.measurements.clone(),
+            arrives: self.arrives.clone(),
+            routes: self.routes.clone(),
+            ..*self
+        }
+    }
+}
+
+type MakeReceiver<R> = dyn Fn() -> Result<R, BoxError> + Send + Sync;
+type MakeNode<const M: usize> = dyn Fn(usize) -> Box<dyn SensorNode<M>> + Send + Sync;
 type Arrives = dyn Fn(u32, usize) -> bool + Send + Sync;
 
 impl<R, const M: usize> fmt::Debug for BitStar<R, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("BitStar").finish_non_exhaustive()
-    }
-}
-
-/// A node of a [`BitStar`].
-#[non_exhaustive]
-pub enum BitNode<R, const M: usize> {
-    /// The fusion centre: machine, estimator, and mean and deviation of each coordinate after each slot with an update.
-    Centre(Box<Centre>, R, Vec<(u32, Vec<(f64, f64)>)>),
-    /// A sensor: machine, its half of the scheme, and the centre's estimator where it follows by echo.
-    Sensor(Box<Sensor>, Box<dyn SensorNode<M>>, Option<R>),
-}
-
-impl<R, const M: usize> fmt::Debug for BitNode<R, M> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("BitNode").finish_non_exhaustive()
-    }
-}
-
-impl<R, const M: usize> BitNode<R, M> {
-    /// The centre's estimates: slot, and mean and deviation of each coordinate. Empty at a sensor.
-    pub fn estimates(&self) -> &[(u32, Vec<(f64, f64)>)] {
-        match self {
-            Self::Centre(_, _, estimates) => estimates,
-            Self::Sensor(..) => &[],
-        }
+        f.debug_struct("BitStar")
+            .field("members", &self.members)
+            .finish_non_exhaustive()
     }
 }
 
@@ -81,7 +93,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
     /// # Errors
     /// If the estimator cannot be made, a slot of a table has not one measurement per sensor, or there are 2^23 slots or more.
     pub fn new(
-        receiver: impl Fn() -> Result<R, machines::BoxError> + Send + Sync + 'static,
+        receiver: impl Fn() -> Result<R, BoxError> + Send + Sync + 'static,
         feedback: Feedback,
         report: ReportLength,
         node: impl Fn(usize) -> Box<dyn SensorNode<M>> + Send + Sync + 'static,
@@ -94,9 +106,6 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             .map_err(|error| Error::estimator("receiver", error))?
             .sensors();
         measurements.check(sensors)?;
-        if measurements.slots() >= 1 << (machines::SLOT_BITS - 1) {
-            return refuse("measurements", measurements.slots(), "fewer than 2^23 slots");
-        }
         Ok(Self {
             members: vec![Member { feedback, report }; sensors],
             receiver: Arc::new(receiver),
@@ -105,7 +114,40 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             clock,
             stream,
             arrives: None,
+            routes: None,
+            announce_every: 0,
+            offsets: [Seconds::ZERO; 2],
         })
+    }
+
+    /// A star whose sensors are told what they must know and all report by one scheme.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of_scheme<C>(
+        receiver: impl Fn() -> Result<R, BoxError> + Send + Sync + 'static,
+        scheme: C,
+        measurements: impl Into<Measurements<SVector<f64, M>>>,
+        clock: Clock,
+        stream: Stream,
+    ) -> Result<Self, Error>
+    where
+        C: Scheme<M> + Clone + Send + Sync + 'static,
+        C::State: 'static,
+    {
+        let node = move |_| -> Box<dyn SensorNode<M>> { Box::new(SchemeNode::new(scheme.clone())) };
+        Self::new(receiver, Feedback::Told, ReportLength::Varying, node, measurements, clock, stream)
+    }
+
+    /// The same where one sensor (the first is 0) learns what it must know, or reports, in another way.
+    ///
+    /// # Errors
+    /// If there is no such sensor.
+    pub fn with_member(mut self, sensor: usize, member: Member) -> Result<Self, Error> {
+        let nodes = self.members.len();
+        let place = self.members.get_mut(sensor);
+        *place.ok_or(Error::UnknownNode { node: sensor, nodes })? = member;
+        Ok(self)
     }
 
     /// The same with losses that were recorded: a report reaches the centre only if `arrives(slot, sensor)`. The channel's losses come on top.
@@ -115,33 +157,111 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         self
     }
 
-    /// The network before its first slot, on a field of one's own: node 0 is the centre, and every sensor must be in range of it.
+    /// The same where sensors out of range of the centre send through others, along shortest routes. What the centre sends to all is passed on by
+    /// every sensor on whose way others are; a frame that is passed on has the sensor's number and a header of its own besides.
+    #[must_use]
+    pub fn relaying(mut self) -> Self {
+        self.routes = Some(Arc::default());
+        self
+    }
+
+    /// The same where the centre sends a heartbeat every so many slots in which it sends nothing else to all, by which sensors set their clocks.
+    #[must_use]
+    pub fn announcing(self, every: u32) -> Self {
+        Self {
+            announce_every: every,
+            ..self
+        }
+    }
+
+    /// The same where the first sensor that reports by the clock does so `first` after the slot's beginning, and each other `spacing` after the one
+    /// before it. A clock may be ahead by `first`.
+    #[must_use]
+    pub fn reporting_at(self, first: Seconds, spacing: Seconds) -> Self {
+        Self {
+            offsets: [first, spacing],
+            ..self
+        }
+    }
+
+    /// The slots.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    /// The network before its first slot: the centre in the middle of its sensors, `radius` metres away.
     ///
     /// # Errors
-    /// If the setup is out of range, the field has not one node per sensor and one for the centre, or a sensor does not reach the centre.
+    /// As [`simulate_on`](Self::simulate_on); if the radius is out of range.
+    pub fn simulate(self, radius: f64, setup: Setup) -> Result<Simulator<Self>, Error> {
+        let field = Field::star(self.members.len(), radius)?;
+        self.simulate_on(field, setup)
+    }
+
+    /// The network before its first slot, on a field of one's own: node 0 is the centre, and every sensor must reach it, directly or by
+    /// [`relaying`](Self::relaying).
+    ///
+    /// # Errors
+    /// If the setup is out of range, the field has not one node per sensor and one for the centre; [`Error::OutOfRange`] or
+    /// [`Error::Disconnected`] if a sensor does not reach the centre; [`Error::SlotTooShort`] if a slot has no time for a report of every sensor.
     pub fn simulate_on(self, field: Field, setup: Setup) -> Result<Simulator<Self>, Error> {
-        let sensors = self.members.len();
-        for sensor in 1..=sensors as u32 {
-            field.check_link(SensorId(sensor), CENTRE)?;
-        }
-        let (first, schedule) = (self.clock.start(1), self.schedule());
-        let centre = Centre::new(CentreSettings::new(self.members.clone(), schedule));
-        let mut nodes = vec![BitNode::Centre(Box::new(centre), self.started()?, Vec::new())];
-        let clocked: Vec<bool> = self.members.iter().map(|m| m.feedback == Feedback::Clock).collect();
+        let sensors = 1..=self.members.len() as u32;
+        let hops = match self.routes {
+            Some(_) => {
+                field.routes(CENTRE)?;
+                let hops = |sensor| self.routes(&field).map_or(1, |routes| routes.hops(sensor));
+                sensors.map(hops).collect()
+            }
+            None => {
+                for sensor in sensors {
+                    field.check_link(SensorId(sensor), CENTRE)?;
+                }
+                vec![1; self.members.len()]
+            }
+        };
+        self.check_fits(&setup, &hops)?;
+        let mut settings = CentreSettings::new(self.members.clone(), self.clock.schedule());
+        settings.announce_every = self.announce_every;
+        let mut nodes = vec![BitNode::Centre(Box::new(CentreNode {
+            machine: Centre::new(settings),
+            receiver: self.started()?,
+            estimates: Vec::new(),
+            failures: Failures::default(),
+        }))];
         for (i, member) in self.members.iter().enumerate() {
             let mut settings = SensorSettings::new(member.feedback);
-            settings.schedule = Some(schedule);
-            let replica = (member.feedback == Feedback::Echoed)
-                .then(|| self.started())
-                .transpose()?;
-            nodes.push(BitNode::Sensor(Box::new(Sensor::new(settings)), (self.node)(i), replica));
+            settings.schedule = Some(self.clock.schedule());
+            settings.offset = self.offset(i);
+            nodes.push(BitNode::Sensor(Box::new(SensingNode {
+                machine: Sensor::new(settings),
+                half: (self.node)(i),
+                counted: 0,
+                replica: self.replica(i)?,
+                passed: 0,
+                failures: Failures::default(),
+            })));
         }
+        let first = self.clock.start(1);
+        let clocked = |(_, member): &(usize, &Member)| member.feedback == Feedback::Clock;
+        let clocked = self.members.iter().enumerate().filter(clocked);
+        let starts: Vec<_> = clocked
+            .map(|(i, _)| (SensorId(i as u32 + 1), Instant(first.0.saturating_add(self.offset(i)))))
+            .collect();
         let mut simulator = Simulator::new(self, nodes, field, setup)?;
-        simulator.start(CENTRE, first, SLOT_BEGINS)?;
-        for (sensor, _) in (1..).zip(clocked).filter(|(_, clocked)| *clocked) {
-            simulator.start(SensorId(sensor), first, SLOT_BEGINS)?;
+        for (node, at) in [(CENTRE, first)].into_iter().chain(starts) {
+            simulator.start(node, at, SLOT_BEGINS)?;
         }
         Ok(simulator)
+    }
+
+    /// From the beginning of a slot until a sensor that reports by the clock measures, in nanoseconds.
+    fn offset(&self, sensor: usize) -> u64 {
+        let before = self.members.iter().take(sensor);
+        let before = before.filter(|member| member.feedback == Feedback::Clock).count();
+        let [first, spacing] = self.offsets;
+        (0..before)
+            .fold(Instant::default().after(first), |at, _| at.after(spacing))
+            .0
     }
 
     /// The estimator before its first slot.
@@ -149,251 +269,44 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         (self.receiver)().map_err(|error| Error::estimator("receiver", error))
     }
 
-    fn schedule(&self) -> Schedule {
-        // A clock's period is a microsecond or more.
-        Schedule::new(NonZeroU64::new(self.clock.start(1).0).unwrap_or(NonZeroU64::MIN))
+    /// The estimator of a sensor that follows the centre.
+    fn replica(&self, sensor: usize) -> Result<Option<R>, Error> {
+        let follows = self.members.get(sensor).is_some_and(|m| m.feedback == Feedback::Echoed);
+        follows.then(|| self.started()).transpose()
     }
 
-    fn carry_out(
-        &self,
-        centre: &mut Centre,
-        receiver: &mut R,
-        estimates: &mut Vec<(u32, Vec<(f64, f64)>)>,
-        context: &mut Context<'_>,
-        actions: Vec<Action>,
-    ) -> Result<(), Error> {
-        for action in actions {
-            match action {
-                Action::SetTimer { at, timer } => {
-                    let token = if timer == CentreTimer::SlotBegins {
-                        SLOT_BEGINS
-                    } else {
-                        OTHER
-                    };
-                    context.at(Instant(at), token);
-                }
-                Action::Note { sensor, note } => context.note(noted(SensorId(sensor as u32 + 1), note)),
-                Action::Send { to, frame } => {
-                    let frame = simulated(&frame)?;
-                    match to {
-                        Recipient::All => context.broadcast(&frame)?,
-                        Recipient::Sensor(i) => drop(context.send(SensorId(i as u32 + 1), &frame)?),
-                    }
-                }
-                Action::Predict { slot } if slot > u64::from(self.measurements.slots()) => {}
-                Action::Predict { slot } => {
-                    let follows = self.members.iter().any(|m| m.feedback == Feedback::Echoed);
-                    let prepared = (|| {
-                        let state = if follows { Some(receiver.state()?) } else { None };
-                        receiver.predict(slot)?;
-                        let feedback = (0..self.members.len()).map(|i| receiver.feedback(i));
-                        Ok::<_, machines::BoxError>((feedback.collect::<Result<Vec<_>, _>>()?, state))
-                    })();
-                    match prepared {
-                        Ok((feedback, state)) => {
-                            let mut sent = Vec::new();
-                            centre.on_predicted(&feedback, state.as_ref(), &mut sent);
-                            self.carry_out(centre, receiver, estimates, context, sent)?;
-                        }
-                        Err(error) => context.note(failed(Stage::Prediction, slot as u32, &error)),
-                    }
-                }
-                Action::Update { slot, observed } => {
-                    let slot = slot as u32;
-                    match update_or_drop(receiver, &observed) {
-                        Outcome::Used => {}
-                        Outcome::SilentDropped(error) => {
-                            let reason = error.to_string();
-                            context.note(Note::SilenceIgnored { slot, reason });
-                        }
-                        Outcome::Failed(error) => context.note(failed(Stage::Update, slot, &error)),
-                    }
-                    estimates.push((slot, receiver.estimate()));
-                }
-            }
+    /// Checks that a slot has time for what the centre sends in the first slot, and for a report of each sensor. Echoes are counted with a bit
+    /// per sensor, reports without payload, since their lengths are not known beforehand.
+    fn check_fits(&self, setup: &Setup, hops: &[usize]) -> Result<(), Error> {
+        let mut receiver = self.started()?;
+        let (told, state) = self
+            .predict(&mut receiver, 1)
+            .map_err(|error| Error::estimator("receiver", error))?;
+        let members = || self.members.iter().zip(&told);
+        let mut bodies: Vec<u64> = members()
+            .filter(|(member, _)| member.feedback == Feedback::Told)
+            .map(|(_, told)| u64::from(Frame::overhead(Kind::Question)) + told.bits() as u64)
+            .collect();
+        if bodies.len() == told.len() && told.windows(2).all(|pair| pair[0] == pair[1]) {
+            bodies.truncate(1);
         }
-        Ok(())
-    }
-
-    fn react(
-        &self,
-        machine: &mut Sensor,
-        half: &mut dyn SensorNode<M>,
-        replica: &mut Option<R>,
-        context: &mut Context<'_>,
-        reaction: Reaction<'_>,
-    ) -> Result<(), Error> {
-        if let Some((at, timer)) = reaction.timer {
-            let token = match timer {
-                SensorTimer::Unacknowledged { slot } => OTHER | slot.number() << 1,
-                _ => SLOT_BEGINS,
-            };
-            context.at(Instant(at), token);
+        bodies.extend(state.map(|_| u64::from(Frame::overhead(Kind::Echo)) + told.len() as u64));
+        let (report, relayed) = (u64::from(Frame::overhead(Kind::Report)), u64::from(Frame::overhead(Kind::Relayed)));
+        for hops in hops.iter().copied() {
+            bodies.extend(std::iter::repeat_n(report + if hops > 1 { relayed } else { 0 }, hops));
         }
-        if let Some(note) = reaction.note {
-            context.note(noted(CENTRE, note));
+        let frames = bodies.len();
+        let mut needed = air_time(&setup.radio, bodies.into_iter().map(Bits));
+        if setup.retries.is_some() {
+            needed += std::iter::repeat_n(setup.radio.answer_time(), hops.iter().sum()).sum();
         }
-        let (index, now) = (context.id().index() - 1, context.now().0);
-        match reaction.task {
-            // The radio repeats by itself.
-            Task::Wait | Task::SendAgain => Ok(()),
-            Task::Send(frame) => context.send(CENTRE, &of(&frame)).map(drop),
-            Task::Follow { slot, kind, payload } => {
-                let digest = replica.as_mut().and_then(|replica| {
-                    let state = self.followed(replica, slot, kind, payload.into()).ok()?;
-                    Some(machines::digest(slot.before(), Payload::from(&state)))
-                });
-                let reaction = machine.on_followed(digest);
-                self.react(machine, half, replica, context, reaction)
-            }
-            Task::Sample { slot, feedback } => {
-                let number = slot.number();
-                if number > self.measurements.slots() {
-                    return Ok(());
-                }
-                let feedback = match replica {
-                    None => feedback.into(),
-                    // What is shared is asked as it would travel.
-                    Some(replica) => match replica
-                        .predict(u64::from(number))
-                        .and_then(|()| replica.feedback(index))
-                    {
-                        Ok(feedback) => feedback,
-                        Err(error) => {
-                            context.note(failed(Stage::Prediction, number, &error));
-                            return Ok(());
-                        }
-                    },
-                };
-                let mut rng = super::slot::own(self.stream, index, number);
-                let reported = self
-                    .measurements
-                    .with(number, index, |measurement| half.report(&mut rng, measurement, &feedback));
-                let report = match reported {
-                    Some(Ok(report)) => report,
-                    Some(Err(error)) => {
-                        context.note(failed(Stage::Report, number, &error.into()));
-                        None
-                    }
-                    None => {
-                        context.note(Note::NotMeasured { slot: number });
-                        None
-                    }
-                };
-                let reaction = machine.on_sample(now, report.as_ref().map(Payload::from));
-                self.react(machine, half, replica, context, reaction)
-            }
-        }
-    }
-
-    /// Brings a replica to the end of the slot before `slot`, and returns its state.
-    fn followed(
-        &self,
-        replica: &mut R,
-        slot: Slot,
-        kind: machines::Kind,
-        told: BitString,
-    ) -> Result<BitString, machines::BoxError> {
-        if kind == machines::Kind::Snapshot {
-            replica.restore(&told)?;
-        } else if slot.number() > 1 {
-            // The replica has predicted into that slot when it was asked.
-            let lengths: Vec<_> = self.members.iter().map(|member| member.report).collect();
-            update_or_drop(replica, &reports_of(&told, &lengths)?);
-        }
-        replica.state()
-    }
-}
-
-impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
-    type Node = BitNode<R, M>;
-
-    fn on_timer(&self, node: &mut Self::Node, context: &mut Context<'_>, token: u32) -> Result<(), Error> {
-        let now = context.now().0;
-        match node {
-            BitNode::Centre(centre, receiver, estimates) => {
-                let timer = if token == SLOT_BEGINS {
-                    CentreTimer::SlotBegins
-                } else {
-                    CentreTimer::Deadline
-                };
-                if timer == CentreTimer::SlotBegins && centre.slot() >= u64::from(self.measurements.slots()) {
-                    return Ok(());
-                }
-                let mut actions = Vec::new();
-                centre.on_timer(now, timer, &mut actions);
-                self.carry_out(centre, receiver, estimates, context, actions)
-            }
-            BitNode::Sensor(machine, half, replica) => {
-                let timer = match token {
-                    SLOT_BEGINS => SensorTimer::SlotBegins,
-                    _ => SensorTimer::Unacknowledged {
-                        slot: Slot::of_count(u64::from(token >> 1)),
-                    },
-                };
-                if timer == SensorTimer::SlotBegins && self.clock.slot(context.now()) > self.measurements.slots() {
-                    return Ok(());
-                }
-                let reaction = machine.on_timer(now, timer);
-                self.react(machine, &mut **half, replica, context, reaction)
-            }
-        }
-    }
-
-    fn on_frame(
-        &self,
-        node: &mut Self::Node,
-        context: &mut Context<'_>,
-        from: SensorId,
-        frame: &Frame,
-    ) -> Result<(), Error> {
-        let Some(decoded) = machine_frame(frame) else {
-            context.note(Note::Malformed);
-            return Ok(());
-        };
-        match node {
-            BitNode::Centre(centre, receiver, estimates) => {
-                let Some(sensor) = from.index().checked_sub(1) else {
-                    return Ok(());
-                };
-                let recorded = self.arrives.as_ref().filter(|_| frame.kind == Kind::Report);
-                if recorded.is_some_and(|arrives| !arrives(frame.slot, sensor)) {
-                    return Ok(());
-                }
-                let mut actions = Vec::new();
-                centre.on_decoded(sensor, &decoded, &mut actions);
-                self.carry_out(centre, receiver, estimates, context, actions)
-            }
-            // Frames of other sensors are in range, and for the centre.
-            BitNode::Sensor(..) if from != CENTRE => Ok(()),
-            BitNode::Sensor(machine, half, replica) => {
-                let reaction = machine.on_decoded(context.now().0, decoded);
-                self.react(machine, &mut **half, replica, context, reaction)
-            }
-        }
-    }
-
-    fn on_damaged(&self, node: &mut Self::Node, _: &mut Context<'_>, from: SensorId) -> Result<(), Error> {
-        if let (BitNode::Centre(centre, ..), Some(sensor)) = (node, from.index().checked_sub(1)) {
-            centre.on_damaged(sensor);
-        }
-        Ok(())
-    }
-
-    /// The centre begins with what it knew before the first slot; a sensor knows that it must ask.
-    fn on_restart(&self, node: &mut Self::Node, context: &mut Context<'_>) -> Result<(), Error> {
-        match node {
-            BitNode::Centre(centre, receiver, _) => {
-                *receiver = self.started()?;
-                centre.on_memory_lost();
-            }
-            BitNode::Sensor(machine, half, replica) => {
-                *half = (self.node)(context.id().index() - 1);
-                if let Some(replica) = replica {
-                    *replica = self.started()?;
-                }
-                machine.on_memory_lost();
-            }
+        let available = self.clock.reporting_time();
+        if needed > available {
+            return Err(Error::SlotTooShort {
+                frames,
+                needed,
+                available,
+            });
         }
         Ok(())
     }

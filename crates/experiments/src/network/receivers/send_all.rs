@@ -2,16 +2,16 @@
 
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::rule::CensoringRule;
-use fewbits_core::{Error, Link, NumberFormat, Observation, Scheme};
+use fewbits_core::{Error, Link, MeasurementNoise, NumberFormat, Observation, Scheme};
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{all_finite, positive, within};
-use nalgebra::Vector1;
+use nalgebra::{Matrix1, Vector1};
 use rand::Rng;
 
 /// Every measurement, rounded to the format: what all other schemes save on. Without feedback; a value wants a checksum, so no bit
 /// may arrive inverted.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SendAll {
+pub(crate) struct SendAll {
     noise_variance: f64,
     format: NumberFormat,
     always: CensoringRule<1>,
@@ -22,7 +22,7 @@ impl SendAll {
     ///
     /// # Errors
     /// If the variance is not a positive number.
-    pub fn new(noise_variance: f64, format: NumberFormat) -> Result<Self, ArgumentError> {
+    pub(crate) fn new(noise_variance: f64, format: NumberFormat) -> Result<Self, ArgumentError> {
         positive("noise_variance", noise_variance)?;
         let always = CensoringRule::scalar(1.0, 0.0)
             .map_err(|error| ArgumentError::new("noise_variance", noise_variance, error.to_string()))?;
@@ -31,6 +31,12 @@ impl SendAll {
             format,
             always,
         })
+    }
+}
+
+impl MeasurementNoise<1> for SendAll {
+    fn noise_covariance_at(&self, _: &Vector1<f64>) -> Matrix1<f64> {
+        Matrix1::new(self.noise_variance)
     }
 }
 

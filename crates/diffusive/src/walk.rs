@@ -1,13 +1,12 @@
-//! A diffusing source found by records that travel from node to node.
+//! The chain of a search over a network: what travels from node to node.
 
-use crate::error::Error;
-use crate::protocols::{Lead, Walker};
-use crate::units::SensorId;
+use crate::message::{Contract, Packet};
+use crate::{Form, Outcome, Search, SourceSensor, Status};
+use fewbits_core::rand::Rng;
 use fewbits_core::{BitString, Message, NumberFormat};
-use fewbits_diffusive::message::{Contract, Packet};
-use fewbits_diffusive::{Form, Outcome, Search, SourceSensor, Status};
+use fewbits_numerics::ArgumentError;
+use fewbits_protocol::{BoxError, Lead, Leader};
 use fewbits_topology::{Deployment, Graph};
-use rand_pcg::Pcg64Dxsm;
 use std::cell::Cell;
 
 /// The chain of [`Search`] with raw records: whoever receives them repeats the search so far, adds its own, and asks the next
@@ -22,7 +21,7 @@ pub struct SourceChain {
 }
 
 impl SourceChain {
-    /// A chain over a field; `samples` has what each node samples when it is asked.
+    /// A chain over a deployment; `samples` has what each node samples when it is asked.
     ///
     /// # Errors
     /// If there is not one list of samples for each node, or what travels is not raw records.
@@ -32,16 +31,15 @@ impl SourceChain {
         deployment: Deployment,
         graph: Graph,
         samples: Vec<Vec<f64>>,
-    ) -> Result<Self, Error> {
-        let refuse = |name, value: String, expected: &str| fewbits_numerics::ArgumentError::new(name, value, expected);
+    ) -> Result<Self, ArgumentError> {
         if samples.len() != deployment.len() {
-            return Err(refuse("samples", samples.len().to_string(), "a list for each node").into());
+            return Err(ArgumentError::new("samples", samples.len(), "a list for each node"));
         }
         if search.form != Form::Raw {
-            return Err(refuse("form", format!("{:?}", search.form), "raw records").into());
+            return Err(ArgumentError::new("form", format!("{:?}", search.form), "raw records"));
         }
         if search.wire.samples.is_some() && search.wire.numbers == NumberFormat::Double {
-            return Err(refuse("wire", "samples of a code".into(), "plain samples").into());
+            return Err(ArgumentError::new("wire", "samples of a code", "plain samples"));
         }
         Ok(Self {
             search,
@@ -53,30 +51,26 @@ impl SourceChain {
     }
 
     /// The search from its first node over `known` records, and which node it would ask after them.
-    fn repeat(&self, known: &[(usize, Vec<f64>)]) -> Result<(Outcome, Option<usize>), Error> {
+    fn repeat(&self, known: &[(usize, Vec<f64>)]) -> Result<(Outcome, Option<usize>), BoxError> {
         let first = known.first().map_or(0, |(node, _)| *node);
         let run = |most: usize, asked: &Cell<Option<usize>>| {
             let mut search = self.search.clone();
             search.most_nodes = most.min(self.search.most_nodes);
-            search
-                .run(&self.sensor, &self.deployment, &self.graph, first, |node| {
-                    match known.iter().find(|(at, _)| *at == node) {
-                        Some((_, samples)) => samples.clone(),
-                        None => {
-                            asked.set(Some(node));
-                            // Whoever it is will sample itself; here it only matters that it was asked.
-                            self.samples.get(first).cloned().unwrap_or_default()
-                        }
+            search.run(&self.sensor, &self.deployment, &self.graph, first, |node| {
+                match known.iter().find(|(at, _)| *at == node) {
+                    Some((_, samples)) => samples.clone(),
+                    None => {
+                        asked.set(Some(node));
+                        // Whoever it is will sample itself; here it only matters that it was asked.
+                        self.samples.get(first).cloned().unwrap_or_default()
                     }
-                })
-                .map_err(|error| Error::estimator("diffusive", error))
+                }
+            })
         };
         let nobody = Cell::new(None);
         let outcome = run(known.len(), &nobody)?;
         if nobody.get().is_some() {
-            return Err(Error::ForeignHandover {
-                expected: "records of this search",
-            });
+            return Err("the handover has records of another search".into());
         }
         let next = Cell::new(None);
         if outcome.status == Status::NodeLimit && known.len() < self.search.most_nodes {
@@ -86,8 +80,8 @@ impl SourceChain {
     }
 }
 
-impl Walker for SourceChain {
-    fn lead(&self, _: &mut Pcg64Dxsm, slot: u32, node: SensorId, message: Option<&BitString>) -> Result<Lead, Error> {
+impl Leader for SourceChain {
+    fn lead(&self, _: &mut dyn Rng, slot: u64, node: u32, message: Option<&BitString>) -> Result<Lead, BoxError> {
         let contract = Contract {
             wire: self.search.wire,
             noise: self.sensor.noise(),
@@ -97,24 +91,21 @@ impl Walker for SourceChain {
             None => Vec::new(),
             Some(bits) => match Packet::from_bits(&contract, bits)? {
                 Packet::Raw { records, .. } => records,
-                Packet::Belief { .. } => {
-                    return Err(Error::ForeignHandover {
-                        expected: "raw records",
-                    });
-                }
+                Packet::Belief { .. } => return Err("the handover is a belief: expected raw records".into()),
             },
         };
-        let own = self.samples.get(node.index()).ok_or(Error::NoReading { node, slot })?;
-        known.push((node.index(), own.clone()));
+        let own = self.samples.get(node as usize);
+        let own = own.ok_or_else(|| format!("node {node} has no samples in slot {slot}"))?;
+        known.push((node as usize, own.clone()));
         let (outcome, next) = self.repeat(&known)?;
-        let estimate = outcome.estimate().ok_or(Error::NoEstimate)?;
+        let estimate = outcome.estimate().ok_or("the step gave no estimate")?;
         let packet = Packet::Raw {
             records: known,
             noise: contract.noise,
         };
         Ok(Lead {
             message: packet.to_bits(&contract)?,
-            next: next.map(|next| SensorId(next as u32)),
+            next: next.map(u32::try_from).transpose()?,
             estimate: estimate.mean().as_slice().to_vec(),
         })
     }

@@ -1,0 +1,275 @@
+//! Censoring sensors and their fusion centre over bits: an [`Estimator`], and the sensors' halves.
+
+use crate::Error;
+use crate::censored::as_core;
+use crate::network::Network;
+use crate::rule::{CensoringRule, OwnRecursion, Weighing};
+use crate::scheme::{Censoring, Prediction};
+use fewbits_core::{
+    BitReader, BitString, BitWriter, CodecError, Gaussian, LinearDynamics, LinearSensing, Message, NumberFormat,
+    Observation, Scheme, SensorNode,
+};
+use fewbits_filters::kalman;
+use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::at_least_one;
+use fewbits_protocol::{BoxError, Estimator, moments};
+use nalgebra::{SMatrix, SVector};
+use rand::Rng;
+use std::sync::Arc;
+
+/// What the fusion centre broadcasts: the prediction, with its covariance where the sensors weigh by it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Broadcast<const D: usize> {
+    /// The predicted mean.
+    Mean(SVector<f64, D>),
+    /// Mean and covariance.
+    Belief(Prediction<D>),
+}
+
+impl<const D: usize> Message for Broadcast<D> {
+    /// How sensors weigh says whether they are told the covariance.
+    type Format = Weighing;
+
+    fn encode(&self, _: &Weighing, writer: &mut BitWriter) -> Result<(), CodecError> {
+        match self {
+            Self::Mean(mean) => mean.encode(&NumberFormat::Double, writer),
+            Self::Belief(prediction) => prediction.encode(&NumberFormat::Double, writer),
+        }
+    }
+
+    fn decode(weighing: &Weighing, reader: &mut BitReader<'_>) -> Result<Self, CodecError> {
+        match weighing {
+            Weighing::FusionCentre => Prediction::decode(&NumberFormat::Double, reader).map(Self::Belief),
+            _ => SVector::decode(&NumberFormat::Double, reader).map(Self::Mean),
+        }
+    }
+}
+
+/// Rules of all sensors, slot by slot; those of the last slot hold on.
+type Rules<const M: usize> = Arc<Vec<Vec<CensoringRule<M>>>>;
+
+/// Censoring sensors under [`Network::fuse_asked`]: CFwMD, CFwMD2, a schedule, or all-send by a threshold of 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CensoringEstimator<G, S, const D: usize, const M: usize> {
+    network: Network<S, D, M>,
+    dynamics: G,
+    start: Gaussian<D>,
+    weighing: Weighing,
+    /// Empty where the rules follow from the broadcast.
+    rules: Rules<M>,
+}
+
+impl<G, S, const D: usize, const M: usize> CensoringEstimator<G, S, D, M>
+where
+    G: LinearDynamics<D>,
+    S: LinearSensing<D, M> + Clone + PartialEq,
+{
+    /// Sensors that weigh with the covariance of their own filters (CFwMD). The rules of `slots` slots are computed beforehand; the
+    /// last holds on.
+    ///
+    /// # Errors
+    /// If there is no slot, or an innovation covariance is not positive definite.
+    pub fn own(network: Network<S, D, M>, dynamics: G, start: Gaussian<D>, slots: usize) -> Result<Self, Error> {
+        at_least_one("slots", slots)?;
+        let mut own = vec![OwnRecursion::new(&start); network.sensors().len()];
+        let mut rules = Vec::with_capacity(slots);
+        for _ in 0..slots {
+            let slot = own.iter_mut().zip(network.sensors()).map(|(own, sensor)| {
+                let step = own.advance(&dynamics, sensor, start.mean())?;
+                CensoringRule::new(&step.innovation_covariance, network.threshold())
+            });
+            rules.push(slot.collect::<Result<Vec<_>, Error>>()?);
+        }
+        Ok(Self::with_rules(network, dynamics, start, Weighing::OwnFilter, rules))
+    }
+
+    /// Sensors that are told the covariance of the prediction (CFwMD2).
+    pub fn told(network: Network<S, D, M>, dynamics: G, start: Gaussian<D>) -> Self {
+        Self::with_rules(network, dynamics, start, Weighing::FusionCentre, Vec::new())
+    }
+
+    /// Sensors that weigh with expected predicted covariances, one for each slot; the last holds on.
+    ///
+    /// # Errors
+    /// If there is none, or an innovation covariance is not positive definite.
+    pub fn scheduled(
+        network: Network<S, D, M>,
+        dynamics: G,
+        start: Gaussian<D>,
+        covariances: &[SMatrix<f64, D, D>],
+    ) -> Result<Self, Error> {
+        at_least_one("covariances", covariances.len())?;
+        let at = |covariance: &SMatrix<f64, D, D>| network.rules_under(&Gaussian::new(*start.mean(), *covariance)?);
+        let rules = covariances.iter().map(at).collect::<Result<_, Error>>()?;
+        Ok(Self::with_rules(network, dynamics, start, Weighing::Scheduled, rules))
+    }
+
+    fn with_rules(
+        network: Network<S, D, M>,
+        dynamics: G,
+        start: Gaussian<D>,
+        weighing: Weighing,
+        rules: Vec<Vec<CensoringRule<M>>>,
+    ) -> Self {
+        Self {
+            network,
+            dynamics,
+            start,
+            weighing,
+            rules: Arc::new(rules),
+        }
+    }
+
+    /// The half of a sensor. That of a sensor which does not exist refuses every measurement.
+    pub fn node(&self, sensor: usize) -> CensoringNode<S, D, M> {
+        CensoringNode {
+            network: self.network.clone(),
+            weighing: self.weighing,
+            rules: self.rules.clone(),
+            sensor,
+            slot: 0,
+        }
+    }
+}
+
+fn in_slot<const M: usize>(rules: &Rules<M>, slot: u64) -> Result<&[CensoringRule<M>], ArgumentError> {
+    let last = rules.len().saturating_sub(1);
+    let at = usize::try_from(slot.saturating_sub(1)).map_or(last, |at| at.min(last));
+    let none = || ArgumentError::new("rules", "none", "rules of one slot at least");
+    rules.get(at).map(Vec::as_slice).ok_or_else(none)
+}
+
+impl<G, S, const D: usize, const M: usize> Estimator for CensoringEstimator<G, S, D, M>
+where
+    G: LinearDynamics<D>,
+    S: LinearSensing<D, M> + Clone + PartialEq,
+{
+    type Belief = Gaussian<D>;
+    type Feedback = Broadcast<D>;
+    type Report = SVector<f64, M>;
+
+    fn sensors(&self) -> usize {
+        self.network.sensors().len()
+    }
+
+    fn start(&self) -> Gaussian<D> {
+        self.start
+    }
+
+    fn predict(&self, _: u64, belief: &Gaussian<D>) -> Result<Gaussian<D>, BoxError> {
+        Ok(kalman::predict(&self.dynamics, belief))
+    }
+
+    fn feedback(&self, predicted: &Gaussian<D>, _: usize) -> Result<Broadcast<D>, BoxError> {
+        Ok(match self.weighing {
+            Weighing::FusionCentre => Broadcast::Belief(Prediction(*predicted)),
+            _ => Broadcast::Mean(*predicted.mean()),
+        })
+    }
+
+    fn update(
+        &self,
+        slot: u64,
+        predicted: &Gaussian<D>,
+        observed: &[(usize, Observation<SVector<f64, M>>)],
+    ) -> Result<Gaussian<D>, BoxError> {
+        let mut all = vec![None; self.sensors()];
+        for (sensor, observation) in observed {
+            if let Some(place) = all.get_mut(*sensor) {
+                *place = Some(*observation);
+            }
+        }
+        let told;
+        let rules = match self.weighing {
+            Weighing::FusionCentre => {
+                told = self.network.rules_under(predicted)?;
+                &told
+            }
+            _ => in_slot(&self.rules, slot)?,
+        };
+        Ok(self.network.fuse_asked(predicted, rules, predicted.mean(), &all)?.0)
+    }
+
+    fn estimate(&self, belief: &Gaussian<D>) -> Vec<(f64, f64)> {
+        moments(belief)
+    }
+
+    fn belief_format(&self) -> NumberFormat {
+        NumberFormat::Double
+    }
+
+    fn feedback_format(&self, _: usize) -> Weighing {
+        self.weighing
+    }
+
+    fn report_format(&self, _: usize) -> NumberFormat {
+        self.network.format()
+    }
+}
+
+/// The half of a sensor of a [`CensoringEstimator`]. It counts the slots where its rule depends on them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CensoringNode<S, const D: usize, const M: usize> {
+    network: Network<S, D, M>,
+    weighing: Weighing,
+    rules: Rules<M>,
+    sensor: usize,
+    /// The last slot in which it was asked, or that it skipped.
+    slot: u64,
+}
+
+/// Bits of the slot in a stored sensor.
+const SLOT_BITS: u32 = 64;
+
+fn refused(name: &'static str, error: CodecError) -> fewbits_core::Error {
+    ArgumentError::new(name, error, "bits of the agreed format").into()
+}
+
+impl<S: LinearSensing<D, M> + Clone + PartialEq, const D: usize, const M: usize> SensorNode<M>
+    for CensoringNode<S, D, M>
+{
+    fn report(
+        &mut self,
+        rng: &mut dyn Rng,
+        measurement: &SVector<f64, M>,
+        feedback: &BitString,
+    ) -> Result<Option<BitString>, fewbits_core::Error> {
+        let (slot, format) = (self.slot.saturating_add(1), self.network.format());
+        let sensors = self.network.sensors();
+        let unknown = || ArgumentError::new("sensor", self.sensor, format!("below {}", sensors.len()));
+        let sensing = sensors.get(self.sensor).ok_or_else(unknown)?.clone();
+        let told = Broadcast::<D>::from_bits(&self.weighing, feedback).map_err(|e| refused("feedback", e))?;
+        let (mean, rule) = match &told {
+            Broadcast::Belief(Prediction(predicted)) => {
+                (predicted.mean(), self.network.rule_under(self.sensor, predicted).map_err(as_core)?)
+            }
+            Broadcast::Mean(mean) => {
+                let rule = in_slot(&self.rules, slot)?.get(self.sensor);
+                (mean, rule.ok_or_else(unknown)?.clone())
+            }
+        };
+        let scheme = Censoring::new(sensing, rule, format).map_err(as_core)?;
+        let report = scheme.encode(rng, &mut (), measurement, mean)?;
+        let bits = report.map(|report| report.to_bits(&format)).transpose();
+        let bits = bits.map_err(|error| refused("report", error))?;
+        self.slot = slot;
+        Ok(bits)
+    }
+
+    fn skip(&mut self, slots: u64) {
+        self.slot = self.slot.saturating_add(slots);
+    }
+
+    fn stored(&self) -> Option<BitString> {
+        let mut writer = BitWriter::new();
+        writer.write(self.slot, SLOT_BITS).ok()?;
+        Some(writer.finish())
+    }
+
+    fn restore(&mut self, memory: &BitString) -> Result<(), fewbits_core::Error> {
+        let mut reader = BitReader::new(memory);
+        let slot = reader.read(SLOT_BITS).and_then(|slot| reader.finish().map(|()| slot));
+        self.slot = slot.map_err(|error| refused("memory", error))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,139 @@
+//! The filters at a fusion centre over bits: [`Estimator`]s, which [`OverBits`](fewbits_protocol::OverBits) makes receivers.
+//!
+//! The sensors' half is [`SchemeNode`](fewbits_core::SchemeNode) of the filter's scheme.
+
+use crate::filter::ScalarFilter;
+use crate::parallel::ParallelFilter;
+use crate::{Error, SignBit};
+use fewbits_core::{Gaussian, Message, NumberFormat, Observation, Scheme, Sign};
+use fewbits_protocol::{BoxError, Estimator, moments};
+
+/// One sensor under a [`ScalarFilter`]: one bit per sample, or several.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScalarEstimator<F> {
+    /// The filter, with what it knows of the link.
+    pub filter: F,
+    /// What is known before the first slot.
+    pub start: Gaussian<1>,
+}
+
+/// What both estimators share: a Gaussian belief of a scalar, in double precision on its way.
+macro_rules! scalar_belief {
+    () => {
+        type Belief = Gaussian<1>;
+
+        fn start(&self) -> Gaussian<1> {
+            self.start
+        }
+
+        fn estimate(&self, belief: &Gaussian<1>) -> Vec<(f64, f64)> {
+            moments(belief)
+        }
+
+        fn belief_format(&self) -> NumberFormat {
+            NumberFormat::Double
+        }
+    };
+}
+
+impl<F: ScalarFilter> Estimator for ScalarEstimator<F> {
+    scalar_belief!();
+    type Feedback = <F::Scheme as Scheme<1>>::Feedback;
+    type Report = <F::Scheme as Scheme<1>>::Report;
+
+    fn sensors(&self) -> usize {
+        1
+    }
+
+    fn predict(&self, _: u64, belief: &Gaussian<1>) -> Result<Gaussian<1>, BoxError> {
+        Ok(self.filter.predict(belief))
+    }
+
+    fn feedback(&self, predicted: &Gaussian<1>, _: usize) -> Result<Self::Feedback, BoxError> {
+        Ok(self.filter.feedback(predicted))
+    }
+
+    fn update(
+        &self,
+        _: u64,
+        predicted: &Gaussian<1>,
+        observed: &[(usize, Observation<Self::Report>)],
+    ) -> Result<Gaussian<1>, BoxError> {
+        match observed.first() {
+            Some((_, observation)) => Ok(self.filter.update(predicted, observation)?.0),
+            None => Ok(*predicted),
+        }
+    }
+
+    fn feedback_format(&self, _: usize) -> <Self::Feedback as Message>::Format {
+        self.filter.scheme().feedback_format()
+    }
+
+    fn report_format(&self, _: usize) -> <Self::Report as Message>::Format {
+        self.filter.scheme().report_format()
+    }
+}
+
+/// `K` one-bit sensors that are told one threshold: [`ParallelFilter`]. Each sensor's half is that of [`scheme`](Self::scheme).
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParallelEstimator {
+    filter: ParallelFilter,
+    scheme: SignBit,
+    start: Gaussian<1>,
+}
+
+impl ParallelEstimator {
+    /// The filter, with what it knows of the links, and what is known before the first slot.
+    ///
+    /// # Errors
+    /// None for a plant that [`ParallelFilter`] accepted.
+    pub fn new(filter: ParallelFilter, start: Gaussian<1>) -> Result<Self, Error> {
+        let scheme = SignBit::new(filter.plant().measurement_variance())?;
+        Ok(Self { filter, scheme, start })
+    }
+
+    /// What each sensor does.
+    pub fn scheme(&self) -> SignBit {
+        self.scheme
+    }
+}
+
+impl Estimator for ParallelEstimator {
+    scalar_belief!();
+    type Feedback = f64;
+    type Report = Sign;
+
+    fn sensors(&self) -> usize {
+        self.filter.sensors()
+    }
+
+    fn predict(&self, _: u64, belief: &Gaussian<1>) -> Result<Gaussian<1>, BoxError> {
+        Ok(self.filter.plant().predict(belief))
+    }
+
+    fn feedback(&self, predicted: &Gaussian<1>, _: usize) -> Result<f64, BoxError> {
+        Ok(predicted.mean()[0])
+    }
+
+    /// A sensor without observation counts as [`Observation::Lost`]: these sensors always speak, so that it says nothing of the state.
+    fn update(
+        &self,
+        _: u64,
+        predicted: &Gaussian<1>,
+        observed: &[(usize, Observation<Sign>)],
+    ) -> Result<Gaussian<1>, BoxError> {
+        let mut all = vec![Observation::Lost; self.filter.sensors()];
+        for (sensor, observation) in observed {
+            if let Some(place) = all.get_mut(*sensor) {
+                *place = *observation;
+            }
+        }
+        Ok(self.filter.update(predicted, &all)?.0)
+    }
+
+    fn feedback_format(&self, _: usize) -> NumberFormat {
+        self.scheme.feedback_format()
+    }
+
+    fn report_format(&self, _: usize) {}
+}

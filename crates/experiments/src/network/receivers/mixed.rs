@@ -1,0 +1,49 @@
+//! The fusion centre of `fewbits-filters` in slots, under dynamics of one slot.
+
+use fewbits_core::{Gaussian, GaussianDynamics, Link, MeasurementNoise, Scheme, Sensing};
+use fewbits_filters::centre::{FusionCentre, Reporting};
+use fewbits_filters::contract::{Evolving, Motion};
+use fewbits_filters::{Error, MomentFilter};
+use fewbits_link::FusionReceiver;
+use fewbits_monte_carlo::Stream;
+use fewbits_numerics::error::refuse;
+use fewbits_protocol::BoxError;
+
+/// Dynamics of one slot, which is a second for the centre.
+struct Slotwise<G>(G);
+
+impl<const D: usize, G: GaussianDynamics<D> + Clone + 'static> Evolving<D> for Slotwise<G> {
+    fn over(&self, seconds: f64) -> Result<Box<dyn Motion<D>>, Error> {
+        if seconds != 1.0 {
+            return refuse("seconds", seconds, "1, the length of a slot");
+        }
+        Ok(Box::new(self.0.clone()))
+    }
+}
+
+/// Makes the receiver of sensors that all report by one scheme over perfect links, before its first slot.
+pub(crate) fn mixed<const D: usize, G, S, C>(
+    dynamics: G,
+    start: Gaussian<D>,
+    sensors: Vec<S>,
+    scheme: C,
+    ask: impl Fn(&Gaussian<1>) -> C::Feedback + Clone + Send + Sync + 'static,
+) -> impl Fn() -> Result<FusionReceiver<D, MomentFilter>, BoxError> + Send + Sync + 'static
+where
+    G: GaussianDynamics<D> + Clone + Send + Sync + 'static,
+    S: Sensing<D, 1> + Clone + Send + Sync + 'static,
+    C: Scheme<1> + MeasurementNoise<1> + Clone + Send + Sync + 'static,
+    C::Factor: 'static,
+{
+    move || {
+        // A Gaussian needs no draws.
+        let (none, world) = (Stream::new(0), Slotwise(dynamics.clone()));
+        let mut centre = FusionCentre::new(&mut none.rng(), world, MomentFilter, &start)?;
+        for (number, sensing) in (0..).zip(&sensors) {
+            let ask = ask.clone();
+            let ask = move |_: &Gaussian<D>, measured: &Gaussian<1>| ask(measured);
+            centre.join(number, Reporting::new(sensing.clone(), scheme.clone(), Link::PERFECT, ask))?;
+        }
+        Ok(FusionReceiver::new(centre, 1.0, none))
+    }
+}

@@ -1,0 +1,199 @@
+//! Receivers of the comparison over networks: against themselves without one, and under losses.
+
+use super::{Followers, LookUp, Patterns};
+use fewbits_adaptive::{Config, Receiver as Following, Sensor};
+use fewbits_binary_patterns::{Bank, BinaryQuantizer, Bit, Decoder, PatternSensor, Source};
+use fewbits_core::factor::InCell;
+use fewbits_core::{Cell, Dynamics, Gaussian, Observation, SchemeNode, Sensing, SensorNode};
+use fewbits_filters::{assumed_density, kalman};
+use fewbits_models::{Ar1, LinearSensor};
+use fewbits_monte_carlo::Stream;
+use fewbits_network::{BitStar, Channel, Clock, Fault, FaultKind, Field, Radio, Seconds, SensorId, Setup, Simulator};
+use fewbits_protocol::{Estimator, Feedback, OverBits, ReportLength};
+use fewbits_quantizer_design::decoder::MmseDecoder;
+use fewbits_quantizer_design::{Scene, System};
+use fewbits_quantizers::Symbol;
+use nalgebra::Vector1;
+
+const SLOTS: usize = 60;
+type Measurements = Vec<Vec<Vector1<f64>>>;
+
+fn dynamics() -> Ar1 {
+    Ar1::new(0.9, 0.5).unwrap()
+}
+
+fn start() -> Gaussian<1> {
+    Gaussian::scalar(0.0, dynamics().stationary_variance().unwrap()).unwrap()
+}
+
+fn direct() -> LinearSensor<1, 1> {
+    LinearSensor::direct(1.0).unwrap()
+}
+
+fn measured() -> Measurements {
+    let (mut rng, mut state) = (Stream::new(8).rng(), Vector1::new(1.0));
+    (0..SLOTS)
+        .map(|_| {
+            state = dynamics().propagate(&mut rng, &state);
+            (0..3).map(|_| direct().sample(&mut rng, &state)).collect()
+        })
+        .collect()
+}
+
+fn clock() -> Clock {
+    Clock::new(Seconds::new(1.0).unwrap()).unwrap()
+}
+
+fn star<E: Estimator + Clone + Send + Sync + 'static>(
+    estimator: E,
+    feedback: Feedback,
+    report: ReportLength,
+    node: impl Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static,
+) -> BitStar<OverBits<E>, 1> {
+    let centre = move || Ok(OverBits::new(estimator.clone()));
+    BitStar::new(centre, feedback, report, node, measured(), clock(), Stream::new(9)).unwrap()
+}
+
+/// A snapshot has thousands of bytes; as link frames of 127 bytes it would hardly ever arrive whole.
+fn setup(seed: u64) -> Setup {
+    let radio = Radio {
+        mtu: None,
+        ..Radio::cc2420(0.0).unwrap()
+    };
+    Setup::new(radio, Stream::new(seed))
+}
+
+fn means<E: Estimator + Clone + Send + Sync + 'static>(star: BitStar<OverBits<E>, 1>) -> (Vec<f64>, u64) {
+    let mut network = star.simulate(10.0, setup(1)).unwrap();
+    network.run_until(clock().end(SLOTS as u32)).unwrap();
+    assert_eq!(network.log().entries, []);
+    let up = network.ledger().accounts()[1..].iter().map(|account| account.payload.0);
+    (network.nodes()[0].means().into_iter().map(|mean| mean[0]).collect(), up.sum())
+}
+
+#[test]
+fn tables_give_what_they_give_alone() {
+    let deviation = start().covariance()[0].sqrt();
+    let system = System::lloyd_max(Scene::gaussian_with_deviations(deviation, &[1.0; 3]).unwrap(), 4).unwrap();
+    let (decoder, quantizer) = (MmseDecoder::new(&system, 1000).unwrap(), &system.quantizers()[0]);
+    let alone = measured().into_iter().map(|z| {
+        let symbol = |z: &Vector1<f64>| Observation::Received(Symbol(quantizer.encode(z[0]).unwrap()));
+        decoder.decode(&z.iter().map(symbol).collect::<Vec<_>>()).unwrap().mean
+    });
+    let look_up = LookUp::new(&system, 1000).unwrap();
+    let schemes = look_up.schemes().to_vec();
+    let node = move |i: usize| -> Box<dyn SensorNode<1>> { Box::new(SchemeNode::new(schemes[i].clone())) };
+    let (over, up) = means(star(look_up, Feedback::Clock, ReportLength::Fixed(2), node));
+    assert_eq!((over, up), (alone.collect(), 3 * 2 * SLOTS as u64));
+}
+
+/// One sign bit of `x ~ N(0, s)` in unit noise: mean `sqrt(2 / pi) s / sqrt(s + 1)`, variance `s - (2 / pi) s^2 / (s + 1)`.
+#[test]
+fn patterns_have_the_variance_given_the_bits() {
+    let variance = 2.0;
+    let sensor = PatternSensor::with_deviation(BinaryQuantizer::new(vec![0.0]).unwrap(), 1.0).unwrap();
+    let source = Source::gaussian_with_deviation(f64::sqrt(variance)).unwrap();
+    let table = Bank::new(source, vec![sensor]).unwrap().table(Decoder::Mmse).unwrap();
+    let patterns = Patterns::new(1, table, variance).unwrap();
+    let predicted = patterns.predict(1, &patterns.start()).unwrap();
+    assert!((predicted.covariance()[0] - variance).abs() < 1e-12);
+    let after = patterns
+        .update(1, &predicted, &[(0, Observation::Received(Bit(true)))])
+        .unwrap();
+    let share = 2.0 / std::f64::consts::PI * variance * variance / (variance + 1.0);
+    assert!((after.mean()[0].abs() - share.sqrt()).abs() < 1e-9, "{after:?}");
+    assert!((after.covariance()[0] - (variance - share)).abs() < 1e-9, "{after:?}");
+    let nothing = patterns.update(1, &predicted, &[(0, Observation::Nothing)]).unwrap();
+    assert!((nothing.covariance()[0] - variance).abs() < 1e-9);
+}
+
+fn followers(config: Config) -> Followers<Ar1, LinearSensor<1, 1>, 1> {
+    Followers {
+        dynamics: dynamics(),
+        sensors: vec![direct(); 3],
+        noise_variance: 1.0,
+        config,
+        start: start(),
+    }
+}
+
+fn followed_star(feedback: Feedback, config: Config) -> BitStar<OverBits<Followers<Ar1, LinearSensor<1, 1>, 1>>, 1> {
+    let followers = followers(config);
+    let node = followers.nodes();
+    star(followers, feedback, ReportLength::Varying, node)
+}
+
+#[test]
+fn followed_signals_give_what_they_give_alone() {
+    let config = Config::new(0.7).unwrap();
+    let (mut sensors, mut receivers) = (vec![Sensor::new(config); 3], vec![Following::new(config); 3]);
+    let (mut belief, mut sent) = (start(), 0);
+    let alone = measured().into_iter().map(|z| {
+        belief = kalman::predict(&dynamics(), &belief);
+        for ((sensor, receiver), z) in sensors.iter_mut().zip(&mut receivers).zip(&z) {
+            let packet = sensor.encode(z[0]).unwrap().map(|report| report.packet);
+            sent += packet.as_ref().map_or(0, |packet| packet.bits() as u64);
+            let value = receiver.receive(&packet.into()).unwrap().value.unwrap();
+            assert!((value - z[0]).abs() <= 0.7);
+            let factor = InCell::new(Cell::new(value - 0.7, value + 0.7).unwrap(), 1.0, 0.0, 1.0).unwrap();
+            belief = assumed_density::update(&belief, direct().matrix(), &factor).unwrap().0;
+        }
+        belief.mean()[0]
+    });
+    let alone: Vec<_> = alone.collect();
+    for feedback in [Feedback::Clock, Feedback::Echoed] {
+        assert_eq!(means(followed_star(feedback, config)), (alone.clone(), sent));
+    }
+}
+
+#[test]
+fn followers_by_echo_come_back_after_losses() {
+    let config = Config::new(0.5).and_then(|c| c.resilient(4, Some(4))).unwrap();
+    let lossy = Setup {
+        channel: Channel::lossy(0.1).unwrap(),
+        ..setup(1)
+    };
+    let mut network = followed_star(Feedback::Echoed, config).simulate(10.0, lossy).unwrap();
+    network.run_until(clock().end(SLOTS as u32)).unwrap();
+    let faults = network.ledger().faults();
+    assert!(faults.resynchronisations > 0 && faults.failures == 0, "{faults:?}");
+    // About as many as echoes and snapshots are lost.
+    assert!(faults.disagreements < SLOTS as u64, "{faults:?}");
+}
+
+/// Twenty runs with losses, restarts and a snapshot in the middle: after quiet slots whoever lives is followed within delta again.
+#[test]
+fn followed_signals_survive_faults() {
+    let config = Config::new(0.5).and_then(|c| c.resilient(4, Some(4))).unwrap();
+    let at = |slot: u64| Seconds::new(slot as f64 + 0.4).unwrap();
+    let mut followed = 0;
+    for seed in 0..20 {
+        let restart = Fault {
+            at: at(10 + seed),
+            node: SensorId((seed % 4) as u32),
+            kind: FaultKind::Restart,
+        };
+        let faulty = Setup {
+            channel: Channel::lossy(0.3).unwrap(),
+            faults: vec![restart],
+            ..setup(seed)
+        };
+        let star = || followed_star(Feedback::Clock, config);
+        let mut network = star().simulate(10.0, faulty).unwrap();
+        network.run_until(clock().end(40)).unwrap();
+        let mut stored = Vec::new();
+        network.snapshot(&mut stored).unwrap();
+        let field = Field::star(3, 10.0).unwrap();
+        let mut network = Simulator::restore(star(), field, setup(seed), stored.as_slice()).unwrap();
+        network.run_until(clock().end(SLOTS as u32)).unwrap();
+        let last = &measured()[SLOTS - 1];
+        let belief = network.nodes()[0].receiver().unwrap().belief().clone();
+        for (receiver, z) in belief.receivers.iter().zip(last) {
+            if receiver.tracked().synchronised {
+                followed += 1;
+                assert!((receiver.tracked().value.unwrap() - z[0]).abs() <= 0.5);
+            }
+        }
+    }
+    assert_eq!(followed, 60);
+}

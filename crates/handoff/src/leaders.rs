@@ -1,0 +1,47 @@
+//! Leaders that hand their belief on as bits.
+
+use crate::{Coded, HandoffFilter};
+use fewbits_core::rand::Rng;
+use fewbits_core::{BitString, Dynamics, Likelihood, Message};
+use fewbits_densities::Mixture;
+use fewbits_mixture_codec::wire::CodedMixture;
+use fewbits_protocol::{BoxError, Lead, Leader};
+
+/// A [`HandoffFilter`] whose belief travels as the bits of its wire format.
+///
+/// The readings of a slot are given for every node that may lead in it; who leads when is known beforehand.
+#[derive(Debug, Clone)]
+pub struct Leaders<const D: usize, G, L> {
+    /// The filter, with its wire format.
+    pub filter: HandoffFilter<Coded<D>>,
+    /// How the world moves.
+    pub dynamics: G,
+    /// What is known before the first slot.
+    pub start: Mixture<D>,
+    /// `readings[k][i]`: what node `i` reads in slot `k + 1`, as a likelihood.
+    pub readings: Vec<Vec<L>>,
+    /// Who leads in slot `k + 1`; the walk ends with the list.
+    pub leaders: Vec<u32>,
+}
+
+impl<const D: usize, G: Dynamics<D>, L: Likelihood<D>> Leader for Leaders<D, G, L> {
+    fn lead(&self, rng: &mut dyn Rng, slot: u64, node: u32, message: Option<&BitString>) -> Result<Lead, BoxError> {
+        let coded = &self.filter.reducer;
+        let received = match message {
+            Some(bits) => CodedMixture::from_bits(&coded.format, bits)?.into_mixture(),
+            None => self.start.clone(),
+        };
+        let at = usize::try_from(slot.saturating_sub(1))?;
+        let reading = self.readings.get(at).and_then(|slot| slot.get(node as usize));
+        let reading = reading.ok_or_else(|| format!("node {node} has no reading in slot {slot}"))?;
+        let (particles, _) = self.filter.posterior(rng, &received, &self.dynamics, reading)?;
+        let estimate = self.filter.estimate(&particles)?;
+        let mixture = coded.reduction.reduce(&estimate, coded.components)?;
+        let message = CodedMixture::new(&mixture, &coded.format, coded.resolution)?;
+        Ok(Lead {
+            estimate: message.mixture().mean().as_slice().to_vec(),
+            message: message.to_bits(&coded.format)?,
+            next: self.leaders.get(at + 1).copied(),
+        })
+    }
+}

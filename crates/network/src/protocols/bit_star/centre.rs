@@ -1,0 +1,79 @@
+//! The fusion centre of a star: what its machine asks for is done on the simulated radio.
+
+use super::node::CentreNode;
+use super::translation::{failed, noted, simulated};
+use super::{BitStar, OTHER, SLOT_BEGINS};
+use crate::error::Error;
+use crate::note::{Note, Stage};
+use crate::simulator::Context;
+use crate::units::{Instant, SensorId};
+use fewbits_protocol::{Action, BoxError, CentreTimer, Feedback, Outcome, Receiver, Recipient, update_or_drop};
+
+impl<R: Receiver, const M: usize> BitStar<R, M> {
+    pub(super) fn carry_out(
+        &self,
+        centre: &mut CentreNode<R>,
+        context: &mut Context<'_>,
+        actions: Vec<Action>,
+    ) -> Result<(), Error> {
+        let slots = self.measurements.slots();
+        for action in actions {
+            match action {
+                Action::SetTimer { at, timer } => {
+                    let token = match timer {
+                        CentreTimer::SlotBegins => SLOT_BEGINS,
+                        _ => OTHER,
+                    };
+                    context.at(Instant(at), token);
+                }
+                Action::Note { sensor, note } => context.note(noted(SensorId(sensor as u32 + 1), note)),
+                Action::Send { to, frame } => {
+                    let frame = simulated(&frame)?;
+                    match to {
+                        Recipient::All => context.broadcast(&frame)?,
+                        Recipient::Sensor(i) => self.send_down(context, SensorId(i as u32 + 1), &frame)?,
+                    }
+                }
+                Action::Predict { slot } if slot > u64::from(slots) => {}
+                Action::Predict { slot } => match self.predict(&mut centre.receiver, slot) {
+                    Ok((feedback, state)) => {
+                        let mut sent = Vec::new();
+                        centre.machine.on_predicted(&feedback, state.as_ref(), &mut sent);
+                        self.carry_out(centre, context, sent)?;
+                    }
+                    Err(error) => {
+                        let note = failed(Stage::Prediction, slot as u32, &error);
+                        centre.failures.note(context, slots, note)?;
+                    }
+                },
+                Action::Update { slot, observed } => {
+                    let slot = slot as u32;
+                    match update_or_drop(&mut centre.receiver, &observed) {
+                        Outcome::Used => {}
+                        Outcome::SilentDropped(error) => {
+                            let reason = error.to_string();
+                            context.note(Note::SilenceIgnored { slot, reason });
+                        }
+                        Outcome::Failed(error) => {
+                            let note = failed(Stage::Update, slot, &error);
+                            centre.failures.note(context, slots, note)?;
+                        }
+                    }
+                    centre.estimates.push((slot, centre.receiver.estimate()));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Predicts into a slot. Returns what each sensor is told, and the state before, where a sensor follows.
+    pub(super) fn predict(&self, receiver: &mut R, slot: u64) -> Result<Predicted, BoxError> {
+        let follows = self.members.iter().any(|m| m.feedback == Feedback::Echoed);
+        let state = if follows { Some(receiver.state()?) } else { None };
+        receiver.predict(slot)?;
+        let feedback = (0..self.members.len()).map(|i| receiver.feedback(i));
+        Ok((feedback.collect::<Result<_, _>>()?, state))
+    }
+}
+
+type Predicted = (Vec<fewbits_core::BitString>, Option<fewbits_core::BitString>);

@@ -1,0 +1,282 @@
+//! A belief that travels from leader to leader: what a leader does, and the state machine of each node.
+
+use crate::frame::{Check, Frame, Kind, digest};
+use crate::note::Note;
+use crate::payload::Payload;
+use crate::receiver::BoxError;
+use crate::slot::{Schedule, Slot};
+use fewbits_core::BitString;
+use fewbits_core::rand::Rng;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+/// What a leader does with the belief that it was handed. Object-safe.
+pub trait Leader {
+    /// One leader's step: measure, update, choose who leads next. The first leader has no message. `rng` is a function of the slot, so that
+    /// whoever repeats a step draws the same.
+    ///
+    /// # Errors
+    /// If the message is no belief, or the measurement is impossible under it: the leader then keeps what it had.
+    fn lead(&self, rng: &mut dyn Rng, slot: u64, node: u32, message: Option<&BitString>) -> Result<Lead, BoxError>;
+}
+
+/// What a leader's step gives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lead {
+    /// The belief as it travels on.
+    pub message: BitString,
+    /// Who leads next; nobody ends the walk.
+    pub next: Option<u32>,
+    /// The estimate.
+    pub estimate: Vec<f64>,
+}
+
+/// What the driver of a [`Bearer`] must do, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Errand {
+    /// Lead in this slot with the belief that was handed over, and call [`Bearer::on_led`] or [`Bearer::on_failed`].
+    Lead {
+        /// The slot.
+        slot: Slot,
+        /// The belief; `None` for the first leader.
+        message: Option<BitString>,
+    },
+    /// Send the frame's bytes one hop nearer to its destination. Where there is no route, call [`Bearer::on_give_up`].
+    Send {
+        /// To whom it goes in the end.
+        destination: u32,
+        /// Slot and digest of the frame, which name it in [`Bearer::on_ack`] and [`Bearer::on_give_up`].
+        name: (Slot, u32),
+        /// The frame's bytes.
+        frame: Vec<u8>,
+    },
+    /// Call [`Bearer::on_timer`] at this time (nanoseconds), not before.
+    SetTimer {
+        /// When.
+        at: u64,
+    },
+    /// Write down what was noticed.
+    Note {
+        /// Whom it is about.
+        with: u32,
+        /// What was noticed.
+        note: Note,
+    },
+}
+
+/// A belief as it is stored: bytes and their number of bits.
+#[derive(Debug, Clone, PartialEq)]
+struct Belief(BitString);
+
+impl Serialize for Belief {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        (self.0.bytes(), self.0.bits()).serialize(to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Belief {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let (bytes, bits) = <(Vec<u8>, usize)>::deserialize(from)?;
+        BitString::from_bytes(bytes, bits).map(Self).map_err(D::Error::custom)
+    }
+}
+
+/// A handover that was sent and is not acknowledged yet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Pending {
+    name: (Slot, u32),
+    destination: u32,
+    belief: Belief,
+}
+
+/// A node of a walk: it leads where it was handed the belief, and passes on what is for others. Events in, [`Errand`]s out.
+///
+/// ```text
+/// on_timer(slot begins) -> Lead;  on_led(next) -> Send;  on_failed -> leads again in the next slot
+/// on_frame(handover) -> for itself: SetTimer (its slot); for another: Send; a second one of its slot: Note
+/// on_ack ends a pending handover;  on_give_up -> leads itself, Note (retained)
+/// ```
+/// A handover that was given up may have arrived all the same: there are two leaders from then on, and where they meet there is a note of a
+/// disagreement. A node that leads already keeps the belief that has seen more slots.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Bearer {
+    address: u32,
+    schedule: Schedule,
+    /// The last slot in which anybody leads.
+    last: u64,
+    /// Whether a link tells what became of a handover.
+    acknowledged: bool,
+    /// The slot in which it leads, and the belief that it was handed.
+    leading: Option<(Slot, Option<Belief>)>,
+    /// The same while the driver leads.
+    acting: Option<(Slot, Option<Belief>)>,
+    /// Name of the last handover that it took.
+    taken: Option<(Slot, u32)>,
+    /// Name of the last handover that it passed on.
+    passed: Option<(Slot, u32)>,
+    pending: Vec<Pending>,
+}
+
+impl Bearer {
+    /// A node with this address. Nobody leads after slot `last`. `acknowledged`: whether its driver calls [`on_ack`](Self::on_ack) or
+    /// [`on_give_up`](Self::on_give_up) for what it sends.
+    pub fn new(address: u32, schedule: Schedule, last: u64, acknowledged: bool) -> Self {
+        Self {
+            address,
+            schedule,
+            last,
+            acknowledged,
+            leading: None,
+            acting: None,
+            taken: None,
+            passed: None,
+            pending: Vec::new(),
+        }
+    }
+
+    /// The node that leads in slot 1. Its driver calls [`on_timer`](Self::on_timer) when that begins.
+    #[must_use]
+    pub fn first(self) -> Self {
+        Self {
+            leading: Some((Slot::of_count(1), None)),
+            ..self
+        }
+    }
+
+    /// The slot in which it leads, if it does.
+    pub fn leads(&self) -> Option<Slot> {
+        self.leading.as_ref().map(|(slot, _)| *slot)
+    }
+
+    /// The belief is gone, if it was here.
+    pub fn on_memory_lost(&mut self) {
+        (self.leading, self.acting) = (None, None);
+        self.pending.clear();
+    }
+
+    fn begins(&self, slot: Slot, now: u64) -> u64 {
+        self.schedule.start(slot.nearest_count(self.schedule.count(now)))
+    }
+
+    /// A timer has fired. One that was set for an earlier handover starts no slot that is still to come.
+    pub fn on_timer(&mut self, now: u64, errands: &mut Vec<Errand>) {
+        let due = self.leads().is_some_and(|slot| self.begins(slot, now) <= now);
+        if !due {
+            return;
+        }
+        self.acting = self.leading.take();
+        if let Some((slot, belief)) = &self.acting {
+            errands.push(Errand::Lead {
+                slot: *slot,
+                message: belief.as_ref().map(|belief| belief.0.clone()),
+            });
+        }
+    }
+
+    /// The driver has led.
+    pub fn on_led(&mut self, now: u64, lead: Lead, errands: &mut Vec<Errand>) {
+        let (Some((slot, _)), Some(next)) = (self.acting.take(), lead.next) else {
+            return;
+        };
+        let (after, belief) = (slot.after(), Belief(lead.message));
+        if next == self.address {
+            self.stay(now, after, Some(belief), errands);
+        } else if slot.nearest_count(self.schedule.count(now)) < self.last {
+            let sum = digest(after, Payload::from(&belief.0));
+            self.pass(next, (after, sum), belief, errands);
+        }
+    }
+
+    /// The leader's step failed: it leads again in the next slot, with what it had.
+    pub fn on_failed(&mut self, now: u64, errands: &mut Vec<Errand>) {
+        if let Some((slot, belief)) = self.acting.take() {
+            self.stay(now, slot.after(), belief, errands);
+        }
+    }
+
+    /// Leads in a slot to come.
+    fn stay(&mut self, now: u64, slot: Slot, belief: Option<Belief>, errands: &mut Vec<Errand>) {
+        if slot.nearest_count(self.schedule.count(now)) <= self.last {
+            self.leading = Some((slot, belief));
+            let at = self.begins(slot, now);
+            errands.push(Errand::SetTimer { at });
+        }
+    }
+
+    fn pass(&mut self, destination: u32, name: (Slot, u32), belief: Belief, errands: &mut Vec<Errand>) {
+        let frame = Frame {
+            destination,
+            ..Frame::new(Kind::Handover, name.0, name.1, Payload::from(&belief.0))
+        };
+        let mut bytes = vec![0; frame.len()];
+        frame.encode(Check::Whole, &mut bytes);
+        errands.push(Errand::Send {
+            destination,
+            name,
+            frame: bytes,
+        });
+        // Kept even where nothing is acknowledged until the driver has found a route.
+        self.pending.retain(|pending| self.acknowledged && pending.name != name);
+        self.pending.push(Pending {
+            name,
+            destination,
+            belief,
+        });
+    }
+
+    /// A frame has arrived that the driver has decoded.
+    pub fn on_decoded(&mut self, now: u64, from: u32, frame: &Frame<'_>, errands: &mut Vec<Errand>) {
+        let (slot, name) = (frame.slot, (frame.slot, frame.digest));
+        let mut note = |note| errands.push(Errand::Note { with: from, note });
+        if frame.kind != Kind::Handover {
+            return note(Note::Unexpected { kind: frame.kind });
+        }
+        if digest(slot, frame.payload) != frame.digest {
+            return note(Note::Disagreement { slot });
+        }
+        let own = frame.destination == self.address;
+        let last = if own { &mut self.taken } else { &mut self.passed };
+        match *last {
+            Some(seen) if seen == name => return note(Note::Duplicate { slot }),
+            Some((seen, _)) if own && slot == seen => return note(Note::Disagreement { slot }),
+            Some((seen, _)) if own && seen.is_after(slot) => return note(Note::Late { slot }),
+            _ => *last = Some(name),
+        }
+        let belief = Belief(frame.payload.into());
+        match own {
+            true => self.take_over(now, from, slot, belief, errands),
+            false => self.pass(frame.destination, name, belief, errands),
+        }
+    }
+
+    /// Takes a belief that another node was to lead with, or has sent. Where this node leads already, the belief that has seen more slots stays, of
+    /// equals the one that is here.
+    fn take_over(&mut self, now: u64, with: u32, slot: Slot, belief: Belief, errands: &mut Vec<Errand>) {
+        if let Some(leads) = self.leads() {
+            let note = Note::Disagreement { slot };
+            errands.push(Errand::Note { with, note });
+            if !slot.is_after(leads) {
+                return;
+            }
+        }
+        self.stay(now, slot, Some(belief), errands);
+    }
+
+    /// A handover has arrived at the next hop.
+    pub fn on_ack(&mut self, name: (Slot, u32)) {
+        self.pending.retain(|pending| pending.name != name);
+    }
+
+    /// No acknowledgement of a handover came, or there is no route: this node keeps the belief.
+    pub fn on_give_up(&mut self, now: u64, name: (Slot, u32), errands: &mut Vec<Errand>) {
+        let Some(at) = self.pending.iter().position(|pending| pending.name == name) else {
+            return;
+        };
+        let Pending {
+            destination, belief, ..
+        } = self.pending.remove(at);
+        let note = Note::Retained { slot: name.0 };
+        let with = destination;
+        errands.push(Errand::Note { with, note });
+        self.take_over(now, with, name.0, belief, errands);
+    }
+}

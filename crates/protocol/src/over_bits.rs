@@ -1,0 +1,181 @@
+//! Estimators in types, and the receivers over bits that they make.
+
+use crate::receiver::{BoxError, Receiver};
+use fewbits_core::{BitReader, BitString, BitWriter, Gaussian, Message, Observation};
+
+/// An estimator at a fusion centre whose belief is a value. [`OverBits`] makes a [`Receiver`] of it.
+///
+/// ```text
+/// slot k:  predicted = predict(belief);  feedback(predicted, i) for each sensor i
+///          belief = update(predicted, what was observed)
+/// ```
+/// Law: all methods are functions of their arguments, so that two ends with equal beliefs stay equal.
+pub trait Estimator {
+    /// What the receiver knows of the state. It travels to those that follow the centre.
+    type Belief: Message + Clone;
+    /// What a sensor is told before it measures.
+    type Feedback: Message;
+    /// What a sensor may report.
+    type Report: Message;
+
+    /// Number of sensors.
+    fn sensors(&self) -> usize;
+
+    /// The belief before the first slot, known at both ends.
+    fn start(&self) -> Self::Belief;
+
+    /// Time update into slot `slot`, from the slot before; the first is 1.
+    ///
+    /// # Errors
+    /// Those of the filter.
+    fn predict(&self, slot: u64, belief: &Self::Belief) -> Result<Self::Belief, BoxError>;
+
+    /// What `sensor` is told, made from the prediction.
+    ///
+    /// # Errors
+    /// Those of the scheme.
+    fn feedback(&self, predicted: &Self::Belief, sensor: usize) -> Result<Self::Feedback, BoxError>;
+
+    /// Measurement update by what was observed of sensors, in rising order of their numbers. Sensors without observation are left out.
+    ///
+    /// # Errors
+    /// If the observations are impossible together; others of the filter.
+    fn update(
+        &self,
+        slot: u64,
+        predicted: &Self::Belief,
+        observed: &[(usize, Observation<Self::Report>)],
+    ) -> Result<Self::Belief, BoxError>;
+
+    /// Mean and standard deviation of each coordinate.
+    fn estimate(&self, belief: &Self::Belief) -> Vec<(f64, f64)>;
+
+    /// How beliefs travel.
+    fn belief_format(&self) -> <Self::Belief as Message>::Format;
+
+    /// How the feedback of a sensor travels.
+    fn feedback_format(&self, sensor: usize) -> <Self::Feedback as Message>::Format;
+
+    /// How the reports of a sensor travel.
+    fn report_format(&self, sensor: usize) -> <Self::Report as Message>::Format;
+}
+
+/// Mean and standard deviation of each coordinate of a Gaussian, for [`Estimator::estimate`].
+pub fn moments<const D: usize>(belief: &Gaussian<D>) -> Vec<(f64, f64)> {
+    let deviations = belief.standard_deviations();
+    belief.mean().iter().copied().zip(deviations.iter().copied()).collect()
+}
+
+/// Bits of the slot in a state.
+const SLOT_BITS: u32 = 64;
+
+/// A [`Receiver`] made of an [`Estimator`]. Its state is the slot in 64 bits and the belief.
+///
+/// The start holds before the first slot that is predicted, whichever that is. Slots that are left out later are predicted through. Bits that are no report of the scheme were sent and not understood: they are taken as
+/// [`Observation::Lost`]. A step that gives an estimate which is not finite fails, and leaves the state as it was.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OverBits<E: Estimator> {
+    estimator: E,
+    /// The last slot that was predicted; 0 before the first.
+    slot: u64,
+    belief: E::Belief,
+}
+
+impl<E: Estimator> OverBits<E> {
+    /// The receiver before the first slot.
+    pub fn new(estimator: E) -> Self {
+        let belief = estimator.start();
+        Self {
+            estimator,
+            slot: 0,
+            belief,
+        }
+    }
+
+    /// The estimator.
+    pub fn estimator(&self) -> &E {
+        &self.estimator
+    }
+
+    /// The belief: predicted between a prediction and its update.
+    pub fn belief(&self) -> &E::Belief {
+        &self.belief
+    }
+
+    fn finite(&self, belief: E::Belief) -> Result<E::Belief, BoxError> {
+        let estimate = self.estimator.estimate(&belief);
+        match estimate.iter().position(|(mean, _)| !mean.is_finite()) {
+            None => Ok(belief),
+            Some(i) => {
+                Err(format!("the estimate is {} in coordinate {i}: expected a finite number", estimate[i].0).into())
+            }
+        }
+    }
+}
+
+impl<E: Estimator> Receiver for OverBits<E> {
+    fn sensors(&self) -> usize {
+        self.estimator.sensors()
+    }
+
+    fn predict(&mut self, slot: u64) -> Result<(), BoxError> {
+        let mut predicted = None;
+        let first = if self.slot == 0 {
+            slot
+        } else {
+            self.slot.saturating_add(1)
+        };
+        for slot in first..=slot {
+            predicted = Some(
+                self.estimator
+                    .predict(slot, predicted.as_ref().unwrap_or(&self.belief))?,
+            );
+        }
+        if let Some(predicted) = predicted {
+            self.belief = self.finite(predicted)?;
+            self.slot = slot;
+        }
+        Ok(())
+    }
+
+    fn feedback(&self, sensor: usize) -> Result<BitString, BoxError> {
+        let feedback = self.estimator.feedback(&self.belief, sensor)?;
+        Ok(feedback.to_bits(&self.estimator.feedback_format(sensor))?)
+    }
+
+    fn update(&mut self, observed: &[(usize, Observation<BitString>)]) -> Result<(), BoxError> {
+        let decoded = observed.iter().map(|(sensor, observation)| {
+            let decoded = match observation {
+                Observation::Received(bits) => E::Report::from_bits(&self.estimator.report_format(*sensor), bits)
+                    .map_or(Observation::Lost, Observation::Received),
+                Observation::Nothing => Observation::Nothing,
+                Observation::Lost => Observation::Lost,
+            };
+            (*sensor, decoded)
+        });
+        let decoded: Vec<_> = decoded.collect();
+        let updated = self.estimator.update(self.slot, &self.belief, &decoded)?;
+        self.belief = self.finite(updated)?;
+        Ok(())
+    }
+
+    fn estimate(&self) -> Vec<(f64, f64)> {
+        self.estimator.estimate(&self.belief)
+    }
+
+    fn state(&self) -> Result<BitString, BoxError> {
+        let mut writer = BitWriter::new();
+        writer.write(self.slot, SLOT_BITS)?;
+        self.belief.encode(&self.estimator.belief_format(), &mut writer)?;
+        Ok(writer.finish())
+    }
+
+    fn restore(&mut self, state: &BitString) -> Result<(), BoxError> {
+        let mut reader = BitReader::new(state);
+        let slot = reader.read(SLOT_BITS)?;
+        let belief = E::Belief::decode(&self.estimator.belief_format(), &mut reader)?;
+        reader.finish()?;
+        (self.slot, self.belief) = (slot, belief);
+        Ok(())
+    }
+}
