@@ -224,13 +224,11 @@ impl Figure for Chains {
         if schemes.len() > 7 {
             // Too many lines for one panel.
             let (unknown, known) = ("Rate unknown", "Rate known");
-            return Plot::grid(
-                2,
-                vec![
-                    determinants(unknown, &|s| !s.known_rate),
-                    determinants(known, &|s| s.known_rate),
-                ],
-            );
+            let panels = [
+                determinants(unknown, &|s| !s.known_rate),
+                determinants(known, &|s| s.known_rate),
+            ];
+            return Plot::grid(2, panels.into());
         }
         let mut errors = Panel::semilog("Error", "nodes", "distance to the source (m)").without_legend();
         let band = of(&schemes[0]).map(|c| (c.step as f64, c.err_q10, c.err_q90)).collect();
