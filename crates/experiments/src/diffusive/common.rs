@@ -153,6 +153,11 @@ impl Scheme {
         }
     }
 
+    /// Its place in the palette: a form of the belief, or a rule, has one colour in every figure, whether the rate is known or not.
+    pub fn place(&self) -> usize {
+        place(self.name)
+    }
+
     pub fn at(self, range: f64) -> Self {
         Self { range, ..self }
     }
@@ -220,6 +225,20 @@ impl Scheme {
         self.search(settings)?
             .run(&sensor, &network.deployment, &network.graph, network.start, samples)
             .map_err(Error::failed)
+    }
+}
+
+/// The place in the palette of a form of the belief, or of a rule; 7 is the threshold's.
+pub(super) fn place(name: &str) -> usize {
+    match name.trim_end_matches(" known rate") {
+        "exact" | "information" => 0,
+        "gmm-4" | "covariance" => 1,
+        "gaussian" | "mahalanobis" => 2,
+        "gaussian-9" | "pairwise" => 3,
+        "lpg-2x5" => 4,
+        "lpg-1x5" => 5,
+        "particles-25" => 6,
+        _ => 8,
     }
 }
 

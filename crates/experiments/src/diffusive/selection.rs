@@ -1,6 +1,6 @@
 //! Rules that choose the next node: how well they rank it, and what that saves.
 
-use super::common::{A, B, Example, Network, Scheme, Settings, tracks};
+use super::common::{A, B, Example, Network, Scheme, Settings, place, tracks};
 use super::summary::{Summary, summaries};
 use crate::prelude::*;
 use fewbits_diffusive::information::Predictions;
@@ -154,8 +154,8 @@ impl Figure for Selection {
         );
         for (c, (rule, _)) in SEARCH_RULES.into_iter().enumerate() {
             let of = rows.searches.iter().skip(c).step_by(SEARCH_RULES.len()).enumerate();
-            let place = |(i, s): (usize, &Summary)| (i as f64 + 0.1 * (c as f64 - 1.0), s.nodes_mean);
-            nodes = nodes.with(Layer::measured(rule, of, place).coloured(c));
+            let at = |(i, s): (usize, &Summary)| (i as f64 + 0.1 * (c as f64 - 1.0), s.nodes_mean);
+            nodes = nodes.with(Layer::measured(rule, of, at).coloured(place(rule)));
         }
         // Rules downwards, best at the top, so that their names have room.
         let mut sorted: Vec<&Ranking> = rows.rankings.iter().collect();

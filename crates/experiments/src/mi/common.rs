@@ -1,8 +1,10 @@
 //! What the tables of this system share: scenes, starting quantizers and rows of designs.
 
 use crate::prelude::*;
-use fewbits_quantizer_design::design::Design;
-use fewbits_quantizer_design::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max};
+use fewbits_quantizer_design::design::{self, Design};
+use fewbits_quantizer_design::{
+    Channel, Criterion, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, lloyd_max,
+};
 
 pub(super) const MI: Criterion = Criterion::MutualInformation;
 pub(super) const MSE: Criterion = Criterion::MeanSquaredError;
@@ -32,6 +34,14 @@ pub(super) fn lloyd_system(scene: &Scene, levels: usize, sd: impl Fn(usize) -> f
         .map(|n| lloyd(levels, sd(n)))
         .collect::<Result<_, _>>()?;
     Ok(System::ideal(scene.clone(), quantizers)?)
+}
+
+/// How many of so many random starts about a system end at the best design's value.
+pub(super) fn arrived(about: &System, criterion: Criterion, starts: usize, best: &Design) -> usize {
+    let reached = |start: &&System| {
+        design::joint(start, criterion, &Newton::default()).is_ok_and(|d| (d.value - best.value).abs() < 1e-10)
+    };
+    design::random_starts(about, starts, 1).iter().filter(reached).count()
 }
 
 /// The odd quantizer with these positive breakpoints and one at zero.

@@ -1,6 +1,6 @@
 //! Table 4.1: two sensors of equal noise, independent or correlated.
 
-use super::common::{MI, MSE, Pair, lloyd_system, name, odd, scene};
+use super::common::{MI, MSE, Pair, arrived, lloyd_system, name, odd, scene};
 use super::plots::errors;
 use crate::prelude::*;
 use crate::reference;
@@ -103,23 +103,14 @@ impl Figure for Table41 {
                 }
                 let system = System::ideal(scene.clone(), vec![odd(first)?, odd(second)?])?;
                 push(method, "printed", Pair::of(&system)?);
-                let reached = |s: &System| {
-                    design::joint(s, criterion, &Newton::default()).is_ok_and(|d| (d.value - best.value).abs() < 1e-10)
-                };
-                let arrived = design::random_starts(&sample, p.starts, 1)
-                    .iter()
-                    .filter(|s| reached(s))
-                    .count();
                 searches.push(Search {
                     case,
                     criterion: method,
                     starts: p.starts,
-                    arrived,
-                    van_trees: if correlated {
-                        None
-                    } else {
-                        Some(bounds::bayesian_cramer_rao(&best.system)?)
-                    },
+                    arrived: arrived(&sample, criterion, p.starts, &best),
+                    van_trees: (!correlated)
+                        .then(|| bounds::bayesian_cramer_rao(&best.system))
+                        .transpose()?,
                     printed_primal_mse: value(format!("printed-primal/{case}")),
                 });
             }
@@ -133,9 +124,7 @@ impl Figure for Table41 {
         let here = claims.at_defaults();
         let designs = || rows.designs.iter();
         let mse = |case: &str, method: &str, design: &str| {
-            designs()
-                .find(|r| (r.case, r.method, r.design) == (case, method, design))
-                .map(|r| r.pair.mse)
+            first(&rows.designs, |r| (r.case, r.method, r.design) == (case, method, design)).map(|r| r.pair.mse)
         };
         claims.keyed("mse", "squared error", designs(), |r| r.pair.mse);
         claims.keyed("outer1", "outer breakpoint of sensor 1", designs(), |r| r.pair.outer1);
@@ -154,11 +143,8 @@ impl Figure for Table41 {
                 .zip(mse(s.case, "mse", "joint"))
                 .is_some_and(|(printed, best)| printed < best)
         });
-        let first = |case: &str| {
-            designs()
-                .find(|r| r.key() == format!("{case} mi greedy"))
-                .map(|r| r.pair.outer1)
-        };
+        let first =
+            |case: &str| first(&rows.designs, |r| r.key() == format!("{case} mi greedy")).map(|r| r.pair.outer1);
         let difference = minus(first("rho0-L4"), first("rho85-L4"));
         let what =
             "the greedy chain's first sensor does not depend on correlation, unlike the printed one (errata mi-5)";

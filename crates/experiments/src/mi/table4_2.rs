@@ -1,6 +1,6 @@
 //! Table 4.2: two sensors of unequal noise.
 
-use super::common::{MI, MSE, Pair, lloyd_system, odd, scene};
+use super::common::{MI, MSE, Pair, arrived, lloyd_system, odd, scene};
 use super::plots::errors;
 use crate::prelude::*;
 use crate::reference;
@@ -77,18 +77,12 @@ impl Figure for Table42 {
                 let best = design::joint(&sample, criterion, &newton)?;
                 push(joint, Pair::joint(&best)?);
                 if criterion == MI {
-                    let reached =
-                        |s: &System| design::joint(s, MI, &newton).is_ok_and(|d| (d.value - best.value).abs() < 1e-10);
-                    let arrived = design::random_starts(&sample, p.starts, 1)
-                        .iter()
-                        .filter(|s| reached(s))
-                        .count();
                     let bits = (levels as f64).log2();
                     let ceo_bound = bounds::ceo(scene.prior(), scene.noise(), &[bits, bits])?.distortion;
                     searches.push(Search {
                         levels,
                         starts: p.starts,
-                        arrived,
+                        arrived: arrived(&sample, MI, p.starts, &best),
                         ceo_bound,
                     });
                 }
@@ -109,11 +103,8 @@ impl Figure for Table42 {
         let what = "the printed error is exact to 1.5 % for the designs, 0.6 % for Lloyd-Max (errata mi-8)";
         claims.keyed("printed", what, designs(), |r| r.design.mse);
         for (levels, ..) in PRINTED {
-            let mse = |method: &str| {
-                designs()
-                    .find(|r| r.levels == levels && r.method == method)
-                    .map(|r| r.design.mse)
-            };
+            let mse =
+                |method: &str| first(&rows.designs, |r| r.levels == levels && r.method == method).map(|r| r.design.mse);
             let what = "squared-error design < Lloyd-Max of the sample < information design, against the printed claim (errata \
                         mi-7) < the printed baseline, scaled to the noise";
             let order = ["mse-joint", "lloyd-y", "mi-joint", "lloyd-noise"];

@@ -173,11 +173,7 @@ impl Figure for Table44 {
         claims.keyed("printed", "printed errors are within about 10 % of the exact ones", designs(), |d| d.pe);
         claims.keyed("equivocation", "ln 2 minus the information", designs(), |d| d.equivocation_nats);
         claims.keyed("unquantized_pe", "error from samples", &rows.checks, |c| c.unquantized_pe);
-        let pe = |signal, method| {
-            designs()
-                .find(|d| d.signal == signal && d.method == method)
-                .map(|d| d.pe)
-        };
+        let pe = |signal, method| first(&rows.designs, |d| d.signal == signal && d.method == method).map(|d| d.pe);
         for &signal in &p.signals {
             let what = "least error < Matusita < mutual information < J-divergence (errata mi-11)";
             let order = ["pe", "matusita", "mi-joint", "j-divergence"].map(|method| pe(signal, method));

@@ -263,11 +263,9 @@ pub(super) fn limits() -> Result<Vec<Limit>, Error> {
             crossover,
             ceo_bound: bounds::ceo(best.system.scene().prior(), best.system.scene().noise(), &vec![bits; sensors])?
                 .distortion,
-            van_trees: if crossover == 0.0 {
-                Some(bounds::bayesian_cramer_rao(&best.system)?)
-            } else {
-                None
-            },
+            van_trees: (crossover == 0.0)
+                .then(|| bounds::bayesian_cramer_rao(&best.system))
+                .transpose()?,
             achieved: best.value,
             unquantized: 1.0 / (1.0 + sensors as f64),
         });
