@@ -1,18 +1,16 @@
 //! Structs whose fields say everything about themselves: what a parameter is by default, what a column is measured in.
 
-/// A struct of parameters: documentation, range (`garde`) and default of a field in one place, and after `=> quick` what
-/// `--quick` lowers it to. Ranges that speak of other fields, of `self`, need the derive where they stand:
+/// A struct of parameters: range (`garde`), default, after `=> quick` what `--quick` lowers it to, and meaning of a field in one
+/// place. The meaning is the field's documentation; one that is longer than a line may stand above the field instead. Ranges that speak of other fields, of `self`, need the derive where they stand:
 /// `parameters! { self #[derive(Validate)] struct ... }`.
 ///
 /// ```
 /// fewbits_experiments::parameters! {
 ///     struct Parameters {
-///         /// Plant coefficient.
 ///         #[garde(range(min = -1.0, max = 1.0))]
-///         a: f64 = 0.9,
-///         /// Simulated runs.
+///         a: f64 = 0.9 => "Plant coefficient.",
 ///         #[garde(range(min = 2, max = 10_000_000))]
-///         trials: u64 = 4000 => quick 40,
+///         trials: u64 = 4000 => quick 40 => "Simulated runs.",
 ///     }
 /// }
 /// let mut p = Parameters::default();
@@ -25,7 +23,8 @@ macro_rules! parameters {
         self #[$validate:meta]
         $(#[$outer:meta])*
         $visible:vis struct $name:ident {
-            $($(#[$attribute:meta])* $shown:vis $field:ident: $type:ty = $default:expr $(=> quick $quick:expr)?,)*
+            $($(#[$attribute:meta])* $shown:vis $field:ident: $type:ty = $default:expr
+                $(=> quick $quick:expr)? $(=> $meaning:literal)?,)*
         }
     ) => {
         $(#[$outer])*
@@ -33,7 +32,7 @@ macro_rules! parameters {
         #[$validate]
         #[serde(deny_unknown_fields)]
         $visible struct $name {
-            $($(#[$attribute])* $shown $field: $type,)*
+            $($(#[$attribute])* $(#[doc = $meaning])? $shown $field: $type,)*
         }
 
         impl Default for $name {
@@ -53,15 +52,16 @@ macro_rules! parameters {
     };
 }
 
-/// Structs of rows, and structs of lists of them: the fields are the columns, each with its unit behind its type.
+/// Structs of rows, and structs of lists of them: the fields are the columns, each with its unit and its meaning behind its type.
+/// The meaning is the field's documentation; one that is longer than a line may stand above the field instead. A row that is
+/// compared with references says by which of its fields it is found: `struct Row by "{distance} m"`
+/// ([`Claims::keyed`](crate::Claims::keyed)).
 ///
 /// ```
 /// fewbits_experiments::rows! {
 ///     struct Row {
-///         /// Distance from the sensor.
-///         distance: f64 ["m"],
-///         /// Bit received.
-///         bit: u32,
+///         distance: f64 ["m"] => "Distance from the sensor.",
+///         bit: u32 => "Bit received.",
 ///     }
 /// }
 /// assert_eq!(fewbits_experiments::Tables::of(&vec![Row { distance: 2.0, bit: 1 }])?.main.columns()[0].unit, "m");
@@ -69,16 +69,27 @@ macro_rules! parameters {
 /// ```
 #[macro_export]
 macro_rules! rows {
+    (@keyed $name:ident [] [$($field:ident)*]) => {};
+    (@keyed $name:ident [$key:literal] [$($field:ident)*]) => {
+        impl $crate::claim::Keyed for $name {
+            #[allow(unused_variables)]
+            fn key(&self) -> String {
+                let Self { $($field),* } = self;
+                format!($key)
+            }
+        }
+    };
     ($(
         $(#[$outer:meta])*
-        $visible:vis struct $name:ident {
-            $($(#[$attribute:meta])* $shown:vis $field:ident: $type:ty $([$unit:tt])?,)*
+        $visible:vis struct $name:ident $(by $key:literal)? {
+            $($(#[$attribute:meta])* $shown:vis $field:ident: $type:ty $([$unit:tt])? $(=> $meaning:literal)?,)*
         }
     )*) => {$(
+        $crate::rows! { @keyed $name [$($key)?] [$($field)*] }
         $(#[$outer])*
         #[derive(::serde::Serialize, ::schemars::JsonSchema)]
         $visible struct $name {
-            $($(#[$attribute])* $(#[schemars(extend("unit" = $unit))])? $shown $field: $type,)*
+            $($(#[$attribute])* $(#[doc = $meaning])? $(#[schemars(extend("unit" = $unit))])? $shown $field: $type,)*
         }
     )*};
 }

@@ -148,7 +148,7 @@ pub trait Quick {
 /// A parameter named `trials` or ending in `_trials` is effort: lowering it leaves the meaning of the figure and skips the
 /// claims that need the full count.
 pub trait Figure: Sync {
-    /// A flat struct whose `Default` is the paper's setting, and whose fields have documentation and ranges (`garde`):
+    /// A flat struct whose `Default` is the paper's setting unless [`Figure::defaults`] says otherwise, and whose fields have documentation and ranges (`garde`):
     /// [`parameters!`](crate::parameters!) writes it.
     type Parameters: Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Default + Quick;
 
@@ -161,6 +161,11 @@ pub trait Figure: Sync {
     /// What stands above the figure.
     fn about(&self) -> About {
         Self::ABOUT
+    }
+
+    /// The paper's setting.
+    fn defaults(&self) -> Self::Parameters {
+        Self::Parameters::default()
     }
 
     /// Parameters without effect under these values: setting one is refused.
@@ -276,7 +281,7 @@ impl<F: Figure> AnyFigure for F {
     }
 
     fn parameters(&self) -> Vec<Parameter> {
-        schema::parameters::<F::Parameters>(&parameters::map(&F::Parameters::default()))
+        schema::parameters::<F::Parameters>(&parameters::map(&self.defaults()))
     }
 
     fn tables(&self) -> Vec<Fields> {
@@ -285,7 +290,7 @@ impl<F: Figure> AnyFigure for F {
 
     fn configure(&self, overrides: &[(String, String)], quick: bool) -> Result<Map<String, Json>, Error> {
         let figure = Figure::about(self).id;
-        let mut start = F::Parameters::default();
+        let mut start = self.defaults();
         if quick {
             start.quicken();
         }
@@ -310,7 +315,7 @@ impl<F: Figure> AnyFigure for F {
         let tables = Tables::of(&rows)?;
         let mut claims = Claims::about(Figure::about(self).id);
         Figure::claims(self, &typed, &rows, &mut claims);
-        let (defaults, full) = parameters::meaning(parameters, &parameters::map(&F::Parameters::default()));
+        let (defaults, full) = parameters::meaning(parameters, &parameters::map(&self.defaults()));
         let claims = claims.judged(defaults, full);
         let plot = self.plot(&typed, &rows);
         Ok(Outcome {

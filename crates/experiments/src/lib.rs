@@ -43,9 +43,9 @@ pub use error::Error;
 pub use figure::{About, AnyFigure, Context, Cost, Figure, Outcome, Quick};
 pub use kept::Kept;
 pub use measured::Measured;
-pub use schema::{Fields, Parameter, plain};
+pub use schema::{Column, Fields, Parameter, plain};
 pub use sweep::{Comparison, Tally};
-pub use table::{Column, Table, Tables, Value};
+pub use table::{Table, Tables, Value};
 
 /// Every figure and table, in the order of the publications.
 pub fn all() -> Vec<&'static dyn AnyFigure> {

@@ -3,6 +3,7 @@
 use fewbits_monte_carlo::{Estimate, Moments};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::ops::Sub;
 
 /// A simulated number and its standard error: two columns (`mse`, `mse_se`) of a table, one mark with its error bar in a plot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -63,6 +64,25 @@ impl From<Estimate> for Measured {
 impl From<&Moments> for Measured {
     fn from(moments: &Moments) -> Self {
         Self::mean(moments)
+    }
+}
+
+/// The mean of the numbers.
+impl FromIterator<f64> for Measured {
+    fn from_iter<I: IntoIterator<Item = f64>>(numbers: I) -> Self {
+        Self::mean(&numbers.into_iter().collect())
+    }
+}
+
+/// The estimate less an exact number.
+impl Sub<f64> for Measured {
+    type Output = Self;
+
+    fn sub(self, exact: f64) -> Self {
+        Self {
+            value: self.value - exact,
+            ..self
+        }
     }
 }
 

@@ -1,10 +1,10 @@
 //! What the fields of parameters and rows say about themselves, read from their derived schema.
 
-use crate::table::Column;
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use serde_json::{Map, Value as Json};
+use std::borrow::Cow;
 
 /// A parameter as `describe` shows it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,6 +19,17 @@ pub struct Parameter {
     pub meaning: String,
     /// Names of the entries of one point, where the parameter is a list of points.
     pub entries: Vec<String>,
+}
+
+/// A column: its name in the CSV header, its unit and what it holds.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Column {
+    /// Name in the header: lower case with underscores.
+    pub name: Cow<'static, str>,
+    /// Unit; empty for pure numbers and labels.
+    pub unit: Cow<'static, str>,
+    /// What the column holds, in a few words.
+    pub meaning: Cow<'static, str>,
 }
 
 /// A table as its rows describe it.

@@ -39,6 +39,19 @@ impl<A: Tally, B: Tally> Tally for (A, B) {
 }
 
 impl Context<'_> {
+    /// What every one of `count` trials of an experiment gave, in their order.
+    ///
+    /// # Errors
+    /// If a trial fails or the run is cancelled.
+    pub fn trials<T: Send>(
+        &self,
+        experiment: &str,
+        count: u64,
+        trial: impl Fn(Trial) -> Result<T, Error> + Sync,
+    ) -> Result<Vec<T>, Error> {
+        Ok(self.monte_carlo(self.stream(experiment), count).run(trial)?)
+    }
+
     /// Runs `trials` trials at one point on the streams of `stream`, each adding to a tally that starts `empty`.
     ///
     /// # Errors
@@ -114,6 +127,15 @@ impl Context<'_> {
         };
         points.iter().map(at).collect()
     }
+}
+
+/// The words of these with `by` between them.
+pub fn joined<T: ToString>(words: impl IntoIterator<Item = T>, by: &str) -> String {
+    words
+        .into_iter()
+        .map(|word| word.to_string())
+        .collect::<Vec<_>>()
+        .join(by)
 }
 
 /// The first row of which this holds.

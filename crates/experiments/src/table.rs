@@ -6,7 +6,7 @@
 //! finite is an error: what did not converge must say so.
 
 use crate::error::Error;
-use crate::schema::{self, Fields};
+use crate::schema::{self, Column, Fields};
 use ciborium::Value as Cbor;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -39,17 +39,6 @@ impl fmt::Display for Value {
             Self::Missing => Ok(()),
         }
     }
-}
-
-/// A column: its name in the CSV header, its unit and what it holds.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Column {
-    /// Name in the header: lower case with underscores.
-    pub name: Cow<'static, str>,
-    /// Unit; empty for pure numbers and labels.
-    pub unit: Cow<'static, str>,
-    /// What the column holds, in a few words.
-    pub meaning: Cow<'static, str>,
 }
 
 /// Rows under named columns.

@@ -180,6 +180,19 @@ mod tests {
         );
     }
 
+    /// Counted by hand: five sensors of two and of four bits, fourteen numbers of 32 bits, five ranges of 32 bits.
+    #[test]
+    fn published_protocol_costs_more_than_plain_ranges() {
+        for (levels, reports) in [(4, 10), (16, 20)] {
+            let bits = StepBits::new(5, levels, &NumberFormat::Single).unwrap();
+            assert_eq!((bits.reports, bits.handover, bits.raw), (reports, 448, 160));
+        }
+        for levels in [2, 256] {
+            let bits = StepBits::new(5, levels, &NumberFormat::Single).unwrap();
+            assert!(bits.reports + bits.handover > bits.raw);
+        }
+    }
+
     #[test]
     fn elections_break_ties_and_time_out() {
         let sensors = [Vector2::new(0.0, 0.0), Vector2::new(2.0, 0.0), Vector2::new(4.0, 0.0)];

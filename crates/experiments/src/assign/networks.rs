@@ -55,25 +55,17 @@ fn evaluate(variances: &[f64]) -> Result<[[f64; 6]; 2], fewbits_sensor_assignmen
 
 rows! {
     /// Averages over networks, one row for each decoder.
-    pub struct Row {
+    pub struct Row by "{at} {decoder}" {
         /// What is varied: standard deviation (`assign-fig6-3`) or mean (`assign-fig6-4`) of the noise variances.
         at: f64 ["V^2"],
-        /// Decoder.
-        decoder: &'static str,
-        /// Networks averaged.
-        trials: u64,
-        /// Squared error of the linear assignment.
-        alg: Measured ["V^2"],
-        /// Least over all assignments.
-        min: Measured ["V^2"],
-        /// Most precise sensor to the coarsest bit.
-        ii: Measured ["V^2"],
-        /// Mean over all assignments.
-        avg: Measured ["V^2"],
-        /// Linear assignment improved by exchanges.
-        swap: Measured ["V^2"],
-        /// Mean of alg/min - 1.
-        excess: Measured,
+        decoder: &'static str => "Decoder.",
+        trials: u64 => "Networks averaged.",
+        alg: Measured ["V^2"] => "Squared error of the linear assignment.",
+        min: Measured ["V^2"] => "Least over all assignments.",
+        ii: Measured ["V^2"] => "Most precise sensor to the coarsest bit.",
+        avg: Measured ["V^2"] => "Mean over all assignments.",
+        swap: Measured ["V^2"] => "Linear assignment improved by exchanges.",
+        excess: Measured => "Mean of alg/min - 1.",
     }
 }
 
@@ -126,11 +118,10 @@ fn rows(context: &Context<'_>, sensors: usize, trials: u64, points: &[(f64, f64,
 }
 
 fn claim_orders(rows: &[Row], claims: &mut Claims) {
-    let key = |r: &Row| format!("{} {}", r.at, r.decoder);
-    claims.references("alg", "linear assignment", rows, |r| (key(r), r.alg));
-    claims.references("min", "least of all", rows, |r| (key(r), r.min));
-    claims.references("ii", "assignment II", rows, |r| (key(r), r.ii));
-    claims.references("avg", "mean of all", rows, |r| (key(r), r.avg));
+    claims.keyed("alg", "linear assignment", rows, |r| r.alg);
+    claims.keyed("min", "least of all", rows, |r| r.min);
+    claims.keyed("ii", "assignment II", rows, |r| r.ii);
+    claims.keyed("avg", "mean of all", rows, |r| r.avg);
     let what = "exchanges end on average within 0.5 % of the minimum";
     claims.all("exchange", what, rows, |r| r.swap.value / r.min.value - 1.0 <= 5e-3);
     let what = "for the centre decoder the linear assignment is on average within 2.5 % of the minimum";
@@ -172,18 +163,15 @@ pub struct Spread;
 
 parameters! { self #[derive(Validate)]
     pub struct SpreadParameters {
-        /// Number of sensors; all their assignments are enumerated.
         #[garde(range(min = 2, max = 7))]
-        sensors: usize = 4,
-        /// Mean of the noise variances, V^2.
+        sensors: usize = 4 => "Number of sensors; all their assignments are enumerated.",
         #[garde(range(min = 1e-4, max = 10.0))]
-        mean: f64 = 0.03,
+        mean: f64 = 0.03 => "Mean of the noise variances, V^2.",
         /// Their population standard deviations, V^2.
         #[garde(length(min = 1, max = 100), inner(range(min = 0.0, max = 10.0)), inner(custom(|sd: &f64, _: &()| feasible(self.sensors, self.mean, *sd))))]
         sds: Vec<f64> = vec![0.0, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03],
-        /// Networks at each point.
         #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 1000 => quick 100,
+        trials: u64 = 1000 => quick 100 => "Networks at each point.",
     }
 }
 
@@ -204,8 +192,7 @@ impl Figure for Spread {
         let what = "the linear assignment beats assignment II as soon as sensors differ, centre decoder";
         let differ = centre(rows).filter(|r| r.at > 0.0);
         here.all("better-than-ii", what, differ, |r| r.alg.value < r.ii.value);
-        let what = "its error falls with the spread";
-        here.decreasing("decreasing", what, centre(rows).map(|r| r.alg));
+        here.decreasing("decreasing", "its error falls with the spread", centre(rows).map(|r| r.alg));
         let ends = centre(rows).next().zip(centre(rows).last());
         let what = "the mean over all assignments falls by 6.6 % only";
         let fall = ends.map(|(first, last)| 1.0 - last.avg.value / first.avg.value);
@@ -227,18 +214,15 @@ pub struct Mean;
 
 parameters! { self #[derive(Validate)]
     pub struct MeanParameters {
-        /// Number of sensors; all their assignments are enumerated.
         #[garde(range(min = 2, max = 7))]
-        sensors: usize = 4,
+        sensors: usize = 4 => "Number of sensors; all their assignments are enumerated.",
         /// Means of the noise variances, V^2.
         #[garde(length(min = 1, max = 100), inner(range(min = 1e-4, max = 10.0)), inner(custom(|mean: &f64, _: &()| feasible(self.sensors, *mean, self.sd))))]
         means: Vec<f64> = vec![0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1],
-        /// Their population standard deviation, V^2.
         #[garde(range(min = 0.0, max = 10.0))]
-        sd: f64 = 0.015,
-        /// Networks at each point.
+        sd: f64 = 0.015 => "Their population standard deviation, V^2.",
         #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 1000 => quick 100,
+        trials: u64 = 1000 => quick 100 => "Networks at each point.",
     }
 }
 

@@ -15,24 +15,18 @@ pub struct Landings;
 
 parameters! {
     pub struct LandingParameters {
-        /// Step of the horizontal axis in units of V.
         #[garde(range(min = 1e-5, max = 1.0))]
-        step: f64 = 0.002,
+        step: f64 = 0.002 => "Step of the horizontal axis in units of V.",
     }
 }
 
 rows! {
     pub struct Landing {
-        /// Source.
-        x: f64 ["V"],
-        /// Estimate with bit 1, the coarsest, wrong.
-        f1: f64 ["V"],
-        /// Estimate with bit 2 wrong.
-        f2: f64 ["V"],
-        /// Estimate with bit 3 wrong.
-        f3: f64 ["V"],
-        /// Estimate with bit 4 wrong.
-        f4: f64 ["V"],
+        x: f64 ["V"] => "Source.",
+        f1: f64 ["V"] => "Estimate with bit 1, the coarsest, wrong.",
+        f2: f64 ["V"] => "Estimate with bit 2 wrong.",
+        f3: f64 ["V"] => "Estimate with bit 3 wrong.",
+        f4: f64 ["V"] => "Estimate with bit 4 wrong.",
     }
 }
 
@@ -55,10 +49,8 @@ impl Landing {
 
 rows! {
     pub struct Landed {
-        /// Estimates along the axis.
-        curve: Vec<Landing>,
-        /// Estimates at the centres of the cells.
-        centres: Vec<Landing>,
+        curve: Vec<Landing> => "Estimates along the axis.",
+        centres: Vec<Landing> => "Estimates at the centres of the cells.",
     }
 }
 
@@ -109,27 +101,20 @@ pub struct BitErrors;
 
 parameters! {
     pub struct ErrorParameters {
-        /// Noise variance in units of V^2.
         #[garde(range(min = 1e-9, max = 1e3))]
-        variance: f64 = 0.03,
-        /// Step of the horizontal axis in units of V.
+        variance: f64 = 0.03 => "Noise variance in units of V^2.",
         #[garde(range(min = 1e-5, max = 1.0))]
-        step: f64 = 0.002,
+        step: f64 = 0.002 => "Step of the horizontal axis in units of V.",
     }
 }
 
 rows! {
     pub struct Wrong {
-        /// Source.
-        x: f64 ["V"],
-        /// Probability that bit 1, the coarsest, is wrong.
-        pa1: f64,
-        /// Probability that bit 2 is wrong.
-        pa2: f64,
-        /// Probability that bit 3 is wrong.
-        pa3: f64,
-        /// Probability that bit 4 is wrong.
-        pa4: f64,
+        x: f64 ["V"] => "Source.",
+        pa1: f64 => "Probability that bit 1, the coarsest, is wrong.",
+        pa2: f64 => "Probability that bit 2 is wrong.",
+        pa3: f64 => "Probability that bit 3 is wrong.",
+        pa4: f64 => "Probability that bit 4 is wrong.",
     }
 }
 

@@ -18,38 +18,25 @@ parameters! {
 
 rows! {
     pub struct Rows {
-        /// Assignments.
-        assignments: Vec<Row>,
-        /// Costs of the linear assignment problem, with the dual variables that prove its optimum.
-        costs: Vec<Cost>,
-        /// The same with the variances read as standard deviations.
-        as_deviations: Vec<Row>,
+        assignments: Vec<Row> => "Assignments.",
+        costs: Vec<Cost> => "Costs of the linear assignment problem, with the dual variables that prove its optimum.",
+        as_deviations: Vec<Row> => "The same with the variances read as standard deviations.",
     }
 
-    struct Row {
-        /// Assignment.
-        assign: &'static str,
-        /// Sensor of each bit, coarsest first, counted from 1.
-        sensors: String,
-        /// Equation 6.6.
-        approx: f64 ["V^2"],
-        /// Exact error of the cell's centre.
-        center: f64 ["V^2"],
-        /// Exact error of the posterior mean.
-        mmse: f64 ["V^2"],
+    struct Row by "{assign}" {
+        assign: &'static str => "Assignment.",
+        sensors: String => "Sensor of each bit, coarsest first, counted from 1.",
+        approx: f64 ["V^2"] => "Equation 6.6.",
+        center: f64 ["V^2"] => "Exact error of the cell's centre.",
+        mmse: f64 ["V^2"] => "Exact error of the posterior mean.",
     }
 
     struct Cost {
-        /// Bit, coarsest first, from 1.
-        bit: usize,
-        /// Sensor, from 1.
-        sensor: usize,
-        /// Cost of giving the bit to the sensor.
-        gamma: f64 ["V^2"],
-        /// Dual variable of the bit.
-        dual_bit: f64 ["V^2"],
-        /// Dual variable of the sensor.
-        dual_sensor: f64 ["V^2"],
+        bit: usize => "Bit, coarsest first, from 1.",
+        sensor: usize => "Sensor, from 1.",
+        gamma: f64 ["V^2"] => "Cost of giving the bit to the sensor.",
+        dual_bit: f64 ["V^2"] => "Dual variable of the bit.",
+        dual_sensor: f64 ["V^2"] => "Dual variable of the sensor.",
     }
 }
 
@@ -60,11 +47,7 @@ fn row(assign: &'static str, sensors: &CodedSensors, assignment: &[usize]) -> Re
     Ok(Row {
         assign,
         // Counted from 1, as the thesis does.
-        sensors: assignment
-            .iter()
-            .map(|n| (n + 1).to_string())
-            .collect::<Vec<_>>()
-            .join(" "),
+        sensors: joined(assignment.iter().map(|n| n + 1), " "),
         approx: quantization_error(sensors.half_width(), sensors.sensors()) + cost,
         center: sensors.centre_mse(assignment)?,
         mmse: sensors.mmse(assignment)?,
@@ -126,10 +109,9 @@ impl Figure for Table {
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let all = || rows.assignments.iter();
-        let key = |r: &Row| r.assign.to_owned();
-        claims.references("approx", "approximate error, assignment", all(), |r| (key(r), r.approx));
-        claims.references("center", "error of the cell's centre, assignment", all(), |r| (key(r), r.center));
-        claims.references("mmse", "error of the posterior mean, assignment", all(), |r| (key(r), r.mmse));
+        claims.keyed("approx", "approximate error, assignment", all(), |r| r.approx);
+        claims.keyed("center", "error of the cell's centre, assignment", all(), |r| r.center);
+        claims.keyed("mmse", "error of the posterior mean, assignment", all(), |r| r.mmse);
         let cells = all().flat_map(|r| {
             [
                 (format!("approx {}", r.assign), r.approx),
@@ -158,19 +140,8 @@ impl Figure for Table {
         let pair = find(&rows.assignments, "optimal").zip(find(&rows.assignments, "best, posterior mean"));
         let gain = pair.map(|(linear, best)| linear.mmse / best.mmse - 1.0);
         here.near("exact-mmse-error", "by 7e-6 only", gain, 7e-6, 0.05 * 7e-6);
-        let bits = rows
-            .costs
-            .iter()
-            .filter(|c| c.sensor == 1)
-            .map(|c| c.dual_bit)
-            .sum::<f64>();
-        let dual = bits
-            + rows
-                .costs
-                .iter()
-                .filter(|c| c.bit == 1)
-                .map(|c| c.dual_sensor)
-                .sum::<f64>();
+        let bits: f64 = select(&rows.costs, |c| c.sensor == 1).map(|c| c.dual_bit).sum();
+        let dual = bits + select(&rows.costs, |c| c.bit == 1).map(|c| c.dual_sensor).sum::<f64>();
         let matched = find(&rows.assignments, "optimal")
             .map_or(f64::NAN, |r| r.approx - quantization_error(1.0, p.variances.len()));
         let what = "the dual variables prove the optimum: their sum is the cost";
@@ -197,11 +168,7 @@ impl Figure for Table {
         let chosen = chosen.map(|(bit, sensor)| (sensor, (n - bit) as f64)).collect();
         let three = &rows.assignments[..3.min(rows.assignments.len())];
         let errors = |value: fn(&Row) -> f64, shift: f64| {
-            three
-                .iter()
-                .enumerate()
-                .map(|(i, r)| (i as f64 + shift, value(r)))
-                .collect::<Vec<_>>()
+            points(three.iter().enumerate(), |(i, r)| (i as f64 + shift, value(r)))
         };
         let costs = Panel::new(
             "Cost of giving a bit to a sensor",

@@ -23,40 +23,26 @@ parameters! {
 
 rows! {
     pub struct Rows {
-        /// Errors before and after each change.
-        changes: Vec<Change>,
-        /// The designs behind the errors after, where there is one.
-        designs: Vec<Design>,
+        changes: Vec<Change> => "Errors before and after each change.",
+        designs: Vec<Design> => "The designs behind the errors after, where there is one.",
     }
 
-    struct Change {
-        /// Name of the comparison.
-        id: String,
-        /// What is changed.
-        idea: &'static str,
-        /// Where.
-        case: String,
-        /// Error before.
-        before: f64 ["V^2"],
-        /// Error after.
-        after: f64 ["V^2"],
-        /// Relative change.
-        change_percent: f64 ["%"],
+    struct Change by "{id}" {
+        id: String => "Name of the comparison.",
+        idea: &'static str => "What is changed.",
+        case: String => "Where.",
+        before: f64 ["V^2"] => "Error before.",
+        after: f64 ["V^2"] => "Error after.",
+        change_percent: f64 ["%"] => "Relative change.",
     }
 
     struct Design {
-        /// Name of the comparison.
-        id: String,
-        /// Where the search began that found it.
-        start: &'static str,
-        /// Sensor, from 1.
-        sensor: usize,
-        /// Standard deviation of its noise.
-        noise_std: f64 ["V"],
-        /// Its mask, where it is a linear pattern on a grid.
-        mask: Option<Mask>,
-        /// Thresholds at which its bit changes, from 0 below all of them.
-        thresholds: String ["V"],
+        id: String => "Name of the comparison.",
+        start: &'static str => "Where the search began that found it.",
+        sensor: usize => "Sensor, from 1.",
+        noise_std: f64 ["V"] => "Standard deviation of its noise.",
+        mask: Option<Mask> => "Its mask, where it is a linear pattern on a grid.",
+        thresholds: String ["V"] => "Thresholds at which its bit changes, from 0 below all of them.",
     }
 }
 
@@ -335,9 +321,8 @@ impl Figure for Beyond {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         claims.all("improvements", "every change lowers the error", &rows.changes, |r| r.after < r.before);
-        let key = |r: &Change| r.id.clone();
-        claims.references("after", "error after the change", &rows.changes, |r| (key(r), r.after));
-        claims.references("change", "relative change (%)", &rows.changes, |r| (key(r), r.change_percent));
+        claims.keyed("after", "error after the change", &rows.changes, |r| r.after);
+        claims.keyed("change", "relative change (%)", &rows.changes, |r| r.change_percent);
         let at = |id: &str| rows.changes.iter().find(|r| r.id == id);
         // A search may find a better design than the best known, not a worse one.
         let known = |r: &Change| crate::reference::value(&format!("binary-beyond/best-known/{}", r.id));

@@ -9,9 +9,8 @@ use fewbits_binary_patterns::{Mask, gray_basis, natural_basis};
 pub struct PrintedBounds;
 
 swept! { 0.0 to 30.0, step => quick 2.0,
-    /// Bits, and sensors.
     #[garde(length(min = 1, max = 4), inner(range(min = 1, max = 5)))]
-    bits: Vec<usize> = vec![3, 4],
+    bits: Vec<usize> = vec![3, 4] => "Bits, and sensors.",
 }
 
 #[derive(Clone, Copy)]
@@ -49,38 +48,25 @@ fn meet(a: Kind, b: Kind, bits: usize, name: &str) -> Result<Option<f64>, Error>
 
 rows! {
     pub struct Rows {
-        /// Values and errors.
-        sets: Vec<Row>,
-        /// Crossings of equation 5.13.
-        crossings: Vec<Crossing>,
+        sets: Vec<Row> => "Values and errors.",
+        crossings: Vec<Crossing> => "Crossings of equation 5.13.",
     }
 
     struct Row {
-        /// Bits B and sensors N.
-        bits: usize,
-        /// Signal-to-noise ratio.
-        snr_db: f64 ["dB"],
-        /// Equation 5.13, all thresholds at zero.
-        crlb_fixed: f64 ["V^2"],
-        /// Equation 5.13, natural patterns.
-        crlb_natural: f64 ["V^2"],
-        /// Equation 5.13, Gray patterns.
-        crlb_gray: f64 ["V^2"],
-        /// Exact error, all thresholds at zero.
-        mse_fixed: f64 ["V^2"],
-        /// Exact error, natural patterns.
-        mse_natural: f64 ["V^2"],
-        /// Exact error, Gray patterns.
-        mse_gray: f64 ["V^2"],
+        bits: usize => "Bits B and sensors N.",
+        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
+        crlb_fixed: f64 ["V^2"] => "Equation 5.13, all thresholds at zero.",
+        crlb_natural: f64 ["V^2"] => "Equation 5.13, natural patterns.",
+        crlb_gray: f64 ["V^2"] => "Equation 5.13, Gray patterns.",
+        mse_fixed: f64 ["V^2"] => "Exact error, all thresholds at zero.",
+        mse_natural: f64 ["V^2"] => "Exact error, natural patterns.",
+        mse_gray: f64 ["V^2"] => "Exact error, Gray patterns.",
     }
 
     struct Crossing {
-        /// Bits B and sensors N.
-        bits: usize,
-        /// Where fixed and Gray cross.
-        fixed_gray_db: Option<f64> ["dB"],
-        /// Where Gray and natural cross.
-        gray_natural_db: Option<f64> ["dB"],
+        bits: usize => "Bits B and sensors N.",
+        fixed_gray_db: Option<f64> ["dB"] => "Where fixed and Gray cross.",
+        gray_natural_db: Option<f64> ["dB"] => "Where Gray and natural cross.",
     }
 }
 
@@ -127,10 +113,7 @@ impl Figure for PrintedBounds {
         });
         claims.references("crossing", what, crossings, |crossing| crossing);
         let natural = |bits: usize| first(&rows.crossings, |c| c.bits == bits).and_then(|c| c.gray_natural_db);
-        let beyond = rows
-            .sets
-            .iter()
-            .filter(|r| natural(r.bits).is_some_and(|at| r.snr_db > at));
+        let beyond = select(&rows.sets, |r| natural(r.bits).is_some_and(|at| r.snr_db > at));
         let what = "where the formula prefers natural patterns, Gray patterns have the smaller error";
         claims.all("contradiction", what, beyond, |r| r.crlb_natural < r.crlb_gray && r.mse_gray < r.mse_natural);
     }

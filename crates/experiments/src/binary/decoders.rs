@@ -13,10 +13,8 @@ swept! { -10.0 to 40.0, step => quick 5.0, }
 
 rows! {
     pub struct Rows {
-        /// Errors and bounds.
-        curves: Vec<Row>,
-        /// How close the van Trees bound is, uniform source.
-        tightness: Vec<Tightness>,
+        curves: Vec<Row> => "Errors and bounds.",
+        tightness: Vec<Tightness> => "How close the van Trees bound is, uniform source.",
     }
 }
 
@@ -30,44 +28,27 @@ enum Kind {
 }
 
 rows! {
-    struct Row {
-        /// Uniform on [-1, 1], or Gaussian of variance 0.1.
-        source: Kind,
-        /// Signal-to-noise ratio.
-        snr_db: f64 ["dB"],
-        /// Posterior mean.
-        mmse: f64 ["V^2"],
-        /// Continuous maximum a posteriori.
-        cmap: f64 ["V^2"],
-        /// Discrete maximum a posteriori.
-        dmap: f64 ["V^2"],
-        /// Discrete maximum a posteriori as printed.
-        dmap_print: f64 ["V^2"],
-        /// Discrete maximum a posteriori, exact cells.
-        dmap_exact: f64 ["V^2"],
-        /// Equation 5.13.
-        crlb: f64 ["V^2"],
-        /// Van Trees bound with optimal weight.
-        vt: f64 ["V^2"],
-        /// Rate-distortion bound as printed.
-        rd_print: f64 ["V^2"],
-        /// Rate-distortion bound of N bits.
-        rd_per_n: f64 ["V^2"],
-        /// Exact centralised bound.
-        central: f64 ["V^2"],
+    struct Row by "{snr_db} dB" {
+        source: Kind => "Uniform on [-1, 1], or Gaussian of variance 0.1.",
+        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
+        mmse: f64 ["V^2"] => "Posterior mean.",
+        cmap: f64 ["V^2"] => "Continuous maximum a posteriori.",
+        dmap: f64 ["V^2"] => "Discrete maximum a posteriori.",
+        dmap_print: f64 ["V^2"] => "Discrete maximum a posteriori as printed.",
+        dmap_exact: f64 ["V^2"] => "Discrete maximum a posteriori, exact cells.",
+        crlb: f64 ["V^2"] => "Equation 5.13.",
+        vt: f64 ["V^2"] => "Van Trees bound with optimal weight.",
+        rd_print: f64 ["V^2"] => "Rate-distortion bound as printed.",
+        rd_per_n: f64 ["V^2"] => "Rate-distortion bound of N bits.",
+        central: f64 ["V^2"] => "Exact centralised bound.",
     }
 
-    struct Tightness {
-        /// Signal-to-noise ratio.
-        snr_db: f64 ["dB"],
-        /// Optimal-weight bound, uniform source.
-        van_trees: f64 ["V^2"],
-        /// Exact error.
-        mmse: f64 ["V^2"],
-        /// Equation 5.13.
-        crlb: f64 ["V^2"],
-        /// Bound over error.
-        ratio: f64,
+    struct Tightness by "{snr_db} dB" {
+        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
+        van_trees: f64 ["V^2"] => "Optimal-weight bound, uniform source.",
+        mmse: f64 ["V^2"] => "Exact error.",
+        crlb: f64 ["V^2"] => "Equation 5.13.",
+        ratio: f64 => "Bound over error.",
     }
 }
 
@@ -154,19 +135,14 @@ impl Figure for Decoders {
         });
         let what = "for a Gaussian source equation 5.13 is a bound";
         claims.all("gaussian-crlb", what, of(Kind::Gaussian), |r| r.crlb <= r.mmse * at_most);
-        let key = |r: &Row| format!("{} dB", r.snr_db);
         let what = "Gaussian source: equation 5.10 as printed (erratum binary-4)";
-        claims.references("as-printed", what, of(Kind::Gaussian), |r| (key(r), r.dmap_print));
-        claims.references("corrected", "the same corrected", of(Kind::Gaussian), |r| (key(r), r.dmap));
-        let key = |r: &Tightness| format!("{} dB", r.snr_db);
-        claims.references("tightness", "van Trees bound over error", &rows.tightness, |r| (key(r), r.ratio));
-        claims.references("crlb", "equation 5.13, uniform source", &rows.tightness, |r| (key(r), r.crlb));
+        claims.keyed("as-printed", what, of(Kind::Gaussian), |r| r.dmap_print);
+        claims.keyed("corrected", "the same corrected", of(Kind::Gaussian), |r| r.dmap);
+        claims.keyed("tightness", "van Trees bound over error", &rows.tightness, |r| r.ratio);
+        claims.keyed("crlb", "equation 5.13, uniform source", &rows.tightness, |r| r.crlb);
         let what =
             "it exceeds the true error at -20, 0, 15 and 20 dB: no bound for a uniform source (erratum binary-7)";
-        let beyond = rows
-            .tightness
-            .iter()
-            .filter(|r| [-20.0, 0.0, 15.0, 20.0].contains(&r.snr_db));
+        let beyond = select(&rows.tightness, |r| [-20.0, 0.0, 15.0, 20.0].contains(&r.snr_db));
         claims.all("uniform-crlb", what, beyond, |r| r.crlb > r.mmse);
     }
 

@@ -9,18 +9,14 @@ use fewbits_binary_patterns::{Mask, gray_basis};
 pub struct Feedback;
 
 swept! { 0.0 to 40.0 => quick 30.0, step => quick 10.0,
-    /// Number of sensors.
     #[garde(range(min = 3, max = 14))]
-    sensors: usize = 10,
-    /// Most bits of the cell index that are tried.
+    sensors: usize = 10 => "Number of sensors.",
     #[garde(range(min = 3, max = 8))]
-    most_bits: usize = 7 => quick 5,
-    /// First step of AQ-VS in units of V. The thesis gives no rule.
+    most_bits: usize = 7 => quick 5 => "Most bits of the cell index that are tried.",
     #[garde(range(min = 1e-6, max = 10.0))]
-    vs_step: f64 = 0.5,
-    /// Factor of AQ-VS.
+    vs_step: f64 = 0.5 => "First step of AQ-VS in units of V. The thesis gives no rule.",
     #[garde(range(min = 1.0, max = 10.0))]
-    vs_factor: f64 = 1.5,
+    vs_factor: f64 = 1.5 => "Factor of AQ-VS.",
 }
 
 /// Finer cells than this share of the noise are not tried: they never win.
@@ -36,35 +32,21 @@ pub(super) fn descend(bits: usize, sensors: usize, snr: f64, extra: usize) -> Re
 }
 
 rows! {
-    pub struct Row {
-        /// Signal-to-noise ratio.
-        snr_db: f64 ["dB"],
-        /// Best linear patterns of three bits, exhaustive.
-        lbqp_b3: f64 ["V^2"],
-        /// Their masks.
-        masks_b3: String,
-        /// Best linear patterns of any number of bits, by descent beyond three.
-        lbqp_best: f64 ["V^2"],
-        /// That number of bits.
-        bits: usize,
-        /// Their masks.
-        masks: String,
-        /// All thresholds at zero, posterior mean.
-        fixed: f64 ["V^2"],
-        /// Luo's allocation, linear fusion.
-        luo_soft: Option<f64> ["V^2"],
-        /// Relaxed multi-threshold bound.
-        ribeiro_relaxed: f64 ["V^2"],
-        /// Adaptive variable step, bounded maximum likelihood.
-        aqvs_mle: f64 ["V^2"],
-        /// Adaptive maximum likelihood, bounded maximum likelihood.
-        aqml_mle: f64 ["V^2"],
-        /// Adaptive maximum likelihood, posterior mean.
-        aqml_mmse: f64 ["V^2"],
-        /// Adaptive posterior mean.
-        aq_posterior_mean: f64 ["V^2"],
-        /// All measurements without quantization.
-        clairvoyant: f64 ["V^2"],
+    pub struct Row by "{snr_db} dB" {
+        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
+        lbqp_b3: f64 ["V^2"] => "Best linear patterns of three bits, exhaustive.",
+        masks_b3: String => "Their masks.",
+        lbqp_best: f64 ["V^2"] => "Best linear patterns of any number of bits, by descent beyond three.",
+        bits: usize => "That number of bits.",
+        masks: String => "Their masks.",
+        fixed: f64 ["V^2"] => "All thresholds at zero, posterior mean.",
+        luo_soft: Option<f64> ["V^2"] => "Luo's allocation, linear fusion.",
+        ribeiro_relaxed: f64 ["V^2"] => "Relaxed multi-threshold bound.",
+        aqvs_mle: f64 ["V^2"] => "Adaptive variable step, bounded maximum likelihood.",
+        aqml_mle: f64 ["V^2"] => "Adaptive maximum likelihood, bounded maximum likelihood.",
+        aqml_mmse: f64 ["V^2"] => "Adaptive maximum likelihood, posterior mean.",
+        aq_posterior_mean: f64 ["V^2"] => "Adaptive posterior mean.",
+        clairvoyant: f64 ["V^2"] => "All measurements without quantization.",
     }
 }
 
@@ -138,17 +120,11 @@ impl Figure for Feedback {
         claims.all("decoder", what, rows, |r| r.aqml_mmse <= r.aqml_mle);
         let what = "nothing is below the unquantized estimate";
         claims.all("floor", what, rows, |r| r.clairvoyant <= r.lbqp_best.min(r.aq_posterior_mean));
-        type Column = fn(&Row) -> f64;
-        let columns: [(&str, &str, Column); 5] = [
-            ("three-bits", "patterns of three bits", |r| r.lbqp_b3),
-            ("best", "patterns of the best resolution", |r| r.lbqp_best),
-            ("aq-ml", "AQ-ML", |r| r.aqml_mle),
-            ("multi-threshold", "relaxed multi-threshold bound", |r| r.ribeiro_relaxed),
-            ("bits", "bits of the best resolution", |r| r.bits as f64),
-        ];
-        for (quantity, what, of) in columns {
-            claims.references(quantity, what, rows, |r| (format!("{} dB", r.snr_db), of(r)));
-        }
+        claims.keyed("three-bits", "patterns of three bits", rows, |r| r.lbqp_b3);
+        claims.keyed("best", "patterns of the best resolution", rows, |r| r.lbqp_best);
+        claims.keyed("aq-ml", "AQ-ML", rows, |r| r.aqml_mle);
+        claims.keyed("multi-threshold", "relaxed multi-threshold bound", rows, |r| r.ribeiro_relaxed);
+        claims.keyed("bits", "bits of the best resolution", rows, |r| r.bits as f64);
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {

@@ -15,42 +15,27 @@ const OTHER: [Mask; 3] = [4, 6, 7];
 
 rows! {
     pub struct Rows {
-        /// Errors and bounds; the variance of the source is 0.1.
-        errors: Vec<Row>,
-        /// Where two bases have the same error.
-        crossings: Vec<Crossing>,
+        errors: Vec<Row> => "Errors and bounds; the variance of the source is 0.1.",
+        crossings: Vec<Crossing> => "Where two bases have the same error.",
     }
 
-    struct Row {
-        /// Signal-to-noise ratio.
-        snr_db: f64 ["dB"],
-        /// Least error over the 28 bases.
-        mse_opt: f64,
-        /// The best basis.
-        masks: String,
-        /// Error of the Gray basis.
-        mse_gray: f64,
-        /// Error of the natural basis.
-        mse_natural: f64,
-        /// Equation 5.12 as printed, R = 3.
-        dr_print: f64,
-        /// The same with the noise of the average.
-        dr_per_n: f64,
-        /// Optimal-weight van Trees bound of the best basis.
-        vt: f64,
-        /// Least error over all triples of masks.
-        mse_unconstrained: f64,
-        /// The best triple.
-        masks_unconstrained: String,
-        /// Error of three sign bits.
-        mse_signs: f64,
+    struct Row by "{snr_db} dB" {
+        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
+        mse_opt: f64 => "Least error over the 28 bases.",
+        masks: String => "The best basis.",
+        mse_gray: f64 => "Error of the Gray basis.",
+        mse_natural: f64 => "Error of the natural basis.",
+        dr_print: f64 => "Equation 5.12 as printed, R = 3.",
+        dr_per_n: f64 => "The same with the noise of the average.",
+        vt: f64 => "Optimal-weight van Trees bound of the best basis.",
+        mse_unconstrained: f64 => "Least error over all triples of masks.",
+        masks_unconstrained: String => "The best triple.",
+        mse_signs: f64 => "Error of three sign bits.",
     }
 
-    struct Crossing {
-        /// Two bases.
-        pair: &'static str,
-        /// Where their errors are equal.
-        snr_db: f64 ["dB"],
+    struct Crossing by "{pair}" {
+        pair: &'static str => "Two bases.",
+        snr_db: f64 ["dB"] => "Where their errors are equal.",
     }
 }
 
@@ -108,17 +93,15 @@ impl Figure for GaussianSource {
         let violated = errors.iter().filter(|r| r.mse_signs < r.dr_print).count();
         let what = "three sign bits fall below the printed function somewhere (erratum binary-6)";
         here.at_least("printed-violated", what, violated as f64, 1.0);
-        let what = "between them {4,6,7} is best (erratum binary-13)";
-        claims.references("crossing", what, &rows.crossings, |c| (c.pair.to_owned(), c.snr_db));
+        claims.keyed("crossing", "between them {4,6,7} is best (erratum binary-13)", &rows.crossings, |c| c.snr_db);
         let from = rows.crossings.last().map_or(f64::NAN, |c| c.snr_db);
         let what = "Gray is the best basis above 6.032 dB and only there";
         claims.all("gray-above", what, errors, |r| (r.masks == "3 4 6") == (r.snr_db > from));
         let what = "and never better than the best";
         claims.all("gray-no-better", what, errors, |r| r.mse_gray >= r.mse_opt * (1.0 - 1e-9));
-        let key = |r: &Row| format!("{} dB", r.snr_db);
-        claims.references("signs", "three sign bits", errors, |r| (key(r), r.mse_signs));
-        claims.references("print", "where the print allows no less than", errors, |r| (key(r), r.dr_print));
-        claims.references("corrected", "and the correct bound is", errors, |r| (key(r), r.dr_per_n));
+        claims.keyed("signs", "three sign bits", errors, |r| r.mse_signs);
+        claims.keyed("print", "where the print allows no less than", errors, |r| r.dr_print);
+        claims.keyed("corrected", "and the correct bound is", errors, |r| r.dr_per_n);
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {

@@ -94,15 +94,12 @@ macro_rules! swept {
         parameters! { self #[derive(Validate)]
             pub struct Parameters {
                 $($own)*
-                /// First signal-to-noise ratio, dB.
                 #[garde(range(min = -60.0, max = 60.0))]
-                from_db: f64 = $from,
-                /// Last signal-to-noise ratio, dB.
+                from_db: f64 = $from => "First signal-to-noise ratio, dB.",
                 #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| super::not_below(self.from_db, *to)))]
-                to_db: f64 = $to $(=> quick $last)?,
-                /// Step, dB.
+                to_db: f64 = $to $(=> quick $last)? => "Last signal-to-noise ratio, dB.",
                 #[garde(range(min = 0.01, max = 60.0))]
-                step_db: f64 = 1.0 => quick $step,
+                step_db: f64 = 1.0 => quick $step => "Step, dB.",
             }
         }
     };
@@ -176,7 +173,7 @@ fn descent_from(
 
 /// Masks as text, in decreasing order of their first column: `4 6 3`.
 fn mask_text(masks: &[Mask]) -> String {
-    masks.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+    joined(masks, " ")
 }
 
 /// The pattern of a mask.

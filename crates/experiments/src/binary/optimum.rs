@@ -9,21 +9,16 @@ pub struct Optimum;
 
 parameters! { self #[derive(Validate)]
     pub struct Parameters {
-        /// Bits of the cell index.
         #[garde(range(min = 2, max = 4))]
-        bits: usize = 3,
-        /// Numbers of sensors, each at least the number of bits.
+        bits: usize = 3 => "Bits of the cell index.",
         #[garde(length(min = 1, max = 6), inner(range(min = 2, max = 10)), inner(custom(|n: &usize, _: &()| enough(*n, self.bits))))]
-        sensors: Vec<usize> = vec![3, 5, 8],
-        /// First signal-to-noise ratio, dB.
+        sensors: Vec<usize> = vec![3, 5, 8] => "Numbers of sensors, each at least the number of bits.",
         #[garde(range(min = -60.0, max = 60.0))]
-        from_db: f64 = 0.0,
-        /// Last signal-to-noise ratio, dB.
+        from_db: f64 = 0.0 => "First signal-to-noise ratio, dB.",
         #[garde(range(min = -60.0, max = 60.0), custom(|to: &f64, _: &()| not_below(self.from_db, *to)))]
-        to_db: f64 = 30.0,
-        /// Step, dB.
+        to_db: f64 = 30.0 => "Last signal-to-noise ratio, dB.",
         #[garde(range(min = 0.01, max = 60.0))]
-        step_db: f64 = 1.0 => quick 5.0,
+        step_db: f64 = 1.0 => quick 5.0 => "Step, dB.",
     }
 }
 
@@ -34,55 +29,35 @@ fn enough(sensors: usize, bits: usize) -> garde::Result {
 
 rows! {
     pub struct Rows {
-        /// Errors of searches and shortcuts.
-        errors: Vec<Row>,
-        /// Single quantities.
-        special: Vec<Special>,
-        /// Sixteen sensors at 18.2 dB.
-        tiling: Vec<Tiling>,
+        errors: Vec<Row> => "Errors of searches and shortcuts.",
+        special: Vec<Special> => "Single quantities.",
+        tiling: Vec<Tiling> => "Sixteen sensors at 18.2 dB.",
     }
 
     struct Row {
-        /// Signal-to-noise ratio.
-        snr_db: f64 ["dB"],
-        /// Number of sensors N.
-        sensors: usize,
-        /// Least error over sets of full rank.
-        mse_opt: f64 ["V^2"],
-        /// The best set.
-        masks: String,
-        /// Least error over all sets.
-        mse_unconstrained: f64 ["V^2"],
-        /// The best of all sets.
-        masks_unconstrained: String,
-        /// Least error with the Gray basis forced (strategy 1).
-        mse_strategy1: f64 ["V^2"],
-        /// Gray basis filled up by equation 5.13.
-        mse_strategy13: f64 ["V^2"],
-        /// All masks by equation 5.13.
-        mse_strategy3: f64 ["V^2"],
-        /// Luo's bits, linear fusion; few sensors leave a bit without any.
-        luo_soft: Option<f64> ["V^2"],
-        /// Luo's bits, posterior mean.
-        luo_mmse: Option<f64> ["V^2"],
-        /// Luo's bits, majority.
-        luo_majority: Option<f64> ["V^2"],
+        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
+        sensors: usize => "Number of sensors N.",
+        mse_opt: f64 ["V^2"] => "Least error over sets of full rank.",
+        masks: String => "The best set.",
+        mse_unconstrained: f64 ["V^2"] => "Least error over all sets.",
+        masks_unconstrained: String => "The best of all sets.",
+        mse_strategy1: f64 ["V^2"] => "Least error with the Gray basis forced (strategy 1).",
+        mse_strategy13: f64 ["V^2"] => "Gray basis filled up by equation 5.13.",
+        mse_strategy3: f64 ["V^2"] => "All masks by equation 5.13.",
+        luo_soft: Option<f64> ["V^2"] => "Luo's bits, linear fusion; few sensors leave a bit without any.",
+        luo_mmse: Option<f64> ["V^2"] => "Luo's bits, posterior mean.",
+        luo_majority: Option<f64> ["V^2"] => "Luo's bits, majority.",
     }
 
-    struct Special {
-        /// What.
-        quantity: &'static str,
-        /// Its value.
-        value: f64,
+    struct Special by "{quantity}" {
+        quantity: &'static str => "What.",
+        value: f64 => "Its value.",
     }
 
-    struct Tiling {
-        /// How sixteen masks were found.
-        design: &'static str,
-        /// Exact error.
-        mse: f64 ["V^2"],
-        /// The masks.
-        masks: String,
+    struct Tiling by "{design}" {
+        design: &'static str => "How sixteen masks were found.",
+        mse: f64 ["V^2"] => "Exact error.",
+        masks: String => "The masks.",
     }
 }
 
@@ -202,15 +177,11 @@ impl Figure for Optimum {
         let what = "N = B: natural up to 1 dB, {4,6,1} at 2 and 3, {4,5,6} at 4 to 8, Gray above (erratum binary-13)";
         here.all("regimes", what, of(3), |r| r.masks == expected(r.snr_db));
         let what = "Gray is optimal only above 8.0212 dB; with little noise the errors tend to the square of a cell's width over 12";
-        claims.references("special", what, &rows.special, |r| (r.quantity.to_owned(), r.value));
-        let limit = rows
-            .special
-            .iter()
-            .find(|r| r.quantity.contains("at 60 dB"))
-            .map(|r| r.value);
+        claims.keyed("special", what, &rows.special, |r| r.value);
+        let limit = first(&rows.special, |r| r.quantity.contains("at 60 dB")).map(|r| r.value);
         claims.below("limit-below", "eight sensors tend to it from below", limit, 0.25 * 0.25 / 12.0);
         let what = "strategy 2 for sixteen sensors at 18.2 dB: tiles lose against a descent";
-        claims.references("tiling", what, &rows.tiling, |r| (r.design.to_owned(), r.mse));
+        claims.keyed("tiling", what, &rows.tiling, |r| r.mse);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {

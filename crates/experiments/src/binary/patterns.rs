@@ -11,15 +11,12 @@ pub struct Clipping;
 
 parameters! { self #[derive(Validate)]
     pub struct ClippingParameters {
-        /// Bits of the cell index.
         #[garde(range(min = 1, max = 4))]
-        bits: usize = 3,
-        /// Signal-to-noise ratio at which both readings are compared, dB.
+        bits: usize = 3 => "Bits of the cell index.",
         #[garde(range(min = -60.0, max = 60.0))]
-        snr_db: f64 = 18.2,
-        /// Masks of the sensors that are compared, below 2^bits.
+        snr_db: f64 = 18.2 => "Signal-to-noise ratio at which both readings are compared, dB.",
         #[garde(length(min = 1, max = 10), inner(range(min = 1, max = 15)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
-        masks: Vec<Mask> = vec![4, 6, 3, 3, 3, 3, 2, 2],
+        masks: Vec<Mask> = vec![4, 6, 3, 3, 3, 3, 2, 2] => "Masks of the sensors that are compared, below 2^bits.",
     }
 }
 
@@ -30,26 +27,19 @@ fn fits(mask: Mask, bits: usize) -> garde::Result {
 
 rows! {
     pub struct Clipped {
-        /// Cells along the axis.
-        cells: Vec<Cell>,
-        /// What the rule costs.
-        errors: Vec<Rule>,
+        cells: Vec<Cell> => "Cells along the axis.",
+        errors: Vec<Rule> => "What the rule costs.",
     }
 
     struct Cell {
-        /// Measurement.
-        y: f64 ["V"],
-        /// Cell of the measurement, from 1.
-        cell: usize,
-        /// The same with the printed sides of the clipping rule.
-        cell_swapped: usize,
+        y: f64 ["V"] => "Measurement.",
+        cell: usize => "Cell of the measurement, from 1.",
+        cell_swapped: usize => "The same with the printed sides of the clipping rule.",
     }
 
-    struct Rule {
-        /// Clipping rule.
-        rule: &'static str,
-        /// Exact error of the posterior mean.
-        mse: f64 ["V^2"],
+    struct Rule by "{rule}" {
+        rule: &'static str => "Clipping rule.",
+        mse: f64 ["V^2"] => "Exact error of the posterior mean.",
     }
 }
 
@@ -126,7 +116,7 @@ impl Figure for Clipping {
         claims.all("monotone", what, tables.cells.windows(2), |w| w[1].cell >= w[0].cell);
         let what = "the best eight patterns at 18.2 dB; with the printed sides even the best masks are thirteen times worse (erratum \
                     binary-1)";
-        claims.references("mse", what, &tables.errors, |r| (r.rule.to_owned(), r.mse));
+        claims.keyed("mse", what, &tables.errors, |r| r.mse);
     }
 
     fn plot(&self, _: &ClippingParameters, tables: &Clipped) -> Plot {
@@ -143,14 +133,10 @@ impl Figure for Clipping {
 rows! {
     /// A bit of a pattern.
     pub struct Bit {
-        /// Name.
-        pattern: String,
-        /// Which natural patterns are XORed, the first the most significant digit.
-        mask: Mask,
-        /// Cell, from 1.
-        l: usize,
-        /// Bit sent from the cell.
-        bit: u32,
+        pattern: String => "Name.",
+        mask: Mask => "Which natural patterns are XORed, the first the most significant digit.",
+        l: usize => "Cell, from 1.",
+        bit: u32 => "Bit sent from the cell.",
     }
 }
 
@@ -194,9 +180,8 @@ fn claim_printed(claims: &mut Claims, what: &str, table: &[Bit], printed: &[&str
 
 parameters! {
     pub struct BitsParameters {
-        /// Bits of the cell index.
         #[garde(range(min = 1, max = 8))]
-        bits: usize = 4,
+        bits: usize = 4 => "Bits of the cell index.",
     }
 }
 
@@ -269,12 +254,10 @@ pub struct Extra;
 
 parameters! { self #[derive(Validate)]
     pub struct ExtraParameters {
-        /// Bits of the cell index.
         #[garde(range(min = 1, max = 8))]
-        bits: usize = 4,
-        /// Masks beyond the Gray basis, below 2^bits.
+        bits: usize = 4 => "Bits of the cell index.",
         #[garde(length(min = 1, max = 20), inner(range(min = 1, max = 255)), inner(custom(|mask: &Mask, _: &()| fits(*mask, self.bits))))]
-        extra: Vec<Mask> = vec![14, 5, 11],
+        extra: Vec<Mask> = vec![14, 5, 11] => "Masks beyond the Gray basis, below 2^bits.",
     }
 }
 
@@ -313,25 +296,19 @@ pub struct Response;
 
 parameters! {
     pub struct ResponseParameters {
-        /// Where the bit changes, in units of V, increasing.
         #[garde(length(min = 1, max = 100), inner(range(min = -10.0, max = 10.0)))]
-        thresholds: Vec<f64> = vec![-0.6, -0.2, 0.1, 0.7],
-        /// Noise standard deviation, in units of V.
+        thresholds: Vec<f64> = vec![-0.6, -0.2, 0.1, 0.7] => "Where the bit changes, in units of V, increasing.",
         #[garde(range(min = 1e-6, max = 1e3))]
-        noise_std: f64 = 0.1,
+        noise_std: f64 = 0.1 => "Noise standard deviation, in units of V.",
     }
 }
 
 rows! {
     pub struct Answer {
-        /// Source.
-        x: f64 ["V"],
-        /// Bit without noise.
-        bit: u32,
-        /// Probability of a 1.
-        p1: f64,
-        /// Fisher information about x in the bit.
-        information: f64 ["1/V^2"],
+        x: f64 ["V"] => "Source.",
+        bit: u32 => "Bit without noise.",
+        p1: f64 => "Probability of a 1.",
+        information: f64 ["1/V^2"] => "Fisher information about x in the bit.",
     }
 }
 

@@ -11,12 +11,10 @@ pub struct Table;
 
 parameters! {
     pub struct Parameters {
-        /// Signal-to-noise ratio, dB.
         #[garde(range(min = -60.0, max = 60.0))]
-        snr_db: f64 = 18.2,
-        /// The printed masks, below 8.
+        snr_db: f64 = 18.2 => "Signal-to-noise ratio, dB.",
         #[garde(length(min = 3, max = 10), inner(range(min = 1, max = 7)))]
-        printed: Vec<Mask> = vec![4, 6, 3, 3, 3, 2, 1, 5],
+        printed: Vec<Mask> = vec![4, 6, 3, 3, 3, 2, 1, 5] => "The printed masks, below 8.",
     }
 }
 
@@ -24,55 +22,36 @@ const BITS: usize = 3;
 
 rows! {
     pub struct Rows {
-        /// The printed and the best sets.
-        sets: Vec<Set>,
-        /// Sizes of the search space.
-        search_spaces: Vec<Space>,
-        /// All sets with both errors, in the order of the posterior mean's.
-        listed: Vec<Listed>,
+        sets: Vec<Set> => "The printed and the best sets.",
+        search_spaces: Vec<Space> => "Sizes of the search space.",
+        listed: Vec<Listed> => "All sets with both errors, in the order of the posterior mean's.",
     }
 
-    struct Set {
-        /// Which set.
-        set: &'static str,
-        /// Its masks.
-        masks: String,
-        /// Exact error of the posterior mean.
-        mse_mmse: f64 ["V^2"],
-        /// Exact error of the discrete maximum a posteriori decoder.
-        mse_dmap: f64 ["V^2"],
-        /// The same with exact cell probabilities.
-        mse_exact_dmap: f64 ["V^2"],
-        /// Equation 5.13.
-        crlb: f64 ["V^2"],
-        /// Optimal-weight van Trees bound.
-        van_trees: f64 ["V^2"],
+    struct Set by "{set}" {
+        set: &'static str => "Which set.",
+        masks: String => "Its masks.",
+        mse_mmse: f64 ["V^2"] => "Exact error of the posterior mean.",
+        mse_dmap: f64 ["V^2"] => "Exact error of the discrete maximum a posteriori decoder.",
+        mse_exact_dmap: f64 ["V^2"] => "The same with exact cell probabilities.",
+        crlb: f64 ["V^2"] => "Equation 5.13.",
+        van_trees: f64 ["V^2"] => "Optimal-weight van Trees bound.",
         /// Place among all sets under the posterior mean, from 0; none for a set that is not of full rank.
         rank: Option<usize>,
-        /// Place under the discrete decoder, from 0.
-        rank_dmap: Option<usize>,
+        rank_dmap: Option<usize> => "Place under the discrete decoder, from 0.",
     }
 
     struct Space {
-        /// Bits B.
-        bits: usize,
-        /// Sensors N.
-        sensors: usize,
-        /// Sets by equation 5.7.
-        printed: f64,
-        /// Multisets of full rank.
-        exact: f64,
-        /// Sets that hold the Gray basis (strategy 1).
-        with_gray: f64,
+        bits: usize => "Bits B.",
+        sensors: usize => "Sensors N.",
+        printed: f64 => "Sets by equation 5.7.",
+        exact: f64 => "Multisets of full rank.",
+        with_gray: f64 => "Sets that hold the Gray basis (strategy 1).",
     }
 
     struct Listed {
-        /// Masks.
-        masks: String,
-        /// Error of the posterior mean.
-        mse_mmse: f64 ["V^2"],
-        /// Error of the discrete decoder.
-        mse_dmap: Option<f64> ["V^2"],
+        masks: String => "Masks.",
+        mse_mmse: f64 ["V^2"] => "Error of the posterior mean.",
+        mse_dmap: Option<f64> ["V^2"] => "Error of the discrete decoder.",
     }
 }
 
@@ -145,20 +124,17 @@ impl Figure for Table {
         let here = claims.at_defaults();
         let at = |set: &str| rows.sets.iter().find(|r| r.set == set);
         let (best, decoded) = (at("best, posterior mean"), at("best, discrete MAP"));
-        let name = |r: &Set| r.set.to_owned();
-        claims.references("mmse", "error of the posterior mean", &rows.sets, |r| (name(r), r.mse_mmse));
-        claims.references("dmap", "error of the discrete decoder", &rows.sets, |r| (name(r), r.mse_dmap));
+        claims.keyed("mmse", "error of the posterior mean", &rows.sets, |r| r.mse_mmse);
+        claims.keyed("dmap", "error of the discrete decoder", &rows.sets, |r| r.mse_dmap);
         let what = "place among 0..2701 under the posterior mean (erratum binary-11)";
-        claims.references("rank", what, &rows.sets, |r| (name(r), r.rank.map(|rank| rank as f64)));
+        claims.keyed("rank", what, &rows.sets, |r| r.rank.map(|rank| rank as f64));
         let what = "place under the discrete decoder: the table fits a search with that decoder";
-        claims.references("rank-dmap", what, &rows.sets, |r| (name(r), r.rank_dmap.map(|rank| rank as f64)));
+        claims.keyed("rank-dmap", what, &rows.sets, |r| r.rank_dmap.map(|rank| rank as f64));
         here.near("sets", "there are 2702 sets", rows.listed.len() as f64, 2702.0, 0.0);
-        let what = "the best set is {4,6,3,3,3,3,2,2}";
-        here.all("best-masks", what, best, |r| r.masks == "2 2 3 3 3 3 4 6");
+        here.all("best-masks", "the best set is {4,6,3,3,3,3,2,2}", best, |r| r.masks == "2 2 3 3 3 3 4 6");
         let what = "the best under the discrete decoder is {1,2,3,3,3,3,4,6}";
         here.all("dmap-masks", what, decoded, |r| r.masks == "1 2 3 3 3 3 4 6");
-        let what = "the van Trees bound is below every error";
-        claims.all("bound", what, &rows.sets, |r| r.van_trees <= r.mse_mmse);
+        claims.all("bound", "the van Trees bound is below every error", &rows.sets, |r| r.van_trees <= r.mse_mmse);
         let what = "equation 5.7 counts multisets once per basis, 1.5 to 18 times too often (erratum binary-2)";
         claims.all("over-count", what, &rows.search_spaces, |r| (1.4..=18.0).contains(&(r.printed / r.exact)));
         let eight = rows.search_spaces.iter().find(|r| (r.bits, r.sensors) == (3, 8));

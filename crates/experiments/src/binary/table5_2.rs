@@ -9,9 +9,8 @@ pub struct Table;
 
 parameters! {
     pub struct Parameters {
-        /// Signal-to-noise ratio, dB.
         #[garde(range(min = -60.0, max = 60.0))]
-        snr_db: f64 = 5.2,
+        snr_db: f64 = 5.2 => "Signal-to-noise ratio, dB.",
         /// The printed patterns, eight bits each.
         #[garde(length(min = 3, max = 3), inner(custom(|text: &String, _: &()| eight_bits(text))))]
         printed: Vec<String> = ["01100110", "10001110", "01011010"].map(String::from).to_vec(),
@@ -31,49 +30,32 @@ const CELLS: usize = 8;
 
 rows! {
     pub struct Rows {
-        /// The printed and other sets.
-        sets: Vec<Set>,
-        /// Errors of the printed triple over those of Gray.
-        over_gray: Vec<OverGray>,
-        /// How many sets there are.
-        sizes: Vec<Size>,
+        sets: Vec<Set> => "The printed and other sets.",
+        over_gray: Vec<OverGray> => "Errors of the printed triple over those of Gray.",
+        sizes: Vec<Size> => "How many sets there are.",
     }
 
-    struct Set {
-        /// Which set.
-        set: &'static str,
-        /// Its patterns.
-        patterns: String,
-        /// Patterns that are XORs of natural ones.
-        linear: usize,
-        /// Exact error of the posterior mean; the variance of the source is 0.1.
-        mse_mmse: f64,
-        /// Exact error of the discrete maximum a posteriori decoder.
-        mse_dmap: f64,
-        /// Place among the labelings of eight cells, from 0.
-        rank: Option<usize>,
+    struct Set by "{set}" {
+        set: &'static str => "Which set.",
+        patterns: String => "Its patterns.",
+        linear: usize => "Patterns that are XORs of natural ones.",
+        mse_mmse: f64 => "Exact error of the posterior mean; the variance of the source is 0.1.",
+        mse_dmap: f64 => "Exact error of the discrete maximum a posteriori decoder.",
+        rank: Option<usize> => "Place among the labelings of eight cells, from 0.",
     }
 
     struct OverGray {
-        /// Signal-to-noise ratio.
-        snr_db: f64 ["dB"],
-        /// Posterior mean.
-        mmse: f64,
-        /// Discrete maximum a posteriori decoder.
-        dmap: f64,
-        /// Equation 5.10 as printed.
-        dmap_print: f64,
-        /// Discrete decoder with exact cell probabilities.
-        dmap_exact: f64,
-        /// Continuous maximum a posteriori decoder.
-        cmap: f64,
+        snr_db: f64 ["dB"] => "Signal-to-noise ratio.",
+        mmse: f64 => "Posterior mean.",
+        dmap: f64 => "Discrete maximum a posteriori decoder.",
+        dmap_print: f64 => "Equation 5.10 as printed.",
+        dmap_exact: f64 => "Discrete decoder with exact cell probabilities.",
+        cmap: f64 => "Continuous maximum a posteriori decoder.",
     }
 
-    struct Size {
-        /// What is counted.
-        what: &'static str,
-        /// How many.
-        count: f64,
+    struct Size by "{what}" {
+        what: &'static str => "What is counted.",
+        count: f64 => "How many.",
     }
 }
 
@@ -137,7 +119,7 @@ impl Figure for Table {
             let bank = scene.pattern_bank(&patterns)?;
             Ok(Set {
                 set,
-                patterns: patterns.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "),
+                patterns: joined(&patterns, " "),
                 linear: patterns.iter().filter(|p| mask_of(p).is_some()).count(),
                 mse_mmse: bank.mmse()?,
                 mse_dmap: bank.mse(Decoder::DiscreteMap(&scene.grid))?,
@@ -167,13 +149,12 @@ impl Figure for Table {
         let here = claims.at_defaults();
         let at = |set: &str| rows.sets.iter().find(|r| r.set == set);
         let what = "exact error, of a variance of 0.1; without the rank constraint a quarter less than Gray";
-        claims.references("mmse", what, &rows.sets, |r| (r.set.to_owned(), r.mse_mmse));
+        claims.keyed("mmse", what, &rows.sets, |r| r.mse_mmse);
         let linear = at("printed").map(|r| r.linear as f64);
-        let what = "one of the printed patterns is not linear (erratum binary-12)";
-        here.near("not-linear", what, linear, 2.0, 0.0);
+        here.near("not-linear", "one of the printed patterns is not linear (erratum binary-12)", linear, 2.0, 0.0);
         let rank = at("printed").and_then(|r| Some(r.rank? as f64));
         here.near("rank", "708 of the 840 labelings are better", rank, 708.0, 0.0);
-        claims.references("count", "number of sets", &rows.sizes, |r| (r.what.to_owned(), r.count));
+        claims.keyed("count", "number of sets", &rows.sizes, |r| r.count);
         let what = "from 5 to 52 dB, under five decoders, Gray is better: nothing makes the print optimal";
         let ratios = rows
             .over_gray

@@ -1,9 +1,9 @@
 //! Beyond the paper: lossy links, scheduled thresholds, and what each filter costs.
 
-use super::case::Case;
-use super::linear::{Scheme, start, time_of_steps};
+use super::case::Simulated;
+use super::linear::{Scheme, time_of_steps};
 use super::pictures::by_budget;
-use super::rows::{Ensemble, Further, Nothing, Part, Rows, Step, Summary};
+use super::rows::{Part, Step, Summary};
 use super::scalar::{BUDGETS, CENSORED};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
@@ -15,31 +15,21 @@ use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::Matrix2;
 
-/// Links that lose messages.
-pub(super) struct Lossy;
-
 const NO_LOSS: &str = "no loss";
 const IGNORED: &str = "loss ignored";
 const MODELLED: &str = "loss modelled";
 
-impl Case for Lossy {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-lossy", "Censored or lost?", "");
-    const CAPTION: &str = "Nothing arrived: the sensor was silent, or its message was lost. A fusion centre that takes loss for silence believes too \
-        much; one that weighs both loses far less.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[(MODELLED, IGNORED)];
-
-    fn setting() -> Linear {
-        Linear {
-            losses: Some(vec![0.05, 0.1, 0.2, 0.3]),
-            ..Linear::scalar(2, &[1.0])
-        }
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+/// Links that lose messages.
+pub(super) static LOSSY: Simulated<Linear, Step> = Simulated {
+    about: About::of("cfwmd-lossy", "Censored or lost?", ""),
+    caption: "Nothing arrived: the sensor was silent, or its message was lost. A fusion centre that takes loss for \
+              silence believes too much; one that weighs both loses far less.",
+    pairs: &[(MODELLED, IGNORED)],
+    setting: || Linear {
+        losses: Some(vec![0.05, 0.1, 0.2, 0.3]),
+        ..Linear::scalar(2, &[1.0])
+    },
+    simulate: |setting, context| {
         let mut all = setting.at_budgets(context, "", &[(NO_LOSS, CENSORED[0].1)])?;
         for loss in setting.losses.iter().flatten().copied() {
             let schemes = [(IGNORED, false), (MODELLED, true)];
@@ -47,9 +37,8 @@ impl Case for Lossy {
             all.extend(setting.at_budgets(context, &format!("loss {loss}"), &schemes)?);
         }
         Ok(all)
-    }
-
-    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+    },
+    claims: |rows, claims| {
         for loss in ["loss 0.1", "loss 0.3"] {
             rows.beats(claims, (MODELLED, IGNORED), (loss, 1.0), &[Part::Position]);
         }
@@ -60,9 +49,8 @@ impl Case for Lossy {
         let what = "modelling the loss keeps the belief honest: squared error over variance";
         claims.below("honest", what, nees("loss modelled, loss 0.3"), 1.4);
         claims.above("naive", "ignoring it does not", nees("loss ignored, loss 0.3"), 2.0);
-    }
-
-    fn plot(setting: &Linear, rows: &Rows<Step>) -> Plot {
+    },
+    plot: |setting, rows| {
         let l = setting.messages[0];
         let mut panel = Panel::linear("Position error over a lossy link", "loss probability", "time-averaged RMSE (m)");
         for (colour, scheme) in [IGNORED, MODELLED].into_iter().enumerate() {
@@ -72,72 +60,58 @@ impl Case for Lossy {
             panel = panel.with_all(Layer::curve(scheme, colour, clean.into_iter().chain(lossy).collect()));
         }
         Plot::of(panel)
-    }
-}
-
-/// Thresholds computed before deployment.
-pub(super) struct Scheduled;
+    },
+    ..Simulated::BASE
+};
 
 const TWO: &str = "2 sensors";
 
 rows! {
     /// Bounds beside the runs.
-    #[derive(Debug)]
+    #[derive(Debug, Default)]
     pub struct Bounds {
-        /// Bounds of any filter that receives these messages.
-        bound: Vec<Bound>,
+        bound: Vec<Bound> => "Bounds of any filter that receives these messages.",
     }
 
     #[derive(Debug)]
     struct Bound {
-        /// Message budget.
-        l: f64 ["messages/step"],
-        /// Number of sensors.
-        sensors: u64,
-        /// Time-averaged position bound, innovations weighed by the sensor's own filter (CFwMD).
-        bound_m: f64 ["m"],
-        /// The same, weighed with the bound's own covariance (CFwMD2, scheduled).
-        bound_centre_m: f64 ["m"],
+        l: f64 ["messages/step"] => "Message budget.",
+        sensors: u64 => "Number of sensors.",
+        bound_m: f64 ["m"] => "Time-averaged position bound, innovations weighed by the sensor's own filter (CFwMD).",
+        bound_centre_m: f64 ["m"] => "The same, weighed with the bound's own covariance (CFwMD2, scheduled).",
     }
 }
 
-impl Further<Linear> for Bounds {
-    fn of(p: &Linear, _: &Context<'_>) -> Result<Self, Error> {
-        let row = |(l, sensors)| {
-            let (bound_m, bound_centre_m) = (bound(p, l, sensors, true)?, bound(p, l, sensors, false)?);
-            Ok(Bound {
-                l,
-                sensors,
-                bound_m,
-                bound_centre_m,
-            })
-        };
-        let own = p.messages.iter().map(|l| (*l, p.sensors));
-        let cases = own.chain([(1.0, 2), (2.0, 2)]).filter(|_| p.noise_variances.len() == 1);
-        let bound = cases.map(row).collect::<Result<_, Error>>()?;
-        Ok(Self { bound })
-    }
+fn bounds(p: &Linear) -> Result<Bounds, Error> {
+    let row = |(l, sensors)| {
+        let (bound_m, bound_centre_m) = (bound(p, l, sensors, true)?, bound(p, l, sensors, false)?);
+        Ok(Bound {
+            l,
+            sensors,
+            bound_m,
+            bound_centre_m,
+        })
+    };
+    let own = p.messages.iter().map(|l| (*l, p.sensors));
+    let cases = own.chain([(1.0, 2), (2.0, 2)]).filter(|_| p.noise_variances.len() == 1);
+    let bound = cases.map(row).collect::<Result<_, Error>>()?;
+    Ok(Bounds { bound })
 }
 
 fn world(sensors: u64) -> String {
     format!("{sensors} sensors")
 }
 
-impl Case for Scheduled {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Bounds;
-
-    const ABOUT: About = About::of("cfwmd-scheduled", "The rate of covariance feedback without the feedback", "");
-    const CAPTION: &str = "A schedule of innovation variances, simulated once before deployment, meets the message budget and the error of covariance \
-        feedback (CFwMD2) without sending a covariance. Thin: optimistic bounds for any filter that receives these messages.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("scheduled", "CFwMD2"), ("scheduled", "CFwMD")];
-
-    fn setting() -> Linear {
-        Linear::scalar(4, &BUDGETS)
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+/// Thresholds computed before deployment.
+pub(super) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
+    further: |setting, _| bounds(setting),
+    about: About::of("cfwmd-scheduled", "The rate of covariance feedback without the feedback", ""),
+    caption: "A schedule of innovation variances, simulated once before deployment, meets the message budget and the \
+              error of covariance feedback (CFwMD2) without sending a covariance. Thin: optimistic bounds for any \
+              filter that receives these messages.",
+    pairs: &[("scheduled", "CFwMD2"), ("scheduled", "CFwMD")],
+    setting: || Linear::scalar(4, &BUDGETS),
+    simulate: |setting, context| {
         let schemes = [
             CENSORED[0],
             CENSORED[1],
@@ -152,9 +126,8 @@ impl Case for Scheduled {
             all.extend(two.run(context, TWO, 1.0, &schemes)?);
         }
         Ok(all)
-    }
-
-    fn claims(rows: &Rows<Step, Bounds>, claims: &mut Claims) {
+    },
+    claims: |rows, claims| {
         let name = |scheme: &str| format!("{scheme}, 4 sensors");
         let bounds = &rows.further.bound;
         for l in BUDGETS {
@@ -176,15 +149,10 @@ impl Case for Scheduled {
         rows.beats(claims, ("scheduled", "CFwMD"), (TWO, 1.0), &[Part::Position]);
         let key = |b: &Bound| (format!("N = {}, l = {}", b.sensors, b.l), b.bound_m);
         claims.references("bound", "information bound of CFwMD (m)", bounds, key);
-    }
-
-    fn plot(setting: &Linear, rows: &Rows<Step, Bounds>) -> Plot {
+    },
+    plot: |setting, rows| {
         let own = world(setting.sensors);
-        let all: Vec<&Summary> = rows
-            .summary
-            .iter()
-            .filter(|r| r.run.world.as_ref() == Some(&own))
-            .collect();
+        let all: Vec<&Summary> = select(&rows.summary, |r| r.run.world.as_ref() == Some(&own)).collect();
         let bounds = || {
             rows.further
                 .bound
@@ -199,8 +167,9 @@ impl Case for Scheduled {
         let rate =
             by_budget(&all, "Rate", "messages a step", |r| r.rate).with(Layer::dashed("budget", budget).coloured(7));
         Plot::grid(2, vec![error, rate])
-    }
-}
+    },
+    ..Simulated::BASE
+};
 
 /// Time-averaged position bound: expected Fisher information of each sensor at the bound's own covariance.
 fn bound(setting: &Linear, messages: f64, sensors: u64, own_filter: bool) -> Result<f64, Error> {
@@ -208,7 +177,7 @@ fn bound(setting: &Linear, messages: f64, sensors: u64, own_filter: bool) -> Res
     let noise = setting.noise_variances[0];
     let eta = fewbits_cfwmd::threshold::threshold(messages / sensors as f64, 1)?;
     let (f, q) = (*dynamics.transition(), *dynamics.noise_covariance());
-    let mut bound = *start(setting)?.covariance();
+    let mut bound = *setting.belief()?.covariance();
     let mut own = bound;
     let mut total = 0.0;
     for _ in 0..setting.steps {
@@ -231,9 +200,6 @@ fn bound(setting: &Linear, messages: f64, sensors: u64, own_filter: bool) -> Res
     Ok((total / setting.steps as f64).sqrt())
 }
 
-/// Error against cost.
-pub(super) struct Cost;
-
 const SCHEMES: [(&str, Scheme); 7] = [
     ("ADF", CENSORED[0].1),
     ("PF 100", Scheme::Particles(100, Weighing::OwnFilter)),
@@ -246,7 +212,7 @@ const SCHEMES: [(&str, Scheme); 7] = [
 
 rows! {
     /// Times beside the runs.
-    #[derive(Debug)]
+    #[derive(Debug, Default)]
     pub struct Times {
         /// Time of a fusion step.
         #[schemars(extend("volatile" = true))]
@@ -255,49 +221,36 @@ rows! {
 
     #[derive(Debug)]
     struct Time {
-        /// Filter.
-        scheme: &'static str,
-        /// Time of one fusion step, best of the repetitions.
-        time_us: f64 ["us"],
-        /// Time over that of the Gaussian belief.
-        relative: f64,
+        scheme: &'static str => "Filter.",
+        time_us: f64 ["us"] => "Time of one fusion step, best of the repetitions.",
+        relative: f64 => "Time over that of the Gaussian belief.",
     }
 }
 
-impl Further<Linear> for Times {
-    fn of(p: &Linear, context: &Context<'_>) -> Result<Self, Error> {
-        let times = time_of_steps(context, p, p.messages[0], &SCHEMES)?;
-        let base = times[0].1;
-        let row = |(scheme, seconds): (_, f64)| Time {
-            scheme,
-            time_us: seconds * 1e6,
-            relative: seconds / base,
-        };
-        let time = times.into_iter().map(row).collect();
-        Ok(Self { time })
-    }
+fn times(p: &Linear, context: &Context<'_>) -> Result<Times, Error> {
+    let times = time_of_steps(context, p, p.messages[0], &SCHEMES)?;
+    let base = times[0].1;
+    let row = |(scheme, seconds): (_, f64)| Time {
+        scheme,
+        time_us: seconds * 1e6,
+        relative: seconds / base,
+    };
+    let time = times.into_iter().map(row).collect();
+    Ok(Times { time })
 }
 
-impl Case for Cost {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Times;
-
-    const ABOUT: About = About::of("cfwmd-cost", "Error against cost", "");
-    const CAPTION: &str = "The Gaussian belief with exact moments (ADF) is as accurate as a thousand particles (PF) at a small fraction of the time; \
-        thirty Rao-Blackwellised particles (RBPF) are on a par. Times are per step of fusion, draws of the experiment excluded.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("PF 1000", "ADF"), ("RBPF 30", "ADF"), ("ADF", "PF 100")];
-    const MEASURES_TIME: bool = true;
-
-    fn setting() -> Linear {
-        Linear::scalar(2, &[1.0])
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        setting.at_budgets(context, "", &SCHEMES)
-    }
-
-    fn claims(rows: &Rows<Step, Times>, claims: &mut Claims) {
+/// Error against cost.
+pub(super) static COST: Simulated<Linear, Step, Times> = Simulated {
+    further: times,
+    about: About::of("cfwmd-cost", "Error against cost", ""),
+    caption: "The Gaussian belief with exact moments (ADF) is as accurate as a thousand particles (PF) at a small \
+              fraction of the time; thirty Rao-Blackwellised particles (RBPF) are on a par. Times are per step of \
+              fusion, draws of the experiment excluded.",
+    pairs: &[("PF 1000", "ADF"), ("RBPF 30", "ADF"), ("ADF", "PF 100")],
+    measures_time: true,
+    setting: || Linear::scalar(2, &[1.0]),
+    simulate: |setting, context| setting.at_budgets(context, "", &SCHEMES),
+    claims: |rows, claims| {
         let ratio = |scheme: &str| rows.ratio(scheme, "ADF", 1.0);
         let what = "1000 particles are not better than the Gaussian belief (RMSE over that of the Gaussian belief)";
         claims.at_least("not-worse", what, ratio("PF 1000"), 0.995);
@@ -306,9 +259,8 @@ impl Case for Cost {
         claims.above("too-few", "100 plain particles are not enough", ratio("PF 100"), 1.03);
         let nees = rows.at("ADF", 1.0).and_then(|r| r.nees);
         claims.within("consistent", "squared position error over its variance averages to one", nees, 1.0, 4.0);
-    }
-
-    fn always(_: &Linear, rows: &Rows<Step, Times>, claims: &mut Claims) {
+    },
+    always: |_, rows, claims| {
         let relative = rows
             .further
             .time
@@ -317,14 +269,14 @@ impl Case for Cost {
             .map(|t| t.relative);
         let what = "the Gaussian belief is at least 15 times cheaper than 1000 particles";
         claims.at_least("cheaper", what, relative, 15.0);
-    }
-
-    fn plot(setting: &Linear, rows: &Rows<Step, Times>) -> Plot {
+    },
+    plot: |setting, rows| {
         let axes = (Axis::log("time a step (µs)"), Axis::linear("time-averaged RMSE (m)"));
         let marks = rows.further.time.iter().enumerate().filter_map(|(colour, time)| {
             let at = rows.at(time.scheme, setting.messages[0])?;
             Some(Layer::measured(time.scheme, [at], |r| (time.time_us, r.position_rmse)).coloured(colour))
         });
         Plot::of(Panel::new("Position error against time", axes.0, axes.1).with_all(marks))
-    }
-}
+    },
+    ..Simulated::BASE
+};

@@ -1,130 +1,96 @@
 //! A simulated figure in few words: a setting, the runs, what is claimed of them, a picture.
 
-use super::rows::{Ensemble, Further, Main, Rows};
+use super::pictures::Main;
+use super::rows::{Ensemble, Nothing, Rows};
 use super::setting::Setting;
 use crate::parameters;
 use crate::prelude::*;
-use schemars::{JsonSchema, Schema, SchemaGenerator};
-use std::borrow::Cow;
-use std::marker::PhantomData;
 
 /// What a simulated figure runs and claims.
-pub(super) trait Case: Sync + 'static {
-    type Setting: Setting;
-    type Main: Main;
-    type Further: Further<Self::Setting>;
-
-    const ABOUT: About;
-    const CAPTION: &'static str;
+pub(super) struct Simulated<S, M, X = Nothing> {
+    pub(super) about: About,
+    pub(super) caption: &'static str,
     /// Schemes that are compared trial by trial, wherever both ran.
-    const PAIRS: &'static [(&'static str, &'static str)];
+    pub(super) pairs: &'static [(&'static str, &'static str)],
     /// Quantities with independent references.
-    const REFERENCES: &'static [&'static str] = &["position", "velocity", "rate"];
-    const MEASURES_TIME: bool = false;
-
+    pub(super) references: &'static [&'static str],
+    pub(super) measures_time: bool,
     /// The publication's setting.
-    fn setting() -> Self::Setting;
-
+    pub(super) setting: fn() -> S,
     /// All runs.
-    fn simulate(setting: &Self::Setting, context: &Context<'_>) -> Result<Vec<Ensemble>, Error>;
-
+    pub(super) simulate: fn(&S, &Context<'_>) -> Result<Vec<Ensemble>, Error>,
+    /// Further tables.
+    pub(super) further: fn(&S, &Context<'_>) -> Result<X, Error>,
     /// Whether the main table shows this run.
-    fn shown(_setting: &Self::Setting, _run: &Ensemble) -> bool {
-        true
-    }
-
+    pub(super) shown: fn(&S, &Ensemble) -> bool,
     /// Claims about the publication's setting at its full number of trials.
-    fn claims(rows: &Rows<Self::Main, Self::Further>, claims: &mut Claims);
-
+    pub(super) claims: fn(&Rows<M, X>, &mut Claims),
     /// Claims about any setting and number of trials.
-    fn always(_setting: &Self::Setting, _rows: &Rows<Self::Main, Self::Further>, _claims: &mut Claims) {}
+    pub(super) always: fn(&S, &Rows<M, X>, &mut Claims),
+    pub(super) plot: fn(&S, &Rows<M, X>) -> Plot,
+}
 
-    fn plot(_setting: &Self::Setting, rows: &Rows<Self::Main, Self::Further>) -> Plot {
-        Self::Main::plot(&rows.main)
+impl<S: Setting, M: Main, X: Default> Simulated<S, M, X> {
+    /// What a figure does not say otherwise.
+    pub(super) const BASE: Self = Self {
+        about: About::of("", "", ""),
+        caption: "",
+        pairs: &[],
+        references: &["position", "velocity", "rate"],
+        measures_time: false,
+        setting: S::default,
+        simulate: |_, _| Ok(Vec::new()),
+        further: |_, _| Ok(X::default()),
+        shown: |_, _| true,
+        claims: |_, _| {},
+        always: |_, _, _| {},
+        plot: |_, rows| M::plot(&rows.main),
+    };
+
+    /// Whether the setting is the publication's but for effort and the choice of budgets.
+    fn is_printed(&self, setting: &S) -> bool {
+        let (own, default) = (parameters::map(setting), parameters::map(&(self.setting)()));
+        let free = |name: &str| parameters::is_effort(name) || ["messages", "particles"].contains(&name);
+        own.iter()
+            .all(|(name, value)| free(name) || default.get(name) == Some(value))
     }
 }
 
-/// The figure of a case.
-pub(super) struct Simulated<C>(PhantomData<fn() -> C>);
-
-impl<C> Simulated<C> {
-    pub(super) const NEW: Self = Self(PhantomData);
-}
-
-/// A case's parameters with its default.
-#[derive(Serialize, Deserialize)]
-#[serde(transparent, bound = "")]
-pub(super) struct Preset<C: Case>(C::Setting);
-
-impl<C: Case> Default for Preset<C> {
-    fn default() -> Self {
-        Self(C::setting())
-    }
-}
-
-impl<C: Case> Quick for Preset<C> {
-    fn quicken(&mut self) {
-        self.0.quicken();
-    }
-}
-
-impl<C: Case> JsonSchema for Preset<C> {
-    fn schema_name() -> Cow<'static, str> {
-        C::Setting::schema_name()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        C::Setting::json_schema(generator)
-    }
-}
-
-impl<C: Case> Validate for Preset<C> {
-    type Context = ();
-
-    fn validate_into(&self, (): &(), parent: &mut dyn FnMut() -> garde::Path, report: &mut garde::Report) {
-        self.0.validate_into(&(), parent, report);
-    }
-}
-
-/// Whether the setting is the publication's but for effort and the choice of budgets.
-fn is_printed<C: Case>(setting: &C::Setting) -> bool {
-    let (own, default) = (parameters::map(setting), parameters::map(&C::setting()));
-    let free = |name: &str| parameters::is_effort(name) || ["messages", "particles"].contains(&name);
-    own.iter()
-        .all(|(name, value)| free(name) || default.get(name) == Some(value))
-}
-
-impl<C: Case> Figure for Simulated<C> {
-    type Parameters = Preset<C>;
-    type Tables = Rows<C::Main, C::Further>;
+impl<S: Setting, M: Main, X: Default + Serialize + JsonSchema> Figure for Simulated<S, M, X> {
+    type Parameters = S;
+    type Tables = Rows<M, X>;
 
     fn about(&self) -> About {
-        C::ABOUT.showing(C::CAPTION)
+        self.about.showing(self.caption)
     }
 
-    fn cost(&self, parameters: &Preset<C>) -> Cost {
-        parameters.0.cost()
+    fn defaults(&self) -> S {
+        (self.setting)()
+    }
+
+    fn cost(&self, setting: &S) -> Cost {
+        setting.cost()
     }
 
     fn measures_time(&self) -> bool {
-        C::MEASURES_TIME
+        self.measures_time
     }
 
-    fn run(&self, Preset(setting): &Preset<C>, context: &Context<'_>) -> Result<Self::Tables, Error> {
-        let ensembles = C::simulate(setting, context)?;
-        let shown: Vec<_> = ensembles.iter().filter(|e| C::shown(setting, e)).collect();
-        let main = C::Main::of(C::ABOUT.id, &shown, is_printed::<C>(setting));
-        Ok(Rows::of(&ensembles, C::PAIRS, main, C::Further::of(setting, context)?))
+    fn run(&self, setting: &S, context: &Context<'_>) -> Result<Rows<M, X>, Error> {
+        let ensembles = (self.simulate)(setting, context)?;
+        let shown: Vec<_> = ensembles.iter().filter(|e| (self.shown)(setting, e)).collect();
+        let main = M::of(self.about.id, &shown, self.is_printed(setting));
+        Ok(Rows::of(&ensembles, self.pairs, main, (self.further)(setting, context)?))
     }
 
-    fn claims(&self, Preset(setting): &Preset<C>, rows: &Self::Tables, claims: &mut Claims) {
+    fn claims(&self, setting: &S, rows: &Rows<M, X>, claims: &mut Claims) {
         let mut limited = claims.at_defaults().at_full_trials();
-        rows.agree(&mut limited, C::REFERENCES);
-        C::claims(rows, &mut limited);
-        C::always(setting, rows, claims);
+        rows.agree(&mut limited, self.references);
+        (self.claims)(rows, &mut limited);
+        (self.always)(setting, rows, claims);
     }
 
-    fn plot(&self, Preset(setting): &Preset<C>, rows: &Self::Tables) -> Plot {
-        C::plot(setting, rows)
+    fn plot(&self, setting: &S, rows: &Rows<M, X>) -> Plot {
+        (self.plot)(setting, rows)
     }
 }

@@ -1,10 +1,10 @@
 //! The nonlinear example, sensors of received power: figures 7 to 10, table III.
 
-use super::case::Case;
+use super::case::Simulated;
 use super::nonlinear::{Scheme, World};
 use super::pictures::BOTH;
 use super::rates::{Rates, as_printed, misses};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step, Summary};
+use super::rows::{Part, Step, Summary};
 use super::setting::{Field, Setting};
 use crate::prelude::*;
 
@@ -22,29 +22,23 @@ parameters! {
     /// Which trial is shown.
     #[derive(Debug, Clone)]
     pub(super) struct Shown {
-        /// Index of the trial whose truth is drawn.
         #[garde(range(max = 1_000_000))]
-        trial: u64 = 1,
+        trial: u64 = 1 => "Index of the trial whose truth is drawn.",
     }
 }
 
 rows! {
     #[derive(Debug)]
     pub(super) struct Map {
-        /// The target.
-        path: Vec<Place>,
-        /// The sensors.
-        sensors: Vec<Place>,
+        path: Vec<Place> => "The target.",
+        sensors: Vec<Place> => "The sensors.",
     }
 
     #[derive(Debug)]
     struct Place {
-        /// Time step, or index of the sensor.
-        k: usize,
-        /// Position.
-        x: f64 ["m"],
-        /// Position.
-        y: f64 ["m"],
+        k: usize => "Time step, or index of the sensor.",
+        x: f64 ["m"] => "Position.",
+        y: f64 ["m"] => "Position.",
     }
 }
 
@@ -70,8 +64,7 @@ impl Figure for Fig7 {
         let grid = map.sensors.iter().filter_map(|s| reach(Some(s))).fold(0.0, f64::max);
         let what = "the target starts among the sensors (farthest coordinate, m)";
         here.below("starts-inside", what, reach(map.path.first()), grid);
-        let what = "and ends outside the grid (farthest coordinate, m)";
-        here.above("ends-outside", what, reach(map.path.last()), grid);
+        here.above("ends-outside", "and ends outside the grid (farthest coordinate, m)", reach(map.path.last()), grid);
     }
 
     fn plot(&self, _: &Shown, map: &Map) -> Plot {
@@ -86,27 +79,15 @@ impl Figure for Fig7 {
     }
 }
 
-pub(super) struct Fig8;
-
-impl Case for Fig8 {
-    type Setting = Field;
-    type Main = Step;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-fig8", "Received power, two messages a step", "CFwMD paper, figure 8");
-    const CAPTION: &str = "Time-averaged, the order is that of the linear case. Not at every step: at first the truth sits exactly on the prior mean, so \
-        that a filter that receives little is right by construction. Errors rise when the target leaves the grid.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("all", "CFwMD"), ("CFwMD", "CFoMD"), ("CFoMD", "random")];
-
-    fn setting() -> Field {
-        Field::new(&[2.0])
-    }
-
-    fn simulate(setting: &Field, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        setting.at_budgets(context, "", &FOUR)
-    }
-
-    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+pub(super) static FIG8: Simulated<Field, Step> = Simulated {
+    about: About::of("cfwmd-fig8", "Received power, two messages a step", "CFwMD paper, figure 8"),
+    caption: "Time-averaged, the order is that of the linear case. Not at every step: at first the truth sits exactly \
+              on the prior mean, so that a filter that receives little is right by construction. Errors rise when the \
+              target leaves the grid.",
+    pairs: &[("all", "CFwMD"), ("CFwMD", "CFoMD"), ("CFoMD", "random")],
+    setting: || Field::new(&[2.0]),
+    simulate: |setting, context| setting.at_budgets(context, "", &FOUR),
+    claims: |rows, claims| {
         for pair in [("all", "CFwMD"), ("CFwMD", "CFoMD")] {
             rows.beats(claims, pair, ("", 2.0), &[Part::Position]);
         }
@@ -123,35 +104,23 @@ impl Case for Fig8 {
             claims.above(format!("leaves-{scheme}"), what, growth, 1.0);
         }
         let saved = rows.at("CFwMD", 2.0).map(|r| 1.0 - r.rate.value / 9.0);
-        let what = "CFwMD saves 83% of the messages, more than the nominal 78%";
-        claims.near("saving", what, saved, 0.831, 0.012);
-    }
-}
+        claims.near("saving", "CFwMD saves 83% of the messages, more than the nominal 78%", saved, 0.831, 0.012);
+    },
+    ..Simulated::BASE
+};
 
-pub(super) struct Fig9;
-
-impl Case for Fig9 {
-    type Setting = Field;
-    type Main = Summary;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-fig9", "Received power against the budget", "CFwMD paper, figure 9");
-    const CAPTION: &str = "Using silence is worth most where little is sent. Censoring with silence ignored beats random selection only up to two \
-        messages a step; from four on it does not, in velocity clearly, contrary to the paper.";
-    const PAIRS: &'static [(&'static str, &'static str)] =
-        &[("CFwMD", "CFoMD"), ("CFwMD", "random"), ("random", "CFoMD")];
-
-    fn setting() -> Field {
-        Field::new(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0])
-    }
-
-    fn simulate(setting: &Field, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+pub(super) static FIG9: Simulated<Field, Summary> = Simulated {
+    about: About::of("cfwmd-fig9", "Received power against the budget", "CFwMD paper, figure 9"),
+    caption: "Using silence is worth most where little is sent. Censoring with silence ignored beats random selection \
+              only up to two messages a step; from four on it does not, in velocity clearly, contrary to the paper.",
+    pairs: &[("CFwMD", "CFoMD"), ("CFwMD", "random"), ("random", "CFoMD")],
+    setting: || Field::new(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
+    simulate: |setting, context| {
         let mut all = setting.at_budgets(context, "", &FOUR[1..])?;
         all.extend(setting.run(context, "", 9.0, &FOUR[..1])?);
         Ok(all)
-    }
-
-    fn claims(rows: &Rows<Summary>, claims: &mut Claims) {
+    },
+    claims: |rows, claims| {
         for l in [1.0, 2.0, 3.0, 4.0, 5.0, 6.0] {
             for other in ["CFoMD", "random"] {
                 let what = format!("CFwMD has the smaller position error than {other} at l = {l} (ratio)");
@@ -172,32 +141,22 @@ impl Case for Fig9 {
             let what = format!("at l = 9 {scheme} sends everything (ratio of errors)");
             claims.near(format!("merge-{scheme}"), what, rows.ratio(scheme, "all", 9.0), 1.0, 0.03);
         }
-    }
-}
-
-pub(super) struct Fig10;
+    },
+    ..Simulated::BASE
+};
 
 const THREE: [f64; 3] = [2.0, 4.0, 6.0];
 /// Where the first budget runs again, to see a small gain.
 const MANY: &str = "60 times the trials, a tenth of the particles";
 
-impl Case for Fig10 {
-    type Setting = Field;
-    type Main = Step;
-    type Further = Nothing;
-
-    const ABOUT: About =
-        About::of("cfwmd-fig10", "Received power, state against covariance feedback", "CFwMD paper, figure 10");
-    const CAPTION: &str = "Feeding the particles' covariance back (CFwMD2) pays at four and six messages per step, more as time goes on. At two it gains \
-        a twentieth of the squared position error, which 200 trials do not tell from nothing; 12000 with fewer particles \
-        do (table `summary`).";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
-
-    fn setting() -> Field {
-        Field::new(&THREE)
-    }
-
-    fn simulate(setting: &Field, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+pub(super) static FIG10: Simulated<Field, Step> = Simulated {
+    about: About::of("cfwmd-fig10", "Received power, state against covariance feedback", "CFwMD paper, figure 10"),
+    caption: "Feeding the particles' covariance back (CFwMD2) pays at four and six messages per step, more as time \
+              goes on. At two it gains a twentieth of the squared position error, which 200 trials do not tell from \
+              nothing; 12000 with fewer particles do (table `summary`).",
+    pairs: &[("CFwMD2", "CFwMD")],
+    setting: || Field::new(&THREE),
+    simulate: |setting, context| {
         let mut all = setting.at_budgets(context, "", &FUSED)?;
         let many = Field {
             trials: 60 * setting.trials,
@@ -206,44 +165,32 @@ impl Case for Fig10 {
         };
         all.extend(many.run(context, MANY, setting.messages[0], &FUSED)?);
         Ok(all)
-    }
-
-    fn shown(_: &Field, run: &Ensemble) -> bool {
-        run.world.is_empty()
-    }
-
-    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+    },
+    shown: |_, run| run.world.is_empty(),
+    claims: |rows, claims| {
         for l in [4.0, 6.0] {
             rows.beats(claims, ("CFwMD2", "CFwMD"), ("", l), &[Part::Position]);
         }
         rows.beats(claims, ("CFwMD2", "CFwMD"), (MANY, 2.0), &BOTH);
-    }
-}
-
-pub(super) struct Table3;
+    },
+    ..Simulated::BASE
+};
 
 const ON_MEAN: &str = "start on the mean";
 const DRAWN: &str = "start drawn from the prior";
 
-impl Case for Table3 {
-    type Setting = Field;
-    type Main = Rates;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-table3", "Rates among sensors of received power", "CFwMD paper, table III");
-    const CAPTION: &str = "Mean number of messages a step. The grid is not printed; a spacing of 10 m with the truth starting on the prior mean fits \
-        best, and leaves the rates at l = 2 about 0.1 below the printed ones, unexplained. Drawn starts run 1000 particles.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
-    const REFERENCES: &'static [&'static str] = &["rate"];
-
-    fn setting() -> Field {
-        Field {
-            drawn_start: None,
-            ..Field::new(&THREE)
-        }
-    }
-
-    fn simulate(setting: &Field, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+pub(super) static TABLE3: Simulated<Field, Rates> = Simulated {
+    about: About::of("cfwmd-table3", "Rates among sensors of received power", "CFwMD paper, table III"),
+    caption: "Mean number of messages a step. The grid is not printed; a spacing of 10 m with the truth starting on \
+              the prior mean fits best, and leaves the rates at l = 2 about 0.1 below the printed ones, unexplained. \
+              Drawn starts run 1000 particles.",
+    pairs: &[("CFwMD2", "CFwMD")],
+    references: &["rate"],
+    setting: || Field {
+        drawn_start: None,
+        ..Field::new(&THREE)
+    },
+    simulate: |setting, context| {
         let mut all = setting.at_budgets(context, ON_MEAN, &FUSED)?;
         let drawn = Field {
             drawn_start: Some(true),
@@ -252,9 +199,8 @@ impl Case for Table3 {
         };
         all.extend(drawn.at_budgets(context, DRAWN, &FUSED)?);
         Ok(all)
-    }
-
-    fn claims(rows: &Rows<Rates>, claims: &mut Claims) {
+    },
+    claims: |rows, claims| {
         as_printed(claims, &rows.main, ON_MEAN);
         let [state, covariance] = misses(&rows.main, ON_MEAN, 2.0).map_or([None; 2], |both| both.map(Some));
         for (name, miss) in [("state", state), ("covariance", covariance)] {
@@ -266,5 +212,6 @@ impl Case for Table3 {
         let drawn = rows.at(&format!("CFwMD, {DRAWN}"), 2.0).map(|r| r.rate.value);
         let what = "a start drawn from the prior gives a rate above the printed 1.598 at l = 2";
         claims.above("drawn-start-rejected", what, drawn, 1.7);
-    }
-}
+    },
+    ..Simulated::BASE
+};

@@ -15,27 +15,25 @@ mod scalar;
 mod setting;
 mod vector;
 
-use case::Simulated;
-
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
-        &Simulated::<scalar::Fig1>::NEW,
-        &Simulated::<scalar::Fig2>::NEW,
-        &Simulated::<no_feedback::Fig3>::NEW,
-        &Simulated::<vector::Fig4>::NEW,
-        &Simulated::<vector::Fig5>::NEW,
-        &Simulated::<vector::Fig6>::NEW,
+        &scalar::FIG1,
+        &scalar::FIG2,
+        &no_feedback::FIG3,
+        &vector::FIG4,
+        &vector::FIG5,
+        &vector::FIG6,
         &field::Fig7,
-        &Simulated::<field::Fig8>::NEW,
-        &Simulated::<field::Fig9>::NEW,
-        &Simulated::<field::Fig10>::NEW,
-        &Simulated::<scalar::Table1>::NEW,
-        &Simulated::<vector::Table2>::NEW,
-        &Simulated::<field::Table3>::NEW,
-        &Simulated::<beyond::Lossy>::NEW,
-        &Simulated::<beyond::Scheduled>::NEW,
-        &Simulated::<beyond::Cost>::NEW,
-        &Simulated::<no_feedback::NoFeedbackFigure>::NEW,
+        &field::FIG8,
+        &field::FIG9,
+        &field::FIG10,
+        &scalar::TABLE1,
+        &vector::TABLE2,
+        &field::TABLE3,
+        &beyond::LOSSY,
+        &beyond::SCHEDULED,
+        &beyond::COST,
+        &no_feedback::NO_FEEDBACK,
     ]
 }

@@ -1,9 +1,9 @@
 //! No feedback, scalar measurements: figure 3 and what the printed likelihood is worth.
 
-use super::case::Case;
-use super::linear::{Method, Scheme, start};
+use super::case::Simulated;
+use super::linear::{Method, Scheme};
 use super::pictures::BOTH;
-use super::rows::{Ensemble, Further, Nothing, Part, Rows, Step};
+use super::rows::{Part, Step};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
@@ -12,23 +12,13 @@ use fewbits_numerics::normal;
 use fewbits_numerics::quadrature::gauss_legendre;
 use nalgebra::Vector2;
 
-pub(super) struct Fig3;
-
-impl Case for Fig3 {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-fig3", "Scalar measurements, no feedback", "CFwMD paper, figure 3");
-    const CAPTION: &str = "The order of the published figure, obtained with the correct filter: a joint Gaussian belief over the state and the sensors' \
-        own estimates. With the printed likelihood CFwMD would coincide with CFoMD.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("CFoMD", "random")];
-
-    fn setting() -> Linear {
-        Linear::scalar(2, &[1.0])
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+pub(super) static FIG3: Simulated<Linear, Step> = Simulated {
+    about: About::of("cfwmd-fig3", "Scalar measurements, no feedback", "CFwMD paper, figure 3"),
+    caption: "The order of the published figure, obtained with the correct filter: a joint Gaussian belief over the \
+              state and the sensors' own estimates. With the printed likelihood CFwMD would coincide with CFoMD.",
+    pairs: &[("CFwMD", "CFoMD"), ("CFoMD", "random")],
+    setting: || Linear::scalar(2, &[1.0]),
+    simulate: |setting, context| {
         let schemes = [
             ("all", Scheme::All),
             ("CFwMD", Scheme::NoFeedback(Method::Joint)),
@@ -36,9 +26,8 @@ impl Case for Fig3 {
             ("random", Scheme::Random),
         ];
         setting.at_budgets(context, "", &schemes)
-    }
-
-    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+    },
+    claims: |rows, claims| {
         rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], ("", 1.0), &BOTH);
         rows.beats(claims, ("CFwMD", "CFoMD"), ("", 1.0), &BOTH);
         rows.beats(claims, ("CFoMD", "random"), ("", 1.0), &[Part::Position]);
@@ -46,26 +35,21 @@ impl Case for Fig3 {
         claims.within("rate-exact", "without feedback the rate is exactly the budget", rate, 1.0, 4.0);
         let gain = rows.ratio("CFwMD", "CFoMD", 1.0).map(|r| 1.0 - r);
         claims.near("gain", "using silence lowers the position RMSE by a tenth", gain, 0.105, 0.025);
-    }
-}
-
-/// Ways to use silence without feedback.
-pub(super) struct NoFeedbackFigure;
+    },
+    ..Simulated::BASE
+};
 
 rows! {
     /// What the printed likelihood says.
-    #[derive(Debug)]
+    #[derive(Debug, Default)]
     pub struct Literal {
-        /// The printed likelihood of silence over the law that it assumes.
-        printed_likelihood: Vec<Printed>,
+        printed_likelihood: Vec<Printed> => "The printed likelihood of silence over the law that it assumes.",
     }
 
     #[derive(Debug)]
     struct Printed {
-        /// Time step.
-        k: usize,
-        /// Position less its mean.
-        offset: f64 ["m"],
+        k: usize => "Time step.",
+        offset: f64 ["m"] => "Position less its mean.",
         /// Probability of silence as printed: averaged over an own estimate that scatters about this position.
         probability: f64,
     }
@@ -78,7 +62,7 @@ fn printed_likelihood(setting: &Linear) -> Result<Vec<Printed>, Error> {
     let threshold = fewbits_cfwmd::threshold::threshold(rate, 1)?;
     let dynamics = constant_velocity_1d(1.0, setting.acceleration_variance)?;
     let sensor = LinearSensor::scalar(Vector2::new(1.0, 0.0), noise)?;
-    let start = start(setting)?;
+    let start = setting.belief()?;
     let mut own = OwnRecursion::new(&start);
     let mut rows = Vec::new();
     for k in 1..=setting.steps as usize {
@@ -99,41 +83,30 @@ fn printed_likelihood(setting: &Linear) -> Result<Vec<Printed>, Error> {
     Ok(rows)
 }
 
-impl Further<Linear> for Literal {
-    fn of(p: &Linear, _: &Context<'_>) -> Result<Self, Error> {
-        let printed_likelihood = printed_likelihood(p)?;
-        Ok(Self { printed_likelihood })
-    }
-}
-
-impl Case for NoFeedbackFigure {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Literal;
-
-    const ABOUT: About =
-        About::of("cfwmd-nofeedback", "What silence is worth without feedback, and what the printed likelihood is", "");
-    const CAPTION: &str = "Exact filter (measurements imputed), joint Gaussian belief, a heuristic that scatters the sensors' estimates about the fusion \
-        centre's, the filter that ignores silence, and the paper's law of the sensors' estimates with its mean corrected, \
-        which does harm because it forgets the data. The likelihood as printed is one number whatever the state, and so \
-        leaves the filter that ignores silence.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[
+/// Ways to use silence without feedback.
+pub(super) static NO_FEEDBACK: Simulated<Linear, Step, Literal> = Simulated {
+    about: About::of(
+        "cfwmd-nofeedback",
+        "What silence is worth without feedback, and what the printed likelihood is",
+        "",
+    ),
+    caption: "Exact filter (measurements imputed), joint Gaussian belief, a heuristic that scatters the sensors' \
+              estimates about the fusion centre's, the filter that ignores silence, and the paper's law of the \
+              sensors' estimates with its mean corrected, which does harm because it forgets the data. The likelihood \
+              as printed is one number whatever the state, and so leaves the filter that ignores silence.",
+    pairs: &[
         ("exact", "joint Gaussian"),
         ("joint Gaussian", "ignored"),
         ("exact", "ignored"),
         ("heuristic", "ignored"),
         ("ignored", "no history"),
         ("joint Gaussian", "heuristic"),
-    ];
-
-    fn setting() -> Linear {
-        Linear {
-            trials: 4000,
-            ..Linear::scalar(2, &[1.0]).with_particles(500)
-        }
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+    ],
+    setting: || Linear {
+        trials: 4000,
+        ..Linear::scalar(2, &[1.0]).with_particles(500)
+    },
+    simulate: |setting, context| {
         let schemes = [
             ("exact", Scheme::NoFeedback(Method::Imputed(setting.cloud()))),
             ("joint Gaussian", Scheme::NoFeedback(Method::Joint)),
@@ -142,9 +115,13 @@ impl Case for NoFeedbackFigure {
             ("no history", Scheme::Unconditional),
         ];
         setting.at_budgets(context, "", &schemes)
-    }
-
-    fn claims(rows: &Rows<Step, Literal>, claims: &mut Claims) {
+    },
+    further: |setting, _| {
+        Ok(Literal {
+            printed_likelihood: printed_likelihood(setting)?,
+        })
+    },
+    claims: |rows, claims| {
         for pair in [
             ("exact", "ignored"),
             ("joint Gaussian", "ignored"),
@@ -157,16 +134,14 @@ impl Case for NoFeedbackFigure {
         let gap = rows.pair("exact", "joint Gaussian", "", 1.0).map(|p| p.position.value);
         let what = "the joint Gaussian belief is as good as the exact filter (difference in squared error, m^2)";
         claims.near("joint-is-exact", what, gap, 0.0, 0.01);
-    }
-
-    fn always(setting: &Linear, rows: &Rows<Step, Literal>, claims: &mut Claims) {
+    },
+    always: |setting, rows, claims| {
         let silent = 1.0 - setting.messages[0] / setting.sensors as f64;
         let what = "the printed likelihood of silence is 1 - l/N at every position and step: it says nothing (erratum cfwmd-2)";
         let printed = &rows.further.printed_likelihood;
         claims.all("printed-is-constant", what, printed, |r| (r.probability - silent).abs() < 1e-9);
-    }
-
-    fn plot(_: &Linear, rows: &Rows<Step, Literal>) -> Plot {
+    },
+    plot: |_, rows| {
         let schemes = Axis::categories("", rows.summary.iter().map(|r| r.run.scheme));
         let all = rows.summary.iter().enumerate();
         Plot::of(
@@ -174,8 +149,9 @@ impl Case for NoFeedbackFigure {
                 .with(Layer::measured("", all, |(i, r)| (i as f64, r.position_rmse)))
                 .without_legend(),
         )
-    }
-}
+    },
+    ..Simulated::BASE
+};
 
 #[cfg(test)]
 mod tests {

@@ -1,8 +1,8 @@
 //! The nonlinear experiments: a target in a plane among sensors of received power.
 
 use super::rows::{Ensemble, Record, simulate};
-use super::setting::Field;
-use crate::{Context, Error};
+use super::setting::{Field, Setting, cost};
+use crate::{Context, Cost, Error};
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::network::Network;
 use fewbits_cfwmd::rule::{CensoringRule, OwnRecursion};
@@ -39,6 +39,7 @@ pub(super) struct World {
 }
 
 /// Truth, measurements and coins of one trial.
+#[derive(Default)]
 pub(super) struct Draws {
     pub(super) truth: Vec<Vector4<f64>>,
     measurements: Vec<Vec<f64>>,
@@ -73,11 +74,7 @@ impl World {
         } else {
             *self.start.mean()
         };
-        let mut draws = Draws {
-            truth: Vec::new(),
-            measurements: Vec::new(),
-            coins: Vec::new(),
-        };
+        let mut draws = Draws::default();
         for _ in 0..self.steps {
             state = self.dynamics.propagate(&mut rng, &state);
             draws.truth.push(state);
@@ -163,22 +160,33 @@ impl World {
     }
 }
 
-/// Runs schemes at one budget on the common trials.
-pub(super) fn run(
-    context: &Context<'_>,
-    field: &Field,
-    world_name: &str,
-    messages: f64,
-    schemes: &[(&'static str, Scheme)],
-) -> Result<Vec<Ensemble>, Error> {
-    let world = World::new(field)?;
-    simulate(
-        context,
-        context.stream("cfwmd-nonlinear"),
-        field.trials,
-        (world_name, messages),
-        schemes,
-        |stream| world.draw(stream),
-        |scheme, draws, stream| world.trial(*scheme, messages, draws, stream.named("particles")),
-    )
+impl Setting for Field {
+    type Scheme = Scheme;
+
+    fn messages(&self) -> &[f64] {
+        &self.messages
+    }
+
+    fn cost(&self) -> Cost {
+        cost(self.trials, self.steps, self.messages.len(), self.particles as f64 * 1e-7)
+    }
+
+    fn run(
+        &self,
+        context: &Context<'_>,
+        name: &str,
+        messages: f64,
+        schemes: &[(&'static str, Scheme)],
+    ) -> Result<Vec<Ensemble>, Error> {
+        let world = World::new(self)?;
+        simulate(
+            context,
+            context.stream("cfwmd-nonlinear"),
+            self.trials,
+            (name, messages),
+            schemes,
+            |stream| world.draw(stream),
+            |scheme, draws, stream| world.trial(*scheme, messages, draws, stream.named("particles")),
+        )
+    }
 }

@@ -1,9 +1,43 @@
-//! The pictures of the simulated figures.
+//! The main tables of the simulated figures, and their pictures.
 
-use super::rows::{Part, Step, Summary};
+use super::rows::{Ensemble, Part, Step, Summary, steps_of, summary};
 use crate::prelude::*;
 
 pub(super) const BOTH: [Part; 2] = [Part::Position, Part::Velocity];
+
+/// A kind of main table.
+pub trait Main: Serialize + JsonSchema + Sized {
+    /// The rows of these runs. `printed`: whether printed numbers may stand beside ours.
+    fn of(figure: &str, runs: &[&Ensemble], printed: bool) -> Vec<Self>;
+
+    /// Their picture.
+    fn plot(rows: &[Self]) -> Plot;
+}
+
+impl Main for Step {
+    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
+        runs.iter().flat_map(|run| steps_of(run)).collect()
+    }
+
+    fn plot(rows: &[Self]) -> Plot {
+        by_step(rows)
+    }
+}
+
+impl Main for Summary {
+    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
+        runs.iter().map(|run| summary(run)).collect()
+    }
+
+    fn plot(rows: &[Self]) -> Plot {
+        let rows: Vec<&Summary> = rows.iter().collect();
+        let panels = [
+            by_budget(&rows, "Position", "time-averaged RMSE (m)", |r| r.position_rmse),
+            by_budget(&rows, "Velocity", "time-averaged RMSE (m/s)", |r| r.velocity_rmse),
+        ];
+        Plot::grid(2, panels.into())
+    }
+}
 
 /// One colour for a scheme in every figure; `otherwise` for schemes that stand in one figure only.
 fn colour_of(scheme: &str, otherwise: usize) -> usize {

@@ -1,6 +1,7 @@
 //! Tables of rates: printed ones beside ours.
 
-use super::rows::{Ensemble, Main, rate};
+use super::pictures::Main;
+use super::rows::{Ensemble, rate};
 use crate::prelude::*;
 use crate::reference;
 
@@ -8,20 +9,13 @@ rows! {
     /// Rates of one budget in one setting.
     #[derive(Debug)]
     pub struct Rates {
-        /// Message budget.
-        l: f64 ["messages/step"],
-        /// How start and noise are read, and the estimator.
-        setting: String,
-        /// Mean number of messages, state feedback (CFwMD).
-        state: Measured ["messages/step"],
-        /// Mean number of messages, state and covariance feedback (CFwMD2).
-        covariance: Measured ["messages/step"],
-        /// The first as printed.
-        printed_state: Option<f64> ["messages/step"],
-        /// The second as printed.
-        printed_covariance: Option<f64> ["messages/step"],
-        /// Trials.
-        trials: usize,
+        l: f64 ["messages/step"] => "Message budget.",
+        setting: String => "How start and noise are read, and the estimator.",
+        state: Measured ["messages/step"] => "Mean number of messages, state feedback (CFwMD).",
+        covariance: Measured ["messages/step"] => "Mean number of messages, state and covariance feedback (CFwMD2).",
+        printed_state: Option<f64> ["messages/step"] => "The first as printed.",
+        printed_covariance: Option<f64> ["messages/step"] => "The second as printed.",
+        trials: usize => "Trials.",
     }
 }
 
@@ -58,15 +52,11 @@ impl Main for Rates {
             ("State and covariance feedback (CFwMD2)", (|r| r.covariance, |r| r.printed_covariance)),
         ];
         let panel = |(title, (ours, printed)): (&str, Columns)| {
-            let excess = |r: &Rates| Measured {
-                value: ours(r).value - r.l,
-                ..ours(r)
-            };
             let worlds = distinct(rows, |r| r.setting.clone());
             let first = rows.iter().filter(|r| Some(&r.setting) == worlds.first());
             let layers = worlds.iter().enumerate().flat_map(|(colour, world)| {
                 let own = rows.iter().filter(|r| r.setting == *world);
-                Layer::curve(world.as_str(), colour, own.map(|r| (r.l, excess(r))).collect())
+                Layer::curve(world.as_str(), colour, own.map(|r| (r.l, ours(r) - r.l)).collect())
             });
             let axis = Axis::linear("message budget l (messages/step)");
             Panel::new(title, axis, Axis::linear("rate minus budget (messages/step)"))
@@ -91,12 +81,5 @@ pub(super) fn as_printed(claims: &mut Claims, rows: &[Rates], world: &str) {
 /// Our rate minus the printed one.
 pub(super) fn misses(rows: &[Rates], world: &str, l: f64) -> Option<[Measured; 2]> {
     let row = rows.iter().find(|r| r.setting == world && r.l == l)?;
-    let less = |ours: Measured, printed: f64| Measured {
-        value: ours.value - printed,
-        ..ours
-    };
-    Some([
-        less(row.state, row.printed_state?),
-        less(row.covariance, row.printed_covariance?),
-    ])
+    Some([row.state - row.printed_state?, row.covariance - row.printed_covariance?])
 }

@@ -1,6 +1,5 @@
 //! What the simulated figures have in common: runs of schemes on common trials, and the rows that come of them.
 
-use super::pictures::{by_budget, by_step};
 use crate::prelude::*;
 
 /// One trial of one scheme, one entry a step.
@@ -71,12 +70,9 @@ rows! {
     /// What the rows speak of.
     #[derive(Debug, Clone, PartialEq)]
     pub struct Run {
-        /// What is sent, and what is made of silence.
-        pub(super) scheme: &'static str,
-        /// Where it ran, in figures of several settings.
-        pub(super) world: Option<String>,
-        /// Message budget.
-        pub(super) l: f64 ["messages/step"],
+        pub(super) scheme: &'static str => "What is sent, and what is made of silence.",
+        pub(super) world: Option<String> => "Where it ran, in figures of several settings.",
+        pub(super) l: f64 ["messages/step"] => "Message budget.",
     }
 }
 
@@ -109,16 +105,11 @@ rows! {
     pub struct Step {
         #[serde(flatten)]
         pub(super) run: Run,
-        /// Time step.
-        pub(super) k: usize,
-        /// Root mean squared position error.
-        pub(super) position_rmse: Measured ["m"],
-        /// Root mean squared velocity error.
-        pub(super) velocity_rmse: Measured ["m/s"],
-        /// Mean number of messages in this step.
-        pub(super) messages: Measured,
-        /// Trials.
-        trials: usize,
+        pub(super) k: usize => "Time step.",
+        pub(super) position_rmse: Measured ["m"] => "Root mean squared position error.",
+        pub(super) velocity_rmse: Measured ["m/s"] => "Root mean squared velocity error.",
+        pub(super) messages: Measured => "Mean number of messages in this step.",
+        trials: usize => "Trials.",
     }
 
     /// One run, averaged over its steps.
@@ -126,35 +117,24 @@ rows! {
     pub struct Summary {
         #[serde(flatten)]
         pub(super) run: Run,
-        /// Root mean squared position error over trials and steps.
-        pub(super) position_rmse: Measured ["m"],
-        /// Root mean squared velocity error over trials and steps.
-        pub(super) velocity_rmse: Measured ["m/s"],
-        /// Mean number of messages.
-        pub(super) rate: Measured ["messages/step"],
+        pub(super) position_rmse: Measured ["m"] => "Root mean squared position error over trials and steps.",
+        pub(super) velocity_rmse: Measured ["m/s"] => "Root mean squared velocity error over trials and steps.",
+        pub(super) rate: Measured ["messages/step"] => "Mean number of messages.",
         /// Squared position error over its variance under the belief; 1 if the belief is consistent.
         pub(super) nees: Option<Measured>,
-        /// Trials.
-        pub(super) trials: usize,
+        pub(super) trials: usize => "Trials.",
     }
 
     /// Two schemes on the same truth, noise and draws.
     #[derive(Debug, Clone)]
     pub struct Paired {
-        /// Scheme.
-        pub(super) first: &'static str,
-        /// Scheme it is compared with.
-        pub(super) second: &'static str,
-        /// Where both ran, in figures of several settings.
-        pub(super) world: Option<String>,
-        /// Message budget.
-        pub(super) l: f64 ["messages/step"],
-        /// Mean squared position error of the first minus that of the second.
-        pub(super) position: Measured ["m^2"],
-        /// The same of the velocity.
-        pub(super) velocity: Measured ["m^2/s^2"],
-        /// Trials.
-        trials: u64,
+        pub(super) first: &'static str => "Scheme.",
+        pub(super) second: &'static str => "Scheme it is compared with.",
+        pub(super) world: Option<String> => "Where both ran, in figures of several settings.",
+        pub(super) l: f64 ["messages/step"] => "Message budget.",
+        pub(super) position: Measured ["m^2"] => "Mean squared position error of the first minus that of the second.",
+        pub(super) velocity: Measured ["m^2/s^2"] => "The same of the velocity.",
+        trials: u64 => "Trials.",
     }
 }
 
@@ -168,7 +148,7 @@ impl Step {
 }
 
 /// A row for each step of a run.
-fn steps_of(e: &Ensemble) -> impl Iterator<Item = Step> {
+pub(super) fn steps_of(e: &Ensemble) -> impl Iterator<Item = Step> {
     let steps = e.records.first().map_or(0, |r| r.position.len());
     (0..steps).map(move |k| Step {
         run: Run::of(e),
@@ -221,55 +201,9 @@ fn paired(ensembles: &[Ensemble], pairs: &[(&str, &str)]) -> Vec<Paired> {
     rows
 }
 
-/// A kind of main table.
-pub trait Main: Serialize + JsonSchema + Sized {
-    /// The rows of these runs. `printed`: whether printed numbers may stand beside ours.
-    fn of(figure: &str, runs: &[&Ensemble], printed: bool) -> Vec<Self>;
-
-    /// Their picture.
-    fn plot(rows: &[Self]) -> Plot;
-}
-
-impl Main for Step {
-    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
-        runs.iter().flat_map(|run| steps_of(run)).collect()
-    }
-
-    fn plot(rows: &[Self]) -> Plot {
-        by_step(rows)
-    }
-}
-
-impl Main for Summary {
-    fn of(_: &str, runs: &[&Ensemble], _: bool) -> Vec<Self> {
-        runs.iter().map(|run| summary(run)).collect()
-    }
-
-    fn plot(rows: &[Self]) -> Plot {
-        let rows: Vec<&Summary> = rows.iter().collect();
-        let panels = [
-            by_budget(&rows, "Position", "time-averaged RMSE (m)", |r| r.position_rmse),
-            by_budget(&rows, "Velocity", "time-averaged RMSE (m/s)", |r| r.velocity_rmse),
-        ];
-        Plot::grid(2, panels.into())
-    }
-}
-
-/// Further tables.
-pub trait Further<S>: Serialize + JsonSchema + Sized {
-    /// Those of a setting.
-    fn of(setting: &S, context: &Context<'_>) -> Result<Self, Error>;
-}
-
 /// No further tables.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Default, Serialize, JsonSchema)]
 pub struct Nothing {}
-
-impl<S> Further<S> for Nothing {
-    fn of(_: &S, _: &Context<'_>) -> Result<Self, Error> {
-        Ok(Self {})
-    }
-}
 
 /// All tables of a simulated figure.
 #[derive(Debug, Serialize, JsonSchema)]

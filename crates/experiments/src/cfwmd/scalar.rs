@@ -1,10 +1,10 @@
 //! Scalar measurements with feedback: figures 1 and 2, table I.
 
-use super::case::Case;
+use super::case::Simulated;
 use super::linear::Scheme;
 use super::pictures::BOTH;
 use super::rates::{Rates, as_printed, misses};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step};
+use super::rows::{Part, Step};
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
 use fewbits_cfwmd::rule::Weighing;
@@ -14,31 +14,21 @@ pub(super) const CENSORED: [(&str, Scheme); 2] = [
     ("CFwMD2", Scheme::Gaussian(Weighing::FusionCentre)),
 ];
 
-pub(super) struct Fig1;
-
-impl Case for Fig1 {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-fig1", "Scalar measurements, state feedback", "CFwMD paper, figure 1");
-    const CAPTION: &str = "Two sensors share one message a step. Silence that the fusion centre takes into account (CFwMD) closes a third of the gap \
-        to sending everything that it leaves open when ignored (CFoMD). The gap that remains is 22% in position, not as \
-        small as the paper suggests.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[
+pub(super) static FIG1: Simulated<Linear, Step> = Simulated {
+    about: About::of("cfwmd-fig1", "Scalar measurements, state feedback", "CFwMD paper, figure 1"),
+    caption: "Two sensors share one message a step. Silence that the fusion centre takes into account (CFwMD) closes a \
+              third of the gap to sending everything that it leaves open when ignored (CFoMD). The gap that remains is \
+              22% in position, not as small as the paper suggests.",
+    pairs: &[
         ("all", "CFwMD"),
         ("CFwMD", "CFoMD"),
         ("CFoMD", "random"),
         ("CFwMD2", "CFwMD"),
         ("CFwMD2", "trigger, centre's s"),
         ("CFwMD", "CFwMD particles"),
-    ];
-
-    fn setting() -> Linear {
-        Linear::scalar(2, &[1.0]).with_particles(1000)
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+    ],
+    setting: || Linear::scalar(2, &[1.0]).with_particles(1000),
+    simulate: |setting, context| {
         let schemes = [
             ("all", Scheme::All),
             ("random", Scheme::Random),
@@ -50,9 +40,8 @@ impl Case for Fig1 {
             ("trigger, centre's s", Scheme::Trigger(Weighing::FusionCentre)),
         ];
         setting.at_budgets(context, "", &schemes)
-    }
-
-    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+    },
+    claims: |rows, claims| {
         rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], ("", 1.0), &BOTH);
         for pair in [
             ("CFwMD", "CFoMD"),
@@ -81,8 +70,9 @@ impl Case for Fig1 {
         let price = rows.ratio("trigger, centre's s", "CFwMD2", 1.0);
         let what = "keeping the belief Gaussian by a random trigger costs 11% at equal rate";
         claims.near("trigger-price", what, price, 1.11, 0.03);
-    }
-}
+    },
+    ..Simulated::BASE
+};
 
 /// Position standard deviation of the all-send Kalman filter: the reference recursion in closed loop.
 fn exact_all_send(sensors: u32) -> Vec<f64> {
@@ -100,62 +90,40 @@ fn exact_all_send(sensors: u32) -> Vec<f64> {
 /// Budgets of four sensors in figure 2 and table I.
 pub(super) const BUDGETS: [f64; 5] = [1.0, 1.2, 1.5, 2.0, 3.0];
 
-pub(super) struct Fig2;
-
-impl Case for Fig2 {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Nothing;
-
-    const ABOUT: About =
-        About::of("cfwmd-fig2", "Scalar measurements, state against covariance feedback", "CFwMD paper, figure 2");
-    const CAPTION: &str = "Four sensors, five budgets. Weighing innovations with the fusion centre's covariance (CFwMD2) meets the budget and is \
-        better from l = 1.2 on; at l = 1 the paper's CFwMD is, in position, because it sends more than it should.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFwMD2"), ("CFwMD2", "CFwMD")];
-
-    fn setting() -> Linear {
-        Linear::scalar(4, &BUDGETS)
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        setting.at_budgets(context, "", &CENSORED)
-    }
-
-    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+pub(super) static FIG2: Simulated<Linear, Step> = Simulated {
+    about: About::of("cfwmd-fig2", "Scalar measurements, state against covariance feedback", "CFwMD paper, figure 2"),
+    caption: "Four sensors, five budgets. Weighing innovations with the fusion centre's covariance (CFwMD2) meets the \
+              budget and is better from l = 1.2 on; at l = 1 the paper's CFwMD is, in position, because it sends more \
+              than it should.",
+    pairs: &[("CFwMD", "CFwMD2"), ("CFwMD2", "CFwMD")],
+    setting: || Linear::scalar(4, &BUDGETS),
+    simulate: |setting, context| setting.at_budgets(context, "", &CENSORED),
+    claims: |rows, claims| {
         rows.beats(claims, ("CFwMD", "CFwMD2"), ("", 1.0), &[Part::Position]);
         for l in [1.2, 1.5, 2.0] {
             rows.beats(claims, ("CFwMD2", "CFwMD"), ("", l), &BOTH);
         }
         let gap = rows.ratio("CFwMD", "CFwMD2", 3.0).map(|r| r - 1.0);
         claims.below("little-gain", "at l = 3 covariance feedback gains less than 2%", gap, 0.02);
-    }
-}
+    },
+    ..Simulated::BASE
+};
 
 /// Trials of the particle filters of table I.
 const CLOUD_TRIALS: u64 = 2000;
-
-pub(super) struct Table1;
 
 const KNOWN: &str = "known start";
 const DRAWN: &str = "start variance 5";
 const CLOUDS: &str = "start variance 5, particles";
 
-impl Case for Table1 {
-    type Setting = Linear;
-    type Main = Rates;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-table1", "Rates with scalar measurements", "CFwMD paper, table I");
-    const CAPTION: &str = "Mean number of messages a step. The initial covariance is not printed; the published numbers fit a start drawn with \
-        variance 5 and 1000 particles better than a known one. With state feedback alone the budget is missed by up to \
-        14%. The particle filters run 2000 trials.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
-
-    fn setting() -> Linear {
-        Linear::scalar(4, &BUDGETS).with_particles(1000)
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+pub(super) static TABLE1: Simulated<Linear, Rates> = Simulated {
+    about: About::of("cfwmd-table1", "Rates with scalar measurements", "CFwMD paper, table I"),
+    caption: "Mean number of messages a step. The initial covariance is not printed; the published numbers fit a start \
+              drawn with variance 5 and 1000 particles better than a known one. With state feedback alone the budget \
+              is missed by up to 14%. The particle filters run 2000 trials.",
+    pairs: &[("CFwMD2", "CFwMD")],
+    setting: || Linear::scalar(4, &BUDGETS).with_particles(1000),
+    simulate: |setting, context| {
         let clouds = [
             ("CFwMD", Scheme::Particles(setting.cloud(), Weighing::OwnFilter)),
             ("CFwMD2", Scheme::Particles(setting.cloud(), Weighing::FusionCentre)),
@@ -173,9 +141,8 @@ impl Case for Table1 {
         all.extend(drawn.at_budgets(context, DRAWN, &CENSORED)?);
         all.extend(drawn.of_trials(CLOUD_TRIALS).at_budgets(context, CLOUDS, &clouds)?);
         Ok(all)
-    }
-
-    fn claims(rows: &Rows<Rates>, claims: &mut Claims) {
+    },
+    claims: |rows, claims| {
         as_printed(claims, &rows.main, CLOUDS);
         let known = BUDGETS.iter().filter_map(|l| misses(&rows.main, KNOWN, *l));
         let what = "a known start gives too low a rate with state feedback, by up to .045";
@@ -192,5 +159,6 @@ impl Case for Table1 {
         let missed = rows.at(&format!("CFwMD, {DRAWN}"), 2.0).map(|r| r.rate.value);
         let what = "state feedback alone falls short of the budget l = 2 by more than a tenth";
         claims.below("budget-missed", what, missed, 1.8);
-    }
-}
+    },
+    ..Simulated::BASE
+};

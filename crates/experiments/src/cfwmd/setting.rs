@@ -2,11 +2,13 @@
 
 use super::rows::Ensemble;
 use crate::prelude::*;
+use fewbits_core::Gaussian;
+use nalgebra::{Matrix2, Vector2};
 use serde::de::DeserializeOwned;
 
 /// Parameters of an experiment whose schemes are simulated on common trials.
 pub trait Setting:
-    Clone + Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Quick + Send + Sync + 'static
+    Clone + Default + Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Quick + Send + Sync + 'static
 {
     /// What is sent, and what is made of it.
     type Scheme: Copy;
@@ -51,7 +53,7 @@ fn at_most(messages: f64, sensors: u64) -> garde::Result {
 }
 
 /// Seconds and bytes of so many trials of ten schemes.
-fn cost(trials: u64, steps: u64, budgets: usize, step_seconds: f64) -> Cost {
+pub(super) fn cost(trials: u64, steps: u64, budgets: usize, step_seconds: f64) -> Cost {
     let runs = trials as f64 * steps as f64 * budgets as f64 * 10.0;
     Cost::new(runs * step_seconds, runs * 32.0)
 }
@@ -136,6 +138,14 @@ impl Linear {
         self.particles.unwrap_or(1) as usize
     }
 
+    /// The belief about the state before the first step.
+    pub(super) fn belief(&self) -> Result<Gaussian<2>, Error> {
+        let (position, velocity) = (self.start_variances[0], self.start_variances[1]);
+        let common = self.start_correlation * (position * velocity).sqrt();
+        let covariance = Matrix2::new(position, common, common, velocity);
+        Ok(Gaussian::new(Vector2::new(self.start[0], self.start[1]), covariance)?)
+    }
+
     /// The same with at most so many trials.
     pub(super) fn of_trials(&self, most: u64) -> Self {
         Self {
@@ -145,36 +155,16 @@ impl Linear {
     }
 }
 
+impl Default for Linear {
+    fn default() -> Self {
+        Self::scalar(2, &[1.0])
+    }
+}
+
 impl Quick for Linear {
     fn quicken(&mut self) {
         self.trials = 100;
         self.particles = self.particles.map(|_| 100);
-    }
-}
-
-impl Setting for Linear {
-    type Scheme = super::linear::Scheme;
-
-    fn messages(&self) -> &[f64] {
-        &self.messages
-    }
-
-    fn cost(&self) -> Cost {
-        let fusion = self.sensors as f64 * 2e-6 + self.cloud() as f64 * 2e-8;
-        cost(self.trials, self.steps, self.messages.len(), fusion)
-    }
-
-    fn run(
-        &self,
-        context: &Context<'_>,
-        world: &str,
-        messages: f64,
-        schemes: &[(&'static str, Self::Scheme)],
-    ) -> Result<Vec<Ensemble>, Error> {
-        match self.noise_variances.len() {
-            1 => super::linear::run::<1>(context, self, world, messages, schemes),
-            _ => super::linear::run::<2>(context, self, world, messages, schemes),
-        }
     }
 }
 
@@ -232,31 +222,15 @@ impl Field {
     }
 }
 
+impl Default for Field {
+    fn default() -> Self {
+        Self::new(&[2.0])
+    }
+}
+
 impl Quick for Field {
     fn quicken(&mut self) {
         self.trials = 24;
         self.particles = 500;
-    }
-}
-
-impl Setting for Field {
-    type Scheme = super::nonlinear::Scheme;
-
-    fn messages(&self) -> &[f64] {
-        &self.messages
-    }
-
-    fn cost(&self) -> Cost {
-        cost(self.trials, self.steps, self.messages.len(), self.particles as f64 * 1e-7)
-    }
-
-    fn run(
-        &self,
-        context: &Context<'_>,
-        world: &str,
-        messages: f64,
-        schemes: &[(&'static str, Self::Scheme)],
-    ) -> Result<Vec<Ensemble>, Error> {
-        super::nonlinear::run(context, self, world, messages, schemes)
     }
 }

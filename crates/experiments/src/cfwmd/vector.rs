@@ -1,10 +1,10 @@
 //! Vector measurements: figures 4, 5 and 6, table II.
 
-use super::case::Case;
+use super::case::Simulated;
 use super::linear::{Method, Scheme};
 use super::pictures::BOTH;
 use super::rates::{Rates, as_printed};
-use super::rows::{Ensemble, Nothing, Part, Rows, Step};
+use super::rows::{Ensemble, Part, Step};
 use super::scalar::CENSORED;
 use super::setting::{Linear, Setting};
 use crate::prelude::*;
@@ -40,24 +40,14 @@ fn worlds() -> [String; 2] {
     [world(1.0), world(STATED)]
 }
 
-pub(super) struct Fig4;
-
-impl Case for Fig4 {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-fig4", "Vector measurements, state feedback", "CFwMD paper, figure 4");
-    const CAPTION: &str = "Position and velocity measured by two sensors that share one message a step. The order of the schemes is that of scalar \
-        measurements, at the acceleration variance that fits the published rates (1) and at the one the text states (4). \
-        The particle filter runs 150 trials.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("CFoMD", "random")];
-
-    fn setting() -> Linear {
-        Linear::vector(2, &[1.0]).with_particles(1000)
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+pub(super) static FIG4: Simulated<Linear, Step> = Simulated {
+    about: About::of("cfwmd-fig4", "Vector measurements, state feedback", "CFwMD paper, figure 4"),
+    caption: "Position and velocity measured by two sensors that share one message a step. The order of the schemes is \
+              that of scalar measurements, at the acceleration variance that fits the published rates (1) and at the \
+              one the text states (4). The particle filter runs 150 trials.",
+    pairs: &[("CFwMD", "CFoMD"), ("CFoMD", "random")],
+    setting: || Linear::vector(2, &[1.0]).with_particles(1000),
+    simulate: |setting, context| {
         let schemes = [
             ("all", Scheme::All),
             ("random", Scheme::Random),
@@ -69,11 +59,10 @@ impl Case for Fig4 {
         let own = world(setting.acceleration_variance);
         all.extend(setting.of_trials(150).run(context, &own, setting.messages[0], &cloud)?);
         Ok(all)
-    }
-
-    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+    },
+    claims: |rows, claims| {
         for world in &worlds() {
-            for pair in Self::PAIRS {
+            for pair in FIG4.pairs {
                 rows.beats(claims, *pair, (world, 1.0), &[Part::Position]);
             }
             rows.in_order(claims, &["all", "CFwMD", "CFoMD", "random"], (world, 1.0), &BOTH);
@@ -82,36 +71,20 @@ impl Case for Fig4 {
         let ratio = rows.ratio(&format!("CFwMD particles, {own}"), &format!("CFwMD, {own}"), 1.0);
         let what = "1000 particles that weigh silence by quadrature agree with the Gaussian belief";
         claims.near("particles-equal", what, ratio, 1.0, 0.06);
-    }
-}
+    },
+    ..Simulated::BASE
+};
 
-pub(super) struct Fig5;
-
-impl Case for Fig5 {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Nothing;
-
-    const ABOUT: About =
-        About::of("cfwmd-fig5", "Vector measurements, state against covariance feedback", "CFwMD paper, figure 5");
-    const CAPTION: &str = "With vector measurements covariance feedback (CFwMD2) is better at each budget; at the acceleration variance that the text \
-        states it would not be, at one message a step.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
-    const REFERENCES: &'static [&'static str] = &["position", "velocity"];
-
-    fn setting() -> Linear {
-        Linear::vector(4, &[1.0, 2.0, 3.0])
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
-        both(context, setting, &CENSORED, &CENSORED)
-    }
-
-    fn shown(p: &Linear, run: &Ensemble) -> bool {
-        run.world == world(p.acceleration_variance)
-    }
-
-    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+pub(super) static FIG5: Simulated<Linear, Step> = Simulated {
+    about: About::of("cfwmd-fig5", "Vector measurements, state against covariance feedback", "CFwMD paper, figure 5"),
+    caption: "With vector measurements covariance feedback (CFwMD2) is better at each budget; at the acceleration \
+              variance that the text states it would not be, at one message a step.",
+    pairs: &[("CFwMD2", "CFwMD")],
+    references: &["position", "velocity"],
+    setting: || Linear::vector(4, &[1.0, 2.0, 3.0]),
+    simulate: |setting, context| both(context, setting, &CENSORED, &CENSORED),
+    shown: |p, run| run.world == world(p.acceleration_variance),
+    claims: |rows, claims| {
         for l in [1.0, 2.0, 3.0] {
             rows.beats(claims, ("CFwMD2", "CFwMD"), (&world(1.0), l), &[Part::Position]);
         }
@@ -120,32 +93,23 @@ impl Case for Fig5 {
         let what =
             "at the stated acceleration variance CFwMD2 is not better at l = 1 (paired difference in standard errors)";
         claims.above("stated-variance-fails", what, z, -2.0);
-    }
-}
-
-pub(super) struct Fig6;
+    },
+    ..Simulated::BASE
+};
 
 /// Trials of the particle filter without feedback.
 const PARTICLE_TRIALS: u64 = 500;
 /// The joint belief on the trials of the particle filter.
 const SAME_TRIALS: &str = "CFwMD on these trials";
 
-impl Case for Fig6 {
-    type Setting = Linear;
-    type Main = Step;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-fig6", "Vector measurements, no feedback", "CFwMD paper, figure 6");
-    const CAPTION: &str = "Without feedback the fusion centre does not know what a silent sensor compared with. A joint belief over the state and the \
-        sensors' own estimates (CFwMD) makes silence informative all the same; the printed likelihood does not. The \
-        exact filter imputes the withheld measurements by particles, in 500 trials.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD", "CFoMD"), ("exact", SAME_TRIALS)];
-
-    fn setting() -> Linear {
-        Linear::vector(2, &[1.0]).with_particles(500)
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+pub(super) static FIG6: Simulated<Linear, Step> = Simulated {
+    about: About::of("cfwmd-fig6", "Vector measurements, no feedback", "CFwMD paper, figure 6"),
+    caption: "Without feedback the fusion centre does not know what a silent sensor compared with. A joint belief over \
+              the state and the sensors' own estimates (CFwMD) makes silence informative all the same; the printed \
+              likelihood does not. The exact filter imputes the withheld measurements by particles, in 500 trials.",
+    pairs: &[("CFwMD", "CFoMD"), ("exact", SAME_TRIALS)],
+    setting: || Linear::vector(2, &[1.0]).with_particles(500),
+    simulate: |setting, context| {
         let schemes = [
             ("all", Scheme::All),
             ("CFwMD", Scheme::NoFeedback(Method::Joint)),
@@ -164,13 +128,9 @@ impl Case for Fig6 {
         all.extend(both(context, &few, &exact, &exact)?);
         all.extend(same);
         Ok(all)
-    }
-
-    fn shown(p: &Linear, run: &Ensemble) -> bool {
-        run.world == world(p.acceleration_variance) && run.scheme != SAME_TRIALS
-    }
-
-    fn claims(rows: &Rows<Step>, claims: &mut Claims) {
+    },
+    shown: |p, run| run.world == world(p.acceleration_variance) && run.scheme != SAME_TRIALS,
+    claims: |rows, claims| {
         for world in &worlds() {
             rows.beats(claims, ("CFwMD", "CFoMD"), (world, 1.0), &[Part::Position]);
             let ratio = rows.ratio(&format!("exact, {world}"), &format!("{SAME_TRIALS}, {world}"), 1.0);
@@ -178,29 +138,20 @@ impl Case for Fig6 {
             let id = format!("joint-is-exact-{}", world.replace(' ', "-"));
             claims.near(id, what, ratio, 1.0, 0.03);
         }
-    }
-}
-
-pub(super) struct Table2;
+    },
+    ..Simulated::BASE
+};
 
 const DEVIATIONS: &str = "acceleration variance 4, noise deviations 2 and 4";
 
-impl Case for Table2 {
-    type Setting = Linear;
-    type Main = Rates;
-    type Further = Nothing;
-
-    const ABOUT: About = About::of("cfwmd-table2", "Rates with vector measurements", "CFwMD paper, table II");
-    const CAPTION: &str = "The published rates fit an acceleration variance of 1, not the stated 4; next best is 4 with the printed noise [2 4] read \
-        as standard deviations.";
-    const PAIRS: &'static [(&'static str, &'static str)] = &[("CFwMD2", "CFwMD")];
-    const REFERENCES: &'static [&'static str] = &["rate"];
-
-    fn setting() -> Linear {
-        Linear::vector(4, &[1.0, 2.0, 3.0])
-    }
-
-    fn simulate(setting: &Linear, context: &Context<'_>) -> Result<Vec<Ensemble>, Error> {
+pub(super) static TABLE2: Simulated<Linear, Rates> = Simulated {
+    about: About::of("cfwmd-table2", "Rates with vector measurements", "CFwMD paper, table II"),
+    caption: "The published rates fit an acceleration variance of 1, not the stated 4; next best is 4 with the printed \
+              noise [2 4] read as standard deviations.",
+    pairs: &[("CFwMD2", "CFwMD")],
+    references: &["rate"],
+    setting: || Linear::vector(4, &[1.0, 2.0, 3.0]),
+    simulate: |setting, context| {
         let mut all = both(context, setting, &CENSORED, &CENSORED)?;
         let deviations = Linear {
             acceleration_variance: STATED,
@@ -209,12 +160,12 @@ impl Case for Table2 {
         };
         all.extend(deviations.at_budgets(context, DEVIATIONS, &CENSORED)?);
         Ok(all)
-    }
-
-    fn claims(rows: &Rows<Rates>, claims: &mut Claims) {
+    },
+    claims: |rows, claims| {
         as_printed(claims, &rows.main, &world(1.0));
         let stated = rows.at(&format!("CFwMD, {}", world(STATED)), 1.0).map(|r| r.rate.value);
         let what = "the stated acceleration variance gives a rate far above the printed .9296 at l = 1";
         claims.above("stated-variance-rejected", what, stated, 0.98);
-    }
-}
+    },
+    ..Simulated::BASE
+};

@@ -53,52 +53,62 @@ parameters! {
         /// Number of the random deployment; it is moved on to the next whose belief has two lobes.
         #[garde(range(max = 1_000_000))]
         deployment: u64 = 0,
-        /// Nodes that have sampled.
         #[garde(range(min = 1, max = 20))]
-        nodes: usize = 3,
-        /// Points of the grid along each axis.
+        nodes: usize = 3 => "Nodes that have sampled.",
         #[garde(range(min = 10, max = 400))]
-        grid: usize = 160,
+        grid: usize = 160 => "Points of the grid along each axis.",
     }
 }
 
 rows! {
     pub struct Fields {
-        /// Densities on a grid.
-        field: Vec<Point>,
-        /// How far each form is from the exact belief.
-        divergences: Vec<Divergence>,
+        field: Vec<Point> => "Densities on a grid.",
+        divergences: Vec<Divergence> => "How far each form is from the exact belief.",
     }
 
     struct Point {
-        /// Position.
-        x: f64 ["m"],
-        /// Position.
-        y: f64 ["m"],
-        /// Density of the figure's belief.
-        p: f64 ["m^-2"],
-        /// Density of the exact belief.
-        exact: f64 ["m^-2"],
+        x: f64 ["m"] => "Position.",
+        y: f64 ["m"] => "Position.",
+        p: f64 ["m^-2"] => "Density of the figure's belief.",
+        exact: f64 ["m^-2"] => "Density of the exact belief.",
     }
 
     struct Divergence {
-        /// The deployment shown.
-        deployment: u64,
-        /// What the belief is approximated by.
-        form: String,
-        /// Numbers in a message.
-        scalars: usize,
-        /// `KL(exact || form)`.
-        kl: f64 ["nats"],
-        /// Distance of the exact belief's two lobes in standard deviations.
-        lobes: f64,
+        deployment: u64 => "The deployment shown.",
+        form: String => "What the belief is approximated by.",
+        scalars: usize => "Numbers in a message.",
+        kl: f64 ["nats"] => "`KL(exact || form)`.",
+        lobes: f64 => "Distance of the exact belief's two lobes in standard deviations.",
     }
 }
 
-pub struct True;
-pub struct Approximated;
+/// Figure 5 or 6.
+pub struct Lobes {
+    about: About,
+    /// What the belief that is shown is projected to; none for the exact one.
+    form: Option<Form>,
+}
 
-fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fields, Error> {
+/// Figure 5.
+pub static FIG5: Lobes = Lobes {
+    about: About::of("diffusive-fig5", "The belief after three nodes", "Zhao and Nehorai 2007, Fig. 5").showing(
+        "Exact density of the source's position after three nodes of example B, rate unknown, in the first random \
+         deployment whose belief has two clear lobes.",
+    ),
+    form: None,
+};
+
+/// Figure 6.
+pub static FIG6: Lobes = Lobes {
+    about: About::of("diffusive-fig6", "The same belief in polynomial Gaussians", "Zhao and Nehorai 2007, Fig. 6")
+        .showing(
+            "The belief of diffusive-fig5 as two polynomial Gaussians of degree 5 in square-root (Galerkin) form, 51 \
+         numbers, beside the exact one: decades below the exact peak.",
+        ),
+    form: Some(LPG),
+};
+
+fn fields(p: &Parameters, context: &Context<'_>, form: Option<Form>) -> Result<Fields, Error> {
     let settings = Settings::default();
     let run = context.monte_carlo(context.stream("diffusive-chains"), 1);
     let mut shown = None;
@@ -119,14 +129,17 @@ fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fi
     let Some((deployment, posterior, apart)) = shown else {
         return Err(Error::Table("no search gave a belief".to_owned()));
     };
-    let belief = project(&posterior, LPG, &POSITION_ONLY)?;
+    let belief = form
+        .map(|form| project(&posterior, form, &POSITION_ONLY))
+        .transpose()?
+        .flatten();
     let (lower, upper) = posterior.cells.bounds();
     let at = |d: usize, i: usize| {
         let (low, high) = (lower[d] - 0.05 * (upper[d] - lower[d]), upper[d] + 0.05 * (upper[d] - lower[d]));
         low + (high - low) * (i as f64 + 0.5) / p.grid as f64
     };
-    let density = |x: &Vector2<f64>| match (&belief, approximated) {
-        (Some(Travelling::Position(belief)), true) => belief.log_density(x).exp(),
+    let density = |x: &Vector2<f64>| match &belief {
+        Some(Travelling::Position(belief)) => belief.log_density(x).exp(),
         _ => posterior.cells.log_density(x).exp(),
     };
     let places = (0..p.grid).flat_map(|j| (0..p.grid).map(move |i| (i, j)));
@@ -157,41 +170,22 @@ fn field(p: &Parameters, context: &Context<'_>, approximated: bool) -> Result<Fi
     Ok(Fields { field, divergences })
 }
 
-fn field_claims(rows: &Fields, claims: &mut Claims) {
-    let here = claims.at_defaults();
-    let kl = |form: &str| rows.divergences.iter().find(|d| d.form == form).map(|d| d.kl);
-    let apart = rows.divergences.first().map(|d| d.lobes);
-    here.above("two-lobes", "the belief after three nodes has two lobes", apart, 4.0);
-    let what = "polynomial Gaussians are within 0.3 nats of it";
-    here.below("lpg-is-close", what, kl("lpg-2x5"), 0.3);
-    let ratio = over(kl("gaussian"), kl("lpg-2x5"));
-    here.above("gaussian-is-not", "one Gaussian is at least five times as far", ratio, 5.0);
-    let what = "two Gaussians show both lobes, too: the paper's claim that a Gaussian sum cannot is overstated (errata diffusive-9)";
-    let ratio = over(kl("gaussian"), kl("gmm-2"));
-    here.above("gaussian-sums-can", what, ratio, 2.0);
-}
-
 /// Decades of the density that are shown.
 const DECADES: f64 = 4.0;
 
 fn field_panel(title: &str, rows: &Fields, of: fn(&Point) -> f64) -> Panel {
-    let mut x: Vec<f64> = rows.field.iter().map(|p| p.x).collect();
-    x.dedup();
-    let side = rows
+    let lowest = rows.field.first().map(|f| f.y);
+    let x: Vec<f64> = rows
         .field
         .iter()
-        .take_while(|p| Some(p.y) == rows.field.first().map(|f| f.y))
-        .count()
-        .max(1);
-    let x: Vec<f64> = x.into_iter().take(side).collect();
+        .take_while(|p| Some(p.y) == lowest)
+        .map(|p| p.x)
+        .collect();
+    let side = x.len().max(1);
     let y: Vec<f64> = rows.field.iter().step_by(side).map(|p| p.y).collect();
     // Lobes are thin and of different heights: decades below the exact belief's peak show them all.
-    let peak = rows
-        .field
-        .iter()
-        .map(|p| p.exact)
-        .fold(f64::MIN_POSITIVE, f64::max)
-        .log10();
+    let exact = rows.field.iter().map(|p| p.exact);
+    let peak = exact.fold(f64::MIN_POSITIVE, f64::max).log10();
     let decades = |p: &Point| (of(p).log10() - peak).clamp(-DECADES, 0.0);
     let values = rows
         .field
@@ -205,44 +199,35 @@ fn field_panel(title: &str, rows: &Fields, of: fn(&Point) -> f64) -> Panel {
         .with(Layer::points("source", vec![B.source.into()]).styled(3, Marker::OpenCircle))
 }
 
-impl Figure for True {
-    figure!(Parameters => Fields, "diffusive-fig5", "The belief after three nodes", "Zhao and Nehorai 2007, Fig. 5",
-        "Exact density of the source's position after three nodes of example B, rate unknown, in the first random \
-         deployment whose belief has two clear lobes.");
+impl Figure for Lobes {
+    type Parameters = Parameters;
+    type Tables = Fields;
+
+    fn about(&self) -> About {
+        self.about
+    }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Fields, Error> {
-        field(p, context, false)
+        fields(p, context, self.form)
     }
 
     fn claims(&self, _: &Parameters, rows: &Fields, claims: &mut Claims) {
-        field_claims(rows, claims);
+        let here = claims.at_defaults();
+        let kl = |form: &str| rows.divergences.iter().find(|d| d.form == form).map(|d| d.kl);
+        let apart = rows.divergences.first().map(|d| d.lobes);
+        here.above("two-lobes", "the belief after three nodes has two lobes", apart, 4.0);
+        here.below("lpg-is-close", "polynomial Gaussians are within 0.3 nats of it", kl("lpg-2x5"), 0.3);
+        let ratio = over(kl("gaussian"), kl("lpg-2x5"));
+        here.above("gaussian-is-not", "one Gaussian is at least five times as far", ratio, 5.0);
+        let what = "two Gaussians show both lobes, too: the paper's claim that a Gaussian sum cannot is overstated (errata diffusive-9)";
+        let ratio = over(kl("gaussian"), kl("gmm-2"));
+        here.above("gaussian-sums-can", what, ratio, 2.0);
     }
 
     fn plot(&self, _: &Parameters, rows: &Fields) -> Plot {
-        Plot::of(field_panel("Exact belief", rows, |p| p.exact))
-    }
-}
-
-impl Figure for Approximated {
-    figure!(Parameters => Fields, "diffusive-fig6", "The same belief in polynomial Gaussians", "Zhao and Nehorai 2007, Fig. 6",
-        "The belief of diffusive-fig5 as two polynomial Gaussians of degree 5 in square-root (Galerkin) form, 51 \
-         numbers, beside the exact one: decades below the exact peak.");
-
-    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Fields, Error> {
-        field(p, context, true)
-    }
-
-    fn claims(&self, _: &Parameters, rows: &Fields, claims: &mut Claims) {
-        field_claims(rows, claims);
-    }
-
-    fn plot(&self, _: &Parameters, rows: &Fields) -> Plot {
-        Plot::grid(
-            2,
-            vec![
-                field_panel("Exact belief", rows, |p| p.exact),
-                field_panel("Polynomial Gaussians", rows, |p| p.p),
-            ],
-        )
+        let shown = self.form.map(|_| field_panel("Polynomial Gaussians", rows, |p| p.p));
+        let exact = field_panel("Exact belief", rows, |p| p.exact);
+        let panels: Vec<Panel> = [exact].into_iter().chain(shown).collect();
+        Plot::grid(panels.len(), panels)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::summary::{Curve, Rows, Summary};
 use crate::Claims;
-use crate::claim::minus;
+use crate::claim::{Keyed, minus};
 
 fn find<'a>(rows: &'a Rows, key: &str) -> Option<&'a Summary> {
     rows.summary.iter().find(|s| s.key() == key)
@@ -19,9 +19,9 @@ fn at<'a>(rows: &'a Rows, scheme: &str, range: f64, step: usize) -> Option<&'a C
 
 fn references(rows: &Rows, claims: &mut Claims) {
     let summary = || rows.summary.iter();
-    claims.references("reach", "share that reaches the threshold", summary(), |r| (r.key(), r.reach));
-    claims.references("nodes_median", "median nodes to the threshold", summary(), |r| (r.key(), r.nodes_median));
-    claims.references("final_err_median", "median error at the end", summary(), |r| (r.key(), r.final_err_median));
+    claims.keyed("reach", "share that reaches the threshold", summary(), |r| r.reach);
+    claims.keyed("nodes_median", "median nodes to the threshold", summary(), |r| r.nodes_median);
+    claims.keyed("final_err_median", "median error at the end", summary(), |r| r.final_err_median);
 }
 
 fn calibrated(rows: &Rows, claims: &mut Claims, key: &str) {
@@ -91,8 +91,7 @@ pub(super) fn fig7(rows: &Rows, claims: &mut Claims) {
     let what = "which they have a right to: their median squared error is 1.39 covariances";
     let nees = find(rows, "lpg-2x5 known rate 15").and_then(|s| s.nees_median);
     full.near("det5/calibrated", what, nees, 1.386, 0.4);
-    let what = "log10 det after five nodes, one Gaussian";
-    paper.near("det5/gaussian", what, value("gaussian known rate"), 3.6, 1.0);
+    paper.near("det5/gaussian", "log10 det after five nodes, one Gaussian", value("gaussian known rate"), 3.6, 1.0);
     calibrated(rows, claims, "exact 15");
 }
 

@@ -205,10 +205,8 @@ impl Figure for Chains {
             let (name, range) = (s.name, s.range);
             rows.curves.iter().filter(move |c| c.scheme == name && c.range == range)
         };
-        // One form of the belief has one colour, whether the rate is known or not; a second range takes the next free ones.
-        let form = |s: &Scheme| (s.name.trim_end_matches(" known rate"), s.range);
-        let forms = distinct(&schemes, form);
-        let colour = |s: &Scheme| forms.iter().position(|f| *f == form(s)).unwrap_or_default();
+        // A second range has the same colours, and other dashes.
+        let colour = |s: &Scheme| s.place() + if s.range == schemes[0].range { 0 } else { 8 };
         let threshold = schemes[0].example.threshold.log10();
         let last = rows.curves.iter().map(|c| c.step).max().unwrap_or(1) as f64;
         let limit = || Layer::dashed("threshold", vec![(1.0, threshold), (last, threshold)]).coloured(7);
@@ -224,13 +222,11 @@ impl Figure for Chains {
         if schemes.len() > 7 {
             // Too many lines for one panel.
             let (unknown, known) = ("Rate unknown", "Rate known");
-            return Plot::grid(
-                2,
-                vec![
-                    determinants(unknown, &|s| !s.known_rate),
-                    determinants(known, &|s| s.known_rate),
-                ],
-            );
+            let panels = [
+                determinants(unknown, &|s| !s.known_rate),
+                determinants(known, &|s| s.known_rate),
+            ];
+            return Plot::grid(2, panels.into());
         }
         let mut errors = Panel::semilog("Error", "nodes", "distance to the source (m)").without_legend();
         let band = of(&schemes[0]).map(|c| (c.step as f64, c.err_q10, c.err_q90)).collect();

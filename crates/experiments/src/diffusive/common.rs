@@ -31,21 +31,16 @@ parameters! {
     /// Settings of every search.
     #[derive(Debug, Clone)]
     pub struct Settings {
-        /// Random deployments, each searched by every scheme.
         #[garde(range(min = 1, max = 100_000))]
-        pub(super) trials: u64 = 200 => quick 8,
-        /// Deployed nodes.
+        pub(super) trials: u64 = 200 => quick 8 => "Random deployments, each searched by every scheme.",
         #[garde(range(min = 2, max = 100_000))]
-        pub(super) nodes: usize = 300,
-        /// Standard deviation of the prior about the first node, m.
+        pub(super) nodes: usize = 300 => "Deployed nodes.",
         #[garde(range(min = 1.0, max = 1e4))]
-        pub(super) prior_sd: f64 = 50.0,
-        /// Lower end of the rate's prior, kg/s.
+        pub(super) prior_sd: f64 = 50.0 => "Standard deviation of the prior about the first node, m.",
         #[garde(range(min = 0.0, max = 0.99))]
-        pub(super) rate_low: f64 = 0.5,
-        /// Upper end of the rate's prior, kg/s.
+        pub(super) rate_low: f64 = 0.5 => "Lower end of the rate's prior, kg/s.",
         #[garde(range(min = 1.01, max = 1e3))]
-        pub(super) rate_high: f64 = 1.5,
+        pub(super) rate_high: f64 = 1.5 => "Upper end of the rate's prior, kg/s.",
     }
 }
 
@@ -158,6 +153,11 @@ impl Scheme {
         }
     }
 
+    /// Its place in the palette: a form of the belief, or a rule, has one colour in every figure, whether the rate is known or not.
+    pub fn place(&self) -> usize {
+        place(self.name)
+    }
+
     pub fn at(self, range: f64) -> Self {
         Self { range, ..self }
     }
@@ -230,6 +230,20 @@ impl Scheme {
     }
 }
 
+/// The place in the palette of a form of the belief, or of a rule; 7 is the threshold's.
+pub(super) fn place(name: &str) -> usize {
+    match name.trim_end_matches(" known rate") {
+        "exact" | "information" => 0,
+        "gmm-4" | "covariance" => 1,
+        "gaussian" | "mahalanobis" => 2,
+        "gaussian-9" | "pairwise" => 3,
+        "lpg-2x5" => 4,
+        "lpg-1x5" => 5,
+        "particles-25" => 6,
+        _ => 8,
+    }
+}
+
 /// What is kept of one search.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Track {
@@ -287,16 +301,13 @@ pub(super) fn tracks(
     };
     let own = Kept::default();
     let kept = context.kept.unwrap_or(&own);
-    let missing: Vec<&Scheme> = schemes
-        .iter()
-        .filter(|s| kept.get::<Vec<Track>>(&name(s)).is_none())
-        .collect();
+    let missing: Vec<&Scheme> = select(schemes, |s| kept.get::<Vec<Track>>(&name(s)).is_none()).collect();
     let every = |trial: Trial| -> Result<Vec<Track>, Error> {
         let one = |scheme: &&Scheme| Ok(Track::of(&scheme.run(settings, trial)?, &scheme.example.source()));
         missing.iter().map(one).collect()
     };
     if !missing.is_empty() {
-        let new = trials(context, experiment, settings.trials, every)?;
+        let new = context.trials(experiment, settings.trials, every)?;
         for (i, scheme) in missing.iter().enumerate() {
             kept.put(name(scheme), new.iter().map(|tracks| tracks[i].clone()).collect::<Vec<_>>());
         }
@@ -306,16 +317,6 @@ pub(super) fn tracks(
     Ok((0..count)
         .map(|trial| all.iter().map(|tracks| tracks[trial].clone()).collect())
         .collect())
-}
-
-/// Runs a closure on every trial of an experiment.
-pub(super) fn trials<T: Send>(
-    context: &Context<'_>,
-    experiment: &str,
-    count: u64,
-    trial: impl Fn(Trial) -> Result<T, Error> + Sync,
-) -> Result<Vec<T>, Error> {
-    Ok(context.monte_carlo(context.stream(experiment), count).run(trial)?)
 }
 
 /// The quantile of unsorted values; none of none.

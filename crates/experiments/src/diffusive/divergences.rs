@@ -1,7 +1,7 @@
 //! The divergence of what travels from the exact belief.
 
 use super::beliefs::{POSITION_ONLY, divergence, exact_search};
-use super::common::{ALARM, LPG, Settings, median, quantile, trials};
+use super::common::{ALARM, LPG, Settings, median, quantile};
 use super::two_phase::TwoPhase;
 use crate::prelude::*;
 use fewbits_core::{Gaussian, Likelihood};
@@ -23,35 +23,25 @@ parameters! {
     /// Settings of the divergences.
     #[derive(Debug, Clone)]
     pub struct KlParameters {
-        /// Random deployments.
         #[garde(range(min = 1, max = 100_000))]
-        trials: u64 = 200 => quick 8,
-        /// Nodes that have sampled.
+        trials: u64 = 200 => quick 8 => "Random deployments.",
         #[garde(length(min = 1), inner(range(min = 1, max = 20)))]
-        nodes: Vec<usize> = vec![1, 2, 3, 4],
+        nodes: Vec<usize> = vec![1, 2, 3, 4] => "Nodes that have sampled.",
     }
 }
 
 rows! {
-    pub struct KlRow {
-        /// Nodes that have sampled.
-        nodes: usize,
-        /// What the belief is approximated by.
-        rep: &'static str,
-        /// Numbers in a message.
-        scalars: usize,
-        /// Median `KL(exact || rep)`.
-        kl_median: Measured ["nats"],
-        /// Its upper decile.
-        kl_q90: f64 ["nats"],
-        /// Its mean.
-        kl_mean: f64 ["nats"],
-        /// Its maximum.
-        kl_max: f64 ["nats"],
+    pub struct KlRow by "{nodes} {rep}" {
+        nodes: usize => "Nodes that have sampled.",
+        rep: &'static str => "What the belief is approximated by.",
+        scalars: usize => "Numbers in a message.",
+        kl_median: Measured ["nats"] => "Median `KL(exact || rep)`.",
+        kl_q90: f64 ["nats"] => "Its upper decile.",
+        kl_mean: f64 ["nats"] => "Its mean.",
+        kl_max: f64 ["nats"] => "Its maximum.",
         /// Share of the terms for which the printed recipe has no answer: the curvature at the peak is not definite.
         no_answer: Option<f64>,
-        /// Deployments.
-        trials: usize,
+        trials: usize => "Deployments.",
     }
 }
 
@@ -95,7 +85,7 @@ impl Figure for Divergences {
 
     fn run(&self, p: &KlParameters, context: &Context<'_>) -> Result<Vec<KlRow>, Error> {
         let settings = Settings::default();
-        let all = trials(context, "diffusive-chains", p.trials, |trial| {
+        let all = context.trials("diffusive-chains", p.trials, |trial| {
             p.nodes
                 .iter()
                 .map(|nodes| {
@@ -142,8 +132,7 @@ impl Figure for Divergences {
         let full = claims.at_full_trials();
         let find =
             |nodes: usize, rep: &str| first(rows, |r| r.nodes == nodes && r.rep == rep).map(|r| r.kl_median.value);
-        let key = |r: &KlRow| format!("{} {}", r.nodes, r.rep);
-        full.references("kl_median", "median divergence", rows, |r| (key(r), r.kl_median));
+        full.keyed("kl_median", "median divergence", rows, |r| r.kl_median);
         let what = "no mean divergence is negative, but for what sums over cells leave (0.01 nats)";
         claims.all("positive", what, rows, |r| r.kl_mean >= -0.01);
         let what = "after the first ring eight Gaussians are closer than two polynomial Gaussians";

@@ -1,6 +1,6 @@
 //! The area above a threshold, with credible bands.
 
-use super::common::{ALARM, B, DIFFUSIVITY, RATE, Scheme, Settings, fraction, median, trials};
+use super::common::{ALARM, B, DIFFUSIVITY, RATE, Scheme, Settings, fraction, median};
 use crate::prelude::*;
 use fewbits_diffusive::{Envelope as Area, SourceLikelihood};
 use fewbits_models::diffusion::contour_radius;
@@ -11,66 +11,45 @@ parameters! {
     /// Settings of the envelope.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        /// Random deployments.
         #[garde(range(min = 1, max = 100_000))]
-        trials: u64 = 200 => quick 8,
-        /// Nodes that have sampled.
+        trials: u64 = 200 => quick 8 => "Random deployments.",
         #[garde(range(min = 1, max = 20))]
-        nodes: usize = 3,
-        /// Time of the envelope after the release began, s.
+        nodes: usize = 3 => "Nodes that have sampled.",
         #[garde(range(min = 1.0, max = 1e5))]
-        time: f64 = 100.0,
-        /// Threshold of the concentration, kg/m^3.
+        time: f64 = 100.0 => "Time of the envelope after the release began, s.",
         #[garde(range(min = 1e-8, max = 1.0))]
-        threshold: f64 = 1e-4,
+        threshold: f64 = 1e-4 => "Threshold of the concentration, kg/m^3.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// The band of the first deployment, direction by direction, seen from the alarm node.
-        band: Vec<Band>,
-        /// How often the band holds the truth.
-        coverage: Vec<Coverage>,
-        /// Probability that the threshold is exceeded, on a grid, first deployment.
-        exceedance: Vec<Exceedance>,
+        band: Vec<Band> => "The band of the first deployment, direction by direction, seen from the alarm node.",
+        coverage: Vec<Coverage> => "How often the band holds the truth.",
+        exceedance: Vec<Exceedance> => "Probability that the threshold is exceeded, on a grid, first deployment.",
     }
 
     struct Band {
-        /// Time.
-        t: f64 ["s"],
-        /// Threshold.
-        c_star: f64 ["kg/m^3"],
-        /// Direction from the alarm node.
-        direction_deg: f64 ["deg"],
-        /// How far the area reaches: 5 per cent quantile.
-        r05: f64 ["m"],
-        /// Median.
-        r50: f64 ["m"],
-        /// 95 per cent quantile.
-        r95: f64 ["m"],
-        /// The truth.
-        truth: f64 ["m"],
+        t: f64 ["s"] => "Time.",
+        c_star: f64 ["kg/m^3"] => "Threshold.",
+        direction_deg: f64 ["deg"] => "Direction from the alarm node.",
+        r05: f64 ["m"] => "How far the area reaches: 5 per cent quantile.",
+        r50: f64 ["m"] => "Median.",
+        r95: f64 ["m"] => "95 per cent quantile.",
+        truth: f64 ["m"] => "The truth.",
     }
 
-    struct Coverage {
-        /// Which edge.
-        edge: &'static str,
-        /// Share of the deployments whose 90 per cent band holds the true edge.
-        coverage: Measured,
-        /// Median width of the band.
-        width_median: Measured ["m"],
-        /// True radius about the source.
-        radius: f64 ["m"],
+    struct Coverage by "{edge}" {
+        edge: &'static str => "Which edge.",
+        coverage: Measured => "Share of the deployments whose 90 per cent band holds the true edge.",
+        width_median: Measured ["m"] => "Median width of the band.",
+        radius: f64 ["m"] => "True radius about the source.",
     }
 
     struct Exceedance {
-        /// Place.
-        x: f64 ["m"],
-        /// Place.
-        y: f64 ["m"],
-        /// Probability that the concentration exceeds the threshold.
-        p_exceed: f64,
+        x: f64 ["m"] => "Place.",
+        y: f64 ["m"] => "Place.",
+        p_exceed: f64 => "Probability that the concentration exceeds the threshold.",
     }
 }
 
@@ -113,7 +92,7 @@ impl Figure for Envelope {
         let radius = contour_radius(RATE, p.threshold, p.time, DIFFUSIVITY)?;
         let source = B.source();
         let edges = [("east", 0.0), ("north", 90.0_f64)];
-        let all = trials(context, "diffusive-chains", p.trials, |trial| {
+        let all = context.trials("diffusive-chains", p.trials, |trial| {
             let Some(area) = p.area(trial)? else { return Ok(None) };
             let quantile = |angle: f64, level| p.reach(&area, &Vector2::zeros(), angle.to_radians(), level);
             let bands = edges.map(|(_, angle)| Ok((quantile(angle, 0.05)?, quantile(angle, 0.95)?)));
@@ -172,13 +151,9 @@ impl Figure for Envelope {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        claims.references("coverage", "coverage of the 90 per cent band", rows.coverage.iter(), |c| {
-            (c.edge.to_owned(), c.coverage)
-        });
-        claims.references("radius", "true radius", rows.coverage.iter(), |c| (c.edge.to_owned(), c.radius));
-        claims.references("width", "median width of the band", rows.coverage.iter(), |c| {
-            (c.edge.to_owned(), c.width_median)
-        });
+        claims.keyed("coverage", "coverage of the 90 per cent band", rows.coverage.iter(), |c| c.coverage);
+        claims.keyed("radius", "true radius", rows.coverage.iter(), |c| c.radius);
+        claims.keyed("width", "median width of the band", rows.coverage.iter(), |c| c.width_median);
         claims.all("ordered", "quantiles are ordered", &rows.band, |b| b.r05 <= b.r50 && b.r50 <= b.r95);
         claims.all("probabilities", "exceedances are probabilities", &rows.exceedance, |e| {
             (0.0..=1.0 + 1e-9).contains(&e.p_exceed)

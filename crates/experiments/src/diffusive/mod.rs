@@ -1,6 +1,7 @@
 //! A diffusive source, found by a belief that walks the network: figures and tables.
 
 mod beliefs;
+mod building;
 mod bytes;
 mod chain_claims;
 mod chains;
@@ -25,8 +26,8 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &route::Route,
         &chains::FIG3,
         &chains::FIG4,
-        &beliefs::True,
-        &beliefs::Approximated,
+        &beliefs::FIG5,
+        &beliefs::FIG6,
         &chains::FIG7,
         &chains::FIG8,
         &chains::FIG9,

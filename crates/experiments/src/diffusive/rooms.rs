@@ -1,26 +1,11 @@
 //! A leak in a building: sensors of few bits, the true geometry, and free space.
 
-use super::common::{fraction, median, trials};
-use super::plan_belief::{Instrument, PlanBelief, Report, THRESHOLDS};
+use super::building::{Building, CELL, Case, Placement, case};
+use super::common::{fraction, median};
+use super::plan_belief::Report;
 use crate::prelude::*;
-use fewbits_diffusion::{Domain, Flow, Plan, PotentialFlow, Scheme, SensorField, Transport};
-use fewbits_models::diffusion::{Air, Ground};
-use nalgebra::Vector3;
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
-/// Three rooms and a corridor, 15 m by 10 m; a window at the right of the first line of rooms, a door to the left of the corridor.
-const PLAN: &str = include_str!("rooms.plan");
-/// Width of a square of the plan, and of a cell, m.
-const CELL: f64 = 0.25;
-/// Diffusivity, m^2/s.
-const DIFFUSIVITY: f64 = 0.05;
-/// Wind from door to window, m^2/s.
-const WIND: f64 = 0.15;
-/// Rates that the source may have, kg/s per metre of height.
-const RATES: [f64; 2] = [0.5, 1.5];
-/// Rates that fit free space: its concentrations are of another size.
-const FREE_RATES: [f64; 2] = [0.3, 30.0];
 /// Misfit above which a model is said to be wrong: one in a hundred, if it is right.
 const WRONG: f64 = 2.6;
 /// Mass of the credible regions.
@@ -30,93 +15,51 @@ parameters! {
     /// Settings of all placements.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        /// Random placements of source and sensors.
         #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 100 => quick 6,
-        /// Sensors.
+        trials: u64 = 100 => quick 6 => "Random placements of source and sensors.",
         #[garde(range(min = 4, max = 200))]
-        sensors: usize = 40,
-        /// Placements in which sensors are visited one after the other.
+        sensors: usize = 40 => "Sensors.",
         #[garde(range(min = 2, max = 10_000))]
-        visit_trials: u64 = 40 => quick 3,
-        /// Sensors of such a placement.
+        visit_trials: u64 = 40 => quick 3 => "Placements in which sensors are visited one after the other.",
         #[garde(range(min = 4, max = 1000))]
-        visit_sensors: usize = 160 => quick 20,
+        visit_sensors: usize = 160 => quick 20 => "Sensors of such a placement.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// How often the source is found, by air and report.
-        found: Vec<Found>,
+        found: Vec<Found> => "How often the source is found, by air and report.",
         /// Errors over the sensors visited, in random order: wind, three bits, 5 per cent noise, five readings each.
         visits: Vec<Visit>,
-        /// Beliefs of one placement over the plan, as in the visits.
-        map: Vec<Square>,
+        map: Vec<Square> => "Beliefs of one placement over the plan, as in the visits.",
     }
 
     struct Found {
-        /// Air, noise, report and number of readings.
-        case: &'static str,
+        case: &'static str => "Air, noise, report and number of readings.",
         /// Share of the placements whose most probable cell is within two cells of the source.
         within_two_cells: Measured,
-        /// Share of the 90 per cent credible regions that hold the source.
-        coverage: Measured,
-        /// Share of the placements in which the true geometry is said to be wrong.
-        false_alarms: Measured,
-        /// As the first, if free space is assumed.
-        free_within_two_cells: Measured,
+        coverage: Measured => "Share of the 90 per cent credible regions that hold the source.",
+        false_alarms: Measured => "Share of the placements in which the true geometry is said to be wrong.",
+        free_within_two_cells: Measured => "As the first, if free space is assumed.",
         /// Of the placements in which free space misses, the share in which it is said to be wrong.
         free_misses_flagged: Measured,
-        /// Median distance of the most probable cell from the source.
-        error_median: Measured ["m"],
+        error_median: Measured ["m"] => "Median distance of the most probable cell from the source.",
     }
 
     struct Visit {
-        /// Sensors visited.
-        sensors: usize,
-        /// Median distance of the most probable cell from the source.
-        error: Measured ["m"],
-        /// The same if free space is assumed.
-        error_free: Measured ["m"],
+        sensors: usize => "Sensors visited.",
+        error: Measured ["m"] => "Median distance of the most probable cell from the source.",
+        error_free: Measured ["m"] => "The same if free space is assumed.",
     }
 
     struct Square {
-        /// Centre of the cell.
-        x: f64 ["m"],
-        /// Centre of the cell.
-        y: f64 ["m"],
-        /// Whether it is wall.
-        wall: bool,
-        /// Probability under the true geometry, as a share of the largest.
-        belief: f64,
-        /// Probability under free space, as a share of the largest.
-        belief_free: f64,
-        /// Whether a sensor stands there.
-        sensor: bool,
-        /// Whether the source is there.
-        source: bool,
-    }
-}
-
-/// One way to report.
-#[derive(Debug, Clone, Copy)]
-struct Case {
-    name: &'static str,
-    windy: bool,
-    /// Standard deviation of the noise as a share of the typical concentration.
-    noise: f64,
-    report: Report,
-    readings: usize,
-}
-
-const fn case(name: &'static str, windy: bool, noise: f64, report: Report, readings: usize) -> Case {
-    Case {
-        name,
-        windy,
-        noise,
-        report,
-        readings,
+        x: f64 ["m"] => "Centre of the cell.",
+        y: f64 ["m"] => "Centre of the cell.",
+        wall: bool => "Whether it is wall.",
+        belief: f64 => "Probability under the true geometry, as a share of the largest.",
+        belief_free: f64 => "Probability under free space, as a share of the largest.",
+        sensor: bool => "Whether a sensor stands there.",
+        source: bool => "Whether the source is there.",
     }
 }
 
@@ -134,125 +77,6 @@ const CASES: [Case; 8] = [
 const VISITED: Case = CASES[7];
 /// Where the source of the map is: in the large room, away from its door.
 const SHOWN: [f64; 3] = [11.1, 8.1, 0.0];
-
-/// Air in the building, and the free space that an estimator without a plan assumes: the same mean wind, no walls.
-struct Building {
-    transport: Transport,
-    free: Air,
-}
-
-impl Building {
-    fn new(windy: bool) -> Result<Self, Error> {
-        let domain = Plan::parse(PLAN)
-            .and_then(|plan| plan.domain(CELL, 1, 0.0))
-            .map_err(Error::failed)?;
-        let flow = match windy {
-            true => PotentialFlow::new(&domain, WIND).map_err(Error::failed)?.flow,
-            false => Flow::still(&domain),
-        };
-        let velocities = flow.velocities(&domain);
-        let mean = velocities
-            .iter()
-            .fold(Vector3::zeros(), |sum, v| sum + Vector3::from(*v))
-            / velocities.len() as f64;
-        let transport = Transport::new(domain, DIFFUSIVITY, &flow, 0.0, Scheme::default()).map_err(Error::failed)?;
-        let free = Air::new(DIFFUSIVITY, mean, Ground::None)
-            .and_then(|air| air.with_closest(0.5 * CELL))
-            .map_err(Error::failed)?;
-        Ok(Self { transport, free })
-    }
-
-    fn domain(&self) -> &Domain {
-        self.transport.domain()
-    }
-
-    fn centre(&self, number: usize) -> [f64; 3] {
-        self.domain().grid().centre(self.domain().free()[number])
-    }
-}
-
-/// Sensors, a source, and the readings.
-struct Placement {
-    sensors: Vec<usize>,
-    source: usize,
-    /// Responses of each sensor to a source in each cell: of the building, and of free space.
-    responses: [Vec<Vec<f64>>; 2],
-    readings: Vec<Vec<f64>>,
-    instrument: Instrument,
-}
-
-impl Placement {
-    fn draw(
-        building: &Building,
-        case: &Case,
-        count: usize,
-        source: Option<usize>,
-        stream: Stream,
-    ) -> Result<Self, Error> {
-        let cells = building.domain().free().len();
-        let mut rng = stream.named("places").rng();
-        let source = source.unwrap_or_else(|| rng.random_range(0..cells));
-        let mut sensors = Vec::with_capacity(count);
-        while sensors.len() < count {
-            let cell = rng.random_range(0..cells);
-            if !sensors.contains(&cell) {
-                sensors.push(cell);
-            }
-        }
-        let points: Vec<[f64; 3]> = sensors.iter().map(|cell| building.centre(*cell)).collect();
-        let field = SensorField::steady(&building.transport, &points).map_err(Error::failed)?;
-        let indoors: Vec<Vec<f64>> = (0..count)
-            .filter_map(|sensor| field.response(sensor, 0).map(<[f64]>::to_vec))
-            .collect();
-        let free = |point: &[f64; 3]| -> Vec<f64> {
-            let at = Vector3::from(*point);
-            (0..cells)
-                .map(|cell| {
-                    building
-                        .free
-                        .concentration(&at, &Vector3::from(building.centre(cell)), 1e9)
-                })
-                .collect()
-        };
-        let free = points.iter().map(free).collect();
-        // The typical concentration and the thresholds: quantiles over all sensors and places of the source at rate one.
-        let mut all: Vec<f64> = indoors.concat();
-        all.sort_by(f64::total_cmp);
-        let quantile = |share: f64| all[((all.len() - 1) as f64 * share) as usize];
-        let thresholds = std::array::from_fn(|k| quantile((k + 1) as f64 / (THRESHOLDS + 1) as f64));
-        let instrument = Instrument::new(case.noise * quantile(0.5), thresholds, RATES[1] * quantile(1.0));
-        let mut noise = stream.named("noise").rng();
-        let rate = rng.random_range(RATES[0]..RATES[1]);
-        let mut read = |clean: f64| -> Vec<f64> {
-            (0..case.readings)
-                .map(|_| clean + instrument.noise * noise.sample::<f64, _>(StandardNormal))
-                .collect()
-        };
-        let readings = indoors.iter().map(|row| read(rate * row[source])).collect();
-        Ok(Self {
-            sensors,
-            source,
-            responses: [indoors, free],
-            readings,
-            instrument,
-        })
-    }
-
-    /// The belief after some sensors, in the building (0) or in free space (1).
-    fn belief(&self, model: usize, case: &Case, visited: &[usize]) -> Result<PlanBelief, Error> {
-        let rows: Vec<(&[f64], &[f64])> = visited
-            .iter()
-            .map(|i| (self.responses[model][*i].as_slice(), self.readings[*i].as_slice()))
-            .collect();
-        let rates = [RATES, FREE_RATES][model];
-        Ok(PlanBelief::new(&self.instrument, case.report, rates, &rows, self.responses[model][0].len())?)
-    }
-
-    fn error(&self, building: &Building, belief: &PlanBelief) -> f64 {
-        let [a, b] = [self.source, belief.mode].map(|cell| building.centre(cell));
-        (a[0] - b[0]).hypot(a[1] - b[1])
-    }
-}
 
 /// What is kept of one placement.
 struct Trialled {
@@ -288,12 +112,12 @@ impl Figure for Rooms {
         let mut found = Vec::new();
         for case in &CASES {
             let building = &buildings[usize::from(case.windy)];
-            let all = trials(context, "diffusive-rooms", p.trials, |trial| self.one(building, case, p, trial.stream))?;
+            let all = context.trials("diffusive-rooms", p.trials, |trial| self.one(building, case, p, trial.stream))?;
             found.push(summary(case.name, &all));
         }
         let building = &buildings[usize::from(VISITED.windy)];
         let stops: Vec<usize> = STOPS.into_iter().filter(|stop| *stop <= p.visit_sensors).collect();
-        let tracks = trials(context, "diffusive-rooms-visits", p.visit_trials, |trial| {
+        let tracks = context.trials("diffusive-rooms-visits", p.visit_trials, |trial| {
             let placement = Placement::draw(building, &VISITED, p.visit_sensors, None, trial.stream)?;
             let (visited, mut errors) = ((0..p.visit_sensors).collect::<Vec<_>>(), Vec::new());
             for stop in &stops {
@@ -323,12 +147,8 @@ impl Figure for Rooms {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let full = claims.at_defaults().at_full_trials();
         for row in &rows.found {
-            let key = row
-                .case
-                .replace(['%', ','], "")
-                .split_whitespace()
-                .collect::<Vec<_>>()
-                .join("-");
+            let words = row.case.replace(['%', ','], "");
+            let key = words.split_whitespace().collect::<Vec<_>>().join("-");
             let what = format!("the stated credible mass is true: {}", row.case);
             full.at_least(format!("calibrated/low/{key}"), what.clone(), row.coverage.value, 0.84);
             full.at_most(format!("calibrated/high/{key}"), what, row.coverage.value, 0.95);
@@ -337,12 +157,7 @@ impl Figure for Rooms {
             let what = format!("the true geometry is hardly ever said to be wrong: {}", row.case);
             full.at_most(format!("false-alarms/{key}"), what, row.false_alarms.value, 0.06);
         }
-        let share = |case: &str| {
-            rows.found
-                .iter()
-                .find(|row| row.case == case)
-                .map(|row| row.within_two_cells.value)
-        };
+        let share = |case: &str| first(&rows.found, |row| row.case == case).map(|row| row.within_two_cells.value);
         for case in ["still, 1 %, values", "wind, 1 %, values"] {
             let what = format!("nine in ten within two cells: {case}");
             full.at_least(format!("found/{}", &case[..5]), what, share(case), 0.9);
@@ -354,13 +169,11 @@ impl Figure for Rooms {
             "still, 1 %, values",
         ];
         full.increasing("few-bits-want-more", "bits and readings find more sources", order.map(share));
-        let (first, last) = (rows.visits.first(), rows.visits.last());
+        let (start, last) = (rows.visits.first(), rows.visits.last());
         // Medians of few placements: compared with one another on the same placements, not with a number.
         let what = "however many sensors are visited, the true geometry is nearer than free space";
         full.all("visits", what, &rows.visits, |v| v.error.value < v.error_free.value);
-        let fall = last
-            .zip(first)
-            .map(|(last, first)| last.error.value / first.error.value);
+        let fall = over(last.map(|v| v.error), start.map(|v| v.error));
         full.at_most("visits-fall", "all sensors leave at most half of the distance that two leave", fall, 0.5);
         full.above("visits-free", "free space stays metres away", last.map(|v| v.error_free.value), 1.0);
     }
@@ -394,26 +207,16 @@ impl Figure for Rooms {
                 .with(Layer::measured("true geometry", &rows.visits, |v| (v.sensors as f64, v.error)))
                 .with(Layer::measured("free space", &rows.visits, |v| (v.sensors as f64, v.error_free)));
         let names = Axis::categories("case", rows.found.iter().map(|row| row.case));
-        let of = |f: fn(&Found) -> Measured| {
-            rows.found
-                .iter()
-                .enumerate()
-                .map(move |(i, row)| (i as f64, f(row).value))
-                .collect()
-        };
+        let of = |f: fn(&Found) -> Measured| points(rows.found.iter().enumerate(), |(i, row)| (i as f64, f(row).value));
         let shares = Panel::new("Within two cells", names, Axis::linear("share").between(0.0, 1.0))
             .with(Layer::points("true geometry", of(|row| row.within_two_cells)).styled(0, Marker::Square))
             .with(Layer::points("90 % regions that hold it", of(|row| row.coverage)).styled(2, Marker::Circle))
             .with(Layer::points("free space", of(|row| row.free_within_two_cells)).styled(1, Marker::Triangle));
-        Plot::grid(
-            2,
-            vec![
-                panel("True geometry", |s| s.belief),
-                panel("Free space", |s| s.belief_free),
-                visits,
-                shares,
-            ],
-        )
+        let maps = [
+            panel("True geometry", |s| s.belief),
+            panel("Free space", |s| s.belief_free),
+        ];
+        Plot::grid(2, maps.into_iter().chain([visits, shares]).collect())
     }
 }
 

@@ -9,15 +9,12 @@ parameters! {
     /// Which deployment is shown.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        /// Number of the random deployment.
         #[garde(range(max = 1_000_000))]
-        deployment: u64 = 0,
-        /// Deployed nodes.
+        deployment: u64 = 0 => "Number of the random deployment.",
         #[garde(range(min = 2, max = 100_000))]
-        nodes: usize = 300,
-        /// Radio range, m.
+        nodes: usize = 300 => "Deployed nodes.",
         #[garde(range(min = 1.0, max = 1000.0))]
-        range: f64 = 15.0,
+        range: f64 = 15.0 => "Radio range, m.",
     }
 }
 
@@ -66,16 +63,11 @@ enum Event {
 
 rows! {
     pub struct TraceRow {
-        /// Nodes that have sampled, this one included.
-        step: usize,
-        /// The node.
-        node: usize,
-        /// What happens.
-        event: Event,
-        /// Bytes that travel.
-        bytes: f64 ["bytes"],
-        /// Decimal logarithm of the determinant, where it is tested.
-        log10_determinant: Option<f64>,
+        step: usize => "Nodes that have sampled, this one included.",
+        node: usize => "The node.",
+        event: Event => "What happens.",
+        bytes: f64 ["bytes"] => "Bytes that travel.",
+        log10_determinant: Option<f64> => "Decimal logarithm of the determinant, where it is tested.",
     }
 }
 
@@ -131,10 +123,7 @@ impl Figure for Trace {
     }
 
     fn plot(&self, _: &Parameters, rows: &Vec<TraceRow>) -> Plot {
-        let tests = rows
-            .iter()
-            .filter_map(|r| Some((r.step as f64, r.log10_determinant?)))
-            .collect();
+        let tests = points(rows, |r| (r.step as f64, r.log10_determinant));
         let mut total = 0.0;
         let bytes = select(rows, |r| r.event == Event::Receive)
             .map(|r| {
@@ -144,54 +133,34 @@ impl Figure for Trace {
             .collect();
         let determinant = Panel::linear("Test", "nodes", "lg det of the covariance (m^4)");
         let sent = Panel::linear("Messages", "nodes", "bytes so far");
-        Plot::grid(
-            2,
-            vec![
-                determinant.with(Layer::points("after each node", tests)),
-                sent.with(Layer::points("received", bytes)),
-            ],
-        )
+        let determinant = determinant.with(Layer::points("after each node", tests));
+        Plot::grid(2, vec![determinant, sent.with(Layer::points("received", bytes))])
     }
 }
 
 rows! {
     pub struct RouteRows {
-        /// The nodes visited.
-        route: Vec<RouteRow>,
-        /// All deployed nodes.
-        field: Vec<Place>,
+        route: Vec<RouteRow> => "The nodes visited.",
+        field: Vec<Place> => "All deployed nodes.",
     }
 
     struct RouteRow {
-        /// Number of the random deployment.
-        deployment: u64,
-        /// Nodes that have sampled, this one included.
-        step: usize,
-        /// The node.
-        node: usize,
-        /// Its position.
-        x: f64 ["m"],
-        /// Its position.
-        y: f64 ["m"],
-        /// Hops from the node before.
-        hop: usize,
-        /// Estimate of the source.
-        estimate_x: f64 ["m"],
-        /// Estimate of the source.
-        estimate_y: f64 ["m"],
-        /// Variance of x.
-        variance_x: f64 ["m^2"],
-        /// Covariance of x and y.
-        covariance_xy: f64 ["m^2"],
-        /// Variance of y.
-        variance_y: f64 ["m^2"],
+        deployment: u64 => "Number of the random deployment.",
+        step: usize => "Nodes that have sampled, this one included.",
+        node: usize => "The node.",
+        x: f64 ["m"] => "Its position.",
+        y: f64 ["m"] => "Its position.",
+        hop: usize => "Hops from the node before.",
+        estimate_x: f64 ["m"] => "Estimate of the source.",
+        estimate_y: f64 ["m"] => "Estimate of the source.",
+        variance_x: f64 ["m^2"] => "Variance of x.",
+        covariance_xy: f64 ["m^2"] => "Covariance of x and y.",
+        variance_y: f64 ["m^2"] => "Variance of y.",
     }
 
     struct Place {
-        /// Position.
-        x: f64 ["m"],
-        /// Position.
-        y: f64 ["m"],
+        x: f64 ["m"] => "Position.",
+        y: f64 ["m"] => "Position.",
     }
 }
 
@@ -230,12 +199,10 @@ impl Figure for Route {
 
     fn claims(&self, p: &Parameters, rows: &RouteRows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let last = rows.route.last().map(|r| (r.x - A.source[0]).hypot(r.y - A.source[1]));
-        here.at_most("ends-near", "the route ends within 15 m of the source", last, 15.0);
-        let error = rows
-            .route
-            .last()
-            .map(|r| (r.estimate_x - A.source[0]).hypot(r.estimate_y - A.source[1]));
+        let last = rows.route.last();
+        let end = last.map(|r| (r.x - A.source[0]).hypot(r.y - A.source[1]));
+        here.at_most("ends-near", "the route ends within 15 m of the source", end, 15.0);
+        let error = last.map(|r| (r.estimate_x - A.source[0]).hypot(r.estimate_y - A.source[1]));
         here.at_most("estimate", "the estimate is within 0.2 m of the source", error, 0.2);
         let first = rows.route.first().map(|r| (r.x - ALARM[0]).hypot(r.y - ALARM[1]));
         claims.near("starts", "the route starts at the alarm node", first, 0.0, 1e-9);

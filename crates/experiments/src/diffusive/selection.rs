@@ -1,6 +1,6 @@
 //! Rules that choose the next node: how well they rank it, and what that saves.
 
-use super::common::{A, B, Example, Network, Scheme, Settings, tracks, trials};
+use super::common::{A, B, Example, Network, Scheme, Settings, place, tracks};
 use super::summary::{Summary, summaries};
 use crate::prelude::*;
 use fewbits_diffusive::information::Predictions;
@@ -13,38 +13,29 @@ parameters! {
     /// Settings of the comparison.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        /// Random deployments of the searches.
         #[garde(range(min = 1, max = 100_000))]
-        trials: u64 = 200 => quick 8,
-        /// Random deployments in which candidates are ranked.
+        trials: u64 = 200 => quick 8 => "Random deployments of the searches.",
         #[garde(range(min = 1, max = 10_000))]
-        ranking_trials: u64 = 60 => quick 2,
-        /// Support points of the bounds.
+        ranking_trials: u64 = 60 => quick 2 => "Random deployments in which candidates are ranked.",
         #[garde(range(min = 10, max = 2_000))]
-        points: usize = 200,
-        /// Draws of the mutual information.
+        points: usize = 200 => "Support points of the bounds.",
         #[garde(range(min = 10, max = 100_000))]
-        draws: usize = 200,
+        draws: usize = 200 => "Draws of the mutual information.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Searches with the exact belief, by rule.
-        searches: Vec<Summary>,
+        searches: Vec<Summary> => "Searches with the exact belief, by rule.",
         /// How rules rank the neighbours after three nodes, against the mutual information by draws.
         rankings: Vec<Ranking>,
     }
 
     struct Ranking {
-        /// Rule.
-        rule: &'static str,
-        /// Mean rank correlation with the exact mutual information.
-        rank_correlation: Measured,
-        /// Information lost by taking the rule's best instead of the best.
-        lost: Measured ["nats"],
-        /// Mean of rule minus exact information, for rules that are in nats.
-        bias: Option<f64> ["nats"],
+        rule: &'static str => "Rule.",
+        rank_correlation: Measured => "Mean rank correlation with the exact mutual information.",
+        lost: Measured ["nats"] => "Information lost by taking the rule's best instead of the best.",
+        bias: Option<f64> ["nats"] => "Mean of rule minus exact information, for rules that are in nats.",
     }
 }
 
@@ -105,7 +96,7 @@ impl Figure for Selection {
         let schemes = schemes();
         let all = tracks(context, "diffusive-chains", &settings, &schemes)?;
         let searches = summaries(&schemes, &settings, &all)?;
-        let ranked = trials(context, "diffusive-chains", p.ranking_trials, |trial| rank(p, &settings, trial))?;
+        let ranked = context.trials("diffusive-chains", p.ranking_trials, |trial| rank(p, &settings, trial))?;
         let mut rankings = Vec::new();
         for (r, rule) in RULES.iter().enumerate() {
             let of = |k: usize| -> Moments { ranked.iter().flatten().map(|trial| trial[r][k]).collect() };
@@ -163,8 +154,8 @@ impl Figure for Selection {
         );
         for (c, (rule, _)) in SEARCH_RULES.into_iter().enumerate() {
             let of = rows.searches.iter().skip(c).step_by(SEARCH_RULES.len()).enumerate();
-            let place = |(i, s): (usize, &Summary)| (i as f64 + 0.1 * (c as f64 - 1.0), s.nodes_mean);
-            nodes = nodes.with(Layer::measured(rule, of, place).coloured(c));
+            let at = |(i, s): (usize, &Summary)| (i as f64 + 0.1 * (c as f64 - 1.0), s.nodes_mean);
+            nodes = nodes.with(Layer::measured(rule, of, at).coloured(place(rule)));
         }
         // Rules downwards, best at the top, so that their names have room.
         let mut sorted: Vec<&Ranking> = rows.rankings.iter().collect();

@@ -7,24 +7,17 @@ rows! {
     pub struct Rows {
         /// Medians and bands over the deployments, node by node; searches that have ended keep their last values.
         pub(super) curves: Vec<Curve>,
-        /// How the searches ended.
-        pub(super) summary: Vec<Summary>,
+        pub(super) summary: Vec<Summary> => "How the searches ended.",
     }
 
     /// A step of the searches of one scheme.
     pub struct Curve {
-        /// What travels, and how nodes are chosen.
-        pub(super) scheme: &'static str,
-        /// Radio range.
-        pub(super) range: f64 ["m"],
-        /// Nodes that have sampled.
-        pub(super) step: usize,
-        /// Median distance of estimate and source.
-        pub(super) err_med: f64 ["m"],
-        /// Its lower decile.
-        pub(super) err_q10: f64 ["m"],
-        /// Its upper decile.
-        pub(super) err_q90: f64 ["m"],
+        pub(super) scheme: &'static str => "What travels, and how nodes are chosen.",
+        pub(super) range: f64 ["m"] => "Radio range.",
+        pub(super) step: usize => "Nodes that have sampled.",
+        pub(super) err_med: f64 ["m"] => "Median distance of estimate and source.",
+        pub(super) err_q10: f64 ["m"] => "Its lower decile.",
+        pub(super) err_q90: f64 ["m"] => "Its upper decile.",
         /// Median of the root of the distance: the paper's "bias", read literally.
         pub(super) sqrt_err_med: f64 ["m^0.5"],
         /// Median decimal logarithm of the covariance's determinant (of m^4).
@@ -34,41 +27,22 @@ rows! {
     }
 
     /// How the searches of one scheme ended.
-    pub struct Summary {
-        /// What travels, and how nodes are chosen.
-        pub(super) scheme: &'static str,
-        /// Radio range.
-        pub(super) range: f64 ["m"],
-        /// Numbers in one message; none for raw records, which grow.
-        pub(super) scalars: Option<usize>,
-        /// Share of the searches that reach the threshold.
-        pub(super) reach: Measured,
-        /// Median nodes of those that do.
-        pub(super) nodes_median: Option<Measured>,
-        /// Their mean.
-        pub(super) nodes_mean: Option<Measured>,
-        /// Lower decile.
-        pub(super) nodes_q10: Option<f64>,
-        /// Upper decile.
-        pub(super) nodes_q90: Option<f64>,
-        /// Median distance of estimate and source at the end.
-        pub(super) final_err_median: Option<Measured> ["m"],
-        /// Share of all searches that end more than a metre off.
-        pub(super) wrong: Measured,
-        /// Share of those that report convergence and are more than a metre off.
-        pub(super) converged_wrong: Measured,
+    pub struct Summary by "{scheme} {range}" {
+        pub(super) scheme: &'static str => "What travels, and how nodes are chosen.",
+        pub(super) range: f64 ["m"] => "Radio range.",
+        pub(super) scalars: Option<usize> => "Numbers in one message; none for raw records, which grow.",
+        pub(super) reach: Measured => "Share of the searches that reach the threshold.",
+        pub(super) nodes_median: Option<Measured> => "Median nodes of those that do.",
+        pub(super) nodes_mean: Option<Measured> => "Their mean.",
+        pub(super) nodes_q10: Option<f64> => "Lower decile.",
+        pub(super) nodes_q90: Option<f64> => "Upper decile.",
+        pub(super) final_err_median: Option<Measured> ["m"] => "Median distance of estimate and source at the end.",
+        pub(super) wrong: Measured => "Share of all searches that end more than a metre off.",
+        pub(super) converged_wrong: Measured => "Share of those that report convergence and are more than a metre off.",
         /// Median squared error in units of the covariance at the end, 1.39 if calibrated.
         pub(super) nees_median: Option<f64>,
-        /// Median distance of estimate and source after three nodes.
-        pub(super) err_after_3: Option<Measured> ["m"],
-        /// Median size of all messages together, over all hops.
-        pub(super) bytes_median: Option<Measured> ["bytes"],
-    }
-}
-
-impl Summary {
-    pub(super) fn key(&self) -> String {
-        format!("{} {}", self.scheme, self.range)
+        pub(super) err_after_3: Option<Measured> ["m"] => "Median distance of estimate and source after three nodes.",
+        pub(super) bytes_median: Option<Measured> ["bytes"] => "Median size of all messages together, over all hops.",
     }
 }
 

@@ -8,18 +8,14 @@ parameters! {
     /// The covariance at which the table is evaluated.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        /// Variance of the first coordinate.
         #[garde(range(min = 0.01, max = 100.0))]
-        variance1: f64 = 2.0,
-        /// Variance of the second coordinate.
+        variance1: f64 = 2.0 => "Variance of the first coordinate.",
         #[garde(range(min = 0.01, max = 100.0))]
-        variance2: f64 = 0.5,
-        /// Correlation.
+        variance2: f64 = 0.5 => "Variance of the second coordinate.",
         #[garde(range(min = -0.99, max = 0.99))]
-        correlation: f64 = 0.7,
-        /// Highest degree.
+        correlation: f64 = 0.7 => "Correlation.",
         #[garde(range(min = 1, max = 8))]
-        degree: usize = 4,
+        degree: usize = 4 => "Highest degree.",
     }
 }
 
@@ -35,34 +31,23 @@ impl Parameters {
 
 rows! {
     pub struct Rows {
-        /// The monomials of every polynomial.
-        monomials: Vec<Monomial>,
-        /// The mean of every polynomial under the Gaussian, which must be zero.
-        means: Vec<Mean>,
+        monomials: Vec<Monomial> => "The monomials of every polynomial.",
+        means: Vec<Mean> => "The mean of every polynomial under the Gaussian, which must be zero.",
     }
 
     struct Monomial {
-        /// First index.
-        nu1: usize,
-        /// Second index.
-        nu2: usize,
-        /// Powers of z1 and z2.
-        monomial: String,
-        /// Its coefficient.
-        coef: f64,
-        /// The coefficient as printed, where the entry is misprinted.
-        printed: Option<f64>,
+        nu1: usize => "First index.",
+        nu2: usize => "Second index.",
+        monomial: String => "Powers of z1 and z2.",
+        coef: f64 => "Its coefficient.",
+        printed: Option<f64> => "The coefficient as printed, where the entry is misprinted.",
     }
 
     struct Mean {
-        /// First index.
-        nu1: usize,
-        /// Second index.
-        nu2: usize,
-        /// Mean of the recursion's polynomial under the Gaussian.
-        mean: f64,
-        /// Mean of the printed polynomial, where it is misprinted.
-        printed: Option<f64>,
+        nu1: usize => "First index.",
+        nu2: usize => "Second index.",
+        mean: f64 => "Mean of the recursion's polynomial under the Gaussian.",
+        printed: Option<f64> => "Mean of the printed polynomial, where it is misprinted.",
     }
 }
 
@@ -149,13 +134,8 @@ impl Figure for Table1 {
     }
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
-        let bars = |value: fn(&Mean) -> Option<f64>| -> Vec<(f64, f64)> {
-            rows.means
-                .iter()
-                .enumerate()
-                .filter_map(|(i, m)| Some((i as f64, value(m)?)))
-                .collect()
-        };
+        let bars =
+            |value: fn(&Mean) -> Option<f64>| points(rows.means.iter().enumerate(), |(i, m)| (i as f64, value(m)));
         let index = Axis::categories("index nu", rows.means.iter().map(|m| format!("{}{}", m.nu1, m.nu2)));
         Plot::of(
             Panel::new("Mean under the Gaussian", index, Axis::linear("mean"))

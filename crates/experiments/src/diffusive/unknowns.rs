@@ -1,6 +1,6 @@
 //! What else could be unknown, and what the model of the rate does to the estimate.
 
-use super::common::{B, Settings, search_box, trials};
+use super::common::{B, Settings, search_box};
 use crate::prelude::*;
 use fewbits_core::{Belief, Gaussian};
 use fewbits_diffusive::density::CellOptions;
@@ -13,52 +13,33 @@ parameters! {
     /// Settings of both tables.
     #[derive(Debug, Clone)]
     pub struct Parameters {
-        /// Random layouts about the source for the comparison of rate models.
         #[garde(range(min = 1, max = 10_000))]
-        trials: u64 = 200 => quick 4,
-        /// Nodes of a layout.
+        trials: u64 = 200 => quick 4 => "Random layouts about the source for the comparison of rate models.",
         #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
-        nodes: Vec<usize> = vec![6, 20],
-        /// Radius of a layout, m.
+        nodes: Vec<usize> = vec![6, 20] => "Nodes of a layout.",
         #[garde(range(min = 1.0, max = 1000.0))]
-        radius: f64 = 25.0,
+        radius: f64 = 25.0 => "Radius of a layout, m.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Cramer-Rao bounds with more and more unknowns.
-        bounds: Vec<Bound>,
-        /// Bias and width of the posterior of noise-free samples, by what is assumed of the rate.
-        models: Vec<Model>,
+        bounds: Vec<Bound> => "Cramer-Rao bounds with more and more unknowns.",
+        models: Vec<Model> => "Bias and width of the posterior of noise-free samples, by what is assumed of the rate.",
     }
 
     struct Bound {
-        /// What is unknown besides the position.
-        unknown: &'static str,
-        /// Standard deviation of x at the bound.
-        sd_x: f64 ["m"],
-        /// Standard deviation of the rate at the bound.
-        sd_rate: Option<f64> ["kg/s"],
+        unknown: &'static str => "What is unknown besides the position.",
+        sd_x: f64 ["m"] => "Standard deviation of x at the bound.",
+        sd_rate: Option<f64> ["kg/s"] => "Standard deviation of the rate at the bound.",
     }
 
-    struct Model {
-        /// What is assumed of the rate.
-        model: &'static str,
-        /// Nodes.
-        nodes: usize,
-        /// Distance of posterior mean and source, although the samples are free of noise.
-        bias: Measured ["m"],
-        /// Fourth root of the determinant of the covariance.
-        width: Measured ["m"],
-        /// Bias in units of the width.
-        bias_in_widths: Measured,
-    }
-}
-
-impl Model {
-    fn key(&self) -> String {
-        format!("{} {}", self.model, self.nodes)
+    struct Model by "{model} {nodes}" {
+        model: &'static str => "What is assumed of the rate.",
+        nodes: usize => "Nodes.",
+        bias: Measured ["m"] => "Distance of posterior mean and source, although the samples are free of noise.",
+        width: Measured ["m"] => "Fourth root of the determinant of the covariance.",
+        bias_in_widths: Measured => "Bias in units of the width.",
     }
 }
 
@@ -127,7 +108,7 @@ impl Figure for Unknowns {
         let mut rows = Vec::new();
         for count in &p.nodes {
             let kinds = models()?;
-            let all = trials(context, "diffusive-layouts", p.trials, |trial| {
+            let all = context.trials("diffusive-layouts", p.trials, |trial| {
                 let mut rng = trial.stream.rng();
                 let mut draw = || -> Result<Record, Error> {
                     let angle = std::f64::consts::TAU * rng.random::<f64>();

@@ -7,55 +7,38 @@ use rayon::prelude::*;
 
 parameters! {
     pub struct Parameters {
-        /// Plants, `a:gamma`.
         #[garde(length(min = 1), dive)]
-        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05)]),
-        /// Bits a sample.
+        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05)]) => "Plants, `a:gamma`.",
         #[garde(length(min = 1), inner(range(min = 1, max = 8)))]
-        bits: Vec<usize> = (1..=8).collect(),
+        bits: Vec<usize> = (1..=8).collect() => "Bits a sample.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Errors of the filters.
-        words: Vec<Row>,
-        /// Several bits about one sample.
-        successive: Vec<Successive>,
+        words: Vec<Row> => "Errors of the filters.",
+        successive: Vec<Successive> => "Several bits about one sample.",
     }
 
-    struct Row {
+    struct Row by "{plant} {bits}" {
         #[serde(flatten)]
         plant: Plant,
-        /// Word length.
-        bits: usize,
-        /// Information of a word against the sample.
-        c: f64,
-        /// Predicted steady variance.
-        riccati: f64 ["sigma^2"],
-        /// Exact steady mean squared error.
-        exact_mse: f64 ["sigma^2"],
-        /// Exact error over the Kalman filter's.
-        loss: f64,
-        /// Predicted variance over the Kalman filter's.
-        riccati_loss: f64,
+        bits: usize => "Word length.",
+        c: f64 => "Information of a word against the sample.",
+        riccati: f64 ["sigma^2"] => "Predicted steady variance.",
+        exact_mse: f64 ["sigma^2"] => "Exact steady mean squared error.",
+        loss: f64 => "Exact error over the Kalman filter's.",
+        riccati_loss: f64 => "Predicted variance over the Kalman filter's.",
     }
 
-    struct Successive {
-        /// Bits about the same sample.
-        bits: usize,
-        /// 1 - c of the Lloyd-Max word.
-        batch: f64,
-        /// 1 - c with thresholds at exact means.
-        exact_tree: f64,
-        /// 1 - c promised by assuming normal densities, (1 - 2/pi)^m.
-        claimed: f64,
-        /// 1 - c true of its levels.
-        own_levels: f64,
-        /// 1 - c true of its cells.
-        centroids: f64,
-        /// Words that no sample causes.
-        empty_words: usize,
+    struct Successive by "{bits}" {
+        bits: usize => "Bits about the same sample.",
+        batch: f64 => "1 - c of the Lloyd-Max word.",
+        exact_tree: f64 => "1 - c with thresholds at exact means.",
+        claimed: f64 => "1 - c promised by assuming normal densities, (1 - 2/pi)^m.",
+        own_levels: f64 => "1 - c true of its levels.",
+        centroids: f64 => "1 - c true of its cells.",
+        empty_words: usize => "Words that no sample causes.",
     }
 }
 
@@ -116,26 +99,19 @@ impl Figure for WordLength {
             let losses = curve.iter().map(|r| r.loss);
             here.decreasing(format!("falls-{}-{}", plant.a, plant.gamma), what, losses);
         }
-        let key = |r: &Row| format!("{} {}", r.plant, r.bits);
         let first = rows.words.iter().filter(|r| Some(&r.plant) == p.plants.first());
         claims.references("information", "information of a word of bits", first, |r| (r.bits.to_string(), r.c));
-        claims.references("loss", "exact loss at a, gamma, bits", &rows.words, |r| (key(r), r.loss));
-        claims.references("mse", "exact error at a, gamma, bits", &rows.words, |r| (key(r), r.exact_mse));
+        claims.keyed("loss", "exact loss at a, gamma, bits", &rows.words, |r| r.loss);
+        claims.keyed("mse", "exact error at a, gamma, bits", &rows.words, |r| r.exact_mse);
         let longer = rows.words.iter().filter(|r| r.bits > 1);
         let what = "from two bits on the prediction is exact to 0.03 %";
         here.all("riccati", what, longer, |r| (r.exact_mse / r.riccati - 1.0).abs() <= 3e-4);
         let rows = &rows.successive;
-        type Of = fn(&Successive) -> f64;
-        let columns: [(&str, Of); 4] = [
-            ("claimed", |r| r.claimed),
-            ("own-levels", |r| r.own_levels),
-            ("centroids", |r| r.centroids),
-            ("exact-tree", |r| r.exact_tree),
-        ];
-        for (name, of) in columns {
-            let what = format!("successive bits, {name}: information of bits");
-            claims.references(name, &what, rows, |r| (r.bits.to_string(), 1.0 - of(r)));
-        }
+        let what = |name: &str| format!("successive bits, {name}: information of bits");
+        claims.keyed("claimed", &what("claimed"), rows, |r| 1.0 - r.claimed);
+        claims.keyed("own-levels", &what("own-levels"), rows, |r| 1.0 - r.own_levels);
+        claims.keyed("centroids", &what("centroids"), rows, |r| 1.0 - r.centroids);
+        claims.keyed("exact-tree", &what("exact-tree"), rows, |r| 1.0 - r.exact_tree);
         let what = "the Lloyd-Max word loses less at every length from two bits";
         claims.all("batch-wins", what, rows.iter().filter(|r| r.bits > 1), |r| r.batch < r.exact_tree);
         let empty = rows.last().map(|r| r.empty_words as f64);

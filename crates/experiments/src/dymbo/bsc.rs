@@ -10,37 +10,27 @@ const ID: &str = "dymbo-bsc";
 
 parameters! {
     pub struct Parameters {
-        /// Plant coefficient.
         #[garde(range(min = -0.999_999, max = 0.999_999))]
-        a: f64 = 0.9,
-        /// Process variances over measurement variance.
+        a: f64 = 0.9 => "Plant coefficient.",
         #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05],
-        /// Probabilities that a bit is inverted.
+        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
         #[garde(length(min = 1), inner(range(min = 0.0, max = 0.499)))]
-        crossover: Vec<f64> = vec![0.0, 0.01, 0.05, 0.1, 0.2, 0.3],
-        /// Runs of the comparison with the exact posterior.
+        crossover: Vec<f64> = vec![0.0, 0.01, 0.05, 0.1, 0.2, 0.3] => "Probabilities that a bit is inverted.",
         #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 400 => quick 40,
+        trials: u64 = 400 => quick 40 => "Runs of the comparison with the exact posterior.",
     }
 }
 
 rows! {
-    pub struct Row {
+    pub struct Row by "{plant} {crossover}" {
         #[serde(flatten)]
         plant: Plant,
-        /// Probability that a bit is inverted.
-        crossover: f64,
-        /// Steady variance computed by the filter that knows.
-        riccati: f64 ["sigma^2"],
-        /// Its exact mean squared error.
-        aware_mse: f64 ["sigma^2"],
-        /// Exact mean squared error of the filter that does not know.
-        naive_mse: f64 ["sigma^2"],
-        /// Runs of the comparison with the exact posterior.
-        trials: u64,
-        /// Mean squared distance of the aware estimate from the exact posterior mean.
-        excess: Measured ["sigma^2"],
+        crossover: f64 => "Probability that a bit is inverted.",
+        riccati: f64 ["sigma^2"] => "Steady variance computed by the filter that knows.",
+        aware_mse: f64 ["sigma^2"] => "Its exact mean squared error.",
+        naive_mse: f64 ["sigma^2"] => "Exact mean squared error of the filter that does not know.",
+        trials: u64 => "Runs of the comparison with the exact posterior.",
+        excess: Measured ["sigma^2"] => "Mean squared distance of the aware estimate from the exact posterior mean.",
     }
 }
 
@@ -77,20 +67,17 @@ impl Figure for NoisyBits {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let (here, paper) = (claims.at_defaults(), claims.at_defaults().at_full_trials());
-        let key = |r: &Row| format!("{} {}", r.plant, r.crossover);
-        let what = "exact error of the filter that knows, at a, gamma, crossover";
-        claims.references("aware", what, rows, |r| (key(r), r.aware_mse));
+        claims.keyed("aware", "exact error of the filter that knows, at a, gamma, crossover", rows, |r| r.aware_mse);
         let what = "exact error of the filter that does not know, at a, gamma, crossover";
-        claims.references("naive", what, rows, |r| (key(r), r.naive_mse));
+        claims.keyed("naive", what, rows, |r| r.naive_mse);
         let what = "relative cost of not knowing, at a, gamma, crossover";
-        claims.references("cost", what, rows, |r| (key(r), r.naive_mse / r.aware_mse - 1.0));
+        claims.keyed("cost", what, rows, |r| r.naive_mse / r.aware_mse - 1.0);
         let rare = rows.iter().filter(|r| r.crossover == 0.01);
         let what = "at one inverted bit in a hundred knowing changes less than 0.01 %";
         here.all("rare", what, rare, |r| (r.naive_mse / r.aware_mse - 1.0).abs() <= 1e-4);
         let fast = rows.iter().filter(|r| r.plant.gamma == 0.5);
         let under = fast.map(|r| r.aware_mse / r.riccati - 1.0).fold(0.0, f64::max);
-        let what = "gamma = 0.5: the prediction is too low by up to 1.6 %";
-        here.near("under-predicts", what, under, 0.0155, 0.001);
+        here.near("under-predicts", "gamma = 0.5: the prediction is too low by up to 1.6 %", under, 0.0155, 0.001);
         let noisy = rows.iter().filter(|r| r.crossover >= 0.1);
         let what = "from crossover 0.1 on the exact posterior would gain at most 0.012 %";
         paper.all("gap", what, noisy, |r| r.excess.value <= 1.2e-4 * r.aware_mse);

@@ -10,41 +10,30 @@ const ID: &str = "dymbo-erasure";
 
 parameters! {
     pub struct Parameters {
-        /// Plant coefficient; the state starts from its stationary law.
         #[garde(range(min = -0.999_999, max = 0.999_999))]
-        a: f64 = 0.9,
-        /// Process variances over measurement variance.
+        a: f64 = 0.9 => "Plant coefficient; the state starts from its stationary law.",
         #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05],
-        /// Probabilities that a bit is lost.
+        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
         #[garde(length(min = 1), inner(range(min = 0.0, max = 0.999_999)))]
-        loss: Vec<f64> = vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7],
-        /// Steps of a run that are measured.
+        loss: Vec<f64> = vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7] => "Probabilities that a bit is lost.",
         #[garde(range(min = 1, max = 10_000))]
-        steps: u64 = 1000,
-        /// Steps before them.
+        steps: u64 = 1000 => "Steps of a run that are measured.",
         #[garde(range(max = 10_000))]
-        burn: u64 = 100,
-        /// Simulated runs.
+        burn: u64 = 100 => "Steps before them.",
         #[garde(range(min = 2, max = 100_000_000))]
-        trials: u64 = 2_000 => quick 100,
+        trials: u64 = 2_000 => quick 100 => "Simulated runs.",
     }
 }
 
 rows! {
-    pub struct Row {
+    pub struct Row by "{plant} {loss}" {
         #[serde(flatten)]
         plant: Plant,
-        /// Probability that a bit is lost.
-        loss: f64,
-        /// Simulated runs.
-        trials: u64,
-        /// Mean of the computed variance.
-        mean_variance: Measured ["sigma^2"],
-        /// Mean squared error.
-        mse: Measured ["sigma^2"],
-        /// Upper bound on the mean variance.
-        bound: f64 ["sigma^2"],
+        loss: f64 => "Probability that a bit is lost.",
+        trials: u64 => "Simulated runs.",
+        mean_variance: Measured ["sigma^2"] => "Mean of the computed variance.",
+        mse: Measured ["sigma^2"] => "Mean squared error.",
+        bound: f64 ["sigma^2"] => "Upper bound on the mean variance.",
     }
 }
 
@@ -118,9 +107,8 @@ impl Figure for LostBits {
         let noise = |m: Measured| 4.5 * m.standard_error.unwrap_or(0.0);
         let what = "the mean variance stays below the bound (Jensen), within 4.5 standard errors";
         claims.all("bounded", what, rows, |r| r.mean_variance.value <= r.bound + noise(r.mean_variance) + 1e-12);
-        let key = |r: &Row| format!("{} {}", r.plant, r.loss);
-        claims.references("mean", "mean variance at a, gamma, loss", rows, |r| (key(r), r.mean_variance));
-        claims.references("bound", "the bound at a, gamma, loss", rows, |r| (key(r), r.bound));
+        claims.keyed("mean", "mean variance at a, gamma, loss", rows, |r| r.mean_variance);
+        claims.keyed("bound", "the bound at a, gamma, loss", rows, |r| r.bound);
         let printed = || rows.iter().filter(|r| [0.1, 0.3, 0.5].contains(&r.loss));
         let what = "the bound is tight to 0.35 %";
         here.all("tight", what, printed(), |r| r.bound <= 1.0035 * r.mean_variance.value + noise(r.mean_variance));

@@ -5,12 +5,10 @@ use crate::prelude::*;
 
 parameters! {
     pub struct Parameters {
-        /// Plant coefficients.
         #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]
-        a: Vec<f64> = vec![0.5, 0.9, 0.99],
-        /// Process variances over measurement variance.
+        a: Vec<f64> = vec![0.5, 0.9, 0.99] => "Plant coefficients.",
         #[garde(length(min = 1), inner(range(min = 1e-12, max = 1e12)))]
-        gamma: Vec<f64> = log_spaced(-3.0, 1.0, 81),
+        gamma: Vec<f64> = log_spaced(-3.0, 1.0, 81) => "Process variances over measurement variance.",
     }
 }
 
@@ -18,10 +16,8 @@ rows! {
     pub struct Row {
         #[serde(flatten)]
         plant: Plant,
-        /// Steady filtered variance of the Kalman filter.
-        kf_reduction: f64 ["sigma^2"],
-        /// Steady filtered variance of the sign-bit filter.
-        dymbo_reduction: f64 ["sigma^2"],
+        kf_reduction: f64 ["sigma^2"] => "Steady filtered variance of the Kalman filter.",
+        dymbo_reduction: f64 ["sigma^2"] => "Steady filtered variance of the sign-bit filter.",
     }
 }
 

@@ -12,15 +12,12 @@ fn hundredths(i: i32) -> f64 {
 
 parameters! {
     pub struct Parameters {
-        /// Plant coefficients.
         #[garde(length(min = 1), inner(range(min = -1.0, max = 1.0)))]
-        a: Vec<f64> = (0..=100).map(hundredths).collect(),
-        /// Process variances over measurement variance.
+        a: Vec<f64> = (0..=100).map(hundredths).collect() => "Plant coefficients.",
         #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e3)))]
-        gamma: Vec<f64> = log_spaced(-3.0, 1.0, 81),
-        /// Losses of the contours.
+        gamma: Vec<f64> = log_spaced(-3.0, 1.0, 81) => "Process variances over measurement variance.",
         #[garde(length(min = 1), inner(range(min = 1.000_001, max = 1e6)))]
-        level: Vec<f64> = vec![1.05, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0],
+        level: Vec<f64> = vec![1.05, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0] => "Losses of the contours.",
         /// Coefficients at which the exact loss is computed as well.
         #[garde(inner(range(min = -1.0, max = 1.0)))]
         exact_a: Vec<f64> = (0..=19).map(|i| hundredths(5 * i)).chain([0.99, 1.0]).collect() => quick vec![0.0, 0.5, 0.9, 1.0],
@@ -29,30 +26,22 @@ parameters! {
 
 rows! {
     pub struct Rows {
-        /// The plane of plants.
-        plane: Vec<Row>,
-        /// Where the loss reaches each level.
-        contours: Vec<Contour>,
+        plane: Vec<Row> => "The plane of plants.",
+        contours: Vec<Contour> => "Where the loss reaches each level.",
     }
 
     struct Row {
         #[serde(flatten)]
         plant: Plant,
-        /// Steady variance over the Kalman filter's, closed form.
-        loss_riccati: f64,
-        /// The same with the exact mean squared error.
-        loss_true: Option<f64>,
+        loss_riccati: f64 => "Steady variance over the Kalman filter's, closed form.",
+        loss_true: Option<f64> => "The same with the exact mean squared error.",
     }
 
-    struct Contour {
-        /// Riccati or exact.
-        kind: &'static str,
-        /// Loss.
-        level: f64,
-        /// Plant coefficient.
-        a: f64,
-        /// Noise ratio at which the loss reaches the level.
-        gamma: f64,
+    struct Contour by "{a}" {
+        kind: &'static str => "Riccati or exact.",
+        level: f64 => "Loss.",
+        a: f64 => "Plant coefficient.",
+        gamma: f64 => "Noise ratio at which the loss reaches the level.",
     }
 }
 
@@ -113,7 +102,7 @@ impl Figure for Loss {
             ("exact", "noise ratio of exact loss 2 at a"),
         ] {
             let double = rows.contours.iter().filter(|c| c.kind == kind && c.level == 2.0);
-            claims.references(&format!("double-{kind}"), what, double, |c| (c.a.to_string(), c.gamma));
+            claims.keyed(&format!("double-{kind}"), what, double, |c| c.gamma);
         }
         let root = steady::coefficient_at_loss(2.0, 1.0).ok().flatten();
         let what = "E4: at gamma = 1 the loss exceeds 2 beyond this |a| (the paper: nowhere)";
@@ -123,8 +112,7 @@ impl Figure for Loss {
         let exact = || rows.plane.iter().filter_map(|r| Some(r.loss_true? / r.loss_riccati));
         let what = "the exact loss is nowhere below the Riccati loss";
         here.all("exact-above", what, exact(), |ratio| ratio >= 1.0 - 1e-10);
-        let what = "the Riccati loss is right to 6 % on the whole grid";
-        here.all("exact-close", what, exact(), |ratio| ratio <= 1.06);
+        here.all("exact-close", "the Riccati loss is right to 6 % on the whole grid", exact(), |ratio| ratio <= 1.06);
         let named = super::common::plants([(0.9, 0.5), (0.9, 1.0), (1.0, 1.0)]);
         let exact = |plant: Plant| plant.model().ok().and_then(|model| chain::true_loss(&model).ok());
         claims.references("exact", "exact loss at a, gamma", named, |plant| (plant.to_string(), exact(plant)));
@@ -184,8 +172,7 @@ fn limits(claims: &mut Claims) {
         let what = format!("a = {a}, gamma to 0: loss - 1 over (1 - 2/pi) gamma/(1 - a^2)^2");
         claims.near(format!("slow-{a}"), what, slope, 1.0, 1e-4);
     }
-    let what = "a = 1, gamma to 0: sqrt(pi/2), not pi/2 (E5)";
-    claims.near("slow-1", what, loss(1.0, 1e-20), (PI / 2.0).sqrt(), 1e-9);
+    claims.near("slow-1", "a = 1, gamma to 0: sqrt(pi/2), not pi/2 (E5)", loss(1.0, 1e-20), (PI / 2.0).sqrt(), 1e-9);
     for a in [0.0, 0.5, 1.0] {
         let expected = (1.0 - FRAC_2_PI) / (1.0 - a * a * (1.0 - FRAC_2_PI));
         let slope = loss(a, 1e9).map(|loss| loss / 1e9 / expected);

@@ -15,74 +15,50 @@ const ID: &str = "dymbo-fig5";
 
 parameters! {
     pub struct Parameters {
-        /// Plant coefficient; the state starts from its stationary law.
         #[garde(range(min = -0.999_999, max = 0.999_999))]
-        a: f64 = 0.9,
-        /// Process variances over measurement variance.
+        a: f64 = 0.9 => "Plant coefficient; the state starts from its stationary law.",
         #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05],
-        /// Resolution of the first message in noise deviations.
+        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
         #[garde(range(min = 1e-3, max = 100.0))]
-        tau: f64 = 1.0,
-        /// Steps after the first message.
+        tau: f64 = 1.0 => "Resolution of the first message in noise deviations.",
         #[garde(range(min = 1, max = 10_000))]
-        steps: usize = 50,
-        /// Simulated runs.
+        steps: usize = 50 => "Steps after the first message.",
         #[garde(range(min = 2, max = 100_000_000))]
-        trials: u64 = 100_000 => quick 5_000,
+        trials: u64 = 100_000 => quick 5_000 => "Simulated runs.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Errors and variances.
-        errors: Vec<Row>,
-        /// One run.
-        path: Vec<Point>,
+        errors: Vec<Row> => "Errors and variances.",
+        path: Vec<Point> => "One run.",
     }
 
-    struct Row {
+    struct Row by "{plant} {n}" {
         #[serde(flatten)]
         plant: Plant,
-        /// Step.
-        n: usize,
-        /// Simulated runs.
-        trials: u64,
-        /// Variance computed by the Kalman filter, which is exact.
-        kf_pred: f64 ["sigma^2"],
-        /// Mean squared error of the Kalman filter.
-        kf_mse: Measured ["sigma^2"],
-        /// Variance computed by the sign-bit filter.
-        dymbo_pred: f64 ["sigma^2"],
-        /// Mean squared error of the sign-bit filter.
-        dymbo_mse: Measured ["sigma^2"],
-        /// Exact mean squared error, by the error chain.
-        dymbo_exact: f64 ["sigma^2"],
-        /// Steady variance of the sign-bit filter.
-        dymbo_minf: f64 ["sigma^2"],
-        /// Steady variance of the Kalman filter.
-        kf_minf: f64 ["sigma^2"],
-        /// Squared error over computed variance, sign-bit filter.
-        nees: Measured,
-        /// Mean squared error when the stationary prior is used at n = 0.
-        informed_mse: Measured ["sigma^2"],
-        /// Its squared error over computed variance.
-        informed_nees: Measured,
+        n: usize => "Step.",
+        trials: u64 => "Simulated runs.",
+        kf_pred: f64 ["sigma^2"] => "Variance computed by the Kalman filter, which is exact.",
+        kf_mse: Measured ["sigma^2"] => "Mean squared error of the Kalman filter.",
+        dymbo_pred: f64 ["sigma^2"] => "Variance computed by the sign-bit filter.",
+        dymbo_mse: Measured ["sigma^2"] => "Mean squared error of the sign-bit filter.",
+        dymbo_exact: f64 ["sigma^2"] => "Exact mean squared error, by the error chain.",
+        dymbo_minf: f64 ["sigma^2"] => "Steady variance of the sign-bit filter.",
+        kf_minf: f64 ["sigma^2"] => "Steady variance of the Kalman filter.",
+        nees: Measured => "Squared error over computed variance, sign-bit filter.",
+        informed_mse: Measured ["sigma^2"] => "Mean squared error when the stationary prior is used at n = 0.",
+        informed_nees: Measured => "Its squared error over computed variance.",
     }
 
     struct Point {
         #[serde(flatten)]
         plant: Plant,
-        /// Step.
-        n: usize,
-        /// State.
-        theta: f64 ["sigma"],
-        /// Estimate of the Kalman filter.
-        kf: f64 ["sigma"],
-        /// Estimate of the sign-bit filter.
-        dymbo: f64 ["sigma"],
-        /// Bit received; none at the first message.
-        bit: Option<f64>,
+        n: usize => "Step.",
+        theta: f64 ["sigma"] => "State.",
+        kf: f64 ["sigma"] => "Estimate of the Kalman filter.",
+        dymbo: f64 ["sigma"] => "Estimate of the sign-bit filter.",
+        bit: Option<f64> => "Bit received; none at the first message.",
     }
 }
 
@@ -238,11 +214,9 @@ impl Figure for Convergence {
                 format!("gamma = {gamma}: simulated error over n >= 30 is the predicted steady variance within 2 %");
             here.near(format!("steady-{gamma}"), what, late.mean(), 1.0, 0.02);
         }
-        let key = |r: &Row| format!("{} {}", r.plant, r.n);
-        claims.references("exact", "exact sign-bit error at a, gamma, n", rows, |r| (key(r), r.dymbo_exact));
-        claims.references("kalman", "Kalman variance at a, gamma, n", rows, |r| (key(r), r.kf_pred));
-        let what = "error when the prior is used at a, gamma, n";
-        claims.references("informed", what, rows, |r| (key(r), r.informed_mse));
+        claims.keyed("exact", "exact sign-bit error at a, gamma, n", rows, |r| r.dymbo_exact);
+        claims.keyed("kalman", "Kalman variance at a, gamma, n", rows, |r| r.kf_pred);
+        claims.keyed("informed", "error when the prior is used at a, gamma, n", rows, |r| r.informed_mse);
 
         let curves = || rows.chunks(p.steps + 1);
         // The Kalman filter settles on its own variance, the sign-bit filter on its own exact error.

@@ -11,63 +11,44 @@ const ID: &str = "dymbo-gap";
 
 parameters! {
     pub struct Parameters {
-        /// Plants, `a:gamma`.
         #[garde(length(min = 1), dive)]
-        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0), (1.0, 1.0)]),
-        /// Resolution of the first message in noise deviations.
+        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0), (1.0, 1.0)]) => "Plants, `a:gamma`.",
         #[garde(range(min = 0.01, max = 10.0))]
-        tau: f64 = 1.0,
-        /// Bits after the first message whose strings are all followed.
+        tau: f64 = 1.0 => "Resolution of the first message in noise deviations.",
         #[garde(range(min = 1, max = 14))]
-        depth: usize = 12 => quick 8,
-        /// Runs of the steady comparison.
+        depth: usize = 12 => quick 8 => "Bits after the first message whose strings are all followed.",
         #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 400 => quick 50,
+        trials: u64 = 400 => quick 50 => "Runs of the steady comparison.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// After a first message, all bit strings.
-        tree: Vec<Row>,
-        /// In the steady state.
-        steady: Vec<Steady>,
+        tree: Vec<Row> => "After a first message, all bit strings.",
+        steady: Vec<Steady> => "In the steady state.",
     }
 
-    struct Row {
+    struct Row by "{plant} {n}" {
         #[serde(flatten)]
         plant: Plant,
-        /// Bits after the first message.
-        n: usize,
-        /// Exact minimum mean squared error given the bits.
-        mmse: f64 ["sigma^2"],
-        /// What the sign-bit filter adds.
-        excess: f64 ["sigma^2"],
-        /// Variance that it computes.
-        riccati: f64 ["sigma^2"],
-        /// Its error by the error chain: mmse + excess.
-        chain_mse: f64 ["sigma^2"],
+        n: usize => "Bits after the first message.",
+        mmse: f64 ["sigma^2"] => "Exact minimum mean squared error given the bits.",
+        excess: f64 ["sigma^2"] => "What the sign-bit filter adds.",
+        riccati: f64 ["sigma^2"] => "Variance that it computes.",
+        chain_mse: f64 ["sigma^2"] => "Its error by the error chain: mmse + excess.",
     }
 
-    struct Steady {
+    struct Steady by "{plant}" {
         #[serde(flatten)]
         plant: Plant,
-        /// Bits a sample.
-        bits: usize,
-        /// Exact steady error of the filter.
-        exact_mse: f64 ["sigma^2"],
-        /// Variance that it computes.
-        riccati: f64 ["sigma^2"],
-        /// Simulated runs.
-        trials: u64,
-        /// Steady distance from the exact posterior mean, squared.
-        excess: Measured ["sigma^2"],
-        /// Minimum error given the bits, `exact_mse - excess`.
-        mmse: f64 ["sigma^2"],
-        /// Kurtosis of the error; 3 if normal.
-        kurtosis: f64,
-        /// Exact steady error at the best constant gain; one bit only.
-        tuned_mse: Option<f64> ["sigma^2"],
+        bits: usize => "Bits a sample.",
+        exact_mse: f64 ["sigma^2"] => "Exact steady error of the filter.",
+        riccati: f64 ["sigma^2"] => "Variance that it computes.",
+        trials: u64 => "Simulated runs.",
+        excess: Measured ["sigma^2"] => "Steady distance from the exact posterior mean, squared.",
+        mmse: f64 ["sigma^2"] => "Minimum error given the bits, `exact_mse - excess`.",
+        kurtosis: f64 => "Kurtosis of the error; 3 if normal.",
+        tuned_mse: Option<f64> ["sigma^2"] => "Exact steady error at the best constant gain; one bit only.",
     }
 }
 
@@ -171,27 +152,22 @@ impl Figure for GapToExact {
         let here = claims.at_defaults();
         let what = "minimum error and excess add up to the error chain's, at every step";
         claims.all("adds-up", what, &rows.tree, |r| (r.mmse + r.excess - r.chain_mse).abs() <= 1e-12);
-        let what = "minimum error after a first message, at a, gamma, bits";
-        claims.references("tree", what, &rows.tree, |r| (format!("{} {}", r.plant, r.n), r.mmse));
+        claims.keyed("tree", "minimum error after a first message, at a, gamma, bits", &rows.tree, |r| r.mmse);
         let of = |bits: usize| rows.steady.iter().filter(move |r| r.bits == bits);
-        let what = "steady excess over the exact posterior mean, at a, gamma";
-        claims.references("excess", what, of(1), |r| (r.plant.to_string(), r.excess));
+        claims.keyed("excess", "steady excess over the exact posterior mean, at a, gamma", of(1), |r| r.excess);
         let what = "the same in percent of the minimum error, at a, gamma";
-        claims.references("percent", what, of(1), |r| (r.plant.to_string(), r.excess.scaled(100.0 / r.mmse)));
+        claims.keyed("percent", what, of(1), |r| r.excess.scaled(100.0 / r.mmse));
         let what =
             "percent that two-bit words leave to the exact posterior: at most .03 at a = .9, .08 at a = 1, and a tenth";
         here.all("two-bits", what, of(2).filter(|r| r.plant.a != 0.99), |r| {
             let most = if r.plant.a < 1.0 { 0.033 } else { 0.088 };
             100.0 * r.excess.value / r.mmse <= most
         });
-        let what = "kurtosis of the error, at a, gamma";
-        claims.references("kurtosis", what, of(1), |r| (r.plant.to_string(), r.kurtosis));
+        claims.keyed("kurtosis", "kurtosis of the error, at a, gamma", of(1), |r| r.kurtosis);
         let what = "percent that the best constant gain would save, at a, gamma";
-        claims.references("tuned", what, of(1), |r| {
-            (r.plant.to_string(), r.tuned_mse.map(|tuned| 100.0 * (1.0 - tuned / r.exact_mse)))
-        });
+        claims.keyed("tuned", what, of(1), |r| r.tuned_mse.map(|tuned| 100.0 * (1.0 - tuned / r.exact_mse)));
         let what = "exact error over computed variance in the steady state, at a, gamma";
-        claims.references("nees", what, of(1), |r| (r.plant.to_string(), r.exact_mse / r.riccati));
+        claims.keyed("nees", what, of(1), |r| r.exact_mse / r.riccati);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {

@@ -8,41 +8,30 @@ use fewbits_numerics::normal::log_pdf_with;
 
 parameters! {
     pub struct Parameters {
-        /// Measurement noise deviations.
         #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
-        sigma: Vec<f64> = vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0],
-        /// Prior deviation.
+        sigma: Vec<f64> = vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0] => "Measurement noise deviations.",
         #[garde(range(min = 1e-6, max = 1e6))]
-        sigma_theta: f64 = 1.0,
+        sigma_theta: f64 = 1.0 => "Prior deviation.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Distance against noise.
-        distances: Vec<Distance>,
-        /// Densities at the smallest noise.
-        densities: Vec<Density>,
+        distances: Vec<Distance> => "Distance against noise.",
+        densities: Vec<Density> => "Densities at the smallest noise.",
     }
 
-    struct Distance {
-        /// Measurement noise deviation.
-        sigma: f64,
-        /// Largest difference of the densities.
-        distance: f64 ["1/unit"],
-        /// Distance times prior deviation times (sigma/prior deviation)^3.
-        cubed: f64,
+    struct Distance by "{sigma}" {
+        sigma: f64 => "Measurement noise deviation.",
+        distance: f64 ["1/unit"] => "Largest difference of the densities.",
+        cubed: f64 => "Distance times prior deviation times (sigma/prior deviation)^3.",
     }
 
     struct Density {
-        /// State.
-        theta: f64 ["unit"],
-        /// Posterior after a +1 at the prior mean.
-        exact: f64 ["1/unit"],
-        /// Normal density of the same moments.
-        normal: f64 ["1/unit"],
-        /// Density before.
-        prior: f64 ["1/unit"],
+        theta: f64 ["unit"] => "State.",
+        exact: f64 ["1/unit"] => "Posterior after a +1 at the prior mean.",
+        normal: f64 ["1/unit"] => "Normal density of the same moments.",
+        prior: f64 ["1/unit"] => "Density before.",
     }
 }
 
@@ -87,7 +76,7 @@ impl Figure for PosteriorShape {
         let rows = &rows.distances;
         let what = "the posterior becomes normal as the noise grows";
         here.decreasing("converges", what, rows.iter().map(|r| r.distance));
-        claims.references("distance", "largest difference at sigma", rows, |r| (r.sigma.to_string(), r.distance));
+        claims.keyed("distance", "largest difference at sigma", rows, |r| r.distance);
         let ratio = rows.windows(2).last().map(|w| w[0].distance / w[1].distance);
         here.near("cubic", "twice the noise, an eighth of the difference", ratio, 8.0, 0.01);
         let constant = rows.last().map(|r| r.cubed);

@@ -7,51 +7,36 @@ use fewbits_dymbo::{RoundedSample, ScalarPlant, first_message_mse};
 
 parameters! {
     pub struct Parameters {
-        /// Measurement noise deviation.
         #[garde(range(min = 1e-6, max = 1e6))]
-        sigma: f64 = 1.0,
-        /// Resolutions of the first message.
+        sigma: f64 = 1.0 => "Measurement noise deviation.",
         #[garde(length(min = 1), inner(range(min = 1e-6, max = 1e6)))]
-        tau: Vec<f64> = vec![0.25, 0.5, 1.0, 2.0, 4.0],
-        /// Plant coefficient.
+        tau: Vec<f64> = vec![0.25, 0.5, 1.0, 2.0, 4.0] => "Resolutions of the first message.",
         #[garde(range(min = -1.0, max = 1.0))]
-        a: f64 = 0.9,
-        /// Process variances over measurement variance.
+        a: f64 = 0.9 => "Plant coefficient.",
         #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05],
+        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// The first message.
-        messages: Vec<Row>,
-        /// The filter after it.
-        starts: Vec<Start>,
+        messages: Vec<Row> => "The first message.",
+        starts: Vec<Start> => "The filter after it.",
     }
 
-    struct Row {
-        /// Resolution of the first message.
-        tau: f64 ["unit"],
-        /// Mean squared error at the worst state.
-        exact_sup: f64 ["unit^2"],
-        /// Variance to start from, sigma^2 + tau^2/12.
-        tight: f64 ["unit^2"],
-        /// The paper's bound, (sigma + tau/2)^2.
-        printed_bound: f64 ["unit^2"],
+    struct Row by "{tau}" {
+        tau: f64 ["unit"] => "Resolution of the first message.",
+        exact_sup: f64 ["unit^2"] => "Mean squared error at the worst state.",
+        tight: f64 ["unit^2"] => "Variance to start from, sigma^2 + tau^2/12.",
+        printed_bound: f64 ["unit^2"] => "The paper's bound, (sigma + tau/2)^2.",
     }
 
-    struct Start {
-        /// Process variance over measurement variance.
-        gamma: f64,
-        /// Step.
-        n: usize,
-        /// Initial variance: tight or printed.
-        start: &'static str,
-        /// Exact mean squared error.
-        mse: f64 ["unit^2"],
-        /// Exact error over computed variance.
-        nees: f64,
+    struct Start by "{start} {gamma}" {
+        gamma: f64 => "Process variance over measurement variance.",
+        n: usize => "Step.",
+        start: &'static str => "Initial variance: tight or printed.",
+        mse: f64 ["unit^2"] => "Exact mean squared error.",
+        nees: f64 => "Exact error over computed variance.",
     }
 }
 
@@ -97,18 +82,15 @@ impl Figure for FirstMessage {
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let messages = &rows.messages;
-        let what = "the printed bound is valid (Minkowski)";
-        claims.all("valid", what, messages, |r| r.printed_bound >= r.exact_sup);
-        claims.references("exact", "worst mean squared error at tau", messages, |r| (r.tau.to_string(), r.exact_sup));
+        claims.all("valid", "the printed bound is valid (Minkowski)", messages, |r| r.printed_bound >= r.exact_sup);
+        claims.keyed("exact", "worst mean squared error at tau", messages, |r| r.exact_sup);
         let one = messages.iter().find(|r| r.tau == p.sigma);
         let what = "E7: at tau = sigma the printed bound is 2.08 times the truth";
         claims.near("loose", what, one.map(|r| r.printed_bound / r.exact_sup), 2.0769, 2e-4);
         let what = "E8: tau = sigma already costs only 8.3 %";
         claims.near("cheap", what, one.map(|r| r.exact_sup / (p.sigma * p.sigma)), 1.0833, 1e-4);
         let at = |n: usize| rows.starts.iter().filter(move |r| r.n == n);
-        claims.references("first-bit", "E7: error after one bit from this variance", at(1), |r| {
-            (format!("{} {}", r.start, r.gamma), r.mse)
-        });
+        claims.keyed("first-bit", "E7: error after one bit from this variance", at(1), |r| r.mse);
         let cautious = rows.starts.iter().filter(|r| r.start == "printed" && r.gamma == 0.5);
         let what = "E7: normalised error from the printed bound at gamma = 0.5, step";
         claims.references("cautious", what, cautious, |r| (r.n.to_string(), r.nees));

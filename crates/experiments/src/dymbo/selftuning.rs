@@ -29,15 +29,12 @@ const JAYANT: f64 = 1.5;
 
 parameters! {
     pub struct Parameters {
-        /// Step of the logarithm of the process variance per bit.
         #[garde(range(min = 0.0, max = 1.0))]
-        gain: f64 = 0.03,
-        /// Probability that a bit is inverted, where bits are.
+        gain: f64 = 0.03 => "Step of the logarithm of the process variance per bit.",
         #[garde(range(min = 0.0, max = 0.4))]
-        flips: f64 = 0.05,
-        /// Simulated runs of 2000 steps.
+        flips: f64 = 0.05 => "Probability that a bit is inverted, where bits are.",
         #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 100 => quick 8,
+        trials: u64 = 100 => quick 8 => "Simulated runs of 2000 steps.",
     }
 }
 
@@ -175,20 +172,14 @@ rows! {
     pub struct Row {
         /// Coefficient, process variance, measurement variance; "jump" if the process variance becomes nine times as large at step 1000.
         plant: String,
-        /// What is known of the process variance, and what receives.
-        receiver: &'static str,
-        /// First step of the window, counted from step 1000.
-        from: u64,
-        /// End of the window.
-        to: u64,
-        /// Simulated runs.
-        trials: u64,
-        /// Root mean squared error.
-        error: Measured,
+        receiver: &'static str => "What is known of the process variance, and what receives.",
+        from: u64 => "First step of the window, counted from step 1000.",
+        to: u64 => "End of the window.",
+        trials: u64 => "Simulated runs.",
+        error: Measured => "Root mean squared error.",
         /// Error in parts of that of the receiver that knows the process variance, over the same link.
         ratio: Measured,
-        /// Process variance at the end in parts of that before the jump, geometric mean.
-        learnt: f64,
+        learnt: f64 => "Process variance at the end in parts of that before the jump, geometric mean.",
     }
 }
 

@@ -7,38 +7,27 @@ use rayon::prelude::*;
 
 parameters! {
     pub struct Parameters {
-        /// Plant coefficient.
         #[garde(range(min = -1.0, max = 1.0))]
-        a: f64 = 0.9,
-        /// Process variances over measurement variance.
+        a: f64 = 0.9 => "Plant coefficient.",
         #[garde(length(min = 1), inner(range(min = 1e-4, max = 1e3)))]
-        gamma: Vec<f64> = vec![0.5, 0.05],
-        /// Sensors a slot.
+        gamma: Vec<f64> = vec![0.5, 0.05] => "Process variances over measurement variance.",
         #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
-        sensors: Vec<usize> = vec![1, 2, 3, 4, 5, 7, 10, 14, 20],
+        sensors: Vec<usize> = vec![1, 2, 3, 4, 5, 7, 10, 14, 20] => "Sensors a slot.",
     }
 }
 
 rows! {
-    pub struct Row {
+    pub struct Row by "{plant} {sensors}" {
         #[serde(flatten)]
         plant: Plant,
-        /// Sensors a slot, K.
-        sensors: usize,
-        /// Computed steady variance, one after the other.
-        sequential: f64 ["sigma^2"],
-        /// Exact error of that; up to ten sensors.
-        sequential_mse: Option<f64> ["sigma^2"],
-        /// Computed steady variance, all at once, linear fusion.
-        parallel: f64 ["sigma^2"],
-        /// Exact error of that.
-        parallel_mse: f64 ["sigma^2"],
-        /// Computed steady variance, all at once, count table.
-        table: f64 ["sigma^2"],
-        /// Exact error of that.
-        table_mse: f64 ["sigma^2"],
-        /// Kalman filter with K unquantized sensors.
-        kalman: f64 ["sigma^2"],
+        sensors: usize => "Sensors a slot, K.",
+        sequential: f64 ["sigma^2"] => "Computed steady variance, one after the other.",
+        sequential_mse: Option<f64> ["sigma^2"] => "Exact error of that; up to ten sensors.",
+        parallel: f64 ["sigma^2"] => "Computed steady variance, all at once, linear fusion.",
+        parallel_mse: f64 ["sigma^2"] => "Exact error of that.",
+        table: f64 ["sigma^2"] => "Computed steady variance, all at once, count table.",
+        table_mse: f64 ["sigma^2"] => "Exact error of that.",
+        kalman: f64 ["sigma^2"] => "Kalman filter with K unquantized sensors.",
     }
 }
 
@@ -84,17 +73,11 @@ impl Figure for SeveralSensors {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        type Of = fn(&Row) -> f64;
-        let columns: [(&str, &str, Of); 4] = [
-            ("sequential", "computed variance in turn", |r| r.sequential),
-            ("parallel", "exact error at once, linear fusion", |r| r.parallel_mse),
-            ("table", "exact error at once, count table", |r| r.table_mse),
-            ("kalman", "variance of unquantized sensors", |r| r.kalman),
-        ];
-        for (quantity, what, of) in columns {
-            let what = format!("{what}, at a, gamma, sensors");
-            claims.references(quantity, &what, rows, |r| (format!("{} {}", r.plant, r.sensors), of(r)));
-        }
+        let what = |what: &str| format!("{what}, at a, gamma, sensors");
+        claims.keyed("sequential", &what("computed variance in turn"), rows, |r| r.sequential);
+        claims.keyed("parallel", &what("exact error at once, linear fusion"), rows, |r| r.parallel_mse);
+        claims.keyed("table", &what("exact error at once, count table"), rows, |r| r.table_mse);
+        claims.keyed("kalman", &what("variance of unquantized sensors"), rows, |r| r.kalman);
         let at = |k: usize| first(rows, |r| r.plant == Plant { a: 0.9, gamma: 0.5 } && r.sensors == k);
         let two = at(2).zip(at(1));
         let what = "gamma = 0.5: by computed variance two one-bit sensors in turn beat one unquantized sensor";
@@ -106,8 +89,7 @@ impl Figure for SeveralSensors {
         let what = "gamma = 0.5, ten sensors: relative saving of the count table";
         let saved = at(10).map(|r| 1.0 - r.table_mse / r.parallel_mse);
         here.near("table-saves", what, saved, 0.026, 1e-3);
-        let what = "in turn is never worse than at once";
-        claims.all("turns", what, rows, |r| r.sequential <= r.parallel * (1.0 + 1e-9));
+        claims.all("turns", "in turn is never worse than at once", rows, |r| r.sequential <= r.parallel * (1.0 + 1e-9));
         let what = "the count table is never worse than linear fusion";
         claims.all("table-wins", what, rows, |r| r.table <= r.parallel * (1.0 + 1e-9));
     }

@@ -11,15 +11,12 @@ const ID: &str = "dymbo-smoother";
 
 parameters! {
     pub struct Parameters {
-        /// Plants, `a:gamma`.
         #[garde(length(min = 1), dive)]
-        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0)]),
-        /// Steps between the state and the last bit.
+        plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (0.99, 1.0)]) => "Plants, `a:gamma`.",
         #[garde(length(min = 1), inner(range(max = 200)))]
-        lag: Vec<usize> = vec![0, 1, 2, 3, 4, 5, 10, 20],
-        /// Simulated runs of ten smoothed states.
+        lag: Vec<usize> = vec![0, 1, 2, 3, 4, 5, 10, 20] => "Steps between the state and the last bit.",
         #[garde(range(min = 2, max = 10_000_000))]
-        trials: u64 = 400 => quick 20,
+        trials: u64 = 400 => quick 20 => "Simulated runs of ten smoothed states.",
     }
 }
 
@@ -29,23 +26,16 @@ const ANCHORS: usize = 10;
 const STRIDE: usize = 4;
 
 rows! {
-    pub struct Row {
+    pub struct Row by "{plant} {lag}" {
         #[serde(flatten)]
         plant: Plant,
-        /// Steps between the state and the last bit.
-        lag: usize,
-        /// Simulated runs of ten smoothed states.
-        trials: u64,
-        /// Steady variance computed by the sign-bit smoother.
-        predicted: f64 ["sigma^2"],
-        /// Steady variance of the unquantized smoother.
-        kalman: f64 ["sigma^2"],
-        /// Mean squared error of the sign-bit smoother.
-        rts_mse: Measured ["sigma^2"],
-        /// Mean squared error of the exact smoother of the same bits.
-        exact_mse: Measured ["sigma^2"],
-        /// Mean squared distance of the two smoothed estimates.
-        excess: Measured ["sigma^2"],
+        lag: usize => "Steps between the state and the last bit.",
+        trials: u64 => "Simulated runs of ten smoothed states.",
+        predicted: f64 ["sigma^2"] => "Steady variance computed by the sign-bit smoother.",
+        kalman: f64 ["sigma^2"] => "Steady variance of the unquantized smoother.",
+        rts_mse: Measured ["sigma^2"] => "Mean squared error of the sign-bit smoother.",
+        exact_mse: Measured ["sigma^2"] => "Mean squared error of the exact smoother of the same bits.",
+        excess: Measured ["sigma^2"] => "Mean squared distance of the two smoothed estimates.",
     }
 }
 
@@ -97,11 +87,9 @@ impl Figure for Smoothing {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let key = |r: &Row| format!("{} {}", r.plant, r.lag);
-        claims.references("rts", "error of the smoother at a, gamma, lag", rows, |r| (key(r), r.rts_mse));
-        claims.references("exact", "error of the exact smoother at a, gamma, lag", rows, |r| (key(r), r.exact_mse));
-        let what = "predicted variance at a, gamma, lag";
-        claims.references("predicted", what, rows, |r| (key(r), r.predicted));
+        claims.keyed("rts", "error of the smoother at a, gamma, lag", rows, |r| r.rts_mse);
+        claims.keyed("exact", "error of the exact smoother at a, gamma, lag", rows, |r| r.exact_mse);
+        claims.keyed("predicted", "predicted variance at a, gamma, lag", rows, |r| r.predicted);
         let at = |gamma: f64, lag: usize| rows.iter().find(|r| r.plant == Plant { a: 0.9, gamma } && r.lag == lag);
         for (gamma, lag, saving) in [(0.5, 5, 0.28), (0.05, 20, 0.21)] {
             let saved = at(gamma, lag)
@@ -115,10 +103,7 @@ impl Figure for Smoothing {
         here.all("near-exact", what, slow, |r| {
             r.excess.value - 4.5 * r.excess.standard_error.unwrap_or(0.0) <= 1.45e-3 * r.exact_mse.value
         });
-        let difference = at(0.05, 4).zip(at(0.05, 0)).map(|(r, now)| Measured {
-            value: r.rts_mse.value - now.kalman,
-            ..r.rts_mse
-        });
+        let difference = at(0.05, 4).zip(at(0.05, 0)).map(|(r, now)| r.rts_mse - now.kalman);
         let what = "gamma = 0.05: from lag 4 the sign-bit smoother beats the unquantized filter";
         here.less("beats-analog", what, difference, 4.5);
     }

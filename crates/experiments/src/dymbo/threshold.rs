@@ -15,24 +15,18 @@ parameters! {
         /// Plants, `a:gamma`; the state starts from its stationary law.
         #[garde(length(min = 1), custom(stationary), dive)]
         plants: Vec<Plant> = plants([(0.9, 0.5), (0.9, 0.05), (-0.9, 0.5)]),
-        /// Steps of a run that are measured.
         #[garde(range(min = 1, max = 10_000))]
-        steps: u64 = 1000,
-        /// Steps before them.
+        steps: u64 = 1000 => "Steps of a run that are measured.",
         #[garde(range(max = 10_000))]
-        burn: u64 = 100,
-        /// Simulated runs.
+        burn: u64 = 100 => "Steps before them.",
         #[garde(range(min = 2, max = 100_000_000))]
-        trials: u64 = 6_000 => quick 200,
-        /// Coefficient of the unstable plant.
+        trials: u64 = 6_000 => quick 200 => "Simulated runs.",
         #[garde(range(min = -3.0, max = 3.0))]
-        unstable_a: f64 = 1.2,
-        /// Its process variance over measurement variance.
+        unstable_a: f64 = 1.2 => "Coefficient of the unstable plant.",
         #[garde(range(min = 1e-6, max = 1e3))]
-        unstable_gamma: f64 = 0.5,
-        /// Simulated runs of it.
+        unstable_gamma: f64 = 0.5 => "Its process variance over measurement variance.",
         #[garde(range(min = 2, max = 100_000_000))]
-        unstable_trials: u64 = 20_000 => quick 2_000,
+        unstable_trials: u64 = 20_000 => quick 2_000 => "Simulated runs of it.",
     }
 }
 
@@ -43,38 +37,26 @@ fn stationary(plants: &[Plant], (): &()) -> garde::Result {
 
 rows! {
     pub struct Rows {
-        /// Errors of the three rules.
-        rules: Vec<Row>,
-        /// Runs of an unstable plant that escape.
-        unstable: Vec<Unstable>,
+        rules: Vec<Row> => "Errors of the three rules.",
+        unstable: Vec<Unstable> => "Runs of an unstable plant that escape.",
     }
 
-    struct Row {
+    struct Row by "{plant} {rule}" {
         #[serde(flatten)]
         plant: Plant,
-        /// Place of the threshold.
-        rule: &'static str,
-        /// Simulated runs.
-        trials: u64,
-        /// Mean squared error.
-        mse: Measured ["sigma^2"],
-        /// Relative excess over the prediction rule, same noise.
-        excess: Measured,
-        /// Squared error over computed variance.
-        nees: Measured,
+        rule: &'static str => "Place of the threshold.",
+        trials: u64 => "Simulated runs.",
+        mse: Measured ["sigma^2"] => "Mean squared error.",
+        excess: Measured => "Relative excess over the prediction rule, same noise.",
+        nees: Measured => "Squared error over computed variance.",
     }
 
-    struct Unstable {
-        /// Plant coefficient.
-        a: f64,
-        /// Process variance over measurement variance.
-        gamma: f64,
-        /// Simulated runs.
-        trials: u64,
-        /// Fraction of runs whose error exceeds 50 within 500 steps.
-        escaped: Measured,
-        /// Steady variance that the filter computes meanwhile.
-        riccati: Option<f64> ["sigma^2"],
+    struct Unstable by "{a} {gamma}" {
+        a: f64 => "Plant coefficient.",
+        gamma: f64 => "Process variance over measurement variance.",
+        trials: u64 => "Simulated runs.",
+        escaped: Measured => "Fraction of runs whose error exceeds 50 within 500 steps.",
+        riccati: Option<f64> ["sigma^2"] => "Steady variance that the filter computes meanwhile.",
     }
 }
 
@@ -202,18 +184,15 @@ impl Figure for ThresholdPlace {
     }
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
-        let key = |r: &Row| format!("{} {}", r.plant, r.rule);
-        claims.references("mse", "mean squared error at a, gamma, rule", &rows.rules, |r| (key(r), r.mse));
+        claims.keyed("mse", "mean squared error at a, gamma, rule", &rows.rules, |r| r.mse);
         let what = "E1: relative excess over the prediction rule at a, gamma, rule";
-        claims.references("excess", what, &rows.rules, |r| (key(r), r.excess));
+        claims.keyed("excess", what, &rows.rules, |r| r.excess);
         let right = rows.rules.iter().filter(|r| r.rule == "prediction");
         let what = "normalised error with the prediction rule at a, gamma";
         claims.references("nees", what, right, |r| (r.plant.to_string(), r.nees));
-        let plant = |r: &Unstable| format!("{} {}", r.a, r.gamma);
         let what = "share of the runs that escape within 500 steps at a, gamma";
-        claims.references("escaped", what, &rows.unstable, |r| (plant(r), r.escaped));
-        let what = "while the computed variance stays finite, at a, gamma";
-        claims.references("riccati", what, &rows.unstable, |r| (plant(r), r.riccati));
+        claims.keyed("escaped", what, &rows.unstable, |r| r.escaped);
+        claims.keyed("riccati", "while the computed variance stays finite, at a, gamma", &rows.unstable, |r| r.riccati);
     }
 
     fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {

@@ -13,21 +13,16 @@ const ID: &str = "dymbo-vector";
 
 parameters! {
     pub struct Parameters {
-        /// Transition matrix, row by row; stable.
         #[garde(length(equal = 4), inner(range(min = -10.0, max = 10.0)), custom(stable))]
-        transition: Vec<f64> = vec![0.95, 0.25, -0.1, 0.9],
-        /// Variance of the process noise of each coordinate.
+        transition: Vec<f64> = vec![0.95, 0.25, -0.1, 0.9] => "Transition matrix, row by row; stable.",
         #[garde(range(min = 1e-6, max = 1e6))]
-        process_variance: f64 = 0.3,
-        /// Variance of the measurement noise.
+        process_variance: f64 = 0.3 => "Variance of the process noise of each coordinate.",
         #[garde(range(min = 1e-6, max = 1e6))]
-        measurement_variance: f64 = 1.0,
-        /// Steps of a run that are measured.
+        measurement_variance: f64 = 1.0 => "Variance of the measurement noise.",
         #[garde(range(min = 1, max = 10_000))]
-        steps: usize = 40 => quick 10,
-        /// Simulated runs.
+        steps: usize = 40 => quick 10 => "Steps of a run that are measured.",
         #[garde(range(min = 2, max = 1_000_000))]
-        trials: u64 = 60 => quick 4,
+        trials: u64 = 60 => quick 4 => "Simulated runs.",
     }
 }
 
@@ -156,27 +151,17 @@ fn one_run<const M: usize>(
 }
 
 rows! {
-    pub struct Row {
-        /// Number of sensors and when they answer.
-        scheme: &'static str,
-        /// Computed steady variance of the first coordinate.
-        p11: f64 ["unit^2"],
-        /// Computed steady covariance.
-        p12: f64 ["unit^2"],
-        /// Computed steady variance of the second coordinate.
-        p22: f64 ["unit^2"],
-        /// Computed steady trace.
-        trace: f64 ["unit^2"],
-        /// Steady trace of the Kalman filter of the same sensors, unquantized.
-        kalman_trace: f64 ["unit^2"],
-        /// Simulated runs.
-        trials: u64,
-        /// Exact minimum given the bits.
-        mmse_trace: Measured ["unit^2"],
-        /// Mean squared distance from the exact mean.
-        excess: Measured ["unit^2"],
-        /// Normalised error over the dimension.
-        nees: Measured,
+    pub struct Row by "{scheme}" {
+        scheme: &'static str => "Number of sensors and when they answer.",
+        p11: f64 ["unit^2"] => "Computed steady variance of the first coordinate.",
+        p12: f64 ["unit^2"] => "Computed steady covariance.",
+        p22: f64 ["unit^2"] => "Computed steady variance of the second coordinate.",
+        trace: f64 ["unit^2"] => "Computed steady trace.",
+        kalman_trace: f64 ["unit^2"] => "Steady trace of the Kalman filter of the same sensors, unquantized.",
+        trials: u64 => "Simulated runs.",
+        mmse_trace: Measured ["unit^2"] => "Exact minimum given the bits.",
+        excess: Measured ["unit^2"] => "Mean squared distance from the exact mean.",
+        nees: Measured => "Normalised error over the dimension.",
     }
 }
 
@@ -238,14 +223,13 @@ impl Figure for VectorState {
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
-        let key = |r: &Row| r.scheme.to_owned();
-        claims.references("trace", "computed steady trace", rows, |r| (key(r), r.trace));
-        claims.references("kalman", "trace of the Kalman filter", rows, |r| (key(r), r.kalman_trace));
-        claims.references("mmse", "exact minimum given the bits", rows, |r| (key(r), r.mmse_trace));
-        claims.references("excess", "excess of the sign-bit filter", rows, |r| (key(r), r.excess));
+        claims.keyed("trace", "computed steady trace", rows, |r| r.trace);
+        claims.keyed("kalman", "trace of the Kalman filter", rows, |r| r.kalman_trace);
+        claims.keyed("mmse", "exact minimum given the bits", rows, |r| r.mmse_trace);
+        claims.keyed("excess", "excess of the sign-bit filter", rows, |r| r.excess);
         let what = "the excess in percent of the minimum";
-        claims.references("percent", what, rows, |r| (key(r), r.excess.scaled(100.0 / r.mmse_trace.value)));
-        claims.references("nees", "normalised error", rows, |r| (key(r), r.nees));
+        claims.keyed("percent", what, rows, |r| r.excess.scaled(100.0 / r.mmse_trace.value));
+        claims.keyed("nees", "normalised error", rows, |r| r.nees);
         let of = |scheme: &str| rows.iter().find(|r| r.scheme == scheme).map(|r| r.trace);
         let what = "three sensors in turn are better than three at once";
         claims.increasing("turns", what, [of("three in turn"), of("three at once")]);

@@ -11,22 +11,17 @@ use fewbits_mixture_codec::{Criterion, Reduction, Split};
 
 parameters! {
     pub struct Parameters {
-        /// Worlds.
         #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 40 => quick 2,
+        trials: u64 = 40 => quick 2 => "Worlds.",
     }
 }
 
 rows! {
     pub struct Row {
-        /// Filter.
-        filter: &'static str,
-        /// Multiple of Silverman's bandwidth.
-        factor: f64,
-        /// Whether the centres are shrunk.
-        shrunk: bool,
-        /// KL from the exact belief to the filter's, averaged over the ten times.
-        kl: Measured ["nat"],
+        filter: &'static str => "Filter.",
+        factor: f64 => "Multiple of Silverman's bandwidth.",
+        shrunk: bool => "Whether the centres are shrunk.",
+        kl: Measured ["nat"] => "KL from the exact belief to the filter's, averaged over the ten times.",
     }
 }
 
@@ -169,16 +164,14 @@ impl Figure for Widths {
             }
             Ok(errors)
         };
-        let runs = context
-            .monte_carlo(context.stream("handoff-bandwidth"), p.trials)
-            .run(one)?;
+        let runs = context.trials("handoff-bandwidth", p.trials, one)?;
         let rows = setups.iter().enumerate().map(|(s, setup)| {
-            let kl: Moments = runs.iter().map(|run| run[s]).collect();
+            let kl = runs.iter().map(|run| run[s]).collect();
             Row {
                 filter: setup.filter,
                 factor: setup.factor,
                 shrunk: setup.shrink,
-                kl: (&kl).into(),
+                kl,
             }
         });
         Ok(rows.collect())
@@ -191,8 +184,7 @@ impl Figure for Widths {
         let paper = kl(rows, "kl", 1.0, false);
         let what = "shrinking removes a quarter of the error or more at no bits";
         full.at_most("shrinkage", what, over(kl(rows, "kl", 1.0, true), paper), 0.8);
-        let what = "so does half the bandwidth";
-        full.at_most("half", what, over(kl(rows, "kl", 0.5, false), paper), 0.8);
+        full.at_most("half", "so does half the bandwidth", over(kl(rows, "kl", 0.5, false), paper), 0.8);
         let what = "but not where the estimate itself is handed on";
         full.at_least("half-kde", what, over(kl(rows, "kde", 0.5, false), kl(rows, "kde", 1.0, false)), 1.1);
         let what = "the pipeline with shrinkage has at most 0.7 of the paper's error";

@@ -8,45 +8,33 @@ use nalgebra::{Matrix1, Vector1};
 
 parameters! {
     pub struct Parameters {
-        /// Mass of the small lobe.
         #[garde(range(min = 1e-6, max = 0.5))]
-        mass: f64 = 0.1,
-        /// Centre of the small lobe of the first density.
+        mass: f64 = 0.1 => "Mass of the small lobe.",
         #[garde(range(min = 0.6, max = 0.9))]
-        lobe: f64 = 0.65,
-        /// Centre of the small lobe of the second.
+        lobe: f64 = 0.65 => "Centre of the small lobe of the first density.",
         #[garde(range(min = 0.6, max = 0.9))]
-        moved_lobe: f64 = 0.85,
-        /// The measurement tells whether the state is above this.
+        moved_lobe: f64 = 0.85 => "Centre of the small lobe of the second.",
         #[garde(range(min = 0.3, max = 0.6))]
-        threshold: f64 = 0.5,
+        threshold: f64 = 0.5 => "The measurement tells whether the state is above this.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// The two densities.
-        densities: Vec<Density>,
-        /// L1 before and after the measurement.
-        l1: Vec<Distance>,
+        densities: Vec<Density> => "The two densities.",
+        l1: Vec<Distance> => "L1 before and after the measurement.",
     }
 
     struct Density {
-        /// State.
-        x: f64,
-        /// First density.
-        p0: f64,
-        /// Second density.
-        p1: f64,
+        x: f64 => "State.",
+        p0: f64 => "First density.",
+        p1: f64 => "Second density.",
     }
 
-    struct Distance {
-        /// When: prior, y0, y1 (given the measurement), expected.
-        when: &'static str,
-        /// Probability of the case under the first density.
-        probability: f64,
-        /// L1 of the two densities.
-        l1: f64,
+    struct Distance by "{when}" {
+        when: &'static str => "When: prior, y0, y1 (given the measurement), expected.",
+        probability: f64 => "Probability of the case under the first density.",
+        l1: f64 => "L1 of the two densities.",
     }
 }
 
@@ -105,8 +93,8 @@ impl Figure for Fig3 {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        claims.references("l1", "L1", &rows.l1, |d| (d.when.to_owned(), d.l1));
-        claims.references("probability", "probability", &rows.l1, |d| (d.when.to_owned(), d.probability));
+        claims.keyed("l1", "L1", &rows.l1, |d| d.l1);
+        claims.keyed("probability", "probability", &rows.l1, |d| d.probability);
         let gap = rows.l1("expected").zip(rows.l1("prior")).map(|(e, p)| e - 2.0 * p);
         claims.at_most("twice", "the expected L1 is at most twice the prior's", gap, 0.0);
         here.below("nothing", "the other answer leaves nothing of it", rows.l1("y0"), 1e-8);

@@ -5,49 +5,34 @@ use crate::prelude::*;
 
 parameters! {
     pub struct Parameters {
-        /// Sensors in the field.
         #[garde(range(min = 5, max = 10_000))]
-        sensors: usize = 25,
-        /// Steps.
+        sensors: usize = 25 => "Sensors in the field.",
         #[garde(range(min = 2, max = 1000))]
-        steps: usize = 10,
+        steps: usize = 10 => "Steps.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// The target and who leads.
-        track: Vec<Step>,
-        /// The sensors.
-        sensors: Vec<Sensor>,
+        track: Vec<Step> => "The target and who leads.",
+        sensors: Vec<Sensor> => "The sensors.",
     }
 
     struct Step {
-        /// Time.
-        t: usize,
-        /// Position of the target.
-        x: f64 ["r0"],
-        /// Position of the target.
-        y: f64 ["r0"],
-        /// The leader; nobody leads at time 0.
-        leader: Option<usize>,
-        /// Its position.
-        leader_x: Option<f64> ["r0"],
-        /// Its position.
-        leader_y: Option<f64> ["r0"],
-        /// Its distance from the target.
-        distance: Option<f64> ["r0"],
-        /// What it read.
-        reading: Option<f64>,
+        t: usize => "Time.",
+        x: f64 ["r0"] => "Position of the target.",
+        y: f64 ["r0"] => "Position of the target.",
+        leader: Option<usize> => "The leader; nobody leads at time 0.",
+        leader_x: Option<f64> ["r0"] => "Its position.",
+        leader_y: Option<f64> ["r0"] => "Its position.",
+        distance: Option<f64> ["r0"] => "Its distance from the target.",
+        reading: Option<f64> => "What it read.",
     }
 
     struct Sensor {
-        /// Number.
-        sensor: usize,
-        /// Position.
-        x: f64 ["r0"],
-        /// Position.
-        y: f64 ["r0"],
+        sensor: usize => "Number.",
+        x: f64 ["r0"] => "Position.",
+        y: f64 ["r0"] => "Position.",
     }
 }
 
@@ -98,23 +83,12 @@ impl Figure for Fig4 {
 
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let track = points(&rows.track, |s| (s.x, s.y));
-        let links = rows
-            .track
-            .iter()
-            .filter_map(|s| Some(Layer::dashed("", vec![(s.x, s.y), (s.leader_x?, s.leader_y?)]).coloured(2)));
-        let leads: Vec<(f64, f64)> = rows
-            .track
-            .iter()
-            .filter_map(|s| Some((s.leader_x?, s.leader_y?)))
-            .collect();
-        let names = rows
-            .track
-            .iter()
-            .filter_map(|s| Some((s.leader_x?, s.leader_y? + 0.35, s.t.to_string())))
-            .collect();
+        let led = || rows.track.iter().filter_map(|s| Some((s, s.leader_x?, s.leader_y?)));
+        let leads = led().map(|(_, x, y)| (x, y)).collect();
+        let names = led().map(|(s, x, y)| (x, y + 0.35, s.t.to_string())).collect();
         let panel = Panel::linear("One world", "x / r0", "y / r0")
             .with(Layer::points("sensors", points(&rows.sensors, |s| (s.x, s.y))).styled(3, Marker::Cross))
-            .with_all(links)
+            .with_all(led().map(|(s, x, y)| Layer::dashed("", vec![(s.x, s.y), (x, y)]).coloured(2)))
             .with(Layer::line("target", track.clone()).coloured(0))
             .with(Layer::points("", track).coloured(0))
             .with(Layer::points("leaders, with their times", leads).styled(1, Marker::Square))

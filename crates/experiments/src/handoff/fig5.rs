@@ -8,55 +8,39 @@ use fewbits_mixture_codec::Reduction;
 
 parameters! {
     pub struct Parameters {
-        /// Times shown.
         #[garde(length(min = 1, max = 3), inner(range(min = 1, max = 10)))]
-        time: Vec<usize> = vec![2, 5, 8],
-        /// Components of the mixture that would be sent.
+        time: Vec<usize> = vec![2, 5, 8] => "Times shown.",
         #[garde(range(min = 1, max = 60))]
-        components: usize = 5,
-        /// Worlds for the mean distance from a Gaussian.
+        components: usize = 5 => "Components of the mixture that would be sent.",
         #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 20,
+        trials: u64 = 20 => "Worlds for the mean distance from a Gaussian.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// The particles of one world.
-        particles: Vec<Particle>,
-        /// The components that would be sent: ellipses of half the mass.
-        ellipses: Vec<Outline>,
-        /// How far from Gaussian the beliefs are, over all worlds.
-        gaussian: Vec<Distance>,
+        particles: Vec<Particle> => "The particles of one world.",
+        ellipses: Vec<Outline> => "The components that would be sent: ellipses of half the mass.",
+        gaussian: Vec<Distance> => "How far from Gaussian the beliefs are, over all worlds.",
     }
 
     struct Particle {
-        /// Time.
-        t: usize,
-        /// Number.
-        i: usize,
-        /// Position.
-        x: f64 ["r0"],
-        /// Position.
-        y: f64 ["r0"],
-        /// Weight.
-        weight: f64,
+        t: usize => "Time.",
+        i: usize => "Number.",
+        x: f64 ["r0"] => "Position.",
+        y: f64 ["r0"] => "Position.",
+        weight: f64 => "Weight.",
     }
 
     struct Outline {
-        /// Time.
-        t: usize,
-        /// Component.
-        component: usize,
-        /// Point of the outline.
-        x: f64 ["r0"],
-        /// Point of the outline.
-        y: f64 ["r0"],
+        t: usize => "Time.",
+        component: usize => "Component.",
+        x: f64 ["r0"] => "Point of the outline.",
+        y: f64 ["r0"] => "Point of the outline.",
     }
 
     struct Distance {
-        /// KL from the estimate to the Gaussian of its moments.
-        kl: Measured ["nat"],
+        kl: Measured ["nat"] => "KL from the estimate to the Gaussian of its moments.",
     }
 }
 

@@ -8,60 +8,40 @@ use std::f64::consts::LN_10;
 
 parameters! {
     pub struct Parameters {
-        /// Worlds.
         #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 400 => quick 4,
+        trials: u64 = 400 => quick 4 => "Worlds.",
     }
 }
 
 rows! {
+    #[derive(Default)]
     pub struct Rows {
-        /// Bounds against time.
-        bounds: Vec<Bound>,
-        /// Plug-in errors of a hand-over, averaged over worlds and time.
-        steps: Vec<Step>,
-        /// Bounds in the same worlds with five components, beside ten.
-        five: Vec<Bound>,
+        bounds: Vec<Bound> => "Bounds against time.",
+        steps: Vec<Step> => "Plug-in errors of a hand-over, averaged over worlds and time.",
+        five: Vec<Bound> => "Bounds in the same worlds with five components, beside ten.",
     }
 
-    struct Bound {
-        /// How estimates are smoothed.
-        smoothing: &'static str,
-        /// Time.
-        t: usize,
-        /// Twice the sum of mean ML errors (ML-optimised): the printed bound of the ML.
-        ml_printed: Measured,
-        /// Twice the sum of mean DR errors: never worse.
-        ml_from_dr: f64,
-        /// Decimal logarithm of the printed KL bound with mean errors (KL-optimised).
-        log10_kl_printed: Measured,
-        /// Of its median over worlds.
-        log10_kl_median: f64,
-        /// Decimal logarithm of the corrected KL bound with mean errors.
-        log10_kl_corrected: f64,
-        /// Decimal logarithm of the printed L1 bound with mean errors (L1-optimised).
-        log10_l1_printed: Measured,
-        /// Mean of `2 tanh(sum DR/2)`, a bound of the L1 for every data sequence (ML-optimised).
-        l1_from_dr: Measured,
-        /// Mean of `phi(2 sum DR)`, a bound of the KL for every data sequence (ML-optimised).
-        kl_from_dr: Measured,
+    struct Bound by "{smoothing}-t{t}" {
+        smoothing: &'static str => "How estimates are smoothed.",
+        t: usize => "Time.",
+        ml_printed: Measured => "Twice the sum of mean ML errors (ML-optimised): the printed bound of the ML.",
+        ml_from_dr: f64 => "Twice the sum of mean DR errors: never worse.",
+        log10_kl_printed: Measured => "Decimal logarithm of the printed KL bound with mean errors (KL-optimised).",
+        log10_kl_median: f64 => "Of its median over worlds.",
+        log10_kl_corrected: f64 => "Decimal logarithm of the corrected KL bound with mean errors.",
+        log10_l1_printed: Measured => "Decimal logarithm of the printed L1 bound with mean errors (L1-optimised).",
+        l1_from_dr: Measured => "Mean of `2 tanh(sum DR/2)`, a bound of the L1 for every data sequence (ML-optimised).",
+        kl_from_dr: Measured => "Mean of `phi(2 sum DR)`, a bound of the KL for every data sequence (ML-optimised).",
     }
 
-    struct Step {
-        /// How estimates are smoothed.
-        smoothing: &'static str,
-        /// What the reduction keeps small.
-        method: &'static str,
-        /// ML at the centres.
-        ml: Measured,
-        /// KL at the centres.
-        kl: Measured,
-        /// L1 at the centres.
-        l1: Measured,
-        /// DR at the centres.
-        dr: Measured,
-        /// Components sent.
-        size: Measured,
+    struct Step by "{smoothing}-{method}" {
+        smoothing: &'static str => "How estimates are smoothed.",
+        method: &'static str => "What the reduction keeps small.",
+        ml: Measured => "ML at the centres.",
+        kl: Measured => "KL at the centres.",
+        l1: Measured => "L1 at the centres.",
+        dr: Measured => "DR at the centres.",
+        size: Measured => "Components sent.",
     }
 }
 
@@ -124,28 +104,27 @@ impl Fig6 {
                 runs.iter().map(of).collect()
             };
             let (own_ml, own_kl) = (own(0), own(1));
-            let moments = |values: &mut dyn Iterator<Item = f64>| Measured::mean(&values.collect::<Moments>());
             // An estimate of a KL may be zero, its logarithm -inf: the median does not mind.
             let mut logs: Vec<f64> = own_kl.iter().map(|b| b.ln_kl_printed / LN_10).collect();
             logs.sort_by(f64::total_cmp);
             Bound {
                 smoothing: smoothing.name(),
                 t,
-                ml_printed: moments(&mut own_ml.iter().map(|b| b.ml_printed)),
+                ml_printed: own_ml.iter().map(|b| b.ml_printed).collect(),
                 ml_from_dr: ml.ml_from_dr,
                 log10_kl_printed: jackknifed(1, |b| b.ln_kl_printed),
                 log10_kl_median: logs[logs.len() / 2],
                 log10_kl_corrected: kl.ln_kl_corrected / LN_10,
                 log10_l1_printed: jackknifed(2, |b| b.ln_l1_printed),
-                l1_from_dr: moments(&mut own_ml.iter().map(|b| b.l1_from_dr)),
-                kl_from_dr: moments(&mut own_ml.iter().map(|b| b.kl_from_dr)),
+                l1_from_dr: own_ml.iter().map(|b| b.l1_from_dr).collect(),
+                kl_from_dr: own_ml.iter().map(|b| b.kl_from_dr).collect(),
             }
         });
         // Errors of one world are averaged over time first: the standard error is over worlds.
         let steps = (0..3).map(|c| {
-            let over = |of: &dyn Fn(&(StepError, usize)) -> f64| {
+            let over = |of: &dyn Fn(&(StepError, usize)) -> f64| -> Measured {
                 let world = |run: &Run| run[c].iter().map(of).collect::<Moments>().mean();
-                Measured::mean(&runs.iter().map(world).collect::<Moments>())
+                runs.iter().map(world).collect()
             };
             Step {
                 smoothing: smoothing.name(),
@@ -257,11 +236,7 @@ impl Figure for Fig6 {
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let mut rows = Rows {
-            bounds: Vec::new(),
-            steps: Vec::new(),
-            five: Vec::new(),
-        };
+        let mut rows = Rows::default();
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
             let stream = context.stream("handoff-fig6").named(smoothing.name());
             let runs = |components| {
@@ -281,18 +256,16 @@ impl Figure for Fig6 {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        let key = |s: &Step| format!("{}-{}", s.smoothing, s.method);
-        full.references("ml", "mean ML of a hand-over", &rows.steps, |s| (key(s), s.ml));
-        full.references("kl", "mean KL of a hand-over", &rows.steps, |s| (key(s), s.kl));
-        full.references("l1", "mean L1 of a hand-over", &rows.steps, |s| (key(s), s.l1));
-        full.references("dr", "mean DR of a hand-over", &rows.steps, |s| (key(s), s.dr));
-        full.references("size", "components sent", &rows.steps, |s| (key(s), s.size));
-        let at = |b: &Bound| format!("{}-t{}", b.smoothing, b.t);
-        full.references("ml-bound", "printed ML bound", &rows.bounds, |b| (at(b), b.ml_printed));
-        full.references("log10-kl", "logarithm of the printed KL bound", &rows.bounds, |b| (at(b), b.log10_kl_printed));
-        full.references("log10-l1", "logarithm of the printed L1 bound", &rows.bounds, |b| (at(b), b.log10_l1_printed));
-        full.references("l1-from-dr", "L1 bound from DR", &rows.bounds, |b| (at(b), b.l1_from_dr));
-        full.references("kl-from-dr", "KL bound from DR", &rows.bounds, |b| (at(b), b.kl_from_dr));
+        full.keyed("ml", "mean ML of a hand-over", &rows.steps, |s| s.ml);
+        full.keyed("kl", "mean KL of a hand-over", &rows.steps, |s| s.kl);
+        full.keyed("l1", "mean L1 of a hand-over", &rows.steps, |s| s.l1);
+        full.keyed("dr", "mean DR of a hand-over", &rows.steps, |s| s.dr);
+        full.keyed("size", "components sent", &rows.steps, |s| s.size);
+        full.keyed("ml-bound", "printed ML bound", &rows.bounds, |b| b.ml_printed);
+        full.keyed("log10-kl", "logarithm of the printed KL bound", &rows.bounds, |b| b.log10_kl_printed);
+        full.keyed("log10-l1", "logarithm of the printed L1 bound", &rows.bounds, |b| b.log10_l1_printed);
+        full.keyed("l1-from-dr", "L1 bound from DR", &rows.bounds, |b| b.l1_from_dr);
+        full.keyed("kl-from-dr", "KL bound from DR", &rows.bounds, |b| b.kl_from_dr);
         for smoothing in [Smoothing::Preset, Smoothing::Silverman] {
             let under = rows.under(smoothing);
             let name = smoothing.name();

@@ -14,57 +14,45 @@ use rand_pcg::Pcg64Mcg;
 
 parameters! {
     pub struct Parameters {
-        /// Components sent.
         #[garde(range(min = 1, max = 100))]
-        components: usize = 5,
-        /// Points of the reference at which densities are compared.
+        components: usize = 5 => "Components sent.",
         #[garde(range(min = 2, max = 2000))]
-        points: usize = 250,
-        /// Worlds.
+        points: usize = 250 => "Points of the reference at which densities are compared.",
         #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 500 => quick 4,
+        trials: u64 = 500 => quick 4 => "Worlds.",
     }
 }
 
 rows! {
-    pub struct Row {
-        /// Time.
-        t: usize,
+    pub struct Row by "{method}-t{t}" {
+        t: usize => "Time.",
         /// What is handed on: a cut by ml, kl or l1; the estimate (kde_only); particles (raw_pf); one Gaussian (gauss).
         method: &'static str,
         /// KL from one reference filter to the method, less that to the other reference filter.
         kl_increase: Measured ["nat"],
-        /// Median over worlds.
-        median: f64 ["nat"],
-        /// The same before the step's own reduction.
-        before_reduction: Option<Measured> ["nat"],
+        median: f64 ["nat"] => "Median over worlds.",
+        before_reduction: Option<Measured> ["nat"] => "The same before the step's own reduction.",
     }
 
+    #[derive(Default)]
     pub struct Rows {
-        /// The actual error.
-        error: Vec<Row>,
-        /// Paired differences.
-        difference: Vec<Difference>,
-        /// Bounds in the same worlds.
-        bounds: Vec<Unamplified>,
+        error: Vec<Row> => "The actual error.",
+        difference: Vec<Difference> => "Paired differences.",
+        bounds: Vec<Unamplified> => "Bounds in the same worlds.",
     }
 
     struct Unamplified {
-        /// Time.
-        t: usize,
+        t: usize => "Time.",
         /// Sum of the KL errors of all hand-overs (KL-optimised): the printed KL bound if nothing were amplified.
         kl_sum: Measured ["nat"],
         /// Twice the sum of the ML errors (ML-optimised): the printed ML bound, which bounds the KL as well.
         ml_bound: Measured ["nat"],
     }
 
-    struct Difference {
-        /// Time.
-        t: usize,
-        /// Which.
-        pair: &'static str,
-        /// Difference of their errors, world by world.
-        kl: Measured ["nat"],
+    struct Difference by "{pair}-t{t}" {
+        t: usize => "Time.",
+        pair: &'static str => "Which.",
+        kl: Measured ["nat"] => "Difference of their errors, world by world.",
     }
 }
 
@@ -196,14 +184,8 @@ impl Figure for Fig6c {
     }
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let runs = context
-            .monte_carlo(context.stream("handoff-fig6c"), p.trials)
-            .run(|it| trial(p, it))?;
-        let mut rows = Rows {
-            error: Vec::new(),
-            difference: Vec::new(),
-            bounds: Vec::new(),
-        };
+        let runs = context.trials("handoff-fig6c", p.trials, |it| trial(p, it))?;
+        let mut rows = Rows::default();
         for t in 1..=STEPS {
             let of = |method: usize, when: usize| runs.iter().map(move |run| run[t - 1].0[method][when]);
             for (m, method) in METHODS.into_iter().enumerate() {
@@ -212,28 +194,23 @@ impl Figure for Fig6c {
                 rows.error.push(Row {
                     t,
                     method,
-                    kl_increase: (&of(m, 0).collect::<Moments>()).into(),
+                    kl_increase: of(m, 0).collect(),
                     median: sorted[sorted.len() / 2],
-                    before_reduction: (m < 3).then(|| (&of(m, 1).collect::<Moments>()).into()),
+                    before_reduction: (m < 3).then(|| of(m, 1).collect()),
                 });
             }
-            let sum = |which: usize| -> Moments {
-                runs.iter()
-                    .map(|run| run[..t].iter().map(|at| at.1[which]).sum::<f64>())
-                    .collect()
+            let sum = |which: usize| -> Measured {
+                let own = runs.iter().map(|run| run[..t].iter().map(|at| at.1[which]).sum());
+                own.collect()
             };
             rows.bounds.push(Unamplified {
                 t,
-                kl_sum: (&sum(1)).into(),
-                ml_bound: Measured::mean(&sum(0)).scaled(2.0),
+                kl_sum: sum(1),
+                ml_bound: sum(0).scaled(2.0),
             });
             for (pair, a, b) in [("ml-kl", 0, 1), ("kl-l1", 1, 2)] {
-                let gap: Moments = of(a, 0).zip(of(b, 0)).map(|(a, b)| a - b).collect();
-                rows.difference.push(Difference {
-                    t,
-                    pair,
-                    kl: (&gap).into(),
-                });
+                let kl = of(a, 0).zip(of(b, 0)).map(|(a, b)| a - b).collect();
+                rows.difference.push(Difference { t, pair, kl });
             }
         }
         Ok(rows)
@@ -242,15 +219,12 @@ impl Figure for Fig6c {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let (here, full) = (claims.at_defaults(), claims.at_full_trials());
         let paper = here.at_full_trials();
-        full.references("kl", "actual error", &rows.error, |r| (format!("{}-t{}", r.method, r.t), r.kl_increase));
+        full.keyed("kl", "actual error", &rows.error, |r| r.kl_increase);
         let before = rows.error.iter().filter_map(|r| Some((r, r.before_reduction?)));
         full.references("before", "error before the reduction", before, |(r, m)| (format!("{}-t{}", r.method, r.t), m));
-        full.references("difference", "paired difference", &rows.difference, |d| {
-            (format!("{}-t{}", d.pair, d.t), d.kl)
-        });
+        full.keyed("difference", "paired difference", &rows.difference, |d| d.kl);
         let pair = |pair: &'static str| rows.difference.iter().filter(move |d| d.pair == pair);
-        let what = "ML is behind KL at every time";
-        paper.all("ml-behind", what, pair("ml-kl"), |d| d.kl.value > 0.0);
+        paper.all("ml-behind", "ML is behind KL at every time", pair("ml-kl"), |d| d.kl.value > 0.0);
         let what = "KL and L1 are the same within 0.015 nat and three standard errors";
         here.all("kl-l1", what, pair("kl-l1"), |d| {
             d.kl.value.abs() < 0.015 + 3.0 * d.kl.standard_error.unwrap_or(0.0)

@@ -2,7 +2,6 @@
 
 mod bandwidth;
 mod exact;
-mod fig1;
 mod fig2;
 mod fig3;
 mod fig4;
@@ -19,7 +18,6 @@ use crate::AnyFigure;
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
     vec![
-        &fig1::Fig1,
         &fig2::Fig2,
         &fig3::Fig3,
         &fig4::Fig4,

@@ -10,15 +10,12 @@ use nalgebra::Vector2;
 
 parameters! {
     pub struct Parameters {
-        /// Components.
         #[garde(length(min = 1), inner(range(min = 1, max = 60)))]
-        components: Vec<usize> = vec![1, 3, 5, 10],
-        /// Resolutions: quantiser steps in standard deviations.
+        components: Vec<usize> = vec![1, 3, 5, 10] => "Components.",
         #[garde(length(min = 1), inner(range(min = 0.01, max = 1.0)))]
-        resolution: Vec<f64> = vec![0.5, 0.35, 0.25, 0.15],
-        /// Worlds, of three beliefs each.
+        resolution: Vec<f64> = vec![0.5, 0.35, 0.25, 0.15] => "Resolutions: quantiser steps in standard deviations.",
         #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 12 => quick 2,
+        trials: u64 = 12 => quick 2 => "Worlds, of three beliefs each.",
     }
 }
 
@@ -26,14 +23,10 @@ rows! {
     pub struct Row {
         /// What is sent: coded, f32 (mixture parameters as floats), coded-kd (a cut by KL, coded), particles (f32, resampled).
         message: &'static str,
-        /// Components, or particles.
-        size: usize,
-        /// Quantiser step in standard deviations, if coded.
-        resolution: Option<f64>,
-        /// Mean length.
-        bits: Measured ["bit"],
-        /// KL from the estimate to what the receiver knows.
-        kl: Measured ["nat"],
+        size: usize => "Components, or particles.",
+        resolution: Option<f64> => "Quantiser step in standard deviations, if coded.",
+        bits: Measured ["bit"] => "Mean length.",
+        kl: Measured ["nat"] => "KL from the estimate to what the receiver knows.",
     }
 }
 
@@ -96,7 +89,7 @@ impl Figure for Rate {
             }
             Ok(sums)
         };
-        let runs = context.monte_carlo(context.stream("handoff-rate"), p.trials).run(one)?;
+        let runs = context.trials("handoff-rate", p.trials, one)?;
         let mut keys = Vec::new();
         for m in &p.components {
             keys.push(("f32", *m, None));
@@ -107,7 +100,7 @@ impl Figure for Rate {
         }
         keys.extend([("particles", 100, None), ("particles", 500, None)]);
         let rows = keys.into_iter().enumerate().map(|(i, (message, size, resolution))| {
-            let of = |k: usize| Measured::mean(&runs.iter().map(|run| run[i][k]).collect::<Moments>());
+            let of = |k: usize| runs.iter().map(|run| run[i][k]).collect();
             Row {
                 message,
                 size,

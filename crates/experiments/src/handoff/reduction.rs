@@ -10,40 +10,31 @@ use std::time::Instant;
 
 parameters! {
     pub struct Parameters {
-        /// Components.
         #[garde(length(min = 1), inner(range(min = 1, max = 100)))]
-        components: Vec<usize> = vec![3, 5, 10, 20],
-        /// Worlds, of three beliefs each.
+        components: Vec<usize> = vec![3, 5, 10, 20] => "Components.",
         #[garde(range(min = 2, max = 10_000))]
-        trials: u64 = 10 => quick 2,
+        trials: u64 = 10 => quick 2 => "Worlds, of three beliefs each.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Errors.
-        errors: Vec<Row>,
+        errors: Vec<Row> => "Errors.",
         /// What the methods cost.
         #[schemars(extend("volatile" = true))]
         cost: Vec<Time>,
     }
 
-    struct Row {
-        /// Method.
-        method: &'static str,
-        /// The most components.
-        components: usize,
-        /// KL from the estimate to the mixture, by quadrature.
-        kl: Measured ["nat"],
+    struct Row by "{method}-m{components}" {
+        method: &'static str => "Method.",
+        components: usize => "The most components.",
+        kl: Measured ["nat"] => "KL from the estimate to the mixture, by quadrature.",
     }
 
     struct Time {
-        /// Method.
-        method: &'static str,
-        /// The most components.
-        components: usize,
-        /// Time of one reduction, the mean of all.
-        milliseconds: f64 ["ms"],
+        method: &'static str => "Method.",
+        components: usize => "The most components.",
+        milliseconds: f64 ["ms"] => "Time of one reduction, the mean of all.",
     }
 }
 
@@ -154,19 +145,17 @@ impl Figure for Reductions {
             }
             Ok(all)
         };
-        let runs = context
-            .monte_carlo(context.stream("handoff-reduction"), p.trials)
-            .run(one)?;
+        let runs = context.trials("handoff-reduction", p.trials, one)?;
         let (mut errors, mut cost) = (Vec::new(), Vec::new());
         for (m, (method, _)) in methods.iter().enumerate() {
             for (c, components) in p.components.iter().enumerate() {
                 let at = m * p.components.len() + c;
-                let kl: Moments = runs.iter().map(|run| run[at].0).collect();
+                let kl = runs.iter().map(|run| run[at].0).collect();
                 let milliseconds = runs.iter().map(|run| run[at].1).collect::<Moments>().mean();
                 errors.push(Row {
                     method,
                     components: *components,
-                    kl: (&kl).into(),
+                    kl,
                 });
                 cost.push(Time {
                     method,
@@ -180,7 +169,7 @@ impl Figure for Reductions {
 
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let (full, paper) = (claims.at_full_trials(), claims.at_defaults().at_full_trials());
-        full.references("kl", "KL", &rows.errors, |r| (format!("{}-m{}", r.method, r.components), r.kl));
+        full.keyed("kl", "KL", &rows.errors, |r| r.kl);
         for m in p.components.iter().filter(|m| **m >= 3) {
             let ratio = over(rows.kl("pipeline 15", *m), rows.kl("kd kl", *m));
             let what = "the recommended pipeline loses at most 0.65 of what the paper's cut does";
@@ -190,8 +179,7 @@ impl Figure for Reductions {
             let gap = minus(rows.kl("principal kl", *m), rows.kl("alternating kl", *m));
             // With three components the difference is below its standard error.
             if *m >= 5 {
-                let what = "alternating axes lose more than principal axes";
-                paper.below(format!("alternating-m{m}"), what, gap, 0.0);
+                paper.below(format!("alternating-m{m}"), "alternating axes lose more than principal axes", gap, 0.0);
             }
         }
         let more = p.components.iter().map(|m| rows.kl("pipeline 15", *m));

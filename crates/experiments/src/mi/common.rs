@@ -1,8 +1,10 @@
 //! What the tables of this system share: scenes, starting quantizers and rows of designs.
 
 use crate::prelude::*;
-use fewbits_quantizer_design::design::Design;
-use fewbits_quantizer_design::{Channel, Criterion, Labelling, Noise, Prior, Quantizer, Scene, System, lloyd_max};
+use fewbits_quantizer_design::design::{self, Design};
+use fewbits_quantizer_design::{
+    Channel, Criterion, Labelling, Newton, Noise, Prior, Quantizer, Scene, System, lloyd_max,
+};
 
 pub(super) const MI: Criterion = Criterion::MutualInformation;
 pub(super) const MSE: Criterion = Criterion::MeanSquaredError;
@@ -34,6 +36,14 @@ pub(super) fn lloyd_system(scene: &Scene, levels: usize, sd: impl Fn(usize) -> f
     Ok(System::ideal(scene.clone(), quantizers)?)
 }
 
+/// How many of so many random starts about a system end at the best design's value.
+pub(super) fn arrived(about: &System, criterion: Criterion, starts: usize, best: &Design) -> usize {
+    let reached = |start: &&System| {
+        design::joint(start, criterion, &Newton::default()).is_ok_and(|d| (d.value - best.value).abs() < 1e-10)
+    };
+    design::random_starts(about, starts, 1).iter().filter(reached).count()
+}
+
 /// The odd quantizer with these positive breakpoints and one at zero.
 pub(super) fn odd(positive: &[f64]) -> Result<Quantizer, Error> {
     let mirrored = positive.iter().rev().map(|b| -b);
@@ -49,32 +59,20 @@ pub(super) fn bsc(words: &[u32], crossover: f64) -> Result<Channel, Error> {
 pub(super) fn breakpoints(quantizer: &Quantizer) -> String {
     // Zero has a sign, and an optimum at zero a rounding error.
     let rounded = |b: &f64| format!("{:.10}", if b.abs() < 5e-11 { 0.0 } else { *b });
-    quantizer
-        .breakpoints()
-        .iter()
-        .map(rounded)
-        .collect::<Vec<_>>()
-        .join(" ")
+    joined(quantizer.breakpoints().iter().map(rounded), " ")
 }
 
 rows! {
     /// A design of two sensors.
     #[derive(Debug, Clone)]
     pub(super) struct Pair {
-        /// Breakpoints of sensor 1.
-        pub(super) gamma1: String,
-        /// Breakpoints of sensor 2.
-        pub(super) gamma2: String,
-        /// Largest breakpoint of sensor 1.
-        pub(super) outer1: f64,
-        /// Largest breakpoint of sensor 2.
-        pub(super) outer2: f64,
-        /// Mutual information between the unknown and all symbols.
-        pub(super) mi_nats: f64 ["nat"],
-        /// The same in bits.
-        pub(super) mi_bits: f64 ["bit"],
-        /// Mean squared error of the posterior mean, in prior variances.
-        pub(super) mse: f64,
+        pub(super) gamma1: String => "Breakpoints of sensor 1.",
+        pub(super) gamma2: String => "Breakpoints of sensor 2.",
+        pub(super) outer1: f64 => "Largest breakpoint of sensor 1.",
+        pub(super) outer2: f64 => "Largest breakpoint of sensor 2.",
+        pub(super) mi_nats: f64 ["nat"] => "Mutual information between the unknown and all symbols.",
+        pub(super) mi_bits: f64 ["bit"] => "The same in bits.",
+        pub(super) mse: f64 => "Mean squared error of the posterior mean, in prior variances.",
         /// Largest eigenvalue of the criterion's Hessian where it was a joint design.
         pub(super) curvature: Option<f64>,
     }

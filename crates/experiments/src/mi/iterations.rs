@@ -4,86 +4,46 @@
 use super::common::{MI, MSE, bsc, lloyd_system, scene};
 use crate::prelude::*;
 use fewbits_quantizer_design::{System, published};
-use serde::de::DeserializeOwned;
 use std::f64::consts::LN_2;
-use std::marker::PhantomData;
 
 parameters! {
-    /// Settings of Figures 4.2 and 4.3.
-    pub struct Clean {
-        /// Steps of each stage.
+    /// Settings of Figures 4.2 to 4.5.
+    pub struct Parameters {
         #[garde(range(min = 1, max = 1000))]
-        steps: usize = 15,
-        /// Noise standard deviation of both sensors, in prior standard deviations.
+        steps: usize = 15 => "Steps of each stage.",
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[garde(length(min = 1, max = 8), inner(inner(range(min = 0.0, max = 0.06))))]
+        crossovers: Option<Vec<f64>> = None => "Crossover probabilities of the words' bits, natural words, increasing.",
         #[garde(range(min = 1e-2, max = 1e2))]
-        noise_sd: f64 = 1.0,
+        noise_sd: f64 = 1.0 => "Noise standard deviation of both sensors, in prior standard deviations.",
     }
 }
 
-parameters! {
-    /// Settings of Figures 4.4 and 4.5.
-    pub struct Channels {
-        /// Steps of each stage.
-        #[garde(range(min = 1, max = 1000))]
-        steps: usize = 15,
-        /// Crossover probabilities of the words' bits, natural words, increasing.
-        #[garde(length(min = 1, max = 8), inner(range(min = 0.0, max = 0.06)))]
-        crossovers: Vec<f64> = vec![0.0, 0.001, 0.01, 0.05],
-        /// Noise standard deviation of both sensors, in prior standard deviations.
-        #[garde(range(min = 1e-2, max = 1e2))]
-        noise_sd: f64 = 1.0,
-    }
-}
-
-/// Steps, crossovers and noise of either setting.
-pub trait Setting: Serialize + DeserializeOwned + JsonSchema + Validate<Context = ()> + Default + Quick {
-    /// Steps, crossovers, noise.
-    fn parts(&self) -> (usize, &[f64], f64);
-}
-
-impl Setting for Clean {
-    fn parts(&self) -> (usize, &[f64], f64) {
-        (self.steps, &[0.0], self.noise_sd)
-    }
-}
-
-impl Setting for Channels {
-    fn parts(&self) -> (usize, &[f64], f64) {
-        (self.steps, &self.crossovers, self.noise_sd)
+impl Parameters {
+    /// Those of a clean channel, unless there are others.
+    fn crossovers(&self) -> &[f64] {
+        self.crossovers.as_deref().unwrap_or(&[0.0])
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Sensor by sensor.
-        chain: Vec<Step>,
-        /// One step of each sensor in turn.
-        cyclic: Vec<Step>,
+        chain: Vec<Step> => "Sensor by sensor.",
+        cyclic: Vec<Step> => "One step of each sensor in turn.",
     }
 
-    struct Step {
-        /// Crossover probability.
-        crossover: f64,
-        /// Steps so far.
-        iteration: usize,
-        /// Sensor being designed.
-        stage: usize,
-        /// Steps in this stage.
-        iter_in_stage: usize,
-        /// Information in sensor 1's symbol.
-        mi_x_z1_nats: f64 ["nat"],
-        /// Information in both symbols.
-        mi_x_z1z2_nats: f64 ["nat"],
-        /// Information in sensor 1's symbol.
-        mi_x_z1_bits: f64 ["bit"],
-        /// Information in both symbols.
-        mi_x_z1z2_bits: f64 ["bit"],
-        /// Squared error from both symbols, in prior variances.
-        mse: f64,
-        /// Outer breakpoint of sensor 1.
-        gamma1_outer: f64,
-        /// Outer breakpoint of sensor 2.
-        gamma2_outer: f64,
+    struct Step by "step {iteration}" {
+        crossover: f64 => "Crossover probability.",
+        iteration: usize => "Steps so far.",
+        stage: usize => "Sensor being designed.",
+        iter_in_stage: usize => "Steps in this stage.",
+        mi_x_z1_nats: f64 ["nat"] => "Information in sensor 1's symbol.",
+        mi_x_z1z2_nats: f64 ["nat"] => "Information in both symbols.",
+        mi_x_z1_bits: f64 ["bit"] => "Information in sensor 1's symbol.",
+        mi_x_z1z2_bits: f64 ["bit"] => "Information in both symbols.",
+        mse: f64 => "Squared error from both symbols, in prior variances.",
+        gamma1_outer: f64 => "Outer breakpoint of sensor 1.",
+        gamma2_outer: f64 => "Outer breakpoint of sensor 2.",
     }
 }
 
@@ -125,43 +85,46 @@ enum Shows {
 }
 
 /// One of Figures 4.2 to 4.5.
-pub struct Iterations<S> {
+pub struct Iterations {
     about: About,
     shows: Shows,
-    setting: PhantomData<fn() -> S>,
+    crossovers: Option<&'static [f64]>,
 }
 
+/// The channels of Figures 4.4 and 4.5.
+const CHANNELS: Option<&[f64]> = Some(&[0.0, 0.001, 0.01, 0.05]);
+
 /// Figure 4.2.
-pub static FIGURE42: Iterations<Clean> = Iterations {
+pub static FIGURE42: Iterations = Iterations {
     about: About::of("mi-fig4-2", "Information over iterations, clean channel", "thesis, Figure 4.2")
         .showing("Mutual information rises in two steps, one per sensor, to a plateau each."),
     shows: Shows::Information,
-    setting: PhantomData,
+    crossovers: None,
 };
 
 /// Figure 4.3.
-pub static FIGURE43: Iterations<Clean> = Iterations {
+pub static FIGURE43: Iterations = Iterations {
     about: About::of("mi-fig4-3", "Squared error over iterations, clean channel", "thesis, Figure 4.3")
         .showing("The squared error falls while the information rises, though it is not what is optimised."),
     shows: Shows::Error,
-    setting: PhantomData,
+    crossovers: None,
 };
 
 /// Figure 4.4.
-pub static FIGURE44: Iterations<Channels> = Iterations {
+pub static FIGURE44: Iterations = Iterations {
     about: About::of("mi-fig4-4", "Information over iterations, noisy channels", "thesis, Figure 4.4")
         .showing("Joint information at four crossovers, natural words. It rises for the better channels; at 0.05 the first stage \
                   lowers it, and the greedy result is below its start."),
     shows: Shows::Information,
-    setting: PhantomData,
+    crossovers: CHANNELS,
 };
 
 /// Figure 4.5.
-pub static FIGURE45: Iterations<Channels> = Iterations {
+pub static FIGURE45: Iterations = Iterations {
     about: About::of("mi-fig4-5", "Squared error over iterations, noisy channels", "thesis, Figure 4.5")
         .showing("Squared error at four crossovers, natural words. It falls at every step, on every channel."),
     shows: Shows::Error,
-    setting: PhantomData,
+    crossovers: CHANNELS,
 };
 
 /// Neighbouring rows of one channel.
@@ -181,16 +144,23 @@ fn pairs(rows: &[Step]) -> impl Iterator<Item = (&Step, &Step)> {
 /// Rounding that does not count as a fall.
 const ROUNDING: f64 = 1e-13;
 
-impl<S: Setting> Figure for Iterations<S> {
-    type Parameters = S;
+impl Figure for Iterations {
+    type Parameters = Parameters;
     type Tables = Rows;
 
     fn about(&self) -> About {
         self.about
     }
 
-    fn run(&self, p: &S, context: &Context<'_>) -> Result<Rows, Error> {
-        let (steps, crossovers, noise_sd) = p.parts();
+    fn defaults(&self) -> Parameters {
+        Parameters {
+            crossovers: self.crossovers.map(<[f64]>::to_vec),
+            ..Parameters::default()
+        }
+    }
+
+    fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
+        let (steps, crossovers, noise_sd) = (p.steps, p.crossovers(), p.noise_sd);
         let (mut chain, mut cyclic) = (Vec::new(), Vec::new());
         for &crossover in crossovers {
             context.check()?;
@@ -219,10 +189,9 @@ impl<S: Setting> Figure for Iterations<S> {
         Ok(Rows { chain, cyclic })
     }
 
-    fn claims(&self, p: &S, rows: &Rows, claims: &mut Claims) {
+    fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let (steps, crossovers, _) = p.parts();
-        let key = |r: &Step| format!("step {}", r.iteration);
+        let (steps, crossovers) = (p.steps, p.crossovers());
         let clean = || rows.chain.iter().filter(|_| crossovers == [0.0]);
         match self.shows {
             Shows::Information => {
@@ -247,11 +216,11 @@ impl<S: Setting> Figure for Iterations<S> {
         }
         match self.about.id {
             "mi-fig4-2" => {
-                claims.references("mi_x_z1_nats", "information of sensor 1", clean(), |r| (key(r), r.mi_x_z1_nats));
-                claims.references("mi_x_z1z2_nats", "information of both", clean(), |r| (key(r), r.mi_x_z1z2_nats));
+                claims.keyed("mi_x_z1_nats", "information of sensor 1", clean(), |r| r.mi_x_z1_nats);
+                claims.keyed("mi_x_z1z2_nats", "information of both", clean(), |r| r.mi_x_z1z2_nats);
             }
             "mi-fig4-3" => {
-                claims.references("mse", "squared error", clean(), |r| (key(r), r.mse));
+                claims.keyed("mse", "squared error", clean(), |r| r.mse);
             }
             "mi-fig4-4" => {
                 let what = "the smaller the crossover, the higher the information, at every step";
@@ -272,8 +241,8 @@ impl<S: Setting> Figure for Iterations<S> {
         }
     }
 
-    fn plot(&self, p: &S, rows: &Rows) -> Plot {
-        let (steps, crossovers, _) = p.parts();
+    fn plot(&self, p: &Parameters, rows: &Rows) -> Plot {
+        let (steps, crossovers) = (p.steps, p.crossovers());
         let several = crossovers.len() > 1;
         type Column = fn(&Step) -> f64;
         let (axis, columns): (&str, &[(Column, &str)]) = match (self.shows, several) {

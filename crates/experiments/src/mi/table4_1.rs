@@ -1,6 +1,6 @@
 //! Table 4.1: two sensors of equal noise, independent or correlated.
 
-use super::common::{MI, MSE, Pair, lloyd_system, name, odd, scene};
+use super::common::{MI, MSE, Pair, arrived, lloyd_system, name, odd, scene};
 use super::plots::errors;
 use crate::prelude::*;
 use crate::reference;
@@ -8,15 +8,12 @@ use fewbits_quantizer_design::{Newton, System, bounds, design};
 
 parameters! {
     pub struct Parameters {
-        /// Noise standard deviation of both sensors, in prior standard deviations.
         #[garde(range(min = 1e-3, max = 1e3))]
-        noise_sd: f64 = 1.0,
-        /// Noise correlation of the third case.
+        noise_sd: f64 = 1.0 => "Noise standard deviation of both sensors, in prior standard deviations.",
         #[garde(range(min = -0.99, max = 0.99))]
-        correlation: f64 = 0.85,
-        /// Random starts of each joint design.
+        correlation: f64 = 0.85 => "Noise correlation of the third case.",
         #[garde(range(min = 1, max = 10_000))]
-        starts: usize = 20,
+        starts: usize = 20 => "Random starts of each joint design.",
     }
 }
 
@@ -40,46 +37,28 @@ const CASES: [Case; 3] = [
 
 rows! {
     pub struct Rows {
-        /// Designs.
-        designs: Vec<Row>,
-        /// Random starts of the joint designs.
-        searches: Vec<Search>,
+        designs: Vec<Row> => "Designs.",
+        searches: Vec<Search> => "Random starts of the joint designs.",
     }
 
-    struct Row {
-        /// Noise correlation and levels.
-        case: &'static str,
-        /// Criterion of the design, or the baseline.
-        method: &'static str,
-        /// How it was reached.
-        design: &'static str,
+    struct Row by "{case} {method} {design}" {
+        case: &'static str => "Noise correlation and levels.",
+        method: &'static str => "Criterion of the design, or the baseline.",
+        design: &'static str => "How it was reached.",
         #[serde(flatten)]
         pair: Pair,
-        /// The publication's squared error.
-        printed_mse: Option<f64>,
-    }
-}
-
-impl Row {
-    fn key(&self) -> String {
-        format!("{} {} {}", self.case, self.method, self.design)
+        printed_mse: Option<f64> => "The publication's squared error.",
     }
 }
 
 rows! {
     struct Search {
-        /// Noise correlation and levels.
-        case: &'static str,
-        /// Criterion of the design.
-        criterion: &'static str,
-        /// Random starts.
-        starts: usize,
-        /// Starts that reached the best value found.
-        arrived: usize,
-        /// Van Trees bound at the joint design, independent noise only.
-        van_trees: Option<f64>,
-        /// Printed squared error of problem (4.2).
-        printed_primal_mse: Option<f64>,
+        case: &'static str => "Noise correlation and levels.",
+        criterion: &'static str => "Criterion of the design.",
+        starts: usize => "Random starts.",
+        arrived: usize => "Starts that reached the best value found.",
+        van_trees: Option<f64> => "Van Trees bound at the joint design, independent noise only.",
+        printed_primal_mse: Option<f64> => "Printed squared error of problem (4.2).",
     }
 }
 
@@ -124,23 +103,14 @@ impl Figure for Table41 {
                 }
                 let system = System::ideal(scene.clone(), vec![odd(first)?, odd(second)?])?;
                 push(method, "printed", Pair::of(&system)?);
-                let reached = |s: &System| {
-                    design::joint(s, criterion, &Newton::default()).is_ok_and(|d| (d.value - best.value).abs() < 1e-10)
-                };
-                let arrived = design::random_starts(&sample, p.starts, 1)
-                    .iter()
-                    .filter(|s| reached(s))
-                    .count();
                 searches.push(Search {
                     case,
                     criterion: method,
                     starts: p.starts,
-                    arrived,
-                    van_trees: if correlated {
-                        None
-                    } else {
-                        Some(bounds::bayesian_cramer_rao(&best.system)?)
-                    },
+                    arrived: arrived(&sample, criterion, p.starts, &best),
+                    van_trees: (!correlated)
+                        .then(|| bounds::bayesian_cramer_rao(&best.system))
+                        .transpose()?,
                     printed_primal_mse: value(format!("printed-primal/{case}")),
                 });
             }
@@ -154,14 +124,12 @@ impl Figure for Table41 {
         let here = claims.at_defaults();
         let designs = || rows.designs.iter();
         let mse = |case: &str, method: &str, design: &str| {
-            designs()
-                .find(|r| (r.case, r.method, r.design) == (case, method, design))
-                .map(|r| r.pair.mse)
+            first(&rows.designs, |r| (r.case, r.method, r.design) == (case, method, design)).map(|r| r.pair.mse)
         };
-        claims.references("mse", "squared error", designs(), |r| (r.key(), r.pair.mse));
-        claims.references("outer1", "outer breakpoint of sensor 1", designs(), |r| (r.key(), r.pair.outer1));
-        claims.references("mi_nats", "information", designs(), |r| (r.key(), r.pair.mi_nats));
-        claims.references("printed", "errors are exact at printed breakpoints", designs(), |r| (r.key(), r.pair.mse));
+        claims.keyed("mse", "squared error", designs(), |r| r.pair.mse);
+        claims.keyed("outer1", "outer breakpoint of sensor 1", designs(), |r| r.pair.outer1);
+        claims.keyed("mi_nats", "information", designs(), |r| r.pair.mi_nats);
+        claims.keyed("printed", "errors are exact at printed breakpoints", designs(), |r| r.pair.mse);
         let curvature = |design: &'static str| designs().filter(move |r| r.case == "rho85-L4" && r.design == design);
         let what = "the printed (mirror-symmetric) solution at 0.85 is a saddle (errata mi-10)";
         here.all("saddle", what, curvature("symmetric"), |r| r.pair.curvature.is_some_and(|c| c > 1e-3));
@@ -175,11 +143,8 @@ impl Figure for Table41 {
                 .zip(mse(s.case, "mse", "joint"))
                 .is_some_and(|(printed, best)| printed < best)
         });
-        let first = |case: &str| {
-            designs()
-                .find(|r| r.key() == format!("{case} mi greedy"))
-                .map(|r| r.pair.outer1)
-        };
+        let first =
+            |case: &str| first(&rows.designs, |r| r.key() == format!("{case} mi greedy")).map(|r| r.pair.outer1);
         let difference = minus(first("rho0-L4"), first("rho85-L4"));
         let what =
             "the greedy chain's first sensor does not depend on correlation, unlike the printed one (errata mi-5)";

@@ -1,6 +1,6 @@
 //! Table 4.2: two sensors of unequal noise.
 
-use super::common::{MI, MSE, Pair, lloyd_system, odd, scene};
+use super::common::{MI, MSE, Pair, arrived, lloyd_system, odd, scene};
 use super::plots::errors;
 use crate::prelude::*;
 use crate::reference;
@@ -8,12 +8,10 @@ use fewbits_quantizer_design::{Newton, System, bounds, design};
 
 parameters! {
     pub struct Parameters {
-        /// Noise variances of the two sensors, in prior variances.
         #[garde(length(min = 2, max = 2), inner(range(min = 1e-6, max = 1e6)))]
-        noise_variances: Vec<f64> = vec![1.0, 0.5],
-        /// Random starts of each joint design.
+        noise_variances: Vec<f64> = vec![1.0, 0.5] => "Noise variances of the two sensors, in prior variances.",
         #[garde(range(min = 1, max = 10_000))]
-        starts: usize = 30,
+        starts: usize = 30 => "Random starts of each joint design.",
     }
 }
 
@@ -22,32 +20,23 @@ const PRINTED: [(usize, &[f64], &[f64]); 2] = [(4, &[1.38], &[1.135]), (8, &[0.6
 
 rows! {
     pub struct Rows {
-        /// Designs.
-        designs: Vec<Row>,
-        /// Random starts of the joint information design.
-        searches: Vec<Search>,
+        designs: Vec<Row> => "Designs.",
+        searches: Vec<Search> => "Random starts of the joint information design.",
     }
 
-    struct Row {
-        /// Levels of each sensor.
-        levels: usize,
-        /// Criterion and how it was reached.
-        method: &'static str,
+    struct Row by "{levels} levels {method}" {
+        levels: usize => "Levels of each sensor.",
+        method: &'static str => "Criterion and how it was reached.",
         #[serde(flatten)]
         design: Pair,
-        /// The publication's squared error.
-        printed_mse: Option<f64>,
+        printed_mse: Option<f64> => "The publication's squared error.",
     }
 
-    struct Search {
-        /// Levels of each sensor.
-        levels: usize,
-        /// Random starts of the joint information design.
-        starts: usize,
-        /// Starts that reached the best value found.
-        arrived: usize,
-        /// Least squared error of any codes at these rates.
-        ceo_bound: f64,
+    struct Search by "{levels} levels" {
+        levels: usize => "Levels of each sensor.",
+        starts: usize => "Random starts of the joint information design.",
+        arrived: usize => "Starts that reached the best value found.",
+        ceo_bound: f64 => "Least squared error of any codes at these rates.",
     }
 }
 
@@ -88,18 +77,12 @@ impl Figure for Table42 {
                 let best = design::joint(&sample, criterion, &newton)?;
                 push(joint, Pair::joint(&best)?);
                 if criterion == MI {
-                    let reached =
-                        |s: &System| design::joint(s, MI, &newton).is_ok_and(|d| (d.value - best.value).abs() < 1e-10);
-                    let arrived = design::random_starts(&sample, p.starts, 1)
-                        .iter()
-                        .filter(|s| reached(s))
-                        .count();
                     let bits = (levels as f64).log2();
                     let ceo_bound = bounds::ceo(scene.prior(), scene.noise(), &[bits, bits])?.distortion;
                     searches.push(Search {
                         levels,
                         starts: p.starts,
-                        arrived,
+                        arrived: arrived(&sample, MI, p.starts, &best),
                         ceo_bound,
                     });
                 }
@@ -114,18 +97,14 @@ impl Figure for Table42 {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let designs = || rows.designs.iter();
-        let key = |r: &Row| format!("{} levels {}", r.levels, r.method);
-        claims.references("mse", "squared error", designs(), |r| (key(r), r.design.mse));
-        claims.references("outer1", "outer breakpoint of sensor 1", designs(), |r| (key(r), r.design.outer1));
-        claims.references("outer2", "outer breakpoint of sensor 2", designs(), |r| (key(r), r.design.outer2));
+        claims.keyed("mse", "squared error", designs(), |r| r.design.mse);
+        claims.keyed("outer1", "outer breakpoint of sensor 1", designs(), |r| r.design.outer1);
+        claims.keyed("outer2", "outer breakpoint of sensor 2", designs(), |r| r.design.outer2);
         let what = "the printed error is exact to 1.5 % for the designs, 0.6 % for Lloyd-Max (errata mi-8)";
-        claims.references("printed", what, designs(), |r| (key(r), r.design.mse));
+        claims.keyed("printed", what, designs(), |r| r.design.mse);
         for (levels, ..) in PRINTED {
-            let mse = |method: &str| {
-                designs()
-                    .find(|r| r.levels == levels && r.method == method)
-                    .map(|r| r.design.mse)
-            };
+            let mse =
+                |method: &str| first(&rows.designs, |r| r.levels == levels && r.method == method).map(|r| r.design.mse);
             let what = "squared-error design < Lloyd-Max of the sample < information design, against the printed claim (errata \
                         mi-7) < the printed baseline, scaled to the noise";
             let order = ["mse-joint", "lloyd-y", "mi-joint", "lloyd-noise"];
@@ -135,8 +114,7 @@ impl Figure for Table42 {
         }
         let what = "every random start reaches the same joint optimum";
         here.all("one-optimum", what, &rows.searches, |s| s.arrived == s.starts);
-        let what = "bound with all subset constraints";
-        claims.references("ceo", what, &rows.searches, |s| (format!("{} levels", s.levels), s.ceo_bound));
+        claims.keyed("ceo", "bound with all subset constraints", &rows.searches, |s| s.ceo_bound);
         let bound = |r: &Row| rows.searches.iter().find(|s| s.levels == r.levels).map(|s| s.ceo_bound);
         claims.all("ceo-gap", "no design beats the bound", designs(), |r| bound(r).is_some_and(|b| r.design.mse > b));
     }

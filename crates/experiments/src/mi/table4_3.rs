@@ -7,67 +7,46 @@ use fewbits_quantizer_design::{Newton, Quantizer, System, bounds, design};
 
 parameters! {
     pub struct Parameters {
-        /// Number of sensors; the greedy chain enumerates `4^sensors` outcomes.
         #[garde(range(min = 2, max = 10))]
-        sensors: usize = 9 => quick 6,
-        /// Noise standard deviation, in prior standard deviations.
+        sensors: usize = 9 => quick 6 => "Number of sensors; the greedy chain enumerates `4^sensors` outcomes.",
         #[garde(range(min = 1e-3, max = 1e3))]
-        noise_sd: f64 = 1.0,
+        noise_sd: f64 = 1.0 => "Noise standard deviation, in prior standard deviations.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Designs.
-        designs: Vec<Design>,
-        /// The greedy chains, sensor by sensor.
-        chain: Vec<Stage>,
-        /// Identical quantizers against their outer breakpoint.
-        curve: Vec<Point>,
-        /// Least squared errors.
-        bounds: Vec<Bound>,
+        designs: Vec<Design> => "Designs.",
+        chain: Vec<Stage> => "The greedy chains, sensor by sensor.",
+        curve: Vec<Point> => "Identical quantizers against their outer breakpoint.",
+        bounds: Vec<Bound> => "Least squared errors.",
     }
 
-    struct Design {
-        /// Criterion and how it was reached.
-        method: String,
-        /// Common outer breakpoint; missing where the sensors differ.
-        t: Option<f64>,
-        /// Mutual information.
-        mi_nats: f64 ["nat"],
-        /// Squared error, in prior variances.
-        mse: f64,
-        /// The publication's value.
-        printed_mse: Option<f64>,
+    struct Design by "{method}" {
+        method: String => "Criterion and how it was reached.",
+        t: Option<f64> => "Common outer breakpoint; missing where the sensors differ.",
+        mi_nats: f64 ["nat"] => "Mutual information.",
+        mse: f64 => "Squared error, in prior variances.",
+        printed_mse: Option<f64> => "The publication's value.",
     }
 
-    struct Stage {
-        /// Criterion of the chain.
-        criterion: &'static str,
-        /// Sensors designed so far.
-        stage: usize,
-        /// Outer breakpoint of the last one.
-        t: f64,
-        /// Mutual information of the sensors so far.
-        mi_nats: f64 ["nat"],
-        /// Their squared error.
-        mse: f64,
+    struct Stage by "{stage}" {
+        criterion: &'static str => "Criterion of the chain.",
+        stage: usize => "Sensors designed so far.",
+        t: f64 => "Outer breakpoint of the last one.",
+        mi_nats: f64 ["nat"] => "Mutual information of the sensors so far.",
+        mse: f64 => "Their squared error.",
     }
 
     struct Point {
-        /// Common outer breakpoint.
-        t: f64,
-        /// Mutual information.
-        mi_nats: f64 ["nat"],
-        /// Squared error.
-        mse: f64,
+        t: f64 => "Common outer breakpoint.",
+        mi_nats: f64 ["nat"] => "Mutual information.",
+        mse: f64 => "Squared error.",
     }
 
-    struct Bound {
-        /// Which bound.
-        bound: &'static str,
-        /// Least squared error.
-        mse: f64,
+    struct Bound by "{bound}" {
+        bound: &'static str => "Which bound.",
+        mse: f64 => "Least squared error.",
     }
 }
 
@@ -183,19 +162,17 @@ impl Figure for Table43 {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let designs = || rows.designs.iter();
-        claims.references("mse", "squared error", designs(), |d| (d.method.clone(), d.mse));
-        claims.references("t", "outer breakpoint", designs(), |d| (d.method.clone(), d.t));
-        claims.references("mi_nats", "information", designs(), |d| (d.method.clone(), d.mi_nats));
+        claims.keyed("mse", "squared error", designs(), |d| d.mse);
+        claims.keyed("t", "outer breakpoint", designs(), |d| d.t);
+        claims.keyed("mi_nats", "information", designs(), |d| d.mi_nats);
         let what = "printed errors are exact at the printed breakpoints to 1.6 % (errata mi-8)";
-        claims.references("printed", what, designs(), |d| (d.method.clone(), d.mse));
+        claims.keyed("printed", what, designs(), |d| d.mse);
         let what =
             "squared-error design < Lloyd-Max of the sample < joint < greedy < printed < Lloyd-Max of the unknown";
         let order = ["mse-joint", "lloyd-y", "mi-joint", "mi-greedy", "mi-printed", "lloyd-x"];
         here.increasing("order", what, order.map(|method| rows.mse(method)));
         let chain: Vec<&Stage> = rows.chain.iter().filter(|s| s.criterion == "mi").collect();
-        claims.references("chain", "outer breakpoint of the greedy chain, sensor", &chain, |s| {
-            (s.stage.to_string(), s.t)
-        });
+        claims.keyed("chain", "outer breakpoint of the greedy chain, sensor", chain.iter().copied(), |s| s.t);
         let what = "a greedy chain cannot give equal quantizers (errata mi-5)";
         claims.all("chain-differs", what, chain.windows(2), |w| (w[0].t - w[1].t).abs() > 1e-6);
         let gap = minus(rows.mse("mse-joint"), rows.design("mi-printed").and_then(|d| d.printed_mse));
@@ -204,8 +181,7 @@ impl Figure for Table43 {
         let short = rows.design("mi-joint").and_then(|d| d.t).map(|t| 1.0 - 1.275 / t);
         let what = "the printed breakpoint is 7.5 % short of the optimum (errata mi-9)";
         here.near("unconverged", what, short, 0.0747, 1e-4);
-        let what = "least error of any codes of two bits";
-        claims.references("bound", what, &rows.bounds, |b| (b.bound.to_owned(), b.mse));
+        claims.keyed("bound", "least error of any codes of two bits", &rows.bounds, |b| b.mse);
         let bound = rows.bound("ceo").unwrap_or(f64::INFINITY);
         claims.all("above-ceo", "every design stays above that bound", designs(), |d| d.mse > bound);
     }

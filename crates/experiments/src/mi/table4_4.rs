@@ -14,69 +14,47 @@ const PE: Criterion = Criterion::BayesError;
 
 parameters! {
     pub struct Parameters {
-        /// The signals to detect, in noise standard deviations.
         #[garde(length(min = 1, max = 20), inner(range(min = 0.1, max = 16.0)))]
-        signals: Vec<f64> = vec![2.0, 4.0],
-        /// Number of sensors; the greedy chain enumerates `4^sensors` outcomes.
+        signals: Vec<f64> = vec![2.0, 4.0] => "The signals to detect, in noise standard deviations.",
         #[garde(range(min = 2, max = 9))]
-        sensors: usize = 5,
-        /// False-alarm probability of the randomised test.
+        sensors: usize = 5 => "Number of sensors; the greedy chain enumerates `4^sensors` outcomes.",
         #[garde(range(min = 1e-9, max = 0.999))]
-        false_alarm: f64 = 0.01,
+        false_alarm: f64 = 0.01 => "False-alarm probability of the randomised test.",
     }
 }
 
 rows! {
+    #[derive(Default)]
     pub struct Rows {
-        /// Designs.
-        designs: Vec<Design>,
-        /// Identical quantizers against their offset.
-        curve: Vec<Point>,
-        /// What the designs are compared with.
-        checks: Vec<Check>,
+        designs: Vec<Design> => "Designs.",
+        curve: Vec<Point> => "Identical quantizers against their offset.",
+        checks: Vec<Check> => "What the designs are compared with.",
     }
 
-    struct Design {
-        /// The value to tell from 0.
-        signal: f64 ["noise sd"],
-        /// What the quantizer maximises (pe: minimises the error itself).
-        method: &'static str,
-        /// Offset of the outer breakpoints (of the first sensor).
-        t: f64 ["noise sd"],
-        /// Offsets of all sensors, where they differ.
-        offsets: String ["noise sd"],
-        /// Bayes error at equal priors.
-        pe: f64,
-        /// The publication's value.
-        printed_pe: Option<f64>,
-        /// Mutual information.
-        mi_nats: f64 ["nat"],
-        /// ln 2 minus it, without cancellation.
-        equivocation_nats: f64 ["nat"],
-        /// Matusita distance of one sensor's symbol.
-        matusita: Option<f64>,
-        /// J-divergence of one sensor's symbol.
-        j_divergence: Option<f64>,
-        /// Bhattacharyya coefficient of one sensor's symbol.
-        bhattacharyya: Option<f64>,
-        /// Detection probability of the randomised Neyman-Pearson test.
-        detection: f64,
+    struct Design by "{signal} {method}" {
+        signal: f64 ["noise sd"] => "The value to tell from 0.",
+        method: &'static str => "What the quantizer maximises (pe: minimises the error itself).",
+        t: f64 ["noise sd"] => "Offset of the outer breakpoints (of the first sensor).",
+        offsets: String ["noise sd"] => "Offsets of all sensors, where they differ.",
+        pe: f64 => "Bayes error at equal priors.",
+        printed_pe: Option<f64> => "The publication's value.",
+        mi_nats: f64 ["nat"] => "Mutual information.",
+        equivocation_nats: f64 ["nat"] => "ln 2 minus it, without cancellation.",
+        matusita: Option<f64> => "Matusita distance of one sensor's symbol.",
+        j_divergence: Option<f64> => "J-divergence of one sensor's symbol.",
+        bhattacharyya: Option<f64> => "Bhattacharyya coefficient of one sensor's symbol.",
+        detection: f64 => "Detection probability of the randomised Neyman-Pearson test.",
     }
 
     struct Point {
-        /// The value to tell from 0.
-        signal: f64 ["noise sd"],
-        /// Common offset.
-        t: f64 ["noise sd"],
-        /// Bayes error.
-        pe: f64,
+        signal: f64 ["noise sd"] => "The value to tell from 0.",
+        t: f64 ["noise sd"] => "Common offset.",
+        pe: f64 => "Bayes error.",
     }
 
-    struct Check {
-        /// The value to tell from 0.
-        signal: f64 ["noise sd"],
-        /// Error from unquantized samples.
-        unquantized_pe: f64,
+    struct Check by "{signal}" {
+        signal: f64 ["noise sd"] => "The value to tell from 0.",
+        unquantized_pe: f64 => "Error from unquantized samples.",
         /// What the best change of one sensor alone would gain on the minimum error, relative.
         single_change_gain: f64,
     }
@@ -92,10 +70,6 @@ fn about(signal: f64, t: f64) -> Result<Quantizer, Error> {
 }
 
 impl Design {
-    fn key(&self) -> String {
-        format!("{} {}", self.signal, self.method)
-    }
-
     /// The row of a system whose sensors have these offsets.
     fn of(p: &Parameters, signal: f64, method: &'static str, offsets: &[f64], system: &System) -> Result<Self, Error> {
         let as_printed = p.sensors == 5;
@@ -105,7 +79,7 @@ impl Design {
             signal,
             method,
             t: offsets[0],
-            offsets: differ.iter().map(|t| format!("{t:.8}")).collect::<Vec<_>>().join(" "),
+            offsets: joined(differ.iter().map(|t| format!("{t:.8}")), " "),
             pe: system.value(PE)?,
             printed_pe: printed.filter(|_| as_printed),
             mi_nats: system.value(MI)?,
@@ -128,11 +102,7 @@ impl Figure for Table44 {
          far off at the strong signal.");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
-        let mut rows = Rows {
-            designs: Vec::new(),
-            curve: Vec::new(),
-            checks: Vec::new(),
-        };
+        let mut rows = Rows::default();
         let newton = Newton::default();
         let ideal = Channel::ideal(4)?;
         for &signal in &p.signals {
@@ -198,19 +168,12 @@ impl Figure for Table44 {
     fn claims(&self, p: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let designs = || rows.designs.iter();
-        claims.references("pe", "error probability", designs(), |d| (d.key(), d.pe));
-        claims.references("t", "offset", designs(), |d| (d.key(), d.t));
-        let what = "printed errors are within about 10 % of the exact ones";
-        claims.references("printed", what, designs(), |d| (d.key(), d.pe));
-        let what = "ln 2 minus the information";
-        claims.references("equivocation", what, designs(), |d| (d.key(), d.equivocation_nats));
-        let what = "error from samples";
-        claims.references("unquantized_pe", what, &rows.checks, |c| (c.signal.to_string(), c.unquantized_pe));
-        let pe = |signal, method| {
-            designs()
-                .find(|d| d.signal == signal && d.method == method)
-                .map(|d| d.pe)
-        };
+        claims.keyed("pe", "error probability", designs(), |d| d.pe);
+        claims.keyed("t", "offset", designs(), |d| d.t);
+        claims.keyed("printed", "printed errors are within about 10 % of the exact ones", designs(), |d| d.pe);
+        claims.keyed("equivocation", "ln 2 minus the information", designs(), |d| d.equivocation_nats);
+        claims.keyed("unquantized_pe", "error from samples", &rows.checks, |c| c.unquantized_pe);
+        let pe = |signal, method| first(&rows.designs, |d| d.signal == signal && d.method == method).map(|d| d.pe);
         for &signal in &p.signals {
             let what = "least error < Matusita < mutual information < J-divergence (errata mi-11)";
             let order = ["pe", "matusita", "mi-joint", "j-divergence"].map(|method| pe(signal, method));

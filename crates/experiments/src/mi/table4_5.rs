@@ -20,9 +20,8 @@ parameters! {
         /// Crossover probabilities; beyond 0.06 a design of four levels loses a cell (see mi-beyond).
         #[garde(length(min = 1, max = 100), inner(range(min = 0.0, max = 0.06)))]
         crossovers: Vec<f64> = PRINTED.map(|p| p.0).to_vec(),
-        /// Noise standard deviation, in prior standard deviations.
         #[garde(range(min = 1e-2, max = 1e2))]
-        noise_sd: f64 = 1.0,
+        noise_sd: f64 = 1.0 => "Noise standard deviation, in prior standard deviations.",
     }
 }
 
@@ -38,17 +37,13 @@ impl Parameters {
 }
 
 rows! {
-    pub struct Row {
-        /// Crossover probability of each bit.
-        crossover: f64,
-        /// Words of the levels.
-        labelling: &'static str,
-        /// Criterion and how it was reached.
-        design: &'static str,
+    pub struct Row by "{crossover} {labelling} {design}" {
+        crossover: f64 => "Crossover probability of each bit.",
+        labelling: &'static str => "Words of the levels.",
+        design: &'static str => "Criterion and how it was reached.",
         #[serde(flatten)]
         pair: Pair,
-        /// The publication's squared error.
-        printed_mse: Option<f64>,
+        printed_mse: Option<f64> => "The publication's squared error.",
     }
 }
 
@@ -92,10 +87,9 @@ impl Figure for Table45 {
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
         let here = claims.at_defaults();
-        let key = |r: &Row| format!("{} {} {}", r.crossover, r.labelling, r.design);
-        claims.references("mse", "squared error", rows, |r| (key(r), r.pair.mse));
-        claims.references("outer2", "outer breakpoint", rows, |r| (key(r), r.pair.outer2));
-        claims.references("printed", "printed error, natural words, three digits", rows, |r| (key(r), r.pair.mse));
+        claims.keyed("mse", "squared error", rows, |r| r.pair.mse);
+        claims.keyed("outer2", "outer breakpoint", rows, |r| r.pair.outer2);
+        claims.keyed("printed", "printed error, natural words, three digits", rows, |r| r.pair.mse);
         let at = |crossover: f64, labelling: &str, design: &str| {
             first(rows, |r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design)).map(|r| &r.pair)
         };
@@ -113,8 +107,7 @@ impl Figure for Table45 {
         let error = ["natural", "gray"].map(|words| at(0.05, words, "mse-joint").map(|d| d.mse));
         here.increasing("mse-prefers-natural", what, error);
         let third = at(0.05, "third", "mse-joint").zip(at(0.05, "gray", "mse-joint"));
-        let what = "the third assignment is much worse";
-        here.above("third-worst", what, third.map(|(a, b)| a.mse - b.mse), 0.04);
+        here.above("third-worst", "the third assignment is much worse", third.map(|(a, b)| a.mse - b.mse), 0.04);
         let natural = select(rows, |r| r.labelling == "natural" && r.design == "mi-joint");
         here.increasing("worse", "errors grow with the crossover", natural.map(|r| r.pair.mse));
     }
@@ -152,32 +145,22 @@ impl Figure for Table45 {
 rows! {
     /// All tables of the mismatch matrix.
     pub struct Mismatches {
-        /// Designs for one channel on another.
-        rows: Vec<Met>,
-        /// The printed design for a clean channel at a crossover of 0.05.
-        printed: Vec<AtPrinted>,
+        rows: Vec<Met> => "Designs for one channel on another.",
+        printed: Vec<AtPrinted> => "The printed design for a clean channel at a crossover of 0.05.",
     }
 
-    struct Met {
-        /// Words of the levels.
-        labelling: &'static str,
-        /// Crossover of the design.
-        designed_for: f64,
-        /// Crossover met.
-        true_crossover: f64,
-        /// Squared error.
-        mse: f64,
-        /// Mutual information.
-        mi_nats: f64 ["nat"],
-        /// The publication's value, printed breakpoints.
-        printed_mse: Option<f64>,
+    struct Met by "{labelling} {designed_for} {true_crossover}" {
+        labelling: &'static str => "Words of the levels.",
+        designed_for: f64 => "Crossover of the design.",
+        true_crossover: f64 => "Crossover met.",
+        mse: f64 => "Squared error.",
+        mi_nats: f64 ["nat"] => "Mutual information.",
+        printed_mse: Option<f64> => "The publication's value, printed breakpoints.",
     }
 
-    struct AtPrinted {
-        /// Words of the levels.
-        labelling: &'static str,
-        /// Squared error of the printed design for a clean channel at a crossover of 0.05.
-        mse: f64,
+    struct AtPrinted by "{labelling}" {
+        labelling: &'static str => "Words of the levels.",
+        mse: f64 => "Squared error of the printed design for a clean channel at a crossover of 0.05.",
     }
 }
 
@@ -222,10 +205,8 @@ impl Figure for Mismatch {
     fn claims(&self, p: &Parameters, tables: &Mismatches, claims: &mut Claims) {
         let here = claims.at_defaults();
         let rows = &tables.rows;
-        let what = "printed design at 0.05";
-        claims.references("at-printed", what, &tables.printed, |r| (r.labelling.to_owned(), r.mse));
-        let key = |r: &Met| format!("{} {} {}", r.labelling, r.designed_for, r.true_crossover);
-        claims.references("mse", "words, designed for, met", rows, |r| (key(r), r.mse));
+        claims.keyed("at-printed", "printed design at 0.05", &tables.printed, |r| r.mse);
+        claims.keyed("mse", "words, designed for, met", rows, |r| r.mse);
         let natural = tables.printed.iter().filter(|r| r.labelling == "natural");
         let what = "the printed 0.497 is natural words' value at the printed breakpoints to 0.3 %";
         claims.references("printed", what, natural, |r| (format!("{} 0 0.05", r.labelling), r.mse));

@@ -10,16 +10,12 @@ use fewbits_pf_mpa::{
 
 parameters! {
     pub struct Parameters {
-        /// Particles.
         #[garde(range(min = 3, max = 1000))]
-        particles: usize = 40,
-        /// Trajectories.
+        particles: usize = 40 => "Particles.",
         #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 200 => quick 4,
+        trials: u64 = 200 => quick 4 => "Trajectories.",
     }
 }
-
-rows! {}
 
 pub struct Ablation;
 

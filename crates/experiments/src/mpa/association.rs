@@ -170,37 +170,25 @@ pub struct Fig37;
 
 parameters! {
     pub struct Parameters {
-        /// Variances of the measurements.
         #[garde(length(min = 1, max = 4), inner(range(min = 1e-8, max = 1.0)))]
-        variance: Vec<f64> = vec![1e-4, 4e-4],
-        /// Distance of the targets at the start.
+        variance: Vec<f64> = vec![1e-4, 4e-4] => "Variances of the measurements.",
         #[garde(range(min = 0.0, max = 10.0))]
-        apart: f64 = 0.1,
+        apart: f64 = 0.1 => "Distance of the targets at the start.",
     }
 }
 
 rows! {
     pub struct Step {
-        /// Variance of the measurements.
-        variance: f64,
-        /// Rule.
-        rule: String,
-        /// Step, from 1.
-        k: usize,
-        /// First target.
-        t1: f64,
-        /// Second target.
-        t2: f64,
-        /// First measurement received.
-        za: f64,
-        /// Second measurement received.
-        zb: f64,
-        /// Estimate of the first target.
-        estimate1: f64,
-        /// Estimate of the second.
-        estimate2: f64,
-        /// Probability that the first measurement is of the first target.
-        p0: f64,
+        variance: f64 => "Variance of the measurements.",
+        rule: String => "Rule.",
+        k: usize => "Step, from 1.",
+        t1: f64 => "First target.",
+        t2: f64 => "Second target.",
+        za: f64 => "First measurement received.",
+        zb: f64 => "Second measurement received.",
+        estimate1: f64 => "Estimate of the first target.",
+        estimate2: f64 => "Estimate of the second.",
+        p0: f64 => "Probability that the first measurement is of the first target.",
     }
 }
 
@@ -266,26 +254,19 @@ pub struct Table;
 parameters! {
     /// Settings.
     pub struct Effort {
-        /// Tracks of each setting.
         #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 400 => quick 10,
+        trials: u64 = 400 => quick 10 => "Tracks of each setting.",
     }
 }
 
 rows! {
-    pub struct Row {
-        /// Variance of the measurements.
-        variance: f64,
-        /// Distance of the targets at the start.
-        apart: f64,
-        /// Rule.
-        method: &'static str,
-        /// Mean squared error, both targets summed, labels counted.
-        labelled: Measured,
-        /// The same with the better labels of each step.
-        unlabelled: Measured,
-        /// Mean distance of the probability from what was.
-        association: Measured,
+    pub struct Row by "R{variance}-sep{apart}-{method}" {
+        variance: f64 => "Variance of the measurements.",
+        apart: f64 => "Distance of the targets at the start.",
+        method: &'static str => "Rule.",
+        labelled: Measured => "Mean squared error, both targets summed, labels counted.",
+        unlabelled: Measured => "The same with the better labels of each step.",
+        association: Measured => "Mean distance of the probability from what was.",
     }
 }
 
@@ -337,17 +318,11 @@ impl Figure for Table {
 
     fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        let key = |r: &Row| format!("R{}-sep{}-{}", r.variance, r.apart, r.method);
-        full.references("labelled", "labelled error", t, |r| (key(r), r.labelled));
-        type Of = fn(&Row) -> Measured;
-        let two: [(&str, &str, Of); 2] = [
-            ("unlabelled", "unlabelled error", |r| r.unlabelled),
-            ("association", "error of association", |r| r.association),
-        ];
-        for (id, what, value) in two {
-            full.references(id, what, t, |r| (key(r), value(r)));
-            full.references_at_most(&format!("{id}-most"), what, t, |r| (key(r), value(r)));
-        }
+        full.keyed("labelled", "labelled error", t, |r| r.labelled);
+        full.keyed("unlabelled", "unlabelled error", t, |r| r.unlabelled);
+        full.keyed_at_most("unlabelled-most", "unlabelled error", t, |r| r.unlabelled);
+        full.keyed("association", "error of association", t, |r| r.association);
+        full.keyed_at_most("association-most", "error of association", t, |r| r.association);
         for (variance, blur) in [(1e-4, 3.0), (4e-4, 2.0)] {
             let of = |method: &str| first(t, |r| r.variance == variance && r.apart == 0.1 && r.method == method);
             let errors = ["jpda", "tanh", "pf-tanh"].map(|m| of(m).map(|r| r.association.value));

@@ -9,34 +9,23 @@ use nalgebra::{Matrix4, Vector2};
 
 parameters! {
     pub struct Parameters {
-        /// Free trajectories.
         #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 400 => quick 10,
+        trials: u64 = 400 => quick 10 => "Free trajectories.",
     }
 }
 
 rows! {
-    pub struct Row {
-        /// Ratio of the powers of range and noise.
-        snr_db: f64 ["dB"],
-        /// Levels of the quantizer.
-        levels: usize,
-        /// Bound for levels, mean over the steps.
-        quantized: Measured,
-        /// Bound for the ranges themselves.
-        unquantized: Measured,
-        /// Grid of 25 nodes an axis.
-        grid: Measured,
-        /// Gaussian message passing.
-        message_passing: Measured,
-        /// Extended Kalman filter of the ranges.
-        unquantized_filter: Measured,
-        /// Medians of the three.
-        grid_median: f64,
-        /// Median.
-        message_passing_median: f64,
-        /// Median.
-        unquantized_filter_median: f64,
+    pub struct Row by "{snr_db}dB-L{levels}" {
+        snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
+        levels: usize => "Levels of the quantizer.",
+        quantized: Measured => "Bound for levels, mean over the steps.",
+        unquantized: Measured => "Bound for the ranges themselves.",
+        grid: Measured => "Grid of 25 nodes an axis.",
+        message_passing: Measured => "Gaussian message passing.",
+        unquantized_filter: Measured => "Extended Kalman filter of the ranges.",
+        grid_median: f64 => "Medians of the three.",
+        message_passing_median: f64 => "Median.",
+        unquantized_filter_median: f64 => "Median.",
     }
 }
 
@@ -82,7 +71,7 @@ impl Figure for Bounds {
                     }
                     Ok((runs.iter().map(|r| r.mse(&world)).collect(), sums))
                 };
-                let all = context.monte_carlo(context.stream("mpa-free"), p.trials).run(one)?;
+                let all = context.trials("mpa-free", p.trials, one)?;
                 // The bound without the trajectories of one group of `GROUPS`.
                 let without = |which: usize, group: Option<usize>| -> Result<f64, Error> {
                     let mut bound = CramerRao::new(*prior()?.covariance());
@@ -127,10 +116,9 @@ impl Figure for Bounds {
 
     fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        let key = |r: &Row| format!("{}dB-L{}", r.snr_db, r.levels);
-        full.references("quantized", "bound for levels", t, |r| (key(r), r.quantized));
-        full.references("unquantized", "bound for ranges", t, |r| (key(r), r.unquantized));
-        full.references("grid-median", "median of the grid", t, |r| (key(r), r.grid_median));
+        full.keyed("quantized", "bound for levels", t, |r| r.quantized);
+        full.keyed("unquantized", "bound for ranges", t, |r| r.unquantized);
+        full.keyed("grid-median", "median of the grid", t, |r| r.grid_median);
         claims.all("floor", "C7: no tracker of levels is below its bound", t, |r| {
             let above = |m: Measured| m.value > r.quantized.value - 3.0 * m.standard_error.unwrap_or(0.0);
             above(r.grid) && above(r.message_passing)

@@ -8,18 +8,15 @@ use fewbits_pf_mpa::Encoder;
 
 parameters! {
     pub struct Parameters {
-        /// Trajectories.
         #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 200 => quick 6,
+        trials: u64 = 200 => quick 6 => "Trajectories.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Encoders over levels and noise.
-        encoders: Vec<Row>,
-        /// Other loadings of the adaptive encoder.
-        loadings: Vec<Row>,
+        encoders: Vec<Row> => "Encoders over levels and noise.",
+        loadings: Vec<Row> => "Other loadings of the adaptive encoder.",
     }
 }
 
@@ -100,10 +97,7 @@ impl Figure for Encoders {
                         (ratio of errors, less two standard errors)";
             full.at_most(format!("four-bits-{snr}"), what, ratio, 1.15);
         }
-        let lost = t
-            .encoders
-            .iter()
-            .filter(|r| r.point.starts_with("adaptive") && r.method == "grid-15");
+        let lost = select(&t.encoders, |r| r.point.starts_with("adaptive") && r.method == "grid-15");
         claims.all("lost", "the grid loses no track with it", lost, |r| r.score.lost == 0.0);
     }
 

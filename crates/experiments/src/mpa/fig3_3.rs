@@ -7,45 +7,33 @@ use fewbits_pf_mpa::Target;
 
 parameters! {
     pub struct Parameters {
-        /// Which trajectory of those that all figures share.
         #[garde(range(min = 0, max = 10_000))]
-        trajectory: u64 = 0,
-        /// Particles of message passing.
+        trajectory: u64 = 0 => "Which trajectory of those that all figures share.",
         #[garde(range(min = 3, max = 1000))]
-        particles: usize = 40,
-        /// Ratio of the powers of range and noise, in decibels.
+        particles: usize = 40 => "Particles of message passing.",
         #[garde(range(min = 0.0, max = 80.0))]
-        snr_db: f64 = 50.0,
-        /// Levels of the quantizer.
+        snr_db: f64 = 50.0 => "Ratio of the powers of range and noise, in decibels.",
         #[garde(range(min = 2, max = 65_536))]
-        levels: usize = 4,
+        levels: usize = 4 => "Levels of the quantizer.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// True and estimated positions.
-        track: Vec<Row>,
-        /// Mean squared errors of this trajectory.
-        errors: Vec<ErrorRow>,
+        track: Vec<Row> => "True and estimated positions.",
+        errors: Vec<ErrorRow> => "Mean squared errors of this trajectory.",
     }
 
     struct Row {
-        /// `truth`, or the tracker.
-        method: String,
-        /// Step, from 1.
-        k: usize,
-        /// Position.
-        x: f64,
-        /// Position.
-        y: f64,
+        method: String => "`truth`, or the tracker.",
+        k: usize => "Step, from 1.",
+        x: f64 => "Position.",
+        y: f64 => "Position.",
     }
 
     struct ErrorRow {
-        /// Tracker.
-        method: String,
-        /// Mean squared position error.
-        mse: f64,
+        method: String => "Tracker.",
+        mse: f64 => "Mean squared position error.",
     }
 }
 
@@ -107,7 +95,7 @@ impl Figure for Fig33 {
         let line = |(i, name): (usize, &&str)| {
             Layer::points(*name, points(t.track.iter().filter(|r| r.method == **name), |r| (r.x, r.y))).coloured(i + 1)
         };
-        let truth = points(t.track.iter().filter(|r| r.method == "truth"), |r| (r.x, r.y));
+        let truth = points(select(&t.track, |r| r.method == "truth"), |r| (r.x, r.y));
         let sensors = canonical().iter().map(|s| (s[0], s[1])).collect();
         let square = |title, [x, y]: [(f64, f64); 2]| {
             let axis = |label, (low, high)| Axis::linear(label).between(low, high);
@@ -115,20 +103,20 @@ impl Figure for Fig33 {
                 .with(Layer::unbroken("truth", truth.clone()))
                 .with_all(names.iter().enumerate().map(line))
         };
-        // The same length in metres on both axes: the square round the true track.
-        let range = |of: fn(&(f64, f64)) -> f64| {
-            let values = truth.iter().map(of);
-            (values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max))
-        };
-        let (x, y) = (range(|p| p.0), range(|p| p.1));
-        let half = 0.6 * (x.1 - x.0).max(y.1 - y.0);
-        let near = [x, y].map(|(low, high)| {
-            let centre = 0.5 * (low + high);
-            (centre - half, centre + half)
-        });
+        // A quarter of the field's side, round the middle of the true track.
+        let (x, y) = truth.get(truth.len() / 2).copied().unwrap_or((10.0, 10.0));
+        let [(left, right), (low, high)] = [x, y].map(|centre| (centre - 2.5, centre + 2.5));
+        let frame = vec![(left, low), (right, low), (right, high), (left, high), (left, low)];
         let field = square("50 dB, four levels", [(0.0, 20.0); 2])
             .with(Layer::points("sensors", sensors).coloured(8))
+            .with(Layer::dashed("", frame).coloured(7))
             .without_legend();
-        Plot::grid(2, vec![field, square("the track, enlarged", near)])
+        Plot::grid(
+            2,
+            vec![
+                field,
+                square("the dashed square, four times as large", [(left, right), (low, high)]),
+            ],
+        )
     }
 }

@@ -10,30 +10,21 @@ use nalgebra::Vector2;
 
 parameters! {
     pub struct Parameters {
-        /// Trajectories of 25 steps.
         #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 160 => quick 3,
+        trials: u64 = 160 => quick 3 => "Trajectories of 25 steps.",
     }
 }
 
 rows! {
-    pub struct Row {
-        /// Ratio of the powers of range and noise.
-        snr_db: f64 ["dB"],
-        /// Particles.
-        particles: usize,
-        /// Share of steps with one claimant.
-        one: Measured,
-        /// With none.
-        none: Measured,
-        /// With several.
-        several: Measured,
-        /// Share of steps in which the true nearest sensor leads.
-        nearest: Measured,
-        /// Mean squared position error of the leader's estimate.
-        mse: Measured,
-        /// Variance of the sensors' estimates about their mean, both axes.
-        spread: Measured,
+    pub struct Row by "{snr_db}dB-N{particles}" {
+        snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
+        particles: usize => "Particles.",
+        one: Measured => "Share of steps with one claimant.",
+        none: Measured => "With none.",
+        several: Measured => "With several.",
+        nearest: Measured => "Share of steps in which the true nearest sensor leads.",
+        mse: Measured => "Mean squared position error of the leader's estimate.",
+        spread: Measured => "Variance of the sensors' estimates about their mean, both axes.",
     }
 }
 
@@ -105,18 +96,11 @@ impl Figure for Leaders {
 
     fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        let key = |r: &Row| format!("{}dB-N{}", r.snr_db, r.particles);
-        type Field = fn(&Row) -> Measured;
-        let fields: [(&str, &str, Field); 5] = [
-            ("one", "share with one claimant", |r| r.one),
-            ("none", "share without", |r| r.none),
-            ("several", "share with several", |r| r.several),
-            ("nearest", "share led by the truly nearest", |r| r.nearest),
-            ("spread", "variance between the copies", |r| r.spread),
-        ];
-        for (quantity, statement, field) in fields {
-            full.references(quantity, statement, t, |r| (key(r), field(r)));
-        }
+        full.keyed("one", "share with one claimant", t, |r| r.one);
+        full.keyed("none", "share without", t, |r| r.none);
+        full.keyed("several", "share with several", t, |r| r.several);
+        full.keyed("nearest", "share led by the truly nearest", t, |r| r.nearest);
+        full.keyed("spread", "variance between the copies", t, |r| r.spread);
         claims.all("sum", "every step has one, none or several", t, |r| {
             (r.one.value + r.none.value + r.several.value - 1.0).abs() < 1e-9
         });
@@ -125,10 +109,7 @@ impl Figure for Leaders {
     fn plot(&self, _: &Parameters, t: &Vec<Row>) -> Plot {
         let names = t.iter().map(|r| format!("{} dB, N = {}", r.snr_db, r.particles));
         let rows: Vec<(usize, &Row)> = t.iter().enumerate().collect();
-        let rest = |share: Measured| Measured {
-            value: 1.0 - share.value,
-            ..share
-        };
+        let rest = |share: Measured| (share - 1.0).scaled(-1.0);
         Plot::of(
             Panel::new("Elections", Axis::categories("", names), Axis::linear("share of steps"))
                 .with(Layer::measured("none claims", rows.clone(), |(i, r)| (i as f64, r.none)))

@@ -4,9 +4,10 @@ mod ablation;
 mod association;
 mod bound;
 mod encoder;
-mod exact;
 mod fig3_3;
+mod gibbs;
 mod leader;
+mod ring;
 mod scores;
 mod sweeps;
 mod world;
@@ -26,10 +27,8 @@ pub fn figures() -> Vec<&'static dyn AnyFigure> {
         &ablation::Ablation,
         &bound::Bounds,
         &encoder::Encoders,
-        &exact::Gibbs,
-        &exact::Rings,
+        &gibbs::Gibbs,
+        &ring::Rings,
         &leader::Leaders,
-        &exact::Bits,
-        &exact::Graphs,
     ]
 }

@@ -7,9 +7,8 @@ use fewbits_pf_mpa::Reports;
 parameters! {
     /// How many trajectories.
     pub struct Effort {
-        /// Trajectories of every tracker but message passing with particles.
         #[garde(range(min = 2, max = 100_000))]
-        pub(super) trials: u64 = 200 => quick 8,
+        pub(super) trials: u64 = 200 => quick 8 => "Trajectories of every tracker but message passing with particles.",
         /// Trajectories of message passing with particles, and of the finest grid and largest clouds; the first of the others'.
         #[garde(range(min = 2, max = 100_000))]
         pub(super) message_trials: u64 = 60 => quick 3,
@@ -33,29 +32,19 @@ impl Effort {
 rows! {
     /// One tracker at one point.
     #[derive(Debug, Clone)]
-    pub struct Row {
-        /// Which setting.
-        pub(super) point: String,
-        /// Ratio of the powers of range and noise.
-        pub(super) snr_db: f64 ["dB"],
-        /// Levels of the quantizer.
-        pub(super) levels: usize,
-        /// Tracker and its particles, draws or nodes an axis.
-        pub(super) method: String,
-        /// Kind of tracker.
-        pub(super) family: String,
-        /// Particles, draws, or nodes an axis.
-        pub(super) size: Option<usize>,
+    pub struct Row by "{point} {method}" {
+        pub(super) point: String => "Which setting.",
+        pub(super) snr_db: f64 ["dB"] => "Ratio of the powers of range and noise.",
+        pub(super) levels: usize => "Levels of the quantizer.",
+        pub(super) method: String => "Tracker and its particles, draws or nodes an axis.",
+        pub(super) family: String => "Kind of tracker.",
+        pub(super) size: Option<usize> => "Particles, draws, or nodes an axis.",
         #[serde(flatten)]
         pub(super) score: Score,
     }
 }
 
 impl Row {
-    pub(super) fn key(&self) -> String {
-        format!("{} {}", self.point, self.method)
-    }
-
     pub(super) fn mse(&self) -> Measured {
         self.score.mse
     }
@@ -85,19 +74,17 @@ pub(super) fn rows(
 pub(super) fn agree(claims: &mut Claims, rows: &[Row], prefix: &str, heavy_tailed: bool) {
     let full = claims.at_full_trials();
     let quantity = |what: &str| format!("{prefix}{what}");
-    full.references(&quantity("mse"), "mean squared position error", rows, |r| (r.key(), r.mse()));
+    full.keyed(&quantity("mse"), "mean squared position error", rows, |r| r.mse());
     if heavy_tailed {
-        full.references(&quantity("median"), "median of the squared position error", rows, |r| {
-            (r.key(), r.score.median)
-        });
-        full.references(&quantity("lost"), "share of lost tracks", rows, |r| (r.key(), r.score.lost));
+        full.keyed(&quantity("median"), "median of the squared position error", rows, |r| r.score.median);
+        full.keyed(&quantity("lost"), "share of lost tracks", rows, |r| r.score.lost);
     }
 }
 
 /// The references of shares that ours stay below, of three particles: where the other program loses more tracks.
 pub(super) fn loses_no_more(claims: &mut Claims, rows: &[Row]) {
     let full = claims.at_full_trials();
-    full.references_at_most("lost-most", "share of lost tracks", rows, |r| (r.key(), r.score.lost));
+    full.keyed_at_most("lost-most", "share of lost tracks", rows, |r| r.score.lost);
 }
 
 /// The axis of squared position errors.

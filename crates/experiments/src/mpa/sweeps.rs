@@ -13,14 +13,10 @@ pub struct Mse;
 
 rows! {
     pub struct Mses {
-        /// Canonical sensors, 50 dB, four levels.
-        trackers: Vec<Row>,
-        /// The published encoder for targets of several speeds.
-        speeds: Vec<Row>,
-        /// Four other layouts of the sensors.
-        layouts: Vec<Row>,
-        /// What many particles reach, at three signal-to-noise ratios.
-        floor: Vec<Row>,
+        trackers: Vec<Row> => "Canonical sensors, 50 dB, four levels.",
+        speeds: Vec<Row> => "The published encoder for targets of several speeds.",
+        layouts: Vec<Row> => "Four other layouts of the sensors.",
+        floor: Vec<Row> => "What many particles reach, at three signal-to-noise ratios.",
     }
 }
 
@@ -141,8 +137,6 @@ impl Figure for Mse {
     }
 }
 
-rows! {}
-
 /// Lines of the families over a coordinate of the rows.
 fn families(rows: &[Row], shown: &[&str], x: impl Fn(&Row) -> f64) -> Vec<Layer> {
     let line = |(i, family): (usize, &&str)| {
@@ -224,40 +218,32 @@ pub struct Fig35;
 
 const LEVELS: [usize; 7] = [2, 4, 8, 16, 32, 64, 256];
 
-parameters! {
-    pub struct LevelEffort {
-        /// Trajectories of every tracker but message passing with particles.
-        #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 100 => quick 8,
-        /// Trajectories of message passing with particles.
-        #[garde(range(min = 2, max = 100_000))]
-        message_trials: u64 = 40 => quick 3,
-    }
-}
-
 impl Figure for Fig35 {
-    figure!(LevelEffort => Vec<Row>, "mpa-fig3-5", "Error over the number of levels", "particle message passing, Figure 3.5",
+    figure!(Effort => Vec<Row>, "mpa-fig3-5", "Error over the number of levels", "particle message passing, Figure 3.5",
         "50 dB, forty particles, the published encoder. Each bit is worth a factor of about four between two and six bits; \
          what is left at eight bits is the noise.");
 
-    fn run(&self, p: &LevelEffort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
+    fn defaults(&self) -> Effort {
+        Effort {
+            trials: 100,
+            message_trials: 40,
+        }
+    }
+
+    fn run(&self, p: &Effort, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let mut methods = gaussian();
         methods.extend([9, 15, 31].map(Method::Grid));
         methods.push(Method::Guided(40));
         methods.extend(messages(40)?);
-        let effort = Effort {
-            trials: p.trials,
-            message_trials: p.message_trials,
-        };
         let mut trackers = Vec::new();
         for levels in LEVELS {
             let point = Point::published(50.0, levels, SPEED)?;
-            trackers.extend(rows(context, &format!("50dB-L{levels}"), &point, &effort.of(&methods))?);
+            trackers.extend(rows(context, &format!("50dB-L{levels}"), &point, &p.of(&methods))?);
         }
         Ok(trackers)
     }
 
-    fn claims(&self, _: &LevelEffort, t: &Vec<Row>, claims: &mut Claims) {
+    fn claims(&self, _: &Effort, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         agree(claims, t, "", true);
         for (method, what) in [
@@ -282,7 +268,7 @@ impl Figure for Fig35 {
         full.increasing("eight-bits", what, [median(256, "EKF-U"), median(256, "improved-40")]);
     }
 
-    fn plot(&self, _: &LevelEffort, t: &Vec<Row>) -> Plot {
+    fn plot(&self, _: &Effort, t: &Vec<Row>) -> Plot {
         let shown = ["EKF-Q", "GMPA", "GMPA-transfer", "improved", "guided"];
         let bits = |r: &Row| (r.levels as f64).log2();
         let grid: Vec<&Row> = t.iter().filter(|r| r.method == "grid-15").collect();

@@ -304,14 +304,10 @@ rows! {
     /// What a method did on many trajectories.
     #[derive(Debug, Clone)]
     pub(super) struct Score {
-        /// Mean squared position error, averaged over trajectories.
-        pub(super) mse: Measured,
-        /// Median over trajectories of their mean squared error.
-        pub(super) median: Measured,
-        /// Share of trajectories with a mean squared error above 4.
-        pub(super) lost: f64,
-        /// Trajectories.
-        pub(super) trajectories: u64,
+        pub(super) mse: Measured => "Mean squared position error, averaged over trajectories.",
+        pub(super) median: Measured => "Median over trajectories of their mean squared error.",
+        pub(super) lost: f64 => "Share of trajectories with a mean squared error above 4.",
+        pub(super) trajectories: u64 => "Trajectories.",
     }
 }
 
@@ -358,8 +354,7 @@ pub(super) fn compare(
             .map(|(method, _)| Ok(method.run(&world, &network, &target, trial.stream)?.mse(&world)))
             .collect()
     };
-    let stream = context.stream("mpa-trajectories");
-    let all = context.monte_carlo(stream, most).run(one)?;
+    let all = context.trials("mpa-trajectories", most, one)?;
     let mut errors: Vec<Vec<f64>> = methods.iter().map(|_| Vec::new()).collect();
     for (index, trial) in all.into_iter().enumerate() {
         let taking = (0..methods.len()).filter(|m| (index as u64) < methods[*m].1);

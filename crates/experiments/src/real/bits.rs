@@ -1,74 +1,52 @@
 //! Error against bits, for every signal and scheme.
 
 use super::baselines::{Played, delta_modulation, jayant, searched};
-use super::recordings::{Recording, Source};
+use super::recordings::{Recording, Source, each};
 use super::tracking::{best_for, stream_bits, words};
 use crate::prelude::*;
 use fewbits_adaptive::{Replay, Silence};
-use rayon::prelude::*;
 
 parameters! {
     pub struct Parameters {
         #[serde(flatten)]
         #[garde(dive)]
         source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
-        /// Bits per sample, at most.
         #[garde(length(min = 1, max = 20), inner(range(min = 0.02, max = 12.0)))]
-        rate: Vec<f64> = vec![0.25, 0.5, 1.0, 2.0] => quick vec![0.5, 2.0],
+        rate: Vec<f64> = vec![0.25, 0.5, 1.0, 2.0] => quick vec![0.5, 2.0] => "Bits per sample, at most.",
     }
 }
 
 rows! {
     pub struct Rows {
-        /// Every scheme at every rate that it can keep to.
-        schemes: Vec<Row>,
-        /// Ours beside the best of the baselines.
-        comparison: Vec<Pair>,
+        schemes: Vec<Row> => "Every scheme at every rate that it can keep to.",
+        comparison: Vec<Pair> => "Ours beside the best of the baselines.",
     }
 
     struct Row {
-        /// Signal.
-        column: String,
-        /// Bits per sample, at most.
-        rate: f64,
+        column: String => "Signal.",
+        rate: f64 => "Bits per sample, at most.",
         /// adaptive and words are ours; the others: send-on-delta (12-bit words), modulation (adaptive delta modulation), jayant,
         /// dpcm-0 and dpcm-1 (deadband, order 0 and 1).
         scheme: &'static str,
-        /// Half-width of the region of silence.
-        delta: Option<f64>,
-        /// Root mean square error.
-        rmse: f64,
-        /// Bits per sample: ideal code lengths where a code is adaptive.
-        bits: f64 ["bit"],
-        /// Packets per sample.
-        packets: f64,
+        delta: Option<f64> => "Half-width of the region of silence.",
+        rmse: f64 => "Root mean square error.",
+        bits: f64 ["bit"] => "Bits per sample: ideal code lengths where a code is adaptive.",
+        packets: f64 => "Packets per sample.",
     }
 
     struct Pair {
-        /// Signal.
-        column: String,
-        /// Bits per sample, at most.
-        rate: f64,
-        /// The best baseline, its order chosen in hindsight.
-        best: &'static str,
-        /// Its root mean square error.
-        best_rmse: f64,
-        /// Ours.
-        rmse: f64,
-        /// Ours over the best; smaller errors than the negligible one count as that.
-        ratio: f64,
-        /// A millionth of the signal's range.
-        negligible: f64,
-        /// Largest error of ours over its delta.
-        worst: f64,
-        /// Ideal bits per sample.
-        ideal: f64 ["bit"],
-        /// The same reports as one range-coded stream, whole 32-bit words.
-        stream: f64 ["bit"],
-        /// As packets of whole bits.
-        packed: f64 ["bit"],
-        /// As one stream that also tells which slots are silent.
-        with_silence: f64 ["bit"],
+        column: String => "Signal.",
+        rate: f64 => "Bits per sample, at most.",
+        best: &'static str => "The best baseline, its order chosen in hindsight.",
+        best_rmse: f64 => "Its root mean square error.",
+        rmse: f64 => "Ours.",
+        ratio: f64 => "Ours over the best; smaller errors than the negligible one count as that.",
+        negligible: f64 => "A millionth of the signal's range.",
+        worst: f64 => "Largest error of ours over its delta.",
+        ideal: f64 ["bit"] => "Ideal bits per sample.",
+        stream: f64 ["bit"] => "The same reports as one range-coded stream, whole 32-bit words.",
+        packed: f64 ["bit"] => "As packets of whole bits.",
+        with_silence: f64 ["bit"] => "As one stream that also tells which slots are silent.",
     }
 }
 
@@ -169,14 +147,7 @@ impl Figure for Bits {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let recordings = p.source.load("real-bits", context)?;
-        let points: Vec<(&Recording, f64)> = recordings
-            .iter()
-            .flat_map(|r| p.rate.iter().map(move |b| (r, *b)))
-            .collect();
-        let found: Vec<(Vec<Row>, Pair)> = points
-            .par_iter()
-            .map(|(recording, rate)| compare(recording, *rate, context))
-            .collect::<Result<_, _>>()?;
+        let found = each(&recordings, &p.rate, |recording, rate| compare(recording, rate, context))?;
         let (schemes, comparison): (Vec<Vec<Row>>, Vec<Pair>) = found.into_iter().unzip();
         Ok(Rows {
             schemes: schemes.into_iter().flatten().collect(),
@@ -190,8 +161,7 @@ impl Figure for Bits {
         claims.at_most("bounded", "no error exceeds delta", largest(pairs.iter().map(|p| p.worst)), 1.0);
         let what = "at equal bits the error is 0.85 of that of the best baseline, in the geometric mean";
         claims.at_most("mean", what, geometric_mean(pairs.iter().map(|p| p.ratio)), 0.85);
-        let what = "and nowhere above 1.1 of it";
-        claims.at_most("worst", what, largest(pairs.iter().map(|p| p.ratio)), 1.1);
+        claims.at_most("worst", "and nowhere above 1.1 of it", largest(pairs.iter().map(|p| p.ratio)), 1.1);
         let ours = || rows.schemes.iter().filter(|r| r.scheme == "adaptive");
         claims.all("rate", "the rate is kept", ours(), |r| r.bits <= r.rate);
         let what = "whole packets cost at most a bit each beyond the ideal length";
@@ -218,10 +188,7 @@ impl Figure for Bits {
             let pair = rows.comparison.iter().find(|p| p.column == *column);
             let negligible = pair.map_or(0.0, |p| p.negligible);
             let curve = |(colour, scheme): (usize, &&'static str)| {
-                let chosen = rows
-                    .schemes
-                    .iter()
-                    .filter(|r| r.column == *column && r.scheme == *scheme);
+                let chosen = select(&rows.schemes, |r| r.column == *column && r.scheme == *scheme);
                 let curve = points(chosen, |r| (r.rate, r.rmse.max(negligible)));
                 match *scheme {
                     "adaptive" => Layer::line(*scheme, curve).coloured(colour),

@@ -1,12 +1,11 @@
 //! Bits against the guaranteed bound, beside codecs that exist as crates.
 
 use super::bits::{geometric_mean, largest};
-use super::recordings::{Recording, Source};
+use super::recordings::{Recording, Source, each};
 use crate::prelude::*;
 use fewbits_adaptive::{BlockCodec, Config};
 use pco::ChunkConfig;
 use pco::standalone::simple_compress;
-use rayon::prelude::*;
 
 parameters! {
     pub struct Parameters {
@@ -21,34 +20,24 @@ parameters! {
 
 rows! {
     pub struct Rows {
-        /// Every signal at every bound.
-        signals: Vec<Row>,
-        /// Means over 73 recorded series, measured elsewhere.
-        references: Vec<Reference>,
+        signals: Vec<Row> => "Every signal at every bound.",
+        references: Vec<Reference> => "Means over 73 recorded series, measured elsewhere.",
     }
 
     struct Row {
-        /// Signal.
-        column: String,
-        /// Largest error in percent of the range.
-        percent: f64,
-        /// Block of the adaptive codec, without container.
-        adaptive: f64 ["bit"],
-        /// Largest error of its restored samples over the bound.
-        worst: f64,
-        /// pco 1 on the indices of a lattice of twice the bound, its delta order found by itself.
-        pco: f64 ["bit"],
+        column: String => "Signal.",
+        percent: f64 => "Largest error in percent of the range.",
+        adaptive: f64 ["bit"] => "Block of the adaptive codec, without container.",
+        worst: f64 => "Largest error of its restored samples over the bound.",
+        pco: f64 ["bit"] => "pco 1 on the indices of a lattice of twice the bound, its delta order found by itself.",
         /// zstd, level 19, on those indices as 32-bit numbers; without the feature `zstd` of this crate not run.
         zstd: Option<f64> ["bit"],
     }
 
     struct Reference {
-        /// Largest error in percent of the range.
-        percent: f64,
-        /// Program.
-        codec: &'static str,
-        /// Mean bits per sample.
-        bits: f64 ["bit"],
+        percent: f64 => "Largest error in percent of the range.",
+        codec: &'static str => "Program.",
+        bits: f64 ["bit"] => "Mean bits per sample.",
     }
 }
 
@@ -107,10 +96,6 @@ impl Figure for Codecs {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let recordings = p.source.load("real-codecs", context)?;
-        let points: Vec<(&Recording, f64)> = recordings
-            .iter()
-            .flat_map(|recording| p.percent.iter().map(move |percent| (recording, *percent)))
-            .collect();
         let references = REFERENCES.iter().flat_map(|(codec, bits)| {
             bits.iter().map(move |(percent, bits)| Reference {
                 percent: *percent,
@@ -119,10 +104,7 @@ impl Figure for Codecs {
             })
         });
         Ok(Rows {
-            signals: points
-                .par_iter()
-                .map(|(recording, percent)| measured(recording, *percent))
-                .collect::<Result<_, _>>()?,
+            signals: each(&recordings, &p.percent, measured)?,
             references: references.collect(),
         })
     }

@@ -18,44 +18,32 @@ parameters! {
         #[serde(flatten)]
         #[garde(dive)]
         source: Source = shown() => quick Source { samples: 1000, ..shown() },
-        /// Bits per sample over a perfect link, which choose delta.
         #[garde(range(min = 0.02, max = 12.0))]
-        rate: f64 = 0.5,
-        /// Probabilities that a packet is lost.
+        rate: f64 = 0.5 => "Bits per sample over a perfect link, which choose delta.",
         #[garde(length(min = 1, max = 9), inner(range(min = 0.0, max = 0.5)))]
-        loss: Vec<f64> = vec![0.0, 0.01, 0.1],
-        /// Slots from one refresh to the next.
+        loss: Vec<f64> = vec![0.0, 0.01, 0.1] => "Probabilities that a packet is lost.",
         #[garde(length(min = 1, max = 9), inner(range(min = 2, max = 100_000)))]
-        refresh: Vec<u64> = vec![25, 100, 400],
-        /// Bits of the packets' counter.
+        refresh: Vec<u64> = vec![25, 100, 400] => "Slots from one refresh to the next.",
         #[garde(range(min = 1, max = 16))]
-        sequence_bits: u32 = 4,
-        /// Sequences of losses.
+        sequence_bits: u32 = 4 => "Bits of the packets' counter.",
         #[garde(range(min = 2, max = 100_000))]
-        trials: u64 = 20 => quick 4,
+        trials: u64 = 20 => quick 4 => "Sequences of losses.",
     }
 }
 
 rows! {
     pub struct Row {
-        /// Signal.
-        column: String,
-        /// Probability that a packet is lost.
-        loss: f64,
-        /// Slots from one refresh to the next.
-        refresh: u64,
-        /// Whole bits per sample, counters and refreshes included.
-        bits: Measured ["bit"],
-        /// Root mean square error over delta.
-        rmse: Measured,
-        /// Share of the slots whose error exceeds delta.
-        beyond: Measured,
+        column: String => "Signal.",
+        loss: f64 => "Probability that a packet is lost.",
+        refresh: u64 => "Slots from one refresh to the next.",
+        bits: Measured ["bit"] => "Whole bits per sample, counters and refreshes included.",
+        rmse: Measured => "Root mean square error over delta.",
+        beyond: Measured => "Share of the slots whose error exceeds delta.",
         /// Share of the slots whose error exceeds delta although the receiver believes to be in step.
         unnoticed: Measured,
         /// Slots from the first packet lost to the next refresh received, at the longest, over the interval of refreshes.
         longest: f64,
-        /// Errors beyond delta while no packet was lost since the last refresh that arrived: never.
-        violations: u64,
+        violations: u64 => "Errors beyond delta while no packet was lost since the last refresh that arrived: never.",
     }
 }
 
@@ -193,14 +181,12 @@ impl Figure for Loss {
             Panel::new("", Axis::log("slots from refresh to refresh"), axis(label.into()))
                 .with_all(p.loss.iter().map(layer))
         };
-        Plot::grid(
-            3,
-            vec![
-                panel("bits per sample", |r| r.bits, Axis::linear),
-                panel("rms error / delta", |r| r.rmse, Axis::log),
-                panel("share of slots beyond delta", |r| r.beyond, Axis::linear),
-                panel("share beyond delta, unnoticed", |r| r.unnoticed, Axis::linear),
-            ],
-        )
+        let panels = [
+            panel("bits per sample", |r| r.bits, Axis::linear),
+            panel("rms error / delta", |r| r.rmse, Axis::log),
+            panel("share of slots beyond delta", |r| r.beyond, Axis::linear),
+            panel("share beyond delta, unnoticed", |r| r.unnoticed, Axis::linear),
+        ];
+        Plot::grid(3, panels.into())
     }
 }

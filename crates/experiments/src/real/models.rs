@@ -18,33 +18,23 @@ parameters! {
         #[serde(flatten)]
         #[garde(dive)]
         source: Source = shown() => quick Source { samples: 1000, ..shown() },
-        /// Bits per sample, at most.
         #[garde(range(min = 0.02, max = 12.0))]
-        rate: f64 = 0.5,
-        /// Slots from one row to the next.
+        rate: f64 = 0.5 => "Bits per sample, at most.",
         #[garde(range(min = 1, max = 10_000))]
-        every: usize = 10,
+        every: usize = 10 => "Slots from one row to the next.",
     }
 }
 
 rows! {
     pub struct Row {
-        /// Signal.
-        column: String,
-        /// Slot.
-        slot: usize,
-        /// Sample.
-        sample: f64,
-        /// Reconstruction.
-        value: f64,
-        /// Weight of the random walks.
-        walk: f64,
-        /// Weight of the velocities that decay by 0.6.
-        damped: f64,
-        /// Weight of the velocities that decay by 0.95.
-        smooth: f64,
-        /// Mean logarithm to base 2 of the driving noise, in steps of two delta.
-        scale: f64,
+        column: String => "Signal.",
+        slot: usize => "Slot.",
+        sample: f64 => "Sample.",
+        value: f64 => "Reconstruction.",
+        walk: f64 => "Weight of the random walks.",
+        damped: f64 => "Weight of the velocities that decay by 0.6.",
+        smooth: f64 => "Weight of the velocities that decay by 0.95.",
+        scale: f64 => "Mean logarithm to base 2 of the driving noise, in steps of two delta.",
     }
 }
 
@@ -92,11 +82,11 @@ impl Figure for Models {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-models", context)?;
-        let found: Vec<Vec<Row>> = recordings
-            .iter()
-            .map(|r| follow(r, p, context))
-            .collect::<Result<_, _>>()?;
-        Ok(found.into_iter().flatten().collect())
+        let mut rows = Vec::new();
+        for recording in &recordings {
+            rows.extend(follow(recording, p, context)?);
+        }
+        Ok(rows)
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {
@@ -105,8 +95,7 @@ impl Figure for Models {
         claims.all("weights", "weights sum to one", rows, sums);
         let of = |column: &'static str| rows.iter().filter(move |r| r.column == column && r.slot > 300);
         let velocity = |r: &Row| r.damped + r.smooth;
-        let what = "a smooth drift is given to the velocities";
-        here.above("drift", what, mean(of("drift"), velocity), 0.5);
+        here.above("drift", "a smooth drift is given to the velocities", mean(of("drift"), velocity), 0.5);
         let moving = mean(of("gusts").filter(|r| r.sample > 0.3), |r| r.scale);
         let calm = mean(of("gusts").filter(|r| r.sample == 0.0), |r| r.scale);
         let what = "gusts raise the scale by a factor of at least four over a calm";

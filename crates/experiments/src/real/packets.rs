@@ -2,42 +2,34 @@
 
 use super::baselines::{Played, searched};
 use super::bits::{NEGLIGIBLE, geometric_mean, largest};
-use super::recordings::{Recording, Source};
+use super::recordings::{Recording, Source, each};
 use super::tracking::best_for;
 use crate::prelude::*;
 use fewbits_adaptive::Replay;
-use rayon::prelude::*;
 
 parameters! {
     pub struct Parameters {
         #[serde(flatten)]
         #[garde(dive)]
         source: Source = Source::default() => quick Source { samples: 800, ..Source::default() },
-        /// Packets per sample, at most.
         #[garde(length(min = 1, max = 20), inner(range(min = 0.005, max = 1.0)))]
-        packets: Vec<f64> = vec![0.03, 0.1, 0.3] => quick vec![0.1],
+        packets: Vec<f64> = vec![0.03, 0.1, 0.3] => quick vec![0.1] => "Packets per sample, at most.",
     }
 }
 
 rows! {
     pub struct Row {
-        /// Signal.
-        column: String,
-        /// Packets per sample, at most.
-        target: f64,
+        column: String => "Signal.",
+        target: f64 => "Packets per sample, at most.",
         /// adaptive; send-on-delta, which is also DPCM of order 0 without a lattice; dpcm-0, dpcm-1.
         scheme: &'static str,
-        /// Half-width of the region of silence.
-        delta: f64,
-        /// Root mean square error.
-        rmse: f64,
-        /// Packets per sample.
-        packets: f64,
+        delta: f64 => "Half-width of the region of silence.",
+        rmse: f64 => "Root mean square error.",
+        packets: f64 => "Packets per sample.",
         /// Error over that of the better of both orders of DPCM, whose packets hold a lattice point too; smaller errors than the
         /// negligible one count as that.
         ratio: Option<f64>,
-        /// A millionth of the signal's range.
-        negligible: f64,
+        negligible: f64 => "A millionth of the signal's range.",
     }
 }
 
@@ -84,14 +76,7 @@ impl Figure for Packets {
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let recordings = p.source.load("real-packets", context)?;
-        let points: Vec<(&Recording, f64)> = recordings
-            .iter()
-            .flat_map(|r| p.packets.iter().map(move |t| (r, *t)))
-            .collect();
-        let found: Vec<Vec<Row>> = points
-            .par_iter()
-            .map(|(recording, target)| compare(recording, *target, context))
-            .collect::<Result<_, _>>()?;
+        let found = each(&recordings, &p.packets, |recording, target| compare(recording, target, context))?;
         Ok(found.into_iter().flatten().collect())
     }
 

@@ -3,6 +3,7 @@
 use crate::prelude::*;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
+use rayon::prelude::*;
 
 /// Samples of a synthetic signal, of the length asked for.
 type Synthesis = fn(&mut rand_pcg::Pcg64Dxsm, usize) -> Vec<f64>;
@@ -49,12 +50,10 @@ parameters! {
         /// Columns; empty for all of the synthetic set, or all of the file but the first.
         #[garde(skip)]
         pub columns: Vec<String> = Vec::new(),
-        /// Columns on a circle of 360.
         #[garde(skip)]
-        pub circular: Vec<String> = vec!["direction".into()],
-        /// Length of the synthetic signals.
+        pub circular: Vec<String> = vec!["direction".into()] => "Columns on a circle of 360.",
         #[garde(range(min = 50, max = 100_000))]
-        pub samples: usize = 3800,
+        pub samples: usize = 3800 => "Length of the synthetic signals.",
     }
 }
 
@@ -86,6 +85,20 @@ impl Source {
         }
         Ok(kept)
     }
+}
+
+/// Computes one result for every signal and number, in parallel and in order.
+pub(super) fn each<T: Send>(
+    recordings: &[Recording],
+    numbers: &[f64],
+    one: impl Fn(&Recording, f64) -> Result<T, Error> + Sync,
+) -> Result<Vec<T>, Error> {
+    let pairs = recordings.iter().flat_map(|r| numbers.iter().map(move |n| (r, *n)));
+    let pairs: Vec<(&Recording, f64)> = pairs.collect();
+    pairs
+        .par_iter()
+        .map(|(recording, number)| one(recording, *number))
+        .collect()
 }
 
 /// Numeric columns of a CSV text: the named ones, or all but the first.

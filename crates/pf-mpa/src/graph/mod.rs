@@ -235,7 +235,8 @@ mod tests {
     #[test]
     fn figures_have_their_degrees() {
         let figure = example().unwrap();
-        assert_eq!((figure.nodes().iter().filter(|n| n.is_variable).count(), figure.edges().len()), (5, 8));
+        let (variables, functions): (Vec<_>, Vec<_>) = figure.nodes().into_iter().partition(|n| n.is_variable);
+        assert_eq!((variables.len(), functions.len(), figure.edges().len()), (5, 4, 8));
         assert!(figure.is_tree());
         let step = tracking_step(5).unwrap();
         assert!(step.nodes().iter().any(|n| n.name == "position" && n.degree == 6));

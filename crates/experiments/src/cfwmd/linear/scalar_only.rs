@@ -1,6 +1,6 @@
 //! Schemes that exist for scalar measurements only.
 
-use super::{Experiment, Track};
+use super::experiment::{Experiment, Track};
 use crate::Error;
 use fewbits_cfwmd::censored::Censored;
 use fewbits_cfwmd::rule::Weighing;

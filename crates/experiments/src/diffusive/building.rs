@@ -1,0 +1,163 @@
+//! The building of `diffusive-rooms`, its air, and the sensors and readings of one placement.
+
+use super::plan_belief::{Instrument, PlanBelief, Report, THRESHOLDS};
+use crate::Error;
+use fewbits_diffusion::{Domain, Flow, Plan, PotentialFlow, Scheme, SensorField, Transport};
+use fewbits_models::diffusion::{Air, Ground};
+use fewbits_monte_carlo::Stream;
+use nalgebra::Vector3;
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+/// Three rooms and a corridor, 15 m by 10 m; a window at the right of the first line of rooms, a door to the left of the corridor.
+const PLAN: &str = include_str!("rooms.plan");
+/// Width of a square of the plan, and of a cell, m.
+pub(super) const CELL: f64 = 0.25;
+/// Diffusivity, m^2/s.
+const DIFFUSIVITY: f64 = 0.05;
+/// Wind from door to window, m^2/s.
+const WIND: f64 = 0.15;
+/// Rates that the source may have, kg/s per metre of height.
+const RATES: [f64; 2] = [0.5, 1.5];
+/// Rates that fit free space: its concentrations are of another size.
+const FREE_RATES: [f64; 2] = [0.3, 30.0];
+
+/// One way to report.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Case {
+    pub(super) name: &'static str,
+    pub(super) windy: bool,
+    /// Standard deviation of the noise as a share of the typical concentration.
+    pub(super) noise: f64,
+    pub(super) report: Report,
+    pub(super) readings: usize,
+}
+
+pub(super) const fn case(name: &'static str, windy: bool, noise: f64, report: Report, readings: usize) -> Case {
+    Case {
+        name,
+        windy,
+        noise,
+        report,
+        readings,
+    }
+}
+
+/// Air in the building, and the free space that an estimator without a plan assumes: the same mean wind, no walls.
+pub(super) struct Building {
+    pub(super) transport: Transport,
+    pub(super) free: Air,
+}
+
+impl Building {
+    pub(super) fn new(windy: bool) -> Result<Self, Error> {
+        let domain = Plan::parse(PLAN)
+            .and_then(|plan| plan.domain(CELL, 1, 0.0))
+            .map_err(Error::failed)?;
+        let flow = match windy {
+            true => PotentialFlow::new(&domain, WIND).map_err(Error::failed)?.flow,
+            false => Flow::still(&domain),
+        };
+        let velocities = flow.velocities(&domain);
+        let mean = velocities
+            .iter()
+            .fold(Vector3::zeros(), |sum, v| sum + Vector3::from(*v))
+            / velocities.len() as f64;
+        let transport = Transport::new(domain, DIFFUSIVITY, &flow, 0.0, Scheme::default()).map_err(Error::failed)?;
+        let free = Air::new(DIFFUSIVITY, mean, Ground::None)
+            .and_then(|air| air.with_closest(0.5 * CELL))
+            .map_err(Error::failed)?;
+        Ok(Self { transport, free })
+    }
+
+    pub(super) fn domain(&self) -> &Domain {
+        self.transport.domain()
+    }
+
+    pub(super) fn centre(&self, number: usize) -> [f64; 3] {
+        self.domain().grid().centre(self.domain().free()[number])
+    }
+}
+
+/// Sensors, a source, and the readings.
+pub(super) struct Placement {
+    pub(super) sensors: Vec<usize>,
+    pub(super) source: usize,
+    /// Responses of each sensor to a source in each cell: of the building, and of free space.
+    pub(super) responses: [Vec<Vec<f64>>; 2],
+    pub(super) readings: Vec<Vec<f64>>,
+    pub(super) instrument: Instrument,
+}
+
+impl Placement {
+    pub(super) fn draw(
+        building: &Building,
+        case: &Case,
+        count: usize,
+        source: Option<usize>,
+        stream: Stream,
+    ) -> Result<Self, Error> {
+        let cells = building.domain().free().len();
+        let mut rng = stream.named("places").rng();
+        let source = source.unwrap_or_else(|| rng.random_range(0..cells));
+        let mut sensors = Vec::with_capacity(count);
+        while sensors.len() < count {
+            let cell = rng.random_range(0..cells);
+            if !sensors.contains(&cell) {
+                sensors.push(cell);
+            }
+        }
+        let points: Vec<[f64; 3]> = sensors.iter().map(|cell| building.centre(*cell)).collect();
+        let field = SensorField::steady(&building.transport, &points).map_err(Error::failed)?;
+        let indoors: Vec<Vec<f64>> = (0..count)
+            .filter_map(|sensor| field.response(sensor, 0).map(<[f64]>::to_vec))
+            .collect();
+        let free = |point: &[f64; 3]| -> Vec<f64> {
+            let at = Vector3::from(*point);
+            (0..cells)
+                .map(|cell| {
+                    building
+                        .free
+                        .concentration(&at, &Vector3::from(building.centre(cell)), 1e9)
+                })
+                .collect()
+        };
+        let free = points.iter().map(free).collect();
+        // The typical concentration and the thresholds: quantiles over all sensors and places of the source at rate one.
+        let mut all: Vec<f64> = indoors.concat();
+        all.sort_by(f64::total_cmp);
+        let quantile = |share: f64| all[((all.len() - 1) as f64 * share) as usize];
+        let thresholds = std::array::from_fn(|k| quantile((k + 1) as f64 / (THRESHOLDS + 1) as f64));
+        let instrument = Instrument::new(case.noise * quantile(0.5), thresholds, RATES[1] * quantile(1.0));
+        let mut noise = stream.named("noise").rng();
+        let rate = rng.random_range(RATES[0]..RATES[1]);
+        let mut read = |clean: f64| -> Vec<f64> {
+            (0..case.readings)
+                .map(|_| clean + instrument.noise * noise.sample::<f64, _>(StandardNormal))
+                .collect()
+        };
+        let readings = indoors.iter().map(|row| read(rate * row[source])).collect();
+        Ok(Self {
+            sensors,
+            source,
+            responses: [indoors, free],
+            readings,
+            instrument,
+        })
+    }
+
+    /// The belief after some sensors, in the building (0) or in free space (1).
+    pub(super) fn belief(&self, model: usize, case: &Case, visited: &[usize]) -> Result<PlanBelief, Error> {
+        let rows: Vec<(&[f64], &[f64])> = visited
+            .iter()
+            .map(|i| (self.responses[model][*i].as_slice(), self.readings[*i].as_slice()))
+            .collect();
+        let rates = [RATES, FREE_RATES][model];
+        Ok(PlanBelief::new(&self.instrument, case.report, rates, &rows, self.responses[model][0].len())?)
+    }
+
+    pub(super) fn error(&self, building: &Building, belief: &PlanBelief) -> f64 {
+        let [a, b] = [self.source, belief.mode].map(|cell| building.centre(cell));
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    }
+}
