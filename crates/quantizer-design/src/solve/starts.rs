@@ -362,10 +362,11 @@ mod tests {
     use crate::solve::polish::polish;
     use fewbits_core::Link;
 
-    /// `docs/quantizers.md` says that no interval cells of that job reach 1.365: 20,000 random starts find none.
+    /// The best intervals of 20,000 random starts have an error of 1.354004: below the 1.36593 where the request of
+    /// `docs/quantizers.md` ends, whose starts miss them.
     #[test]
     #[ignore = "minutes"]
-    fn random_starts_of_the_job_find_no_better_intervals() {
+    fn random_starts_of_the_job_find_better_intervals() {
         let noise = Noise::equicorrelated_with_deviations(&[1.0, 1.0], 0.5).unwrap();
         let scene = Scene::new(Prior::normal(20.0, 4.0).unwrap(), noise).unwrap();
         let participants = Participant::all(&[3, 3], &[Link::flipping(0.02).unwrap(); 2]);
@@ -393,7 +394,6 @@ mod tests {
                 polish(&scene, mean_squared_error, &participants, cells_of(&point), true, Deadline::NEVER).unwrap();
             least = least.min(polished.system.value(mean_squared_error).unwrap());
         }
-        println!("least {least:.9}");
-        assert!((1.365_92..1.365_94).contains(&least), "{least}");
+        assert!((1.354..1.354_005).contains(&least), "{least}");
     }
 }
