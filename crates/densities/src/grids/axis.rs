@@ -40,12 +40,11 @@ impl TryFrom<Stored> for Grid {
 /// Most nodes of a grid.
 const MOST: usize = 1_000_000;
 
-/// Largest size of a node: squares of its distances are still finite.
-pub(super) const FARTHEST: f64 = 1e150;
+/// Largest width of a grid, and size of a belief over a lattice: squares of distances are still finite.
+pub(super) const WIDEST: f64 = 1e153;
 
 impl Grid {
-    /// Moments of a density at the nodes are finite: no square overflows, no density of a node overflows, and nodes are not the same
-    /// number.
+    /// Refuses nodes over which the moments of a density overflow. A density is at most the reciprocal of the spacing.
     fn of_nodes(lower: f64, spacing: f64, points: usize) -> Result<Self, Error> {
         let grid = Self {
             lower,
@@ -53,10 +52,9 @@ impl Grid {
             points,
         };
         let farthest = lower.abs().max(grid.node(points).abs());
-        if !(farthest <= FARTHEST && spacing >= f64::MIN_POSITIVE && spacing > 2.0 * f64::EPSILON * farthest) {
-            let expected = "a normal number that tells nodes apart, and nodes within 1e150 of 0";
-            let given = format!("{spacing} from {lower}");
-            return Err(ArgumentError::new("spacing", given, expected).into());
+        if !(spacing * points as f64 <= WIDEST && spacing >= f64::MIN_POSITIVE && farthest / spacing <= 1e300) {
+            let expected = "a spacing that keeps the grid below 1e153 and above the rounding of its reciprocal";
+            return Err(ArgumentError::new("spacing", format!("{spacing} from {lower}"), expected).into());
         }
         Ok(grid)
     }
@@ -64,8 +62,8 @@ impl Grid {
     /// Nodes from `lower` to `upper` or just beyond, `spacing` apart.
     ///
     /// # Errors
-    /// If bounds are not increasing or not within 1e150 of 0, the spacing is not positive or below the rounding of a bound, or there
-    /// are more than a million nodes.
+    /// If bounds are not finite or not increasing, the spacing is not positive, there are more than a million nodes, or moments over
+    /// them would leave the range of numbers.
     pub fn new(lower: f64, upper: f64, spacing: f64) -> Result<Self, Error> {
         finite("lower", lower)?;
         finite("upper", upper)?;

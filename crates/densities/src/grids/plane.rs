@@ -1,6 +1,6 @@
 //! A density over the plane.
 
-use super::axis::FARTHEST;
+use super::axis::WIDEST;
 use super::line::{TRIANGULAR_VARIANCE, absorb, check_density, triangular};
 use crate::Error;
 use crate::particles::weights::Categorical;
@@ -84,7 +84,7 @@ impl PlaneMass {
         belief: &Gaussian<2>,
         fill: impl FnOnce(&Self, &mut [f64]),
     ) -> Result<Self, Error> {
-        if !(belief.mean().amax() <= FARTHEST && belief.covariance().amax() <= FARTHEST * FARTHEST) {
+        if !(belief.mean().amax() <= WIDEST && belief.covariance().amax() <= WIDEST * WIDEST) {
             return Err(fewbits_core::Error::Impossible.into());
         }
         let refuse = || ArgumentError::new("basis", format!("{basis:?}"), "a regular matrix");

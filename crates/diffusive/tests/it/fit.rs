@@ -84,7 +84,15 @@ fn right_model_is_not_refused() {
 /// outside the box) that converge.
 fn error_rates(forms: &[(Form, u64)]) {
     for (form, right) in forms.iter().copied() {
-        let (refusals, _, _) = refused(form, anywhere, field(1.0), 0..right);
+        // Particles are told the rate 1.
+        let right_model = |seed| match form {
+            Form::Particles(_) => Truth {
+                rate: 1.0,
+                ..anywhere(seed)
+            },
+            _ => anywhere(seed),
+        };
+        let (refusals, _, _) = refused(form, right_model, field(1.0), 0..right);
         let rate = |_| Truth {
             source: Vector2::new(62.0, 50.0),
             rate: 2.5,

@@ -82,7 +82,7 @@ fn run<M: SourceModel + Clone>(
 #[test]
 fn every_rule_finds_the_source_behind_the_wall() {
     let model = sensor(field(2));
-    for rule in [Rule::MutualInformation, Rule::CramerRao, Rule::Mahalanobis] {
+    for rule in [Rule::MutualInformation, Rule::CramerRao] {
         let outcome = run(1, &model, &model, |search| search.rule = rule);
         let error = (outcome.estimate().unwrap().mean() - Vector2::from(SOURCE)).norm();
         assert!(error < 0.25, "{rule:?}: {:?} {error}", outcome.status);
@@ -92,7 +92,7 @@ fn every_rule_finds_the_source_behind_the_wall() {
 #[test]
 fn every_form_travels_through_rooms() {
     let model = sensor(field(2));
-    for form in [Form::Raw, Form::Mixture(4), Form::Gaussian] {
+    for form in [Form::Raw, Form::Mixture(4)] {
         let outcome = run(2, &model, &model, |search| (search.form, search.rule) = (form, Rule::MutualInformation));
         let error = (outcome.estimate().unwrap().mean() - Vector2::from(SOURCE)).norm();
         assert!(error < 0.5, "{form:?}: {:?} {error}", outcome.status);

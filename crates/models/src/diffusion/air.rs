@@ -18,7 +18,7 @@ const SQRT_PI: f64 = 1.772_453_850_905_516;
 /// Largest size, in SI units, of diffusivity, wind, distance and age, and the smallest of those that divide: no product of a closed
 /// form overflows. Beyond that distance there is no concentration; an age beyond it is the steady state.
 const LARGEST: f64 = 1e60;
-const SMALLEST: f64 = 1e-60;
+pub(super) const SMALLEST: f64 = 1e-60;
 
 /// What bounds the air below.
 #[derive(Debug, Clone, Copy, PartialEq)]
