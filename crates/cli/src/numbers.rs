@@ -33,7 +33,11 @@ pub(crate) fn mean_and_deviation(option: &'static str, text: &str) -> Result<(f6
 /// A size in as few digits as say it, four at most.
 pub(crate) fn short(number: f64) -> String {
     if number == 0.0 || (1e-4..1e7).contains(&number.abs()) {
-        let digits = if number == 0.0 { 0 } else { (3 - number.abs().log10().floor() as i32).max(0) as usize };
+        let digits = if number == 0.0 {
+            0
+        } else {
+            (3 - number.abs().log10().floor() as i32).max(0) as usize
+        };
         let text = format!("{number:.digits$}");
         if text.contains('.') {
             return text.trim_end_matches('0').trim_end_matches('.').to_owned();

@@ -353,8 +353,7 @@ mod tests {
             let grid = Grid::uniform(v, 3).unwrap();
             let noise = source.noise_std(5.0).unwrap();
             let found = free_breakpoints_of_masks(&source, &grid, &[4, 4, 6], noise, 0.05, 2).unwrap();
-            let start =
-                PatternSensor::with_deviation(linear_pattern(4, 3).unwrap().on(&grid).unwrap(), noise).unwrap();
+            let start = PatternSensor::with_deviation(linear_pattern(4, 3).unwrap().on(&grid).unwrap(), noise).unwrap();
             assert!(found.sensors.iter().any(|s| *s != start));
             (found.mse / (v * v), found.sensors[2].quantizer().breakpoints()[0] / v)
         };

@@ -38,7 +38,11 @@ impl Residual {
         let other = (1.0 - share).max(f64::MIN_POSITIVE);
         let size = (other / share).sqrt();
         // Bits of equal probability have no surprise.
-        let surprise = if (share - other).abs() > EQUAL { size.copysign(other - share) } else { 0.0 };
+        let surprise = if (share - other).abs() > EQUAL {
+            size.copysign(other - share)
+        } else {
+            0.0
+        };
         (size.is_finite() && correction != 0.0).then_some(Self {
             surprise,
             residual: size.copysign(correction),

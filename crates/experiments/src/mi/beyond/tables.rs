@@ -109,8 +109,7 @@ const SEARCHES: [(&str, usize, f64, f64, &[Criterion]); 7] = [
 
 fn signs(noise_sd: f64, rho: f64) -> Result<System, fewbits_quantizer_design::Error> {
     let noise = fewbits_quantizer_design::Noise::equicorrelated_with_deviations(&[noise_sd; 2], rho)?;
-    let scene =
-        fewbits_quantizer_design::Scene::new(fewbits_quantizer_design::Prior::gaussian_with_deviation(1.0)?, noise)?;
+    let scene = Scene::new(fewbits_quantizer_design::Prior::gaussian_with_deviation(1.0)?, noise)?;
     System::ideal(scene, vec![Quantizer::new(vec![0.0])?; 2])
 }
 
