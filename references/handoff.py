@@ -241,3 +241,9 @@ def register(figure, most):
 
 register("handoff-fig6a", 5)
 register("handoff-fig6b", 10)
+
+
+# Lengths of messages that are not coded: 6M - 1 numbers of 32 bits of a mixture, two of each particle
+
+RECIPES.of("handoff-rate/bits", "^f32-")(lambda row: 32 * (6 * int(row[4:]) - 1))
+RECIPES.of("handoff-rate/bits", "^particles-")(lambda row: 64 * int(row[10:]))
