@@ -2,7 +2,8 @@
 
 use super::node::{BitNode, CentreNode, SensingNode, StoredBitNode, StoredNode};
 use super::translation::{is_for_all, machine_frame};
-use super::{BitStar, CENTRE, SLOT_BEGINS};
+use super::routes::CENTRE;
+use super::{BitStar, SLOT_BEGINS};
 use crate::error::Error;
 use crate::medium::{Frame, Kind};
 use crate::note::Note;

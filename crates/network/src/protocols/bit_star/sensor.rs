@@ -2,7 +2,8 @@
 
 use super::node::SensingNode;
 use super::translation::{failed, noted, of};
-use super::{BitStar, CENTRE, OTHER, SLOT_BEGINS};
+use super::routes::CENTRE;
+use super::{BitStar, OTHER, SLOT_BEGINS};
 use crate::error::Error;
 use crate::note::{Note, Stage};
 use crate::simulator::Context;
