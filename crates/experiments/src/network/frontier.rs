@@ -102,7 +102,7 @@ impl Figure for Frontier {
         let (scalar, plane) = (worlds::scalar()?, worlds::plane()?);
         let (of_scalar, of_plane) = (schemes::scalar_schemes(), schemes::plane_schemes());
         let one =
-            |name: &str, schemes: &[Scheme], run: &(dyn Fn(Scheme, Stream) -> Result<worlds::Bill, Error> + Sync)| {
+            |name: &str, schemes: &[Scheme], run: &(dyn Fn(Scheme, Stream) -> Result<super::bill::Bill, Error> + Sync)| {
                 let all = context.compare(
                     "network-frontier",
                     p.trials,
