@@ -1,8 +1,8 @@
 //! A sensor of a star: what its machine asks for is done with its half of the scheme and the simulated radio.
 
 use super::node::SensingNode;
-use super::translation::{failed, noted, of};
 use super::routes::CENTRE;
+use super::translation::{failed, noted, of};
 use super::{BitStar, OTHER, SLOT_BEGINS};
 use crate::error::Error;
 use crate::note::{Note, Stage};
