@@ -101,20 +101,21 @@ impl Figure for Frontier {
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Vec<Row>, Error> {
         let (scalar, plane) = (worlds::scalar()?, worlds::plane()?);
         let (of_scalar, of_plane) = (schemes::scalar_schemes(), schemes::plane_schemes());
-        let one =
-            |name: &str, schemes: &[Scheme], run: &(dyn Fn(Scheme, Stream) -> Result<worlds::Bill, Error> + Sync)| {
-                let all = context.compare(
-                    "network-frontier",
-                    p.trials,
-                    &[name],
-                    |name| (*name).to_owned(),
-                    schemes,
-                    |_, scheme, it| run(*scheme, it.stream).map(|bill| bill.numbers()),
-                )?;
-                all.into_iter()
-                    .next()
-                    .ok_or_else(|| Error::Table("no world".to_owned()))
-            };
+        let one = |name: &str,
+                   schemes: &[Scheme],
+                   run: &(dyn Fn(Scheme, Stream) -> Result<super::bill::Bill, Error> + Sync)| {
+            let all = context.compare(
+                "network-frontier",
+                p.trials,
+                &[name],
+                |name| (*name).to_owned(),
+                schemes,
+                |_, scheme, it| run(*scheme, it.stream).map(|bill| bill.numbers()),
+            )?;
+            all.into_iter()
+                .next()
+                .ok_or_else(|| Error::Table("no world".to_owned()))
+        };
         let in_scalar = one("scalar", &of_scalar, &|scheme, stream| scalar.run(scheme, stream, p.slots))?;
         let in_plane = one("plane", &of_plane, &|scheme, stream| plane.run(scheme, stream, p.slots))?;
         let (least, everything) = (scalar.everything()?, plane.everything()?[1].sqrt());

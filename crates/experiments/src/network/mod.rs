@@ -1,5 +1,6 @@
 //! All schemes over one simulated network: figures.
 
+mod bill;
 mod faults;
 mod frontier;
 mod lifetime;

@@ -2,7 +2,8 @@
 //!
 //! A scheme that is added is in all figures: give it a [`Scheme`], its label, and an arm of [`World::run`].
 
-use super::receivers::{Followers, LookUp, Patterns, SendAll, mixed};
+use super::bill::Bill;
+use super::receivers::{Followers, Halves, LookUp, Patterns, SendAll, bits, each, mixed, over_bits};
 use super::schemes::{Scheme, Talk};
 use crate::prelude::*;
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Decoder, PatternSensor, Source};
@@ -21,9 +22,9 @@ use fewbits_handoff::{Coded, HandoffFilter, Leaders};
 use fewbits_mixture_codec::Reduction;
 use fewbits_mixture_codec::wire::WireFormat;
 use fewbits_models::{Ar1, LinearGaussian, LinearSensor, PLANE_POSITION, constant_velocity_2d};
-use fewbits_network::{BitStar, Clock, Field, Ledger, Radio, Seconds, SensorId, Setup, Walk};
+use fewbits_network::{BitStar, Clock, Field, Radio, Seconds, SensorId, Setup, Walk};
 use fewbits_pf_mpa::{QuantizedRange, RangeNoise, RangeReference, RangeSensor, optimal_loading};
-use fewbits_protocol::{BoxError, Estimator, Feedback, OverBits, Receiver, ReportLength};
+use fewbits_protocol::{BoxError, Feedback, Receiver, ReportLength};
 use fewbits_quantizer_design::{Criterion, Newton, Scene, System, design};
 use fewbits_quantizers::{Labelling, Quantizer, QuantizingSensor, lloyd_max};
 use nalgebra::{Matrix4, SVector, Vector1, Vector4};
@@ -46,42 +47,6 @@ pub(super) const RADIUS: f64 = 20.0;
 /// Distance of the range sensors from where the target starts; it covers some 300 in the standard run.
 const FAR: f64 = 10_000.0;
 
-/// What one run came to, a slot on average.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Bill {
-    /// Squared error.
-    pub(super) squared: f64,
-    /// Payload bits of reports, or of beliefs that travel.
-    pub(super) reports: f64,
-    /// Bits on air with everything.
-    pub(super) air: f64,
-    /// Energy of all radios, J.
-    pub(super) joules: f64,
-    /// Energy of the busiest sensor's radio beyond what it takes asleep, J.
-    pub(super) busiest: f64,
-}
-
-impl Bill {
-    pub(super) fn numbers(&self) -> [f64; 5] {
-        [self.squared, self.reports, self.air, self.joules, self.busiest]
-    }
-
-    /// `first` is the first node that is a sensor.
-    fn of(ledger: &Ledger, first: usize, squared: f64, slots: usize) -> Self {
-        let (n, all) = (slots as f64, ledger.messages());
-        let sensors = &ledger.accounts()[first..];
-        let asleep = Radio::cc2420(0.0).map_or(0.0, |radio| radio.sleep.value());
-        let spent = |a: &fewbits_network::Account| a.sending.value() + a.receiving.value() - asleep * a.awake.value();
-        Self {
-            squared,
-            reports: sensors.iter().map(|account| account.payload.0 as f64).sum::<f64>() / n,
-            air: all.air.0 as f64 / n,
-            joules: (all.sending.value() + all.receiving.value()) / n,
-            busiest: sensors.iter().map(spent).fold(0.0, f64::max) / n,
-        }
-    }
-}
-
 /// A world: how it moves, who senses it, and what is known of it beforehand.
 #[derive(Debug, Clone)]
 pub(super) struct World<const D: usize, G> {
@@ -99,53 +64,6 @@ pub(super) struct World<const D: usize, G> {
 
 type Truths<const D: usize> = Vec<SVector<f64, D>>;
 type Measurements = Vec<Vec<Vector1<f64>>>;
-
-/// Both halves of a scheme over bits, and how its sensors learn what they must know.
-struct Halves<R, C, N> {
-    centre: C,
-    feedback: Feedback,
-    report: ReportLength,
-    node: N,
-    receiver: std::marker::PhantomData<R>,
-}
-
-impl<R, C, N> Halves<R, C, N>
-where
-    R: Receiver,
-    C: Fn() -> Result<R, BoxError> + Send + Sync + 'static,
-    N: Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static,
-{
-    fn new(centre: C, feedback: Feedback, report: ReportLength, node: N) -> Self {
-        Self {
-            centre,
-            feedback,
-            report,
-            node,
-            receiver: std::marker::PhantomData,
-        }
-    }
-}
-
-/// The receiver of an estimator in types, before its first slot.
-fn over_bits<E>(e: E) -> impl Fn() -> Result<OverBits<E>, BoxError> + Send + Sync + 'static
-where
-    E: Estimator + Clone + Send + Sync + 'static,
-{
-    move || Ok(OverBits::new(e.clone()))
-}
-
-/// The sensors' half of a scheme without memory.
-fn each<C>(scheme: C) -> impl Fn(usize) -> Box<dyn SensorNode<1>> + Send + Sync + 'static
-where
-    C: fewbits_core::Scheme<1> + Clone + Send + Sync + 'static,
-    C::State: 'static,
-{
-    move |_| Box::new(SchemeNode::new(scheme.clone()))
-}
-
-fn bits(bits: usize) -> ReportLength {
-    ReportLength::Fixed(bits as u32)
-}
 
 /// The scalar world, in its stationary state.
 pub(super) fn scalar() -> Result<World<1, Ar1>, Error> {

@@ -1,22 +1,10 @@
 //! Carrier sense: who waits, who hears whom, and which frames destroy each other.
 
-use super::core::{Outgoing, SimulatorCore};
+use super::core::{OnAir, Outgoing, SimulatorCore};
 use super::queue::EventKind;
 use super::setup::Access;
 use crate::units::{Bits, Instant, SensorId};
 use rand::RngExt;
-use serde::{Deserialize, Serialize};
-
-/// A transmission while it is on air.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct OnAir {
-    pub(super) from: SensorId,
-    start: Instant,
-    end: Instant,
-    /// What is on its way: receiver, and place in the queue.
-    pub(super) arrivals: Vec<(SensorId, u32)>,
-}
 
 impl SimulatorCore {
     /// Whether nodes contend for the air.

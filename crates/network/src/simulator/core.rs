@@ -3,7 +3,6 @@
 //! [`Simulator`](super::Simulator) takes events from here; [`Context`](super::Context) is the part that a protocol may use. What is sent is in
 //! `transmission`.
 
-use super::contention::OnAir;
 use super::ledger::{Account, Ledger};
 use super::log::{Detail, Entry, Log, Reception};
 use super::queue::{Arrival, Event, EventKind, Queue};
@@ -51,6 +50,17 @@ pub(super) struct Outgoing {
     pub(super) sender_awake: bool,
     /// The receiver is awake from the attempt before.
     pub(super) receiver_awake: bool,
+}
+
+/// A transmission while it is on air.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OnAir {
+    pub(super) from: SensorId,
+    pub(super) start: Instant,
+    pub(super) end: Instant,
+    /// What is on its way: receiver, and place in the queue.
+    pub(super) arrivals: Vec<(SensorId, u32)>,
 }
 
 /// What a snapshot holds besides the nodes.

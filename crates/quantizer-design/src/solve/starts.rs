@@ -20,6 +20,8 @@ const MAX_COARSE_WORK: f64 = 5e8;
 const START_WORK: f64 = 6e8;
 /// Rounds over the sensors that a climb takes, about.
 const CLIMB_ROUNDS: f64 = 10.0;
+/// Climbs that should fit into a time limit; otherwise they go over rough nodes.
+const LEAST_CLIMBS: f64 = 4.0;
 /// Times that grids are refined, each by a factor of three: breakpoints end within 1e-3 of a standard deviation, from where
 /// Newton's method takes over.
 const REFINEMENTS: usize = 3;
@@ -79,7 +81,7 @@ impl Search<'_> {
         let cells: Vec<usize> = participants.iter().map(|p| grid_cells(p.bits)).collect();
         let largest = cells.iter().copied().max().unwrap_or(0);
         let mut work = landscape.work(largest);
-        let work_is_large = work > MAX_COARSE_WORK;
+        let work_is_large = work > MAX_COARSE_WORK || control.is_short_for(LEAST_CLIMBS * CLIMB_ROUNDS * work);
         if work_is_large {
             landscape = Landscape::new(&[(1.0, scene)], criterion, laws, Resolution::Rough)?;
             work = landscape.work(largest);

@@ -1,8 +1,9 @@
 //! Events of the simulator as those of the machines, and nodes as a snapshot has them.
 
 use super::node::{BitNode, CentreNode, SensingNode, StoredBitNode, StoredNode};
+use super::routes::CENTRE;
 use super::translation::{is_for_all, machine_frame};
-use super::{BitStar, CENTRE, SLOT_BEGINS};
+use super::{BitStar, SLOT_BEGINS};
 use crate::error::Error;
 use crate::medium::{Frame, Kind};
 use crate::note::Note;

@@ -1,12 +1,13 @@
 //! A star whose nodes run the state machines of `fewbits-protocol`: the machines of real sensors.
 //!
-//! `driver` hands the simulator's events to the machines, `centre` and `sensor` do what these ask for, `relay` passes frames on, `node` has what
-//! they hold, `translation` their frames and notes.
+//! `driver` hands the simulator's events to the machines, `centre` and `sensor` do what these ask for, `relay` passes frames on along
+//! `routes`, `node` has what they hold, `translation` their frames and notes.
 
 mod centre;
 mod driver;
 mod node;
 mod relay;
+mod routes;
 mod sensor;
 pub(crate) mod translation;
 
@@ -26,11 +27,10 @@ use fewbits_protocol::{
 };
 use nalgebra::SVector;
 use node::Failures;
-use relay::Routes;
+use routes::{CENTRE, Routes};
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-const CENTRE: SensorId = SensorId(0);
 /// Timers of nodes: a slot begins; the deadline of a centre, or a missing acknowledgement (with the slot above) of a sensor.
 const SLOT_BEGINS: u32 = 0;
 const OTHER: u32 = 1;

@@ -1,63 +1,14 @@
 //! Frames over several hops: what sensors pass on for others.
 
+use super::BitStar;
 use super::node::SensingNode;
+use super::routes::{CENTRE, Routes};
 use super::translation::{goes_up, is_for_all};
-use super::{BitStar, CENTRE};
 use crate::error::Error;
 use crate::medium::{Check, Field, Frame, Kind};
 use crate::note::Note;
 use crate::simulator::Context;
 use crate::units::SensorId;
-
-/// For each node the next one on its way to the centre, and whether others send through it.
-#[derive(Debug)]
-pub(super) struct Routes {
-    parents: Vec<SensorId>,
-    passes: Vec<bool>,
-}
-
-impl Routes {
-    fn new(field: &Field) -> Self {
-        let hops = field.graph().hops_from(CENTRE.index()).ok();
-        let parent = |node| hops.as_ref().and_then(|hops| hops.parent(node));
-        let parents: Vec<_> = (0..field.len())
-            .map(|node| parent(node).map_or(CENTRE, |parent| SensorId(parent as u32)))
-            .collect();
-        let mut passes = vec![false; parents.len()];
-        for parent in &parents {
-            passes[parent.index()] = true;
-        }
-        Self { parents, passes }
-    }
-
-    fn parent(&self, node: SensorId) -> SensorId {
-        self.parents.get(node.index()).copied().unwrap_or(CENTRE)
-    }
-
-    /// The node before `below` on the way down from `above`.
-    fn down(&self, above: SensorId, below: SensorId) -> SensorId {
-        let mut hop = below;
-        for _ in 0..self.parents.len() {
-            let parent = self.parent(hop);
-            if parent == above || parent == CENTRE {
-                break;
-            }
-            hop = parent;
-        }
-        hop
-    }
-
-    pub(super) fn hops(&self, node: u32) -> usize {
-        let mut at = SensorId(node);
-        (0..self.parents.len())
-            .take_while(|_| {
-                let here = at;
-                at = self.parent(at);
-                here != CENTRE
-            })
-            .count()
-    }
-}
 
 impl<R, const M: usize> BitStar<R, M> {
     /// The routes, if sensors relay.

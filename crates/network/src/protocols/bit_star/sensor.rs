@@ -1,8 +1,9 @@
 //! A sensor of a star: what its machine asks for is done with its half of the scheme and the simulated radio.
 
 use super::node::SensingNode;
+use super::routes::CENTRE;
 use super::translation::{failed, noted, of};
-use super::{BitStar, CENTRE, OTHER, SLOT_BEGINS};
+use super::{BitStar, OTHER, SLOT_BEGINS};
 use crate::error::Error;
 use crate::note::{Note, Stage};
 use crate::simulator::Context;
