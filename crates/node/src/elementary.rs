@@ -38,7 +38,8 @@ pub fn power(x: f32) -> f32 {
     let f = x - (shifted - ROUNDING);
     // In pairs, so that few operations wait for each other.
     let square = f * f;
-    let high = (0.240_226_45 + f * 0.055_503_615) + square * ((0.009_618_791 + f * 0.001_339_05) + square * 0.000_152_510_57);
+    let high =
+        (0.240_226_45 + f * 0.055_503_615) + square * ((0.009_618_791 + f * 0.001_339_05) + square * 0.000_152_510_57);
     let fraction = (1.0 + f * core::f32::consts::LN_2) + square * high;
     f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23)) * fraction
 }

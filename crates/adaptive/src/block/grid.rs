@@ -100,7 +100,9 @@ impl Grid {
         match self {
             Self::Decimal { decimals, width } => {
                 // Twice the digits of the middle, which may be half of one.
-                let short = width.checked_mul(index).and_then(|middle| middle.checked_mul(2)?.checked_add(width - 1));
+                let short = width
+                    .checked_mul(index)
+                    .and_then(|middle| middle.checked_mul(2)?.checked_add(width - 1));
                 let twice = match short {
                     Some(twice) => twice as f64,
                     None => (2 * i128::from(*width) * i128::from(index) + i128::from(*width) - 1) as f64,

@@ -93,7 +93,12 @@ pub(super) fn with_models(
     Ok(writer.finish())
 }
 
-pub(super) fn read_models(bytes: &[u8], rows: usize, grid: &Grid, others: Option<&Others<'_>>) -> Result<Vec<i64>, CodecError> {
+pub(super) fn read_models(
+    bytes: &[u8],
+    rows: usize,
+    grid: &Grid,
+    others: Option<&Others<'_>>,
+) -> Result<Vec<i64>, CodecError> {
     let mut reader = Reader::new(bytes);
     let first = read_first(&mut reader)?;
     let mut indices = vec![first];

@@ -5,8 +5,8 @@
 //! w_i <- w_i + rate (bit - p) s_i   the gradient of the code length
 //! ```
 
-use fewbits_node::elementary::{log2, squash};
 use super::priors::MIXER_WEIGHTS;
+use fewbits_node::elementary::{log2, squash};
 use std::sync::LazyLock;
 
 /// Contexts whose outcomes are counted.

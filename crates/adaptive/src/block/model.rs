@@ -8,11 +8,11 @@
 //! ```
 
 use super::coder::Coder;
-use fewbits_node::elementary::{log2, round};
 use super::experts::{Frequencies, LeastSquares, Tails, Track};
 use super::filters::Filters;
 use super::mixer::{EXPERTS, Mixer, log_odds};
 use fewbits_core::CodecError;
+use fewbits_node::elementary::{log2, round};
 
 /// Largest index, either sign: sums of a few stay whole in an `i64` with room.
 pub(super) const LARGEST: i64 = 1 << 46;

@@ -188,7 +188,10 @@ impl<'a> Law<'a> {
         let a = a.min(WEIGHTS);
         let b = b.min(WEIGHTS - a);
         let mixed = [(a, bank), (b, residuals), (WEIGHTS - a - b, values)];
-        let share: u64 = mixed.iter().map(|(weight, share)| u64::from(*weight) * u64::from(*share)).sum();
+        let share: u64 = mixed
+            .iter()
+            .map(|(weight, share)| u64::from(*weight) * u64::from(*share))
+            .sum();
         let free = u64::from(TOTAL - EACH * ESCAPE - ESCAPE_SHARE);
         EACH * symbol + ((free * (share >> 16)) >> PRECISION) as u32
     }
