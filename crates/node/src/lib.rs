@@ -15,7 +15,7 @@
 //! let quantizer = Quantizer::new(&[1000_u16, 2048, 3000], &[0, 1, 3, 2], 2)?;
 //! assert_eq!(quantizer.word(2050)?, 3);
 //!
-//! // Any signal within 0.05: the encoder holds about 3.6 KiB; silence costs nothing.
+//! // Any signal within 0.05: the encoder holds 3.2 KB; silence costs nothing.
 //! let mut encoder = Encoder::new(Config::new(0.05)?);
 //! let first = encoder.encode(20.0)?;
 //! assert!(first.is_some() && encoder.encode(20.01)?.is_none());
@@ -36,7 +36,7 @@
 //!
 //! The central choice: **thresholds are of the samples' own type.** A sample that is a code of a converter is compared with codes, so a
 //! sign bit, a word, a bit of a pattern and a censoring sensor need no floating point. Only the level of a range, the own filter, the
-//! trigger and the adaptive encoder compute, and they use IEEE arithmetic, square roots and exponentials that are the same on every
+//! trigger and the adaptive encoder compute, and they use IEEE arithmetic, square roots and powers that are the same on every
 //! machine: [`golden`] has inputs and messages to check that against.
 //!
 //! Not here: what a report means (the estimators), frames and resynchronisation (the protocol), radio, storage.

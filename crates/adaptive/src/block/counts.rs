@@ -54,7 +54,7 @@ impl Count {
     fn learn(&mut self, bit: bool) {
         let (one, seen) = (i32::from(self.one), self.seen.min(MOST_SEEN));
         let target = if bit { i32::from(u16::MAX) } else { 0 };
-        let moved = one + ((target - one) * SHARES[usize::from(seen)] >> 15);
+        let moved = one + (((target - one) * SHARES[usize::from(seen)]) >> 15);
         self.one = (moved as u16).clamp(LEAST, u16::MAX - LEAST);
         self.seen = (seen + 1).min(MOST_SEEN);
     }
@@ -141,7 +141,7 @@ impl Counts {
                 size = size.saturating_add(over - 1);
             }
             // No writer's differences of differences are larger.
-            if size > 8 * LARGEST as u64 >> k {
+            if size > (8 * LARGEST as u64) >> k {
                 return Err(damaged(i64::MAX));
             }
             if up { size as i64 } else { -(size as i64) }
@@ -152,7 +152,7 @@ impl Counts {
         if index.abs() > LARGEST {
             return Err(damaged(index));
         }
-        self.size += d.unsigned_abs().min(1 << 44) - self.size / 16;
+        self.size = self.size - self.size / 16 + d.unsigned_abs().min(1 << 44);
         self.told = [d, self.told[0]];
         self.slope = index - self.last;
         self.last = index;

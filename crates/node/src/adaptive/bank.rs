@@ -6,7 +6,7 @@
 //! heavier tails that recordings have, and costs one exponential for a cell:
 //!
 //! ```text
-//! E = exp(-|d| / s),  C = exp(1 / 2s):   P(cell) = E (C - 1/C) / ((1 + E C)(1 + E / C))
+//! E = exp(-|d| / s),  C = exp(1 / 2s):   P(cell) = E (C - 1/C) / (1 + E (C + 1/C) + E^2)
 //! w <- w P(cell) / sum;   (x, v) <- (x, v) + d (g0, g1);   w <- (1 - 0.005) w + 0.005 / 24
 //! ```
 //!
@@ -64,9 +64,11 @@ pub(super) fn propagate([a, b, d]: Covariance, decay: f32, q: f32) -> Covariance
 pub(super) struct Family {
     /// Doublings of the odds of the predictive law in one step.
     pub(super) sharpness: [f32; SCALES],
-    /// The odds of half a step, and their inverse.
-    pub(super) widening: [f32; SCALES],
-    pub(super) narrowing: [f32; SCALES],
+    /// `C - 1/C` and `C + 1/C`, where `C` are the odds of half a step.
+    pub(super) difference: [f32; SCALES],
+    pub(super) sum: [f32; SCALES],
+    /// `1/C^2`: what a step does to the odds.
+    pub(super) beyond: [f32; SCALES],
     pub(super) gain_x: [f32; SCALES],
     pub(super) gain_v: [f32; SCALES],
 }
@@ -74,8 +76,9 @@ pub(super) struct Family {
 impl Family {
     const EMPTY: Self = Self {
         sharpness: [0.0; SCALES],
-        widening: [0.0; SCALES],
-        narrowing: [0.0; SCALES],
+        difference: [0.0; SCALES],
+        sum: [0.0; SCALES],
+        beyond: [0.0; SCALES],
         gain_x: [0.0; SCALES],
         gain_v: [0.0; SCALES],
     };
@@ -83,8 +86,11 @@ impl Family {
     pub(super) fn set(&mut self, m: usize, [a, b, _]: Covariance) {
         let total = a + CELL;
         self.sharpness[m] = DOUBLINGS / sqrt_f32(a + NOISE * NOISE);
-        self.widening[m] = exp2(0.5 * self.sharpness[m]);
-        self.narrowing[m] = 1.0 / self.widening[m];
+        let odds = exp2(0.5 * self.sharpness[m]);
+        let inverse = 1.0 / odds;
+        self.difference[m] = odds - inverse;
+        self.sum[m] = odds + inverse;
+        self.beyond[m] = inverse * inverse;
         self.gain_x[m] = a / total;
         self.gain_v[m] = b / total;
     }
@@ -170,15 +176,18 @@ impl Bank {
     pub(super) fn predict(&mut self, elapsed: u32) -> Ahead {
         let slots = elapsed.clamp(1, LONGEST_GAP);
         let families = self.x.chunks_exact_mut(SCALES).zip(self.v.chunks_exact_mut(SCALES));
-        for ((x, v), decay) in families.zip(DECAYS).skip(1) {
-            for _ in 0..slots {
-                for (x, v) in x.iter_mut().zip(v.iter_mut()) {
-                    *v *= decay;
-                    *x += *v;
+        let mut mean = 0.0;
+        for ((x, v), (decay, w)) in families.zip(DECAYS.into_iter().zip(self.w.chunks_exact(SCALES))) {
+            for ((x, v), w) in x.iter_mut().zip(v).zip(w) {
+                if decay > 0.0 {
+                    for _ in 0..slots {
+                        *v *= decay;
+                        *x += *v;
+                    }
                 }
+                mean += *x * w;
             }
         }
-        let mean = self.x.iter().zip(&self.w).map(|(x, w)| x * w).sum();
         Ahead { slots, mean }
     }
 
@@ -186,12 +195,9 @@ impl Bank {
     /// cell.
     pub(super) fn update(&mut self, ahead: &Ahead, step: f32) -> f32 {
         let (x, v, w) = (self.x.as_chunks_mut().0, self.v.as_chunks_mut().0, self.w.as_chunks_mut().0);
-        for (family, ((x, v), w)) in x.iter_mut().zip(v).zip(w).enumerate() {
-            ahead.with_family(family, |shape| update_family(shape, step, x, v, w));
-        }
         let mut total = 0.0;
-        for w in &self.w {
-            total += w;
+        for (family, ((x, v), w)) in x.iter_mut().zip(v).zip(w).enumerate() {
+            ahead.with_family(family, |shape| update_family(shape, step, x, v, w, &mut total));
         }
         let inverse = (1.0 - SWITCHING) / total;
         for w in &mut self.w {
@@ -235,22 +241,31 @@ impl Bank {
     }
 }
 
-/// Moves eight models to the index `step` from the last, and multiplies their weights by what they predicted.
-fn update_family(shape: &Family, step: f32, x: &mut Eight, v: &mut Eight, w: &mut Eight) {
+/// Where there are vector registers, sums are taken apart from what is summed.
+const VECTORS: bool = cfg!(feature = "std");
+
+/// Moves eight models to the index `step` from the last, and multiplies their weights by what they predicted. Adds the weights to `total`, the
+/// first first.
+fn update_family(shape: &Family, step: f32, x: &mut Eight, v: &mut Eight, w: &mut Eight, total: &mut f32) {
     vectorised(
         #[inline(always)]
         || {
             for m in 0..SCALES {
                 let d = step - x[m];
                 let e = power(-lesser(d.abs() * shape.sharpness[m], FARTHEST));
-                let (wide, narrow) = (shape.widening[m], shape.narrowing[m]);
-                let evidence = e * (wide - narrow) / ((1.0 + e * wide) * (1.0 + e * narrow));
+                let evidence = e * shape.difference[m] / (1.0 + e * shape.sum[m] + e * e);
                 x[m] += shape.gain_x[m] * d - step;
                 v[m] += shape.gain_v[m] * d;
                 w[m] *= greater(evidence, LEAST);
+                if !VECTORS {
+                    *total += w[m];
+                }
             }
         },
     );
+    if VECTORS {
+        w.iter().for_each(|w| *total += w);
+    }
 }
 
 /// Tails of eight models below and above the cell at `at`.
@@ -263,7 +278,7 @@ fn set_both_tails(tails: &mut [Eight; 2], shape: &Family, at: f32, x: &Eight, w:
                 let z = (x[m] - (at - 0.5)) * shape.sharpness[m];
                 let low = power(greater(lesser(z, FARTHEST), -FARTHEST));
                 // The odds one step further.
-                let high = low * shape.narrowing[m] * shape.narrowing[m];
+                let high = low * shape.beyond[m];
                 below[m] = w[m] / (1.0 + low);
                 above[m] = w[m] * high / (1.0 + high);
             }
@@ -340,8 +355,9 @@ mod tests {
             let (k, table) = (m % SCALES, &STEADY[m / SCALES]);
             let sharpness = std::f64::consts::PI / (3.0 * (ahead[0] + noise)).sqrt() * std::f64::consts::LOG2_E;
             assert!(is(table.sharpness[k], sharpness), "model {m}");
-            assert!(is(table.widening[k], (0.5 * sharpness).exp2()), "model {m}");
-            assert!(is(table.narrowing[k], (-0.5 * sharpness).exp2()), "model {m}");
+            let odds = (0.5 * sharpness).exp2();
+            assert!(is(table.difference[k], odds - 1.0 / odds) && is(table.sum[k], odds + 1.0 / odds), "model {m}");
+            assert!(is(table.beyond[k], (-sharpness).exp2()), "model {m}");
             assert!(is(table.gain_x[k], ahead[0] / (ahead[0] + cell)), "model {m}");
             assert!(is(table.gain_v[k], ahead[1] / (ahead[0] + cell)), "model {m}");
             // What is computed for gaps is the same within rounding.

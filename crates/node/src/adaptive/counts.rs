@@ -80,7 +80,7 @@ impl Residuals {
 }
 
 /// Values remembered.
-pub const CAPACITY: usize = 256;
+pub const CAPACITY: usize = 240;
 /// Weight of a reported value; a silent slot counts one.
 pub const REPORTED: u32 = 10;
 /// Total at which all counts are halved.
@@ -95,7 +95,7 @@ const LOWEST: i64 = -(1 << 40);
 
 /// How often each index occurred, for the indices worth remembering, in increasing order.
 ///
-/// An index and its count share a word of 64 bits, the index above: the table takes 2 KiB, and is ordered as its words are.
+/// An index and its count share a word of 64 bits, the index above: the table takes 1,920 bytes, and is ordered as its words are.
 #[derive(Debug, Clone)]
 pub struct Values {
     entries: [u64; CAPACITY],
@@ -132,7 +132,7 @@ impl Values {
         self.stored().iter().map(move |entry| (index(*entry), count_of(*entry)))
     }
 
-    /// From what [`iter`](Self::iter) gives, if it is: at most 256 increasing indices, counts above zero and not too large.
+    /// From what [`iter`](Self::iter) gives, if it is: at most 240 increasing indices, counts above zero and not too large.
     pub fn from_counts(counts: impl IntoIterator<Item = (i64, u32)>) -> Option<Self> {
         let mut values = Self::NONE;
         let mut before = None;
