@@ -80,8 +80,8 @@ fn two_correlated_sensors_over_a_flipping_link() {
     assert!(header.contains("plant_thresholds_0") && header.contains("plant_decode"));
     // A step takes some 5 ms, so these are far below 10 s on any machine.
     assert!(solutions.steps() < 1000, "{} steps", solutions.steps());
-    // Not the best intervals: 20,000 random starts find 1.354004.
-    assert!(solution.value() < 1.365_94, "{}", solution.value());
+    // The best of 20,000 random starts.
+    assert!(solution.value() < 1.354_01, "{} after {}", solution.value(), solutions.steps());
     assert_eq!((solution.certificate(), solution.scope()), (Certificate::LocalOptimum, Scope::EverySensor));
     assert!(solution.gap().unwrap() > 0.0);
     let (error, standard_error) = simulated(solution, &[1.0, 1.0], 0.5, 100_000);
