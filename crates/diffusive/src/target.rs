@@ -1,15 +1,12 @@
 //! A belief times the likelihood of records, cell by cell.
 
 use crate::belief::{JointBelief, PositionBelief, Prior};
-use crate::density::Slice;
-use crate::density::{CellTarget, Cells};
+use crate::density::{CellTarget, Cells, Slice};
 use crate::rate::{Intervals, RateModel, RateRange, RateSums, cut_normal, ends_about};
 use crate::{Error, SourceLikelihood};
 use fewbits_core::Columns;
 use fewbits_models::SourceModel;
-use fewbits_numerics::LogSum;
-use fewbits_numerics::kernels::largest;
-use fewbits_numerics::normal::log_interval;
+use fewbits_numerics::{LogSum, kernels::largest, normal::log_interval};
 use nalgebra::{Matrix2, Vector2};
 
 /// A Gaussian over the plane, ready to be blurred over cells of any width.

@@ -137,8 +137,13 @@ impl Tracker for RaoBlackwellGuided {
         let increments = &workspace.increments;
         let log_likelihood = next.reweigh(|_, logs| logs.iter_mut().zip(increments).for_each(|(l, c)| *l += c))?;
         let effective_sample_size = next.effective_sample_size();
+        let velocity_variance = (s + ts * ts * q - gain * cross).max(0.0);
+        if !(WithManoeuvre::estimate(next).is_finite() && velocity_variance.is_finite()) {
+            let what = "a moment of the posterior (from the belief or the ranges)";
+            return Err(fewbits_core::Error::NotANumber { what }.into());
+        }
         std::mem::swap(&mut belief.particles, next);
-        belief.velocity_variance = (s + ts * ts * q - gain * cross).max(0.0);
+        belief.velocity_variance = velocity_variance;
         Ok(StepInfo {
             log_likelihood: Some(log_likelihood),
             effective_sample_size: Some(effective_sample_size),

@@ -24,7 +24,8 @@ impl RingBias {
     /// The laws for the cell `[a, b)` and noise of the given deviation.
     ///
     /// # Errors
-    /// If an end is not finite, `a < b` does not hold, `b` is not above zero or the deviation is not.
+    /// If an end is not finite, `a < b` does not hold, `b` is not above zero or the deviation is not; if a moment leaves the range of
+    /// numbers.
     pub fn new(a: f64, b: f64, deviation: f64) -> Result<Self, Error> {
         finite("a", a)?;
         positive("b", b)?;
@@ -49,8 +50,12 @@ impl RingBias {
         let printed = first / mass;
         // The exact law is the larger one beyond the printed mean.
         let beyond = panels(printed, &|d: f64| likelihood(d) * (d / first - 1.0 / mass));
-        if !(mass > 0.0 && first > 0.0) {
-            return refuse("cell", format!("[{a}, {b})"), "a cell that a positive distance can cause");
+        if ![printed, second / first, beyond].iter().all(|x| x.is_finite()) {
+            return refuse(
+                "cell",
+                format!("[{a}, {b})"),
+                "a cell that a positive distance can cause, in numbers whose squares are in range",
+            );
         }
         Ok(Self {
             printed,

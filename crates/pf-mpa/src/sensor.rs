@@ -191,6 +191,11 @@ impl RangeSensor {
     /// Unit vector from the sensor to a point: the slope of the distance; zero at the sensor itself, where it has none.
     pub fn direction(&self, x: f64, y: f64) -> Vector2<f64> {
         let distance = self.distance(x, y);
+        if distance > f64::MAX {
+            // Differences or their length are beyond the range of numbers; a quarter of them is not.
+            let (dx, dy) = (0.25 * x - 0.25 * self.position[0], 0.25 * y - 0.25 * self.position[1]);
+            return Vector2::new(dx, dy) / libm::hypot(dx, dy);
+        }
         if distance > 0.0 {
             (Vector2::new(x, y) - self.position) / distance
         } else {
@@ -324,6 +329,8 @@ mod tests {
             assert!((sensor.distance(3.0 * scale, 4.0 * scale) / (5.0 * scale) - 1.0).abs() < 1e-15);
             assert!((sensor.direction(3.0 * scale, 4.0 * scale) - Vector2::new(0.6, 0.8)).amax() < 1e-15);
         }
+        let far = RangeSensor::new(Vector2::new(-1.5e308, 0.0), RangeNoise::constant(1.0).unwrap()).unwrap();
+        assert!((far.direction(1.5e308, 0.0) - Vector2::new(1.0, 0.0)).amax() < 1e-15);
     }
 
     #[test]

@@ -2,6 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+/// Multiplications per second that a computation may count on: a third of what a slow processor does.
+const SPEED: f64 = 3e8;
+
 /// The instant at which a computation must end, if there is one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Deadline(Option<Instant>);
@@ -16,5 +19,11 @@ impl Deadline {
 
     pub(crate) fn is_over(self) -> bool {
         self.0.is_some_and(|end| Instant::now() >= end)
+    }
+
+    /// Whether so many multiplications may take longer than what is left of the time.
+    pub(crate) fn is_short_for(self, work: f64) -> bool {
+        self.0
+            .is_some_and(|end| work > SPEED * end.saturating_duration_since(Instant::now()).as_secs_f64())
     }
 }

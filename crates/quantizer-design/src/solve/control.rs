@@ -29,9 +29,6 @@ pub enum Stage {
     Certificate,
 }
 
-/// Multiplications per second that a search may count on: a third of what a slow processor does.
-const SPEED: f64 = 3e8;
-
 /// A part of the time limit, in the order in which the parts are used up. What one part leaves, the next may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Share {
@@ -99,11 +96,6 @@ impl<'a> Control<'a> {
             now + left / parts as u32
         };
         self.deadline = Deadline::after(self.started, self.limit.map(end));
-    }
-
-    /// Whether so many multiplications may take longer than the limit.
-    pub(super) fn is_short_for(&self, work: f64) -> bool {
-        self.limit.is_some_and(|limit| work > SPEED * limit.as_secs_f64())
     }
 
     /// When the present share of the time ends.

@@ -35,6 +35,11 @@ pub(super) fn is_affordable(scene: &Scene, criterion: Criterion, outcomes: f64) 
     tables * evaluation_work(scene, criterion, outcomes) <= MAX_HESSIAN_WORK
 }
 
+/// Whether designs can be compared after the time is over.
+pub(super) fn is_quick(scene: &Scene, criterion: Criterion, outcomes: f64) -> Result<bool, Error> {
+    Ok(evaluation_work(&scene.at(Resolution::Coarse)?, criterion, outcomes) <= LATE_COARSE_WORK)
+}
+
 /// Multiplications that one evaluation takes.
 fn evaluation_work(scene: &Scene, criterion: Criterion, outcomes: f64) -> f64 {
     let per_outcome = Scored::new(criterion, scene)
@@ -63,8 +68,9 @@ pub(super) fn polish(
         let mut system = system_of(scene, participants, &cells, apart)?;
         let outcomes = system.outcomes() as f64;
         let work = evaluation_work(scene, criterion, outcomes);
-        let is_late = deadline.is_over();
-        if is_late && evaluation_work(&coarse, criterion, outcomes) > LATE_COARSE_WORK {
+        let is_late = deadline.is_short_for(work);
+        let coarse_work = evaluation_work(&coarse, criterion, outcomes);
+        if coarse_work > LATE_COARSE_WORK && deadline.is_short_for(coarse_work) {
             system = system_of(&scene.at(Resolution::Rough)?, participants, &cells, apart)?;
         } else if work > if is_late { LATE_VALUE_WORK } else { MAX_VALUE_WORK } {
             system = system_of(&coarse, participants, &cells, apart)?;

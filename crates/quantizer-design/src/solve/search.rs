@@ -131,8 +131,12 @@ pub(super) fn gray_walk(words: usize, stream: Stream) -> Vec<usize> {
     let mut walk = vec![rng.random_range(0..words)];
     loop {
         let last = walk[walk.len() - 1];
-        let neighbours = (0..usize::BITS).map(|bit| last ^ (1 << bit)).take_while(|word| *word < 2 * words);
-        let free: Vec<usize> = neighbours.filter(|word| *word < words && !walk.contains(word)).collect();
+        let neighbours = (0..usize::BITS)
+            .map(|bit| last ^ (1 << bit))
+            .take_while(|word| *word < 2 * words);
+        let free: Vec<usize> = neighbours
+            .filter(|word| *word < words && !walk.contains(word))
+            .collect();
         if free.is_empty() {
             return walk;
         }

@@ -81,7 +81,9 @@ impl Search<'_> {
         let cells: Vec<usize> = participants.iter().map(|p| grid_cells(p.bits)).collect();
         let largest = cells.iter().copied().max().unwrap_or(0);
         let mut work = landscape.work(largest);
-        let work_is_large = work > MAX_COARSE_WORK || control.is_short_for(LEAST_CLIMBS * CLIMB_ROUNDS * work);
+        control.enter(Share::AllSensors);
+        let climbs = LEAST_CLIMBS * CLIMB_ROUNDS * work;
+        let work_is_large = work > MAX_COARSE_WORK || control.deadline().is_short_for(climbs);
         if work_is_large {
             landscape = Landscape::new(&[(1.0, scene)], criterion, laws, Resolution::Rough)?;
             work = landscape.work(largest);
@@ -103,8 +105,10 @@ impl Search<'_> {
             if designs.is_empty() {
                 designs.push(best_alone);
             }
-            designs.push(plain(scene, participants, gray)?);
-            designs.push(plain(scene, participants, |level| level)?);
+            if polish::is_quick(scene, criterion, outcomes)? {
+                designs.push(plain(scene, participants, gray)?);
+                designs.push(plain(scene, participants, |level| level)?);
+            }
         }
         Ok(Searched {
             designs,
@@ -122,7 +126,6 @@ impl Search<'_> {
         work: f64,
         control: &mut Control<'_>,
     ) -> Vec<Point> {
-        control.enter(Share::AllSensors);
         let grids: Vec<Grid> = (0..cells.len())
             .map(|n| {
                 let more = self.given.map_or(&[][..], |given| &given[n].breakpoints);
