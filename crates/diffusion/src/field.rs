@@ -148,8 +148,7 @@ impl SensorField {
             // Prefer a corner with a value of its own: along a wall the field is that of the near side.
             let near = moved()
                 .map(|axis| corner ^ (1 << axis))
-                .filter(|without| joined[*without])
-                .next_back();
+                .rfind(|without| joined[*without]);
             let inside = moved().all(|axis| next[axis] < grid.counts()[axis]);
             let free = near
                 .filter(|_| inside)
@@ -296,7 +295,8 @@ impl SourceModel for SensorField {
                 }
             }
         }
-        (most - least).max(0.0) * (2.0 * half_width / narrowest).min(1.0).max(0.0)
+        let share = 2.0 * half_width / narrowest;
+        (most - least).max(0.0) * if share < 1.0 { share.max(0.0) } else { 1.0 }
     }
 
     /// True if the square holds a part of a free cell.

@@ -30,7 +30,7 @@ fn finite(numbers: &[f64]) -> bool {
 /// A grid of wild edges, or of nine squares.
 fn domain(x: &[f64], which: [u8; 6]) -> Option<Domain> {
     let mut edges = [x[..3].to_vec(), vec![0.0, x[3], x[4]]];
-    if which[0] % 2 == 0 {
+    if which[0].is_multiple_of(2) {
         edges.iter_mut().for_each(|axis| axis.sort_by(f64::total_cmp));
     }
     let grid = [
@@ -104,7 +104,7 @@ proptest! {
             if let Ok(snapshots) = transient.run(&[0.0; 5], &[release], &[x[7]]) {
                 prop_assert!(snapshots.iter().all(|s| finite(&s.concentration) && finite(&s.dose)), "{:?} {:?}", x, snapshots);
             }
-            if let Ok(responses) = transient.step_responses(&[patch.clone()], &[x[7]]) {
+            if let Ok(responses) = transient.step_responses(std::slice::from_ref(&patch), &[x[7]]) {
                 prop_assert!(responses.iter().flatten().all(|field| finite(field)), "{:?} {:?}", x, responses);
             }
         }

@@ -263,7 +263,7 @@ impl Search<'_> {
                 0..=4 => of(n, i),
                 // Other Gray codes; one sensor random, the others good; or all random.
                 _ if i % 2 == 1 => of(n, 6),
-                _ if i % 4 == 0 && n != i % grids.len() => of(n, 0),
+                _ if i.is_multiple_of(4) && n != i % grids.len() => of(n, 0),
                 _ => of(n, 5),
             })
             .collect()
