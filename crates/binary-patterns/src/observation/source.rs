@@ -41,13 +41,19 @@ pub(crate) enum Kind {
     Gaussian { std: f64 },
 }
 
+/// A number above zero whose square is a number above zero, with room for sums.
+fn squared(argument: &'static str, value: f64) -> Result<f64, Error> {
+    positive(argument, value)?;
+    Ok(fewbits_numerics::error::within(argument, value, 1e-150, 1e150)?)
+}
+
 impl Source {
     /// Uniform on `[-half_width, half_width]`.
     ///
     /// # Errors
-    /// If `half_width` is not a finite number above zero.
+    /// If `half_width` is not a finite number above zero, or its square leaves the range of numbers.
     pub fn uniform(half_width: f64) -> Result<Self, Error> {
-        let half_width = positive("half_width", half_width)?;
+        let half_width = squared("half_width", half_width)?;
         Ok(Self {
             kind: Kind::Uniform { half_width },
         })
@@ -56,9 +62,9 @@ impl Source {
     /// `N(0, std^2)`.
     ///
     /// # Errors
-    /// If `std` is not a finite number above zero.
+    /// If `std` is not a finite number above zero, or its square leaves the range of numbers.
     pub fn gaussian_with_deviation(std: f64) -> Result<Self, Error> {
-        let std = positive("std", std)?;
+        let std = squared("std", std)?;
         Ok(Self {
             kind: Kind::Gaussian { std },
         })

@@ -84,3 +84,10 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn sources_whose_variance_is_beyond_the_numbers_are_refused() {
+    for size in [1e254, 1e-254] {
+        assert!(Source::uniform(size).is_err() && Source::gaussian_with_deviation(size).is_err());
+    }
+}

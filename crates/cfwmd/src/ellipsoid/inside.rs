@@ -54,7 +54,8 @@ impl<const M: usize> GaussianInEllipsoid<M> {
         let white = lower.solve_lower_triangular(&half.transpose()).ok_or_else(refuse)?;
         let (values, vectors) = symmetric_eigen(symmetrised(&white));
         // In whitened coordinates 1 is the scale of the innovation itself.
-        if values.min() < -1e-9 * values.amax().max(1e-3) {
+        let sound = values.iter().all(|x| x.is_finite()) && values.min() >= -1e-9 * values.amax().max(1e-3);
+        if !sound {
             return Err(refuse());
         }
         let mut order: [usize; M] = std::array::from_fn(|i| i);

@@ -100,3 +100,11 @@ proptest! {
         check(&factor, [x[14], x[15]], prior.as_ref());
     }
 }
+
+#[test]
+fn indefinite_noise_near_the_largest_number_is_refused() {
+    let rule = CensoringRule::new(&Matrix2::new(0.04, -2.5, -2.5, 1e117), 1.1).unwrap();
+    let noise = Matrix2::new(-3.0, f64::MAX, f64::MAX, 0.0);
+    let reports = MissingReports { nothing: 1, lost: 0 };
+    assert!(Censored::missing(&rule, &Vector2::zeros(), &noise, &Link::PERFECT, reports).is_err());
+}
