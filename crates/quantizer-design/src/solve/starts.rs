@@ -2,7 +2,7 @@
 
 use super::control::{Control, Share, Stage};
 use super::landscape::{Grid, Landscape, WordLaw, Words};
-use super::participant::{Participant, WordedCells};
+use super::participant::{Participant, WordedCells, system_of};
 use super::polish;
 use super::search::{Point, best_of, cells_of, climb, gray_walk, grid_with, random_start, refine, spacing, start};
 use crate::criterion::{AllowedCells, Criterion};
@@ -78,20 +78,31 @@ impl Search<'_> {
             });
         }
         let mut landscape = Landscape::new(&[(1.0, scene)], criterion, laws.clone(), Resolution::Coarse)?;
-        let cells: Vec<usize> = participants.iter().map(|p| grid_cells(p.bits)).collect();
+        let mut cells: Vec<usize> = participants.iter().map(|p| grid_cells(p.bits)).collect();
         let largest = cells.iter().copied().max().unwrap_or(0);
         let mut work = landscape.work(largest);
         control.enter(Share::AllSensors);
         let climbs = LEAST_CLIMBS * CLIMB_ROUNDS * work;
-        let work_is_large = work > MAX_COARSE_WORK || control.deadline().is_short_for(climbs);
+        let is_short = control.deadline().is_short_for(climbs);
+        control.is_cut_short |= is_short;
+        let work_is_large = work > MAX_COARSE_WORK || is_short;
+        let mut first = best_alone;
+        let mut search = *self;
+        if is_short {
+            cells = participants.iter().map(|p| few_grid_cells(p.bits)).collect();
+        }
         if work_is_large {
+            let rough = scene.at(Resolution::Rough)?;
             landscape = Landscape::new(&[(1.0, scene)], criterion, laws, Resolution::Rough)?;
-            work = landscape.work(largest);
+            work = landscape.work(cells.iter().copied().max().unwrap_or(0));
+            // Where few climbs are possible the first one starts from the best design at hand.
+            first = self.best_at_hand(&rough, first, control)?;
+            search.given = self.given.or(Some(&first));
         }
         let points = if work > MAX_JOINT_WORK {
             Vec::new()
         } else {
-            self.joint_points(&landscape, &cells, &singles, work, control)
+            search.joint_points(&landscape, &cells, &singles, work, control)
         };
         let unit = size_of(&landscape, &points);
         let refined = self.refined(&landscape, &cells, best_of(points, SAME * unit), outcomes, control);
@@ -103,7 +114,7 @@ impl Search<'_> {
             // What the search has seen is rough or cut short: the exact values decide between its best and plain designs.
             designs.truncate(1);
             if designs.is_empty() {
-                designs.push(best_alone);
+                designs.push(first.clone());
             }
             if polish::is_quick(scene, criterion, outcomes)? {
                 designs.push(plain(scene, participants, gray)?);
@@ -115,6 +126,30 @@ impl Search<'_> {
             value: best,
             apart: true,
         })
+    }
+
+    /// The best on rough nodes of a design and the plain ones, as far as there is time to evaluate them.
+    fn best_at_hand(
+        &self,
+        rough: &Scene,
+        design: Vec<WordedCells>,
+        control: &mut Control<'_>,
+    ) -> Result<Vec<WordedCells>, Error> {
+        let others = [
+            plain(self.scene, self.participants, gray)?,
+            plain(self.scene, self.participants, |level| level)?,
+        ];
+        let mut best = (f64::NEG_INFINITY, design.clone());
+        for cells in [design].into_iter().chain(others) {
+            if !control.go_on() {
+                break;
+            }
+            let value = system_of(rough, self.participants, &cells, true)?.value(self.criterion)?;
+            if self.criterion.sense() * value > best.0 {
+                best = (self.criterion.sense() * value, cells);
+            }
+        }
+        Ok(best.1)
     }
 
     /// Results of the climbs from all starts, as many as there is time for.
@@ -358,4 +393,9 @@ fn grid_cells(bits: u32) -> usize {
         4 => 96,
         _ => 200,
     }
+}
+
+/// The same where time is short.
+fn few_grid_cells(bits: u32) -> usize {
+    grid_cells(bits).min((4 << bits).max(16))
 }
