@@ -126,22 +126,23 @@ impl RangeFactor {
     }
 
     /// The observation as a value with additional variance: a cell's middle and `width^2 / 12`; `None` where nothing was
-    /// observed.
+    /// observed, or mean
+    /// or variance are no numbers.
     pub fn reconstruction(&self) -> Option<(f64, f64)> {
         let uniform = |[a, b]: [f64; 2]| (0.5 * (a + b), (b - a) * (b - a) / 12.0);
-        match &self.kind {
-            Kind::Value { range, .. } => Some((*range, 0.0)),
-            Kind::Cell { nominal, .. } => Some(uniform(*nominal)),
+        let (mean, variance) = match &self.kind {
+            Kind::Value { range, .. } => (*range, 0.0),
+            Kind::Cell { nominal, .. } => uniform(*nominal),
             Kind::Levels { edges, given } => {
                 let cells = || edges.windows(2).zip(given).map(|(e, p)| (uniform([e[0], e[1]]), *p));
                 let total: f64 = given.iter().sum();
                 let mean = cells().map(|((m, _), p)| p * m).sum::<f64>() / total;
                 let spread = |((m, v), p): ((f64, f64), f64)| p * (v + (m - mean) * (m - mean));
-                let variance = cells().map(spread).sum::<f64>() / total;
-                (mean.is_finite() && variance.is_finite()).then_some((mean, variance))
+                (mean, cells().map(spread).sum::<f64>() / total)
             }
-            Kind::Constant(_) => None,
-        }
+            Kind::Constant(_) => return None,
+        };
+        (mean.is_finite() && variance.is_finite()).then_some((mean, variance))
     }
 
     /// `ln p(observation | d)`.

@@ -67,7 +67,7 @@ impl RangeNoise {
             (self.constant * self.constant + relative * relative).sqrt()
         };
         if deviation > f64::MIN_POSITIVE {
-            deviation
+            deviation.min(f64::MAX)
         } else {
             f64::MIN_POSITIVE
         }

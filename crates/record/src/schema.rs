@@ -121,7 +121,7 @@ impl Column {
         let (Some(sample), Some(restored)) = (sample, restored) else {
             return sample.is_none() && restored.is_none();
         };
-        if !sample.is_finite() || !restored.is_finite() {
+        if sample.to_bits() == restored.to_bits() || !sample.is_finite() || !restored.is_finite() {
             return sample.to_bits() == restored.to_bits();
         }
         self.promise(share_bound.unwrap_or(0.0))

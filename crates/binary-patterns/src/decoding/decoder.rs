@@ -7,6 +7,7 @@ use crate::observation::source::Nodes;
 use crate::{Bit, Grid, LookupTable};
 use fewbits_core::Observation;
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::finite;
 
 /// Probabilities below this are taken as this when their logarithm is multiplied by a count that may be zero.
 const FLOOR: f64 = 1e-300;
@@ -45,8 +46,9 @@ impl Bank {
     /// the posterior variance. In squared units of the source.
     ///
     /// # Errors
-    /// If the number of observations is not the number of sensors.
+    /// If the number of observations is not the number of sensors, or `estimate` is not finite.
     pub fn posterior_squared_error(&self, observations: &[Observation<Bit>], estimate: f64) -> Result<f64, Error> {
+        finite("estimate", estimate)?;
         let (score, nodes) = self.posterior_score(observations)?;
         let w = weights_under(&score, &nodes);
         let (mass, _) = moments(&w, &nodes.x);
