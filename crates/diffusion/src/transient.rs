@@ -292,5 +292,6 @@ fn common_unit(instants: &[f64]) -> Option<f64> {
         }
     }
     let shortest = intervals().fold(f64::INFINITY, f64::min);
-    (unit > shortest / 64.0).then_some(unit)
+    // An interval that counts as zero has no multiple.
+    (unit > shortest / 64.0 && unit < 1.5 * shortest).then_some(unit)
 }

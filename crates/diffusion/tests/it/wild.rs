@@ -120,3 +120,25 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn release_just_before_a_reading_ends() {
+    let domain = Plan::parse("I.#\n..O").unwrap().domain(0.5, 1, 0.0).unwrap();
+    let flow = PotentialFlow::new(&domain, 1.0).unwrap().flow;
+    let patch = domain.point([0.2, 0.2, 0.0]).unwrap();
+    let transport = Transport::new(domain, 1.0, &flow, 0.0, Scheme::default()).unwrap();
+    let release = |start| Release {
+        patch: patch.clone(),
+        rate: 1.0,
+        start,
+        stop: 2.0,
+    };
+    let dose = |start| {
+        let snapshots = Transient::new(&transport)
+            .run(&[0.0; 5], &[release(start)], &[1.0, 3.0])
+            .unwrap();
+        snapshots[1].dose[0]
+    };
+    let (late, at) = (dose(1.0 - 1e-12), dose(1.0));
+    assert!((late / at - 1.0).abs() < 1e-6, "{late} {at}");
+}
