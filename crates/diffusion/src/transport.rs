@@ -225,7 +225,7 @@ impl Transport {
     /// Mass, and what leaves per second, of a concentration; or of a dose (kg s/m^3), all that has left.
     ///
     /// # Errors
-    /// If there is not one number for each free cell.
+    /// If there is not one number for each free cell, or a part of the budget is beyond the range of numbers.
     pub fn budget(&self, concentration: &[f64]) -> Result<Budget, Error> {
         self.check_field(concentration)?;
         let contents = || self.volumes.iter().zip(concentration).map(|(volume, c)| volume * c);
@@ -244,6 +244,15 @@ impl Transport {
                 Boundary::Outflow => budget.outflow += leaves,
             }
         }
+        let Budget {
+            mass,
+            decayed,
+            absorbed,
+            leaked,
+            inflow,
+            outflow,
+        } = budget;
+        all_finite("budget", &[mass, decayed, absorbed, leaked, inflow, outflow])?;
         Ok(budget)
     }
 

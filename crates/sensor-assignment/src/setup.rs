@@ -11,7 +11,7 @@ use fewbits_numerics::error::{all_finite, non_negative, positive};
 ///
 /// # Errors
 /// [`Error::InfeasibleVariances`] unless `std <= mean sqrt(N - 1)`, beyond which one variance is always negative;
-/// [`Error::Argument`] if the mean or `least` is not positive, the deviation negative, or the direction constant or not finite.
+/// [`Error::Argument`] if the mean or `least` is not positive, the deviation negative, the direction constant or not finite, or a variance not finite.
 pub fn variances_with_moments(mean: f64, std: f64, least: f64, direction: &[f64]) -> Result<Option<Vec<f64>>, Error> {
     let mean = positive("mean", mean)?;
     let std = non_negative("std", std)?;
@@ -30,6 +30,7 @@ pub fn variances_with_moments(mean: f64, std: f64, least: f64, direction: &[f64]
         return Err(ArgumentError::new("direction", "constant", "numbers that differ").into());
     }
     let variances: Vec<f64> = direction.iter().map(|z| mean + std * (z - centre) / spread).collect();
+    all_finite("variances", &variances)?;
     Ok(variances.iter().all(|&v| v >= least).then_some(variances))
 }
 

@@ -57,7 +57,8 @@ impl TryFrom<Stored> for PlaneMass {
 impl PlaneMass {
     fn empty(basis: &Matrix2<f64>, first: [i64; 2], size: [usize; 2]) -> Result<Self, Error> {
         all_finite("basis", basis.as_slice())?;
-        if basis.determinant() == 0.0 || !basis.determinant().is_finite() {
+        // Densities are at most one over the area of a node.
+        if !basis.determinant().is_normal() {
             return Err(ArgumentError::new("basis", format!("{basis:?}"), "a regular matrix").into());
         }
         let nodes = size[0].saturating_mul(size[1]);
