@@ -22,6 +22,8 @@ pub struct Steady<'a> {
 
 /// Columns that are solved together: enough to use the factor well, few enough that scratch memory stays below that of the factor.
 const COLUMNS: usize = 32;
+/// Share of the largest concentration that rounding may leave below zero.
+const ROUNDING: f64 = 1e-9;
 
 impl<'a> Steady<'a> {
     /// Factors the transport.
@@ -37,7 +39,7 @@ impl<'a> Steady<'a> {
     /// The concentration in each free cell, kg/m^3, with all sources on.
     ///
     /// # Errors
-    /// If a rate is not finite, or a patch is of another domain.
+    /// If a rate is not finite, a patch is of another domain, or [`Error::Factorisation`].
     pub fn concentration(&self, sources: &[Source]) -> Result<Vec<f64>, Error> {
         let mut right = vec![0.0; self.transport.volumes.len()];
         for source in sources {
@@ -53,7 +55,7 @@ impl<'a> Steady<'a> {
     /// The concentration with the given release in each free cell, kg/s.
     ///
     /// # Errors
-    /// If there is not one release for each free cell, or a release or a concentration is not finite.
+    /// If there is not one release for each free cell, a release or a concentration is not finite, or [`Error::Factorisation`].
     pub fn from_amounts(&self, releases: &[f64]) -> Result<Vec<f64>, Error> {
         // The same conditions as for a field.
         self.transport.net_outflow(releases)?;
@@ -62,7 +64,7 @@ impl<'a> Steady<'a> {
         let mut found = columns.col_as_slice(0).to_vec();
         all_finite("concentration", &found)?;
         if releases.iter().all(|release| *release >= 0.0) {
-            raise(&mut found);
+            raise(&mut found)?;
         }
         Ok(found)
     }
@@ -70,7 +72,7 @@ impl<'a> Steady<'a> {
     /// For each sensor the concentration that it measures, kg/m^3 per kg/s, of a source in each free cell: one adjoint solution.
     ///
     /// # Errors
-    /// If a patch is of another domain, or a response is not finite.
+    /// If a patch is of another domain, a response is not finite, or [`Error::Factorisation`].
     pub fn adjoint(&self, sensors: &[Patch]) -> Result<Vec<Vec<f64>>, Error> {
         let count = self.transport.volumes.len();
         let mut fields = Vec::with_capacity(sensors.len());
@@ -86,7 +88,7 @@ impl<'a> Steady<'a> {
             for j in 0..group.len() {
                 let mut found = columns.col_as_slice(j).to_vec();
                 all_finite("response", &found)?;
-                raise(&mut found);
+                raise(&mut found)?;
                 fields.push(found);
             }
         }
@@ -94,10 +96,15 @@ impl<'a> Steady<'a> {
     }
 }
 
-/// Sets to zero what rounding left below zero of a field that cannot be negative.
-fn raise(field: &mut [f64]) {
-    let rounding = -f64::EPSILON * field.iter().copied().fold(0.0, f64::max);
-    for c in field.iter_mut().filter(|c| (rounding..0.0).contains(*c)) {
-        *c = 0.0;
+/// Sets to zero what rounding left below zero of a field that cannot be negative; refuses a field that is negative beyond rounding.
+fn raise(field: &mut [f64]) -> Result<(), Error> {
+    let rounding = -ROUNDING * field.iter().copied().fold(0.0, f64::max);
+    if field.iter().any(|c| *c < rounding) {
+        return Err(Error::Factorisation {
+            unknowns: field.len(),
+            singular: true,
+        });
     }
+    field.iter_mut().for_each(|c| *c = c.max(0.0));
+    Ok(())
 }

@@ -68,6 +68,8 @@ pub struct Transient<'a> {
 const MIN_SHARE_EXPONENT: i32 = -45;
 /// Most steps of an interval: rounding may keep the error just below the tolerance however short the steps are.
 const MAX_STEPS: usize = 200_000;
+/// Most common units of all intervals together: steps are counted in shares of it.
+const MAX_UNITS: f64 = 65536.0;
 /// A step is doubled if its error is below the tolerance over this: the error grows eightfold, and half of that is margin.
 const DOUBLING_MARGIN: f64 = 16.0;
 
@@ -272,7 +274,8 @@ fn check_instants(name: &'static str, instants: &[f64]) -> Result<(), Error> {
     }
 }
 
-/// The longest time of which all intervals are multiples, if the shortest interval has at most 64 of them: steps then have few lengths.
+/// The longest time of which all intervals are multiples, if the shortest interval has at most 64 of
+/// them and all have at most [`MAX_UNITS`]: steps then have few lengths.
 fn common_unit(instants: &[f64]) -> Option<f64> {
     let intervals = || {
         instants
@@ -293,5 +296,5 @@ fn common_unit(instants: &[f64]) -> Option<f64> {
     }
     let shortest = intervals().fold(f64::INFINITY, f64::min);
     // An interval that counts as zero has no multiple.
-    (unit > shortest / 64.0 && unit < 1.5 * shortest).then_some(unit)
+    (unit > shortest / 64.0 && unit < 1.5 * shortest && last < MAX_UNITS * unit).then_some(unit)
 }

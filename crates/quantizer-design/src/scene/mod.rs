@@ -18,7 +18,7 @@ pub use noise::Noise;
 pub use prior::Prior;
 pub(crate) use resolution::Resolution;
 
-use crate::error::Error;
+use crate::error::{Error, refuse};
 use fewbits_numerics::normal;
 use fewbits_numerics::stored;
 use serde::{Deserialize, Serialize};
@@ -75,7 +75,8 @@ impl Scene {
     /// Discretises a prior and the noise of all sensors.
     ///
     /// # Errors
-    /// If the noise is so much narrower than the prior that more than a million nodes would be needed.
+    /// If the noise is so much narrower than the prior that more than a million nodes would be needed, or mean or variance of the
+    /// prior are beyond the range of numbers.
     pub fn new(prior: Prior, noise: Noise) -> Result<Self, Error> {
         Self::resolved(prior, noise, Resolution::Full)
     }
@@ -133,6 +134,10 @@ impl Scene {
             values,
             weights,
         };
+        if !scene.variance.is_finite() || !scene.mean.is_finite() {
+            let shown = format!("mean {mean}, variance {}", scene.variance);
+            return refuse("prior", shown, "a prior whose mean and variance are in the range of numbers");
+        }
         if !scene.noise.is_independent() {
             scene.resolve_shared_factor(crowd, resolution)?;
         }
