@@ -4,6 +4,7 @@ use crate::{Domain, Error, Patch, Steady, StepControl, Transient, Transport};
 use fewbits_models::nalgebra::Vector3;
 use fewbits_models::{Receptor, SourceGradient, SourceModel};
 use fewbits_numerics::ArgumentError;
+use fewbits_numerics::error::within;
 use std::sync::Arc;
 
 /// Adjoint solutions of several sensors: the concentration that each measures, per unit rate, of a source at any place and of several
@@ -38,11 +39,14 @@ pub struct SensorField {
     responses: Vec<Vec<Vec<f64>>>,
 }
 
+/// Responses above this, kg/m^3 per kg/s, have no gradient in the range of numbers.
+const LARGEST_RESPONSE: f64 = 1e240;
+
 impl SensorField {
     /// Steady responses of sensors at the given points, m.
     ///
     /// # Errors
-    /// If a point is outside or blocked, or the transport has no steady state.
+    /// If a point is outside or blocked, the transport has no steady state, or a response is above 1e240 kg/m^3 per kg/s.
     pub fn steady(transport: &Transport, points: &[[f64; 3]]) -> Result<Self, Error> {
         let fields = Steady::new(transport)?.adjoint(&patches(transport, points)?)?;
         let responses = fields.into_iter().map(|field| vec![field]).collect();
@@ -80,6 +84,10 @@ impl SensorField {
             .iter()
             .map(|point| domain.locate(*point))
             .collect::<Result<_, _>>()?;
+        // Gradients divide by widths of cells.
+        for response in responses.iter().flatten().flatten() {
+            within("response", *response, f64::MIN, LARGEST_RESPONSE)?;
+        }
         Ok(Self {
             domain,
             sensors,
