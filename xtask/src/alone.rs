@@ -1,8 +1,8 @@
 //! `cargo xtask alone`: every crate built as a user would depend on it, outside the workspace.
 //!
 //! For each library crate a package is written to a temporary folder that depends on that crate alone: checked with default
-//! features and with none, then with each of the crate's examples as its program, which is run. Examples that read arguments are
-//! built only.
+//! features and with none, then with the example of its front page and with each file in `examples` as its program, which is run. Examples
+//! that read arguments are built only. With `--git` the dependency is on a repository instead of this checkout.
 
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
 use clap::Args;
@@ -19,6 +19,9 @@ pub struct Options {
     /// Only check, and run no examples; without names, the crates that promise few dependencies.
     #[arg(long)]
     pub fast: bool,
+    /// Address of a repository to depend on by git, such as that of a bare clone: `file:///tmp/fewbits.git`.
+    #[arg(long)]
+    pub git: Option<String>,
 }
 
 /// Crates that others take alone, small by promise.
@@ -69,13 +72,14 @@ pub fn run(options: &Options) -> Result<bool, Error> {
             names => names.iter().any(|n| n == name),
         };
         if chosen {
-            good &= try_crate(package, root, &target, options.fast)?;
+            good &= try_crate(package, root, &target, options)?;
         }
     }
     Ok(good)
 }
 
-fn try_crate(package: &Package, root: &Path, target: &Path, fast: bool) -> Result<bool, Error> {
+fn try_crate(package: &Package, root: &Path, target: &Path, options: &Options) -> Result<bool, Error> {
+    let git = options.git.as_deref();
     let folder = target.join("packages").join(package.name.as_str());
     let source = folder.join("src");
     let failed = |path: &Path| {
@@ -88,7 +92,9 @@ fn try_crate(package: &Package, root: &Path, target: &Path, fast: bool) -> Resul
     let write = |path: PathBuf, text: &str| std::fs::write(&path, text).map_err(failed(&path));
     let cargo = |verb: &str| {
         let status = Command::new("cargo")
-            .args([verb, "--quiet", "--offline", "--manifest-path"])
+            .args([verb, "--quiet"])
+            .args(git.is_none().then_some("--offline"))
+            .arg("--manifest-path")
             .arg(folder.join("Cargo.toml"))
             .env("CARGO_TARGET_DIR", target)
             .stdout(std::process::Stdio::null())
@@ -105,21 +111,49 @@ fn try_crate(package: &Package, root: &Path, target: &Path, fast: bool) -> Resul
     };
     write(source.join("main.rs"), "fn main() {}\n")?;
     for (what, features) in [("with default features", true), ("without features", false)] {
-        write(folder.join("Cargo.toml"), &manifest(package, features, &BTreeSet::new()))?;
+        write(folder.join("Cargo.toml"), &manifest(package, git, features, &BTreeSet::new()))?;
         report(what, cargo("check")?);
     }
-    for example in package.targets.iter().filter(|t| t.is_example() && !fast) {
-        let path = example.src_path.as_std_path();
-        let text = std::fs::read_to_string(path).map_err(failed(path))?;
-        write(folder.join("Cargo.toml"), &manifest(package, true, &used(&text)))?;
+    if options.fast {
+        return Ok(good);
+    }
+    let read = |path: &Path| std::fs::read_to_string(path).map_err(failed(path));
+    let mut programs = Vec::new();
+    for part in &package.targets {
+        let path = part.src_path.as_std_path();
+        if part.is_example() {
+            programs.push((format!("example {}", part.name), read(path)?));
+        } else if part.is_lib() {
+            programs.extend(front_page(&read(path)?).map(|text| ("front page".to_owned(), text)));
+        }
+    }
+    for (what, text) in programs {
+        write(folder.join("Cargo.toml"), &manifest(package, git, true, &used(&text)))?;
         write(source.join("main.rs"), &text)?;
-        let (verb, what) = match text.contains("env::args") {
-            true => ("build", "example (not run: it reads arguments)"),
-            false => ("run", "example"),
+        let (verb, note) = match text.contains("env::args") {
+            true => ("build", " (not run: it reads arguments)"),
+            false => ("run", ""),
         };
-        report(&format!("{what} {}", example.name), cargo(verb)?);
+        report(&format!("{what}{note}"), cargo(verb)?);
     }
     Ok(good)
+}
+
+/// The first example of a crate's documentation as a program.
+fn front_page(library: &str) -> Option<String> {
+    let mut lines = library.lines().map_while(|line| line.strip_prefix("//!"));
+    lines.find(|line| ["```", "```rust"].contains(&line.trim()))?;
+    let lines = lines.map(|line| line.strip_prefix(' ').unwrap_or(line));
+    let shown = lines.take_while(|line| line.trim() != "```");
+    let body: Vec<&str> = shown.map(|line| line.strip_prefix("# ").unwrap_or(line)).collect();
+    let body = body.join("\n");
+    Some(if body.contains("fn main()") {
+        body
+    } else if body.contains("Ok::<") {
+        format!("fn main() {{\nlet done = (|| {{\n{body}\n}})();\nassert!(done.is_ok());\n}}\n")
+    } else {
+        format!("fn main() {{\n{body}\n}}\n")
+    })
 }
 
 /// Names that stand before a `::` in a program: crates among them.
@@ -133,13 +167,16 @@ fn used(program: &str) -> BTreeSet<String> {
 }
 
 /// A package that depends on one crate and on what its program imports besides.
-fn manifest(package: &Package, default_features: bool, used: &BTreeSet<String>) -> String {
-    let folder = |manifest: &str| manifest.trim_end_matches("/Cargo.toml").to_owned();
+fn manifest(package: &Package, git: Option<&str>, default_features: bool, used: &BTreeSet<String>) -> String {
+    let place = |folder: &str| match git {
+        Some(address) => format!("git = \"{address}\""),
+        None => format!("path = \"{folder}\""),
+    };
     let mut text = format!(
         "[package]\nname = \"alone-{0}\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n[dependencies]\n\
-         {0} = {{ path = \"{1}\", default-features = {default_features} }}\n",
+         {0} = {{ {1}, default-features = {default_features} }}\n",
         package.name,
-        folder(package.manifest_path.as_str()),
+        place(package.manifest_path.as_str().trim_end_matches("/Cargo.toml")),
     );
     let mut known = BTreeSet::from([package.name.to_string()]);
     for dependency in &package.dependencies {
@@ -149,7 +186,7 @@ fn manifest(package: &Package, default_features: bool, used: &BTreeSet<String>) 
         }
         let features: Vec<String> = dependency.features.iter().map(|f| format!("\"{f}\"")).collect();
         let source = match &dependency.path {
-            Some(path) => format!("path = \"{path}\""),
+            Some(path) => place(path.as_str()),
             None => format!("version = \"{}\"", dependency.req),
         };
         text += &format!(
@@ -164,7 +201,18 @@ fn manifest(package: &Package, default_features: bool, used: &BTreeSet<String>) 
 
 #[cfg(test)]
 mod tests {
-    use super::used;
+    use super::{front_page, used};
+
+    #[test]
+    fn front_pages_are_programs() {
+        let page = "//! A.\n//!\n//! ```\n//! use a::b;\n//! # Ok::<(), a::E>(())\n//! ```\n//! C.\n\nmod a;\n";
+        let program = front_page(page).unwrap();
+        assert!(
+            program.starts_with("fn main() {\nlet done = (|| {\nuse a::b;\nOk::<(), a::E>(())\n})();"),
+            "{program}"
+        );
+        assert_eq!(front_page("//! None.\n"), None);
+    }
 
     #[test]
     fn imports_are_found() {
