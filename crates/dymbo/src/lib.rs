@@ -26,7 +26,7 @@
 //! `fewbits_filters`, applied to the beliefs of any filter here.
 //!
 //! ```
-//! use fewbits_core::{Gaussian, Observation, Sign};
+//! use fewbits_core::{Observation, Sign};
 //! use fewbits_dymbo::{DymboFilter, Initialisation, RoundedSample, ScalarFilter, ScalarPlant};
 //!
 //! let filter = DymboFilter::new(ScalarPlant::new(0.9, 0.5, 1.0)?);
