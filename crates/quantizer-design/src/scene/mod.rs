@@ -75,8 +75,8 @@ impl Scene {
     /// Discretises a prior and the noise of all sensors.
     ///
     /// # Errors
-    /// If the noise is so much narrower than the prior that more than a million nodes would be needed, or mean or variance of the
-    /// prior are beyond the range of numbers.
+    /// If the noise is so much narrower than the prior that more than a million nodes would be needed, or squares of the
+    /// prior's values are beyond the range of numbers.
     pub fn new(prior: Prior, noise: Noise) -> Result<Self, Error> {
         Self::resolved(prior, noise, Resolution::Full)
     }
@@ -134,9 +134,10 @@ impl Scene {
             values,
             weights,
         };
-        if !scene.variance.is_finite() || !scene.mean.is_finite() {
+        let in_range = |x: &f64| ((x - mean) * (x - mean)).is_finite();
+        if !scene.variance.is_finite() || !scene.values.iter().all(in_range) {
             let shown = format!("mean {mean}, variance {}", scene.variance);
-            return refuse("prior", shown, "a prior whose mean and variance are in the range of numbers");
+            return refuse("prior", shown, "a prior with values whose squares are in the range of numbers");
         }
         if !scene.noise.is_independent() {
             scene.resolve_shared_factor(crowd, resolution)?;
