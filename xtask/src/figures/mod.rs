@@ -7,6 +7,8 @@ mod gallery;
 mod options;
 mod produce;
 mod progress;
+#[cfg_attr(not(feature = "mpi"), path = "one_rank.rs")]
+mod ranks;
 mod record;
 mod reuse;
 mod run;
@@ -21,6 +23,7 @@ pub use error::Error;
 pub use options::{Action, Options};
 
 use options::in_workspace;
+use ranks::Ranks;
 use record::Record;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -37,11 +40,15 @@ pub enum Ending {
     Interrupted,
 }
 
-/// Makes the chosen figures.
+/// Makes the chosen figures. With feature `mpi` under `mpirun`, the ranks share them; rank 0 alone reads and writes `--out` and prints.
 ///
 /// # Errors
 /// If an option is refused or the output directory cannot be written. Nothing is written before all options are accepted.
 pub fn run(options: &Options) -> Result<Ending, Error> {
+    let ranks = Ranks::start();
+    if !ranks.is_first() {
+        return run::work(&ranks, options);
+    }
     match &options.action {
         Some(Action::Describe { ids }) => {
             let pages: Vec<_> = select::figures(ids)?.into_iter().map(describe::one).collect();
@@ -53,11 +60,11 @@ pub fn run(options: &Options) -> Result<Ending, Error> {
             print(&times::table(&Record::read_all(&in_workspace(from))?));
             Ok(Ending::Good)
         }
-        None => make(options),
+        None => make(options, &ranks),
     }
 }
 
-fn make(options: &Options) -> Result<Ending, Error> {
+fn make(options: &Options, ranks: &Ranks) -> Result<Ending, Error> {
     let folder = in_workspace(&options.out);
     let mut chosen = select::figures(&options.ids)?;
     if !options.except.is_empty() {
@@ -79,7 +86,7 @@ fn make(options: &Options) -> Result<Ending, Error> {
         return Ok(Ending::Good);
     }
     let jobs = select::configure(&chosen, options)?;
-    run::run(&jobs, &write::Directory::create(&folder)?, options)
+    run::run(&jobs, &write::Directory::create(&folder)?, options, ranks)
 }
 
 /// Copies the figures of other directories into one.
