@@ -1,7 +1,7 @@
 """The sign-bit Kalman filter: Ribeiro and Giannakis, "Distributed Kalman filtering based on severely quantized WSN data".
 
 Everything in units of the measurement noise (sigma = 1); `gamma` is the process variance. Equation numbers are the paper's; where
-docs/errata.md corrects one, its id (E1 to E13) stands beside it.
+docs/errata.md corrects one, its id (`dymbo-1`) stands beside it.
 """
 
 from functools import lru_cache
@@ -28,7 +28,7 @@ def filtered(p, c):
 
 
 def steady_predicted(a, gamma, c):
-    """Positive root of A p^2 + B p - gamma = 0, the fixed point of (13) and (24) (E2)."""
+    """Positive root of A p^2 + B p - gamma = 0, the fixed point of (13) and (24) (erratum dymbo-2)."""
     big, linear = 1 - a * a * (1 - c), 1 - gamma - a * a
     return (np.sqrt(linear**2 + 4 * big * gamma) - linear) / (2 * big)
 
@@ -38,7 +38,7 @@ def steady(a, gamma, c=ONE_BIT):
 
 
 def loss(a, gamma):
-    """(25), the right way up (E3)."""
+    """(25), the right way up (erratum dymbo-3)."""
     return steady(a, gamma) / steady(a, gamma, 1.0)
 
 
@@ -50,7 +50,7 @@ def variances(a, gamma, start, steps, c=ONE_BIT):
     return np.array(m)
 
 
-# The error chain: with the threshold at the prediction (E1) the error is a Markov chain of its own
+# The error chain: with the threshold at the prediction (erratum dymbo-1) the error is a Markov chain of its own
 
 class Chain:
     """Densities of the error on a grid; the trapezoid rule is spectrally accurate here."""
@@ -113,7 +113,7 @@ def exact_course(a, gamma, start, steps, density=None, chain=None):
     return np.array(errors)
 
 
-FIRST = 1 + 1 / 12  # sigma^2 + tau^2 / 12 (E7)
+FIRST = 1 + 1 / 12  # sigma^2 + tau^2 / 12 (erratum dymbo-7)
 
 
 @lru_cache(None)
@@ -188,7 +188,7 @@ def cold_kalman(row):
 
 
 def first_cells(a, gamma):
-    """First message of resolution 1 with the stationary prior N(0, S): edges, probabilities and variances of the cells (E13)."""
+    """First message of resolution 1 with the stationary prior N(0, S): edges, probabilities and variances of the cells (erratum dymbo-13)."""
     prior = gamma / (1 - a * a)
     s = np.sqrt(prior + 1)
     edges = np.arange(-np.ceil(9 * s), np.ceil(9 * s) + 1) + 0.5
@@ -232,7 +232,7 @@ def informed(row):
 
 @RECIPES.of("dymbo-prop1b/distance")
 def distance(row):
-    """Proposition 1(b) (E11): the posterior of one bit is skew-normal; greatest distance from the normal of its moments."""
+    """Proposition 1(b) (erratum dymbo-11): the posterior of one bit is skew-normal; greatest distance from the normal of its moments."""
     sigma = float(row)
     mean, variance = np.sqrt(ONE_BIT / (1 + sigma**2)), 1 - ONE_BIT / (1 + sigma**2)
     gap = lambda t: np.abs(2 * phi(t) * ndtr(t / sigma) - phi((t - mean) / np.sqrt(variance)) / np.sqrt(variance))
@@ -259,7 +259,7 @@ def cautious(row):
     return course(0.9, 0.5, 2.25)[int(row)] / variances(0.9, 0.5, 2.25, 5)[int(row)]
 
 
-# Threshold of (14) as printed (E1)
+# Threshold of (14) as printed (erratum dymbo-1)
 
 @lru_cache(None)
 def thresholds(a, gamma, chains=4000, steps=1200):

@@ -12,7 +12,7 @@ from common import Recipes, numbers
 
 RECIPES = Recipes()
 
-# Rings: a cell [a, b] of range in noise of deviation s has the radial law l(d); the message needs d l(d) (E3 of chapter 3)
+# Rings: a cell [a, b] of range in noise of deviation s has the radial law l(d); the message needs d l(d) (erratum mpa-3)
 
 DEVIATION = {"9-10.5": 0.03, "1-2.5": 0.005, "0.2-1.7": 0.003, "4-5": 0.3}
 
@@ -40,7 +40,7 @@ RECIPES.of("mpa-ring/tv")(lambda row: ring(row)[2])
 
 @RECIPES.of("mpa-ring/weights")
 def weights(row):
-    """Second moment of Algorithm 4's ratio (1/N) sum_j f(x | j) / f(x | i), x from f(. | i), n components d deviations apart (E4)."""
+    """Second moment of Algorithm 4's ratio (1/N) sum_j f(x | j) / f(x | i), x from f(. | i), n components d deviations apart (erratum mpa-4)."""
     n, d = (int(v) for v in row.split("x"))
     m = d * np.arange(n)
     exponent = (m[None, :, None] - m[:, None, None]) * (m[None, None, :] - m[:, None, None])

@@ -67,7 +67,7 @@ class Setting:
         return r, d / r[..., None]
 
     def code(self, z, last, mean, cov):
-        """Cells [lo, hi] of the measured ranges, ends that are half-infinite, and the middle of each cell (E1, E2 of chapter 3)."""
+        """Cells [lo, hi] of the measured ranges, ends that are half-infinite, and the middle of each cell (errata mpa-1, mpa-2)."""
         if self.encoder == "published":
             reference = self.geometry(last[:, :2])[0]
         else:
@@ -187,7 +187,7 @@ def positions(method, s, confined=True, trials=TRIALS):
                 exact = grid(s, mean, cov, lo, hi, count) if name == "grid" else guided(s, rng, mean, cov, updated, lo, hi, count)
                 better = regress(mean, cov, exact[0], exact[1])
                 updated = [np.where(exact[2].reshape(-1, *[1] * (b.ndim - 1)), u, b) for u, b in zip(updated, better)]
-            if name == "GMPA-transfer":  # velocity passed on unchanged (E7 of chapter 3)
+            if name == "GMPA-transfer":  # velocity passed on unchanged (erratum mpa-7)
                 old = mean, cov
                 mean, cov = updated
                 mean[:, 2:] = old[0][:, 2:]

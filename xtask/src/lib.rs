@@ -13,5 +13,6 @@
 pub mod alone;
 pub mod api;
 pub mod bench;
+mod errata;
 pub mod figures;
 pub mod tidy;

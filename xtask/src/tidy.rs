@@ -6,7 +6,9 @@
 //! 4. Every file of integration tests is a module of the crate's one test binary.
 //! 5. Every relative link of a page leads to a file, and every page of `docs` is linked from `docs/index.md`.
 //! 6. No source file has more than 400 lines, and no files of a crate import each other in a circle (`tidy/files.rs`).
+//! 7. Errata and the figures and tests that show them cite each other (`tidy/errata.rs`).
 
+pub(crate) mod errata;
 mod files;
 
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
@@ -83,6 +85,7 @@ pub fn check(root: &Path) -> Result<Vec<String>, Error> {
     problems.extend(files::problems(root, &source_folders(root)?)?);
     problems.extend(figure_problems(root)?);
     problems.extend(link_problems(root)?);
+    problems.extend(errata::problems(root)?);
     Ok(problems)
 }
 

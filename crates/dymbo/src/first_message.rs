@@ -196,7 +196,7 @@ pub enum Initialisation {
     /// A first message of resolution `tau` and no other knowledge: `theta_hat(0) = m(0)`, variance `sigma^2 + tau^2/12`.
     ///
     /// The bound of Proposition 2, `(sigma + tau/2)^2`, is no variance to start from: it is up to twice too large and makes
-    /// the filter over-cautious (erratum E7).
+    /// the filter over-cautious (erratum `dymbo-7`).
     Fine {
         /// The sensor that sent it.
         scheme: RoundedSample,

@@ -14,7 +14,7 @@ use std::f64::consts::FRAC_2_PI;
 /// A sensor that reports whether its sample reached the broadcast threshold.
 ///
 /// Any threshold will do; that of the Dymbo filter is the prediction `a theta_hat(n-1)` of the present state, the best one
-/// for a single step ([`expected_information`]). Equation (14) of the paper prints `theta_hat(n-1)` (erratum E1).
+/// for a single step ([`expected_information`]). Equation (14) of the paper prints `theta_hat(n-1)` (erratum `dymbo-1`).
 ///
 /// ```
 /// use fewbits_core::{Factor, Gaussian, Link, Observation, Scheme, Sign};

@@ -11,7 +11,7 @@ use std::f64::consts::FRAC_2_PI;
 /// Ratio of the steady filtered variances of the sign-bit filter and of the Kalman filter on the same plant: at least 1,
 /// increasing in `|a|` and in `gamma`.
 ///
-/// The paper prints the inverse (erratum E3) and calls it below 2 for every `gamma < 1` (E4: it is, for `|a| <= 0.979`).
+/// The paper prints the inverse (erratum `dymbo-3`) and calls it below 2 for every `gamma < 1` (`dymbo-4`: it is, for `|a| <= 0.979`).
 ///
 /// # Errors
 /// No process noise, for which both variances vanish or neither settles at a rate of its own.

@@ -41,10 +41,6 @@ impl Expected {
     fn of(condition: impl fmt::Display) -> Self {
         Self::Condition(condition.to_string())
     }
-
-    fn none_broken() -> Self {
-        Self::of("0 violations")
-    }
 }
 
 impl fmt::Display for Expected {
@@ -106,6 +102,7 @@ macro_rules! comparisons {
 pub struct Claims {
     figure: &'static str,
     made: Rc<RefCell<Vec<Claim>>>,
+    erratum: Option<&'static str>,
     at_defaults: bool,
     full_effort: bool,
 }
@@ -116,6 +113,7 @@ impl Claims {
         Self {
             figure,
             made: Rc::default(),
+            erratum: None,
             at_defaults: false,
             full_effort: false,
         }
@@ -125,6 +123,14 @@ impl Claims {
     pub fn at_defaults(&self) -> Self {
         Self {
             at_defaults: true,
+            ..self.clone()
+        }
+    }
+
+    /// What is claimed through this says at its end that it shows this erratum of `docs/errata.md`.
+    pub(crate) fn showing(&self, erratum: &'static str) -> Self {
+        Self {
+            erratum: Some(erratum),
             ..self.clone()
         }
     }
@@ -150,9 +156,13 @@ impl Claims {
             Some(value) if value.is_finite() && holds(value) => Verdict::Pass,
             _ => Verdict::Fail,
         };
+        let mut statement = statement.into();
+        if let Some(erratum) = self.erratum {
+            statement.push_str(&format!(" (erratum {erratum})"));
+        }
         self.made.borrow_mut().push(Claim {
             id: id.into(),
-            statement: statement.into(),
+            statement,
             verdict,
             value: value.unwrap_or(f64::NAN),
             expected,
@@ -176,7 +186,7 @@ impl Claims {
         for row in rows {
             broken += f64::from(u8::from(!holds(row)));
         }
-        self.decide(id, statement, any.then_some(broken), Expected::none_broken(), |v| v == 0.0);
+        self.decide(id, statement, any.then_some(broken), Expected::of("0 violations"), |v| v == 0.0);
     }
 
     /// `|value - expected| <= tolerance`.
@@ -200,7 +210,7 @@ impl Claims {
         let values: Option<Vec<f64>> = values.into_iter().map(Into::into).collect();
         let values = values.filter(|v| v.len() > 1);
         let broken = values.map(|v| v.windows(2).filter(|pair| !increases(pair[0], pair[1])).count() as f64);
-        self.decide(id, statement, broken, Expected::none_broken(), |v| v == 0.0);
+        self.decide(id, statement, broken, Expected::of("0 violations"), |v| v == 0.0);
     }
 
     /// Each value is strictly larger than the next.

@@ -186,6 +186,13 @@ impl Panel {
         self
     }
 
+    /// Whether it is a map: its axes are the coordinates `x` and `y` in one unit. A metre is then as long on both.
+    pub fn is_map(&self) -> bool {
+        let linear = |axis: &Axis| axis.scale == Scale::Linear && axis.names.is_empty();
+        let unit = |axis: &'_ Axis, name| axis.label.strip_prefix(name).map(str::to_owned);
+        linear(&self.x) && linear(&self.y) && unit(&self.x, "x / ").is_some_and(|u| Some(u) == unit(&self.y, "y / "))
+    }
+
     /// Leaves the legend out.
     #[must_use]
     pub fn without_legend(self) -> Self {

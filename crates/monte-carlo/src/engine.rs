@@ -7,6 +7,8 @@
 use crate::stream::Stream;
 #[cfg(feature = "rayon")]
 use rayon::prelude::*;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -26,6 +28,7 @@ pub struct Trial {
 
 /// Why a run has no result. The failing trial of lowest index is reported, on any number of threads.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[non_exhaustive]
 pub enum MonteCarloError {
     /// A trial failed.
@@ -51,6 +54,13 @@ pub enum MonteCarloError {
     /// The run was cancelled.
     #[error("cancelled")]
     Cancelled,
+    /// Ranks could not exchange what their trials gave.
+    #[cfg(feature = "mpi")]
+    #[error("ranks cannot exchange results: {message}")]
+    Exchange {
+        /// What cannot be written, read or sent.
+        message: String,
+    },
 }
 
 /// A number of independent trials on the streams of one experiment.
@@ -174,19 +184,34 @@ impl<'a> MonteCarlo<'a> {
         trial: impl Fn(&mut A, Trial) -> Result<(), E> + Sync,
         merge: impl Fn(&mut A, A),
     ) -> Result<A, MonteCarloError> {
-        let chunks = 0..self.trials.div_ceil(CHUNK);
-        #[cfg(feature = "rayon")]
-        let chunks = chunks.into_par_iter();
-        // The lowest index that has failed so far. Trials below it still run, so that the one reported does not depend on the threads.
-        let failed = AtomicU64::new(u64::MAX);
-        let chunks: Vec<Result<A, MonteCarloError>> = chunks
-            .map(|chunk| self.fold_chunk(chunk, &failed, &empty, &trial))
-            .collect();
+        let chunks = self.fold_chunks((0..self.chunks()).collect(), &empty, trial);
         let mut total = empty();
         for chunk in chunks {
             merge(&mut total, chunk?);
         }
         Ok(total)
+    }
+
+    pub(crate) fn chunks(&self) -> u64 {
+        self.trials.div_ceil(CHUNK)
+    }
+
+    /// Folds the given chunks, in their order.
+    pub(crate) fn fold_chunks<A: Send, E: Display>(
+        &self,
+        chunks: Vec<u64>,
+        empty: impl Fn() -> A + Sync,
+        trial: impl Fn(&mut A, Trial) -> Result<(), E> + Sync,
+    ) -> Vec<Result<A, MonteCarloError>> {
+        // The lowest index that has failed so far. Trials below it still run, so that the one reported does not depend on the threads.
+        let failed = AtomicU64::new(u64::MAX);
+        #[cfg(feature = "rayon")]
+        let chunks = chunks.into_par_iter();
+        #[cfg(not(feature = "rayon"))]
+        let chunks = chunks.into_iter();
+        chunks
+            .map(|chunk| self.fold_chunk(chunk, &failed, &empty, &trial))
+            .collect()
     }
 
     fn fold_chunk<A, E: Display>(

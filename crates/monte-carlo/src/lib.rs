@@ -12,10 +12,18 @@
 //! assert!(mean.estimate().z_score(0.5).abs() < 4.0);
 //! # Ok::<(), fewbits_monte_carlo::MonteCarloError>(())
 //! ```
+//!
+//! With feature `mpi` (needs an MPI library and libclang) `MonteCarlo::fold_over` and `MonteCarlo::run_over` spread trials over the
+//! ranks of an MPI job. Their result is the same to the last bit as that of one process.
 
 pub mod engine;
+#[cfg(feature = "mpi")]
+mod ranks;
 pub mod statistics;
 pub mod stream;
+
+#[cfg(feature = "mpi")]
+pub use mpi;
 
 pub use engine::{MonteCarlo, MonteCarloError, Trial};
 pub use statistics::{Estimate, Moments};

@@ -278,6 +278,7 @@ mod tests {
         assert_eq!(sigmoid(1e4) + sigmoid(-1e4), 1.0);
     }
 
+    /// Erratum `mpa-11`.
     #[test]
     fn exact_probabilities_are_symmetric_and_hypotheses_agree_with_one_step() {
         for scale in [1e-4, 1.0, 1e4] {

@@ -65,6 +65,9 @@ pub enum Error {
     /// The thread pool could not be started.
     #[error("cannot start threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The sources could not be read.
+    #[error(transparent)]
+    Sources(#[from] crate::tidy::Error),
     /// A setting was refused.
     #[error(transparent)]
     Setting(fewbits_experiments::Error),

@@ -7,6 +7,8 @@ mod gallery;
 mod options;
 mod produce;
 mod progress;
+#[cfg_attr(not(feature = "mpi"), path = "one_rank.rs")]
+mod ranks;
 mod record;
 mod reuse;
 mod run;
@@ -20,6 +22,7 @@ pub use draw::to_svg;
 pub use error::Error;
 pub use options::{Action, Options};
 
+use crate::{errata, tidy};
 use options::in_workspace;
 use record::Record;
 use std::io::Write;
@@ -37,11 +40,15 @@ pub enum Ending {
     Interrupted,
 }
 
-/// Makes the chosen figures.
+/// Makes the chosen figures. With feature `mpi` under `mpirun`, the ranks share them; rank 0 alone reads and writes `--out` and prints.
 ///
 /// # Errors
 /// If an option is refused or the output directory cannot be written. Nothing is written before all options are accepted.
 pub fn run(options: &Options) -> Result<Ending, Error> {
+    let ranks = ranks::Ranks::start();
+    if !ranks.is_first() {
+        return run::work(&ranks, options);
+    }
     match &options.action {
         Some(Action::Describe { ids }) => {
             let pages: Vec<_> = select::figures(ids)?.into_iter().map(describe::one).collect();
@@ -49,15 +56,16 @@ pub fn run(options: &Options) -> Result<Ending, Error> {
             Ok(Ending::Good)
         }
         Some(Action::Merge { from, out, json }) => merge(from, &in_workspace(out), *json),
+        Some(Action::Errata { from, check }) => errata(&in_workspace(from), *check),
         Some(Action::Times { from }) => {
             print(&times::table(&Record::read_all(&in_workspace(from))?));
             Ok(Ending::Good)
         }
-        None => make(options),
+        None => make(options, &ranks),
     }
 }
 
-fn make(options: &Options) -> Result<Ending, Error> {
+fn make(options: &Options, ranks: &ranks::Ranks) -> Result<Ending, Error> {
     let folder = in_workspace(&options.out);
     let mut chosen = select::figures(&options.ids)?;
     if !options.except.is_empty() {
@@ -79,7 +87,7 @@ fn make(options: &Options) -> Result<Ending, Error> {
         return Ok(Ending::Good);
     }
     let jobs = select::configure(&chosen, options)?;
-    run::run(&jobs, &write::Directory::create(&folder)?, options)
+    run::run(&jobs, &write::Directory::create(&folder)?, options, ranks)
 }
 
 /// Copies the figures of other directories into one.
@@ -105,6 +113,42 @@ fn merge(from: &[PathBuf], out: &Path, json: bool) -> Result<Ending, Error> {
     };
     summary.write(&records, &Record::read_all(out.path())?, elapsed)?;
     Ok(summary.print(&records, elapsed))
+}
+
+/// Writes the last column of `docs/errata.md` from the claims of a directory, or compares it.
+fn errata(from: &Path, check: bool) -> Result<Ending, Error> {
+    let records = Record::read_all(from)?;
+    let tests = tidy::errata::tests(&in_workspace(Path::new(".")))?;
+    let path = in_workspace(Path::new("docs/errata.md"));
+    let page = std::fs::read_to_string(&path).map_err(|source| Error::Read {
+        path: path.clone(),
+        source,
+    })?;
+    let ids: Vec<&'static str> = fewbits_experiments::all()
+        .iter()
+        .map(|figure| figure.about().id)
+        .collect();
+    let new = errata::written(&page, &tests, |row| {
+        let shows = |id: &&&'static str| match records.get(**id) {
+            Some(record) => record
+                .claims
+                .iter()
+                .any(|c| errata::cited(&c.statement).any(|cited| cited == row.id)),
+            None => row.figures_and_tests().0.contains(**id),
+        };
+        ids.iter().filter(shows).copied().collect()
+    });
+    match (new == page, check) {
+        (true, _) => Ok(Ending::Good),
+        (false, true) => {
+            eprintln!("{} is not up to date: `cargo xtask figures errata`", path.display());
+            Ok(Ending::Failed)
+        }
+        (false, false) => {
+            std::fs::write(&path, new).map_err(|source| Error::Write { path, source })?;
+            Ok(Ending::Good)
+        }
+    }
 }
 
 /// Prints a page; a reader that has seen enough and closed the pipe is no error.

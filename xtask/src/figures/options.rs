@@ -77,6 +77,16 @@ pub enum Action {
         #[arg(long)]
         json: bool,
     },
+    /// Write the column of `docs/errata.md` that names the figures and tests which show each erratum. Figures that the directory does
+    /// not have keep their place.
+    Errata {
+        /// Directory with figures, of quick ones at least; relative to the workspace.
+        #[arg(default_value = "target/figures")]
+        from: PathBuf,
+        /// Write nothing and fail if the column is not up to date.
+        #[arg(long)]
+        check: bool,
+    },
     /// Print the table of expected times with what the figures of an output directory took.
     Times {
         /// Directory with figures; relative to the workspace.

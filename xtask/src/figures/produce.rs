@@ -1,14 +1,72 @@
-//! Running one figure.
+//! Making one figure.
 
+use super::record::Record;
 use super::select::Job;
-use fewbits_experiments::{Context, Outcome};
+use super::write::Made;
+use super::{Error, Options, reuse};
+use fewbits_experiments::{Context, Kept, Outcome};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use thiserror::Error;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+use thiserror::Error as ThisError;
+
+/// Set by Ctrl-C.
+pub(super) static STOP: AtomicBool = AtomicBool::new(false);
+
+/// Makes figures on the threads of this process.
+pub(super) struct Maker<'a> {
+    options: &'a Options,
+    pool: rayon::ThreadPool,
+    kept: Kept,
+}
+
+impl<'a> Maker<'a> {
+    pub(super) fn new(options: &'a Options) -> Result<Self, Error> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(options.threads.unwrap_or(0) as usize)
+            .build()?;
+        Ok(Self {
+            options,
+            pool,
+            kept: Kept::default(),
+        })
+    }
+
+    pub(super) fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// One figure, telling `report` the number of trials just finished; none if the user stopped the run.
+    pub(super) fn make(&self, job: &Job, report: &(dyn Fn(u64) + Sync)) -> Option<Made> {
+        let (about, began) = (job.figure.about(), Instant::now());
+        let has_read = AtomicBool::new(false);
+        let read = |path: &str| {
+            has_read.store(true, Ordering::Relaxed);
+            std::fs::read_to_string(path)
+        };
+        let context = Context {
+            seed: self.options.seed,
+            progress: Some(report),
+            cancel: Some(&STOP),
+            read: Some(&read),
+            kept: Some(&self.kept),
+        };
+        let result = produce(&self.pool, job, &context);
+        // A user's file may change: its figure is made again.
+        let fingerprint = reuse::fingerprint(job, self.options.seed).filter(|_| !has_read.load(Ordering::Relaxed));
+        let record = Record::new(about, &job.parameters, began.elapsed(), self.options, fingerprint);
+        match result {
+            Ok(outcome) => Some(Made::of(record, &outcome, !self.options.no_plots)),
+            Err(Failure::Cancelled) => None,
+            Err(failure) => Some(Made::failed(record, &failure)),
+        }
+    }
+}
 
 /// Why a figure has no outcome.
-#[derive(Debug, Error)]
-pub(super) enum Failure {
+#[derive(Debug, ThisError)]
+enum Failure {
     #[error("stopped")]
     Cancelled,
     #[error("{0}")]
@@ -18,7 +76,7 @@ pub(super) enum Failure {
 }
 
 /// Runs one figure; a panic in it is its own failure and nobody else's.
-pub(super) fn produce(pool: &rayon::ThreadPool, job: &Job, context: &Context<'_>) -> Result<Outcome, Failure> {
+fn produce(pool: &rayon::ThreadPool, job: &Job, context: &Context<'_>) -> Result<Outcome, Failure> {
     let run = || pool.install(|| job.figure.produce(&job.parameters, context));
     match catch_unwind(AssertUnwindSafe(run)) {
         Ok(Ok(outcome)) => Ok(outcome),

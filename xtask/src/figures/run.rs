@@ -1,20 +1,17 @@
 //! One run: figures side by side, longest first, with the gallery and the summary up to date all the time.
 
-use super::produce::{Failure, produce};
-use super::progress::Progress;
+use super::produce::{Maker, STOP};
+use super::progress::{Progress, Running};
+use super::ranks::{Order, Ranks};
 use super::record::Record;
 use super::select::Job;
 use super::times::expected_seconds;
-use super::write::{Directory, Summary};
-use super::{Ending, Error, Options, reuse, serve, write};
-use fewbits_experiments::{Context, Kept};
-use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use super::write::{Directory, Made, Summary};
+use super::{Ending, Error, Options, reuse, serve};
+use std::collections::{BTreeMap, HashMap};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
-
-/// Set by Ctrl-C.
-static STOP: AtomicBool = AtomicBool::new(false);
 
 /// How often the progress is asked whether it has something to say.
 const TICK: Duration = Duration::from_millis(500);
@@ -23,10 +20,11 @@ const TICK: Duration = Duration::from_millis(500);
 struct Run<'a> {
     options: &'a Options,
     out: &'a Directory,
-    pool: rayon::ThreadPool,
+    maker: Maker<'a>,
+    /// Threads of all ranks.
+    threads: usize,
     progress: Progress,
     started: Instant,
-    kept: Kept,
     /// Place of each job in the order of the figures.
     finished: Mutex<Finished>,
 }
@@ -39,26 +37,36 @@ struct Finished {
     all: BTreeMap<String, Record>,
 }
 
-/// A job with its place in the order of the figures, its fingerprint and the seconds that it is expected to take.
+/// A job with its place in the order of the figures and the seconds that it is expected to take.
 struct Planned<'a> {
     job: &'a Job,
     place: usize,
-    fingerprint: Option<String>,
     seconds: f64,
 }
 
-/// Makes the figures of `jobs`.
-pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options) -> Result<Ending, Error> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads.unwrap_or(0) as usize)
-        .build()?;
+/// Ends the run gently at the first signal and at once at the second.
+fn stop_on_signals(note: &'static str) {
     // A handler that is there already (a test in this process) is as good.
-    let _ = ctrlc::set_handler(|| {
+    let _ = ctrlc::set_handler(move || {
         if STOP.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprintln!("stopping: finished figures stay, running ones are given up (once more to stop at once)");
+        eprint!("{note}");
     });
+}
+
+/// Makes what rank 0 orders; writes and prints nothing.
+pub(super) fn work(ranks: &Ranks, options: &Options) -> Result<Ending, Error> {
+    stop_on_signals("");
+    let maker = Maker::new(options)?;
+    ranks.work(maker.threads(), |order| maker.make(&order.job()?, &|_| ()));
+    Ok(Ending::Good)
+}
+
+/// Makes the figures of `jobs`.
+pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options, ranks: &Ranks) -> Result<Ending, Error> {
+    stop_on_signals("stopping: finished figures stay, running ones are given up (once more to stop at once)\n");
+    let maker = Maker::new(options)?;
     let mut finished = Finished {
         all: Record::read_all(out.path())?,
         ..Finished::default()
@@ -76,21 +84,21 @@ pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options) -> Result<En
             None => planned.push(Planned {
                 job,
                 place,
-                fingerprint,
                 seconds: expected_seconds(id, options.quick),
             }),
         }
     }
     planned.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
     let seconds = planned.iter().map(|p| p.seconds).sum();
-    let progress = Progress::start(planned.len(), finished.records.len(), seconds, pool.current_num_threads());
+    let threads = maker.threads() * ranks.size();
+    let progress = Progress::start(planned.len(), finished.records.len(), seconds, threads);
     let run = Run {
         options,
         out,
-        pool,
+        maker,
+        threads,
         progress,
         started: Instant::now(),
-        kept: Kept::default(),
         finished: Mutex::new(finished),
     };
     let server = options.serve.then(|| serve::Server::start(out.path())).transpose()?;
@@ -106,7 +114,7 @@ pub(super) fn run(jobs: &[Job], out: &Directory, options: &Options) -> Result<En
                 run.progress.heartbeat();
             }
         });
-        run.side_by_side(&shared);
+        run.side_by_side(&shared, ranks);
         alone.iter().for_each(|planned| run.make(planned));
         done.store(true, Ordering::Relaxed);
     });
@@ -128,39 +136,19 @@ impl Run<'_> {
         if STOP.load(Ordering::Relaxed) {
             return;
         }
-        let (about, began) = (planned.job.figure.about(), Instant::now());
-        let running = self.progress.begin(about.id);
-        let report = |trials: u64| running.advance(trials);
-        let has_read = AtomicBool::new(false);
-        let read = |path: &str| {
-            has_read.store(true, Ordering::Relaxed);
-            std::fs::read_to_string(path)
-        };
-        let context = Context {
-            seed: self.options.seed,
-            progress: Some(&report),
-            cancel: Some(&STOP),
-            read: Some(&read),
-            kept: Some(&self.kept),
-        };
-        let result = produce(&self.pool, planned.job, &context);
-        let threads = self.pool.current_num_threads();
-        if matches!(&result, Err(Failure::Cancelled)) {
-            running.finish(0.0, threads, None);
+        let running = self.progress.begin(planned.job.figure.about().id);
+        let made = self.maker.make(planned.job, &|trials| running.advance(trials));
+        self.finish(running, planned, made);
+    }
+
+    /// Writes what was made, here or on another rank; nothing if it was given up.
+    fn finish(&self, running: Running<'_>, planned: &Planned<'_>, made: Option<Made>) {
+        let Some(made) = made else {
+            running.finish(0.0, self.threads, None);
             return;
-        }
-        // A user's file may change: its figure is made again.
-        let fingerprint = planned
-            .fingerprint
-            .clone()
-            .filter(|_| !has_read.load(Ordering::Relaxed));
-        let record = Record::new(about, &planned.job.parameters, began.elapsed(), self.options, fingerprint);
-        let written = match &result {
-            Ok(outcome) => write::figure(self.out, record.clone().with(outcome), Some(outcome), !self.options.no_plots),
-            Err(failure) => write::figure(self.out, record.clone().failed(failure.to_string()), None, false),
         };
-        let record = written.unwrap_or_else(|error| record.failed(error.to_string()));
-        running.finish(planned.seconds, threads, Some(&record));
+        let record = made.write(self.out);
+        running.finish(planned.seconds, self.threads, Some(&record));
         let mut finished = self.finished();
         finished.all.insert(record.id.clone(), record.clone());
         finished.records.insert(planned.place, record);
@@ -169,9 +157,8 @@ impl Run<'_> {
         let _ = self.write("In progress: this page shows what is finished.");
     }
 
-    /// Runs figures on as many threads as the pool has.
-    fn side_by_side(&self, planned: &[&Planned<'_>]) {
-        // Figures of one world follow one another, from the place of the longest.
+    /// Runs figures on all threads of all ranks. Figures of one world follow one another, from the place of the longest.
+    fn side_by_side(&self, planned: &[&Planned<'_>], ranks: &Ranks) {
         let mut worlds: Vec<Vec<&Planned<'_>>> = Vec::new();
         for figure in planned {
             let world = figure.job.figure.world();
@@ -183,15 +170,33 @@ impl Run<'_> {
                 None => worlds.push(vec![figure]),
             }
         }
-        let next = AtomicUsize::new(0);
+        let threads = self.maker.threads().min(worlds.len());
+        let left = Mutex::new(worlds.into_iter());
+        let next = || match STOP.load(Ordering::Relaxed) {
+            true => None,
+            false => left.lock().unwrap_or_else(PoisonError::into_inner).next(),
+        };
         std::thread::scope(|scope| {
-            for _ in 0..self.pool.current_num_threads().min(worlds.len()) {
+            for _ in 0..threads {
                 scope.spawn(|| {
-                    while let Some(world) = worlds.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    while let Some(world) = next() {
                         world.iter().for_each(|planned| self.make(planned));
                     }
                 });
             }
+            let mut elsewhere = HashMap::new();
+            let orders = || next().map(|world| world.iter().map(|planned| Order::of(planned.job)).collect());
+            ranks.serve(orders, |id, made| {
+                let Some(planned) = planned.iter().find(|planned| planned.job.figure.about().id == id) else {
+                    return;
+                };
+                let begun = elsewhere.remove(id);
+                let running = begun.unwrap_or_else(|| self.progress.begin(planned.job.figure.about().id));
+                match made {
+                    Some(_) => self.finish(running, planned, made),
+                    None => drop(elsewhere.insert(id.to_owned(), running)),
+                }
+            });
         });
     }
 

@@ -3,6 +3,7 @@
 use super::record::Record;
 use super::{Ending, Error, draw, gallery, print, summary};
 use fewbits_experiments::{Outcome, Table};
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -57,60 +58,88 @@ impl Directory {
     }
 }
 
-/// Writes the files of one figure, its record last: there is no CSV without its JSON. The record as it was written.
-pub(super) fn figure(
-    out: &Directory,
-    mut record: Record,
-    outcome: Option<&Outcome>,
-    plots: bool,
-) -> Result<Record, Error> {
-    out.clear(&record.id);
-    let done = outcome
-        .map_or(Ok(()), |outcome| tables_and_plot(out, &mut record, outcome, plots))
-        .and_then(|()| {
-            let document = json!(record);
-            out.write(&format!("{}.json", record.id), format!("{document:#}\n").as_bytes())
-        });
-    if done.is_err() {
-        for name in &record.files {
-            let _ = std::fs::remove_file(out.path().join(name));
+/// A figure as it was made: its record, and its files with their text.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Made {
+    pub(super) record: Record,
+    files: Vec<(String, String)>,
+}
+
+impl Made {
+    /// Without result.
+    pub(super) fn failed(record: Record, reason: &impl ToString) -> Self {
+        Self {
+            record: record.failed(reason.to_string()),
+            files: Vec::new(),
         }
     }
-    done.map(|()| record)
+
+    /// With the tables and, if wanted, the plot of an outcome.
+    pub(super) fn of(record: Record, outcome: &Outcome, plots: bool) -> Self {
+        let mut made = Self {
+            record: record.clone().with(outcome),
+            files: Vec::new(),
+        };
+        match made.add(outcome, plots) {
+            Ok(()) => made,
+            Err(error) => Self::failed(record, &error),
+        }
+    }
+
+    fn add(&mut self, outcome: &Outcome, plots: bool) -> Result<(), Error> {
+        let id = self.record.id.clone();
+        let main = (format!("{id}.csv"), &outcome.tables.main);
+        let further = outcome
+            .tables
+            .further
+            .iter()
+            .map(|(name, table)| (format!("{id}-{name}.csv"), table));
+        for (name, table) in std::iter::once(main).chain(further) {
+            let csv = to_csv(table).map_err(|error| Error::Write {
+                path: PathBuf::from(&name),
+                source: std::io::Error::other(error),
+            })?;
+            self.record.columns.insert(name.clone(), json!(table.columns()));
+            self.files.push((name, csv));
+        }
+        if plots {
+            self.files
+                .push((format!("{id}.svg"), draw::to_svg(&id, &outcome.plot)?));
+        }
+        self.record.files = self.files.iter().map(|(name, _)| name.clone()).collect();
+        Ok(())
+    }
+
+    /// Writes the files, the record last: there is no CSV without its JSON. The record as it was written.
+    pub(super) fn write(self, out: &Directory) -> Record {
+        out.clear(&self.record.id);
+        let document = json!(self.record);
+        let last = (format!("{}.json", self.record.id), format!("{document:#}\n"));
+        let written = self
+            .files
+            .iter()
+            .chain([&last])
+            .try_for_each(|(name, text)| out.write(name, text.as_bytes()));
+        match written {
+            Ok(()) => self.record,
+            Err(error) => {
+                for (name, _) in &self.files {
+                    let _ = std::fs::remove_file(out.path().join(name));
+                }
+                self.record.failed(error.to_string())
+            }
+        }
+    }
 }
 
-fn tables_and_plot(out: &Directory, record: &mut Record, outcome: &Outcome, plots: bool) -> Result<(), Error> {
-    let id = record.id.clone();
-    let main = (format!("{id}.csv"), &outcome.tables.main);
-    let further = outcome
-        .tables
-        .further
-        .iter()
-        .map(|(name, table)| (format!("{id}-{name}.csv"), table));
-    for (name, table) in std::iter::once(main).chain(further) {
-        let csv = to_csv(table).map_err(|error| Error::Write {
-            path: out.path().join(&name),
-            source: std::io::Error::other(error),
-        })?;
-        record.columns.insert(name.clone(), json!(table.columns()));
-        record.files.push(name.clone());
-        out.write(&name, &csv)?;
-    }
-    if plots {
-        let name = format!("{id}.svg");
-        record.files.push(name.clone());
-        out.write(&name, draw::to_svg(&id, &outcome.plot)?.as_bytes())?;
-    }
-    Ok(())
-}
-
-fn to_csv(table: &Table) -> Result<Vec<u8>, csv::Error> {
+fn to_csv(table: &Table) -> Result<String, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(table.columns().iter().map(|column| column.name.as_ref()))?;
     for row in table.rows() {
         writer.write_record(row.iter().map(ToString::to_string))?;
     }
-    writer.into_inner().map_err(|error| error.into_error().into())
+    let bytes = writer.into_inner().map_err(|error| error.into_error())?;
+    String::from_utf8(bytes).map_err(|error| std::io::Error::other(error).into())
 }
 
 /// What a run leaves besides its figures: the gallery, and the summary as text and on standard output.

@@ -56,6 +56,32 @@ fn every_shape_leaves_its_elements() {
     assert!(svg(empty().with(Layer::texts(vec![(1.0, 2.0, "here".into())]))).contains("here"));
 }
 
+/// Two marks a metre apart across and down, of maps that are wide, high, and beside a field.
+#[test]
+fn a_metre_of_a_map_is_as_long_on_both_axes() {
+    let field = Layer::heat("level", vec![0.0, 30.0], vec![0.0, 10.0], vec![vec![0.0, 1.0]; 2]);
+    let bare = |x: f64, y: f64| {
+        Panel::new("", Axis::linear("x / m").between(0.0, x), Axis::linear("y / m").between(0.0, y))
+            .with(Layer::points("", vec![(1.0, 1.0), (2.0, 1.0), (1.0, 2.0)]))
+    };
+    for panel in [
+        bare(30.0, 10.0),
+        bare(10.0, 30.0),
+        bare(10.0, 10.0),
+        bare(30.0, 10.0).with(field),
+    ] {
+        assert!(panel.is_map());
+        let drawn = svg(panel);
+        let at: Vec<(f64, f64)> = drawn
+            .split("<circle ")
+            .skip(1)
+            .map(|circle| (attribute(circle, "cx"), attribute(circle, "cy")))
+            .collect();
+        let (across, down) = (at[1].0 - at[0].0, at[0].1 - at[2].1);
+        assert!((across / down - 1.0).abs() < 0.03, "{across} {down}");
+    }
+}
+
 #[test]
 fn what_has_no_place_on_an_axis_is_left_out() {
     let points = vec![

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod draw;
+#[cfg(feature = "mpi")]
+mod ranks;
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -178,6 +178,7 @@ mod tests {
         assert_relative_eq!(network_rate_distortion(&source, s, 3).unwrap(), 0.052077, max_relative = 1e-5);
     }
 
+    /// Erratum `binary-9`.
     #[test]
     fn variance_splits_into_estimation_error_and_estimate() {
         let source = Source::uniform(1.0).unwrap();

@@ -192,6 +192,7 @@ fn compute(name: &str, inputs: &Value) -> Option<Vec<f64>> {
     })
 }
 
+/// Erratum `cfwmd-5`.
 #[test]
 fn every_reference_value_is_met_or_belongs_to_a_figure() {
     let (mut met, mut figures) = (0, 0);

@@ -57,6 +57,7 @@ proptest! {
     }
 }
 
+/// Erratum `cfwmd-1`.
 #[test]
 fn far_tails_and_wide_beliefs_stay_accurate() {
     let base = Silence {

@@ -62,6 +62,7 @@ fn draws_have_the_moments_at_every_scale() {
     }
 }
 
+/// Erratum `dymbo-9`.
 #[test]
 fn densities_integrate_to_one() {
     for scale in [1e-4, 1.0, 1e4] {

@@ -49,6 +49,7 @@ fn range(e: &Value) -> RateRange {
     RateRange::new(number(e, "mu_low"), number(e, "mu_high")).unwrap()
 }
 
+/// Erratum `diffusive-1`.
 #[test]
 fn likelihoods() {
     for e in entries("loglik_sample") {

@@ -27,6 +27,7 @@ fn of_a_gaussian_everything_is_exact() {
 }
 
 /// A gamma density of shape 9, `x^8 exp(-x)`: mode 8, mean 9, variance 9.
+/// Erratum `diffusive-7`.
 #[test]
 fn of_a_skewed_density_the_cumulants_are_closer_than_the_peak() {
     let log_density = |x: &Vector1<f64>| {

@@ -169,6 +169,7 @@ fn envelopes_are_between_certainties() {
     assert!((edge - 0.5).abs() < 0.05, "{edge}");
 }
 
+/// Erratum `diffusive-8`.
 #[test]
 fn selectors_score_candidates() {
     let outcome = run(3, 1.0, false, 300, |search| search.most_nodes = 2);

@@ -111,7 +111,12 @@ impl Figure for Table {
         let all = || rows.assignments.iter();
         claims.keyed("approx", "approximate error, assignment", all(), |r| r.approx);
         claims.keyed("center", "error of the cell's centre, assignment", all(), |r| r.center);
-        claims.keyed("mmse", "error of the posterior mean, assignment", all(), |r| r.mmse);
+        claims.keyed(
+            "mmse",
+            "error of the posterior mean, a fifth below that of the cell's centre (erratum assign-2), assignment",
+            all(),
+            |r| r.mmse,
+        );
         let cells = all().flat_map(|r| {
             [
                 (format!("approx {}", r.assign), r.approx),
@@ -144,7 +149,7 @@ impl Figure for Table {
         let dual = bits + select(&rows.costs, |c| c.bit == 1).map(|c| c.dual_sensor).sum::<f64>();
         let matched = find(&rows.assignments, "optimal")
             .map_or(f64::NAN, |r| r.approx - quantization_error(1.0, p.variances.len()));
-        let what = "the dual variables prove the optimum: their sum is the cost";
+        let what = "the dual variables prove the optimum: their sum is the cost (erratum binary-20)";
         claims.near("duality", what, dual, matched, 1e-15 + 1e-12 * matched);
         let what = "and none exceeds a cost";
         claims.all("dual-feasible", what, &rows.costs, |c| c.dual_bit + c.dual_sensor <= c.gamma + 1e-12);

@@ -153,7 +153,8 @@ impl Figure for Optimum {
         let what = "filling the Gray basis by equation 5.13 is poor: ratio to the optimum";
         let ratio = |r: &Row| (format!("{} sensors, {} dB", r.sensors, r.snr_db), r.mse_strategy13 / r.mse_opt);
         claims.references("strategy-3", what, all, ratio);
-        let what = "without the basis, equation 5.13 repeats one pattern; the worst ratio to the optimum";
+        let what =
+            "without the basis, equation 5.13 repeats one pattern; the worst ratio to the optimum (erratum binary-16)";
         let worst = of(8).map(|r| r.mse_strategy3 / r.mse_opt).reduce(f64::max);
         here.above("strategy-3-alone", what, worst, 20.0);
         if p.bits == 3 {

@@ -128,7 +128,7 @@ impl Figure for Table {
         claims.keyed("dmap", "error of the discrete decoder", &rows.sets, |r| r.mse_dmap);
         let what = "place among 0..2701 under the posterior mean (erratum binary-11)";
         claims.keyed("rank", what, &rows.sets, |r| r.rank.map(|rank| rank as f64));
-        let what = "place under the discrete decoder: the table fits a search with that decoder";
+        let what = "place under the discrete decoder: the table fits a search with that decoder (erratum binary-19)";
         claims.keyed("rank-dmap", what, &rows.sets, |r| r.rank_dmap.map(|rank| rank as f64));
         here.near("sets", "there are 2702 sets", rows.listed.len() as f64, 2702.0, 0.0);
         here.all("best-masks", "the best set is {4,6,3,3,3,3,2,2}", best, |r| r.masks == "2 2 3 3 3 3 4 6");

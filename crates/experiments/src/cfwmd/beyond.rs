@@ -52,7 +52,7 @@ pub(super) static LOSSY: Simulated<Linear, Step> = Simulated {
     },
     plot: |setting, rows| {
         let l = setting.messages[0];
-        let mut panel = Panel::linear("Position error over a lossy link", "loss probability", "time-averaged RMSE (m)");
+        let mut panel = Panel::linear("Position error over a lossy link", "loss probability", "time-averaged RMSE / m");
         for (colour, scheme) in [IGNORED, MODELLED].into_iter().enumerate() {
             let at = |loss: &f64| Some((*loss, rows.at(&format!("{scheme}, loss {loss}"), l)?.position_rmse));
             let clean = rows.at(NO_LOSS, l).map(|r| (0.0, r.position_rmse));
@@ -160,7 +160,7 @@ pub(super) static SCHEDULED: Simulated<Linear, Step, Bounds> = Simulated {
                 .filter(|b| b.sensors == setting.sensors)
                 .take(setting.messages.len())
         };
-        let error = by_budget(&all, "Position error", "time-averaged RMSE (m)", |r| r.position_rmse)
+        let error = by_budget(&all, "Position error", "time-averaged RMSE / m", |r| r.position_rmse)
             .with(Layer::dashed("bound on CFwMD", points(bounds(), |b| (b.l, b.bound_m))).coloured(0))
             .with(Layer::dashed("bound on the others", points(bounds(), |b| (b.l, b.bound_centre_m))).coloured(1));
         let budget = setting.messages.iter().map(|l| (*l, *l)).collect();
@@ -271,7 +271,7 @@ pub(super) static COST: Simulated<Linear, Step, Times> = Simulated {
         claims.at_least("cheaper", what, relative, 15.0);
     },
     plot: |setting, rows| {
-        let axes = (Axis::log("time a step (µs)"), Axis::linear("time-averaged RMSE (m)"));
+        let axes = (Axis::log("time a step / µs"), Axis::linear("time-averaged RMSE / m"));
         let marks = rows.further.time.iter().enumerate().filter_map(|(colour, time)| {
             let at = rows.at(time.scheme, setting.messages[0])?;
             Some(Layer::measured(time.scheme, [at], |r| (time.time_us, r.position_rmse)).coloured(colour))

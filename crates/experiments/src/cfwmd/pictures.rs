@@ -32,8 +32,8 @@ impl Main for Summary {
     fn plot(rows: &[Self]) -> Plot {
         let rows: Vec<&Summary> = rows.iter().collect();
         let panels = [
-            by_budget(&rows, "Position", "time-averaged RMSE (m)", |r| r.position_rmse),
-            by_budget(&rows, "Velocity", "time-averaged RMSE (m/s)", |r| r.velocity_rmse),
+            by_budget(&rows, "Position", "time-averaged RMSE / m", |r| r.position_rmse),
+            by_budget(&rows, "Velocity", "time-averaged RMSE / (m/s)", |r| r.velocity_rmse),
         ];
         Plot::grid(2, panels.into())
     }
@@ -62,8 +62,8 @@ pub(super) fn by_step(steps: &[Step]) -> Plot {
         let world_name = world.as_ref().map_or_else(String::new, |w| format!(", {w}"));
         for part in BOTH {
             let (axis, title) = match part {
-                Part::Position => ("RMSE (m)", "Position"),
-                Part::Velocity => ("RMSE (m/s)", "Velocity"),
+                Part::Position => ("RMSE / m", "Position"),
+                Part::Velocity => ("RMSE / (m/s)", "Velocity"),
             };
             let own = |r: &&Step| (&r.run.world, r.run.l) == (world, *l);
             let layers = schemes.iter().enumerate().flat_map(|(order, scheme)| {
@@ -83,7 +83,7 @@ pub(super) fn by_step(steps: &[Step]) -> Plot {
 
 /// A number of the summary against the budget, a curve for each scheme.
 pub(super) fn by_budget(rows: &[&Summary], title: &str, label: &str, of: impl Fn(&Summary) -> Measured) -> Panel {
-    let axes = (Axis::linear("message budget l (messages/step)"), Axis::linear(label));
+    let axes = (Axis::linear("message budget l / (messages/step)"), Axis::linear(label));
     let schemes = distinct(rows, |r| r.run.scheme);
     let layers = schemes.iter().enumerate().flat_map(|(order, scheme)| {
         let own = rows.iter().filter(|r| r.run.scheme == *scheme);

@@ -134,7 +134,7 @@ pub(super) static FIG6: Simulated<Linear, Step> = Simulated {
         for world in &worlds() {
             rows.beats(claims, ("CFwMD", "CFoMD"), (world, 1.0), &[Part::Position]);
             let ratio = rows.ratio(&format!("exact, {world}"), &format!("{SAME_TRIALS}, {world}"), 1.0);
-            let what = format!("the joint Gaussian belief is as good as the exact filter, {world}");
+            let what = format!("the joint Gaussian belief is as good as the exact filter, {world} (erratum cfwmd-15)");
             let id = format!("joint-is-exact-{}", world.replace(' ', "-"));
             claims.near(id, what, ratio, 1.0, 0.03);
         }
@@ -164,7 +164,8 @@ pub(super) static TABLE2: Simulated<Linear, Rates> = Simulated {
     claims: |rows, claims| {
         as_printed(claims, &rows.main, &world(1.0));
         let stated = rows.at(&format!("CFwMD, {}", world(STATED)), 1.0).map(|r| r.rate.value);
-        let what = "the stated acceleration variance gives a rate far above the printed .9296 at l = 1";
+        let what =
+            "the stated acceleration variance gives a rate far above the printed .9296 at l = 1 (erratum cfwmd-6)";
         claims.above("stated-variance-rejected", what, stated, 0.98);
     },
     ..Simulated::BASE

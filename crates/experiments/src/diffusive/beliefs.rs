@@ -194,7 +194,7 @@ fn field_panel(title: &str, rows: &Fields, of: fn(&Point) -> f64) -> Panel {
         .collect();
     let ends = |axis: &[f64]| (axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(1.0));
     let ((x0, x1), (y0, y1)) = (ends(&x), ends(&y));
-    Panel::new(title, Axis::linear("x (m)").between(x0, x1), Axis::linear("y (m)").between(y0, y1))
+    Panel::new(title, Axis::linear("x / m").between(x0, x1), Axis::linear("y / m").between(y0, y1))
         .with(Layer::heat("lg(p/peak)", x, y, values))
         .with(Layer::points("source", vec![B.source.into()]).styled(3, Marker::OpenCircle))
 }
@@ -219,7 +219,7 @@ impl Figure for Lobes {
         here.below("lpg-is-close", "polynomial Gaussians are within 0.3 nats of it", kl("lpg-2x5"), 0.3);
         let ratio = over(kl("gaussian"), kl("lpg-2x5"));
         here.above("gaussian-is-not", "one Gaussian is at least five times as far", ratio, 5.0);
-        let what = "two Gaussians show both lobes, too: the paper's claim that a Gaussian sum cannot is overstated (errata diffusive-9)";
+        let what = "two Gaussians show both lobes, too: the paper's claim that a Gaussian sum cannot is overstated (erratum diffusive-9)";
         let ratio = over(kl("gaussian"), kl("gmm-2"));
         here.above("gaussian-sums-can", what, ratio, 2.0);
     }

@@ -29,9 +29,9 @@ fn calibrated(rows: &Rows, claims: &mut Claims, key: &str) {
     let nees = find(rows, key).and_then(|s| s.nees_median);
     let what = "the exact belief is calibrated: the median squared error is 1.39 covariances";
     full.near("calibrated", what, nees, 1.386, 0.4);
-    // A small determinant allows a long thin belief: a metre along it is no error of the belief (errata diffusive-15).
+    // A small determinant allows a long thin belief: a metre along it is no error of the belief.
     let wrong = find(rows, key).map(|s| s.converged_wrong.value);
-    let what = "at most one in a hundred exact beliefs converges more than a metre off";
+    let what = "at most one in a hundred exact beliefs converges more than a metre off (erratum diffusive-15)";
     full.at_most("exact-is-right", what, wrong, 0.01);
 }
 
@@ -52,7 +52,7 @@ pub(super) fn fig3(rows: &Rows, claims: &mut Claims) {
     full.below("range", what, minus(error(15.0, 6), error(10.0, 6)), 0.0);
     calibrated(rows, claims, "exact 15");
     let wrong = find(rows, "gaussian known rate 15").map(|s| s.wrong.value);
-    let what = "one Gaussian stops more than a metre off in a good part of the searches; the paper shows none (errata diffusive-12)";
+    let what = "one Gaussian stops more than a metre off in a good part of the searches; the paper shows none (erratum diffusive-12)";
     full.at_least("gaussian-is-often-wrong", what, wrong, 0.1);
 }
 
@@ -65,7 +65,7 @@ pub(super) fn fig4(rows: &Rows, claims: &mut Claims) {
         let what = format!("15 m of range need fewer nodes than 10 m: {scheme}");
         full.below(format!("range/{}", scheme.replace(' ', "-")), what, minus(wide, narrow), 0.0);
     }
-    let what = "the printed 14 nodes are below almost every single-Gaussian search (errata diffusive-12)";
+    let what = "the printed 14 nodes are below almost every single-Gaussian search (erratum diffusive-12)";
     let lowest = find(rows, "gaussian known rate 15").and_then(|s| s.nodes_q10);
     paper.above("printed-14", what, lowest, 14.0);
     calibrated(rows, claims, "exact 15");
@@ -83,7 +83,7 @@ pub(super) fn fig7(rows: &Rows, claims: &mut Claims) {
     let determinant = |scheme| at(rows, scheme, 15.0, 5)?.log10det_med;
     let value = |scheme| determinant(scheme).map(|m| m.value);
     let lpg = "lpg-2x5 known rate";
-    let what = "after five nodes polynomial Gaussians are sharper than the other program's (log10 det -3.8), by more than four standard errors (errata diffusive-13)";
+    let what = "after five nodes polynomial Gaussians are sharper than the other program's (log10 det -3.8), by more than four standard errors (erratum diffusive-13)";
     let most = determinant(lpg).map(|m| m.value + 4.0 * m.standard_error.unwrap_or(0.0));
     paper.below("det5/lpg", what, most, -3.8);
     let what = "and no sharper than the exact belief with the rate known";
@@ -117,7 +117,7 @@ pub(super) fn fig8(rows: &Rows, claims: &mut Claims) {
         let what = format!("polynomial Gaussians need fewer nodes than one Gaussian: {lpg}");
         full.below(id, what, minus(median(lpg), median(gaussian)), 0.0);
     }
-    let what = "a mixture of 23 numbers is as good, within a node, as 51 of polynomial Gaussians (errata diffusive-9)";
+    let what = "a mixture of 23 numbers is as good, within a node, as 51 of polynomial Gaussians (erratum diffusive-9)";
     full.at_most("mixtures-do", what, minus(median("gmm-4 known rate"), median(lpg)), 1.0);
     let wrong = find(rows, "mode and curvature known rate 15").map(|s| s.wrong.value);
     let what = "mode and curvature report convergence in the wrong place in most searches: never trust a determinant from them";

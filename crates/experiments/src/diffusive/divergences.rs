@@ -149,7 +149,7 @@ impl Figure for Divergences {
         let what =
             "on the first ring the printed two-phase fit is on average at least twice as far away as the Galerkin form";
         full.at_least("printed-ring", what, ratio, 2.0);
-        let what = "and of most terms there is no printed answer: no definite curvature (errata diffusive-14)";
+        let what = "and of most terms there is no printed answer: no definite curvature (erratum diffusive-14)";
         let share = row(1, TWO_PHASES).and_then(|r| r.no_answer);
         full.at_least("printed-no-answer", what, share, 0.5);
         let ratio = over(mean(3, TWO_PHASES), find(3, TWO_PHASES));

@@ -179,15 +179,15 @@ impl Figure for Envelope {
         });
         let map = Panel::new(
             "Probability of exceedance",
-            Axis::linear("x (m)").between(0.0, 100.0),
-            Axis::linear("y (m)").between(0.0, 100.0),
+            Axis::linear("x / m").between(0.0, 100.0),
+            Axis::linear("y / m").between(0.0, 100.0),
         )
         .with(Layer::heat("P(c > threshold)", centres.clone(), centres, values))
         .with(Layer::dashed("true edge", circle.collect()).coloured(3));
         let of = |f: fn(&Band) -> f64| rows.band.iter().map(|b| (b.direction_deg, f(b))).collect::<Vec<_>>();
         let limits = rows.band.iter().map(|b| (b.direction_deg, b.r05, b.r95)).collect();
         let band =
-            Panel::linear(format!("Reach from the alarm node after {} s", p.time), "direction (deg)", "reach (m)")
+            Panel::linear(format!("Reach from the alarm node after {} s", p.time), "direction / deg", "reach / m")
                 .with(Layer::band("90 % band", limits).coloured(0))
                 .with(Layer::line("median", of(|b| b.r50)).coloured(0))
                 .with(Layer::dashed("truth", of(|b| b.truth)).coloured(3));

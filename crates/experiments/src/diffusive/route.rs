@@ -131,7 +131,7 @@ impl Figure for Trace {
                 (r.step as f64, total)
             })
             .collect();
-        let determinant = Panel::linear("Test", "nodes", "lg det of the covariance (m^4)");
+        let determinant = Panel::linear("Test", "nodes", "lg det of the covariance / m^4");
         let sent = Panel::linear("Messages", "nodes", "bytes so far");
         let determinant = determinant.with(Layer::points("after each node", tests));
         Plot::grid(2, vec![determinant, sent.with(Layer::points("received", bytes))])
@@ -213,7 +213,7 @@ impl Figure for Route {
 
     fn plot(&self, _: &Parameters, rows: &RouteRows) -> Plot {
         let axis = |label: &str| Axis::linear(label).between(0.0, 100.0);
-        let mut panel = Panel::new("Route and belief", axis("x (m)"), axis("y (m)"));
+        let mut panel = Panel::new("Route and belief", axis("x / m"), axis("y / m"));
         panel = panel
             .with(Layer::points("deployed", rows.field.iter().map(|p| (p.x, p.y)).collect()).styled(7, Marker::Circle));
         for r in &rows.route {

@@ -132,7 +132,7 @@ impl Figure for Selection {
         let what = "the pairwise lower bound ranks as the exact information does";
         full.at_least("pairwise-ranks", what, rank("pairwise lower"), 0.98);
         let lost = |rule: &str| rows.rankings.iter().find(|r| r.rule == rule).map(|r| r.lost.value);
-        let what = "choosing by the Gaussian bound loses less than 0.15 nat, though it misjudges beliefs of two peaks (errata diffusive-16)";
+        let what = "choosing by the Gaussian bound loses less than 0.15 nat, though it misjudges beliefs of two peaks (erratum diffusive-16)";
         full.below("gaussian-loses-little", what, lost("gaussian bound"), 0.15);
         let gap = minus(rank("pairwise lower"), rank("mahalanobis"));
         full.above("mahalanobis-does-not", "Mahalanobis distance ranks far worse", gap, 0.2);
@@ -149,7 +149,7 @@ impl Figure for Selection {
         let names = SETTINGS.iter().map(|s| s.0.to_owned());
         let mut nodes = Panel::new(
             "Nodes to the threshold",
-            Axis::categories("example and range (m)", names),
+            Axis::categories("example and range / m", names),
             Axis::linear("mean nodes").between(0.0, 11.0),
         );
         for (c, (rule, _)) in SEARCH_RULES.into_iter().enumerate() {

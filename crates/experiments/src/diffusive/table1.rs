@@ -125,7 +125,7 @@ impl Figure for Table1 {
         claims.all("zero-mean", what, rows.means.iter().filter(|m| m.nu1 + m.nu2 > 0), |m| m.mean.abs() < 1e-10);
         let misprint = |nu1, nu2| first(&rows.means, |m| (m.nu1, m.nu2) == (nu1, nu2)).and_then(|m| m.printed);
         for (nu, id, reference) in [((4, 0), "he40", MISPRINT_40), ((2, 2), "he22", MISPRINT_22)] {
-            let what = "the printed entry has another mean and is a misprint (errata diffusive-3)";
+            let what = "the printed entry has another mean and is a misprint (erratum diffusive-3)";
             let value = misprint(nu.0, nu.1).map(f64::abs);
             here.near(format!("misprint/{id}"), what, value, reference, 0.01);
         }

@@ -170,7 +170,7 @@ impl Figure for Unknowns {
             here.near(format!("bound/{unknown}").replace(' ', ""), what, bound(unknown), expected, 1e-5);
         }
         let bias = |key: &str| rows.models.iter().find(|m| m.key() == key);
-        let what = "a rate for each sample is metres off without any noise (errata diffusive-2)";
+        let what = "a rate for each sample is metres off without any noise (erratum diffusive-2)";
         paper.above("sample-wise-is-biased", what, bias("sample-wise 20").map(|m| m.bias.value), 1.0);
         let what = "and many widths off: it is inconsistent";
         paper.above("sample-wise-is-inconsistent", what, bias("sample-wise 20").map(|m| m.bias_in_widths.value), 2.0);
@@ -183,12 +183,12 @@ impl Figure for Unknowns {
     fn plot(&self, _: &Parameters, rows: &Rows) -> Plot {
         let bars = rows.bounds.iter().enumerate().map(|(i, b)| (i as f64, b.sd_x));
         let unknown = Axis::categories("unknown besides the position", rows.bounds.iter().map(|b| b.unknown));
-        let bound = Panel::new("Bound of x", unknown, Axis::linear("standard deviation (m)")).with(Layer::bars(
+        let bound = Panel::new("Bound of x", unknown, Axis::linear("standard deviation / m")).with(Layer::bars(
             "",
             bars.collect(),
             0.6,
         ));
-        let mut bias = Panel::semilog("Noise-free samples", "nodes", "median distance to the source (m)");
+        let mut bias = Panel::semilog("Noise-free samples", "nodes", "median distance to the source / m");
         for (c, model) in ["sample-wise", "node-wise", "joint"].into_iter().enumerate() {
             let of = || select(&rows.models, |m| m.model == model);
             let width = points(of(), |m| (m.nodes as f64, m.width.value));

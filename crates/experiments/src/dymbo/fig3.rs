@@ -55,7 +55,7 @@ impl Figure for KalmanVariance {
         }
         let what = "the Kalman variance stays below that of one measurement";
         claims.all("kf-below-one", what, rows, |r| r.kf_reduction < 1.0);
-        let what = "the sign-bit filter is nowhere better";
+        let what = "the sign-bit filter is nowhere better (erratum dymbo-2)";
         claims.all("dymbo-above-kf", what, rows, |r| r.dymbo_reduction >= r.kf_reduction);
         let kalman = |a: f64, gamma: f64| Plant { a, gamma }.kalman_variance().ok();
         for &a in &p.a {
@@ -72,8 +72,9 @@ impl Figure for KalmanVariance {
             let gamma = (r.plant.gamma * 1e12).round() / 1e12;
             (format!("{} {gamma}", r.plant.a), r.kf_reduction)
         });
-        let what = "E6: at gamma = 2 the Kalman variance is no longer about half the measurement's (a = 0.9)";
-        claims.near("e6", what, kalman(0.9, 2.0), 0.721, 5e-4);
+        let what =
+            "at gamma = 2 the Kalman variance is no longer about half the measurement's (a = 0.9) (erratum dymbo-6)";
+        claims.near("kf-at-2", what, kalman(0.9, 2.0), 0.721, 5e-4);
     }
 
     fn plot(&self, p: &Parameters, rows: &Vec<Row>) -> Plot {

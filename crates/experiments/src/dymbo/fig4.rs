@@ -91,7 +91,9 @@ impl Figure for Loss {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
-        claims.all("at-least-one", "the loss is never below 1", &rows.plane, |r| r.loss_riccati >= 1.0);
+        claims.all("at-least-one", "the loss is never below 1 (erratum dymbo-3)", &rows.plane, |r| {
+            r.loss_riccati >= 1.0
+        });
         shapes(claims);
         limits(claims);
         let what = "largest loss over |a| <= 1, gamma <= 1, at the corner";
@@ -105,8 +107,8 @@ impl Figure for Loss {
             claims.keyed(&format!("double-{kind}"), what, double, |c| c.gamma);
         }
         let root = steady::coefficient_at_loss(2.0, 1.0).ok().flatten();
-        let what = "E4: at gamma = 1 the loss exceeds 2 beyond this |a| (the paper: nowhere)";
-        claims.near("e4-riccati", what, root, 0.979320618683, 1e-10);
+        let what = "at gamma = 1 the loss exceeds 2 beyond this |a| (the paper: nowhere) (erratum dymbo-4)";
+        claims.near("double-gamma-1", what, root, 0.979320618683, 1e-10);
         let root = chain::coefficient_at_loss(2.0, 1.0).ok().flatten();
         claims.near("exact-double-gamma-1", "exact loss 2 at gamma = 1", root, 0.971111, 1e-6);
         let exact = || rows.plane.iter().filter_map(|r| Some(r.loss_true? / r.loss_riccati));
@@ -162,7 +164,7 @@ fn shapes(claims: &mut Claims) {
         .enumerate()
         .flat_map(|(i, line)| gammas.iter().zip(line).map(move |(g, l)| (a(i), *g, *l)));
     let low = cells.filter(|(a, gamma, _)| *a <= 0.979 && *gamma <= 1.0 || *gamma <= 0.926);
-    let what = "E4: the loss is below 2 for |a| <= 0.979 and gamma <= 1, or gamma <= 0.926";
+    let what = "the loss is below 2 for |a| <= 0.979 and gamma <= 1, or gamma <= 0.926 (erratum dymbo-4)";
     claims.all("below-two", what, low, |(.., loss)| loss < 2.0);
 }
 
@@ -172,7 +174,13 @@ fn limits(claims: &mut Claims) {
         let what = format!("a = {a}, gamma to 0: loss - 1 over (1 - 2/pi) gamma/(1 - a^2)^2");
         claims.near(format!("slow-{a}"), what, slope, 1.0, 1e-4);
     }
-    claims.near("slow-1", "a = 1, gamma to 0: sqrt(pi/2), not pi/2 (E5)", loss(1.0, 1e-20), (PI / 2.0).sqrt(), 1e-9);
+    claims.near(
+        "slow-1",
+        "a = 1, gamma to 0: sqrt(pi/2), not pi/2 (erratum dymbo-5)",
+        loss(1.0, 1e-20),
+        (PI / 2.0).sqrt(),
+        1e-9,
+    );
     for a in [0.0, 0.5, 1.0] {
         let expected = (1.0 - FRAC_2_PI) / (1.0 - a * a * (1.0 - FRAC_2_PI));
         let slope = loss(a, 1e9).map(|loss| loss / 1e9 / expected);
@@ -180,6 +188,6 @@ fn limits(claims: &mut Claims) {
         claims.near(format!("fast-{a}"), what, slope, 1.0, 1e-6);
     }
     let after = |c: f64| (0..100_000).fold(1.0, |m, _| filtered_variance(m, 1.0, c));
-    let what = "E5: pi/2 is the ratio for a constant parameter, after 100000 samples";
+    let what = "pi/2 is the ratio for a constant parameter, after 100000 samples (erratum dymbo-5)";
     claims.near("static", what, after(FRAC_2_PI) / after(1.0), 1.570889, 1e-6);
 }

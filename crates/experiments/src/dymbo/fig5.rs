@@ -123,8 +123,8 @@ impl Figure for Convergence {
     figure!(Parameters => Rows, ID, "Convergence after a fine first message", "Ribeiro and Giannakis, Fig. 5",
         "Mean squared error of the Kalman filter and of the sign-bit filter, simulated (points, one standard error) and \
          exact (lines); the third curve starts from first message and stationary prior together. The level differs \
-         by the loss, the convergence by a step or two (E12); for the slow plant the first message without the \
-         prior is worse than the prior alone (E13).");
+         by the loss, the convergence by a step or two (erratum dymbo-12); for the slow plant the first message without the \
+         prior is worse than the prior alone (erratum dymbo-13).");
 
     fn run(&self, p: &Parameters, context: &Context<'_>) -> Result<Rows, Error> {
         let plants = each(p.a, &p.gamma);
@@ -224,12 +224,12 @@ impl Figure for Convergence {
             let limit = limit?;
             curve.iter().position(|r| value(r) <= 1.05 * limit).map(|n| n as f64)
         };
-        let what = "E12: steps of the sign-bit filter to within 5 % of its level, a, gamma";
+        let what = "steps of the sign-bit filter to within 5 % of its level, a, gamma (erratum dymbo-12)";
         claims.references("steps-dymbo", what, curves(), |c| {
             let level = c.last().map(|r| r.dymbo_exact);
             (c[0].plant.to_string(), settled(c, |r| r.dymbo_exact, level))
         });
-        let what = "E12: steps of the Kalman filter to within 5 % of its level, a, gamma";
+        let what = "steps of the Kalman filter to within 5 % of its level, a, gamma (erratum dymbo-12)";
         claims.references("steps-kf", what, curves(), |c| {
             let level = c.last().map(|r| r.kf_minf);
             (c[0].plant.to_string(), settled(c, |r| r.kf_pred, level))
@@ -300,11 +300,11 @@ fn starts(claims: &mut Claims) {
         let scheme = RoundedSample::new(1.0, 1.0).ok()?;
         first_message_value(&scheme, &plant.stationary().ok()?).ok()
     };
-    let what = "E13: mean variance after first message and prior together, at a, gamma";
+    let what = "mean variance after first message and prior together, at a, gamma (erratum dymbo-13)";
     claims.references("e13", what, &paper, |p| (p.to_string(), value(p).map(|v| v.expected_variance)));
     let what = "entropy of the first message in bits, at a, gamma";
     claims.references("entropy", what, &paper, |p| (p.to_string(), value(p).map(|v| v.entropy_bits)));
     let prior = paper.last().and_then(|plant| plant.stationary().ok());
-    let what = "E13: at gamma = 0.05 the prior alone is better than the first message alone, 13/12";
-    claims.below("e13-worse", what, prior.map(|prior| prior.covariance()[0]), 13.0 / 12.0);
+    let what = "at gamma = 0.05 the prior alone is better than the first message alone, 13/12 (erratum dymbo-13)";
+    claims.below("message-worse-than-prior", what, prior.map(|prior| prior.covariance()[0]), 13.0 / 12.0);
 }

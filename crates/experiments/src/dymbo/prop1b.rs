@@ -40,7 +40,7 @@ pub struct PosteriorShape;
 impl Figure for PosteriorShape {
     figure!(Parameters => Rows, "dymbo-prop1b", "The posterior of one bit is nearly normal", "Ribeiro and Giannakis, Proposition 1(b)",
         "Largest difference between the exact posterior density after one bit, which is skew-normal, and the normal \
-         density of the same mean and variance. It falls with the cube of the noise (Proposition 1b, restated: E11). \
+         density of the same mean and variance. It falls with the cube of the noise (Proposition 1b, restated: erratum dymbo-11). \
          Right: both densities at the smallest noise, where they differ most.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
@@ -78,7 +78,7 @@ impl Figure for PosteriorShape {
         here.decreasing("converges", what, rows.iter().map(|r| r.distance));
         claims.keyed("distance", "largest difference at sigma", rows, |r| r.distance);
         let ratio = rows.windows(2).last().map(|w| w[0].distance / w[1].distance);
-        here.near("cubic", "twice the noise, an eighth of the difference", ratio, 8.0, 0.01);
+        here.near("cubic", "twice the noise, an eighth of the difference (erratum dymbo-11)", ratio, 8.0, 0.01);
         let constant = rows.last().map(|r| r.cubed);
         here.near("constant", "constant of the cubic law", constant, 0.0200, 5e-5);
     }

@@ -46,7 +46,7 @@ impl Figure for FirstMessage {
     figure!(Parameters => Rows, "dymbo-prop2", "The fine first message", "Ribeiro and Giannakis, Proposition 2",
         "Mean squared error of the first sample rounded to a multiple of tau, at the worst place of the state: exact, \
          sigma^2 + tau^2/12, and the paper's bound (sigma + tau/2)^2. The bound is valid but loose; a filter that \
-         starts from it (right) is over-cautious for several steps (E7).");
+         starts from it (right) is over-cautious for several steps (erratum dymbo-7).");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
         let noise = p.sigma * p.sigma;
@@ -85,14 +85,14 @@ impl Figure for FirstMessage {
         claims.all("valid", "the printed bound is valid (Minkowski)", messages, |r| r.printed_bound >= r.exact_sup);
         claims.keyed("exact", "worst mean squared error at tau", messages, |r| r.exact_sup);
         let one = messages.iter().find(|r| r.tau == p.sigma);
-        let what = "E7: at tau = sigma the printed bound is 2.08 times the truth";
+        let what = "at tau = sigma the printed bound is 2.08 times the truth (erratum dymbo-7)";
         claims.near("loose", what, one.map(|r| r.printed_bound / r.exact_sup), 2.0769, 2e-4);
-        let what = "E8: tau = sigma already costs only 8.3 %";
+        let what = "tau = sigma already costs only 8.3 % (erratum dymbo-8)";
         claims.near("cheap", what, one.map(|r| r.exact_sup / (p.sigma * p.sigma)), 1.0833, 1e-4);
         let at = |n: usize| rows.starts.iter().filter(move |r| r.n == n);
-        claims.keyed("first-bit", "E7: error after one bit from this variance", at(1), |r| r.mse);
+        claims.keyed("first-bit", "error after one bit from this variance (erratum dymbo-7)", at(1), |r| r.mse);
         let cautious = rows.starts.iter().filter(|r| r.start == "printed" && r.gamma == 0.5);
-        let what = "E7: normalised error from the printed bound at gamma = 0.5, step";
+        let what = "normalised error from the printed bound at gamma = 0.5, step (erratum dymbo-7)";
         claims.references("cautious", what, cautious, |r| (r.n.to_string(), r.nees));
     }
 

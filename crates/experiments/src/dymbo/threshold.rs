@@ -146,7 +146,7 @@ pub struct ThresholdPlace;
 impl Figure for ThresholdPlace {
     figure!(Parameters => Rows, ID, "Where the threshold belongs", "Ribeiro and Giannakis, equation (14)",
         "Steady mean squared error with the threshold at the prediction a theta_hat(n-1), at theta_hat(n-1) as equation \
-         (14) prints it with the update unchanged, and the same with the exact update (E1). For a > 0 the mistake \
+         (14) prints it with the update unchanged, and the same with the exact update (erratum dymbo-1). For a > 0 the mistake \
          hides within the width of a line; for a < 0 it is a catastrophe. A second table counts the runs of an \
          unstable plant that escape although the computed variance stays finite.");
 
@@ -185,7 +185,7 @@ impl Figure for ThresholdPlace {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         claims.keyed("mse", "mean squared error at a, gamma, rule", &rows.rules, |r| r.mse);
-        let what = "E1: relative excess over the prediction rule at a, gamma, rule";
+        let what = "relative excess over the prediction rule at a, gamma, rule (erratum dymbo-1)";
         claims.keyed("excess", what, &rows.rules, |r| r.excess);
         let right = rows.rules.iter().filter(|r| r.rule == "prediction");
         let what = "normalised error with the prediction rule at a, gamma";

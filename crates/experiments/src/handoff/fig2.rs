@@ -63,7 +63,7 @@ impl Figure for Fig2 {
         here.above("ten-steps", "and ten steps more than 0.1 nat", at(rows, 0.97, 10).map(|r| r.kl_total), 0.1);
         let what = "while the ten steps' own losses sum to less than 0.01 nat";
         here.below("sum", what, at(rows, 0.97, 10).map(|r| r.sum_of_steps), 1e-2);
-        let what = "at the printed ratio 0.96 a step loses more than the printed 0.001 nat (errata handoff-1)";
+        let what = "at the printed ratio 0.96 a step loses more than the printed 0.001 nat (erratum handoff-1)";
         here.above("printed-ratio", what, at(rows, 0.96, 1).map(|r| r.kl_step), 1e-3);
         let what = "the other way round even 0.97 stays below 0.1 nat after ten steps";
         here.below("reverse", what, at(rows, 0.97, 10).map(|r| r.kl_total_reverse), 0.1);

@@ -256,9 +256,19 @@ impl Figure for Fig6 {
 
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let full = claims.at_full_trials();
-        full.keyed("ml", "mean ML of a hand-over", &rows.steps, |s| s.ml);
-        full.keyed("kl", "mean KL of a hand-over", &rows.steps, |s| s.kl);
-        full.keyed("l1", "mean L1 of a hand-over", &rows.steps, |s| s.l1);
+        full.keyed(
+            "ml",
+            "largest log-ratio at the centres (erratum handoff-11), mean over hand-overs",
+            &rows.steps,
+            |s| s.ml,
+        );
+        full.keyed(
+            "kl",
+            "mean KL of a hand-over, bandwidth by the particles kept (erratum handoff-13)",
+            &rows.steps,
+            |s| s.kl,
+        );
+        full.keyed("l1", "mean L1 of a hand-over, noise of variance 0.05 (erratum handoff-12)", &rows.steps, |s| s.l1);
         full.keyed("dr", "mean DR of a hand-over", &rows.steps, |s| s.dr);
         full.keyed("size", "components sent", &rows.steps, |s| s.size);
         full.keyed("ml-bound", "printed ML bound", &rows.bounds, |b| b.ml_printed);

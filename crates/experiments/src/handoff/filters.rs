@@ -59,7 +59,7 @@ impl Smoothing {
 }
 
 /// The estimate of Figure 6. Its bandwidth counts the particles that were kept, as the other program's does by the evidence of its
-/// numbers (errata `handoff-13`); [`HandoffFilter::estimate`] counts all.
+/// numbers (erratum `handoff-13`); [`HandoffFilter::estimate`] counts all.
 pub(super) fn estimate(filter: &HandoffFilter<Whole>, particles: &Particles<2>) -> Result<KernelEstimate<2>, Error> {
     Ok(KernelEstimate::fit(trimmed(particles, filter.trim)?, &filter.bandwidth)?)
 }

@@ -218,6 +218,11 @@ impl Figure for Iterations {
             "mi-fig4-2" => {
                 claims.keyed("mi_x_z1_nats", "information of sensor 1", clean(), |r| r.mi_x_z1_nats);
                 claims.keyed("mi_x_z1z2_nats", "information of both", clean(), |r| r.mi_x_z1z2_nats);
+                // The prior has variance one, so that its entropy is ln(2 pi e) / 2.
+                let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E).ln();
+                let objective = rows.chain.last().map(|r| r.mi_x_z1z2_nats - entropy);
+                let what = "the printed objective E ln p(x given z) is negative (erratum mi-1)";
+                here.near("printed-objective", what, objective, -0.944, 5e-4);
             }
             "mi-fig4-3" => {
                 claims.keyed("mse", "squared error", clean(), |r| r.mse);
@@ -227,7 +232,8 @@ impl Figure for Iterations {
                 here.all("ordered", what, pairs(&rows.chain), |(a, b)| a.mi_x_z1z2_nats > b.mi_x_z1z2_nats);
                 let worst: Vec<&Step> = rows.chain.iter().filter(|r| r.crossover == 0.05).collect();
                 let information = |k: usize| worst.get(k).map(|r| r.mi_x_z1z2_nats);
-                let what = "at 0.05 the joint information falls in stage 1, which designs for sensor 1 alone";
+                let what =
+                    "at 0.05 the joint information falls in stage 1, which designs for sensor 1 alone (erratum mi-15)";
                 let fall = minus(information(steps), information(0));
                 here.below("not-monotone", what, fall, 0.0);
                 let what = "what the greedy design gains on the Lloyd-Max start: it loses";

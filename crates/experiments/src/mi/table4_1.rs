@@ -131,12 +131,12 @@ impl Figure for Table41 {
         claims.keyed("mi_nats", "information", designs(), |r| r.pair.mi_nats);
         claims.keyed("printed", "errors are exact at printed breakpoints", designs(), |r| r.pair.mse);
         let curvature = |design: &'static str| designs().filter(move |r| r.case == "rho85-L4" && r.design == design);
-        let what = "the printed (mirror-symmetric) solution at 0.85 is a saddle (errata mi-10)";
+        let what = "the printed (mirror-symmetric) solution at 0.85 is a saddle (erratum mi-10)";
         here.all("saddle", what, curvature("symmetric"), |r| r.pair.curvature.is_some_and(|c| c > 1e-3));
         let what = "the best pair found at 0.85 is a local optimum";
         claims.all("optimum", what, curvature("joint"), |r| r.pair.curvature.is_some_and(|c| c < 0.0));
         let what = "printed errors of (4.2) without correlation lie below the best any contiguous pair reached, so they are not \
-                    exact (errata mi-6)";
+                    exact (erratum mi-6)";
         let independent = || rows.searches.iter().filter(|s| s.case != "rho85-L4");
         here.all("primal-too-low", what, independent(), |s| {
             s.printed_primal_mse
@@ -147,7 +147,7 @@ impl Figure for Table41 {
             |case: &str| first(&rows.designs, |r| r.key() == format!("{case} mi greedy")).map(|r| r.pair.outer1);
         let difference = minus(first("rho0-L4"), first("rho85-L4"));
         let what =
-            "the greedy chain's first sensor does not depend on correlation, unlike the printed one (errata mi-5)";
+            "the greedy chain's first sensor does not depend on correlation, unlike the printed one (erratum mi-5)";
         claims.near("greedy-first", what, difference, 0.0, 1e-9);
         let loss = |case: &'static str| {
             let pair = mse(case, "mi", "greedy").zip(mse(case, "mi", "joint"));
@@ -158,7 +158,7 @@ impl Figure for Table41 {
         let lost = mse("rho85-L4", "mi", "greedy")
             .zip(mse("rho85-L4", "mi", "joint"))
             .map(|(a, b)| a / b - 1.0);
-        let what = "at 0.85 the greedy chain costs half a percent: not negligible (errata mi-6)";
+        let what = "at 0.85 the greedy chain costs half a percent: not negligible (erratum mi-6)";
         here.near("rho85-loss", what, lost, 0.00506, 1e-4);
         let what = "without correlation every random start reaches the same optimum";
         here.all("one-optimum", what, independent(), |s| s.arrived == s.starts);

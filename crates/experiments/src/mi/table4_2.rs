@@ -100,12 +100,12 @@ impl Figure for Table42 {
         claims.keyed("mse", "squared error", designs(), |r| r.design.mse);
         claims.keyed("outer1", "outer breakpoint of sensor 1", designs(), |r| r.design.outer1);
         claims.keyed("outer2", "outer breakpoint of sensor 2", designs(), |r| r.design.outer2);
-        let what = "the printed error is exact to 1.5 % for the designs, 0.6 % for Lloyd-Max (errata mi-8)";
+        let what = "the printed error is exact to 1.5 % for the designs, 0.6 % for Lloyd-Max (erratum mi-8)";
         claims.keyed("printed", what, designs(), |r| r.design.mse);
         for (levels, ..) in PRINTED {
             let mse =
                 |method: &str| first(&rows.designs, |r| r.levels == levels && r.method == method).map(|r| r.design.mse);
-            let what = "squared-error design < Lloyd-Max of the sample < information design, against the printed claim (errata \
+            let what = "squared-error design < Lloyd-Max of the sample < information design, against the printed claim (erratum \
                         mi-7) < the printed baseline, scaled to the noise";
             let order = ["mse-joint", "lloyd-y", "mi-joint", "lloyd-noise"];
             here.increasing(format!("L{levels}-order"), what, order.map(mse));

@@ -162,10 +162,10 @@ impl Figure for Table43 {
     fn claims(&self, _: &Parameters, rows: &Rows, claims: &mut Claims) {
         let here = claims.at_defaults();
         let designs = || rows.designs.iter();
-        claims.keyed("mse", "squared error", designs(), |d| d.mse);
+        claims.keyed("mse", "squared error, by counts of identical sensors (erratum mi-4)", designs(), |d| d.mse);
         claims.keyed("t", "outer breakpoint", designs(), |d| d.t);
         claims.keyed("mi_nats", "information", designs(), |d| d.mi_nats);
-        let what = "printed errors are exact at the printed breakpoints to 1.6 % (errata mi-8)";
+        let what = "printed errors are exact at the printed breakpoints to 1.6 % (erratum mi-8)";
         claims.keyed("printed", what, designs(), |d| d.mse);
         let what =
             "squared-error design < Lloyd-Max of the sample < joint < greedy < printed < Lloyd-Max of the unknown";
@@ -173,13 +173,13 @@ impl Figure for Table43 {
         here.increasing("order", what, order.map(|method| rows.mse(method)));
         let chain: Vec<&Stage> = rows.chain.iter().filter(|s| s.criterion == "mi").collect();
         claims.keyed("chain", "outer breakpoint of the greedy chain, sensor", chain.iter().copied(), |s| s.t);
-        let what = "a greedy chain cannot give equal quantizers (errata mi-5)";
+        let what = "a greedy chain cannot give equal quantizers (erratum mi-5)";
         claims.all("chain-differs", what, chain.windows(2), |w| (w[0].t - w[1].t).abs() > 1e-6);
         let gap = minus(rows.mse("mse-joint"), rows.design("mi-printed").and_then(|d| d.printed_mse));
-        let what = "the printed 0.1233 lies below the best of all identical designs (errata mi-8)";
+        let what = "the printed 0.1233 lies below the best of all identical designs (erratum mi-8)";
         claims.above("too-low", what, gap, 0.0);
         let short = rows.design("mi-joint").and_then(|d| d.t).map(|t| 1.0 - 1.275 / t);
-        let what = "the printed breakpoint is 7.5 % short of the optimum (errata mi-9)";
+        let what = "the printed breakpoint is 7.5 % short of the optimum (erratum mi-9)";
         here.near("unconverged", what, short, 0.0747, 1e-4);
         claims.keyed("bound", "least error of any codes of two bits", &rows.bounds, |b| b.mse);
         let bound = rows.bound("ceo").unwrap_or(f64::INFINITY);

@@ -175,7 +175,7 @@ impl Figure for Table44 {
         claims.keyed("unquantized_pe", "error from samples", &rows.checks, |c| c.unquantized_pe);
         let pe = |signal, method| first(&rows.designs, |d| d.signal == signal && d.method == method).map(|d| d.pe);
         for &signal in &p.signals {
-            let what = "least error < Matusita < mutual information < J-divergence (errata mi-11)";
+            let what = "least error < Matusita < mutual information < J-divergence (erratum mi-11)";
             let order = ["pe", "matusita", "mi-joint", "j-divergence"].map(|method| pe(signal, method));
             here.increasing(format!("{signal}-order"), what, order);
             let others = designs().filter(|d| d.signal == signal && d.method != "j-divergence");
@@ -187,7 +187,7 @@ impl Figure for Table44 {
         let what = "four levels lose against samples";
         claims.all("unquantized", what, &rows.checks, |c| pe(c.signal, "pe").is_some_and(|pe| pe > c.unquantized_pe));
         let what =
-            "the printed 1.0e-5 at the strong signal is below the best that any design found reaches (errata mi-11)";
+            "the printed 1.0e-5 at the strong signal is below the best that any design found reaches (erratum mi-11)";
         here.above("too-low", what, pe(4.0, "pe").map(|pe| pe - 1.0e-5), 0.0);
     }
 

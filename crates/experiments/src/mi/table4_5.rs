@@ -93,17 +93,17 @@ impl Figure for Table45 {
         let at = |crossover: f64, labelling: &str, design: &str| {
             first(rows, |r| (r.crossover, r.labelling, r.design) == (crossover, labelling, design)).map(|r| &r.pair)
         };
-        let what = "the printed breakpoint exceeds the joint optimum of natural words by 0.5 to 1.1 %";
+        let what = "the printed breakpoint exceeds the joint optimum of natural words by 0.5 to 1.1 % (erratum mi-14)";
         here.all("excess", what, PRINTED, |(crossover, outer)| {
             at(crossover, "natural", "mi-joint").is_some_and(|d| (0.0045..=0.0115).contains(&(outer / d.outer2 - 1.0)))
         });
-        let what = "Gray words move the breakpoint by 0.4 % only, so the printed table is not Gray's";
+        let what = "Gray words move the breakpoint by 0.4 % only, so the printed table is not Gray's (erratum mi-14)";
         let gray = at(0.05, "gray", "mi-joint").zip(at(0.0, "gray", "mi-joint"));
         here.at_most("gray-still", what, gray.map(|(a, b)| (a.outer2 / b.outer2 - 1.0).abs()), 0.0045);
         let information = ["natural", "gray"].map(|words| at(0.05, words, "mi-joint").map(|d| d.mi_nats));
         here.increasing("mi-prefers-gray", "at 0.05 information prefers Gray words", information);
         let what =
-            "at 0.05 squared error prefers natural words: the designs are not application-independent (errata mi-12)";
+            "at 0.05 squared error prefers natural words: the designs are not application-independent (erratum mi-12)";
         let error = ["natural", "gray"].map(|words| at(0.05, words, "mse-joint").map(|d| d.mse));
         here.increasing("mse-prefers-natural", what, error);
         let third = at(0.05, "third", "mse-joint").zip(at(0.05, "gray", "mse-joint"));

@@ -326,17 +326,17 @@ impl Figure for Table {
         for (variance, blur) in [(1e-4, 3.0), (4e-4, 2.0)] {
             let of = |method: &str| first(t, |r| r.variance == variance && r.apart == 0.1 && r.method == method);
             let errors = ["jpda", "tanh", "pf-tanh"].map(|m| of(m).map(|r| r.association.value));
-            let what = "C10: exact < printed rule < printed rule over particles";
+            let what = "exact < printed rule < printed rule over particles (erratum mpa-12)";
             full.increasing(format!("order-{variance}"), what, errors);
             let ratio = of("pf-tanh")
                 .zip(of("pf-exact"))
                 .map(|(a, b)| a.unlabelled.value / b.unlabelled.value);
-            let what = "C10: over particles the printed rule blurs the targets";
+            let what = "over particles the printed rule blurs the targets";
             full.above(format!("particles-{variance}"), what, ratio, blur);
         }
         let genie = |r: &Row| first(t, |g| g.variance == r.variance && g.apart == r.apart && g.method == "genie");
         let known = t.iter().filter(|r| r.method != "genie");
-        full.all("genie", "C10: no rule is below the genie", known, |r| {
+        full.all("genie", "no rule is below the genie", known, |r| {
             genie(r).is_some_and(|g| g.labelled.value <= r.labelled.value)
         });
     }

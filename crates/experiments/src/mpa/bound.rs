@@ -117,16 +117,21 @@ impl Figure for Bounds {
     fn claims(&self, _: &Parameters, t: &Vec<Row>, claims: &mut Claims) {
         let full = claims.at_full_trials();
         full.keyed("quantized", "bound for levels", t, |r| r.quantized);
-        full.keyed("unquantized", "bound for ranges", t, |r| r.unquantized);
+        full.keyed(
+            "unquantized",
+            "bound for ranges, which has no mean over free trajectories (erratum mpa-17)",
+            t,
+            |r| r.unquantized,
+        );
         full.keyed("grid-median", "median of the grid", t, |r| r.grid_median);
-        claims.all("floor", "C7: no tracker of levels is below its bound", t, |r| {
+        claims.all("floor", "no tracker of levels is below its bound", t, |r| {
             let above = |m: Measured| m.value > r.quantized.value - 3.0 * m.standard_error.unwrap_or(0.0);
             above(r.grid) && above(r.message_passing)
         });
         claims.all("order", "levels never tell more than ranges", t, |r| r.quantized.value > r.unquantized.value);
         for snr in SNRS {
             let of = t.iter().filter(|r| r.snr_db == snr).map(|r| r.quantized.value);
-            full.decreasing(format!("levels-{snr}"), "C7: fewer levels, larger bound", of);
+            full.decreasing(format!("levels-{snr}"), "fewer levels, larger bound", of);
         }
         let loose = t.iter().find(|r| r.snr_db == 50.0 && r.levels == 4);
         full.above("loose", "at 50 dB the bound says little", loose.map(|r| r.grid_median / r.quantized.value), 5.0);

@@ -83,7 +83,12 @@ impl Figure for Encoders {
         let grid = |name: &str, point: &str| mse(&t.encoders, &format!("{name} {point}"), "grid-15");
         for (point, factor) in [("50dB-L4", 20.0), ("40dB-L4", 8.0), ("30dB-L4", 2.4)] {
             let gain = over(grid("published", point), grid("adaptive", point));
-            full.at_least(format!("gain-{point}"), "the adaptive encoder divides the error", gain, factor);
+            full.at_least(
+                format!("gain-{point}"),
+                "the adaptive encoder divides the error (erratum mpa-2)",
+                gain,
+                factor,
+            );
         }
         for snr in ["50dB", "40dB", "30dB"] {
             let point = format!("{snr}-L16");

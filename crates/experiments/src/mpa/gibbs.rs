@@ -152,10 +152,10 @@ impl Figure for Gibbs {
         let what = "draws have the mean of the chain after these sweeps";
         claims.all_within("law", what, &t.sampled, |r| (r.mean, r.after_sweeps), 4.0);
         let first = t.sampled.iter().find(|r| r.case == "A");
-        let what = "C8: five sweeps leave a bias of 0.0093 in case A, beyond the 0.004 that was asked for";
+        let what = "five sweeps leave a bias of 0.0093 in case A, beyond the 0.004 that was asked for";
         here.near("bias-a", what, first.map(|r| r.after_sweeps - r.exact), 0.009_346, 1e-5);
         let plane = t.sampled.iter().filter(|r| r.case == "C");
-        paper.all("bias-c", "C8: in case C it is within 0.004", plane, |r| (r.mean.value - r.exact).abs() < 0.004);
+        paper.all("bias-c", "in case C it is within 0.004", plane, |r| (r.mean.value - r.exact).abs() < 0.004);
         let stuck = t.sampled.iter().find(|r| r.case == "B").map(|r| r.second_eigenvalue);
         claims.above("stuck", "between separated modes a chain does not move", stuck, 0.999_999);
     }

@@ -102,11 +102,11 @@ impl Figure for Rings {
         claims.keyed("kernel-printed", "error of the printed kernel", &t.kernels, |r| r.printed_error);
         claims.keyed("kernel-silverman", "error of Silverman's", &t.kernels, |r| r.silverman_error);
         let large = t.kernels.iter().filter(|r| r.n >= 40);
-        claims.all("kernels", "E5: from forty points up the printed factor is worse", large, |r| {
+        claims.all("kernels", "from forty points up the printed factor is worse (erratum mpa-5)", large, |r| {
             r.silverman_error < r.printed_error
         });
-        claims.keyed("weights", "E4: second moment of ratio weights", &t.weights, |r| r.each);
-        claims.all("shift", "E3: the message is further out", &t.rings, |r| r.exact > r.printed);
+        claims.keyed("weights", "second moment of ratio weights (erratum mpa-4)", &t.weights, |r| r.each);
+        claims.all("shift", "the message is further out (erratum mpa-3)", &t.rings, |r| r.exact > r.printed);
     }
 
     fn plot(&self, _: &None, t: &RingRows) -> Plot {

@@ -222,7 +222,7 @@ impl Figure for Frontier {
                 panels.push(
                     panel
                         .with(Layer::unbroken("nothing beats these", steps))
-                        .with(Layer::texts(names)),
+                        .with(Layer::beside(names)),
                 );
             }
         }

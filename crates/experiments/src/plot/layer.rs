@@ -106,10 +106,12 @@ pub enum Shape {
         /// Position and limits.
         limits: Vec<(f64, f64, f64)>,
     },
-    /// Short texts, centred at their points.
+    /// Short texts.
     Texts {
         /// Position and text.
         texts: Vec<(f64, f64, String)>,
+        /// Whether they stand right above their points, which have marks, and not centred on them.
+        beside: bool,
     },
 }
 
@@ -218,9 +220,14 @@ impl Layer {
         Self::new(label, Shape::Band { limits })
     }
 
-    /// Short texts.
+    /// Short texts, centred at their points.
     pub fn texts(texts: Vec<(f64, f64, String)>) -> Self {
-        Self::new("", Shape::Texts { texts })
+        Self::new("", Shape::Texts { texts, beside: false })
+    }
+
+    /// Short texts right above their points, which have marks.
+    pub fn beside(texts: Vec<(f64, f64, String)>) -> Self {
+        Self::new("", Shape::Texts { texts, beside: true })
     }
 
     /// Whether it has no points.
@@ -230,7 +237,7 @@ impl Layer {
             Shape::Heat { values, .. } => values.is_empty(),
             Shape::Boxes { boxes } => boxes.is_empty(),
             Shape::Band { limits } => limits.is_empty(),
-            Shape::Texts { texts } => texts.is_empty(),
+            Shape::Texts { texts, .. } => texts.is_empty(),
         }
     }
 

@@ -140,6 +140,7 @@ fn all_filters_agree_with_the_kalman_filter() {
     }
 }
 
+/// Erratum `mpa-6`.
 #[test]
 fn the_likelihood_estimate_is_unbiased_for_every_law() {
     let scene = scene(6);

@@ -241,6 +241,7 @@ mod tests {
         assert!(kl_chain_corrected(&p0, &p1, &p2).unwrap() >= truth);
     }
 
+    /// Erratum `handoff-10`.
     #[test]
     fn missing_mass_is_infinite_and_common_zeros_are_nothing() {
         let d = discrete(&[0.5, 0.5, 0.0], &[1.0, 0.0, 0.0]).unwrap();

@@ -38,6 +38,7 @@ fn relations_between_the_measures_hold_on_twenty_thousand_pairs() {
     }
 }
 
+/// Erratum `handoff-3`.
 #[test]
 fn the_corrected_chain_holds_where_the_printed_one_fails() {
     let mut rng = Stream::new(22).rng();

@@ -56,6 +56,7 @@ fn centred_normals() {
     assert!((kl_centred_normals(1.0, at("gauss.r_max").powi(10)).unwrap() - 0.1).abs() < 1e-7);
 }
 
+/// Erratum `handoff-2`.
 #[test]
 fn discrete_measures_and_chains() {
     let f = Fixtures::load();
@@ -83,6 +84,7 @@ fn given(p: &[f64], group: &[usize]) -> (Vec<f64>, f64) {
     (posterior.collect(), mass)
 }
 
+/// Erratum `handoff-4`.
 #[test]
 fn counterexamples_of_the_subscript_and_of_the_factor_two() {
     let f = Fixtures::load();
@@ -183,6 +185,7 @@ fn merging_and_refinement_of_d1() {
     }
 }
 
+/// Erratum `handoff-5`.
 #[test]
 fn pairs_on_a_line() {
     let f = Fixtures::load();

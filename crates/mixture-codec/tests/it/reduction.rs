@@ -79,6 +79,7 @@ proptest! {
         }
     }
 
+    /// Erratum `handoff-6`.
     #[test]
     fn cuts_keep_the_moments_and_runnalls_bounds_the_loss(seed in any::<u64>(), m in 1..6_usize) {
         let estimate = crescent(seed, 24, 1.0);
@@ -205,6 +206,7 @@ fn paper_reduction_with_room_for_all_keeps_all() {
     }
 }
 
+/// Erratum `handoff-7`.
 #[test]
 fn a_price_in_bits_is_kept() {
     let estimate = crescent(3, 64, 1.0);
@@ -220,6 +222,7 @@ fn a_price_in_bits_is_kept() {
 }
 
 /// Errors that have nothing to do with the tree, so that more nodes may well be worse.
+/// Erratum `handoff-8`.
 #[test]
 fn any_errors_are_cut_optimally() {
     use rand::RngExt;

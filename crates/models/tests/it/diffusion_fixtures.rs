@@ -45,6 +45,7 @@ fn continuous_source() {
     }
 }
 
+/// Erratum `diffusive-4`.
 #[test]
 fn finite_release() {
     for e in entries("cont_finite") {

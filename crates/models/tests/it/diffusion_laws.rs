@@ -24,6 +24,7 @@ proptest! {
         prop_assert!((scaled * unit - base).abs() <= 1e-12 * base);
     }
 
+    /// Erratum `diffusive-5`.
     #[test]
     fn mass_is_kept_or_lost(z0 in 0.0..4.0f64, t in 0.05..3.0f64, loss in 0.0..6.0f64, v in -1.5..1.5f64) {
         let reach = z0 + 1.5 * t + 14.0 * (2.0 * 1.3 * t).sqrt();
@@ -57,6 +58,7 @@ proptest! {
 }
 
 /// The printed wall law creates mass in wind away from the wall; the law of the total flux keeps it.
+/// Erratum `diffusive-6`.
 #[test]
 fn wind_across_the_wall() {
     let axis = |flux, loss| {

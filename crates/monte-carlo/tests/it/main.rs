@@ -4,4 +4,6 @@
 
 mod engine;
 mod random;
+#[cfg(feature = "mpi")]
+mod ranks;
 mod wild;

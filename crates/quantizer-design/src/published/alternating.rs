@@ -246,6 +246,7 @@ mod tests {
     use crate::scene::Scene;
     use fewbits_quantizers::lloyd_max;
 
+    /// Erratum `mi-2`.
     #[test]
     fn converges_to_the_stationary_point_of_newton() {
         let scene = Scene::gaussian_with_deviations(1.0, &[1.0]).unwrap();

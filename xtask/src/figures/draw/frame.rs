@@ -10,7 +10,7 @@ use plotters::style::{RGBColor, ShapeStyle};
 pub(super) type Place = (f64, f64);
 
 /// Half the size of a mark.
-const MARK: f64 = 18.0;
+pub(super) const MARK: f64 = 18.0;
 
 /// Two axes and the rectangle they span on paper.
 pub(super) struct Frame<'a, 'b> {

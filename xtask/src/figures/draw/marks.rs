@@ -1,6 +1,6 @@
 //! Layers on their axes.
 
-use super::frame::{Frame, mark};
+use super::frame::{Frame, MARK, mark};
 use super::style::{PAPER, TICK, colour, dashes, heat, marker, pen, text, wide};
 use fewbits_experiments::plot::{Layer, Shape};
 use plotters::element::{PathElement, Polygon, Rectangle, Text};
@@ -72,16 +72,24 @@ pub(super) fn draw(frame: &Frame<'_, '_>, layer: &Layer, shades: (f64, f64)) -> 
                 .collect();
             frame.area.draw(&Polygon::new(outline, ink.mix(0.25))).map_err(why)
         }
-        Shape::Texts { texts } => {
+        Shape::Texts { texts, beside } => {
             let style = text(TICK).pos(Pos::new(HPos::Center, VPos::Center));
             for (x, y, words) in texts {
-                if let Some(at) = frame.place((*x, *y)).filter(|at| frame.inside(*at)) {
-                    let at = (at.0.round() as i32, at.1.round() as i32);
-                    frame
-                        .area
-                        .draw(&Text::new(words.clone(), at, style.clone()))
-                        .map_err(why)?;
+                let Some(at) = frame.place((*x, *y)).filter(|at| frame.inside(*at)) else {
+                    continue;
+                };
+                let (half, high) = (0.5 * wide(words, TICK) + 6.0, 0.42 * f64::from(TICK));
+                let round = |x: f64, y: f64| (x.round() as i32, y.round() as i32);
+                let mut at = at;
+                if *beside {
+                    let (last, first) = (frame.right - half, frame.top + high);
+                    at = ((at.0 + MARK + half).min(last), (at.1 - MARK - high).max(first));
+                    let ground = [round(at.0 - half, at.1 - high), round(at.0 + half, at.1 + high)];
+                    let paper = Rectangle::new(ground, PAPER.mix(0.55).filled());
+                    frame.area.draw(&paper).map_err(why)?;
                 }
+                let name = Text::new(words.clone(), round(at.0, at.1), style.clone());
+                frame.area.draw(&name).map_err(why)?;
             }
             Ok(())
         }
@@ -244,6 +252,6 @@ pub(super) fn extent(layer: &Layer) -> (Vec<f64>, Vec<f64>) {
         Shape::Band { limits } => {
             (limits.iter().map(|l| l.0).collect(), limits.iter().flat_map(|l| [l.1, l.2]).collect())
         }
-        Shape::Texts { texts } => texts.iter().map(|(x, y, _)| (*x, *y)).unzip(),
+        Shape::Texts { texts, .. } => texts.iter().map(|(x, y, _)| (*x, *y)).unzip(),
     }
 }

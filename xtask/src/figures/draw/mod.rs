@@ -97,10 +97,70 @@ fn why(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
-/// Height of a panel: names left of it have room.
+/// Height of a panel: names left of it have room, and maps that are wider than high leave none below.
 fn height(panel: &Panel) -> i32 {
-    let names = Names::left(&Scaled::new(&panel.y, std::iter::empty(), false));
-    PANEL_HEIGHT.max(names.height() + ABOVE + 260)
+    let layout = Layout::of(panel);
+    match layout.spare(panel, PANEL_HEIGHT) {
+        Some(spare) if spare > 0.0 => PANEL_HEIGHT - spare as i32,
+        _ => PANEL_HEIGHT.max(layout.left_names.height() + ABOVE + 260),
+    }
+}
+
+/// Axes of a panel and the room of what stands beside them.
+struct Layout {
+    x: Scaled,
+    y: Scaled,
+    left_names: Names,
+    below_names: Names,
+    /// Left of the frame.
+    left: i32,
+    /// Below the frame.
+    below: i32,
+    /// Width of the frame.
+    length: f64,
+}
+
+impl Layout {
+    fn of(panel: &Panel) -> Self {
+        let layers = &panel.layers;
+        let marks = layers.iter().any(|layer| matches!(layer.shape, Shape::Points { .. }));
+        let x = Scaled::new(&panel.x, layers.iter().flat_map(|layer| marks::extent(layer).0), marks);
+        let y = Scaled::new(&panel.y, layers.iter().flat_map(|layer| marks::extent(layer).1), marks);
+        let x = x.in_the_style_of(&y);
+        let y = y.in_the_style_of(&x);
+        let described = |label: &str| if label.is_empty() { 0 } else { LINE + 8 };
+        let left_names = Names::left(&y);
+        let numbers = y.ticks(9).into_iter().map(|v| wide(&tick(&y, v), TICK));
+        let left = GAP + 20 + described(&panel.y.label) + numbers.fold(left_names.width(), f64::max) as i32;
+        let bar = if field_of(panel).is_some() { COLOUR_BAR } else { 0 };
+        let length = f64::from(PANEL_WIDTH as i32 - bar - left - MARGIN - RIGHT);
+        let below_names = Names::below(&x, length);
+        let below = GAP + below_names.depth() * LINE + described(&panel.x.label);
+        Self {
+            x,
+            y,
+            left_names,
+            below_names,
+            left,
+            below,
+            length,
+        }
+    }
+
+    /// Height that a map of this panel's width leaves free in a panel of this height, negative where it is too high; none if the
+    /// panel is no map.
+    fn spare(&self, panel: &Panel, height: i32) -> Option<f64> {
+        let room = f64::from(height - ABOVE - MARGIN - self.below);
+        panel
+            .is_map()
+            .then(|| room - self.length * self.y.span() / self.x.span())
+    }
+}
+
+/// The name of a panel's field.
+fn field_of(panel: &Panel) -> Option<&str> {
+    let field = |layer: &&fewbits_experiments::plot::Layer| matches!(layer.shape, Shape::Heat { .. });
+    panel.layers.iter().find(field).map(|layer| layer.label.as_str())
 }
 
 /// Least and largest value of all fields of a plot with this label: what is compared has one scale.
@@ -149,31 +209,30 @@ fn small_ticks(frame: &Frame<'_, '_>) -> Result<(), String> {
 }
 
 fn draw_panel(root: &Area<'_>, area: &Area<'_>, panel: &Panel, plot: &Plot) -> Result<(), String> {
-    let is_heat = |shape: &Shape| matches!(shape, Shape::Heat { .. });
-    let heat = panel
-        .layers
-        .iter()
-        .find(|layer| is_heat(&layer.shape))
-        .map(|layer| layer.label.as_str());
-    let marks = panel
-        .layers
-        .iter()
-        .any(|layer| matches!(layer.shape, Shape::Points { .. }));
-    let (width, _) = area.dim_in_pixel();
+    let heat = field_of(panel);
+    let (width, height) = area.dim_in_pixel();
     let (main, margin) = area.split_horizontally(width as i32 - if heat.is_some() { COLOUR_BAR } else { 0 });
-    let x = Scaled::new(&panel.x, panel.layers.iter().flat_map(|layer| marks::extent(layer).0), marks);
-    let y = Scaled::new(&panel.y, panel.layers.iter().flat_map(|layer| marks::extent(layer).1), marks);
-    let described = |label: &str| if label.is_empty() { 0 } else { LINE + 8 };
-    let left_names = Names::left(&y);
-    let numbers = y.ticks(9).into_iter().map(|v| wide(&tick(&y, v), TICK));
-    let left = GAP + 20 + described(&panel.y.label) + numbers.fold(left_names.width(), f64::max) as i32;
-    let length = f64::from(main.dim_in_pixel().0 as i32 - left - MARGIN - RIGHT);
-    let below_names = Names::below(&x, length);
+    let layout = Layout::of(panel);
+    // A map keeps its scale: what it does not need stays free below, or on both sides.
+    let spare = layout.spare(panel, height as i32).unwrap_or(0.0);
+    let beside = 0.5 * (-spare).max(0.0) * layout.x.span() / layout.y.span();
+    let length = layout.length - 2.0 * beside;
+    let Layout {
+        x,
+        y,
+        left_names,
+        below_names,
+        left,
+        below,
+        ..
+    } = layout;
     let mut chart = ChartBuilder::on(&main)
         .margin(MARGIN)
         .margin_top(ABOVE)
-        .margin_right(RIGHT)
-        .x_label_area_size(GAP + below_names.depth() * LINE + described(&panel.x.label))
+        .margin_left(MARGIN + beside as i32)
+        .margin_right(RIGHT + beside as i32)
+        .margin_bottom(MARGIN + spare.max(0.0) as i32)
+        .x_label_area_size(below)
         .y_label_area_size(left)
         .build_cartesian_2d(x.clone(), y.clone())
         .map_err(why)?;

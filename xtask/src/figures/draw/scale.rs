@@ -12,6 +12,8 @@ pub(super) struct Scaled {
     low: f64,
     high: f64,
     names: Vec<(f64, String)>,
+    /// Written in powers of ten whatever the limits.
+    powers: bool,
 }
 
 impl Scaled {
@@ -30,7 +32,23 @@ impl Scaled {
             low,
             high,
             names: axis.names.clone(),
+            powers: false,
         }
+    }
+
+    /// Powers of ten if the other axis of the panel has them and this one shows nothing between its decades.
+    pub(super) fn in_the_style_of(mut self, other: &Self) -> Self {
+        let decades = self
+            .ticks(9)
+            .iter()
+            .all(|tick| (tick.log10() - tick.log10().round()).abs() < 1e-9);
+        self.powers = other.scale == Scale::Log && other.in_powers() && self.scale == Scale::Log && decades;
+        self
+    }
+
+    /// From the lower to the upper limit.
+    pub(super) fn span(&self) -> f64 {
+        self.high - self.low
     }
 
     /// Whether a value can be placed on the axis at all.
@@ -62,7 +80,7 @@ impl Scaled {
     /// Whether the numbers of this axis are written as powers of ten: all of them, or none.
     fn in_powers(&self) -> bool {
         match self.scale {
-            Scale::Log => self.low < 1e-3 || self.high > 1e5,
+            Scale::Log => self.powers || self.low < 1e-3 || self.high > 1e5,
             Scale::Linear => !(1e-3..=1e5).contains(&self.low.abs().max(self.high.abs())),
         }
     }
@@ -217,6 +235,8 @@ mod tests {
         assert_eq!([1e-6, 0.1, 1.0].map(|v| wide.format_ext(&v)), ["10⁻⁶", "10⁻¹", "10⁰"]);
         let near = Scaled::new(&Axis::log("").between(0.01, 100.0), std::iter::empty(), false);
         assert_eq!([0.01, 1.0, 100.0].map(|v| near.format_ext(&v)), ["0.01", "1", "100"]);
+        let as_wide = near.in_the_style_of(&wide);
+        assert_eq!([0.01, 1.0, 100.0].map(|v| as_wide.format_ext(&v)), ["10⁻²", "10⁰", "10²"]);
         let large = Scaled::new(&Axis::linear("").between(0.0, 2e5), std::iter::empty(), false);
         assert_eq!([0.0, 5e4, 1e5].map(|v| large.format_ext(&v)), ["0", "5·10⁴", "10⁵"]);
     }
