@@ -89,7 +89,10 @@ impl Search<'_> {
         let mut first = best_alone;
         let mut search = *self;
         if is_short {
-            cells = participants.iter().map(|p| few_grid_cells(p.bits)).collect();
+            cells = participants
+                .iter()
+                .map(|p| grid_cells(p.bits).min((4 << p.bits).max(16)))
+                .collect();
         }
         if work_is_large {
             let rough = scene.at(Resolution::Rough)?;
@@ -393,9 +396,4 @@ fn grid_cells(bits: u32) -> usize {
         4 => 96,
         _ => 200,
     }
-}
-
-/// The same where time is short.
-fn few_grid_cells(bits: u32) -> usize {
-    grid_cells(bits).min((4 << bits).max(16))
 }
