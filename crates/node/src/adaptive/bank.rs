@@ -212,13 +212,7 @@ impl Bank {
         let mut sums = [0.0; 2];
         let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
         for (family, (x, w)) in x.iter().zip(w).enumerate() {
-            ahead.with_family(family, |shape| {
-                let mut tails = [[0.0; SCALES]; 2];
-                set_both_tails(&mut tails, shape, at, x, w);
-                for (sum, tails) in sums.iter_mut().zip(&tails) {
-                    tails.iter().for_each(|tail| *sum += tail);
-                }
-            });
+            ahead.with_family(family, |shape| add_both_tails(&mut sums, shape, at, x, w));
         }
         sums
     }
@@ -230,73 +224,93 @@ impl Bank {
         let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
         for (family, (x, w)) in x.iter().zip(w).enumerate() {
             ahead.with_family(family, |shape| {
-                let mut tails = [0.0; SCALES];
-                set_tails(&mut tails, &shape.sharpness, edge, side, x, w);
-                for tail in tails {
-                    sum = sum.wrapping_add((tail * scale) as u32);
-                }
+                sum = sum.wrapping_add(counted_tails(&shape.sharpness, [edge, side, scale], x, w));
             });
         }
         sum
     }
 }
 
-/// Where there are vector registers, sums are taken apart from what is summed.
+/// Where there are vector registers, eight models are taken to memory of their own first, so that nothing forbids to take them at once, and
+/// sums are taken apart from what is summed.
 const VECTORS: bool = cfg!(feature = "std");
 
 /// Moves eight models to the index `step` from the last, and multiplies their weights by what they predicted. Adds the weights to `total`, the
 /// first first.
 fn update_family(shape: &Family, step: f32, x: &mut Eight, v: &mut Eight, w: &mut Eight, total: &mut f32) {
+    if !VECTORS {
+        return update_each(shape, step, [x, v, w], |w| *total += w);
+    }
     vectorised(
         #[inline(always)]
         || {
-            for m in 0..SCALES {
-                let d = step - x[m];
-                let e = power(-lesser(d.abs() * shape.sharpness[m], FARTHEST));
-                let evidence = e * shape.difference[m] / (1.0 + e * shape.sum[m] + e * e);
-                x[m] += shape.gain_x[m] * d - step;
-                v[m] += shape.gain_v[m] * d;
-                w[m] *= greater(evidence, LEAST);
-                if !VECTORS {
-                    *total += w[m];
-                }
-            }
+            let [mut at, mut speed, mut weight] = [*x, *v, *w];
+            update_each(shape, step, [&mut at, &mut speed, &mut weight], |_| ());
+            (*x, *v, *w) = (at, speed, weight);
         },
     );
-    if VECTORS {
-        w.iter().for_each(|w| *total += w);
+    w.iter().for_each(|w| *total += w);
+}
+
+#[inline(always)]
+fn update_each(shape: &Family, step: f32, [x, v, w]: [&mut Eight; 3], mut take: impl FnMut(f32)) {
+    for m in 0..SCALES {
+        let d = step - x[m];
+        let e = power(-lesser(d.abs() * shape.sharpness[m], FARTHEST));
+        let evidence = e * shape.difference[m] / (1.0 + e * shape.sum[m] + e * e);
+        x[m] += shape.gain_x[m] * d - step;
+        v[m] += shape.gain_v[m] * d;
+        w[m] *= greater(evidence, LEAST);
+        take(w[m]);
     }
 }
 
-/// Tails of eight models below and above the cell at `at`.
-fn set_both_tails(tails: &mut [Eight; 2], shape: &Family, at: f32, x: &Eight, w: &Eight) {
-    vectorised(
+/// Adds the tails of eight models below and above the cell at `at` to sums, the first first.
+fn add_both_tails([lower, upper]: &mut [f32; 2], shape: &Family, at: f32, x: &Eight, w: &Eight) {
+    if !VECTORS {
+        for m in 0..SCALES {
+            let [below, above] = both_tails(shape, m, at, x, w);
+            (*lower, *upper) = (*lower + below, *upper + above);
+        }
+        return;
+    }
+    let (below, above) = vectorised(
         #[inline(always)]
         || {
-            let [below, above] = tails;
+            let (mut below, mut above) = ([0.0; SCALES], [0.0; SCALES]);
             for m in 0..SCALES {
-                let z = (x[m] - (at - 0.5)) * shape.sharpness[m];
-                let low = power(greater(lesser(z, FARTHEST), -FARTHEST));
-                // The odds one step further.
-                let high = low * shape.beyond[m];
-                below[m] = w[m] / (1.0 + low);
-                above[m] = w[m] * high / (1.0 + high);
+                [below[m], above[m]] = both_tails(shape, m, at, x, w);
             }
+            (below, above)
         },
     );
+    below.iter().for_each(|tail| *lower += tail);
+    above.iter().for_each(|tail| *upper += tail);
 }
 
-/// Tails of eight models.
-fn set_tails(tails: &mut Eight, sharpness: &Eight, edge: f32, side: f32, x: &Eight, w: &Eight) {
+#[inline(always)]
+fn both_tails(shape: &Family, m: usize, at: f32, x: &Eight, w: &Eight) -> [f32; 2] {
+    let z = (x[m] - (at - 0.5)) * shape.sharpness[m];
+    let low = power(greater(lesser(z, FARTHEST), -FARTHEST));
+    // The odds one step further.
+    let high = low * shape.beyond[m];
+    [w[m] / (1.0 + low), w[m] * high / (1.0 + high)]
+}
+
+/// Tails of eight models below `edge` (above it, if `side` is -1), each times `scale` as a whole number, added.
+fn counted_tails(sharpness: &Eight, [edge, side, scale]: [f32; 3], x: &Eight, w: &Eight) -> u32 {
     vectorised(
         #[inline(always)]
         || {
+            let mut sum = 0_u32;
             for m in 0..SCALES {
                 let z = side * (x[m] - edge) * sharpness[m];
-                tails[m] = w[m] / (1.0 + power(greater(lesser(z, FARTHEST), -FARTHEST)));
+                let tail = w[m] / (1.0 + power(greater(lesser(z, FARTHEST), -FARTHEST)));
+                sum = sum.wrapping_add((tail * scale) as u32);
             }
+            sum
         },
-    );
+    )
 }
 
 /// A slot ahead of the last update.
