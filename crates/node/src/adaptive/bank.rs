@@ -109,12 +109,20 @@ impl Bank {
         let (x, v) = (self.x.as_chunks_mut::<SCALES>().0, self.v.as_chunks_mut::<SCALES>().0);
         // The first family's velocities are 0.
         for ((x, v), decay) in x.iter_mut().zip(v).zip(&DECAYS).skip(1) {
-            for _ in 0..slots {
-                for (x, v) in x.iter_mut().zip(&mut *v) {
-                    *v *= decay;
-                    *x += *v;
-                }
-            }
+            // As wide as what is read next, which else waits until both halves are in memory.
+            vectorised(
+                #[inline(always)]
+                || {
+                    let (mut at, mut speed) = (*x, *v);
+                    for _ in 0..slots {
+                        for (at, speed) in at.iter_mut().zip(&mut speed) {
+                            *speed *= decay;
+                            *at += *speed;
+                        }
+                    }
+                    (*x, *v) = (at, speed);
+                },
+            );
         }
         let mean = self.x.iter().zip(&self.w).fold(0.0, |mean, (x, w)| mean + x * w);
         Ahead { slots, mean }
