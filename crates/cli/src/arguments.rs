@@ -233,6 +233,13 @@ pub(crate) struct ReceiveOptions {
     /// Bits per second of the serial line.
     #[arg(long, default_value_t = 115200, value_name = "BAUD")]
     pub(crate) baud: u32,
+    /// Frames are those of one sensor with the adaptive encoder of `fewbits-node`, within this bound: `±0.05`, on a circle `±2@360`. Rows
+    /// are slots and values. From a loss that is noticed to the next refresh there are gaps.
+    #[arg(long, value_name = "BOUND", conflicts_with = "udp", allow_hyphen_values = true)]
+    pub(crate) sensor: Option<String>,
+    /// With `--sensor`: bits of the number in each of its packets.
+    #[arg(long, default_value_t = 4, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(crate) sequence_bits: u32,
     /// With UDP or a serial line: end when nothing came for so long.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     pub(crate) timeout: Option<std::time::Duration>,

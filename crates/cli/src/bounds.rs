@@ -69,7 +69,8 @@ fn refused(value: &str) -> Error {
     }
 }
 
-fn parse_one(text: &str) -> Result<Spec, Error> {
+/// One bound, perhaps on a circle.
+pub(crate) fn parse_one(text: &str) -> Result<Spec, Error> {
     let (bound, period) = match text.split_once('@') {
         None => (text, None),
         Some((bound, period)) => (bound, Some(period.parse::<f64>().map_err(|_| refused(text))?)),

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::input::Row;
 use crate::output::{Shape, Writer};
 use crate::unpack::{all_columns, write_blocks};
-use crate::{Ending, output, pack, serial};
+use crate::{Ending, node, output, pack, serial};
 use fewbits_record::{BlockReader, FrameReader, FrameWriter};
 use std::fs::File;
 use std::io::{Read, Write};
@@ -182,22 +182,37 @@ fn wait(
 
 /// Runs `receive`.
 pub(crate) fn receive(options: &ReceiveOptions) -> Result<Ending, Error> {
-    match (&options.udp, &options.serial) {
-        (Some(address), _) => receive_datagrams(options, address),
-        (None, Some(device)) => {
-            let line = serial::open(device, options.baud)?;
-            let mut frames = serial::Frames::new(line, options.timeout);
-            receive_frames(options, device, || frames.next())
+    let sensor = options.sensor.as_deref();
+    let sensor = sensor
+        .map(|bound| node::config(bound, options.sequence_bits))
+        .transpose()?;
+    match (&options.udp, &options.serial, sensor) {
+        (Some(address), ..) => receive_datagrams(options, address),
+        (None, Some(device), sensor) => {
+            let mut frames = serial::Frames::of_line(serial::open(device, options.baud)?, options.timeout);
+            match sensor {
+                Some(config) => node::receive(options, config, &mut frames, device),
+                None => receive_frames(options, device, || frames.next()),
+            }
         }
-        (None, None) => receive_stream(options),
+        (None, None, Some(config)) => {
+            let (source, name) = open(&options.file)?;
+            node::receive(options, config, &mut serial::Frames::of_stream(source), name)
+        }
+        (None, None, None) => receive_stream(options),
     }
 }
 
-fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
-    let (source, name): (Box<dyn Read>, &str) = match options.file.as_str() {
+/// A file or standard input, and its name for messages.
+fn open(file: &str) -> Result<(Box<dyn Read + Send>, &str), Error> {
+    Ok(match file {
         "-" => (Box::new(std::io::stdin()), "standard input"),
         file => (Box::new(File::open(file).map_err(Error::file(file, "open"))?), file),
-    };
+    })
+}
+
+fn receive_stream(options: &ReceiveOptions) -> Result<Ending, Error> {
+    let (source, name) = open(&options.file)?;
     let blocks = BlockReader::new(source).map_err(Error::recording(name))?;
     let (columns, names) = all_columns(blocks.schema());
     let mut writer = Writer::new(options.output.as_deref(), Shape::Csv, blocks.schema(), &names)?;

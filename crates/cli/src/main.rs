@@ -15,6 +15,7 @@ mod generate;
 mod info;
 mod input;
 mod link;
+mod node;
 mod numbers;
 mod output;
 mod pack;

@@ -55,17 +55,30 @@ pub(crate) struct Frames {
 }
 
 impl Frames {
-    pub(crate) fn new(mut line: File, timeout: Option<Duration>) -> Self {
+    /// Of a line: it is read again where it has no bytes, until nothing came for the timeout.
+    pub(crate) fn of_line(line: File, timeout: Option<Duration>) -> Self {
+        Self::new(line, timeout, Some(PAUSE))
+    }
+
+    /// Of a stream, which ends.
+    pub(crate) fn of_stream(source: impl Read + Send + 'static) -> Self {
+        Self::new(source, None, None)
+    }
+
+    fn new(mut source: impl Read + Send + 'static, timeout: Option<Duration>, pause: Option<Duration>) -> Self {
         let (sender, chunks) = sync_channel(CHUNKS);
         // Reading blocks, and the timeout does not wait for it. The thread ends with the process.
         std::thread::spawn(move || {
             let mut buffer = [0; 4096];
             loop {
-                let chunk = match line.read(&mut buffer) {
-                    Ok(0) => {
-                        std::thread::sleep(PAUSE);
-                        continue;
-                    }
+                let chunk = match source.read(&mut buffer) {
+                    Ok(0) => match pause {
+                        Some(pause) => {
+                            std::thread::sleep(pause);
+                            continue;
+                        }
+                        None => return,
+                    },
                     Ok(count) => Ok(buffer[..count].to_vec()),
                     Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                     Err(error) => Err(error),
@@ -83,7 +96,7 @@ impl Frames {
         }
     }
 
-    /// The next frame; `None` if nothing came for the timeout.
+    /// The next frame; `None` if nothing came for the timeout, or at the end of a stream.
     pub(crate) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
         loop {
             if let Some(end) = self.collected.iter().position(|byte| *byte == 0) {

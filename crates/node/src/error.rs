@@ -44,7 +44,8 @@ pub(crate) const fn finite(name: &'static str, value: f64) -> Result<f64, Error>
 }
 
 pub(crate) const fn positive(name: &'static str, value: f64) -> Result<f64, Error> {
-    if value.is_finite() && value > 0.0 {
+    // By bits, because comparing doubles is a routine of its own in software: those from the smallest number up to the largest.
+    if value.to_bits().wrapping_sub(1) < f64::MAX.to_bits() {
         Ok(value)
     } else {
         Err(Error::new(name, value, "a finite number above 0"))

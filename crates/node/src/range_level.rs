@@ -1,14 +1,23 @@
 //! The level of a range: equal cells about a reference.
 
 use crate::error::{Error, finite, positive};
-use crate::math::ratio;
+use crate::math::twice_ratio;
 
-/// Edge `q` of `levels` equal cells on `centre +- half_width`; edge 0 and edge `levels` are those of the nominal cells, which are
-/// continued to infinity.
+/// Edge `q`, at most `levels`, of `levels` equal cells on `centre +- half_width`; edge 0 and edge `levels` are those of the nominal cells,
+/// which are continued to infinity.
 #[inline]
 pub fn edge(q: u32, levels: u32, centre: f64, half_width: f64) -> f64 {
-    let share = ratio(q, levels);
-    centre + half_width * (share + share - 1.0)
+    let place = match q {
+        0 => 0.0,
+        q if q < levels => twice_ratio(q, levels),
+        _ => 2.0,
+    };
+    at(place, centre, half_width)
+}
+
+/// The number at `place` half widths above the lowest edge.
+fn at(place: f64, centre: f64, half_width: f64) -> f64 {
+    centre + half_width * (place - 1.0)
 }
 
 /// Level of a range: `clamp(floor((I + 1) levels / 2), 0, levels - 1)` with `I = (range - centre) / half_width`, by comparison with the edges of
@@ -23,17 +32,30 @@ pub fn range_level(range: f64, centre: f64, half_width: f64, levels: u32) -> Res
     let Some(last) = levels.checked_sub(1) else {
         return Err(Error::new("levels", 0.0, "at least one level"));
     };
-    // Bisection of the edges: without division, which is long in software.
+    let range = ordered(range);
+    Ok(bisect(last, |q| range >= ordered(at(twice_ratio(q, levels), centre, half_width))))
+}
+
+/// The last `q` up to `last` whose edge is reached; edge 0 is. By comparisons: divisions of doubles and of long numbers are routines of
+/// their own in software.
+#[inline(always)]
+fn bisect(last: u32, is_reached: impl Fn(u32) -> bool) -> u32 {
     let (mut level, mut highest) = (0, last);
     while level < highest {
         let middle = highest - (highest - level) / 2;
-        if range >= edge(middle, levels, centre, half_width) {
+        if is_reached(middle) {
             level = middle;
         } else {
             highest = middle - 1;
         }
     }
-    Ok(level)
+    level
+}
+
+/// A whole number that orders as the value does, both zeros equal: comparing doubles is a routine of its own in software.
+fn ordered(value: f64) -> i64 {
+    let bits = value.to_bits() as i64;
+    if bits < 0 { i64::MIN.wrapping_sub(bits) } else { bits }
 }
 
 /// [`range_level`] of codes, without floating point and with exact edges. With a half width of 0 it is the first or the last level.
@@ -42,10 +64,5 @@ pub fn range_level_of_codes(range: i32, centre: i32, half_width: u32, levels: u1
     // The range less the lowest edge, and the distance of all edges: below 2^34, times `levels` below 2^50.
     let above = i64::from(range) - i64::from(centre) + i64::from(half_width);
     let (scaled, width) = (above * i64::from(levels), 2 * i64::from(half_width));
-    let (mut level, mut edge) = (0, width);
-    while level + 1 < u32::from(levels) && scaled >= edge {
-        level += 1;
-        edge += width;
-    }
-    level
+    bisect(u32::from(levels).saturating_sub(1), |q| scaled >= i64::from(q) * width)
 }

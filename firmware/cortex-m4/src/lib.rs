@@ -155,6 +155,15 @@ pub fn serial_write(byte: u8) {
     }
 }
 
+/// Sends a frame of less than 254 bytes in consistent-overhead byte stuffing, ended by a zero byte.
+pub fn serial_frame(frame: &[u8]) {
+    for run in frame.split(|byte| *byte == 0) {
+        serial_write(run.len() as u8 + 1);
+        run.iter().copied().for_each(serial_write);
+    }
+    serial_write(0);
+}
+
 const SYSTICK: *mut u32 = 0xE000_E010 as *mut u32;
 const TICKS: u32 = 0xff_ffff;
 

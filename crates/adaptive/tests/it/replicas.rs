@@ -27,7 +27,7 @@ fn replicas_agree_to_the_bit_across_restarts() {
     }
 }
 
-/// As above, over ten million samples; two minutes.
+/// As above, over ten million samples; ten seconds.
 #[test]
 #[ignore = "long: cargo test -p fewbits-adaptive --release -- --ignored ten_million"]
 fn replicas_agree_to_the_bit_over_ten_million_samples() {

@@ -4,6 +4,7 @@
 
 mod design;
 mod fleet;
+mod node;
 mod pages;
 mod track;
 

@@ -15,9 +15,9 @@
 //! fixed order: two ends that see the same indices hold the same bits. Models are taken eight at a time, one family, which fills vector
 //! registers where there are any and needs little memory where there are none.
 
-use super::steady::{STEADY, UPDATED};
-use crate::elementary::{exp2, greater, lesser, power};
-use crate::math::sqrt_f32;
+use super::family::Family;
+use super::steady::STEADY;
+use crate::elementary::{greater, lesser, power};
 use fewbits_numerics::kernels::vectorised;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -26,87 +26,18 @@ use serde::{Deserialize, Serialize};
 pub const MODELS: usize = 24;
 /// Share of the weights that is spread evenly after each slot.
 const SWITCHING: f32 = 0.005;
-/// Standard deviation of the sensing noise, in steps, beyond that of the cell.
-pub(super) const NOISE: f32 = 0.15;
-/// Variance of an index as a measurement.
-pub(super) const CELL: f32 = NOISE * NOISE + 1.0 / 12.0;
-/// `pi / sqrt(3) log2 e`: doublings in one standard deviation of the logistic law.
-const DOUBLINGS: f32 = 2.6167593;
 /// Per-slot factors of the velocities; zero is the random walk.
 pub const DECAYS: [f32; 3] = [0.0, 0.6, 0.95];
+/// Families of models.
+pub(super) const FAMILIES: usize = DECAYS.len();
 /// Models of one family, by increasing scale.
-pub const SCALES: usize = MODELS / DECAYS.len();
+pub const SCALES: usize = MODELS / FAMILIES;
 /// Beyond this many doublings the tails are flat.
 const FARTHEST: f32 = 60.0;
 /// The least evidence, so that a wild value does not decide everything.
 const LEAST: f32 = 1e-15;
 /// Longer gaps between samples count as this many slots.
 pub(super) const LONGEST_GAP: u32 = 64;
-
-/// Standard deviation of the driving noise of a scale, in steps of `2 delta`.
-pub(super) fn noise_of(scale: usize) -> f32 {
-    f32::from_bits((127 - 6 + 2 * scale as u32) << 23)
-}
-
-/// A covariance of position and velocity: `[xx, xv, vv]`.
-pub(super) type Covariance = [f32; 3];
-
-pub(super) fn propagate([a, b, d]: Covariance, decay: f32, q: f32) -> Covariance {
-    if decay == 0.0 {
-        return [a + q, 0.0, 0.0];
-    }
-    let far = decay * b + decay * decay * d + q;
-    [a + 2.0 * decay * b + decay * decay * d + q, far, decay * decay * d + q]
-}
-
-/// What follows from the predicted covariances of one family.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Family {
-    /// Doublings of the odds of the predictive law in one step.
-    pub(super) sharpness: [f32; SCALES],
-    /// `C - 1/C` and `C + 1/C`, where `C` are the odds of half a step.
-    pub(super) difference: [f32; SCALES],
-    pub(super) sum: [f32; SCALES],
-    /// `1/C^2`: what a step does to the odds.
-    pub(super) beyond: [f32; SCALES],
-    pub(super) gain_x: [f32; SCALES],
-    pub(super) gain_v: [f32; SCALES],
-}
-
-impl Family {
-    const EMPTY: Self = Self {
-        sharpness: [0.0; SCALES],
-        difference: [0.0; SCALES],
-        sum: [0.0; SCALES],
-        beyond: [0.0; SCALES],
-        gain_x: [0.0; SCALES],
-        gain_v: [0.0; SCALES],
-    };
-
-    pub(super) fn set(&mut self, m: usize, [a, b, _]: Covariance) {
-        let total = a + CELL;
-        self.sharpness[m] = DOUBLINGS / sqrt_f32(a + NOISE * NOISE);
-        let odds = exp2(0.5 * self.sharpness[m]);
-        let inverse = 1.0 / odds;
-        self.difference[m] = odds - inverse;
-        self.sum[m] = odds + inverse;
-        self.beyond[m] = inverse * inverse;
-        self.gain_x[m] = a / total;
-        self.gain_v[m] = b / total;
-    }
-
-    /// The family `slots` after the last update.
-    fn after(family: usize, slots: u32) -> Self {
-        let mut ahead = Self::EMPTY;
-        let decay = DECAYS.get(family).copied().unwrap_or(0.0);
-        let updated = UPDATED.chunks_exact(SCALES).nth(family).into_iter().flatten();
-        for (m, updated) in updated.enumerate().take(SCALES) {
-            let q = noise_of(m) * noise_of(m);
-            ahead.set(m, (0..slots).fold(*updated, |p, _| propagate(p, decay, q)));
-        }
-        ahead
-    }
-}
 
 /// Of a model one slot ahead: doublings of the odds of its predictive law in one step, and its gains of position and velocity. Zeros beyond
 /// the last.
@@ -175,29 +106,46 @@ impl Bank {
     /// The time update over `elapsed` slots.
     pub(super) fn predict(&mut self, elapsed: u32) -> Ahead {
         let slots = elapsed.clamp(1, LONGEST_GAP);
-        let families = self.x.chunks_exact_mut(SCALES).zip(self.v.chunks_exact_mut(SCALES));
-        let mut mean = 0.0;
-        for ((x, v), (decay, w)) in families.zip(DECAYS.into_iter().zip(self.w.chunks_exact(SCALES))) {
-            for ((x, v), w) in x.iter_mut().zip(v).zip(w) {
-                if decay > 0.0 {
+        let (x, v) = (self.x.as_chunks_mut::<SCALES>().0, self.v.as_chunks_mut::<SCALES>().0);
+        // The first family's velocities are 0.
+        for ((x, v), decay) in x.iter_mut().zip(v).zip(&DECAYS).skip(1) {
+            // As wide as what is read next, which else waits until both halves are in memory.
+            vectorised(
+                #[inline(always)]
+                || {
+                    let (mut at, mut speed) = (*x, *v);
                     for _ in 0..slots {
-                        *v *= decay;
-                        *x += *v;
+                        for (at, speed) in at.iter_mut().zip(&mut speed) {
+                            *speed *= decay;
+                            *at += *speed;
+                        }
                     }
-                }
-                mean += *x * w;
-            }
+                    (*x, *v) = (at, speed);
+                },
+            );
         }
+        let mean = self.x.iter().zip(&self.w).fold(0.0, |mean, (x, w)| mean + x * w);
         Ahead { slots, mean }
     }
 
     /// The measurement update with the index `step` from the last, from which positions are counted then; returns the probability of its
     /// cell.
     pub(super) fn update(&mut self, ahead: &Ahead, step: f32) -> f32 {
-        let (x, v, w) = (self.x.as_chunks_mut().0, self.v.as_chunks_mut().0, self.w.as_chunks_mut().0);
         let mut total = 0.0;
-        for (family, ((x, v), w)) in x.iter_mut().zip(v).zip(w).enumerate() {
-            ahead.with_family(family, |shape| update_family(shape, step, x, v, w, &mut total));
+        let eights = self
+            .x
+            .as_chunks_mut()
+            .0
+            .iter_mut()
+            .zip(self.v.as_chunks_mut().0)
+            .zip(self.w.as_chunks_mut().0);
+        if VECTORS {
+            ahead.with_families(|shapes| update_families(shapes, step, eights));
+            self.w.iter().for_each(|w| total += w);
+        } else {
+            for (family, ((x, v), w)) in eights.enumerate() {
+                ahead.with_family(family, |shape| update_each(shape, step, [x, v, w], |w| total += w));
+            }
         }
         let inverse = (1.0 - SWITCHING) / total;
         for w in &mut self.w {
@@ -212,13 +160,7 @@ impl Bank {
         let mut sums = [0.0; 2];
         let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
         for (family, (x, w)) in x.iter().zip(w).enumerate() {
-            ahead.with_family(family, |shape| {
-                let mut tails = [[0.0; SCALES]; 2];
-                set_both_tails(&mut tails, shape, at, x, w);
-                for (sum, tails) in sums.iter_mut().zip(&tails) {
-                    tails.iter().for_each(|tail| *sum += tail);
-                }
-            });
+            ahead.with_family(family, |shape| add_both_tails(&mut sums, shape, at, x, w));
         }
         sums
     }
@@ -230,73 +172,96 @@ impl Bank {
         let (x, w) = (self.x.as_chunks().0, self.w.as_chunks().0);
         for (family, (x, w)) in x.iter().zip(w).enumerate() {
             ahead.with_family(family, |shape| {
-                let mut tails = [0.0; SCALES];
-                set_tails(&mut tails, &shape.sharpness, edge, side, x, w);
-                for tail in tails {
-                    sum = sum.wrapping_add((tail * scale) as u32);
-                }
+                sum = sum.wrapping_add(counted_tails(&shape.sharpness, [edge, side, scale], x, w));
             });
         }
         sum
     }
 }
 
-/// Where there are vector registers, sums are taken apart from what is summed.
+/// Where there are vector registers, eight models are taken to memory of their own first, so that nothing forbids to take them at once, and
+/// sums are taken apart from what is summed.
 const VECTORS: bool = cfg!(feature = "std");
 
-/// Moves eight models to the index `step` from the last, and multiplies their weights by what they predicted. Adds the weights to `total`, the
-/// first first.
-fn update_family(shape: &Family, step: f32, x: &mut Eight, v: &mut Eight, w: &mut Eight, total: &mut f32) {
+/// [`update_each`] of all models.
+fn update_families<'a>(
+    shapes: &[Family; FAMILIES],
+    step: f32,
+    eights: impl Iterator<Item = ((&'a mut Eight, &'a mut Eight), &'a mut Eight)>,
+) {
     vectorised(
         #[inline(always)]
         || {
-            for m in 0..SCALES {
-                let d = step - x[m];
-                let e = power(-lesser(d.abs() * shape.sharpness[m], FARTHEST));
-                let evidence = e * shape.difference[m] / (1.0 + e * shape.sum[m] + e * e);
-                x[m] += shape.gain_x[m] * d - step;
-                v[m] += shape.gain_v[m] * d;
-                w[m] *= greater(evidence, LEAST);
-                if !VECTORS {
-                    *total += w[m];
-                }
+            for (shape, ((x, v), w)) in shapes.iter().zip(eights) {
+                let [mut at, mut speed, mut weight] = [*x, *v, *w];
+                update_each(shape, step, [&mut at, &mut speed, &mut weight], |_| ());
+                (*x, *v, *w) = (at, speed, weight);
             }
         },
     );
-    if VECTORS {
-        w.iter().for_each(|w| *total += w);
+}
+
+/// Moves eight models to the index `step` from the last, and multiplies their weights by what they predicted. Gives the weights to `take`,
+/// the first first.
+#[inline(always)]
+fn update_each(shape: &Family, step: f32, [x, v, w]: [&mut Eight; 3], mut take: impl FnMut(f32)) {
+    for m in 0..SCALES {
+        let d = step - x[m];
+        let e = power(-lesser(d.abs() * shape.sharpness[m], FARTHEST));
+        let evidence = e * shape.difference[m] / (1.0 + e * shape.sum[m] + e * e);
+        x[m] += shape.gain_x[m] * d - step;
+        v[m] += shape.gain_v[m] * d;
+        w[m] *= greater(evidence, LEAST);
+        take(w[m]);
     }
 }
 
-/// Tails of eight models below and above the cell at `at`.
-fn set_both_tails(tails: &mut [Eight; 2], shape: &Family, at: f32, x: &Eight, w: &Eight) {
-    vectorised(
+/// Adds the tails of eight models below and above the cell at `at` to sums, the first first.
+fn add_both_tails([lower, upper]: &mut [f32; 2], shape: &Family, at: f32, x: &Eight, w: &Eight) {
+    if !VECTORS {
+        for m in 0..SCALES {
+            let [below, above] = both_tails(shape, m, at, x, w);
+            (*lower, *upper) = (*lower + below, *upper + above);
+        }
+        return;
+    }
+    let (below, above) = vectorised(
         #[inline(always)]
         || {
-            let [below, above] = tails;
+            let (mut below, mut above) = ([0.0; SCALES], [0.0; SCALES]);
             for m in 0..SCALES {
-                let z = (x[m] - (at - 0.5)) * shape.sharpness[m];
-                let low = power(greater(lesser(z, FARTHEST), -FARTHEST));
-                // The odds one step further.
-                let high = low * shape.beyond[m];
-                below[m] = w[m] / (1.0 + low);
-                above[m] = w[m] * high / (1.0 + high);
+                [below[m], above[m]] = both_tails(shape, m, at, x, w);
             }
+            (below, above)
         },
     );
+    below.iter().for_each(|tail| *lower += tail);
+    above.iter().for_each(|tail| *upper += tail);
 }
 
-/// Tails of eight models.
-fn set_tails(tails: &mut Eight, sharpness: &Eight, edge: f32, side: f32, x: &Eight, w: &Eight) {
+#[inline(always)]
+fn both_tails(shape: &Family, m: usize, at: f32, x: &Eight, w: &Eight) -> [f32; 2] {
+    let z = (x[m] - (at - 0.5)) * shape.sharpness[m];
+    let low = power(greater(lesser(z, FARTHEST), -FARTHEST));
+    // The odds one step further.
+    let high = low * shape.beyond[m];
+    [w[m] / (1.0 + low), w[m] * high / (1.0 + high)]
+}
+
+/// Tails of eight models below `edge` (above it, if `side` is -1), each times `scale` as a whole number, added.
+fn counted_tails(sharpness: &Eight, [edge, side, scale]: [f32; 3], x: &Eight, w: &Eight) -> u32 {
     vectorised(
         #[inline(always)]
         || {
+            let mut sum = 0_u32;
             for m in 0..SCALES {
                 let z = side * (x[m] - edge) * sharpness[m];
-                tails[m] = w[m] / (1.0 + power(greater(lesser(z, FARTHEST), -FARTHEST)));
+                let tail = w[m] / (1.0 + power(greater(lesser(z, FARTHEST), -FARTHEST)));
+                sum = sum.wrapping_add((tail * scale) as u32);
             }
+            sum
         },
-    );
+    )
 }
 
 /// A slot ahead of the last update.
@@ -316,55 +281,19 @@ impl Ahead {
         }
     }
 
+    /// Of all families at once.
+    fn with_families<T>(&self, work: impl FnOnce(&[Family; FAMILIES]) -> T) -> T {
+        if self.slots == 1 {
+            work(&STEADY)
+        } else {
+            work(&core::array::from_fn(|family| Family::after(family, self.slots)))
+        }
+    }
+
     /// Apart from the steady state, so that its memory on the stack is taken only where samples are irregular.
     #[cold]
     #[inline(never)]
     fn with_computed<T>(&self, family: usize, work: impl FnOnce(&Family) -> T) -> T {
         work(&Family::after(family, self.slots))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Iterates the covariances of each model to their fixed point, in `f64`: the tables hold it.
-    #[test]
-    fn tables_are_the_fixed_point() {
-        let is = |stored: f32, exact: f64| (f64::from(stored) - exact).abs() <= 6e-8 * exact.abs();
-        let noise = 0.15 * 0.15;
-        for (m, updated) in UPDATED.iter().enumerate() {
-            let (decay, q) = ([0.0, 0.6, 0.95][m / SCALES], 4.0_f64.powi(2 * (m % SCALES) as i32 - 6));
-            let cell = noise + 1.0 / 12.0;
-            let mut p = [1.0, 0.0, if decay == 0.0 { 0.0 } else { q }];
-            let mut ahead = p;
-            for _ in 0..20_000 {
-                let [a, b, d] = p;
-                ahead = match decay {
-                    0.0 => [a + q, 0.0, 0.0],
-                    _ => {
-                        let speed = decay * decay * d + q;
-                        [a + 2.0 * decay * b + speed, decay * b + speed, speed]
-                    }
-                };
-                let [a, b, d] = ahead;
-                let (g0, g1) = (a / (a + cell), b / (a + cell));
-                p = [a - g0 * a, b - g0 * b, d - g1 * b];
-            }
-            assert!(updated.iter().zip(p).all(|(stored, exact)| is(*stored, exact)), "model {m}");
-            let (k, table) = (m % SCALES, &STEADY[m / SCALES]);
-            let sharpness = std::f64::consts::PI / (3.0 * (ahead[0] + noise)).sqrt() * std::f64::consts::LOG2_E;
-            assert!(is(table.sharpness[k], sharpness), "model {m}");
-            let odds = (0.5 * sharpness).exp2();
-            assert!(is(table.difference[k], odds - 1.0 / odds) && is(table.sum[k], odds + 1.0 / odds), "model {m}");
-            assert!(is(table.beyond[k], (-sharpness).exp2()), "model {m}");
-            assert!(is(table.gain_x[k], ahead[0] / (ahead[0] + cell)), "model {m}");
-            assert!(is(table.gain_v[k], ahead[1] / (ahead[0] + cell)), "model {m}");
-            // What is computed for gaps is the same within rounding.
-            let mut shape = Family::EMPTY;
-            shape.set(k, propagate(*updated, DECAYS[m / SCALES], noise_of(k) * noise_of(k)));
-            assert!((f64::from(shape.sharpness[k]) / sharpness - 1.0).abs() < 1e-6, "model {m}");
-            assert!((f64::from(shape.gain_x[k]) * (ahead[0] + cell) / ahead[0] - 1.0).abs() < 1e-6, "model {m}");
-        }
     }
 }

@@ -1,5 +1,7 @@
 //! Adaptive frequencies: of residuals, and of values that return.
 
+use fewbits_numerics::kernels::vectorised;
+
 /// Residuals counted one by one.
 const WINDOW: i64 = 64;
 /// Counts of residuals.
@@ -182,7 +184,11 @@ impl Values {
     /// Counts of the indices in `first..end`.
     pub fn between(&self, first: i64, end: i64) -> u32 {
         let chosen = self.stored().get(self.rank(first)..self.rank(end));
-        chosen.map_or(0, |entries| entries.iter().map(|entry| count_of(*entry)).sum())
+        let entries = chosen.unwrap_or(&[]);
+        vectorised(
+            #[inline(always)]
+            || entries.iter().map(|entry| count_of(*entry)).sum(),
+        )
     }
 
     pub(super) fn add(&mut self, j: i64, weight: u32) {

@@ -11,6 +11,7 @@ mod bank;
 mod config;
 mod counts;
 mod encoder;
+mod family;
 mod lattice;
 mod law;
 mod replica;

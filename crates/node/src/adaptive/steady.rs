@@ -1,6 +1,7 @@
-//! The steady state of the bank, computed once: `bank`'s test iterates the covariances to it.
+//! The steady state of the bank, computed once: `family`'s test iterates the covariances to it.
 
-use super::bank::{Covariance, Family, MODELS};
+use super::bank::MODELS;
+use super::family::{Covariance, Family};
 
 /// One slot ahead, by families.
 #[rustfmt::skip]

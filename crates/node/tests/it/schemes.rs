@@ -84,6 +84,8 @@ fn range_level_agrees_with_its_edges() {
     }
     assert_eq!(range_level(1e300, 0.0, 1e-300, 4), Ok(3));
     assert_eq!(range_level(-1e300, 0.0, 1e-300, 4), Ok(0));
+    // Both zeros reach the edge at zero.
+    assert_eq!([range_level(-0.0, 0.0, 1.0, 2), range_level(0.0, -0.0, 1.0, 2)], [Ok(1); 2]);
     assert!(range_level(1.0, 1.0, 1.0, 0).is_err() && range_level(f64::NAN, 1.0, 1.0, 4).is_err());
 }
 
