@@ -234,7 +234,7 @@ fn join<const D: usize>(
 
 fn serve<R: Receiver, T: Transport>(
     options: &CentreOptions,
-    given: &Configuration,
+    _given: &Configuration,
     mut transport: T,
     station: &mut Station<R, T::Address>,
     coordinates: usize,
@@ -253,9 +253,9 @@ fn serve<R: Receiver, T: Transport>(
     #[cfg(feature = "live")]
     let page = match options.live {
         Some(address) => {
-            let mut numbers: Vec<u32> = given.sensors.iter().map(|sensor| sensor.number).collect();
+            let mut numbers: Vec<u32> = _given.sensors.iter().map(|sensor| sensor.number).collect();
             numbers.sort_unstable();
-            let page = fewbits_link::LivePage::serve(address, numbers, given.period)?;
+            let page = fewbits_link::LivePage::serve(address, numbers, _given.period)?;
             eprintln!("page at http://{}/", page.address());
             Some(page)
         }

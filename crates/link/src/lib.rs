@@ -57,5 +57,5 @@ pub use live::{HISTORY, LivePage};
 pub use sensor::{Request, SensorLink};
 pub use station::{Counts, Output, Peer, Station, Step};
 pub use store::Store;
-pub use transport::{Program, Transport, now, run_sensor, run_station};
+pub use transport::{Datagram, Program, Transport, now, run_sensor, run_station};
 pub use udp::Udp;

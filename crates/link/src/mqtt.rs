@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::topics::{QUEUE, Queue, Topics};
-use crate::transport::Transport;
+use crate::transport::{Datagram, Transport};
 pub use rumqttc;
 use rumqttc::mqttbytes::v4::SubscribeReasonCode;
 use rumqttc::{Client, ConnectionError, Event, MqttOptions, NetworkOptions, Packet, QoS};
@@ -126,7 +126,7 @@ impl Transport for Mqtt {
         }
     }
 
-    fn receive(&mut self, wait: Duration) -> Result<Option<(u32, &[u8])>, Error> {
+    fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, u32>>, Error> {
         Ok(self.queue.receive(wait))
     }
 }

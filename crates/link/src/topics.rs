@@ -1,7 +1,7 @@
 //! What transports over named topics share: sensor 3 of the fleet `plant` sends on `plant/3/up` and is told on `plant/3/down`.
 
 use crate::error::Error;
-use crate::transport::MAX_DATAGRAM;
+use crate::transport::{Datagram, MAX_DATAGRAM};
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -88,7 +88,7 @@ impl Queue {
         (Inlet { topics, sender }, Self { receiver, last })
     }
 
-    pub(crate) fn receive(&mut self, wait: Duration) -> Option<(u32, &[u8])> {
+    pub(crate) fn receive(&mut self, wait: Duration) -> Option<Datagram<'_, u32>> {
         let (sensor, bytes) = self.receiver.recv_timeout(wait).ok()?;
         self.last = bytes;
         Some((sensor, &self.last))

@@ -18,6 +18,9 @@ const BATCH: usize = 256;
 const MAX_WAIT: Duration = Duration::from_millis(100);
 const HELLO_EVERY: Duration = Duration::from_secs(1);
 
+/// Where a datagram has come from, and its bytes.
+pub type Datagram<'a, A> = (A, &'a [u8]);
+
 /// What carries datagrams between a centre and its sensors. It may lose, repeat and reorder them.
 pub trait Transport {
     /// Where a datagram goes, or has come from. A station stores it as text; text that is none is an address that is not known.
@@ -26,11 +29,11 @@ pub trait Transport {
     /// Sends a datagram. Does not wait: what cannot be sent is lost.
     fn send(&mut self, to: &Self::Address, bytes: &[u8]);
 
-    /// The next datagram and where it has come from; `None` if none comes within `wait`.
+    /// The next datagram; `None` if none comes within `wait`.
     ///
     /// # Errors
     /// If none can come any more.
-    fn receive(&mut self, wait: Duration) -> Result<Option<(Self::Address, &[u8])>, Error>;
+    fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, Self::Address>>, Error>;
 }
 
 /// Nanoseconds since 1970.

@@ -1,7 +1,7 @@
 //! Datagrams over UDP.
 
 use crate::error::Error;
-use crate::transport::{MAX_DATAGRAM, Transport};
+use crate::transport::{Datagram, MAX_DATAGRAM, Transport};
 use std::io::ErrorKind;
 use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 use std::time::Duration;
@@ -57,7 +57,7 @@ impl Transport for Udp {
         let _ = self.socket.send_to(bytes, to);
     }
 
-    fn receive(&mut self, wait: Duration) -> Result<Option<(SocketAddr, &[u8])>, Error> {
+    fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, SocketAddr>>, Error> {
         self.wait(wait).map_err(|source| Error::socket(self.address, source))?;
         loop {
             match self.socket.recv_from(&mut self.buffer) {

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::topics::{Queue, Topics};
-use crate::transport::Transport;
+use crate::transport::{Datagram, Transport};
 pub use ::zenoh;
 use ::zenoh::pubsub::Subscriber;
 use ::zenoh::{Session, Wait};
@@ -66,7 +66,7 @@ impl Transport for Zenoh {
             .wait();
     }
 
-    fn receive(&mut self, wait: Duration) -> Result<Option<(u32, &[u8])>, Error> {
+    fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, u32>>, Error> {
         Ok(self.queue.receive(wait))
     }
 }
