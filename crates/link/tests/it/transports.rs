@@ -150,6 +150,34 @@ fn losses_change_estimates() {
     assert_ne!(lossless.estimate(), records[0].2);
 }
 
+/// A centre's state is good over another transport: what it knew is, where its sensors were is not.
+#[test]
+fn state_over_another_transport() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = || Some(fewbits_link::Store::new(folder.path().join("state")));
+    let (settings, mut outputs) = (|| settings(Reports::Signs, 10, 10), Vec::new());
+    let known = peers(10).into_iter().map(|peer| fewbits_link::Peer {
+        address: Some(([127, 0, 0, 1], 9).into()),
+        ..peer
+    });
+    let mut udp = Station::new(settings(), receiver(Reports::Signs, LOSS), known.collect(), store()).unwrap();
+    udp.on_time(10, &mut outputs).unwrap();
+    udp.on_time(19, &mut outputs).unwrap();
+    let unknown = peers(10).into_iter().map(|peer| fewbits_link::Peer::<u32> {
+        address: None,
+        number: peer.number,
+        key: peer.key,
+    });
+    let mut topics = Station::new(settings(), receiver(Reports::Signs, LOSS), unknown.collect(), store()).unwrap();
+    assert_eq!(topics.last_step(), udp.last_step());
+    assert_eq!(topics.last_step().unwrap().asked, [true; 10]);
+    let mut outputs = Vec::new();
+    topics.on_time(20, &mut outputs).unwrap();
+    topics.on_time(29, &mut outputs).unwrap();
+    assert!(outputs.iter().all(|output| !matches!(output, Output::Datagram { .. })));
+    assert_eq!(topics.last_step().unwrap().asked, [false; 10]);
+}
+
 #[cfg(feature = "mqtt")]
 mod mqtt {
     use super::*;
