@@ -36,7 +36,7 @@ pub(crate) enum Task {
     Send(SendOptions),
     /// Receive frames from a file, a pipe, UDP or a serial line and write their rows as CSV.
     Receive(ReceiveOptions),
-    /// Run a fusion centre over UDP. Estimates go to standard output, a row per slot.
+    /// Run a fusion centre over UDP, MQTT or zenoh. Estimates go to standard output, a row per slot.
     Centre(CentreOptions),
     /// Run a sensor over UDP. Samples come from standard input, one per line and slot.
     Sensor(SensorOptions),

@@ -1,14 +1,15 @@
-//! `fewbits centre`: a fusion centre over UDP. Each slot's estimate is a row on standard output.
+//! `fewbits centre`: a fusion centre over UDP, MQTT or zenoh. Each slot's estimate is a row on standard output.
 
 use crate::Ending;
 use crate::arguments::CentreOptions;
 use crate::error::Error;
+use crate::place::Place;
 use crate::report::{Report, censored, configuration, configured, coordinate};
 use fewbits_core::{FullValue, Gaussian, Link, OnAxes};
 use fewbits_filters::MomentFilter;
 use fewbits_filters::centre::{FusionCentre, Reporting};
 use fewbits_filters::contract::Evolving;
-use fewbits_link::{FusionReceiver, Key, Output, Peer, Station, Step, Store, udp};
+use fewbits_link::{FusionReceiver, Key, Output, Peer, Station, Step, Store, Transport, Udp, run_station};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{CentreSettings, Feedback, Member, Receiver, ReportLength, Schedule};
@@ -25,7 +26,7 @@ use std::path::PathBuf;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Configuration {
-    /// Address and port.
+    /// Address and port, or broker or endpoint and fleet.
     listen: String,
     /// Seconds of a slot; the same at all sensors that report by the clock.
     period: f64,
@@ -74,7 +75,7 @@ struct Sensor {
     number: u32,
     key: String,
     /// Address, where it is known beforehand.
-    address: Option<std::net::SocketAddr>,
+    address: Option<String>,
     /// The coordinate of the state that it reads.
     #[serde(default)]
     reads: usize,
@@ -90,9 +91,31 @@ struct Sensor {
 pub(crate) fn run(options: &CentreOptions) -> Result<Ending, Error> {
     let file = &options.configuration;
     let given: Configuration = configuration(file)?;
+    match Place::of(&given.listen).map_err(configured(file))? {
+        Place::Udp(address) => over(options, &given, || Ok(Udp::bind(address)?)),
+        #[cfg(feature = "mqtt")]
+        Place::Mqtt { broker, fleet } => over(options, &given, || {
+            let broker = crate::place::mqtt(broker).map_err(configured(file))?;
+            Ok(fewbits_link::mqtt::Mqtt::centre(broker, fleet)?)
+        }),
+        #[cfg(feature = "zenoh")]
+        Place::Zenoh { endpoint, fleet } => over(options, &given, || {
+            let session = crate::place::zenoh(endpoint, true).map_err(configured(file))?;
+            Ok(fewbits_link::zenoh::Zenoh::centre(session, fleet)?)
+        }),
+    }
+}
+
+/// Runs it over the transport that `open` gives once everything else is known to be right.
+fn over<T: Transport>(
+    options: &CentreOptions,
+    given: &Configuration,
+    open: impl FnOnce() -> Result<T, Error>,
+) -> Result<Ending, Error> {
+    let file = &options.configuration;
     match &given.model {
         Model::RandomWalk { density } => {
-            with(options, &given, ContinuousLinear::random_walk(*density).map_err(configured(file))?)
+            with(options, given, open, ContinuousLinear::random_walk(*density).map_err(configured(file))?)
         }
         Model::OrnsteinUhlenbeck {
             mean,
@@ -101,20 +124,27 @@ pub(crate) fn run(options: &CentreOptions) -> Result<Ending, Error> {
         } => {
             let world =
                 ContinuousLinear::ornstein_uhlenbeck(*mean, *time_constant, *variance).map_err(configured(file))?;
-            with(options, &given, world)
+            with(options, given, open, world)
         }
-        Model::ConstantVelocity { density } => {
-            with(options, &given, ContinuousLinear::nearly_constant_velocity(*density).map_err(configured(file))?)
-        }
-        Model::ConstantVelocity2d { density } => {
-            with(options, &given, ContinuousLinear::nearly_constant_velocity_2d(*density).map_err(configured(file))?)
-        }
+        Model::ConstantVelocity { density } => with(
+            options,
+            given,
+            open,
+            ContinuousLinear::nearly_constant_velocity(*density).map_err(configured(file))?,
+        ),
+        Model::ConstantVelocity2d { density } => with(
+            options,
+            given,
+            open,
+            ContinuousLinear::nearly_constant_velocity_2d(*density).map_err(configured(file))?,
+        ),
     }
 }
 
-fn with<const D: usize>(
+fn with<const D: usize, T: Transport>(
     options: &CentreOptions,
     given: &Configuration,
+    open: impl FnOnce() -> Result<T, Error>,
     world: impl Evolving<D> + 'static,
 ) -> Result<Ending, Error> {
     let file = &options.configuration;
@@ -140,10 +170,14 @@ fn with<const D: usize>(
             return Err(refused(format!("sensor {number} stands twice")));
         }
         join(&mut centre, sensor).map_err(|error| refused(format!("sensor {number}: {error}")))?;
+        let no_address = |text: &String| refused(format!("sensor {number}: {text} is no address"));
+        let address = sensor.address.as_ref();
         peers.push(Peer {
             number,
             key: Key::from_hex(&sensor.key).map_err(|error| refused(format!("sensor {number}: {error}")))?,
-            address: sensor.address,
+            address: address
+                .map(|text| text.parse().map_err(|_| no_address(text)))
+                .transpose()?,
         });
     }
     let nanoseconds = (given.period * 1e9).round();
@@ -164,7 +198,7 @@ fn with<const D: usize>(
     });
     let receiver = FusionReceiver::new(centre, given.period, stream);
     let mut station = Station::new(settings, receiver, peers, store)?;
-    serve(options, given, &mut station, D)
+    serve(options, given, open()?, &mut station, D)
 }
 
 fn join<const D: usize>(
@@ -198,13 +232,13 @@ fn join<const D: usize>(
     Ok(())
 }
 
-fn serve<R: Receiver>(
+fn serve<R: Receiver, T: Transport>(
     options: &CentreOptions,
-    given: &Configuration,
-    station: &mut Station<R>,
+    _given: &Configuration,
+    mut transport: T,
+    station: &mut Station<R, T::Address>,
     coordinates: usize,
 ) -> Result<Ending, Error> {
-    let socket = udp::bind(given.listen.as_str())?;
     let mut sink = std::io::stdout().lock();
     let failed = Error::file("standard output", "write");
     let mut head = "slot,reports".to_owned();
@@ -219,9 +253,9 @@ fn serve<R: Receiver>(
     #[cfg(feature = "live")]
     let page = match options.live {
         Some(address) => {
-            let mut numbers: Vec<u32> = given.sensors.iter().map(|sensor| sensor.number).collect();
+            let mut numbers: Vec<u32> = _given.sensors.iter().map(|sensor| sensor.number).collect();
             numbers.sort_unstable();
-            let page = fewbits_link::LivePage::serve(address, numbers, given.period)?;
+            let page = fewbits_link::LivePage::serve(address, numbers, _given.period)?;
             eprintln!("page at http://{}/", page.address());
             Some(page)
         }
@@ -229,7 +263,7 @@ fn serve<R: Receiver>(
     };
     let mut remaining = options.slots;
     let mut outcome = Ok(());
-    udp::run_station(&socket, station, |_station, outputs| {
+    run_station(&mut transport, station, |_station, outputs| {
         for output in outputs {
             match output {
                 Output::Step(step) => {

@@ -21,6 +21,7 @@ mod output;
 mod pack;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod place;
 mod plan;
 mod plot;
 mod report;

@@ -1,11 +1,12 @@
-//! `fewbits sensor`: samples from standard input, reports over UDP.
+//! `fewbits sensor`: samples from standard input, reports over UDP, MQTT or zenoh.
 
 use crate::Ending;
 use crate::arguments::SensorOptions;
 use crate::error::Error;
+use crate::place::Place;
 use crate::report::{Report, censored, configuration, configured};
 use fewbits_core::{BitString, FullValue, SchemeNode, SensorNode};
-use fewbits_link::{Key, SensorLink, Store, udp};
+use fewbits_link::{Key, Program, SensorLink, Store, Udp, run_sensor};
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{Feedback, Note, SensorSettings, Slot};
 use nalgebra::Vector1;
@@ -20,7 +21,7 @@ use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Configuration {
-    /// Address and port of the centre.
+    /// Address and port of the centre, or broker or endpoint and fleet.
     centre: String,
     number: u32,
     key: String,
@@ -52,20 +53,36 @@ pub(crate) fn run(options: &SensorOptions) -> Result<Ending, Error> {
     let node = node(file, &given)?;
     let mut settings = SensorSettings::new(Feedback::Told);
     settings.heartbeat_after = given.heartbeat_after;
-    let mut addresses = given.centre.to_socket_addrs().map_err(configured(file))?;
-    let centre = addresses
-        .next()
-        .ok_or_else(|| configured(file)("centre: no address of that name"))?;
     let key = Key::from_hex(&given.key).map_err(configured(file))?;
     let mut link = SensorLink::new(settings, given.number, key, given.state.map(Store::new))?;
-    let socket = udp::bind(if centre.is_ipv6() { "[::]:0" } else { "0.0.0.0:0" })?;
     let mut program = Samples {
         lines: lines(),
         node,
         stream: Stream::new(given.seed).indexed(u64::from(given.number)),
         refused: None,
     };
-    udp::run_sensor(&socket, centre, &mut link, &mut program)?;
+    match Place::of(&given.centre).map_err(configured(file))? {
+        Place::Udp(address) => {
+            let mut addresses = address.to_socket_addrs().map_err(configured(file))?;
+            let centre = addresses
+                .next()
+                .ok_or_else(|| configured(file)("centre: no address of that name"))?;
+            let mut socket = Udp::bind(if centre.is_ipv6() { "[::]:0" } else { "0.0.0.0:0" })?;
+            run_sensor(&mut socket, &centre, &mut link, &mut program)?;
+        }
+        #[cfg(feature = "mqtt")]
+        Place::Mqtt { broker, fleet } => {
+            let broker = crate::place::mqtt(broker).map_err(configured(file))?;
+            let mut mqtt = fewbits_link::mqtt::Mqtt::sensor(broker, fleet, given.number)?;
+            run_sensor(&mut mqtt, &given.number, &mut link, &mut program)?;
+        }
+        #[cfg(feature = "zenoh")]
+        Place::Zenoh { endpoint, fleet } => {
+            let session = crate::place::zenoh(endpoint, false).map_err(configured(file))?;
+            let mut zenoh = fewbits_link::zenoh::Zenoh::sensor(session, fleet, given.number)?;
+            run_sensor(&mut zenoh, &given.number, &mut link, &mut program)?;
+        }
+    }
     match program.refused {
         Some(error) => Err(error),
         None => Ok(Ending::Good),
@@ -128,7 +145,7 @@ impl Samples {
     }
 }
 
-impl udp::Program for Samples {
+impl Program for Samples {
     /// One line per slot. An empty line, or none that is there yet, is no measurement: silence.
     fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>> {
         let (number, line) = match self.lines.try_recv() {

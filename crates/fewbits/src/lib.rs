@@ -1,7 +1,7 @@
 //! Estimation from sensors that may send only a few bits: one bit per sample, a message only when it matters.
 //!
 //! This crate only re-exports; depend on the single crates if you need one of them. Each is behind a feature of its name,
-//! all but `diffusion` (which builds a sparse solver) on by default:
+//! all but `diffusion` (which builds a sparse solver) and those of `link` (processes) on by default:
 //!
 //! | module | feature | what it is for |
 //! |---|---|---|
@@ -19,7 +19,7 @@
 //! | `pf_mpa` | `pf-mpa` | tracking from quantized ranges |
 //! | `sensor_assignment` | `sensor-assignment` | which sensor sends which bit |
 //! | `record` | `record` | files and frames of many columns within guaranteed errors |
-//! | `link`, `protocol` | `link` | a fusion centre and its sensors as processes: frames, keys, sockets |
+//! | `link`, `protocol` | `link`; `link-mqtt`, `link-zenoh`, `link-live` | a fusion centre and its sensors as processes: frames, keys, sockets; over MQTT, over zenoh, with a page |
 //! | `node` | `node` | the sensor's halves of all schemes, without the standard library |
 //! | `network`, `protocol` | `network` | a simulated network: bits, joules, faults, and every estimator over it |
 //! | `filters`, `models`, `densities` | `filters` | Kalman, particle and exact grid filters, and what they run on |

@@ -16,7 +16,7 @@ pub enum Error {
         #[source]
         source: std::io::Error,
     },
-    /// A socket failed.
+    /// A socket, a broker or a session failed.
     #[error("socket {address}")]
     Socket {
         /// Its address.
@@ -54,4 +54,11 @@ pub enum Error {
     /// The estimator failed before the first slot.
     #[error("the estimator")]
     Estimator(#[source] BoxError),
+}
+
+impl Error {
+    pub(crate) fn socket(address: impl ToString, source: std::io::Error) -> Self {
+        let address = address.to_string();
+        Self::Socket { address, source }
+    }
 }

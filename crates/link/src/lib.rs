@@ -2,8 +2,11 @@
 //!
 //! | use | when |
 //! |---|---|
-//! | [`Station`], [`SensorLink`] | frames under keys and a state that is stored, over a transport of one's own |
-//! | [`udp::run_station`], [`udp::run_sensor`] | the same over UDP, by the clock of the machine |
+//! | [`run_station`], [`run_sensor`] | a centre and its sensors by the clock of the machine, over a [`Transport`] |
+//! | [`Udp`] | datagrams over UDP |
+//! | `mqtt::Mqtt` (feature `mqtt`) | datagrams through a broker: sensors behind networks that let nothing in |
+//! | `zenoh::Zenoh` (feature `zenoh`) | fleets over several hosts, with or without routers |
+//! | [`Station`], [`SensorLink`] | frames under keys and a state that is stored, with sockets and clock of one's own |
 //! | [`FusionReceiver`] | the estimator is the mixed fusion centre of `fewbits-filters` |
 //! | `LivePage` (feature `live`) | people want to see a running centre |
 //! | [`Key`], [`ReplayWindow`], [`Store`] | the parts |
@@ -34,10 +37,17 @@ mod error;
 mod fusion;
 #[cfg(feature = "live")]
 mod live;
+#[cfg(feature = "mqtt")]
+pub mod mqtt;
 mod sensor;
 mod station;
 mod store;
-pub mod udp;
+#[cfg(any(feature = "mqtt", feature = "zenoh"))]
+mod topics;
+mod transport;
+mod udp;
+#[cfg(feature = "zenoh")]
+pub mod zenoh;
 
 pub use envelope::{Direction, ENVELOPE_HEADER, Key, MIN_KEY_BYTES, Refusal, ReplayWindow, TAG_BYTES, sensor_of};
 pub use error::Error;
@@ -47,3 +57,5 @@ pub use live::{HISTORY, LivePage};
 pub use sensor::{Request, SensorLink};
 pub use station::{Counts, Output, Peer, Station, Step};
 pub use store::Store;
+pub use transport::{Datagram, Program, Transport, now, run_sensor, run_station};
+pub use udp::Udp;

@@ -56,10 +56,7 @@ impl LivePage {
     /// # Errors
     /// If the address is taken or none of this machine.
     pub fn serve(address: SocketAddr, numbers: Vec<u32>, period: f64) -> Result<Self, Error> {
-        let failed = |source| Error::Socket {
-            address: address.to_string(),
-            source,
-        };
+        let failed = |source| Error::socket(address, source);
         let listener = std::net::TcpListener::bind(address).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;

@@ -10,7 +10,9 @@ use fewbits_protocol::{
 };
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
+use std::fmt::Display;
 use std::net::SocketAddr;
+use std::str::FromStr;
 
 /// Envelopes of one slot that a centre can send to one sensor.
 const COUNTERS_PER_SLOT: u64 = 1 << 16;
@@ -18,13 +20,13 @@ const STATE_VERSION: u32 = 1;
 
 /// A sensor that a centre takes frames from.
 #[derive(Debug, Clone)]
-pub struct Peer {
+pub struct Peer<A = SocketAddr> {
     /// Its number on the wire.
     pub number: u32,
     /// The key that it shares with the centre.
     pub key: Key,
     /// Where it is, if that is known before it has sent anything.
-    pub address: Option<SocketAddr>,
+    pub address: Option<A>,
 }
 
 /// One slot as it ended.
@@ -72,11 +74,11 @@ impl Step {
 /// What leaves a station.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum Output {
+pub enum Output<A = SocketAddr> {
     /// A datagram.
     Datagram {
         /// To where.
-        to: SocketAddr,
+        to: A,
         /// An envelope.
         bytes: Vec<u8>,
     },
@@ -123,7 +125,7 @@ struct Stored {
     slot: u64,
     windows: Vec<ReplayWindow>,
     /// Where sensors were last: a centre that goes on need not wait until they speak.
-    addresses: Vec<Option<SocketAddr>>,
+    addresses: Vec<Option<String>>,
     receiver: (Vec<u8>, usize),
     last: Option<Step>,
 }
@@ -139,10 +141,10 @@ struct Stored {
 /// with the same store goes on from the last stored step, which it publishes again ([`Station::last_step`]); the slot in which it was stopped
 /// passes, and its reports are lost.
 #[derive(Debug)]
-pub struct Station<R> {
+pub struct Station<R, A = SocketAddr> {
     centre: Centre,
     receiver: R,
-    peers: Vec<Peer>,
+    peers: Vec<Peer<A>>,
     places: HashMap<u32, usize>,
     windows: Vec<ReplayWindow>,
     /// Envelopes sent to each sensor in this slot.
@@ -155,7 +157,7 @@ pub struct Station<R> {
     last: Option<Step>,
 }
 
-impl<R: Receiver> Station<R> {
+impl<R: Receiver, A: Clone + Display + FromStr> Station<R, A> {
     /// A centre with these sensors, in the order of the receiver's. It goes on from the store if that holds anything.
     ///
     /// # Errors
@@ -164,7 +166,7 @@ impl<R: Receiver> Station<R> {
     pub fn new(
         settings: CentreSettings,
         mut receiver: R,
-        mut peers: Vec<Peer>,
+        mut peers: Vec<Peer<A>>,
         store: Option<Store>,
     ) -> Result<Self, Error> {
         let sensors = receiver.sensors();
@@ -209,7 +211,8 @@ impl<R: Receiver> Station<R> {
             centre.resume(stored.slot);
             windows = stored.windows;
             for (peer, stored) in peers.iter_mut().zip(stored.addresses) {
-                peer.address = stored.or(peer.address);
+                let stored = stored.and_then(|address| address.parse().ok());
+                peer.address = stored.or(peer.address.take());
             }
             last = stored.last;
         }
@@ -257,7 +260,7 @@ impl<R: Receiver> Station<R> {
     ///
     /// # Errors
     /// If the store cannot be written: nothing of the step has left then.
-    pub fn on_time(&mut self, now: u64, outputs: &mut Vec<Output>) -> Result<(), Error> {
+    pub fn on_time(&mut self, now: u64, outputs: &mut Vec<Output<A>>) -> Result<(), Error> {
         while let Some(entry) = self.timers.first_entry().filter(|entry| *entry.key() <= now) {
             for timer in entry.remove() {
                 let mut actions = Vec::new();
@@ -272,7 +275,7 @@ impl<R: Receiver> Station<R> {
     ///
     /// # Errors
     /// As [`on_time`](Self::on_time). A datagram that is refused is no error: see [`counts`](Self::counts).
-    pub fn on_datagram(&mut self, from: SocketAddr, bytes: &[u8], outputs: &mut Vec<Output>) -> Result<(), Error> {
+    pub fn on_datagram(&mut self, from: A, bytes: &[u8], outputs: &mut Vec<Output<A>>) -> Result<(), Error> {
         let opened = sensor_of(bytes).ok_or(Refusal::TooShort).and_then(|number| {
             let place = *self.places.get(&number).ok_or(Refusal::Unknown)?;
             let (counter, frame) = self.peers[place].key.open(Direction::ToCentre, bytes)?;
@@ -299,7 +302,7 @@ impl<R: Receiver> Station<R> {
         self.carry_out(actions, outputs)
     }
 
-    fn carry_out(&mut self, actions: Vec<Action>, outputs: &mut Vec<Output>) -> Result<(), Error> {
+    fn carry_out(&mut self, actions: Vec<Action>, outputs: &mut Vec<Output<A>>) -> Result<(), Error> {
         for action in actions {
             match action {
                 Action::SetTimer { at, timer } => self.timers.entry(at).or_default().push(timer),
@@ -331,7 +334,7 @@ impl<R: Receiver> Station<R> {
         Ok(())
     }
 
-    fn predict(&mut self, slot: u64, outputs: &mut Vec<Output>) -> Result<(), Error> {
+    fn predict(&mut self, slot: u64, outputs: &mut Vec<Output<A>>) -> Result<(), Error> {
         self.sent.fill(0);
         // Before anything is sent it is known that the slot has begun.
         self.save()?;
@@ -362,9 +365,9 @@ impl<R: Receiver> Station<R> {
         }
     }
 
-    fn send(&mut self, place: usize, frame: &[u8], outputs: &mut Vec<Output>) {
+    fn send(&mut self, place: usize, frame: &[u8], outputs: &mut Vec<Output<A>>) {
         let peer = &self.peers[place];
-        let Some(to) = peer.address else { return };
+        let Some(to) = peer.address.clone() else { return };
         self.sent[place] += 1;
         // Slots never begin twice, so that no counter is used twice.
         let counter = self.centre.slot() * COUNTERS_PER_SLOT + self.sent[place].min(COUNTERS_PER_SLOT - 1);
@@ -380,7 +383,11 @@ impl<R: Receiver> Station<R> {
             sensors: self.peers.iter().map(|peer| peer.number).collect(),
             slot: self.centre.slot(),
             windows: self.windows.clone(),
-            addresses: self.peers.iter().map(|peer| peer.address).collect(),
+            addresses: self
+                .peers
+                .iter()
+                .map(|peer| peer.address.as_ref().map(A::to_string))
+                .collect(),
             receiver: (state.bytes().to_vec(), state.bits()),
             last: self.last.clone(),
         })

@@ -1,9 +1,9 @@
 //! What an event costs, against a push and a pop of a bare binary heap of as many entries.
 
 use divan::counter::ItemsCount;
-use fewbits_core::BitWriter;
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{Context, Error, Field, Frame, Instant, Kind, Protocol, Radio, SensorId, Setup, Simulator};
+use fewbits_protocol::Payload;
 use fewbits_topology::Deployment;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -47,14 +47,13 @@ impl Protocol for Ticking {
         let now = context.now();
         context.at(Instant(next(now.0)), token);
         if self.reports {
-            let mut bit = BitWriter::new();
-            bit.write_bit(true);
-            context.send(SensorId(token ^ 1), &Frame::new(Kind::Report, 1, 0, bit.finish()))?;
+            let bit = Payload::new(&[0x80], 1).unwrap_or(Payload::EMPTY);
+            context.send(SensorId(token ^ 1), &Frame::new(Kind::Report, 1.into(), 0, bit))?;
         }
         Ok(())
     }
 
-    fn on_frame(&self, node: &mut u32, _: &mut Context<'_>, _: SensorId, _: &Frame) -> Result<(), Error> {
+    fn on_frame(&self, node: &mut u32, _: &mut Context<'_>, _: SensorId, _: &Frame<'_>) -> Result<(), Error> {
         *node += 1;
         Ok(())
     }

@@ -1,6 +1,8 @@
 //! What a node can notice, as it stands in the log.
 
+use crate::error::in_full;
 use crate::units::SensorId;
+use fewbits_protocol as machines;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -59,6 +61,30 @@ pub enum Note {
     Restarted,
     /// The node died.
     Died,
+}
+
+impl Note {
+    pub(crate) fn failed(stage: Stage, slot: u32, error: &machines::BoxError) -> Self {
+        let reason = in_full(&**error);
+        Self::Failed { stage, slot, reason }
+    }
+
+    /// A machine's note of a frame of `with`, in the log's words.
+    pub(crate) fn noticed(with: SensorId, note: machines::Note) -> Self {
+        use machines::Note as Noticed;
+        match note {
+            Noticed::Damaged(_) | Noticed::FutureVersion { .. } => Self::Damaged,
+            Noticed::Duplicate { .. } => Self::Duplicate,
+            Noticed::Late { .. } => Self::Late,
+            Noticed::Disagreement { slot } => Self::Disagreement {
+                with,
+                slot: slot.number(),
+            },
+            Noticed::Retained { slot } => Self::Retained { slot: slot.number() },
+            Noticed::Resynchronised { slot } => Self::Resynchronised { slot: slot.number() },
+            _ => Self::Malformed,
+        }
+    }
 }
 
 /// A step of a slot that can fail.

@@ -142,18 +142,26 @@ impl<'a> Frame<'a> {
         Some(bytes)
     }
 
+    /// What bytes say they carry, unchecked; `None` if there are none.
+    pub fn kind_of(bytes: &[u8]) -> Option<Kind> {
+        // Three bits: always one of the eight.
+        bytes
+            .first()
+            .map(|first| Kind::ALL[usize::from(first >> KIND_SHIFT & 7)])
+    }
+
     /// Reads a frame that takes all of `bytes`. Total: any bytes are a frame or an error.
     ///
     /// # Errors
     /// If the bytes are of another version, too few, fail their check, or use bits that must be zero.
     pub fn decode(bytes: &'a [u8], check: Check) -> Result<Self, DecodeError> {
-        let first = *bytes.first().ok_or(DecodeError::TooShort { found: 0 })?;
+        let (Some(first), Some(kind)) = (bytes.first(), Self::kind_of(bytes)) else {
+            return Err(DecodeError::TooShort { found: 0 });
+        };
         let version = first >> VERSION_SHIFT;
         if version != VERSION {
             return Err(DecodeError::Version { found: version });
         }
-        // Three bits: always one of the eight.
-        let kind = Kind::ALL[usize::from(first >> KIND_SHIFT & 7)];
         let padding = usize::from(first & 7);
         let too_short = DecodeError::TooShort { found: bytes.len() };
         let end = bytes.len().checked_sub(CHECK_BYTES).ok_or(too_short)?;

@@ -20,10 +20,10 @@ fn key(digit: char) -> String {
     digit.to_string().repeat(64)
 }
 
-/// Files of a centre at `port` and of its two sensors; the second has `key` at its side.
-fn written(folder: &Path, port: u16, second: &str) {
+/// Files of a centre at `place` and of its two sensors; the second has the key `second` at its side.
+fn written(folder: &Path, place: &str, second: &str) {
     let centre = format!(
-        "listen = \"127.0.0.1:{port}\"\nperiod = 0.04\nstate = \"centre.state\"\n\
+        "listen = \"{place}\"\nperiod = 0.04\nstate = \"centre.state\"\n\
          model = {{ kind = \"random-walk\", density = 0.01 }}\nprior = {{ mean = [0.0], deviation = [10.0] }}\n\
          [[sensor]]\nnumber = 1\nkey = \"{}\"\ndeviation = 0.5\nreport = {{ kind = \"value\" }}\nloss = 0.1\n\
          [[sensor]]\nnumber = 2\nkey = \"{}\"\ndeviation = 0.5\nreport = {{ kind = \"sign\" }}\nloss = 0.1\n",
@@ -33,7 +33,7 @@ fn written(folder: &Path, port: u16, second: &str) {
     std::fs::write(folder.join("centre.toml"), centre).unwrap();
     for (number, key, kind) in [(1, key('a'), "value"), (2, second.to_owned(), "sign")] {
         let sensor = format!(
-            "centre = \"127.0.0.1:{port}\"\nnumber = {number}\nkey = \"{key}\"\ndeviation = 0.5\n\
+            "centre = \"{place}\"\nnumber = {number}\nkey = \"{key}\"\ndeviation = 0.5\n\
              report = {{ kind = \"{kind}\" }}\nstate = \"sensor{number}.state\"\n"
         );
         std::fs::write(folder.join(format!("sensor{number}.toml")), sensor).unwrap();
@@ -58,8 +58,12 @@ fn run(folder: &Path, slots: &str) -> Output {
     output
 }
 
-fn free_port() -> u16 {
-    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+fn free_place() -> String {
+    UdpSocket::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .to_string()
 }
 
 /// Slot, reports and mean of each row.
@@ -77,8 +81,12 @@ fn rows(output: &Output) -> Vec<(u64, u32, f64)> {
 
 #[test]
 fn centre_estimates_what_its_sensors_read_and_goes_on() {
+    estimates_and_goes_on(&free_place());
+}
+
+fn estimates_and_goes_on(place: &str) {
     let folder = tempfile::tempdir().unwrap();
-    written(folder.path(), free_port(), &key('b'));
+    written(folder.path(), place, &key('b'));
     let first = rows(&run(folder.path(), "75"));
     assert!(first.iter().any(|(_, reports, _)| *reports == 2), "{first:?}");
     let last = *first.last().unwrap();
@@ -89,10 +97,44 @@ fn centre_estimates_what_its_sensors_read_and_goes_on() {
     assert!(second[1].0 > last.0 && (second[1].2 - last.2).abs() < 1.0, "{second:?}");
 }
 
+#[cfg(feature = "mqtt")]
+#[test]
+fn fleet_meets_at_a_broker() {
+    let place = free_place();
+    let (_, port) = place.rsplit_once(':').unwrap();
+    // Debian's place is not on everybody's path.
+    let path = format!("{}:/usr/sbin:/usr/local/sbin", std::env::var("PATH").unwrap_or_default());
+    // Without this the second report of a slot waits 40 ms for the acknowledgement of the first.
+    let folder = tempfile::tempdir().unwrap();
+    let settings = format!("listener {port} 127.0.0.1\nallow_anonymous true\nset_tcp_nodelay true\n");
+    std::fs::write(folder.path().join("broker.conf"), settings).unwrap();
+    let mut command = Command::new("mosquitto");
+    let command = command.args(["-c", "broker.conf"]).current_dir(&folder);
+    let command = command.env("PATH", path).stdout(Stdio::null());
+    let Ok(mut broker) = command.stderr(Stdio::null()).spawn() else {
+        println!("skipped: mosquitto is not installed");
+        return;
+    };
+    while std::net::TcpStream::connect(&place).is_err() {
+        assert!(broker.try_wait().unwrap().is_none(), "the broker has ended");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let outcome = std::panic::catch_unwind(|| estimates_and_goes_on(&format!("mqtt://{place}/plant/hall")));
+    broker.kill().unwrap();
+    broker.wait().unwrap();
+    outcome.unwrap();
+}
+
+#[cfg(feature = "zenoh")]
+#[test]
+fn fleet_meets_over_zenoh() {
+    estimates_and_goes_on(&format!("zenoh://{}/plant", free_place()));
+}
+
 #[test]
 fn sensor_with_another_key_is_not_heard() {
     let folder = tempfile::tempdir().unwrap();
-    written(folder.path(), free_port(), &key('c'));
+    written(folder.path(), &free_place(), &key('c'));
     let rows = rows(&run(folder.path(), "75"));
     assert!(rows.iter().any(|(_, reports, _)| *reports == 1) && rows.iter().all(|(_, reports, _)| *reports < 2));
 }
@@ -100,7 +142,7 @@ fn sensor_with_another_key_is_not_heard() {
 #[test]
 fn configuration_errors_name_file_and_value() {
     let folder = tempfile::tempdir().unwrap();
-    written(folder.path(), 1, &key('b'));
+    written(folder.path(), "127.0.0.1:1", &key('b'));
     let path = folder.path().join("centre.toml");
     let good = std::fs::read_to_string(&path).unwrap();
     for (from, to, said) in [
@@ -109,6 +151,11 @@ fn configuration_errors_name_file_and_value() {
         ("mean = [0.0]", "mean = [0.0, 1.0]", "expected 1 means"),
         ("kind = \"sign\"", "kind = \"sgin\"", "sgin"),
         (&key('b'), "abcd", "key has 2 bytes: expected 32 or more"),
+        ("127.0.0.1:1", "coap://127.0.0.1:1/plant", "coap://127.0.0.1:1/plant: expected host:port"),
+        #[cfg(feature = "mqtt")]
+        ("127.0.0.1:1", "mqtt://127.0.0.1:1", "expected host:port, mqtt://host:port/fleet"),
+        #[cfg(not(feature = "mqtt"))]
+        ("127.0.0.1:1", "mqtt://127.0.0.1:1/plant", "build it with `--features mqtt`"),
     ] {
         std::fs::write(&path, good.replace(from, to)).unwrap();
         let output = start(folder.path(), &["centre", "centre.toml"])

@@ -75,14 +75,20 @@ impl Protocol for Collect {
     fn on_timer(&self, _: &mut u32, air: &mut Air<'_>, token: u32) -> Result<(), fewbits_network::Error> {
         let parent = self.parents[air.id().index()];
         let bit = BitString::from_bytes(vec![0x80], 1)?;
-        air.send(SensorId(parent), &Frame::new(Kind::Report, token, 0, bit))?;
+        air.send(SensorId(parent), &Frame::new(Kind::Report, u64::from(token).into(), 0, (&bit).into()))?;
         if u64::from(token) < self.slots {
             air.at(Instant(air.now().0 + SLOT), token + 1);
         }
         Ok(())
     }
 
-    fn on_frame(&self, node: &mut u32, _: &mut Air<'_>, _: SensorId, _: &Frame) -> Result<(), fewbits_network::Error> {
+    fn on_frame(
+        &self,
+        node: &mut u32,
+        _: &mut Air<'_>,
+        _: SensorId,
+        _: &Frame<'_>,
+    ) -> Result<(), fewbits_network::Error> {
         *node += 1;
         Ok(())
     }

@@ -13,7 +13,7 @@ const WORD_BITS: usize = 4;
 const READMISSION: u32 = 100;
 
 impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
-    /// What one slot says about its sensor, from the belief before.
+    /// What one slot says about its sensor, from the belief before it.
     pub(super) fn watch(
         &self,
         member: &Member<D>,

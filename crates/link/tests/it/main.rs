@@ -6,5 +6,6 @@ mod followed;
 #[cfg(feature = "live")]
 mod live;
 mod stops;
+mod transports;
 mod world;
 mod worlds;

@@ -2,7 +2,7 @@
 
 use crate::world::{Reports, SENSORS, assert_replayed, peers, receiver, settings};
 use crate::worlds::sensors;
-use fewbits_link::{Output, Station, Step, Store, udp};
+use fewbits_link::{Output, Station, Step, Store, Udp, run_station};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::process::{Command, Stdio};
@@ -43,8 +43,8 @@ fn centre_process() {
     if let Some(step) = station.last_step() {
         write(step);
     }
-    let socket = udp::bind(address.as_str()).unwrap();
-    udp::run_station(&socket, &mut station, |_, outputs| {
+    let mut socket = Udp::bind(address.as_str()).unwrap();
+    run_station(&mut socket, &mut station, |_, outputs| {
         for output in outputs {
             if let Output::Step(step) = output {
                 write(step);
@@ -58,7 +58,7 @@ fn centre_process() {
 fn kill(times: u64) {
     let folder = tempfile::tempdir().unwrap();
     // A port that was free a moment ago.
-    let address = udp::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let address = Udp::bind("127.0.0.1:0").unwrap().address();
     let stop = Arc::new(AtomicBool::new(false));
     let threads = sensors(Reports::Signs, address, &stop, &Default::default());
     for i in 0..times {

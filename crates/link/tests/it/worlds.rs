@@ -2,7 +2,7 @@
 
 use crate::world::{Record, Reports, SENSORS, assert_replayed, key, measurement, node, peers, receiver, settings};
 use fewbits_core::BitString;
-use fewbits_link::{Output, SensorLink, Station, Step, udp};
+use fewbits_link::{Output, Program, SensorLink, Station, Step, Transport, Udp, run_sensor, run_station};
 use fewbits_protocol::{Feedback, SensorSettings, Slot};
 use std::collections::HashSet;
 use std::net::UdpSocket;
@@ -23,7 +23,7 @@ pub struct Measuring {
     pub asked: Asked,
 }
 
-impl udp::Program for Measuring {
+impl Program for Measuring {
     fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>> {
         let mut rng = fewbits_monte_carlo::Stream::new(9).rng();
         let sample = measurement(self.number, slot.number());
@@ -46,7 +46,7 @@ pub fn sensors(
         .map(|number| {
             let (stop, asked) = (stop.clone(), asked.clone());
             std::thread::spawn(move || {
-                let socket = udp::bind("127.0.0.1:0").unwrap();
+                let mut socket = Udp::bind("127.0.0.1:0").unwrap();
                 let mut link = SensorLink::new(SensorSettings::new(Feedback::Told), number, key(number), None).unwrap();
                 let mut program = Measuring {
                     number,
@@ -54,7 +54,7 @@ pub fn sensors(
                     stop,
                     asked,
                 };
-                udp::run_sensor(&socket, centre, &mut link, &mut program).unwrap();
+                run_sensor(&mut socket, &centre, &mut link, &mut program).unwrap();
             })
         })
         .collect()
@@ -115,8 +115,8 @@ fn relay(centre: std::net::SocketAddr, stop: Arc<AtomicBool>) -> (std::net::Sock
 }
 
 fn over_udp(reports: Reports, steps: usize) {
-    let socket = udp::bind("127.0.0.1:0").unwrap();
-    let centre = socket.local_addr().unwrap();
+    let mut socket = Udp::bind("127.0.0.1:0").unwrap();
+    let centre = socket.address();
     let stop = Arc::new(AtomicBool::new(false));
     let (relay, lossy) = relay(centre, stop.clone());
     let asked = Asked::default();
@@ -125,15 +125,14 @@ fn over_udp(reports: Reports, steps: usize) {
     let settings = settings(reports, 20_000_000, count as usize);
     let mut station = Station::new(settings, receiver(reports, loss), peers(count), None).unwrap();
     // All sensors have said where they are before the first slot.
-    let (mut known, mut buffer) = (HashSet::new(), [0; 2048]);
-    socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    let mut known = HashSet::new();
     while known.len() < count as usize {
-        let (length, from) = socket.recv_from(&mut buffer).unwrap();
-        station.on_datagram(from, &buffer[..length], &mut Vec::new()).unwrap();
+        let (from, bytes) = socket.receive(Duration::from_secs(20)).unwrap().unwrap();
+        station.on_datagram(from, bytes, &mut Vec::new()).unwrap();
         known.insert(from);
     }
     let mut records: Vec<Step> = Vec::new();
-    udp::run_station(&socket, &mut station, |_, outputs| {
+    run_station(&mut socket, &mut station, |_, outputs| {
         for output in outputs {
             if let Output::Step(step) = output {
                 assert!(step.asked.iter().all(|asked| *asked));

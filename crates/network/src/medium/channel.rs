@@ -4,6 +4,7 @@ use super::loss::Loss;
 use crate::units::Seconds;
 use fewbits_core::{ArgumentError, Link};
 use fewbits_numerics::error::within;
+use fewbits_protocol::Check;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
@@ -151,17 +152,6 @@ pub struct ReceivedCopy {
     pub delay: Seconds,
     /// Indices of the bits that were inverted.
     pub flipped: Vec<u32>,
-}
-
-/// What the frame check covers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Check {
-    /// Header and payload: a frame with an inverted bit is dropped.
-    #[default]
-    Whole,
-    /// The header alone, for schemes whose factor accounts for inverted bits.
-    Header,
 }
 
 #[cfg(test)]

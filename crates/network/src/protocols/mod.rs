@@ -3,5 +3,13 @@
 pub(crate) mod bit_star;
 pub(crate) mod walk;
 
+use crate::error::Error;
+use fewbits_protocol::{Check, Frame};
+
+/// The frame that a machine has written.
+fn decoded(bytes: &[u8]) -> Result<Frame<'_>, Error> {
+    Frame::decode(bytes, Check::Whole).map_err(|error| Error::estimator("protocol", error))
+}
+
 pub use bit_star::{BitNode, BitStar, CentreNode, SensingNode, SlotEstimate, StoredBitNode};
 pub use walk::{Walk, WalkNode};

@@ -1,15 +1,15 @@
 //! A belief that travels, from leader to leader or along a chain of nodes, hop by hop: the machines of `fewbits-protocol` over the simulated radio.
 
-use super::bit_star::translation::{machine_frame, noted, simulated};
+use super::decoded;
 use crate::clock::Clock;
-use crate::error::{Cause, Error, in_full};
-use crate::medium::{Field, Frame};
+use crate::error::{Cause, Error};
+use crate::medium::Field;
 use crate::note::{Note, Stage};
 use crate::simulator::{Context, Protocol, Setup, Simulator, Storable, Ticket};
 use crate::units::{Instant, SensorId};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::error::refuse;
-use fewbits_protocol::{Bearer, Errand, Leader, SLOT_BITS, Slot};
+use fewbits_protocol::{Bearer, Errand, Frame, Leader, SLOT_BITS, Slot};
 use serde::{Deserialize, Serialize};
 
 /// A belief that walks over the network under a [`Leader`].
@@ -101,14 +101,14 @@ impl<L: Leader> Walk<L> {
             for errand in errands {
                 match errand {
                     Errand::SetTimer { at } => context.at(Instant(at), 0),
-                    Errand::Note { with, note } => context.note(noted(SensorId(with), note)),
+                    Errand::Note { with, note } => context.note(Note::noticed(SensorId(with), note)),
                     Errand::Send {
                         destination,
                         name,
                         frame,
                     } => match hop(context, destination)? {
                         Some(hop) => {
-                            let ticket = context.send_now(hop, &simulated(&frame)?)?;
+                            let ticket = context.send_now(hop, &decoded(&frame)?)?;
                             if context.has_acknowledgements() {
                                 node.tickets.push((ticket, name));
                             }
@@ -141,11 +141,7 @@ impl<L: Leader> Walk<L> {
 
     /// Notes that a leader's step failed. Leaders change, so failures count over the whole run.
     fn failed(&self, context: &mut Context<'_>, slot: u32, error: Cause) -> Result<(), Error> {
-        let last = Note::Failed {
-            stage: Stage::Lead,
-            slot,
-            reason: in_full(&*error),
-        };
+        let last = Note::failed(Stage::Lead, slot, &error);
         context.note(last.clone());
         if context.failures() > u64::from(self.last_slot / 2) {
             return Err(Error::MostSlotsFailed {
@@ -184,15 +180,14 @@ impl<L: Leader> Protocol for Walk<L> {
         node: &mut WalkNode,
         context: &mut Context<'_>,
         from: SensorId,
-        frame: &Frame,
+        frame: &Frame<'_>,
     ) -> Result<(), Error> {
-        let known = (frame.destination as usize) < context.field().len();
-        let Some(decoded) = machine_frame(frame).filter(|_| known) else {
+        if (frame.destination as usize) >= context.field().len() {
             context.note(Note::Malformed);
             return Ok(());
-        };
+        }
         let mut errands = Vec::new();
-        node.bearer.on_decoded(context.now().0, from.0, &decoded, &mut errands);
+        node.bearer.on_decoded(context.now().0, from.0, frame, &mut errands);
         self.carry_out(node, context, errands)
     }
 

@@ -4,9 +4,11 @@ use super::core::{BufferPool, SimulatorCore};
 use super::log::{Detail, Entry, Reception, Transmission};
 use super::queue::Arrival;
 use crate::error::Error;
-use crate::medium::{Check, Frame, Kind, Loss, ReceivedCopy, Stored, Transceiver};
+use crate::medium::air::{from_air, payload_bits};
+use crate::medium::{Loss, ReceivedCopy, Stored, Transceiver};
 use crate::units::{Bits, Joules, SensorId};
 use fewbits_core::BitString;
+use fewbits_protocol::Frame;
 use rand::Rng;
 
 /// Bits of a frame's length in a batch.
@@ -53,7 +55,7 @@ impl SimulatorCore {
         };
         let body = Bits(own as u64 + lengths);
         Size {
-            payload: frames.iter().map(payload_bits).sum(),
+            payload: frames.iter().map(|frame| payload_bits(&frame.0) as u64).sum(),
             own,
             link_frames: radio.link_frames(body),
             air: radio.on_air(body),
@@ -255,8 +257,8 @@ impl SimulatorCore {
     fn is_intact(&self, frames: &[Stored], copy: &ReceivedCopy) -> bool {
         copy.flipped.is_empty()
             || frames_of(frames, copy).all(|bits| {
-                let check = Frame::kind_of(&bits).map_or(Check::Whole, |kind| self.check_of(kind));
-                Frame::from_bits(&bits, check).is_ok()
+                let bytes = from_air(&bits);
+                Frame::decode(&bytes, self.check_of(Frame::kind_of(&bytes))).is_ok()
             })
     }
 }
@@ -293,14 +295,4 @@ fn replayed(recorded: Option<Entry>, attempt: &Attempt<'_>, transmission: usize)
         return Err(left("the bits"));
     }
     Ok(recorded.receptions)
-}
-
-fn payload_bits(frame: &Stored) -> u64 {
-    let overhead = match Frame::kind_of(&frame.0) {
-        // The header of the frame within is no payload.
-        Some(Kind::Relayed) => Frame::overhead(Kind::Relayed) + Frame::overhead(Kind::Report),
-        Some(kind) => Frame::overhead(kind),
-        None => 0,
-    };
-    (frame.0.bits() as u64).saturating_sub(u64::from(overhead))
 }

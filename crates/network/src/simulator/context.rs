@@ -3,9 +3,10 @@
 use super::core::{SimulatorCore, Ticket};
 use super::queue::EventKind;
 use crate::error::{Cause, Error};
-use crate::medium::{Field, Frame};
+use crate::medium::Field;
 use crate::note::Note;
 use crate::units::{Instant, Seconds, SensorId};
+use fewbits_protocol::Frame;
 use serde::{Serialize, de::DeserializeOwned};
 
 /// Behaviour of the nodes: one small state machine per node, all under one protocol.
@@ -31,7 +32,7 @@ pub trait Protocol {
         node: &mut Self::Node,
         context: &mut Context<'_>,
         from: SensorId,
-        frame: &Frame,
+        frame: &Frame<'_>,
     ) -> Result<(), Error>;
 
     /// A frame has arrived and failed its check. Slots tell who sent it.
@@ -123,7 +124,7 @@ impl Context<'_> {
     ///
     /// # Errors
     /// [`Error::UnknownNode`], [`Error::SelfLink`], [`Error::OutOfRange`]; if the frame does not fit its format.
-    pub fn send(&mut self, to: SensorId, frame: &Frame) -> Result<Ticket, Error> {
+    pub fn send(&mut self, to: SensorId, frame: &Frame<'_>) -> Result<Ticket, Error> {
         self.core.field.check_link(self.node, to)?;
         self.core.submit(self.node, Some(to), frame)
     }
@@ -132,7 +133,7 @@ impl Context<'_> {
     ///
     /// # Errors
     /// As [`Context::send`].
-    pub fn send_now(&mut self, to: SensorId, frame: &Frame) -> Result<Ticket, Error> {
+    pub fn send_now(&mut self, to: SensorId, frame: &Frame<'_>) -> Result<Ticket, Error> {
         self.core.field.check_link(self.node, to)?;
         self.core.send(self.node, Some(to), frame)
     }
@@ -141,7 +142,7 @@ impl Context<'_> {
     ///
     /// # Errors
     /// If the frame does not fit its format.
-    pub fn broadcast(&mut self, frame: &Frame) -> Result<(), Error> {
+    pub fn broadcast(&mut self, frame: &Frame<'_>) -> Result<(), Error> {
         self.core.submit(self.node, None, frame).map(|_| ())
     }
 

@@ -9,11 +9,12 @@ use super::queue::{Arrival, Event, EventKind, Queue};
 use super::setup::{FaultKind, Setup};
 use crate::error::Error;
 use crate::medium::loss::BurstState;
-use crate::medium::{Check, Field, Kind, ReceivedCopy, Stored};
+use crate::medium::{Field, ReceivedCopy, Stored};
 use crate::note::Note;
 use crate::units::{Instant, Joules, Seconds, SensorId};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
+use fewbits_protocol::{Check, Kind};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -223,9 +224,9 @@ impl SimulatorCore {
         self.is_alive(node) && self.state.out_until[node.index()] <= self.state.now
     }
 
-    pub(super) fn check_of(&self, kind: Kind) -> Check {
+    pub(super) fn check_of(&self, kind: Option<Kind>) -> Check {
         match kind {
-            Kind::Report => self.setup.report_check,
+            Some(Kind::Report) => self.setup.report_check,
             _ => Check::Whole,
         }
     }

@@ -22,11 +22,13 @@ pub use summary::{EstimateError, Summary};
 
 use self::core::{SimulatorCore, State};
 use crate::error::Error;
-use crate::medium::{Check, Field, Frame, Kind};
+use crate::medium::Field;
+use crate::medium::air::from_air;
 use crate::note::Note;
 use crate::units::{Instant, Joules, Seconds, SensorId};
 use fewbits_core::BitString;
 use fewbits_numerics::ArgumentError;
+use fewbits_protocol::Frame;
 use log::{unreadable, unwritable};
 use queue::{Arrival, Event, EventKind};
 use std::io::{Read, Write};
@@ -173,11 +175,8 @@ impl<P: Protocol> Simulator<P> {
         if let Some(frame) = answer {
             self.core.answer(frame, id, from)?;
         }
-        let check = match Frame::kind_of(&bits) {
-            Some(Kind::Report) => self.core.setup.report_check,
-            _ => Check::Whole,
-        };
-        let frame = Frame::from_bits(&bits, check);
+        let bytes = from_air(&bits);
+        let frame = Frame::decode(&bytes, self.core.check_of(Frame::kind_of(&bytes)));
         let mut context = Context {
             core: &mut self.core,
             node: id,

@@ -1,6 +1,6 @@
 //! Events to come, in order, and the frames that are on their way.
 
-use crate::medium::frame::stored;
+use crate::medium::air::stored;
 use crate::units::{Instant, SensorId};
 use fewbits_core::BitString;
 use serde::{Deserialize, Serialize};

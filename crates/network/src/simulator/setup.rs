@@ -2,11 +2,12 @@
 
 use super::log::Detail;
 use crate::error::Error;
-use crate::medium::{Channel, Check, Field, Loss, Radio};
+use crate::medium::{Channel, Field, Loss, Radio};
 use crate::units::{Seconds, SensorId};
 use fewbits_monte_carlo::Stream;
 use fewbits_numerics::ArgumentError;
 use fewbits_numerics::error::{at_least_one, within};
+use fewbits_protocol::Check;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -15,17 +15,18 @@ use super::core::{Batch, Outgoing, SimulatorCore, Ticket};
 use super::log::{Acknowledgement, Detail, Entry};
 use super::queue::EventKind;
 use crate::error::Error;
-use crate::medium::{Frame, Radio, Stored};
+use crate::medium::{Radio, Stored, on_air};
 use crate::units::{Bits, Instant, Seconds, SensorId};
+use fewbits_protocol::Frame;
 
 impl SimulatorCore {
     /// Sends a frame, perhaps later in a batch.
-    pub(super) fn submit(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame) -> Result<Ticket, Error> {
+    pub(super) fn submit(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame<'_>) -> Result<Ticket, Error> {
         let batching = self.setup.batching;
         if batching.max_frames <= 1 {
             return self.send(from, to, frame);
         }
-        let bits = Stored(frame.to_bits(self.check_of(frame.kind))?);
+        let bits = Stored(on_air(frame, self.check_of(Some(frame.kind))));
         let radio = self.setup.radio_of(from);
         if let Some(waiting) = self.state.batches.get(&(from, to)) {
             let together: u64 = waiting
@@ -59,8 +60,8 @@ impl SimulatorCore {
     }
 
     /// Sends a frame as soon as the air is free, alone.
-    pub(super) fn send(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame) -> Result<Ticket, Error> {
-        let bits = Stored(frame.to_bits(self.check_of(frame.kind))?);
+    pub(super) fn send(&mut self, from: SensorId, to: Option<SensorId>, frame: &Frame<'_>) -> Result<Ticket, Error> {
+        let bits = Stored(on_air(frame, self.check_of(Some(frame.kind))));
         let ticket = self.next_ticket();
         self.dispatch(from, to, std::slice::from_ref(&bits), &[ticket])?;
         Ok(ticket)

@@ -27,12 +27,12 @@ impl Protocol for Caller {
 
     fn on_timer(&self, node: &mut Diary, context: &mut Context<'_>, token: u32) -> Result<(), Error> {
         let payload = BitString::from_bytes(vec![0; self.payload.div_ceil(8)], self.payload)?;
-        let ticket = context.send(SensorId(token), &Frame::new(Kind::Report, 1, 0, payload))?;
+        let ticket = context.send(SensorId(token), &Frame::new(Kind::Report, 1.into(), 0, (&payload).into()))?;
         node.sent.push(ticket);
         Ok(())
     }
 
-    fn on_frame(&self, node: &mut Diary, context: &mut Context<'_>, _: SensorId, _: &Frame) -> Result<(), Error> {
+    fn on_frame(&self, node: &mut Diary, context: &mut Context<'_>, _: SensorId, _: &Frame<'_>) -> Result<(), Error> {
         node.received.push(context.now().0);
         Ok(())
     }

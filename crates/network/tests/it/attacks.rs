@@ -5,9 +5,9 @@ use fewbits_core::{BitString, Link};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{
     BitStar, Channel, Check, Clock, Context, Error, Fault, FaultKind, Field, Frame, Instant, Kind, Loss, Note,
-    Protocol, Radio, Seconds, SensorId, Setup, Simulator, Walk,
+    Protocol, Radio, Seconds, SensorId, Setup, Simulator, Walk, on_air,
 };
-use fewbits_protocol::{BoxError, Feedback, Lead, Leader};
+use fewbits_protocol::{BoxError, Feedback, Lead, Leader, Payload};
 use fewbits_topology::Deployment;
 use nalgebra::Vector2;
 use proptest::prelude::*;
@@ -19,18 +19,20 @@ fn star(feedback: Feedback) -> Counted {
     counted(Link::PERFECT, feedback, scalar(3, SLOTS as usize, 1))
 }
 
-fn frame(kind: usize, slot: u32, digest: u32, payload: &[u8], less: usize) -> Frame {
+fn forged(kind: usize, slot: u64, digest: u32, payload: &[u8], less: usize) -> BitString {
     let kinds = [
-        Kind::Question,
+        Kind::Feedback,
         Kind::Report,
         Kind::Echo,
         Kind::Snapshot,
         Kind::Request,
         Kind::Handover,
-        Kind::Beacon,
+        Kind::Heartbeat,
+        Kind::Acknowledgement,
     ];
     let bits = (payload.len() * 8).saturating_sub(less);
-    Frame::new(kinds[kind], slot, digest, BitString::from_bytes(payload.to_vec(), bits).unwrap())
+    let payload = BitString::from_bytes(payload.to_vec(), bits).unwrap();
+    on_air(&Frame::new(kinds[kind], slot.into(), digest, (&payload).into()), Check::Whole)
 }
 
 proptest! {
@@ -38,8 +40,8 @@ proptest! {
     #[test]
     fn noise_and_forged_frames_are_counted_and_dropped(
         noise in prop::collection::vec((prop::collection::vec(any::<u8>(), 0..40), 0_u32..4, 0_u32..4, 0.5..9.5_f64), 1..20),
-        forged in prop::collection::vec(
-            (0_usize..7, 0_u32..12, any::<u32>(), prop::collection::vec(any::<u8>(), 0..40), 0_usize..8, 0_u32..4, 0_u32..4, 0.5..9.5_f64),
+        frames in prop::collection::vec(
+            (0_usize..8, 0_u64..12, any::<u32>(), prop::collection::vec(any::<u8>(), 0..40), 0_usize..8, 0_u32..4, 0_u32..4, 0.5..9.5_f64),
             0..20,
         ),
         echoed in any::<bool>(),
@@ -50,11 +52,11 @@ proptest! {
         let mut bad = 0;
         for (bytes, from, to, t) in noise {
             let bits = BitString::from_bytes(bytes.clone(), bytes.len() * 8).unwrap();
-            bad += u64::from(Frame::from_bits(&bits, Check::Whole).is_err());
+            bad += u64::from(Frame::decode(&bytes, Check::Whole).is_err());
             network.inject(at(t), SensorId(from), SensorId(to), bits).unwrap();
         }
-        for (kind, slot, digest, payload, less, from, to, t) in forged {
-            let bits = frame(kind, slot, digest, &payload, less).to_bits(Check::Whole).unwrap();
+        for (kind, slot, digest, payload, less, from, to, t) in frames {
+            let bits = forged(kind, slot, digest, &payload, less);
             network.inject(at(t), SensorId(from), SensorId(to), bits).unwrap();
         }
         network.run_until(clock().end(SLOTS + 2)).unwrap();
@@ -95,11 +97,11 @@ impl Protocol for Sender {
 
     fn on_timer(&self, (): &mut (), context: &mut Context<'_>, token: u32) -> Result<(), Error> {
         context
-            .send(SensorId(token), &Frame::new(Kind::Beacon, 1, 0, BitString::default()))
+            .send(SensorId(token), &Frame::new(Kind::Heartbeat, 1.into(), 0, Payload::EMPTY))
             .map(|_| ())
     }
 
-    fn on_frame(&self, (): &mut (), _: &mut Context<'_>, _: SensorId, _: &Frame) -> Result<(), Error> {
+    fn on_frame(&self, (): &mut (), _: &mut Context<'_>, _: SensorId, _: &Frame<'_>) -> Result<(), Error> {
         Ok(())
     }
 

@@ -5,10 +5,10 @@ use crate::worlds::{clock, setup};
 use fewbits_core::{BitString, Error, Observation, SensorNode};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{
-    BitNode, BitStar, Channel, Detail, Fault, FaultKind, Field, Frame, Kind, Measurements, Note, Seconds, SensorId,
-    Setup, Simulator,
+    BitNode, BitStar, Channel, Check, Detail, Fault, FaultKind, Field, Frame, Kind, Measurements, Note, Seconds,
+    SensorId, Setup, Simulator, on_air,
 };
-use fewbits_protocol::{BoxError, Feedback, Member, Receiver, ReportLength};
+use fewbits_protocol::{BoxError, Feedback, Member, Payload, Receiver, ReportLength};
 use nalgebra::{SVector, Vector1};
 use rand::Rng;
 
@@ -190,12 +190,16 @@ fn relayed_frames_survive_losses_and_strangers() {
         .simulate_on(line, setup)
         .unwrap();
     for (to, sensor) in (0..4).flat_map(|to| [0, 1, 3, 9].map(|sensor| (to, sensor))) {
-        let report = Frame::new(Kind::Report, 7, 1, BitString::default())
-            .relayed(sensor)
-            .unwrap();
-        let twice = report.relayed(sensor).unwrap();
-        for frame in [report, twice] {
-            let bits = frame.to_bits(fewbits_network::Check::Whole).unwrap();
+        let carrying = |frame: BitString| {
+            let frame = Frame {
+                destination: sensor,
+                ..Frame::new(Kind::Handover, 7.into(), 1, (&frame).into())
+            };
+            on_air(&frame, Check::Whole)
+        };
+        let report = carrying(on_air(&Frame::new(Kind::Report, 7.into(), 1, Payload::EMPTY), Check::Whole));
+        let twice = carrying(report.clone());
+        for bits in [report, twice] {
             network
                 .inject(clock().start(7), SensorId(to ^ 1), SensorId(to), bits)
                 .unwrap();

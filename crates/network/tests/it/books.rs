@@ -132,11 +132,11 @@ impl Protocol for Chatter {
     fn on_timer(&self, _: &mut u32, context: &mut Context<'_>, _: u32) -> Result<(), Error> {
         let bit = BitString::from_bytes(vec![0x80], 1)?;
         context
-            .send(SensorId(0), &Frame::new(Kind::Report, 1, 0, bit))
+            .send(SensorId(0), &Frame::new(Kind::Report, 1.into(), 0, (&bit).into()))
             .map(|_| ())
     }
 
-    fn on_frame(&self, node: &mut u32, _: &mut Context<'_>, _: SensorId, _: &Frame) -> Result<(), Error> {
+    fn on_frame(&self, node: &mut u32, _: &mut Context<'_>, _: SensorId, _: &Frame<'_>) -> Result<(), Error> {
         *node += 1;
         Ok(())
     }

@@ -7,9 +7,9 @@ use fewbits_dymbo::{CountFusion, ParallelEstimator, ParallelFilter};
 use fewbits_monte_carlo::Stream;
 use fewbits_network::{
     BitStar, Channel, Check, Clock, Detail, Error, Fault, FaultKind, Field, Frame, Instant, Kind, Loss, Measurements,
-    Note, Radio, Seconds, SensorId, Setup, Stage, Walk, digest,
+    Note, Radio, Seconds, SensorId, Setup, Stage, Walk, on_air,
 };
-use fewbits_protocol::{BoxError, Feedback, Lead, Leader, OverBits, ReportLength};
+use fewbits_protocol::{BoxError, Feedback, Lead, Leader, OverBits, ReportLength, Slot, digest};
 use fewbits_topology::Deployment;
 use nalgebra::{Vector1, Vector2};
 use rand::Rng;
@@ -233,7 +233,7 @@ impl Leader for Last {
 /// Node 1 is to lead in slot 8. It relays a handover to node 2, which is dead. What cannot be passed on is kept only if it has seen more slots.
 #[test]
 fn a_relay_that_leads_keeps_its_newer_belief() {
-    let leads_after = |relayed: u32| {
+    let leads_after = |relayed: u64| {
         let at = |x: f64| Instant::default().after(Seconds::new(x).unwrap());
         let line = [0.0, 1.0, 2.0].map(|x| Vector2::new(x, 0.0)).to_vec();
         let field = Field::new(&Deployment::given(line).unwrap(), 1.5).unwrap();
@@ -250,14 +250,15 @@ fn a_relay_that_leads_keeps_its_newer_belief() {
         };
         let walk = Walk::new(Last, clock(), 20, Stream::new(1)).unwrap();
         let mut network = walk.simulate(field, SensorId(0), setup).unwrap();
-        let mut handover = |time: f64, destination: u32, slot: u32, byte: u8| {
+        let mut handover = |time: f64, destination: u32, slot: u64, byte: u8| {
+            let slot = Slot::of_count(slot);
             let payload = BitString::from_bytes(vec![byte], 8).unwrap();
             let frame = Frame {
                 destination,
-                ..Frame::new(Kind::Handover, slot, digest(u64::from(slot), &payload), payload)
+                ..Frame::new(Kind::Handover, slot, digest(slot, (&payload).into()), (&payload).into())
             };
             network
-                .inject(at(time), SensorId(0), SensorId(1), frame.to_bits(Check::Whole).unwrap())
+                .inject(at(time), SensorId(0), SensorId(1), on_air(&frame, Check::Whole))
                 .unwrap();
         };
         handover(2.0, 1, 8, 1);

@@ -1,7 +1,7 @@
 //! The fusion centre of a star: what its machine asks for is done on the simulated radio.
 
+use super::super::decoded;
 use super::node::CentreNode;
-use super::translation::{failed, noted, simulated};
 use super::{BitStar, OTHER, SLOT_BEGINS};
 use crate::error::Error;
 use crate::note::{Note, Stage};
@@ -26,9 +26,9 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
                     };
                     context.at(Instant(at), token);
                 }
-                Action::Note { sensor, note } => context.note(noted(SensorId(sensor as u32 + 1), note)),
+                Action::Note { sensor, note } => context.note(Note::noticed(SensorId(sensor as u32 + 1), note)),
                 Action::Send { to, frame } => {
-                    let frame = simulated(&frame)?;
+                    let frame = decoded(&frame)?;
                     match to {
                         Recipient::All => context.broadcast(&frame)?,
                         Recipient::Sensor(i) => self.send_down(context, SensorId(i as u32 + 1), &frame)?,
@@ -42,7 +42,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
                         self.carry_out(centre, context, sent)?;
                     }
                     Err(error) => {
-                        let note = failed(Stage::Prediction, slot as u32, &error);
+                        let note = Note::failed(Stage::Prediction, slot as u32, &error);
                         centre.failures.note(context, slots, note)?;
                     }
                 },
@@ -55,7 +55,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
                             context.note(Note::SilenceIgnored { slot, reason });
                         }
                         Outcome::Failed(error) => {
-                            let note = failed(Stage::Update, slot, &error);
+                            let note = Note::failed(Stage::Update, slot, &error);
                             centre.failures.note(context, slots, note)?;
                         }
                     }

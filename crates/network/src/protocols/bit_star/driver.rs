@@ -1,15 +1,16 @@
 //! Events of the simulator as those of the machines, and nodes as a snapshot has them.
 
+use super::super::decoded;
 use super::node::{BitNode, CentreNode, SensingNode, StoredBitNode, StoredNode};
+use super::relay::is_for_all;
 use super::routes::CENTRE;
-use super::translation::{is_for_all, machine_frame};
 use super::{BitStar, SLOT_BEGINS};
 use crate::error::Error;
-use crate::medium::{Frame, Kind};
+use crate::medium::air::carried;
 use crate::note::Note;
 use crate::simulator::{Context, Protocol, Storable};
 use crate::units::SensorId;
-use fewbits_protocol::{BoxError, CentreTimer, Receiver, SensorTimer, Slot};
+use fewbits_protocol::{BoxError, CentreTimer, Frame, Kind, Receiver, SensorTimer, Slot};
 
 impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
     type Node = BitNode<R, M>;
@@ -55,23 +56,21 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
         node: &mut Self::Node,
         context: &mut Context<'_>,
         from: SensorId,
-        frame: &Frame,
+        frame: &Frame<'_>,
     ) -> Result<(), Error> {
-        let unwrapped;
-        let addressed = frame.kind == Kind::Relayed;
-        let (from, frame) = match frame.kind {
-            Kind::Relayed => match self.relay(context, frame)? {
-                Some((origin, inner)) => {
-                    unwrapped = inner;
-                    (origin, &unwrapped)
-                }
+        let bytes = carried(frame);
+        let inner = bytes.as_deref().and_then(|bytes| decoded(bytes).ok());
+        let (from, frame, addressed) = match (frame.kind, &inner) {
+            (Kind::Handover, Some(inner)) => match self.relay(context, frame, inner)? {
+                Some(origin) => (origin, inner, true),
                 None => return Ok(()),
             },
-            _ => (from, frame),
-        };
-        let Some(decoded) = machine_frame(frame) else {
-            context.note(Note::Malformed);
-            return Ok(());
+            // In a star no belief walks.
+            (Kind::Handover, None) => {
+                context.note(Note::Malformed);
+                return Ok(());
+            }
+            _ => (from, frame, false),
         };
         match node {
             BitNode::Centre(centre) => {
@@ -83,11 +82,11 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
                     return Ok(());
                 }
                 let recorded = self.arrives.as_ref().filter(|_| frame.kind == Kind::Report);
-                if recorded.is_some_and(|arrives| !arrives(frame.slot, sensor)) {
+                if recorded.is_some_and(|arrives| !arrives(frame.slot.number(), sensor)) {
                     return Ok(());
                 }
                 let mut actions = Vec::new();
-                centre.machine.on_decoded(sensor, &decoded, &mut actions);
+                centre.machine.on_decoded(sensor, frame, &mut actions);
                 self.carry_out(centre, context, actions)
             }
             // Frames of other sensors are in range, and for the centre.
@@ -96,7 +95,7 @@ impl<R: Receiver, const M: usize> Protocol for BitStar<R, M> {
                 if !addressed {
                     self.pass_on(sensor, context, from, frame)?;
                 }
-                let reaction = sensor.machine.on_decoded(context.now().0, decoded);
+                let reaction = sensor.machine.on_decoded(context.now().0, *frame);
                 self.react(sensor, context, reaction)
             }
         }

@@ -1,7 +1,7 @@
 //! A star whose nodes run the state machines of `fewbits-protocol`: the machines of real sensors.
 //!
 //! `driver` hands the simulator's events to the machines, `centre` and `sensor` do what these ask for, `relay` passes frames on along
-//! `routes`, `node` has what they hold, `translation` their frames and notes.
+//! `routes`, `node` has what they hold.
 
 mod centre;
 mod driver;
@@ -9,21 +9,20 @@ mod node;
 mod relay;
 mod routes;
 mod sensor;
-pub(crate) mod translation;
 
 pub use node::{BitNode, CentreNode, SensingNode, SlotEstimate, StoredBitNode};
 
 use crate::clock::Clock;
 use crate::error::Error;
 use crate::measurements::Measurements;
-use crate::medium::{Field, Frame, Kind};
+use crate::medium::Field;
 use crate::simulator::transmission::air_time;
 use crate::simulator::{Setup, Simulator};
 use crate::units::{Bits, Instant, Seconds, SensorId};
 use fewbits_core::{Scheme, SchemeNode, SensorNode};
 use fewbits_monte_carlo::Stream;
 use fewbits_protocol::{
-    BoxError, Centre, CentreSettings, Feedback, Member, Receiver, ReportLength, Sensor, SensorSettings,
+    BoxError, Centre, CentreSettings, Feedback, Kind, Member, Receiver, ReportLength, Sensor, SensorSettings,
 };
 use nalgebra::SVector;
 use node::Failures;
@@ -285,13 +284,13 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         let members = || self.members.iter().zip(&told);
         let mut bodies: Vec<u64> = members()
             .filter(|(member, _)| member.feedback == Feedback::Told)
-            .map(|(_, told)| u64::from(Frame::overhead(Kind::Question)) + told.bits() as u64)
+            .map(|(_, told)| (8 * Kind::Feedback.overhead() + told.bits()) as u64)
             .collect();
         if bodies.len() == told.len() && told.windows(2).all(|pair| pair[0] == pair[1]) {
             bodies.truncate(1);
         }
-        bodies.extend(state.map(|_| u64::from(Frame::overhead(Kind::Echo)) + told.len() as u64));
-        let (report, relayed) = (u64::from(Frame::overhead(Kind::Report)), u64::from(Frame::overhead(Kind::Relayed)));
+        bodies.extend(state.map(|_| (8 * Kind::Echo.overhead() + told.len()) as u64));
+        let (report, relayed) = (8 * Kind::Report.overhead() as u64, 8 * Kind::Handover.overhead() as u64);
         for hops in hops.iter().copied() {
             bodies.extend(std::iter::repeat_n(report + if hops > 1 { relayed } else { 0 }, hops));
         }

@@ -3,12 +3,23 @@
 use super::BitStar;
 use super::node::SensingNode;
 use super::routes::{CENTRE, Routes};
-use super::translation::{goes_up, is_for_all};
 use crate::error::Error;
-use crate::medium::{Check, Field, Frame, Kind};
+use crate::medium::Field;
+use crate::medium::air::{carrying, on_air};
 use crate::note::Note;
 use crate::simulator::Context;
 use crate::units::SensorId;
+use fewbits_protocol::{Check, Frame, Kind};
+
+/// Whether sensors send frames of this kind to the centre, and not the other way.
+fn goes_up(kind: Kind) -> bool {
+    matches!(kind, Kind::Report | Kind::Request | Kind::Heartbeat)
+}
+
+/// Whether the centre sends frames of this kind to all sensors.
+pub(super) fn is_for_all(kind: Kind) -> bool {
+    matches!(kind, Kind::Feedback | Kind::Echo | Kind::Snapshot | Kind::Heartbeat)
+}
 
 impl<R, const M: usize> BitStar<R, M> {
     /// The routes, if sensors relay.
@@ -24,38 +35,44 @@ impl<R, const M: usize> BitStar<R, M> {
     }
 
     /// Sends a sensor's frame to the centre.
-    pub(super) fn send_up(&self, context: &mut Context<'_>, frame: &Frame) -> Result<(), Error> {
+    pub(super) fn send_up(&self, context: &mut Context<'_>, frame: &Frame<'_>) -> Result<(), Error> {
         match self.parent(context) {
             CENTRE => context.send(CENTRE, frame).map(drop),
             parent => {
-                let relayed = frame.relayed(context.id().0)?;
-                context.send(parent, &relayed).map(drop)
+                let bits = on_air(frame, Check::Whole);
+                context.send(parent, &carrying(frame, &bits, context.id())).map(drop)
             }
         }
     }
 
     /// Sends a frame of the centre to one sensor. Where sensors relay it is always addressed: others are for all.
-    pub(super) fn send_down(&self, context: &mut Context<'_>, to: SensorId, frame: &Frame) -> Result<(), Error> {
+    pub(super) fn send_down(&self, context: &mut Context<'_>, to: SensorId, frame: &Frame<'_>) -> Result<(), Error> {
         match self.routes(context.field()).map(|routes| routes.down(CENTRE, to)) {
             None => context.send(to, frame).map(drop),
-            Some(hop) => context.send(hop, &frame.relayed(to.0)?).map(drop),
+            Some(hop) => {
+                let bits = on_air(frame, Check::Whole);
+                context.send(hop, &carrying(frame, &bits, to)).map(drop)
+            }
         }
     }
 
-    /// A relayed frame has arrived. Returns the frame within, and whom it is from, where it has come to its end; passes it on elsewhere.
-    pub(super) fn relay(&self, context: &mut Context<'_>, frame: &Frame) -> Result<Option<(SensorId, Frame)>, Error> {
+    /// A frame has arrived that carries another one, `inner`. Returns whom that is from where it has come to its end; passes it on elsewhere.
+    pub(super) fn relay(
+        &self,
+        context: &mut Context<'_>,
+        frame: &Frame<'_>,
+        inner: &Frame<'_>,
+    ) -> Result<Option<SensorId>, Error> {
         let (id, sensor) = (context.id(), SensorId(frame.destination));
-        let inner = Frame::from_bits(&frame.payload, Check::Whole);
-        let inner = inner.ok().filter(|inner| inner.kind != Kind::Relayed);
-        let (Some(inner), Some(routes)) = (inner, self.routes(context.field())) else {
+        let Some(routes) = self.routes(context.field()) else {
             context.note(Note::Malformed);
             return Ok(None);
         };
         let exists = sensor != CENTRE && sensor.index() < context.field().len();
         match (goes_up(inner.kind), exists) {
             (_, false) => context.note(Note::Malformed),
-            (true, _) if id == CENTRE => return Ok(Some((sensor, inner))),
-            (false, _) if id == sensor => return Ok(Some((CENTRE, inner))),
+            (true, _) if id == CENTRE => return Ok(Some(sensor)),
+            (false, _) if id == sensor => return Ok(Some(CENTRE)),
             (true, _) => drop(context.send(routes.parent(id), frame)?),
             (false, _) => {
                 let hop = routes.down(id, sensor);
@@ -74,11 +91,14 @@ impl<R, const M: usize> BitStar<R, M> {
         sensor: &mut SensingNode<R, M>,
         context: &mut Context<'_>,
         from: SensorId,
-        frame: &Frame,
+        frame: &Frame<'_>,
     ) -> Result<(), Error> {
         let passes = |routes: &Routes| routes.passes[context.id().index()] && from == routes.parent(context.id());
-        if is_for_all(frame.kind) && frame.slot > sensor.passed && self.routes(context.field()).is_some_and(passes) {
-            sensor.passed = frame.slot;
+        if is_for_all(frame.kind)
+            && frame.slot.number() > sensor.passed
+            && self.routes(context.field()).is_some_and(passes)
+        {
+            sensor.passed = frame.slot.number();
             context.broadcast(frame)?;
         }
         Ok(())

@@ -2,7 +2,6 @@
 
 use super::node::SensingNode;
 use super::routes::CENTRE;
-use super::translation::{failed, noted, of};
 use super::{BitStar, OTHER, SLOT_BEGINS};
 use crate::error::Error;
 use crate::note::{Note, Stage};
@@ -28,12 +27,12 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
             context.at(Instant(at), token);
         }
         if let Some(note) = reaction.note {
-            context.note(noted(CENTRE, note));
+            context.note(Note::noticed(CENTRE, note));
         }
         match reaction.task {
             // The radio repeats by itself.
             Task::Wait | Task::SendAgain => Ok(()),
-            Task::Send(frame) => self.send_up(context, &of(&frame)),
+            Task::Send(frame) => self.send_up(context, &frame),
             Task::Follow { slot, kind, payload } => {
                 let followed = |replica| self.followed(replica, slot, kind, payload.into()).ok();
                 let state = sensor.replica.as_mut().and_then(followed);
@@ -69,7 +68,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         let feedback = match feedback {
             Ok(feedback) => feedback,
             Err(error) => {
-                let note = failed(Stage::Prediction, slot, &error);
+                let note = Note::failed(Stage::Prediction, slot, &error);
                 return sensor.failures.note(context, slots, note).map(|()| None);
             }
         };
@@ -87,7 +86,7 @@ impl<R: Receiver, const M: usize> BitStar<R, M> {
         match reported {
             Some(Ok(report)) => Ok(report),
             Some(Err(error)) => {
-                let note = failed(Stage::Report, slot, &error.into());
+                let note = Note::failed(Stage::Report, slot, &error.into());
                 sensor.failures.note(context, slots, note).map(|()| None)
             }
             None => {

@@ -1,0 +1,84 @@
+//! Where a centre and its sensors meet, as their files say it.
+
+#[cfg(feature = "mqtt")]
+use fewbits_link::mqtt::rumqttc::MqttOptions;
+#[cfg(feature = "zenoh")]
+use fewbits_link::zenoh::zenoh::{Config, Session, Wait};
+
+/// `host:port`, `mqtt://[user:password@]host[:port]/fleet` or `zenoh://host:port/fleet`.
+pub(crate) enum Place<'a> {
+    Udp(&'a str),
+    #[cfg(feature = "mqtt")]
+    Mqtt {
+        broker: &'a str,
+        fleet: &'a str,
+    },
+    #[cfg(feature = "zenoh")]
+    Zenoh {
+        endpoint: &'a str,
+        fleet: &'a str,
+    },
+}
+
+impl<'a> Place<'a> {
+    pub(crate) fn of(text: &'a str) -> Result<Self, String> {
+        let Some((kind, rest)) = text.split_once("://") else {
+            return Ok(Self::Udp(text));
+        };
+        match (kind, rest.split_once('/')) {
+            #[cfg(feature = "mqtt")]
+            ("mqtt", Some((broker, fleet))) => Ok(Self::Mqtt { broker, fleet }),
+            #[cfg(feature = "zenoh")]
+            ("zenoh", Some((endpoint, fleet))) => Ok(Self::Zenoh { endpoint, fleet }),
+            #[cfg(not(feature = "mqtt"))]
+            ("mqtt", _) => Err(format!("{text}: this program was built without it: build it with `--features mqtt`")),
+            #[cfg(not(feature = "zenoh"))]
+            ("zenoh", _) => Err(format!("{text}: this program was built without it: build it with `--features zenoh`")),
+            _ => Err(format!("{text}: expected host:port, mqtt://host:port/fleet or zenoh://host:port/fleet")),
+        }
+    }
+}
+
+/// How to reach a broker: `[user:password@]host[:port]`.
+#[cfg(feature = "mqtt")]
+pub(crate) fn mqtt(broker: &str) -> Result<MqttOptions, String> {
+    let (login, address) = match broker.rsplit_once('@') {
+        Some((login, address)) => (Some(login), address),
+        None => (None, broker),
+    };
+    // The colons of an address of version 6 stand in brackets.
+    let (host, port) = match address.rsplit_once(':').filter(|(_, port)| !port.ends_with(']')) {
+        Some((host, port)) => (host, port.parse().map_err(|_| format!("broker {address}: no port"))?),
+        None => (address, 1883),
+    };
+    // Without a name the broker gives one, so that no two ends have the same.
+    let mut options = MqttOptions::new("", host.trim_matches(['[', ']']), port);
+    if let Some((user, password)) = login.map(|login| login.split_once(':').unwrap_or((login, ""))) {
+        options.set_credentials(user, password);
+    }
+    Ok(options)
+}
+
+/// A session that listens at `endpoint`, `host:port`, or connects to it as soon as somebody listens there.
+#[cfg(feature = "zenoh")]
+pub(crate) fn zenoh(endpoint: &str, listens: bool) -> Result<Session, Box<dyn std::error::Error>> {
+    let endpoint = format!("[{:?}]", format!("tcp/{endpoint}"));
+    let (listen, connect) = if listens {
+        (&*endpoint, "[]")
+    } else {
+        ("[]", &*endpoint)
+    };
+    let mut config = Config::default();
+    let settings = [
+        ("mode", "\"peer\""),
+        ("scouting/multicast/enabled", "false"),
+        ("listen/endpoints", listen),
+        ("connect/endpoints", connect),
+    ];
+    for (name, value) in settings {
+        config.insert_json5(name, value).map_err(|error| error.to_string())?;
+    }
+    Ok(fewbits_link::zenoh::zenoh::open(config)
+        .wait()
+        .map_err(|error| error.to_string())?)
+}

@@ -1,0 +1,132 @@
+//! Datagrams through an MQTT broker.
+
+use crate::error::Error;
+use crate::topics::{QUEUE, Queue, Topics};
+use crate::transport::{Datagram, Transport};
+pub use rumqttc;
+use rumqttc::mqttbytes::v4::SubscribeReasonCode;
+use rumqttc::{Client, ConnectionError, Event, MqttOptions, NetworkOptions, Packet, QoS};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
+
+/// The longest message that does not end the connection. What is longer than a datagram is left alone.
+const MAX_MESSAGE: usize = 1 << 20;
+const CONNECT_WITHIN: Duration = Duration::from_secs(10);
+const RECONNECT_AFTER: Duration = Duration::from_secs(1);
+
+/// One end's connection to a broker. An address is the number of the sensor, at either end.
+///
+/// Sensor 3 of the fleet `plant` sends on the topic `plant/3/up` and is told on `plant/3/down`, both with quality of service 0: the protocol has
+/// its own answer to lost frames, and a frame that comes after its slot is of no use. When the connection ends a thread makes it anew, and what is
+/// sent meanwhile is lost.
+pub struct Mqtt {
+    client: Arc<Client>,
+    is_connected: Arc<AtomicBool>,
+    topics: Topics,
+    queue: Queue,
+}
+
+impl std::fmt::Debug for Mqtt {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Mqtt")
+            .field("topics", &self.topics)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Mqtt {
+    /// The centre of a fleet. Sizes of messages and the kind of session are set here.
+    ///
+    /// # Errors
+    /// If the fleet's name has an empty part or one of `+ # * $ ?`, or the broker does not answer or refuses.
+    pub fn centre(options: MqttOptions, fleet: &str) -> Result<Self, Error> {
+        Self::connect(options, Topics::new(fleet, None)?)
+    }
+
+    /// A sensor of a fleet.
+    ///
+    /// # Errors
+    /// As [`centre`](Self::centre).
+    pub fn sensor(options: MqttOptions, fleet: &str, number: u32) -> Result<Self, Error> {
+        Self::connect(options, Topics::new(fleet, Some(number))?)
+    }
+
+    fn connect(mut options: MqttOptions, topics: Topics) -> Result<Self, Error> {
+        options
+            .set_max_packet_size(MAX_MESSAGE, MAX_MESSAGE)
+            .set_clean_session(true);
+        let (host, port) = options.broker_address();
+        let failed = |source| Error::socket(format!("{host}:{port}"), source);
+        let (client, mut connection) = Client::new(options, QUEUE);
+        let mut network = NetworkOptions::new();
+        network.set_tcp_nodelay(true);
+        connection.eventloop.set_network_options(network);
+        let (client, is_connected) = (Arc::new(client), Arc::new(AtomicBool::new(false)));
+        let (inlet, queue) = Queue::new(topics.clone());
+        let (sender, outcome) = mpsc::channel();
+        // The thread ends with the last client: it keeps none.
+        let (weak, connected, filter) = (Arc::downgrade(&client), is_connected.clone(), topics.from("+"));
+        std::thread::spawn(move || {
+            let mut must_subscribe = false;
+            for event in connection.iter() {
+                match event {
+                    Ok(Event::Incoming(Packet::Publish(message))) => inlet.leave(&message.topic, message.payload),
+                    // The broker keeps nothing of a session that has ended.
+                    Ok(Event::Incoming(Packet::ConnAck(_))) => must_subscribe = true,
+                    Ok(Event::Incoming(Packet::SubAck(answer))) => {
+                        let refused = answer.return_codes.contains(&SubscribeReasonCode::Failure);
+                        connected.store(!refused, Ordering::Relaxed);
+                        let refusal = std::io::Error::other(format!("the broker refuses the topic {filter}"));
+                        let _ = sender.send(if refused { Err(refusal) } else { Ok(()) });
+                    }
+                    Ok(_) => {}
+                    Err(error) => {
+                        connected.store(false, Ordering::Relaxed);
+                        let error = match error {
+                            ConnectionError::Io(error) => error,
+                            error => std::io::Error::other(error),
+                        };
+                        let _ = sender.send(Err(error));
+                        if weak.strong_count() == 0 {
+                            return;
+                        }
+                        std::thread::sleep(RECONNECT_AFTER);
+                    }
+                }
+                // If there is no place for the request, it is made after the next event.
+                if must_subscribe && let Some(client) = weak.upgrade() {
+                    must_subscribe = client.try_subscribe(&filter, QoS::AtMostOnce).is_err();
+                }
+            }
+        });
+        let slow = |_| Err(std::io::ErrorKind::TimedOut.into());
+        outcome
+            .recv_timeout(CONNECT_WITHIN)
+            .unwrap_or_else(slow)
+            .map_err(failed)?;
+        Ok(Self {
+            client,
+            is_connected,
+            topics,
+            queue,
+        })
+    }
+}
+
+impl Transport for Mqtt {
+    type Address = u32;
+
+    fn send(&mut self, to: &u32, bytes: &[u8]) {
+        // What waited for a connection would come after its slot.
+        if self.is_connected.load(Ordering::Relaxed) {
+            let _ = self
+                .client
+                .try_publish(self.topics.to(*to), QoS::AtMostOnce, false, bytes);
+        }
+    }
+
+    fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, u32>>, Error> {
+        Ok(self.queue.receive(wait))
+    }
+}

@@ -1,0 +1,96 @@
+//! What transports over named topics share: sensor 3 of the fleet `plant` sends on `plant/3/up` and is told on `plant/3/down`.
+
+use crate::error::Error;
+use crate::transport::{Datagram, MAX_DATAGRAM};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// Datagrams that wait to be taken. More are lost, so that a flood takes no memory.
+pub(crate) const QUEUE: usize = 4096;
+
+/// The topics of one end. An address is the number of the sensor at one end of them.
+#[derive(Debug, Clone)]
+pub(crate) struct Topics {
+    fleet: String,
+    /// `None` at the centre.
+    sensor: Option<u32>,
+}
+
+impl Topics {
+    /// # Errors
+    /// If the name of the fleet has an empty part or a character with which one name stands for many.
+    pub(crate) fn new(fleet: &str, sensor: Option<u32>) -> Result<Self, Error> {
+        if fleet.split('/').any(str::is_empty) || fleet.contains(|c: char| "+#*$?".contains(c) || c.is_control()) {
+            return Err(Error::Argument {
+                name: "fleet",
+                value: fleet.to_owned(),
+                expected: "parts separated by `/`, none empty, without `+ # * $ ?`".to_owned(),
+            });
+        }
+        let fleet = fleet.to_owned();
+        Ok(Self { fleet, sensor })
+    }
+
+    fn ways(&self) -> (&'static str, &'static str) {
+        match self.sensor {
+            None => ("down", "up"),
+            Some(_) => ("up", "down"),
+        }
+    }
+
+    /// The topic on which this end sends.
+    pub(crate) fn to(&self, sensor: u32) -> String {
+        format!("{}/{sensor}/{}", self.fleet, self.ways().0)
+    }
+
+    /// The topics on which this end takes datagrams; `any` stands for any number.
+    pub(crate) fn from(&self, any: &str) -> String {
+        let sensor = self.sensor.map_or_else(|| any.to_owned(), |sensor| sensor.to_string());
+        format!("{}/{sensor}/{}", self.fleet, self.ways().1)
+    }
+
+    /// The sensor that a topic names on which a datagram has come.
+    fn sensor_of(&self, topic: &str) -> Option<u32> {
+        let rest = topic.strip_prefix(&self.fleet)?.strip_prefix('/')?;
+        rest.strip_suffix(self.ways().1)?.strip_suffix('/')?.parse().ok()
+    }
+}
+
+/// Where a thread of the transport leaves datagrams.
+pub(crate) struct Inlet {
+    topics: Topics,
+    sender: mpsc::SyncSender<(u32, Vec<u8>)>,
+}
+
+impl Inlet {
+    pub(crate) fn leave(&self, topic: &str, bytes: impl AsRef<[u8]> + Into<Vec<u8>>) {
+        if let Some(sensor) = self
+            .topics
+            .sensor_of(topic)
+            .filter(|_| bytes.as_ref().len() <= MAX_DATAGRAM)
+        {
+            let _ = self.sender.try_send((sensor, bytes.into()));
+        }
+    }
+}
+
+/// Datagrams that have come.
+#[derive(Debug)]
+pub(crate) struct Queue {
+    receiver: mpsc::Receiver<(u32, Vec<u8>)>,
+    last: Vec<u8>,
+}
+
+impl Queue {
+    pub(crate) fn new(topics: Topics) -> (Inlet, Self) {
+        let (sender, receiver) = mpsc::sync_channel(QUEUE);
+        let last = Vec::new();
+        (Inlet { topics, sender }, Self { receiver, last })
+    }
+
+    pub(crate) fn receive(&mut self, wait: Duration) -> Option<Datagram<'_, u32>> {
+        let (sensor, bytes) = self.receiver.recv_timeout(wait).ok()?;
+        self.last = bytes;
+        Some((sensor, &self.last))
+    }
+}

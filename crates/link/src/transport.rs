@@ -1,0 +1,146 @@
+//! What carries datagrams, and the loops that run a station or a sensor over it by the clock of the machine.
+
+use crate::error::Error;
+use crate::sensor::{Request, SensorLink};
+use crate::station::{Output, Station};
+use fewbits_core::BitString;
+use fewbits_protocol::{Note, Receiver, Slot};
+use std::fmt::{Debug, Display};
+use std::ops::ControlFlow;
+use std::str::FromStr;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// Bytes of the longest datagram.
+pub(crate) const MAX_DATAGRAM: usize = 65_535;
+/// Datagrams that are taken before timers are looked at again: a flood does not hold up a slot.
+const BATCH: usize = 256;
+/// The longest wait: whoever watches is asked ten times a second.
+const MAX_WAIT: Duration = Duration::from_millis(100);
+const HELLO_EVERY: Duration = Duration::from_secs(1);
+
+/// Where a datagram has come from, and its bytes.
+pub type Datagram<'a, A> = (A, &'a [u8]);
+
+/// What carries datagrams between a centre and its sensors. It may lose, repeat and reorder them.
+pub trait Transport {
+    /// Where a datagram goes, or has come from. A station stores it as text; text that is none is an address that is not known.
+    type Address: Clone + PartialEq + Debug + Display + FromStr;
+
+    /// Sends a datagram. Does not wait: what cannot be sent is lost.
+    fn send(&mut self, to: &Self::Address, bytes: &[u8]);
+
+    /// The next datagram; `None` if none comes within `wait`.
+    ///
+    /// # Errors
+    /// If none can come any more.
+    fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, Self::Address>>, Error>;
+}
+
+/// Nanoseconds since 1970.
+pub fn now() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// Waits for datagrams until `until`, and takes those that are there.
+fn receive<T: Transport>(
+    transport: &mut T,
+    until: u64,
+    mut take: impl FnMut(T::Address, &[u8]) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let mut wait = Duration::from_nanos(until.saturating_sub(now())).clamp(Duration::from_micros(50), MAX_WAIT);
+    for _ in 0..BATCH {
+        let Some((from, bytes)) = transport.receive(wait)? else {
+            break;
+        };
+        take(from, bytes)?;
+        if now() >= until {
+            break;
+        }
+        wait = Duration::ZERO;
+    }
+    Ok(())
+}
+
+/// Runs a station until `watch` breaks. `watch` sees every step and note once it is stored, and is asked at least ten times a second with an empty list.
+///
+/// # Errors
+/// If the transport or the store fails.
+pub fn run_station<R: Receiver, T: Transport>(
+    transport: &mut T,
+    station: &mut Station<R, T::Address>,
+    mut watch: impl FnMut(&Station<R, T::Address>, &[Output<T::Address>]) -> ControlFlow<()>,
+) -> Result<(), Error> {
+    let mut outputs = Vec::new();
+    loop {
+        station.on_time(now(), &mut outputs)?;
+        for output in &outputs {
+            if let Output::Datagram { to, bytes } = output {
+                transport.send(to, bytes);
+            }
+        }
+        if watch(station, &outputs).is_break() {
+            return Ok(());
+        }
+        outputs.clear();
+        let until = station.next_timer().unwrap_or(u64::MAX);
+        receive(transport, until, |from, bytes| station.on_datagram(from, bytes, &mut outputs))?;
+    }
+}
+
+/// What a sensor's program does.
+pub trait Program {
+    /// Measures in a slot and encodes the report; `None` is silence. Break if there is nothing more to measure.
+    fn sample(&mut self, slot: Slot, feedback: &BitString) -> ControlFlow<(), Option<BitString>>;
+
+    /// Writes down what was noticed.
+    fn note(&mut self, _: Note) {}
+
+    /// Asked at least ten times a second whether to go on.
+    fn goes_on(&mut self) -> bool {
+        true
+    }
+}
+
+/// Runs a sensor until its program breaks. Datagrams that are not from `centre` are left alone.
+///
+/// # Errors
+/// If the transport or the store fails.
+pub fn run_sensor<T: Transport>(
+    transport: &mut T,
+    centre: &T::Address,
+    link: &mut SensorLink,
+    program: &mut impl Program,
+) -> Result<(), Error> {
+    let mut requests = Vec::new();
+    let mut hello_at = 0;
+    while program.goes_on() {
+        if now() >= hello_at {
+            requests.push(link.hello()?);
+            hello_at = now() + HELLO_EVERY.as_nanos() as u64;
+        }
+        link.on_time(now(), &mut requests)?;
+        while !requests.is_empty() {
+            for request in std::mem::take(&mut requests) {
+                match request {
+                    Request::Datagram(bytes) => transport.send(centre, &bytes),
+                    Request::Note(note) => program.note(note),
+                    Request::Sample { slot, feedback } => {
+                        let ControlFlow::Continue(report) = program.sample(slot, &feedback) else {
+                            return Ok(());
+                        };
+                        link.on_sample(now(), report.as_ref(), &mut requests)?;
+                        // As long as the centre asks it knows where the sensor is.
+                        hello_at = now() + HELLO_EVERY.as_nanos() as u64;
+                    }
+                }
+            }
+        }
+        let until = link.next_timer().unwrap_or(u64::MAX).min(hello_at);
+        receive(transport, until, |from, bytes| match from == *centre {
+            true => link.on_datagram(now(), bytes, &mut requests),
+            false => Ok(()),
+        })?;
+    }
+    Ok(())
+}

@@ -1,0 +1,72 @@
+//! Datagrams over zenoh: peers, or routers between them.
+
+use crate::error::Error;
+use crate::topics::{Queue, Topics};
+use crate::transport::{Datagram, Transport};
+pub use ::zenoh;
+use ::zenoh::pubsub::Subscriber;
+use ::zenoh::{Session, Wait};
+use std::time::Duration;
+
+/// One end's session of zenoh. An address is the number of the sensor, at either end.
+///
+/// Sensor 3 of the fleet `plant` sends on the key `plant/3/up` and is told on `plant/3/down`. Who connects to whom is the session's configuration:
+/// sensors that connect to a centre that listens need no router.
+#[derive(Debug)]
+pub struct Zenoh {
+    session: Session,
+    topics: Topics,
+    queue: Queue,
+    /// Takes datagrams as long as it lives.
+    _subscriber: Subscriber<()>,
+}
+
+impl Zenoh {
+    /// The centre of a fleet.
+    ///
+    /// # Errors
+    /// If the fleet's name has an empty part or one of `+ # * $ ?`, or the session is closed.
+    pub fn centre(session: Session, fleet: &str) -> Result<Self, Error> {
+        Self::subscribe(session, Topics::new(fleet, None)?)
+    }
+
+    /// A sensor of a fleet.
+    ///
+    /// # Errors
+    /// As [`centre`](Self::centre).
+    pub fn sensor(session: Session, fleet: &str, number: u32) -> Result<Self, Error> {
+        Self::subscribe(session, Topics::new(fleet, Some(number))?)
+    }
+
+    fn subscribe(session: Session, topics: Topics) -> Result<Self, Error> {
+        let (inlet, queue) = Queue::new(topics.clone());
+        let key = topics.from("*");
+        let subscriber = session
+            .declare_subscriber(&key)
+            .callback(move |sample| inlet.leave(sample.key_expr().as_str(), sample.payload().to_bytes()));
+        let subscriber = subscriber.wait();
+        Ok(Self {
+            _subscriber: subscriber.map_err(|error| Error::socket(key, std::io::Error::other(error)))?,
+            session,
+            topics,
+            queue,
+        })
+    }
+}
+
+impl Transport for Zenoh {
+    type Address = u32;
+
+    fn send(&mut self, to: &u32, bytes: &[u8]) {
+        // Dropped where the network is congested, and not held back to be sent with others.
+        let put = self.session.put(self.topics.to(*to), bytes);
+        let _ = put
+            .congestion_control(::zenoh::qos::CongestionControl::Drop)
+            .express(true)
+            .wait();
+    }
+
+    fn receive(&mut self, wait: Duration) -> Result<Option<Datagram<'_, u32>>, Error> {
+        Ok(self.queue.receive(wait))
+    }
+}
