@@ -297,17 +297,22 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// If a sensor is unknown or bits do not decode; [`fewbits_core::Error::Impossible`] if the observations are impossible together, in
     /// which case the caller may drop them or start anew.
     pub fn receive(&mut self, rng: &mut dyn Rng, slots: &[Slot]) -> Result<Received, Error> {
-        // What each slot says is judged given the slots before it: sensors that err with the estimate would else be counted as independent.
-        let mut given = self.estimate();
+        let predicted = self.estimate();
+        // A report is judged given those before it: sensors that err with the prediction would else count as independent. Silence is judged by
+        // the prediction alone, since the silence of sensors that died together would speak for each other's.
+        let mut given = predicted;
         let mut used = Vec::with_capacity(slots.len());
         let mut watched = Vec::with_capacity(slots.len());
         for slot in slots {
             let member = self.member(slot.sensor)?;
             let working = member.state.presence.working;
             let likelihood = member.sensor.likelihood(&slot.feedback, &slot.observation, working)?;
-            watched.push(self.watch(member, slot, &given, &*likelihood)?);
+            let is_report = matches!(slot.observation, Observation::Received(_));
+            let belief = if is_report { &given } else { &predicted };
+            watched.push(self.watch(member, slot, belief, &*likelihood)?);
             if !member.state.excluded {
-                if slots.len() > 1
+                if is_report
+                    && slots.len() > 1
                     && let Ok(conditioned) = likelihood.condition(&given)
                 {
                     given = conditioned.belief;

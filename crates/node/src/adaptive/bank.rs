@@ -15,23 +15,15 @@
 //! fixed order: two ends that see the same indices hold the same bits. Models are taken eight at a time, one family, which fills vector
 //! registers where there are any and needs little memory where there are none.
 
-use super::family::Family;
-use super::steady::STEADY;
+use super::family::{DECAYS, FAMILIES, Family, MODELS, SCALES};
+use super::steady::{STEADY, UPDATED};
 use crate::elementary::{greater, lesser, power};
 use fewbits_numerics::kernels::vectorised;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// Number of models.
-pub const MODELS: usize = 24;
 /// Share of the weights that is spread evenly after each slot.
 const SWITCHING: f32 = 0.005;
-/// Per-slot factors of the velocities; zero is the random walk.
-pub const DECAYS: [f32; 3] = [0.0, 0.6, 0.95];
-/// Families of models.
-pub(super) const FAMILIES: usize = DECAYS.len();
-/// Models of one family, by increasing scale.
-pub const SCALES: usize = MODELS / FAMILIES;
 /// Beyond this many doublings the tails are flat.
 const FARTHEST: f32 = 60.0;
 /// The least evidence, so that a wild value does not decide everything.
@@ -286,7 +278,7 @@ impl Ahead {
         if self.slots == 1 {
             work(&STEADY)
         } else {
-            work(&core::array::from_fn(|family| Family::after(family, self.slots)))
+            work(&core::array::from_fn(|family| Family::after(family, self.slots, &UPDATED)))
         }
     }
 
@@ -294,6 +286,6 @@ impl Ahead {
     #[cold]
     #[inline(never)]
     fn with_computed<T>(&self, family: usize, work: impl FnOnce(&Family) -> T) -> T {
-        work(&Family::after(family, self.slots))
+        work(&Family::after(family, self.slots, &UPDATED))
     }
 }

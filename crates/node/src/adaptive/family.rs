@@ -1,10 +1,16 @@
 //! What follows from the covariances of the bank's models: laws and gains, eight models of one family at once.
 
-use super::bank::{DECAYS, SCALES};
-use super::steady::UPDATED;
 use crate::elementary::exp2;
 use crate::math::sqrt_f32;
 
+/// Number of models.
+pub const MODELS: usize = 24;
+/// Per-slot factors of the velocities; zero is the random walk.
+pub const DECAYS: [f32; 3] = [0.0, 0.6, 0.95];
+/// Families of models.
+pub(super) const FAMILIES: usize = DECAYS.len();
+/// Models of one family, by increasing scale.
+pub const SCALES: usize = MODELS / FAMILIES;
 /// Standard deviation of the sensing noise, in steps, beyond that of the cell.
 const NOISE: f32 = 0.15;
 /// Variance of an index as a measurement.
@@ -64,11 +70,11 @@ impl Family {
         self.gain_v[m] = b / total;
     }
 
-    /// The family `slots` after the last update.
-    pub(super) fn after(family: usize, slots: u32) -> Self {
+    /// The family `slots` after the last update, from the covariances of all models after an update.
+    pub(super) fn after(family: usize, slots: u32, updated: &[Covariance; MODELS]) -> Self {
         let mut ahead = Self::EMPTY;
         let decay = DECAYS.get(family).copied().unwrap_or(0.0);
-        let updated = UPDATED.chunks_exact(SCALES).nth(family).into_iter().flatten();
+        let updated = updated.chunks_exact(SCALES).nth(family).into_iter().flatten();
         for (m, updated) in updated.enumerate().take(SCALES) {
             let q = noise_of(m) * noise_of(m);
             ahead.set(m, (0..slots).fold(*updated, |p, _| propagate(p, decay, q)));
@@ -80,7 +86,7 @@ impl Family {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::adaptive::steady::STEADY;
+    use crate::adaptive::steady::{STEADY, UPDATED};
 
     /// Iterates the covariances of each model to their fixed point, in `f64`: the tables hold it.
     #[test]

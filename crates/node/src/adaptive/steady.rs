@@ -1,7 +1,6 @@
 //! The steady state of the bank, computed once: `family`'s test iterates the covariances to it.
 
-use super::bank::MODELS;
-use super::family::{Covariance, Family};
+use super::family::{Covariance, Family, MODELS};
 
 /// One slot ahead, by families.
 #[rustfmt::skip]
