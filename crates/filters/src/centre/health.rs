@@ -1,6 +1,6 @@
 //! Whether the model still holds, from the receiver's own evidence.
 //!
-//! Under a right model three sequences have mean 0 and variance 1 given the past and the slots before at the same instant, for every sensor:
+//! Under a right model three sequences have mean 0 and variance 1 given the past and the reports before at the same instant, for every sensor:
 //!
 //! | sequence | what moves it |
 //! |---|---|

@@ -41,7 +41,7 @@ pub(super) fn is_quick(scene: &Scene, criterion: Criterion, outcomes: f64) -> Re
 }
 
 /// Multiplications that one evaluation takes.
-fn evaluation_work(scene: &Scene, criterion: Criterion, outcomes: f64) -> f64 {
+pub(super) fn evaluation_work(scene: &Scene, criterion: Criterion, outcomes: f64) -> f64 {
     let per_outcome = Scored::new(criterion, scene)
         .map_or(f64::INFINITY, |s| s.features().iter().map(|f| f.weights.len() as f64).sum::<f64>());
     outcomes * per_outcome

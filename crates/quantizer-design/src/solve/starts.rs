@@ -138,13 +138,13 @@ impl Search<'_> {
         design: Vec<WordedCells>,
         control: &mut Control<'_>,
     ) -> Result<Vec<WordedCells>, Error> {
-        let others = [
-            plain(self.scene, self.participants, gray)?,
-            plain(self.scene, self.participants, |level| level)?,
-        ];
+        let gray = plain(self.scene, self.participants, gray)?;
+        let natural = plain(self.scene, self.participants, |level| level)?;
+        let outcomes = self.participants.iter().map(|p| p.law().outputs as f64).product();
+        let work = polish::evaluation_work(rough, self.criterion, outcomes);
         let mut best = (f64::NEG_INFINITY, design.clone());
-        for cells in [design].into_iter().chain(others) {
-            if !control.go_on() {
+        for cells in [design, gray, natural] {
+            if !control.go_on() || control.deadline().is_short_for(work) {
                 break;
             }
             let value = system_of(rough, self.participants, &cells, true)?.value(self.criterion)?;
