@@ -4,9 +4,8 @@
 //! order, so the result is the same to the last bit on any number of threads. A trial draws only from its own [`Stream`], so
 //! one that fails can be run again alone.
 
+use crate::parallel;
 use crate::stream::Stream;
-#[cfg(feature = "rayon")]
-use rayon::prelude::*;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
@@ -205,13 +204,7 @@ impl<'a> MonteCarlo<'a> {
     ) -> Vec<Result<A, MonteCarloError>> {
         // The lowest index that has failed so far. Trials below it still run, so that the one reported does not depend on the threads.
         let failed = AtomicU64::new(u64::MAX);
-        #[cfg(feature = "rayon")]
-        let chunks = chunks.into_par_iter();
-        #[cfg(not(feature = "rayon"))]
-        let chunks = chunks.into_iter();
-        chunks
-            .map(|chunk| self.fold_chunk(chunk, &failed, &empty, &trial))
-            .collect()
+        parallel::map(&chunks, |chunk| self.fold_chunk(*chunk, &failed, &empty, &trial))
     }
 
     fn fold_chunk<A, E: Display>(

@@ -17,6 +17,7 @@
 //! ranks of an MPI job. Their result is the same to the last bit as that of one process.
 
 pub mod engine;
+pub mod parallel;
 #[cfg(feature = "mpi")]
 mod ranks;
 pub mod statistics;

@@ -6,10 +6,10 @@ use crate::prelude::*;
 use fewbits_binary_patterns::published::{AdaptiveRule, adaptive};
 use fewbits_binary_patterns::search::{Descent, free_breakpoints};
 use fewbits_binary_patterns::{BinaryQuantizer, Grid, Mask, Pattern, PatternSensor, Source, gray_basis};
+use fewbits_monte_carlo::parallel;
 use fewbits_sensor_assignment::{
     CodedSensors, Estimator, JonkerVolgenant, LinearAssignment, brute_force, exchange, pair_costs,
 };
-use rayon::prelude::*;
 
 pub struct Beyond;
 
@@ -164,14 +164,14 @@ fn free(id: &'static str, name: &'static str, scene: Scene, sensors: usize, jitt
             starts.push(("linear patterns of four bits, any rank", quantizers(&fine, best.masks, 4)?));
             starts.push(("any of 127 patterns", any_patterns(&scene, &linear.masks)?.0));
         }
-        let moved = starts.into_par_iter().map(|(start, quantizers)| {
+        let results = parallel::try_map(&starts, |(start, quantizers)| {
             let sensors = quantizers
-                .into_iter()
-                .map(|q| PatternSensor::with_deviation(q, scene.noise));
+                .iter()
+                .map(|q| PatternSensor::with_deviation(q.clone(), scene.noise));
             let sensors = sensors.collect::<Result<Vec<_>, _>>()?;
-            Ok((start, free_breakpoints(&scene.source, &sensors, jitter / scene.source.scale(), 4)?))
-        });
-        let results = moved.collect::<Result<Vec<_>, Error>>()?;
+            let jitter = jitter / scene.source.scale();
+            Ok::<_, Error>((*start, free_breakpoints(&scene.source, &sensors, jitter, 4)?))
+        })?;
         let best = results.into_iter().min_by(|a, b| a.1.mse.total_cmp(&b.1.mse));
         let (start, found) = best.ok_or_else(|| Error::Table("no start".to_owned()))?;
         let sensors: Vec<_> = found
@@ -307,10 +307,7 @@ impl Figure for Beyond {
          thresholds. The table `designs` has masks and thresholds, and where the search for them began.");
 
     fn run(&self, p: &Parameters, _: &Context<'_>) -> Result<Rows, Error> {
-        let found = jobs(p.thorough)?
-            .par_iter()
-            .map(|job| job())
-            .collect::<Result<Vec<_>, _>>()?;
+        let found = parallel::try_map(&jobs(p.thorough)?, |job| job())?;
         let (changes, designs): (Vec<_>, Vec<_>) = found.into_iter().unzip();
         Ok(Rows {
             changes,

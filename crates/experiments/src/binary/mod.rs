@@ -16,7 +16,7 @@ use crate::AnyFigure;
 use crate::prelude::*;
 use fewbits_binary_patterns::search::{Descent, LinearSearch};
 use fewbits_binary_patterns::{Bank, BinaryQuantizer, Grid, Mask, Pattern, Source, linear_pattern, rank};
-use rayon::prelude::*;
+use fewbits_monte_carlo::parallel;
 
 /// The figures of this system, in the order of the publication.
 pub fn figures() -> Vec<&'static dyn AnyFigure> {
@@ -120,7 +120,7 @@ fn sweep(from: f64, to: f64, step: f64) -> Vec<f64> {
 
 /// Computes one result a sweep point, in parallel and in order.
 fn each<T: Send>(points: &[f64], f: impl Fn(f64) -> Result<T, Error> + Sync) -> Result<Vec<T>, Error> {
-    points.par_iter().map(|&point| f(point)).collect()
+    parallel::try_map(points, |&point| f(point))
 }
 
 /// Where `f` changes sign between `low` and `high`, to `1e-8`.

@@ -5,7 +5,7 @@ use crate::prelude::*;
 use fewbits_binary_patterns::{
     BinaryQuantizer, Grid, Mask, Pattern, check_separation, generator_matrix, gray_basis, natural_basis,
 };
-use rayon::prelude::*;
+use fewbits_monte_carlo::parallel;
 
 pub struct Clipping;
 
@@ -90,10 +90,7 @@ impl Figure for Clipping {
             let patterns = masks.iter().map(turned).collect::<Result<Vec<_>, _>>()?;
             Ok(wide.pattern_bank(&patterns)?.mmse()?)
         };
-        let best = all
-            .par_iter()
-            .map(|set| swapped(&set.masks))
-            .collect::<Result<Vec<_>, _>>()?;
+        let best = parallel::try_map(&all, |set| swapped(&set.masks))?;
         let errors = vec![
             Rule {
                 rule: "nearest outer cell",

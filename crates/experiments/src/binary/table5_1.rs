@@ -5,7 +5,7 @@ use crate::prelude::*;
 use fewbits_binary_patterns::bounds::{optimal_weight_van_trees, printed_crlb};
 use fewbits_binary_patterns::search::MaskSet;
 use fewbits_binary_patterns::{Decoder, Mask, count};
-use rayon::prelude::*;
+use fewbits_monte_carlo::parallel;
 
 pub struct Table;
 
@@ -64,14 +64,11 @@ impl Figure for Table {
         let scene = Scene::uniform(BITS, p.snr_db)?;
         let search = scene.search(p.printed.len())?;
         let ranking = search.ranking()?;
-        let decoded = ranking.par_iter().map(|set| {
+        let mut by_map = parallel::try_map(&ranking, |set| {
             let mse = search.bank(&set.masks)?.mse(Decoder::DiscreteMap(&scene.grid))?;
-            Ok(MaskSet {
-                masks: set.masks.clone(),
-                mse,
-            })
-        });
-        let mut by_map: Vec<MaskSet> = decoded.collect::<Result<_, Error>>()?;
+            let masks = set.masks.clone();
+            Ok::<_, Error>(MaskSet { masks, mse })
+        })?;
         by_map.sort_by(|a, b| a.mse.total_cmp(&b.mse).then_with(|| a.masks.cmp(&b.masks)));
         let place = |sets: &[MaskSet], masks: &[Mask]| sets.iter().position(|s| s.masks == masks);
         let mut printed = p.printed.clone();

@@ -3,7 +3,7 @@
 use super::{Scene, each, pattern, pattern_panel, sweep};
 use crate::prelude::*;
 use fewbits_binary_patterns::{Decoder, Pattern, check_separation, count, mask_of};
-use rayon::prelude::*;
+use fewbits_monte_carlo::parallel;
 
 pub struct Table;
 
@@ -82,7 +82,7 @@ fn labelings() -> Result<Vec<Vec<Pattern>>, Error> {
 fn place(scene: &Scene, labelings: &[Vec<Pattern>], printed: &[Pattern]) -> Result<usize, Error> {
     let error = |patterns: &[Pattern]| Ok::<_, Error>(scene.pattern_bank(patterns)?.mmse()?);
     let own = error(printed)?;
-    let errors = labelings.par_iter().map(|l| error(l)).collect::<Result<Vec<_>, _>>()?;
+    let errors = parallel::try_map(labelings, |l| error(l))?;
     // Mirror images tie with it up to rounding.
     Ok(errors.iter().filter(|e| **e < own * (1.0 - 1e-9)).count())
 }

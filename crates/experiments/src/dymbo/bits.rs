@@ -3,7 +3,7 @@
 use super::common::{Plant, plants};
 use crate::prelude::*;
 use fewbits_dymbo::{MultibitFilter, ScalarFilter, chain, iterated};
-use rayon::prelude::*;
+use fewbits_monte_carlo::parallel;
 
 parameters! {
     pub struct Parameters {
@@ -62,7 +62,7 @@ impl Figure for WordLength {
             let (kalman, c) = (plant.kalman_variance()?, filter.information());
             let riccati = plant.model()?.steady_state(c)?.filtered_variance;
             let exact_mse = chain::multibit_mse(&filter)?;
-            Ok(Row {
+            Ok::<_, Error>(Row {
                 plant,
                 bits,
                 c,
@@ -86,7 +86,7 @@ impl Figure for WordLength {
             })
         };
         Ok(Rows {
-            words: cases.par_iter().map(row).collect::<Result<_, Error>>()?,
+            words: parallel::try_map(&cases, row)?,
             successive: (1..=5).map(successive).collect::<Result<_, Error>>()?,
         })
     }

@@ -3,7 +3,7 @@
 use super::common::{Plant, each, log_spaced};
 use crate::prelude::*;
 use fewbits_dymbo::{chain, filtered_variance, steady};
-use rayon::prelude::*;
+use fewbits_monte_carlo::parallel;
 use std::f64::consts::{FRAC_2_PI, PI};
 
 fn hundredths(i: i32) -> f64 {
@@ -63,13 +63,13 @@ impl Figure for Loss {
         let row = |plant: &Plant| {
             let model = plant.model()?;
             let exact = p.exact_a.contains(&plant.a).then(|| chain::true_loss(&model));
-            Ok(Row {
+            Ok::<_, Error>(Row {
                 plant: *plant,
                 loss_riccati: steady::loss(&model)?,
                 loss_true: exact.transpose()?,
             })
         };
-        let plane = plants.par_iter().map(row).collect::<Result<_, Error>>()?;
+        let plane = parallel::try_map(&plants, row)?;
         let mut contours = Vec::new();
         let mut push = |kind, level, a, gamma: Option<f64>| {
             contours.extend(gamma.map(|gamma| Contour { kind, level, a, gamma }));
@@ -79,11 +79,8 @@ impl Figure for Loss {
                 push("riccati", level, a, steady::noise_ratio_at_loss(level, a)?);
             }
         }
-        let exact = p
-            .exact_a
-            .par_iter()
-            .map(|a| Ok((*a, chain::noise_ratio_at_loss(2.0, *a)?)));
-        for (a, gamma) in exact.collect::<Result<Vec<_>, Error>>()? {
+        let exact = |a: &f64| Ok::<_, Error>((*a, chain::noise_ratio_at_loss(2.0, *a)?));
+        for (a, gamma) in parallel::try_map(&p.exact_a, exact)? {
             push("exact", 2.0, a, gamma);
         }
         Ok(Rows { plane, contours })

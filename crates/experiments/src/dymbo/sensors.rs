@@ -3,7 +3,7 @@
 use super::common::{Plant, each};
 use crate::prelude::*;
 use fewbits_dymbo::{CountFusion, ParallelFilter, ScalarPlant, chain, steady};
-use rayon::prelude::*;
+use fewbits_monte_carlo::parallel;
 
 parameters! {
     pub struct Parameters {
@@ -68,7 +68,7 @@ impl Figure for SeveralSensors {
                 kalman: together.steady_state(1.0)?.filtered_variance,
             })
         };
-        cases.par_iter().map(row).collect()
+        parallel::try_map(&cases, row)
     }
 
     fn claims(&self, _: &Parameters, rows: &Vec<Row>, claims: &mut Claims) {

@@ -1,9 +1,9 @@
 //! Signals: synthetic ones with the traits of recordings, or columns of a user's file.
 
 use crate::prelude::*;
+use fewbits_monte_carlo::parallel;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
-use rayon::prelude::*;
 
 /// Samples of a synthetic signal, of the length asked for.
 type Synthesis = fn(&mut rand_pcg::Pcg64Dxsm, usize) -> Vec<f64>;
@@ -95,10 +95,7 @@ pub(super) fn each<T: Send>(
 ) -> Result<Vec<T>, Error> {
     let pairs = recordings.iter().flat_map(|r| numbers.iter().map(move |n| (r, *n)));
     let pairs: Vec<(&Recording, f64)> = pairs.collect();
-    pairs
-        .par_iter()
-        .map(|(recording, number)| one(recording, *number))
-        .collect()
+    parallel::try_map(&pairs, |(recording, number)| one(recording, *number))
 }
 
 /// Numeric columns of a CSV text: the named ones, or all but the first.

@@ -1,0 +1,39 @@
+//! One result an item, in parallel and in order.
+
+use std::sync::{Mutex, PoisonError};
+
+/// Calls `one` with every item and returns the results in the items' order. With feature `rayon` the calls are shared among the threads of
+/// the current pool, and the result does not depend on how many there are.
+///
+/// ```
+/// let squares = fewbits_monte_carlo::parallel::map(&[1, 2, 3], |x| x * x);
+/// assert_eq!(squares, [1, 4, 9]);
+/// ```
+pub fn map<I: Sync, T: Send>(items: &[I], one: impl Fn(&I) -> T + Sync) -> Vec<T> {
+    let results: Vec<Mutex<Option<T>>> = items.iter().map(|_| Mutex::new(None)).collect();
+    for_all(items.len(), &|i| {
+        let result = one(&items[i]);
+        *results[i].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+    });
+    let taken = results
+        .into_iter()
+        .map(|r| r.into_inner().unwrap_or_else(PoisonError::into_inner));
+    taken.flatten().collect()
+}
+
+/// As [`map`], of calls that may fail.
+///
+/// # Errors
+/// The error of the first item that has one. The other items are computed all the same.
+pub fn try_map<I: Sync, T: Send, E: Send>(items: &[I], one: impl Fn(&I) -> Result<T, E> + Sync) -> Result<Vec<T>, E> {
+    map(items, one).into_iter().collect()
+}
+
+/// Calls `body` with every index below `count`. It takes a trait object, so that the parallel loop is compiled once and not once an
+/// experiment.
+fn for_all(count: usize, body: &(dyn Fn(usize) + Sync)) {
+    #[cfg(feature = "rayon")]
+    rayon::iter::ParallelIterator::for_each(rayon::iter::IntoParallelIterator::into_par_iter(0..count), body);
+    #[cfg(not(feature = "rayon"))]
+    (0..count).for_each(body);
+}
