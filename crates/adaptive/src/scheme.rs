@@ -118,6 +118,8 @@ impl Factor<1> for SlotFactor {
     }
 }
 
+impl fewbits_core::Deterministic<1> for SlotScheme {}
+
 impl Scheme<1> for SlotScheme {
     type State = ();
     type Feedback = ();

@@ -112,6 +112,8 @@ fn finite_over<const M: usize>(
     Ok(all_finite("prediction", prediction.as_slice())?)
 }
 
+impl<const D: usize, const M: usize, S: Sensing<D, M>> fewbits_core::Deterministic<M> for Censoring<S, D, M> {}
+
 impl<const D: usize, const M: usize, S: Sensing<D, M>> Scheme<M> for Censoring<S, D, M> {
     type State = ();
     /// The state prediction of the fusion centre.
@@ -248,6 +250,11 @@ impl<const D: usize, const M: usize, S: LinearSensing<D, M>> MeasurementNoise<M>
     fn noise_covariance_at(&self, _: &SVector<f64, M>) -> SMatrix<f64, M, M> {
         *self.sensing.noise_covariance()
     }
+}
+
+impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> fewbits_core::Deterministic<M>
+    for CovarianceFeedback<S, D, M>
+{
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M> + Clone> Scheme<M> for CovarianceFeedback<S, D, M> {

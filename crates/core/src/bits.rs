@@ -244,12 +244,14 @@ impl<'a> BitReader<'a> {
         }
         let (rest, skipped) = (&self.message.bytes[self.position / 8..], self.position % 8);
         self.position += width as usize;
-        let word = rest.first_chunk().copied().unwrap_or_else(|| {
-            let mut padded = [0; 8];
-            padded[..rest.len()].copy_from_slice(rest);
-            padded
-        });
-        let mut field = u64::from_be_bytes(word) << skipped;
+        let word = match rest.first_chunk() {
+            Some(bytes) => u64::from_be_bytes(*bytes),
+            None => (0..)
+                .step_by(8)
+                .zip(rest)
+                .fold(0, |word, (i, byte)| word | u64::from(*byte) << (56 - i)),
+        };
+        let mut field = word << skipped;
         if skipped + width as usize > 64 {
             field |= u64::from(rest[8]) >> (8 - skipped);
         }

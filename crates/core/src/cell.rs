@@ -15,6 +15,12 @@ pub struct Cell {
     upper: f64,
 }
 
+#[cold]
+#[inline(never)]
+fn refused(lower: f64, upper: f64) -> ArgumentError {
+    ArgumentError::new("cell", format!("[{lower}, {upper})"), "lower < upper")
+}
+
 impl Cell {
     /// The cell `[lower, upper)`.
     ///
@@ -25,7 +31,7 @@ impl Cell {
         if lower < upper {
             Ok(Self { lower, upper })
         } else {
-            Err(ArgumentError::new("cell", format!("[{lower}, {upper})"), "lower < upper"))
+            Err(refused(lower, upper))
         }
     }
 

@@ -66,6 +66,8 @@ impl Factor<1> for SentValue {
     }
 }
 
+impl crate::Deterministic<1> for FullValue {}
+
 impl Scheme<1> for FullValue {
     type State = ();
     type Feedback = ();

@@ -66,3 +66,9 @@ pub trait Scheme<const M: usize> {
         link: &Link,
     ) -> Result<Self::Factor, Error>;
 }
+
+/// A scheme whose sensor draws no random numbers, so that it reports without a random source
+/// ([`SchemeNode::answer`](crate::SchemeNode::answer)).
+///
+/// Law ([`crate::laws::scheme::deterministic`]): `encode` draws nothing, and says the same again.
+pub trait Deterministic<const M: usize>: Scheme<M> {}

@@ -3,10 +3,11 @@
 use crate::bits::BitString;
 use crate::error::Error;
 use crate::message::Message;
-use crate::scheme::Scheme;
+use crate::scheme::{Deterministic, Scheme};
 use fewbits_numerics::ArgumentError;
 use nalgebra::SVector;
-use rand::Rng;
+use rand::{Rng, TryRng};
+use std::convert::Infallible;
 
 /// A sensor as it sees itself: a measurement and the feedback's bits in, a report's bits or silence out. It needs no belief and no
 /// model of the world. Object-safe, so that sensors of any kind stand in one list.
@@ -65,6 +66,36 @@ impl<C: Scheme<M>, const M: usize> SchemeNode<C, M> {
     #[must_use]
     pub fn with_memory(self, memory: C::State) -> Self {
         Self { memory, ..self }
+    }
+}
+
+impl<C: Deterministic<M>, const M: usize> SchemeNode<C, M> {
+    /// [`SensorNode::report`] without a random source.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn answer(&mut self, measurement: &SVector<f64, M>, feedback: &BitString) -> Result<Option<BitString>, Error> {
+        self.report(&mut Undrawn, measurement, feedback)
+    }
+}
+
+/// The random source of those that draw nothing.
+struct Undrawn;
+
+impl TryRng for Undrawn {
+    type Error = Infallible;
+
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        Ok(0)
+    }
+
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        Ok(0)
+    }
+
+    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+        bytes.fill(0);
+        Ok(())
     }
 }
 

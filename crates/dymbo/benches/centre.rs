@@ -10,7 +10,7 @@ use fewbits_filters::{MomentFilter, assumed_density};
 use fewbits_models::{ContinuousLinear, LinearSensor};
 use fewbits_monte_carlo::Stream;
 use nalgebra::{Matrix2, Vector2};
-use rand::RngExt;
+use rand::{Rng, RngExt};
 
 const SENSORS: u32 = 1000;
 
@@ -22,6 +22,11 @@ fn main() {
 fn setting() -> (Gaussian<2>, OnAxes<LinearSensor<1, 1>, 2, 1>, SignBit) {
     let prior = Gaussian::new(Vector2::zeros(), Matrix2::identity()).unwrap();
     (prior, OnAxes::new(LinearSensor::direct(1.0).unwrap(), [0]).unwrap(), SignBit::new(1.0).unwrap())
+}
+
+/// The bits of an instant.
+fn bits(draws: &mut impl Rng) -> Vec<bool> {
+    (0..SENSORS).map(|_| draws.random_bool(0.5)).collect()
 }
 
 /// A thousand one-bit sensors. Over [`bare_updates_of_1000_bits`] it is what bits, presence and health cost.
@@ -39,26 +44,24 @@ fn centre_of_1000_bits(bencher: Bencher) {
     let feedback = centre.feedback(0).unwrap();
     let mut draws = Stream::new(2).rng();
     let slots = || -> Vec<Slot> {
-        let bit = |above: bool| BitString::from_bytes(vec![if above { 0x80 } else { 0 }], 1).unwrap();
-        (0..SENSORS)
-            .map(|number| {
-                let report = Observation::Received(bit(draws.random_bool(0.5)));
-                Slot::new(number, feedback.clone(), report)
-            })
-            .collect()
+        let report = |above: bool| BitString::from_bytes(vec![if above { 0x80 } else { 0 }], 1).unwrap();
+        let slot = |(number, bit)| Slot::new(number, feedback.clone(), Observation::Received(report(bit)));
+        (0..).zip(bits(&mut draws)).map(slot).collect()
     };
     bencher
         .with_inputs(slots)
-        .bench_local_values(|slots| centre.receive(&mut rng, black_box(&slots)).unwrap());
+        .bench_local_refs(|slots| centre.receive(&mut rng, black_box(slots)).unwrap());
 }
 
+/// The same bits, as alternating ones would teach the processor their pattern.
 #[divan::bench(sample_size = 1, sample_count = 100)]
 fn bare_updates_of_1000_bits(bencher: Bencher) {
     let (prior, sensing, scheme) = setting();
-    bencher.bench_local(|| {
+    let mut draws = Stream::new(2).rng();
+    bencher.with_inputs(|| bits(&mut draws)).bench_local_refs(|bits| {
         let mut belief = prior;
-        for number in 0..SENSORS {
-            let bit = Observation::Received(Sign::of(f64::from(number % 2), 0.5).unwrap());
+        for above in bits {
+            let bit = Observation::Received(if *above { Sign::Above } else { Sign::Below });
             let factor = scheme.factor(black_box(&0.0), &bit, &Link::PERFECT).unwrap();
             belief = assumed_density::update_through(&belief, &Observed::new(sensing, factor))
                 .unwrap()

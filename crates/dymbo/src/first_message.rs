@@ -141,6 +141,8 @@ impl RoundedSample {
     }
 }
 
+impl fewbits_core::Deterministic<1> for RoundedSample {}
+
 impl Scheme<1> for RoundedSample {
     type State = ();
     type Feedback = ();

@@ -157,6 +157,8 @@ impl MeasurementNoise<1> for InnovationWord {
     }
 }
 
+impl fewbits_core::Deterministic<1> for InnovationWord {}
+
 impl Scheme<1> for InnovationWord {
     type State = ();
     type Feedback = Prediction;

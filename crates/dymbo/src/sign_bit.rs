@@ -65,6 +65,8 @@ impl MeasurementNoise<1> for SignBit {
     }
 }
 
+impl fewbits_core::Deterministic<1> for SignBit {}
+
 impl Scheme<1> for SignBit {
     type State = ();
     type Feedback = f64;
@@ -91,6 +93,7 @@ impl Scheme<1> for SignBit {
         Ok(Some(if reached { Sign::Above } else { Sign::Below }))
     }
 
+    #[inline]
     fn factor(
         &self,
         threshold: &f64,

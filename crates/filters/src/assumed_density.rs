@@ -52,6 +52,7 @@ pub fn update<const D: usize, const M: usize>(
 ///
 /// # Errors
 /// As [`update`].
+#[inline(always)]
 pub fn update_through<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     observed: &Observed<impl Sensing<D, M>, impl Factor<M>, M>,
@@ -94,6 +95,7 @@ pub fn evidence_through<const D: usize, const M: usize>(
 }
 
 /// The law of the noise-free measurement, from `P H'`.
+#[inline]
 fn measured<const D: usize, const M: usize>(
     predicted: SVector<f64, M>,
     matrix: &SMatrix<f64, M, D>,
@@ -107,6 +109,7 @@ fn measured<const D: usize, const M: usize>(
     Ok(prior)
 }
 
+#[inline(always)]
 fn update_at<const D: usize, const M: usize>(
     belief: &Gaussian<D>,
     predicted: SVector<f64, M>,

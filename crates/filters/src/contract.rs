@@ -86,15 +86,6 @@ where
     }
 }
 
-/// What conditioning a Gaussian on one observation gives.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Conditioned<const D: usize> {
-    /// The Gaussian with the moments of the posterior.
-    pub belief: Gaussian<D>,
-    /// `ln p(observation | past)`.
-    pub log_likelihood: f64,
-}
-
 /// What one observation says about the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
@@ -104,19 +95,31 @@ pub struct Evidence {
     pub correction: f64,
 }
 
+impl Evidence {
+    fn new<const M: usize>(log_likelihood: f64, correction: &SVector<f64, M>) -> Self {
+        Self {
+            log_likelihood,
+            correction: correction.iter().next().copied().unwrap_or(0.0),
+        }
+    }
+}
+
 /// What one observation says about the state: weighs clouds and grids ([`Likelihood`]), conditions Gaussians.
 pub trait StateLikelihood<const D: usize>: Likelihood<D> {
-    /// Conditions a Gaussian, the sensing linearised at its mean.
+    /// Replaces a Gaussian by that with the moments of the posterior, the sensing linearised at its mean.
     ///
     /// # Errors
-    /// [`fewbits_core::Error::Impossible`] if the observation has probability zero under the belief.
-    fn condition(&self, belief: &Gaussian<D>) -> Result<Conditioned<D>, Error>;
+    /// [`fewbits_core::Error::Impossible`] if the observation has probability zero under the belief, which is then as it was.
+    fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error>;
 
     /// How likely the observation is under a Gaussian, and where it moves the measurement.
     ///
     /// # Errors
     /// As [`condition`](Self::condition).
     fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error>;
+
+    /// `ln p(observation)`, if it is the same for every state: a loss, a silence that says nothing.
+    fn as_constant(&self) -> Option<f64>;
 
     /// Whether the likelihood depends on this coordinate, near this state.
     fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool;
@@ -127,20 +130,23 @@ pub trait StateLikelihood<const D: usize>: Likelihood<D> {
 }
 
 impl<const D: usize, const M: usize, S: Sensing<D, M>, F: Factor<M>> StateLikelihood<D> for Observed<S, F, M> {
-    fn condition(&self, belief: &Gaussian<D>) -> Result<Conditioned<D>, Error> {
+    #[inline]
+    fn condition(&self, belief: &mut Gaussian<D>) -> Result<Evidence, Error> {
         let (posterior, info) = assumed_density::update_through(belief, self)?;
-        Ok(Conditioned {
-            belief: posterior,
-            log_likelihood: info.log_likelihood,
-        })
+        *belief = posterior;
+        Ok(Evidence::new(info.log_likelihood, &info.correction))
     }
 
     fn evidence(&self, belief: &Gaussian<D>) -> Result<Evidence, Error> {
         let (log_likelihood, correction) = assumed_density::evidence_through(belief, self)?;
-        Ok(Evidence {
-            log_likelihood,
-            correction: if M == 0 { 0.0 } else { correction[0] },
-        })
+        Ok(Evidence::new(log_likelihood, &correction))
+    }
+
+    fn as_constant(&self) -> Option<f64> {
+        match self.factor.as_scalar()? {
+            (Scalar::Constant(factor), log_scale) => Some(factor.probability().ln() + log_scale),
+            _ => None,
+        }
     }
 
     fn reads(&self, state: &SVector<f64, D>, axis: usize) -> bool {
@@ -227,6 +233,13 @@ pub trait StateFilter<const D: usize> {
         observed: &[&dyn StateLikelihood<D>],
     ) -> Result<Info, Error>;
 
+    /// The belief of these moments, if conditioning on one observation after the other ([`StateLikelihood::condition`]) is all that
+    /// [`update`](Self::update) does. `None` for other filters. A centre conditions to judge each observation by those before it, and
+    /// then need not do so twice.
+    fn of_moments(&self, _: &Gaussian<D>) -> Option<Self::Belief> {
+        None
+    }
+
     /// One step from a belief to the next: [`predict`](Self::predict), then [`update`](Self::update).
     ///
     /// # Errors
@@ -276,14 +289,16 @@ impl<const D: usize> StateFilter<D> for MomentFilter {
     ) -> Result<Info, Error> {
         let (mut next, mut log_likelihood) = (*belief, 0.0);
         for one in observed {
-            let conditioned = one.condition(&next)?;
-            next = conditioned.belief;
-            log_likelihood += conditioned.log_likelihood;
+            log_likelihood += one.condition(&mut next)?.log_likelihood;
         }
         *belief = next;
         Ok(Info {
             log_likelihood,
             effective_sample_size: None,
         })
+    }
+
+    fn of_moments(&self, moments: &Gaussian<D>) -> Option<Gaussian<D>> {
+        Some(*moments)
     }
 }

@@ -60,7 +60,7 @@ fn propose<const D: usize>(
 ) -> Option<(SVector<f64, D>, f64)> {
     let posterior = observed
         .iter()
-        .try_fold(*moved, |belief, one| one.condition(&belief).map(|c| c.belief))
+        .try_fold(*moved, |mut belief, one| one.condition(&mut belief).map(|_| belief))
         .ok()?;
     // u = back (x' - f) on the range of Q; elsewhere u stays standard normal.
     let lower = semidefinite_factor("noise_covariance", moved.covariance()).ok()?;

@@ -14,9 +14,22 @@ use rand::Rng;
 /// predict:  w <- (1 - e) w + e / M, beliefs mixed; filter j moves with its own scale of the noise
 /// update:   each filter takes in the observations; w_j times its evidence, normalised
 /// ```
+/// Scales multiply the covariance of the process noise: 4 is twice the deviation. Neighbours that differ by a factor of 4 or less cost little; a
+/// step costs as much as its `M` filters. A centre's own [noise scale](crate::centre::FusionCentre::noise_scale) multiplies all of them.
 /// A [`Switching`](crate::Switching) world with as many models as there are scales gives each filter a model of its own.
+///
 /// `e` is how often the scale may change: with 0 the bank settles on one scale for good. Words of 2 bits and more tell the scale by
-/// evidence; single bits at the prediction do not (use [`NoiseLearning`](crate::centre::NoiseLearning)).
+/// evidence. A single bit at the prediction of the only filter has probability 1/2 whatever the scale, and tells nothing
+/// (use [`NoiseLearning`](crate::centre::NoiseLearning)); in a bank it lies off the predictions of the other filters, and tells a little.
+///
+/// ```
+/// use fewbits_core::Gaussian;
+/// use fewbits_filters::{MomentFilter, NoiseBank, StateFilter};
+/// let mut bank = NoiseBank::new(MomentFilter, vec![0.25, 1.0, 4.0], 1e-3)?;
+/// let belief = bank.start(&mut rand_pcg::Pcg64Mcg::new(1), &Gaussian::scalar(0.0, 1.0)?)?;
+/// assert!((bank.scale(&belief) - 1.0).abs() < 1e-12); // nothing is known yet
+/// # Ok::<(), fewbits_filters::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct NoiseBank<const D: usize, F> {
     filter: F,

@@ -107,8 +107,21 @@ fn require(
     if accepted(value) {
         Ok(value)
     } else {
-        Err(ArgumentError::new(name, value, expected))
+        Err(refused(name, value, expected))
     }
+}
+
+/// Out of line: callers stay small enough to be inlined.
+#[cold]
+#[inline(never)]
+fn refused(name: &'static str, value: f64, expected: &str) -> ArgumentError {
+    ArgumentError::new(name, value, expected)
+}
+
+#[cold]
+#[inline(never)]
+fn refused_range(name: &'static str, value: f64, low: f64, high: f64) -> ArgumentError {
+    ArgumentError::new(name, value, format!("a number in [{low}, {high}]"))
 }
 
 /// Accepts any finite number.
@@ -135,7 +148,7 @@ pub fn within(name: &'static str, value: f64, low: f64, high: f64) -> Result<f64
     if (low..=high).contains(&value) {
         Ok(value)
     } else {
-        Err(ArgumentError::new(name, value, format!("a number in [{low}, {high}]")))
+        Err(refused_range(name, value, low, high))
     }
 }
 

@@ -213,6 +213,8 @@ impl MeasurementNoise<1> for QuantizedRange {
     }
 }
 
+impl fewbits_core::Deterministic<1> for QuantizedRange {}
+
 impl Scheme<1> for QuantizedRange {
     type State = ();
     type Feedback = RangeReference;

@@ -83,6 +83,8 @@ impl MeasurementNoise<1> for QuantizingSensor {
     }
 }
 
+impl fewbits_core::Deterministic<1> for QuantizingSensor {}
+
 impl Scheme<1> for QuantizingSensor {
     type State = ();
     type Feedback = ();

@@ -39,6 +39,8 @@ impl BinaryQuantizer {
 }
 
 /// A sensor that reports in every slot: a missing report says nothing about the measurement.
+impl fewbits_core::Deterministic<1> for PatternSensor {}
+
 impl Scheme<1> for PatternSensor {
     type State = ();
     type Feedback = ();

@@ -44,6 +44,11 @@ pub struct LocalCensoring<S, const D: usize, const M: usize> {
     supposed: SVector<f64, D>,
 }
 
+impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> fewbits_core::Deterministic<M>
+    for LocalCensoring<S, D, M>
+{
+}
+
 impl<S: LinearSensing<D, M> + Clone, const D: usize, const M: usize> Scheme<M> for LocalCensoring<S, D, M> {
     /// The sensor's estimate after the last slot.
     type State = SVector<f64, D>;

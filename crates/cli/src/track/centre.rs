@@ -196,7 +196,7 @@ impl<const D: usize> Estimator for Centre<D> {
         };
         let seat = Seat { sends, ..seat };
         let remote = sends.remote::<D>(seat.noise, Link::lossy(seat.loss)?)?;
-        self.centre.join(self.members.len() as u32, remote)?;
+        self.centre.join_boxed(self.members.len() as u32, remote)?;
         self.members.push(Member {
             node: sends.node(seat.noise)?,
             seat,

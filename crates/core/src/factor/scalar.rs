@@ -165,6 +165,7 @@ impl Factor<1> for Scalar {
         delegate!(self, factor => factor.add_log_likelihoods(means, log_weights));
     }
 
+    #[inline]
     fn tilted(&self, prior: &Gaussian<1>) -> Result<Tilted<1>, Error> {
         delegate!(self, factor => factor.tilted(prior))
     }

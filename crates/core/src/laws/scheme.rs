@@ -3,7 +3,7 @@
 use super::{STANDARD_ERRORS, Violation, agree, failed};
 use crate::factor::Factor;
 use crate::observation::{Link, Observation};
-use crate::scheme::Scheme;
+use crate::scheme::{Deterministic, Scheme};
 use nalgebra::SVector;
 use rand::Rng;
 
@@ -145,4 +145,30 @@ where
     let measure = |rng: &mut R| m + noise(rng);
     let lost = |seen: &Observation<S::Report>| *seen == Observation::Lost;
     honesty(scheme, feedback, link, rng, draws, measure, lost, left.clamp(0.0, 1.0))
+}
+
+/// The law of [`Deterministic`]: two sensors that are handed differently seeded sources report the same, and leave both as they were.
+///
+/// # Errors
+/// If encoding fails, or the measurement at which the law fails.
+pub fn deterministic<const M: usize, S: Deterministic<M>, R: Rng + Clone + PartialEq>(
+    scheme: &S,
+    feedback: &S::Feedback,
+    rngs: &[R; 2],
+    measurements: &[SVector<f64, M>],
+) -> Result<(), Violation>
+where
+    S::Report: PartialEq,
+{
+    const LAW: &str = "a deterministic scheme draws nothing";
+    let mut drawn = rngs.clone();
+    let (mut first, mut second) = (scheme.start(), scheme.start());
+    for m in measurements {
+        let one = failed(LAW, scheme.encode(&mut drawn[0], &mut first, m, feedback))?;
+        let other = failed(LAW, scheme.encode(&mut drawn[1], &mut second, m, feedback))?;
+        if one != other || drawn != *rngs {
+            return Err(Violation::new(LAW, format!("a draw at {m:?}"), "none"));
+        }
+    }
+    Ok(())
 }

@@ -75,7 +75,7 @@ impl<F: StateFilter<1>> Scalar<F> {
         let mut nodes = Vec::new();
         for number in 0..sensors {
             let (remote, node) = sensor(kind, LinearSensor::direct(r).unwrap(), r, 0.0);
-            centre.join(number, remote).unwrap();
+            centre.join_boxed(number, remote).unwrap();
             nodes.push(node);
         }
         let truth = prior.sample(&mut rng);
@@ -262,11 +262,11 @@ impl<F: StateFilter<4>> Plane<F> {
         let mut nodes = Vec::new();
         for (number, axis) in PLANE_POSITION.into_iter().enumerate() {
             let (remote, node) = sensor(Kind::Bit, coordinate(axis), 0.5, 0.1);
-            centre.join(number as u32, remote).unwrap();
+            centre.join_boxed(number as u32, remote).unwrap();
             nodes.push(node);
         }
         let (remote, node) = sensor(Kind::Word, range(ANCHORS[0]), 0.04, 0.0);
-        centre.join(2, remote).unwrap();
+        centre.join_boxed(2, remote).unwrap();
         nodes.push(node);
         Self {
             centre,
@@ -280,7 +280,7 @@ impl<F: StateFilter<4>> Plane<F> {
 
     fn join_late(&mut self) {
         let (remote, node) = sensor(Kind::Value, range(ANCHORS[1]), 0.04, 0.0);
-        self.centre.join(3, remote).unwrap();
+        self.centre.join_boxed(3, remote).unwrap();
         self.nodes.push(node);
     }
 
@@ -353,7 +353,7 @@ fn axes_that_a_grid_does_not_have_are_refused() {
 fn noise_that_is_stated_twice_must_agree() {
     let mut plane = Plane::new(MomentFilter, 3);
     let (other, _) = sensor(Kind::Bit, coordinate(0), 0.4, 0.0);
-    let refused = plane.centre.join(9, other);
+    let refused = plane.centre.join_boxed(9, other);
     assert!(matches!(refused, Err(Error::Argument(e)) if e.name == "noise"));
     assert_eq!(SignBit::new(0.4).unwrap().noise_covariance_at(&Vector1::new(1.0))[0], 0.4);
 }

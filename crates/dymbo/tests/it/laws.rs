@@ -1,7 +1,7 @@
 //! The laws of schemes, on every scheme of this crate and all kinds of links.
 
 use fewbits_core::laws::{factor, message, scheme};
-use fewbits_core::{Gaussian, Link, Message, Observation, Scheme, Sign};
+use fewbits_core::{Deterministic, Gaussian, Link, Message, Observation, Scheme, Sign};
 use fewbits_dymbo::{CellIndex, InnovationWord, Multiple, Prediction, RoundedSample, SignBit};
 use fewbits_monte_carlo::Stream;
 use nalgebra::Vector1;
@@ -9,8 +9,13 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 
 /// All laws of one scheme with the given reports, in a unit of measurement.
-fn obeys<S: Scheme<1>>(scheme_: &S, feedback: &S::Feedback, noise_variance: f64, unit: f64, reports: &[S::Report])
-where
+fn obeys<S: Deterministic<1>>(
+    scheme_: &S,
+    feedback: &S::Feedback,
+    noise_variance: f64,
+    unit: f64,
+    reports: &[S::Report],
+) where
     S::Report: Copy + PartialEq + std::fmt::Debug,
 {
     let points = [-7.0, -1.2, 0.0, 0.31, 2.0, 40.0].map(|m| Vector1::new(m * unit));
@@ -39,6 +44,8 @@ where
             scheme::frequencies(scheme_, feedback, &link, &mut rng, 4000, &m, noise, reports.to_vec()).unwrap();
         }
     }
+    let sources = [Stream::new(1).rng(), Stream::new(2).rng()];
+    scheme::deterministic(scheme_, feedback, &sources, &points[1..4]).unwrap();
     let format = scheme_.report_format();
     for report in reports {
         message::round_trip(report, &format).unwrap();

@@ -124,7 +124,7 @@ pub(super) enum Alarm {
 
 /// The limit at which a two-sided sum of standard normal terms raises one alarm in `1 / rate` steps (Siegmund's approximation:
 /// `(exp(2 k b) - 2 k b - 1) / (2 k^2)` steps on one side, `b` the limit plus 1.166).
-pub(super) fn limit(rate: f64) -> f64 {
+fn limit(rate: f64) -> f64 {
     let steps = 2.0 / rate;
     let run = |b: f64| ((2.0 * DRIFT * b).exp_m1() - 2.0 * DRIFT * b) / (2.0 * DRIFT * DRIFT);
     let (mut low, mut high) = (0.0, 400.0);
@@ -164,6 +164,22 @@ impl FalseAlarms {
         within("sensor", self.sensor, 1e-9, 0.1)?;
         within("centre", self.centre, 1e-9, 0.1)?;
         Ok(())
+    }
+}
+
+/// Limits of the cumulative sums.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Limits {
+    pub sensor: f64,
+    pub centre: f64,
+}
+
+impl Limits {
+    pub fn new(rates: &FalseAlarms) -> Self {
+        Self {
+            sensor: limit(rates.sensor / SEQUENCES as f64),
+            centre: limit(rates.centre / SEQUENCES as f64),
+        }
     }
 }
 

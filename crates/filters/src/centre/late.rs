@@ -36,7 +36,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let mut likelihoods: Vec<Box<dyn StateLikelihood<D>>> = Vec::new();
             for slot in checkpoint.slots.iter().filter(|slot| slot.used) {
                 // A sensor may have left since.
-                if let Some(member) = self.members.get(&slot.sensor) {
+                if let Ok(member) = self.member(slot.sensor) {
                     let (feedback, observation) = slot.bits()?;
                     likelihoods.push(member.sensor.likelihood(&feedback, &observation, slot.working)?);
                 }

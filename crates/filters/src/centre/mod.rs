@@ -29,6 +29,7 @@ mod judge;
 mod late;
 mod learning;
 mod presence;
+mod receive;
 mod remote;
 mod slot;
 mod state;
@@ -41,16 +42,17 @@ pub use slot::{Event, Received, Slot};
 pub use state::CentreState;
 
 use crate::Error;
-use crate::contract::{Evolving, StateFilter, StateLikelihood};
-use fewbits_core::factor::Scalar;
+use crate::contract::{Evolving, StateFilter};
 use fewbits_core::{Belief, BitString, Gaussian, Observation};
 use fewbits_numerics::error::{finite, non_negative, positive, refuse};
 use rand::Rng;
 use state::{Checkpoint, MemberState};
-use std::collections::BTreeMap;
 
 struct Member<const D: usize> {
+    number: u32,
     sensor: Box<dyn RemoteSensor<D>>,
+    /// Probability that a report arrives that was sent.
+    arrival: f64,
     /// Whether nothing but the link keeps its reports back.
     always_speaks: bool,
     state: MemberState,
@@ -72,13 +74,14 @@ pub struct FusionCentre<const D: usize, F: StateFilter<D>> {
     belief: F::Belief,
     now: f64,
     noise_scale: f64,
-    members: BTreeMap<u32, Member<D>>,
+    /// In order of their numbers.
+    members: Vec<Member<D>>,
     outage: presence::Outage,
     monitor: health::Monitor,
     history: Vec<Checkpoint<F::Belief>>,
     dropped: u64,
     failures: Failures,
-    false_alarms: FalseAlarms,
+    limits: health::Limits,
     learning: Option<NoiseLearning>,
     acquisition: Option<Gaussian<D>>,
     window: f64,
@@ -102,13 +105,13 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             belief,
             now: 0.0,
             noise_scale: 1.0,
-            members: BTreeMap::new(),
+            members: Vec::new(),
             outage: presence::Outage::default(),
             monitor: health::Monitor::default(),
             history: Vec::new(),
             dropped: 0,
             failures: Failures::default(),
-            false_alarms: FalseAlarms::default(),
+            limits: health::Limits::new(&FalseAlarms::default()),
             learning: None,
             acquisition: None,
             window: 0.0,
@@ -130,7 +133,10 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// If a rate is out of range.
     pub fn with_false_alarms(self, false_alarms: FalseAlarms) -> Result<Self, Error> {
         false_alarms.check()?;
-        Ok(Self { false_alarms, ..self })
+        Ok(Self {
+            limits: health::Limits::new(&false_alarms),
+            ..self
+        })
     }
 
     /// The same with process noise that is learnt.
@@ -178,27 +184,38 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// # Errors
     /// If the sensor cannot ask for a report under the present belief: its noise is stated twice with different numbers.
     pub fn join(&mut self, number: u32, sensor: impl RemoteSensor<D> + 'static) -> Result<(), Error> {
-        let estimate = self.estimate();
-        let feedback = sensor.feedback(&estimate)?;
-        let nothing = sensor.likelihood(&feedback, &Observation::Nothing, 1.0).ok();
-        let nothing = nothing.and_then(|one| one.as_linear_scalar(estimate.mean()));
+        self.join_boxed(number, Box::new(sensor))
+    }
+
+    /// As [`join`](Self::join), of a kind that is chosen while the program runs.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn join_boxed(&mut self, number: u32, sensor: Box<dyn RemoteSensor<D>>) -> Result<(), Error> {
+        let feedback = sensor.feedback(&self.estimate())?;
+        let nothing = sensor.likelihood(&feedback, &Observation::Nothing, 1.0);
         let member = Member {
-            always_speaks: nothing.is_some_and(|(one, _)| matches!(one.factor, Scalar::Constant(_))),
-            sensor: Box::new(sensor),
+            number,
+            arrival: sensor.arrival(),
+            always_speaks: nothing.is_ok_and(|one| one.as_constant().is_some()),
+            sensor,
             state: MemberState::new(),
         };
-        self.members.insert(number, member);
+        match self.seat(number, 0) {
+            Ok(seat) => self.members[seat] = member,
+            Err(seat) => self.members.insert(seat, member),
+        }
         Ok(())
     }
 
     /// Dismisses a sensor. Whether there was one.
     pub fn leave(&mut self, number: u32) -> bool {
-        self.members.remove(&number).is_some()
+        self.seat(number, 0).map(|seat| self.members.remove(seat)).is_ok()
     }
 
     /// Numbers of the sensors.
     pub fn sensors(&self) -> impl Iterator<Item = u32> + '_ {
-        self.members.keys().copied()
+        self.members.iter().map(|member| member.number)
     }
 
     /// Seconds since the prior.
@@ -255,11 +272,22 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         Ok(self.member(number)?.state.excluded)
     }
 
+    /// Where a sensor is, or where it would be. Slots mostly come in order: it is looked for at `guess` first.
+    fn seat(&self, number: u32, guess: usize) -> Result<usize, usize> {
+        match self.members.get(guess) {
+            Some(member) if member.number == number => Ok(guess),
+            _ => self.members.binary_search_by_key(&number, |member| member.number),
+        }
+    }
+
     fn member(&self, number: u32) -> Result<&Member<D>, Error> {
+        Ok(&self.members[self.seated(number, 0)?])
+    }
+
+    fn seated(&self, number: u32, guess: usize) -> Result<usize, Error> {
         let seated = self.members.len();
-        self.members
-            .get(&number)
-            .ok_or(Error::UnknownSensor { sensor: number, seated })
+        let unknown = |_| Error::UnknownSensor { sensor: number, seated };
+        self.seat(number, guess).map_err(unknown)
     }
 
     /// Moves the belief to `time` (seconds since the prior).
@@ -276,7 +304,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             let mut belief = self.belief.clone();
             self.filter.predict(rng, &*motion, self.noise_scale, &mut belief)?;
             self.belief = belief;
-            let sensors = self.members.values_mut().map(|member| &mut member.state.presence);
+            let sensors = self.members.iter_mut().map(|member| &mut member.state.presence);
             self.outage.advance(seconds, &self.failures, sensors);
             self.now = time;
         }
@@ -289,46 +317,5 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
     /// If there is no such sensor, or as [`RemoteSensor::feedback`].
     pub fn feedback(&self, number: u32) -> Result<BitString, Error> {
         self.member(number)?.sensor.feedback(&self.estimate())
-    }
-
-    /// Takes in what was observed at the present instant.
-    ///
-    /// # Errors
-    /// If a sensor is unknown or bits do not decode; [`fewbits_core::Error::Impossible`] if the observations are impossible together, in
-    /// which case the caller may drop them or start anew.
-    pub fn receive(&mut self, rng: &mut dyn Rng, slots: &[Slot]) -> Result<Received, Error> {
-        let predicted = self.estimate();
-        // A report is judged given those before it: sensors that err with the prediction would else count as independent. Silence is judged by
-        // the prediction alone, since the silence of sensors that died together would speak for each other's.
-        let mut given = predicted;
-        let mut used = Vec::with_capacity(slots.len());
-        let mut watched = Vec::with_capacity(slots.len());
-        for slot in slots {
-            let member = self.member(slot.sensor)?;
-            let working = member.state.presence.working;
-            let likelihood = member.sensor.likelihood(&slot.feedback, &slot.observation, working)?;
-            let is_report = matches!(slot.observation, Observation::Received(_));
-            let belief = if is_report { &given } else { &predicted };
-            watched.push(self.watch(member, slot, belief, &*likelihood)?);
-            if !member.state.excluded {
-                if is_report
-                    && slots.len() > 1
-                    && let Ok(conditioned) = likelihood.condition(&given)
-                {
-                    given = conditioned.belief;
-                }
-                used.push(likelihood);
-            }
-        }
-        let before = (self.window > 0.0).then(|| self.belief.clone());
-        let mut belief = self.belief.clone();
-        let used: Vec<&dyn StateLikelihood<D>> = used.iter().map(|one| &**one).collect();
-        let info = self.filter.update(rng, &mut belief, &used)?;
-        self.belief = belief;
-        if let Some(before) = before {
-            self.remember(before, slots);
-        }
-        let events = self.judge(rng, slots, &watched)?;
-        Ok(Received { info, events })
     }
 }

@@ -1,7 +1,7 @@
 //! A sensor as its receiver sees it: bits in, likelihoods out.
 
 use crate::Error;
-use crate::contract::StateLikelihood;
+use crate::contract::{Evidence, StateLikelihood};
 use fewbits_core::{BitString, Gaussian, Link, MeasurementNoise, Message, Observation, Observed, Scheme, Sensing};
 use fewbits_numerics::error::{ArgumentError, within};
 use fewbits_numerics::linalg::congruence;
@@ -29,35 +29,40 @@ pub trait RemoteSensor<const D: usize> {
         working: f64,
     ) -> Result<Box<dyn StateLikelihood<D>>, Error>;
 
+    /// Conditions a Gaussian on [`likelihood`](Self::likelihood).
+    ///
+    /// # Errors
+    /// As there, and as [`StateLikelihood::condition`].
+    fn condition(
+        &self,
+        feedback: &BitString,
+        observation: &Observation<BitString>,
+        working: f64,
+        belief: &mut Gaussian<D>,
+    ) -> Result<Evidence, Error> {
+        self.likelihood(feedback, observation, working)?.condition(belief)
+    }
+
+    /// The evidence of [`likelihood`](Self::likelihood) under a Gaussian.
+    ///
+    /// # Errors
+    /// As there, and as [`StateLikelihood::evidence`].
+    fn evidence(
+        &self,
+        feedback: &BitString,
+        observation: &Observation<BitString>,
+        working: f64,
+        belief: &Gaussian<D>,
+    ) -> Result<Evidence, Error> {
+        self.likelihood(feedback, observation, working)?.evidence(belief)
+    }
+
     /// Variance of a scalar measurement under the prediction, noise included, if the sensor sends every measurement as a value.
     /// `None` for words, vectors and sensors that may be silent.
     fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64>;
 
     /// Probability that a report arrives that was sent.
     fn arrival(&self) -> f64;
-}
-
-impl<const D: usize> RemoteSensor<D> for Box<dyn RemoteSensor<D>> {
-    fn feedback(&self, predicted: &Gaussian<D>) -> Result<BitString, Error> {
-        (**self).feedback(predicted)
-    }
-
-    fn likelihood(
-        &self,
-        feedback: &BitString,
-        observation: &Observation<BitString>,
-        working: f64,
-    ) -> Result<Box<dyn StateLikelihood<D>>, Error> {
-        (**self).likelihood(feedback, observation, working)
-    }
-
-    fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64> {
-        (**self).value_variance(predicted)
-    }
-
-    fn arrival(&self) -> f64 {
-        (**self).arrival()
-    }
 }
 
 /// Both ends' knowledge of a sensor that reports by a [`Scheme`]: how it senses, what it reports, over which link, and what it is told.
@@ -135,6 +140,30 @@ impl<S, C, A, const M: usize> Reporting<S, C, A, M> {
         let jacobian: SMatrix<f64, M, D> = self.sensing.jacobian(predicted.mean());
         Ok(Gaussian::from_trusted_parts(mean, congruence(&jacobian, predicted.covariance()) + supposed))
     }
+
+    #[inline(always)]
+    fn observed(
+        &self,
+        feedback: &BitString,
+        observation: &Observation<BitString>,
+        working: f64,
+    ) -> Result<Observed<S, C::Factor, M>, Error>
+    where
+        S: Clone,
+        C: Scheme<M>,
+    {
+        let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), feedback)?;
+        let observation = match observation {
+            // Bits that are no report of the scheme: sent, and not understood.
+            Observation::Received(bits) => C::Report::from_bits(&self.scheme.report_format(), bits)
+                .map_or(Observation::Lost, Observation::Received),
+            Observation::Nothing => Observation::Nothing,
+            Observation::Lost => Observation::Lost,
+        };
+        let link = supposed(&self.link, working)?;
+        let factor = self.scheme.factor(&feedback, &observation, &link)?;
+        Ok(Observed::new(self.sensing.clone(), factor))
+    }
 }
 
 impl<const D: usize, const M: usize, S, C, A> RemoteSensor<D> for Reporting<S, C, A, M>
@@ -155,18 +184,27 @@ where
         observation: &Observation<BitString>,
         working: f64,
     ) -> Result<Box<dyn StateLikelihood<D>>, Error> {
-        let feedback = C::Feedback::from_bits(&self.scheme.feedback_format(), feedback)?;
-        let observation = match observation {
-            // Bits that are no report of the scheme: sent, and not understood.
-            Observation::Received(bits) => C::Report::from_bits(&self.scheme.report_format(), bits)
-                .map_or(Observation::Lost, Observation::Received),
-            Observation::Nothing => Observation::Nothing,
-            Observation::Lost => Observation::Lost,
-        };
-        let factor = self
-            .scheme
-            .factor(&feedback, &observation, &supposed(&self.link, working)?)?;
-        Ok(Box::new(Observed::new(self.sensing.clone(), factor)))
+        Ok(Box::new(self.observed(feedback, observation, working)?))
+    }
+
+    fn condition(
+        &self,
+        feedback: &BitString,
+        observation: &Observation<BitString>,
+        working: f64,
+        belief: &mut Gaussian<D>,
+    ) -> Result<Evidence, Error> {
+        self.observed(feedback, observation, working)?.condition(belief)
+    }
+
+    fn evidence(
+        &self,
+        feedback: &BitString,
+        observation: &Observation<BitString>,
+        working: f64,
+        belief: &Gaussian<D>,
+    ) -> Result<Evidence, Error> {
+        self.observed(feedback, observation, working)?.evidence(belief)
     }
 
     fn value_variance(&self, predicted: &Gaussian<D>) -> Option<f64> {
@@ -183,6 +221,7 @@ where
 
 /// A sensor that works with probability `working` is one whose reports are lost more often without a trace:
 /// `1 - (1 - loss) working`. A known loss needs a sensor that works.
+#[inline]
 fn supposed(link: &Link, working: f64) -> Result<Link, Error> {
     within("working", working, 0.0, 1.0)?;
     if working == 1.0 {

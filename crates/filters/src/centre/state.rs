@@ -149,7 +149,7 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
             members: self
                 .members
                 .iter()
-                .map(|(number, m)| (*number, m.state.clone()))
+                .map(|member| (member.number, member.state.clone()))
                 .collect(),
             outage: self.outage,
             monitor: self.monitor,
@@ -168,11 +168,11 @@ impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
         }
         finite("now", state.now)?;
         positive("noise_scale", state.noise_scale)?;
-        if !state.members.keys().eq(self.members.keys()) {
-            let expected = format!("the sensors {:?}", self.members.keys().collect::<Vec<_>>());
+        if !state.members.keys().copied().eq(self.sensors()) {
+            let expected = format!("the sensors {:?}", self.sensors().collect::<Vec<_>>());
             return refuse("state", format!("of the sensors {:?}", state.members.keys().collect::<Vec<_>>()), expected);
         }
-        for (member, stored) in self.members.values_mut().zip(state.members.into_values()) {
+        for (member, stored) in self.members.iter_mut().zip(state.members.into_values()) {
             member.state = stored;
         }
         self.now = state.now;

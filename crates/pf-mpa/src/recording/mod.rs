@@ -61,7 +61,8 @@ pub struct RangeEstimate {
     pub covariance: Matrix2<f64>,
     /// Bias of all ranges.
     pub bias: f64,
-    /// Deviation of the velocity along an axis, as it was learnt.
+    /// Deviation of the velocity along an axis, as it was learnt: [`RangeSettings::speed`] times the root of the bank's noise scale, which is the
+    /// geometric mean under the probabilities of its filters.
     pub speed: f64,
     /// Whether the track was found to be lost with this range; acquisition begins anew.
     pub lost: bool,

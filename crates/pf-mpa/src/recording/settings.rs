@@ -16,7 +16,9 @@ pub struct RangeSettings {
     pub stray: f64,
     /// Deviation of the velocity along each axis, in metres per second.
     pub speed: f64,
-    /// How well `speed` is known: to this factor, 1 or more. The speed is learnt within it.
+    /// How well `speed` is known: to this factor, 1 or more. The speed is learnt within it, by a [`NoiseBank`](fewbits_filters::NoiseBank) of
+    /// speeds from `speed / speed_factor` to `speed * speed_factor`, each at most twice the one before. At `v` times `speed` the
+    /// process noise has `v^2` times its covariance, the drift of the bias included.
     pub speed_factor: f64,
     /// How long a velocity lasts, in seconds.
     pub persistence: f64,
@@ -63,7 +65,8 @@ impl RangeSettings {
         Ok(())
     }
 
-    /// Scales of the process noise in the bank: the speed in steps of at most two, which cost a few percent.
+    /// Scales of the process noise's covariance in the bank, the squares of those of the speed: steps of at most two in speed, which cost a few
+    /// percent of the error.
     pub(super) fn scales(&self) -> Vec<f64> {
         let steps = self.speed_factor.log2().ceil() as i32;
         let step = if steps > 0 {

@@ -1,0 +1,190 @@
+//! What is observed at one instant: the belief after it, and what each slot says about its sensor.
+
+use super::health::Residual;
+use super::judge::Watched;
+use super::{FusionCentre, Member, Received, Slot};
+use crate::Error;
+use crate::contract::{Evidence, Info, StateFilter, StateLikelihood};
+use fewbits_core::{BitString, Gaussian, Observation};
+use rand::Rng;
+
+/// Reports of at most this many bits are words, whose alternatives are enumerated.
+const WORD_BITS: usize = 4;
+
+impl<const D: usize, F: StateFilter<D>> FusionCentre<D, F> {
+    /// Takes in what was observed at the present instant.
+    ///
+    /// # Errors
+    /// If a sensor is unknown or bits do not decode; [`fewbits_core::Error::Impossible`] if the observations are impossible together, in
+    /// which case the caller may drop them or start anew.
+    pub fn receive(&mut self, rng: &mut dyn Rng, slots: &[Slot]) -> Result<Received, Error> {
+        let predicted = self.estimate();
+        // A report is judged given those before it: sensors that err with the prediction would else count as independent. Silence is judged by
+        // the prediction alone, since the silence of sensors that died together would speak for each other's.
+        let mut given = predicted;
+        let mut posterior = self.filter.of_moments(&predicted).map(|_| Posterior::default());
+        let mut used = Vec::new();
+        let mut watched = Vec::with_capacity(slots.len());
+        let mut next_seat = 0;
+        for slot in slots {
+            let seat = self.seated(slot.sensor, next_seat)?;
+            next_seat = seat + 1;
+            let member = &self.members[seat];
+            let (working, is_used) = (member.state.presence.working, !member.state.excluded);
+            let likelihood = || member.sensor.likelihood(&slot.feedback, &slot.observation, working);
+            let Observation::Received(bits) = &slot.observation else {
+                let missing = likelihood()?;
+                watched.push((seat, member.silence(slot, &*missing, &predicted)?));
+                match &mut posterior {
+                    Some(posterior) if is_used => posterior.missing(&*missing, &given)?,
+                    None if is_used => used.push(missing),
+                    _ => {}
+                }
+                continue;
+            };
+            let report = if posterior.is_none() { Some(likelihood()?) } else { None };
+            let condition = |belief: &mut Gaussian<D>| match &report {
+                Some(report) => report.condition(belief),
+                None => member
+                    .sensor
+                    .condition(&slot.feedback, &slot.observation, working, belief),
+            };
+            let is_bit = bits.bits() == 1 && member.always_speaks;
+            let before = (!is_bit).then_some(given);
+            let conditioned = if is_used {
+                condition(&mut given)
+            } else {
+                condition(&mut given.clone())
+            };
+            let evidence = match conditioned {
+                Ok(evidence) => Some(evidence),
+                Err(error) if posterior.is_some() && is_used => return Err(error),
+                // What cannot be conditioned on may have evidence all the same.
+                Err(_) => member.evidence(slot, &slot.observation, working, &given)?,
+            };
+            let report_says = match (evidence, before) {
+                (None, _) => Watched::Report(None),
+                (Some(evidence), None) => Watched::Bit(evidence, member.arrival * working),
+                (Some(evidence), Some(before)) => Watched::Report(member.residual(slot, bits, &before, evidence)?),
+            };
+            watched.push((seat, report_says));
+            if !is_used {
+                continue;
+            }
+            match &mut posterior {
+                Some(Posterior {
+                    apart: Some(apart),
+                    log_likelihood,
+                }) => *log_likelihood += condition(apart)?.log_likelihood,
+                Some(posterior) => posterior.log_likelihood += evidence.map_or(0.0, |one| one.log_likelihood),
+                None => {}
+            }
+            used.extend(report);
+        }
+        let mut belief = self.belief.clone();
+        let mut info = Info::default();
+        if let Some(Posterior { apart, log_likelihood }) = posterior {
+            info.log_likelihood = log_likelihood;
+            belief = self.filter.of_moments(&apart.unwrap_or(given)).unwrap_or(belief);
+        } else {
+            let used: Vec<&dyn StateLikelihood<D>> = used.iter().map(|one| &**one).collect();
+            info = self.filter.update(rng, &mut belief, &used)?;
+        }
+        let before = (self.window > 0.0).then(|| self.belief.clone());
+        self.belief = belief;
+        if let Some(before) = before {
+            self.remember(before, slots);
+        }
+        let events = self.judge(rng, &watched)?;
+        Ok(Received { info, events })
+    }
+}
+
+/// The posterior of a filter of moments, while observations are taken in one after the other.
+#[derive(Default)]
+struct Posterior<const D: usize> {
+    /// Its moments once silence has been taken in. Before, they are those given the reports.
+    apart: Option<Gaussian<D>>,
+    log_likelihood: f64,
+}
+
+impl<const D: usize> Posterior<D> {
+    /// Takes in silence or a loss.
+    fn missing(&mut self, missing: &dyn StateLikelihood<D>, given: &Gaussian<D>) -> Result<(), Error> {
+        if let Some(log) = missing.as_constant().filter(|log| log.is_finite()) {
+            self.log_likelihood += log;
+            return Ok(());
+        }
+        self.log_likelihood += missing.condition(self.apart.get_or_insert(*given))?.log_likelihood;
+        Ok(())
+    }
+}
+
+impl<const D: usize> Member<D> {
+    /// What an observation in this slot says about the model; `None` if it is impossible.
+    fn evidence(
+        &self,
+        slot: &Slot,
+        observation: &Observation<BitString>,
+        working: f64,
+        belief: &Gaussian<D>,
+    ) -> Result<Option<Evidence>, Error> {
+        match self.sensor.evidence(&slot.feedback, observation, working, belief) {
+            Ok(found) => Ok(Some(found)),
+            Err(Error::Core(fewbits_core::Error::Impossible)) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// How likely a sensor that works is silent, from the belief before the slot.
+    fn silence(
+        &self,
+        slot: &Slot,
+        likelihood: &dyn StateLikelihood<D>,
+        predicted: &Gaussian<D>,
+    ) -> Result<Watched, Error> {
+        if slot.observation == Observation::Lost {
+            return Ok(Watched::Nothing);
+        }
+        let found = match likelihood.as_constant() {
+            Some(log) if self.state.presence.working == 1.0 => log.exp(),
+            _ => self
+                .evidence(slot, &slot.observation, 1.0, predicted)?
+                .map_or(0.0, |one| one.log_likelihood.exp()),
+        };
+        Ok(Watched::Silence(found.min(1.0)))
+    }
+
+    /// A report's place in its predicted law, `None` if it has none.
+    fn residual(
+        &self,
+        slot: &Slot,
+        bits: &BitString,
+        predicted: &Gaussian<D>,
+        received: Evidence,
+    ) -> Result<Option<Residual>, Error> {
+        let place = |found: Evidence| (found.log_likelihood, found.correction);
+        let working = self.state.presence.working;
+        if let Some(variance) = self.sensor.value_variance(predicted) {
+            let log_density = received.log_likelihood - (self.arrival * working).ln();
+            return Ok(Residual::of_value(log_density, variance, received.correction));
+        }
+        if bits.bits() == 0 || bits.bits() > WORD_BITS {
+            return Ok(None);
+        }
+        let mut words = Vec::with_capacity(1 << bits.bits());
+        let mut at = 0;
+        for word in 0..1_u8 << bits.bits() {
+            let other = BitString::from_bytes(vec![word << (8 - bits.bits())], bits.bits())?;
+            if other == *bits {
+                at = words.len();
+                words.push(place(received));
+                continue;
+            }
+            // A word that the scheme never sends is no alternative.
+            let found = self.evidence(slot, &Observation::Received(other), working, predicted);
+            words.extend(found.ok().flatten().map(place));
+        }
+        Ok(Residual::of_word(&words, at))
+    }
+}
