@@ -117,39 +117,52 @@ impl SensorField {
         }
     }
 
-    /// The corners of the box of cell centres about a point. `None` if the point is not in a free cell.
-    fn stencil(&self, point: &[f64; 3]) -> Option<Stencil> {
-        let grid = self.domain.grid();
+    /// Free cells whose means stand for the corners of the box of cell centres about a point, with their weights in the value and in the
+    /// gradient. `None` if the point is not in a free cell.
+    fn stencil(&self, point: &[f64; 3]) -> Option<([(usize, f64, Vector3<f64>); 8], usize)> {
+        let (grid, axes) = (self.domain.grid(), self.domain.grid().dimension());
         let own = grid.cell_at(*point)?;
-        let number = self.domain.number(own)?;
         let (at, centre) = (grid.place(own), grid.centre(own));
-        let mut found = Stencil {
-            corners: [number; 8],
-            position: [0.0; 3],
-            widths: [1.0; 3],
-            upwards: [0, 1, 2].map(|axis| point[axis] >= centre[axis]),
-            axes: grid.dimension(),
-        };
-        for axis in 0..found.axes {
-            if let Some(next) = grid.next(at, axis, found.upwards[axis]) {
-                found.widths[axis] = 0.5 * (grid.width(axis, at[axis]) + grid.width(axis, next[axis]));
-                found.position[axis] = (point[axis] - centre[axis]).abs() / found.widths[axis];
+        let mut corners = [(self.domain.number(own)?, 1.0, Vector3::zeros()); 8];
+        // Position of the point in the box along each axis, and width of the box.
+        let (mut position, mut widths) = ([0.0; 3], [1.0; 3]);
+        let upwards = [0, 1, 2].map(|axis| point[axis] >= centre[axis]);
+        for axis in 0..axes {
+            if let Some(next) = grid.next(at, axis, upwards[axis]) {
+                widths[axis] = 0.5 * (grid.width(axis, at[axis]) + grid.width(axis, next[axis]));
+                position[axis] = (point[axis] - centre[axis]).abs() / widths[axis];
             }
         }
         // A corner counts if it is free and joined to the own cell through free corners; otherwise another corner stands for it.
         let mut joined = [true, false, false, false, false, false, false, false];
-        for corner in 1..1_usize << found.axes {
-            let moved = || (0..found.axes).filter(|axis| corner >> axis & 1 == 1);
+        for corner in 0..1_usize << axes {
+            let beyond = |axis: usize| corner >> axis & 1 == 1;
+            let moved = || (0..axes).filter(|axis| beyond(*axis));
             // Prefer a corner with a value of its own: along a wall the field is that of the near side.
             let near = moved()
                 .map(|axis| corner ^ (1 << axis))
                 .rfind(|without| joined[*without]);
-            let place = moved().try_fold(at, |at, axis| grid.next(at, axis, found.upwards[axis]));
-            let free = near.and(place).and_then(|place| self.domain.number(grid.index(place)));
-            joined[corner] = free.is_some();
-            found.corners[corner] = free.unwrap_or(found.corners[near.unwrap_or(corner & (corner - 1))]);
+            let place = moved().try_fold(at, |at, axis| grid.next(at, axis, upwards[axis]));
+            if corner > 0 {
+                let free = near.and(place).and_then(|place| self.domain.number(grid.index(place)));
+                joined[corner] = free.is_some();
+                corners[corner].0 = free.unwrap_or(corners[near.unwrap_or(corner & (corner - 1))].0);
+            }
+            let factor = |axis: usize| {
+                if beyond(axis) {
+                    position[axis]
+                } else {
+                    1.0 - position[axis]
+                }
+            };
+            corners[corner].1 = (0..axes).map(factor).product();
+            for axis in 0..axes {
+                let others: f64 = (0..axes).filter(|other| *other != axis).map(factor).product();
+                let slope = others / widths[axis];
+                corners[corner].2[axis] = if beyond(axis) == upwards[axis] { slope } else { -slope };
+            }
         }
-        Some(found)
+        Some((corners, 1 << axes))
     }
 
     /// Calls `f` with the value and gradient of a response at a point for each age.
@@ -163,12 +176,14 @@ impl SensorField {
         for (k, age) in ages.iter().enumerate() {
             let about = self.about(*age);
             // Otherwise the field stands between both ages: a steady one, or after the last age.
-            if let Some(stencil) = stencil.as_ref().filter(|_| about != before.0) {
+            if let Some((corners, count)) = stencil.as_ref().filter(|_| about != before.0) {
                 let mut result = nothing;
-                for (known, weight) in about.into_iter().filter(|pair| pair.1 > 0.0) {
-                    let (value, gradient) = stencil.apply(&self.responses[known][sensor]);
-                    result.value += weight * value;
-                    result.gradient += weight * gradient;
+                for (known, share) in about.into_iter().filter(|pair| pair.1 > 0.0) {
+                    let field = &self.responses[known][sensor];
+                    for (cell, weight, slopes) in &corners[..*count] {
+                        result.value += share * (field[*cell] * weight);
+                        result.gradient += share * field[*cell] * slopes;
+                    }
                 }
                 // Steps in time may leave an error below zero.
                 before = (about, if result.value < 0.0 { nothing } else { result });
@@ -192,36 +207,6 @@ impl SensorField {
             *places = (low?.saturating_sub(margin), (high? + margin).min(edges.len() - 2));
         }
         Some(places)
-    }
-}
-
-/// Multilinear interpolation between up to eight free cells.
-struct Stencil {
-    /// The free cell whose mean stands for the corner that is beyond along a subset of the axes (by bits).
-    corners: [usize; 8],
-    /// Position of the point in the box along each axis, and width of the box.
-    position: [f64; 3],
-    widths: [f64; 3],
-    upwards: [bool; 3],
-    axes: usize,
-}
-
-impl Stencil {
-    fn apply(&self, field: &[f64]) -> (f64, Vector3<f64>) {
-        let (mut value, mut gradient) = (0.0, Vector3::zeros());
-        for corner in 0..1_usize << self.axes {
-            let beyond = |axis: usize| corner >> axis & 1 == 1;
-            let near = |axis: usize| 1.0 - self.position[axis];
-            let factor = |axis: usize| if beyond(axis) { self.position[axis] } else { near(axis) };
-            let c = field[self.corners[corner]];
-            value += c * (0..self.axes).map(factor).product::<f64>();
-            for axis in 0..self.axes {
-                let outwards = beyond(axis) == self.upwards[axis];
-                let others: f64 = (0..self.axes).filter(|other| *other != axis).map(factor).product();
-                gradient[axis] += if outwards { c } else { -c } * others / self.widths[axis];
-            }
-        }
-        (value, gradient)
     }
 }
 

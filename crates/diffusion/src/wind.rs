@@ -151,12 +151,14 @@ fn solve_potential(domain: &Domain, supply: Vec<f64>) -> Result<Vec<f64>, Error>
     factor.solve(Direction::Forward, &mut columns);
     let mut potential = columns.col_as_slice(0).to_vec();
     // One step of refinement: flows are differences of the potential.
-    transport.apply(Direction::Forward, &potential, columns.col_as_slice_mut(0));
-    columns
-        .col_as_slice_mut(0)
-        .iter_mut()
-        .zip(supply)
-        .for_each(|(x, supply)| *x = supply - *x);
+    for (i, supply) in supply.into_iter().enumerate() {
+        columns[(i, 0)] = supply - transport.diagonal[i] * potential[i];
+    }
+    for face in &domain.faces[..domain.inner] {
+        let [low, high] = face.cells;
+        columns[(low, 0)] += conductance(face) * potential[high];
+        columns[(high, 0)] += conductance(face) * potential[low];
+    }
     factor.solve(Direction::Forward, &mut columns);
     let changes = potential.iter_mut().zip(columns.col_as_slice(0));
     changes.for_each(|(phi, change)| *phi += change);
