@@ -38,6 +38,9 @@ pub struct SensorField {
     responses: Vec<Vec<Vec<f64>>>,
 }
 
+/// A free cell, and the weights of its mean in a value and in a gradient.
+type Corner = (usize, f64, Vector3<f64>);
+
 /// Responses above this, kg/m^3 per kg/s, have no gradient in the range of numbers.
 const LARGEST_RESPONSE: f64 = 1e240;
 
@@ -119,7 +122,7 @@ impl SensorField {
 
     /// Free cells whose means stand for the corners of the box of cell centres about a point, with their weights in the value and in the
     /// gradient. `None` if the point is not in a free cell.
-    fn stencil(&self, point: &[f64; 3]) -> Option<([(usize, f64, Vector3<f64>); 8], usize)> {
+    fn stencil(&self, point: &[f64; 3]) -> Option<([Corner; 8], usize)> {
         let (grid, axes) = (self.domain.grid(), self.domain.grid().dimension());
         let own = grid.cell_at(*point)?;
         let (at, centre) = (grid.place(own), grid.centre(own));
