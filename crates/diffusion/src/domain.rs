@@ -2,8 +2,7 @@
 
 use crate::grid::LARGEST;
 use crate::{Error, Grid};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::within;
+use fewbits_numerics::error::{refuse, within};
 
 /// What happens to the substance at a face between a free cell and what is not free.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,13 +19,6 @@ pub enum Boundary {
     Outflow,
 }
 
-impl Boundary {
-    /// Whether wind passes.
-    pub fn is_open(&self) -> bool {
-        matches!(self, Self::Inflow | Self::Outflow)
-    }
-}
-
 /// What a cell of the grid is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cell {
@@ -38,28 +30,39 @@ pub enum Cell {
     Blocked(Boundary),
 }
 
-/// A face between two free cells.
+/// A face of a free cell that is not closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Face {
-    /// Numbers of the free cells below and above.
+    /// Numbers of the free cells below and above. What is outside counts as two more cells: the last behind inflows, the other elsewhere.
     pub(crate) cells: [usize; 2],
     pub(crate) axis: usize,
     pub(crate) area: f64,
-    /// Distances of both centres from the face, m.
+    /// Distances of both centres from the face, m; 0 outside.
     pub(crate) halves: [f64; 2],
+    /// `None` between two free cells.
+    pub(crate) boundary: Option<Boundary>,
 }
 
-/// A face between a free cell and what is not free.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct EdgeFace {
-    /// Number of the free cell.
-    pub(crate) cell: usize,
-    pub(crate) axis: usize,
-    /// Whether it is the upper face of the cell.
-    pub(crate) upper: bool,
-    pub(crate) area: f64,
-    pub(crate) half: f64,
-    pub(crate) boundary: Boundary,
+/// Number of cells that what is outside counts as.
+pub(crate) const OUTSIDE: usize = 2;
+
+impl Face {
+    /// The side of a free cell: 0 below, 1 above. 0 between two free cells.
+    #[inline]
+    pub(crate) fn side(&self) -> usize {
+        usize::from(self.cells[1] < self.cells[0])
+    }
+
+    /// Number of the free cell on that side.
+    #[inline]
+    pub(crate) fn cell(&self) -> usize {
+        self.cells[self.side()]
+    }
+
+    /// Whether wind passes.
+    pub(crate) fn is_open(&self) -> bool {
+        matches!(self.boundary, None | Some(Boundary::Inflow | Boundary::Outflow))
+    }
 }
 
 /// The free cells of a grid, their faces, and the boundary at each face that leads out.
@@ -82,8 +85,10 @@ pub struct Domain {
     free: Vec<usize>,
     /// Number among the free cells, or `BLOCKED`, for each cell of the grid.
     numbers: Vec<usize>,
+    /// Faces between free cells, then those that lead out.
     pub(crate) faces: Vec<Face>,
-    pub(crate) edge_faces: Vec<EdgeFace>,
+    /// Number of faces between free cells.
+    pub(crate) inner: usize,
 }
 
 const BLOCKED: usize = usize::MAX;
@@ -102,8 +107,7 @@ impl Domain {
     /// If the number of cells is not that of the grid, a leak is negative or above 1e30 m/s, or [`Error::NoFreeCell`].
     pub fn new(grid: Grid, cells: &[Cell], sides: [[Boundary; 2]; 3]) -> Result<Self, Error> {
         if cells.len() != grid.cells() {
-            let expected = format!("{}, one for each cell of the grid", grid.cells());
-            return Err(ArgumentError::new("cells", cells.len(), expected).into());
+            return refuse("cells", cells.len(), format!("{}, one for each cell of the grid", grid.cells()));
         }
         let of_cells = cells.iter().filter_map(|cell| match cell {
             Cell::Free => None,
@@ -114,8 +118,8 @@ impl Domain {
                 within("leak", *leak, 0.0, LARGEST)?;
             }
         }
-        let is_free = |cell: &Cell| !matches!(cell, Cell::Blocked(_));
-        let free: Vec<usize> = (0..cells.len()).filter(|i| is_free(&cells[*i])).collect();
+        let is_free = |cell: &usize| !matches!(cells[*cell], Cell::Blocked(_));
+        let free: Vec<usize> = (0..cells.len()).filter(is_free).collect();
         if free.is_empty() {
             return Err(Error::NoFreeCell);
         }
@@ -123,56 +127,50 @@ impl Domain {
         for (number, cell) in free.iter().enumerate() {
             numbers[*cell] = number;
         }
-        let (mut faces, mut edge_faces) = (Vec::new(), Vec::new());
-        let counts = grid.counts();
+        let (mut faces, mut edge) = (Vec::new(), Vec::new());
+        let ways = [0, 1, 2].map(|axis| [(axis, false), (axis, true)]);
         for (number, cell) in free.iter().enumerate() {
             let at = grid.place(*cell);
-            for axis in 0..grid.dimension() {
-                let (area, half) = (grid.face_area(&at, axis), 0.5 * grid.width(axis, at[axis]));
-                for upper in [false, true] {
-                    let mut next = at;
-                    // Below the first cell it is beyond the last.
-                    next[axis] = if upper { at[axis] + 1 } else { at[axis].wrapping_sub(1) };
-                    let boundary = if next[axis] < counts[axis] {
-                        let other = grid.index(next);
-                        match cells[other] {
-                            Cell::Blocked(boundary) => boundary,
-                            _ if upper => {
-                                let halves = [half, 0.5 * grid.width(axis, next[axis])];
-                                faces.push(Face {
-                                    cells: [number, numbers[other]],
-                                    axis,
-                                    area,
-                                    halves,
-                                });
-                                continue;
-                            }
-                            _ => continue,
-                        }
-                    } else if let Cell::Open(boundary) = cells[*cell] {
-                        boundary
-                    } else {
-                        sides[axis][usize::from(upper)]
-                    };
-                    if boundary != Boundary::Closed {
-                        edge_faces.push(EdgeFace {
-                            cell: number,
-                            axis,
-                            upper,
-                            area,
-                            half,
-                            boundary,
-                        });
-                    }
+            for &(axis, upper) in ways[..grid.dimension()].as_flattened() {
+                let next = grid.next(at, axis, upper);
+                let boundary = match (next.map(|next| cells[grid.index(next)]), cells[*cell]) {
+                    (Some(Cell::Blocked(boundary)), _) | (None, Cell::Open(boundary)) => Some(boundary),
+                    (Some(_), _) => None,
+                    (None, _) => Some(sides[axis][usize::from(upper)]),
+                };
+                let (other, other_half) = match (boundary, next) {
+                    (None, Some(next)) => (numbers[grid.index(next)], 0.5 * grid.width(axis, next[axis])),
+                    _ => (free.len() + usize::from(boundary == Some(Boundary::Inflow)), 0.0),
+                };
+                let half = 0.5 * grid.width(axis, at[axis]);
+                let (mut cells, mut halves) = ([number, other], [half, other_half]);
+                if !upper {
+                    cells.reverse();
+                    halves.reverse();
+                }
+                let area = grid.across(at, Some(axis));
+                let face = Face {
+                    cells,
+                    axis,
+                    area,
+                    halves,
+                    boundary,
+                };
+                match boundary {
+                    None if upper => faces.push(face),
+                    None | Some(Boundary::Closed) => {}
+                    Some(_) => edge.push(face),
                 }
             }
         }
+        let inner = faces.len();
+        faces.extend(edge);
         Ok(Self {
             grid,
             free,
             numbers,
             faces,
-            edge_faces,
+            inner,
         })
     }
 
@@ -184,18 +182,18 @@ impl Domain {
     /// # Errors
     /// If a normal is not of length one.
     pub fn with_wall_normals(mut self, normal: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, Error> {
-        for face in &mut self.edge_faces {
-            let Boundary::Leaking(leak) = face.boundary else {
+        for k in self.inner..self.faces.len() {
+            let face = self.faces[k];
+            let Some(Boundary::Leaking(leak)) = face.boundary else {
                 continue;
             };
-            let mut centre = self.grid.centre(self.free[face.cell]);
-            centre[face.axis] += if face.upper { face.half } else { -face.half };
+            let centre = self.face_centre(&face);
             let n = normal(centre);
             let length = n.iter().map(|x| x * x).sum::<f64>().sqrt();
             if length.is_nan() || (length - 1.0).abs() > 1e-6 {
-                return Err(ArgumentError::new("normal", format!("{n:?} at {centre:?}"), "a vector of length 1").into());
+                return refuse("normal", format!("{n:?} at {centre:?}"), "a vector of length 1");
             }
-            face.boundary = Boundary::Leaking(leak * n[face.axis].abs());
+            self.faces[k].boundary = Some(Boundary::Leaking(leak * n[face.axis].abs()));
         }
         Ok(self)
     }
@@ -239,17 +237,13 @@ impl Domain {
     pub fn locate(&self, point: [f64; 3]) -> Result<usize, Error> {
         let cell = self.grid.cell_at(point).ok_or(Error::Outside { point })?;
         self.number(cell).ok_or_else(|| {
-            let distance = |cell: &usize| {
-                let centre = self.grid.centre(*cell);
-                (0..self.grid.dimension())
-                    .map(|i| (centre[i] - point[i]).powi(2))
-                    .sum::<f64>()
-            };
-            let nearest = self.free.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            Error::Blocked {
-                point,
-                nearest: self.grid.centre(nearest.copied().unwrap_or(0)),
-            }
+            let axes = 0..self.grid.dimension();
+            let distance = |centre: &[f64; 3]| axes.clone().map(|i| (centre[i] - point[i]).powi(2)).sum::<f64>();
+            let centres = self.free.iter().map(|cell| self.grid.centre(*cell));
+            let nearest = centres
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+                .unwrap_or(point);
+            Error::Blocked { point, nearest }
         })
     }
 
@@ -258,9 +252,8 @@ impl Domain {
     /// # Errors
     /// As [`Domain::locate`].
     pub fn point(&self, point: [f64; 3]) -> Result<Patch, Error> {
-        Ok(Patch {
-            shares: vec![(self.locate(point)?, 1.0)],
-        })
+        let shares = vec![(self.locate(point)?, 1.0)];
+        Ok(Patch { shares })
     }
 
     /// All cells whose centres are in the box between two corners, with shares in proportion to their volumes.
@@ -268,56 +261,79 @@ impl Domain {
     /// # Errors
     /// If there is no such cell, or one of them is blocked ([`Error::Blocked`]).
     pub fn block(&self, lower: [f64; 3], upper: [f64; 3]) -> Result<Patch, Error> {
-        let inside = |axis: usize| -> Vec<usize> {
-            let edges = self.grid.edges(axis);
-            let within = |i: &usize| {
-                let centre = 0.5 * (edges[*i] + edges[*i + 1]);
-                axis >= self.grid.dimension() || (lower[axis]..upper[axis]).contains(&centre)
-            };
-            (0..edges.len() - 1).filter(within).collect()
-        };
-        let [columns, lines, layers] = [0, 1, 2].map(inside);
         let mut shares = Vec::new();
-        for layer in &layers {
-            for line in &lines {
-                for column in &columns {
-                    let cell = self.grid.index([*column, *line, *layer]);
-                    let number = self.locate(self.grid.centre(cell))?;
-                    shares.push((number, self.grid.volume(cell)));
-                }
+        for cell in 0..self.grid.cells() {
+            let centre = self.grid.centre(cell);
+            if (0..self.grid.dimension()).all(|axis| (lower[axis]..upper[axis]).contains(&centre[axis])) {
+                shares.push((self.locate(centre)?, self.grid.volume(cell)));
             }
         }
-        let total: f64 = shares.iter().map(|share| share.1).sum();
         if shares.is_empty() {
-            let shown = format!("{lower:?} to {upper:?}");
-            return Err(ArgumentError::new("lower, upper", shown, "a box that holds the centre of a cell").into());
+            return refuse("lower, upper", format!("{lower:?} to {upper:?}"), "a box that holds the centre of a cell");
         }
+        let total: f64 = shares.iter().map(|share| share.1).sum();
         shares.iter_mut().for_each(|share| share.1 /= total);
         Ok(Patch { shares })
     }
 
     /// The number of the connected part that each free cell belongs to, and how many parts there are.
     pub fn parts(&self) -> (Vec<usize>, usize) {
-        let mut part = vec![BLOCKED; self.free.len()];
-        let neighbours = Neighbours::new(self.free.len(), &self.faces);
-        let mut count = 0;
-        for seed in 0..part.len() {
-            if part[seed] != BLOCKED {
+        let (mut number, parts) = (vec![0; self.free.len()], self.walk());
+        for (k, part) in parts.iter().enumerate() {
+            part.iter().for_each(|(cell, _)| number[*cell] = k);
+        }
+        (number, parts.len())
+    }
+
+    /// For each connected part its cells, each with the face that leads to it from a cell before it; none leads to the first.
+    pub(crate) fn walk(&self) -> Vec<Vec<(usize, Option<usize>)>> {
+        let mut above = vec![[0; 3]; self.free.len()];
+        for (k, face) in self.faces[..self.inner].iter().enumerate() {
+            above[face.cells[0]][face.axis] = k;
+        }
+        let ways = [(2, false), (1, false), (0, false), (0, true), (1, true), (2, true)];
+        let (mut reached, mut parts) = (vec![false; self.free.len()], Vec::new());
+        for seed in 0..self.free.len() {
+            if reached[seed] {
                 continue;
             }
-            let mut open = vec![seed];
-            part[seed] = count;
-            while let Some(cell) = open.pop() {
-                for (other, _) in neighbours.of(cell) {
-                    if part[*other] == BLOCKED {
-                        part[*other] = count;
-                        open.push(*other);
+            reached[seed] = true;
+            let (mut part, mut next) = (vec![(seed, None)], 0);
+            while let Some((cell, _)) = part.get(next).copied() {
+                next += 1;
+                let at = self.grid.place(self.free[cell]);
+                for (axis, upper) in ways {
+                    let place = self.grid.next(at, axis, upper);
+                    let other = place.and_then(|place| self.number(self.grid.index(place)));
+                    if let Some(other) = other.filter(|other| !reached[*other]) {
+                        reached[other] = true;
+                        part.push((other, Some(above[cell.min(other)][axis])));
                     }
                 }
             }
-            count += 1;
+            parts.push(part);
         }
-        (part, count)
+        parts
+    }
+
+    /// Centre of a face, m.
+    pub(crate) fn face_centre(&self, face: &Face) -> [f64; 3] {
+        let mut centre = self.grid.centre(self.free[face.cell()]);
+        centre[face.axis] += [face.halves[0], -face.halves[1]][face.side()];
+        centre
+    }
+
+    /// Column, line and layer of a free cell, as errors name it.
+    pub(crate) fn place(&self, number: usize) -> [usize; 3] {
+        self.grid.place(self.free[number])
+    }
+
+    /// Refuses a list that has not one entry for each free cell.
+    pub(crate) fn check_count(&self, name: &'static str, found: usize) -> Result<(), Error> {
+        if found != self.free.len() {
+            return refuse(name, format!("{found} entries"), format!("{}, one for each free cell", self.free.len()));
+        }
+        Ok(())
     }
 }
 
@@ -325,37 +341,5 @@ impl Patch {
     /// Mean of a field per free cell over the patch.
     pub fn mean(&self, field: &[f64]) -> f64 {
         self.shares.iter().map(|(cell, share)| share * field[*cell]).sum()
-    }
-}
-
-/// For each free cell its neighbours and the faces between.
-pub(crate) struct Neighbours {
-    starts: Vec<usize>,
-    entries: Vec<(usize, usize)>,
-}
-
-impl Neighbours {
-    pub(crate) fn new(count: usize, faces: &[Face]) -> Self {
-        let mut starts = vec![0; count + 1];
-        for cell in faces.iter().flat_map(|face| face.cells) {
-            starts[cell + 1] += 1;
-        }
-        for i in 0..count {
-            starts[i + 1] += starts[i];
-        }
-        let mut next = starts.clone();
-        let mut entries = vec![(0, 0); 2 * faces.len()];
-        for (k, face) in faces.iter().enumerate() {
-            for (own, other) in [(face.cells[0], face.cells[1]), (face.cells[1], face.cells[0])] {
-                entries[next[own]] = (other, k);
-                next[own] += 1;
-            }
-        }
-        Self { starts, entries }
-    }
-
-    /// `(neighbour, face)` of a cell.
-    pub(crate) fn of(&self, cell: usize) -> &[(usize, usize)] {
-        &self.entries[self.starts[cell]..self.starts[cell + 1]]
     }
 }

@@ -3,8 +3,7 @@
 use crate::{Domain, Error, Patch, Steady, StepControl, Transient, Transport};
 use fewbits_models::nalgebra::Vector3;
 use fewbits_models::{Receptor, SourceGradient, SourceModel};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::within;
+use fewbits_numerics::error::{refuse, within};
 use std::sync::Arc;
 
 /// Adjoint solutions of several sensors: the concentration that each measures, per unit rate, of a source at any place and of several
@@ -12,8 +11,8 @@ use std::sync::Arc;
 ///
 /// A sensor measures the mean over its cell. Between the centres of cells values are interpolated linearly along each axis. A blocked
 /// corner takes the value of the corners on the near side, so that nothing is interpolated across a wall. Between two ages, and
-/// between age 0 and the first, values are interpolated linearly; beyond the last finite age its values stand. An infinite age is the
-/// steady state.
+/// between age 0 and the first, values are interpolated linearly; beyond the last age its values stand. A steady field has one value for
+/// all ages above 0.
 ///
 /// ```
 /// use fewbits_diffusion::{Flow, Plan, Scheme, SensorField, Transport};
@@ -33,11 +32,14 @@ pub struct SensorField {
     domain: Arc<Domain>,
     /// Free cell of each sensor.
     sensors: Vec<usize>,
-    /// Increasing; the last may be infinite.
+    /// Increasing; one infinite age if the field is steady.
     ages: Vec<f64>,
-    /// For each sensor, for each age, the response per free cell.
+    /// For each age, for each sensor, the response per free cell.
     responses: Vec<Vec<Vec<f64>>>,
 }
+
+/// A free cell, and the weights of its mean in a value and in a gradient.
+type Corner = (usize, f64, Vector3<f64>);
 
 /// Responses above this, kg/m^3 per kg/s, have no gradient in the range of numbers.
 const LARGEST_RESPONSE: f64 = 1e240;
@@ -48,9 +50,8 @@ impl SensorField {
     /// # Errors
     /// If a point is outside or blocked, the transport has no steady state, or a response is above 1e240 kg/m^3 per kg/s.
     pub fn steady(transport: &Transport, points: &[[f64; 3]]) -> Result<Self, Error> {
-        let fields = Steady::new(transport)?.adjoint(&patches(transport, points)?)?;
-        let responses = fields.into_iter().map(|field| vec![field]).collect();
-        Self::with(transport, points, vec![f64::INFINITY], responses)
+        let steady = Steady::new(transport)?;
+        Self::new(transport, points, &[f64::INFINITY], |sensors| Ok(vec![steady.adjoint(sensors)?]))
     }
 
     /// Responses of sensors at the given points (m) to sources that have released for the given ages (s, increasing, after 0).
@@ -64,26 +65,23 @@ impl SensorField {
         ages: &[f64],
         control: StepControl,
     ) -> Result<Self, Error> {
-        let mut by_sensor = vec![Vec::with_capacity(ages.len()); points.len()];
         let mut transient = Transient::new(transport).with_control(control)?;
-        for fields in transient.step_responses(&patches(transport, points)?, ages)? {
-            let pairs = by_sensor.iter_mut().zip(fields);
-            pairs.for_each(|(sensor, field)| sensor.push(field));
-        }
-        Self::with(transport, points, ages.to_vec(), by_sensor)
+        Self::new(transport, points, ages, |sensors| transient.step_responses(sensors, ages))
     }
 
-    fn with(
+    fn new(
         transport: &Transport,
         points: &[[f64; 3]],
-        ages: Vec<f64>,
-        responses: Vec<Vec<Vec<f64>>>,
+        ages: &[f64],
+        respond: impl FnOnce(&[Patch]) -> Result<Vec<Vec<Vec<f64>>>, Error>,
     ) -> Result<Self, Error> {
-        let domain = transport.domain().clone();
-        let sensors = points
+        let (domain, ages) = (transport.domain().clone(), ages.to_vec());
+        let patches: Vec<Patch> = points
             .iter()
-            .map(|point| domain.locate(*point))
+            .map(|point| domain.point(*point))
             .collect::<Result<_, _>>()?;
+        let sensors = patches.iter().map(|patch| patch.shares[0].0).collect();
+        let responses = respond(&patches)?;
         // Gradients divide by widths of cells.
         for response in responses.iter().flatten().flatten() {
             within("response", *response, f64::MIN, LARGEST_RESPONSE)?;
@@ -103,138 +101,115 @@ impl SensorField {
 
     /// Response of a sensor, by its place in the list, at the `age`-th age, per free cell, kg/m^3 per kg/s. `None` if there is none.
     pub fn response(&self, sensor: usize, age: usize) -> Option<&[f64]> {
-        Some(self.responses.get(sensor)?.get(age)?)
+        Some(self.responses.get(age)?.get(sensor)?)
     }
 
-    /// The two responses about an age with their weights; nothing before age 0.
+    /// The places of the two ages about an age, with their weights; nothing before age 0.
     fn about(&self, age: f64) -> [(usize, f64); 2] {
         let next = self.ages.partition_point(|known| *known < age);
-        if age.is_nan() || age <= 0.0 {
-            return [(0, 0.0); 2];
-        }
-        match (next.checked_sub(1), self.ages.get(next)) {
-            (_, Some(known)) if *known == age => [(next, 1.0), (0, 0.0)],
-            (None, Some(known)) if known.is_finite() => [(next, age / known), (0, 0.0)],
-            // Only the steady state is known.
-            (None, _) => [(next, 1.0), (0, 0.0)],
-            (Some(before), Some(known)) if known.is_finite() => {
+        let before = next.saturating_sub(1);
+        match self.ages.get(next) {
+            _ if age.is_nan() || age <= 0.0 => [(0, 0.0); 2],
+            None => [(before, 1.0), (0, 0.0)],
+            Some(known) if known.is_infinite() => [(next, 1.0), (0, 0.0)],
+            Some(known) if next == 0 => [(0, age / known), (0, 0.0)],
+            Some(known) => {
                 let share = (age - self.ages[before]) / (known - self.ages[before]);
-                [(before, 1.0 - share), (next, share)]
+                [(next, share), (before, 1.0 - share)]
             }
-            (Some(before), _) => [(before, 1.0), (0, 0.0)],
         }
     }
 
-    /// The corners of the box of cell centres about a point: for each subset of axes (by bits) the weights of free cells whose mean stands
-    /// for that corner; and the position in the box and its width along each axis.
-    fn stencil(&self, point: &[f64; 3]) -> Option<Stencil> {
-        let grid = self.domain.grid();
+    /// Free cells whose means stand for the corners of the box of cell centres about a point, with their weights in the value and in the
+    /// gradient. `None` if the point is not in a free cell.
+    fn stencil(&self, point: &[f64; 3]) -> Option<([Corner; 8], usize)> {
+        let (grid, axes) = (self.domain.grid(), self.domain.grid().dimension());
         let own = grid.cell_at(*point)?;
-        let number = self.domain.number(own)?;
-        let (at, centre, axes) = (grid.place(own), grid.centre(own), grid.dimension());
-        let (mut corners, mut position, mut widths, mut upwards) = ([number; 8], [0.0; 3], [1.0; 3], [true; 3]);
-        let mut next = at;
+        let (at, centre) = (grid.place(own), grid.centre(own));
+        let mut corners = [(self.domain.number(own)?, 1.0, Vector3::zeros()); 8];
+        // Position of the point in the box along each axis, and width of the box.
+        let (mut position, mut widths) = ([0.0; 3], [1.0; 3]);
+        let upwards = [0, 1, 2].map(|axis| point[axis] >= centre[axis]);
         for axis in 0..axes {
-            upwards[axis] = point[axis] >= centre[axis];
-            // Below the first cell it is beyond the last.
-            next[axis] = if upwards[axis] {
-                at[axis] + 1
-            } else {
-                at[axis].wrapping_sub(1)
-            };
-            if next[axis] < grid.counts()[axis] {
+            if let Some(next) = grid.next(at, axis, upwards[axis]) {
                 widths[axis] = 0.5 * (grid.width(axis, at[axis]) + grid.width(axis, next[axis]));
                 position[axis] = (point[axis] - centre[axis]).abs() / widths[axis];
             }
         }
         // A corner counts if it is free and joined to the own cell through free corners; otherwise another corner stands for it.
         let mut joined = [true, false, false, false, false, false, false, false];
-        for corner in 1..1_usize << axes {
-            let moved = || (0..axes).filter(|axis| corner >> axis & 1 == 1);
-            let mut cell = at;
-            moved().for_each(|axis| cell[axis] = next[axis]);
+        for corner in 0..1_usize << axes {
+            let beyond = |axis: usize| corner >> axis & 1 == 1;
+            let moved = || (0..axes).filter(|axis| beyond(*axis));
             // Prefer a corner with a value of its own: along a wall the field is that of the near side.
             let near = moved()
                 .map(|axis| corner ^ (1 << axis))
                 .rfind(|without| joined[*without]);
-            let inside = moved().all(|axis| next[axis] < grid.counts()[axis]);
-            let free = near
-                .filter(|_| inside)
-                .and_then(|_| self.domain.number(grid.index(cell)));
-            joined[corner] = free.is_some();
-            corners[corner] = free.unwrap_or(corners[near.unwrap_or(corner & (corner - 1))]);
+            let place = moved().try_fold(at, |at, axis| grid.next(at, axis, upwards[axis]));
+            if corner > 0 {
+                let free = near.and(place).and_then(|place| self.domain.number(grid.index(place)));
+                joined[corner] = free.is_some();
+                corners[corner].0 = free.unwrap_or(corners[near.unwrap_or(corner & (corner - 1))].0);
+            }
+            let factor = |axis: usize| {
+                if beyond(axis) {
+                    position[axis]
+                } else {
+                    1.0 - position[axis]
+                }
+            };
+            corners[corner].1 = (0..axes).map(factor).product();
+            for axis in 0..axes {
+                let others: f64 = (0..axes).filter(|other| *other != axis).map(factor).product();
+                let slope = others / widths[axis];
+                corners[corner].2[axis] = if beyond(axis) == upwards[axis] { slope } else { -slope };
+            }
         }
-        Some(Stencil {
-            corners,
-            position,
-            widths,
-            upwards,
-            axes,
-        })
+        Some((corners, 1 << axes))
     }
 
     /// Calls `f` with the value and gradient of a response at a point for each age.
     fn interpolate(&self, sensor: usize, point: &Vector3<f64>, ages: &[f64], mut f: impl FnMut(usize, SourceGradient)) {
-        const NOTHING: SourceGradient = SourceGradient {
+        let nothing = SourceGradient {
             value: 0.0,
-            gradient: Vector3::new(0.0, 0.0, 0.0),
+            gradient: Vector3::zeros(),
         };
-        let known = self.stencil(&(*point).into()).zip(self.responses.get(sensor));
-        let mut before: Option<([(usize, f64); 2], SourceGradient)> = None;
+        let stencil = self.stencil(&(*point).into()).filter(|_| sensor < self.sensors.len());
+        let mut before = ([(0, 0.0); 2], nothing);
         for (k, age) in ages.iter().enumerate() {
             let about = self.about(*age);
-            let mut result = NOTHING;
-            match (&known, before) {
-                // Ages between which the field stands: a steady one, or the last.
-                (_, Some((same, found))) if same == about => result = found,
-                (Some((stencil, fields)), _) => {
-                    for (field, weight) in about.into_iter().filter(|pair| pair.1 > 0.0) {
-                        let (value, gradient) = stencil.apply(&fields[field]);
-                        result.value += weight * value;
-                        result.gradient += weight * gradient;
+            // Otherwise the field stands between both ages: a steady one, or after the last age.
+            if let Some((corners, count)) = stencil.as_ref().filter(|_| about != before.0) {
+                let mut result = nothing;
+                for (known, share) in about.into_iter().filter(|pair| pair.1 > 0.0) {
+                    let field = &self.responses[known][sensor];
+                    for (cell, weight, slopes) in &corners[..*count] {
+                        result.value += share * (field[*cell] * weight);
+                        result.gradient += share * field[*cell] * slopes;
                     }
                 }
-                (None, _) => {}
+                // Steps in time may leave an error below zero.
+                before = (about, if result.value < 0.0 { nothing } else { result });
             }
-            // Steps in time may leave an error below zero.
-            if result.value < 0.0 {
-                result = NOTHING;
-            }
-            before = Some((about, result));
-            f(k, result);
+            f(k, before.1);
         }
     }
-}
 
-fn patches(transport: &Transport, points: &[[f64; 3]]) -> Result<Vec<Patch>, Error> {
-    points.iter().map(|point| transport.domain().point(*point)).collect()
-}
-
-/// Multilinear interpolation between up to eight free cells.
-struct Stencil {
-    corners: [usize; 8],
-    position: [f64; 3],
-    widths: [f64; 3],
-    upwards: [bool; 3],
-    axes: usize,
-}
-
-impl Stencil {
-    fn apply(&self, field: &[f64]) -> (f64, Vector3<f64>) {
-        let (mut value, mut gradient) = (0.0, Vector3::zeros());
-        for corner in 0..1_usize << self.axes {
-            let beyond = |axis: usize| corner >> axis & 1 == 1;
-            let near = |axis: usize| 1.0 - self.position[axis];
-            let factor = |axis: usize| if beyond(axis) { self.position[axis] } else { near(axis) };
-            let c = field[self.corners[corner]];
-            value += c * (0..self.axes).map(factor).product::<f64>();
-            for axis in 0..self.axes {
-                let outwards = beyond(axis) == self.upwards[axis];
-                let others: f64 = (0..self.axes).filter(|other| *other != axis).map(factor).product();
-                gradient[axis] += if outwards { c } else { -c } * others / self.widths[axis];
+    /// First and last place along each axis of the cells that the horizontal square of a half width about a source meets, with `margin`
+    /// more on each side. `None` if the square is outside the grid.
+    fn square(&self, source: &Vector3<f64>, half_width: f64, margin: usize) -> Option<[(usize, usize); 3]> {
+        let (grid, mut places) = (self.domain.grid(), [(0, 0); 3]);
+        for (axis, places) in places.iter_mut().enumerate().take(grid.dimension()) {
+            let (edges, reach) = (grid.edges(axis), if axis < 2 { half_width } else { 0.0 });
+            let (first, last) = (edges[0], edges[edges.len() - 1]);
+            let (low, high) = (source[axis] - reach, source[axis] + reach);
+            if !(low <= last && high >= first) {
+                return None;
             }
+            let [low, high] = [low, high].map(|x| grid.along(axis, x.clamp(first, last)));
+            *places = (low?.saturating_sub(margin), (high? + margin).min(edges.len() - 2));
         }
-        (value, gradient)
+        Some(places)
     }
 }
 
@@ -246,8 +221,7 @@ impl SourceModel for SensorField {
             Some(index) => Ok(Receptor { place: *place, index }),
             None => {
                 let shown = format!("({}, {}, {})", place.x, place.y, place.z);
-                Err(ArgumentError::new("place", shown, "a point in the cell of a sensor with an adjoint solution")
-                    .into())
+                refuse("place", shown, "a point in the cell of a sensor with an adjoint solution")
             }
         }
     }
@@ -263,66 +237,43 @@ impl SourceModel for SensorField {
     }
 
     fn source_gradient(&self, receptor: &Receptor, source: &Vector3<f64>, age: f64) -> SourceGradient {
-        let mut found = None;
-        self.interpolate(receptor.index, source, &[age], |_, gradient| found = Some(gradient));
-        found.unwrap_or(SourceGradient {
+        let mut found = SourceGradient {
             value: 0.0,
             gradient: Vector3::zeros(),
-        })
+        };
+        self.interpolate(receptor.index, source, &[age], |_, gradient| found = gradient);
+        found
     }
 
     /// From the range of the response over the cells of the square and one more on each side; within a cell, its share of that.
     fn variation(&self, receptor: &Receptor, source: &Vector3<f64>, half_width: f64, age: f64) -> f64 {
-        let Some(fields) = self.responses.get(receptor.index) else {
+        let Some(places) = self
+            .square(source, half_width, 1)
+            .filter(|_| receptor.index < self.sensors.len())
+        else {
             return 0.0;
         };
-        let grid = self.domain.grid();
-        let (mut ranges, mut narrowest) = ([(0, 0); 3], f64::INFINITY);
-        for (axis, range) in ranges.iter_mut().enumerate().take(grid.dimension()) {
-            let edges = grid.edges(axis);
-            let last = edges.len() - 2;
-            let reach = if axis < 2 { half_width } else { 0.0 };
-            let place = |x: f64| grid.along(axis, x.clamp(edges[0], edges[last + 1])).unwrap_or(0);
-            let (low, high) =
-                (place(source[axis] - reach).saturating_sub(1), (place(source[axis] + reach) + 1).min(last));
-            *range = (low, high);
-            narrowest = (low..=high).map(|i| grid.width(axis, i)).fold(narrowest, f64::min);
-        }
-        let weights = self.about(age);
+        let (grid, about) = (self.domain.grid(), self.about(age));
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-        for layer in ranges[2].0..=ranges[2].1 {
-            for line in ranges[1].0..=ranges[1].1 {
-                for column in ranges[0].0..=ranges[0].1 {
-                    if let Some(number) = self.domain.number(grid.index([column, line, layer])) {
-                        let c: f64 = weights
-                            .iter()
-                            .map(|(field, weight)| weight * fields[*field][number])
-                            .sum();
-                        (least, most) = (least.min(c), most.max(c));
-                    }
-                }
-            }
+        for number in grid.block(places).filter_map(|cell| self.domain.number(cell)) {
+            let response = |(known, weight): &(usize, f64)| weight * self.responses[*known][receptor.index][number];
+            let c: f64 = about.iter().map(response).sum();
+            (least, most) = (least.min(c), most.max(c));
         }
-        let share = 2.0 * half_width / narrowest;
+        let axes = places.into_iter().enumerate().take(grid.dimension());
+        let widths = axes.flat_map(|(axis, (low, high))| (low..=high).map(move |i| grid.width(axis, i)));
+        let share = 2.0 * half_width / widths.fold(f64::INFINITY, f64::min);
         (most - least).max(0.0) * if share < 1.0 { share.max(0.0) } else { 1.0 }
     }
 
     /// True if the square holds a part of a free cell.
     fn admits(&self, source: &Vector3<f64>, half_width: f64) -> bool {
-        let grid = self.domain.grid();
-        let mut ranges = [(0, 0); 3];
-        for (axis, range) in ranges.iter_mut().enumerate().take(grid.dimension()) {
-            let edges = grid.edges(axis);
-            let (first, last) = (edges[0], edges[edges.len() - 1]);
-            let reach = if axis < 2 { half_width } else { 0.0 };
-            let (low, high) = (source[axis] - reach, source[axis] + reach);
-            if !(low <= last && high >= first) {
-                return false;
-            }
-            let place = |x: f64| grid.along(axis, x.clamp(first, last)).unwrap_or(0);
-            *range = (place(low), place(high));
-        }
-        let cells = |axis: usize| ranges[axis].0..=ranges[axis].1;
-        cells(2).any(|k| cells(1).any(|j| cells(0).any(|i| self.domain.number(grid.index([i, j, k])).is_some())))
+        let places = self.square(source, half_width, 0);
+        places.is_some_and(|places| {
+            self.domain
+                .grid()
+                .block(places)
+                .any(|cell| self.domain.number(cell).is_some())
+        })
     }
 }

@@ -1,8 +1,7 @@
 //! Rectilinear grids.
 
 use crate::Error;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{at_least_one, positive, within};
+use fewbits_numerics::error::{at_least_one, positive, refuse};
 
 /// Largest coordinate, diffusivity, velocity and decay in SI units, and the reciprocal of the smallest width and diffusivity: what is
 /// formed of them stays far from the ends of the range of numbers.
@@ -25,16 +24,13 @@ impl Grid {
     /// If there are not one to three axes, an axis has fewer than two edges, an edge is beyond 1e30 m, or edges do not increase by at
     /// least 1e-30 m.
     pub fn new(edges: &[Vec<f64>]) -> Result<Self, Error> {
-        if !(1..=3).contains(&edges.len()) {
-            return Err(ArgumentError::new("edges", format!("{} axes", edges.len()), "one to three axes").into());
-        }
-        for axis in edges {
-            for edge in axis {
-                within("edges", *edge, -LARGEST, LARGEST)?;
-            }
-            if axis.len() < 2 || axis.windows(2).any(|pair| pair[1] - pair[0] < LARGEST.recip()) {
-                return Err(ArgumentError::new("edges", format!("{axis:?}"), "two or more increasing numbers").into());
-            }
+        let increase = |axis: &Vec<f64>| {
+            let apart = axis.windows(2).all(|pair| pair[1] - pair[0] >= LARGEST.recip());
+            axis.len() >= 2 && apart && axis.iter().all(|edge| edge.abs() <= LARGEST)
+        };
+        if !(1..=3).contains(&edges.len()) || !edges.iter().all(increase) {
+            let expected = "one to three axes of two or more increasing numbers from -1e30 to 1e30";
+            return refuse("edges", format!("{edges:?}"), expected);
         }
         let axis = |i: usize| edges.get(i).cloned().unwrap_or_else(|| vec![0.0, 1.0]);
         Ok(Self {
@@ -49,9 +45,7 @@ impl Grid {
     /// If there are not one to three counts, one is zero, or `width` is not a positive number.
     pub fn uniform(counts: &[usize], width: f64) -> Result<Self, Error> {
         positive("width", width)?;
-        for count in counts {
-            at_least_one("counts", *count)?;
-        }
+        counts.iter().try_for_each(|n| at_least_one("counts", *n).map(drop))?;
         let axis = |n: &usize| (0..=*n).map(|i| i as f64 * width).collect();
         Self::new(&counts.iter().map(axis).collect::<Vec<Vec<f64>>>())
     }
@@ -104,16 +98,26 @@ impl Grid {
 
     /// Volume of a cell, m^3; its area in a plane, its length on a line.
     pub fn volume(&self, cell: usize) -> f64 {
-        let at = self.place(cell);
-        (0..3).map(|axis| self.width(axis, at[axis])).product()
+        self.across(self.place(cell), None)
     }
 
-    /// Area of a cell's faces across an axis.
-    pub(crate) fn face_area(&self, at: &[usize; 3], across: usize) -> f64 {
-        (0..3)
-            .filter(|axis| *axis != across)
-            .map(|axis| self.width(axis, at[axis]))
-            .product()
+    /// Product of a cell's widths along all axes but one: the area of its faces across that axis.
+    pub(crate) fn across(&self, at: [usize; 3], without: Option<usize>) -> f64 {
+        let axes = (0..3).filter(|axis| Some(*axis) != without);
+        axes.map(|axis| self.width(axis, at[axis])).product()
+    }
+
+    /// The place above or below along an axis, if it is on the grid.
+    #[inline]
+    pub(crate) fn next(&self, mut at: [usize; 3], axis: usize, upper: bool) -> Option<[usize; 3]> {
+        at[axis] = if upper { at[axis] + 1 } else { at[axis].checked_sub(1)? };
+        (at[axis] + 1 < self.edges[axis].len()).then_some(at)
+    }
+
+    /// The cells of a block, given by its first and last place along each axis.
+    pub(crate) fn block(&self, [x, y, z]: [(usize, usize); 3]) -> impl Iterator<Item = usize> {
+        let lines = (z.0..=z.1).flat_map(move |k| (y.0..=y.1).map(move |j| [j, k]));
+        lines.flat_map(move |[j, k]| (x.0..=x.1).map(move |i| self.index([i, j, k])))
     }
 
     /// Place along an axis of the cells that hold a coordinate: of two cells that share it, the upper one; at the end of the grid the last.

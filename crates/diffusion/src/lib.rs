@@ -50,13 +50,15 @@ mod steady;
 mod stepper;
 mod transient;
 mod transport;
+mod wind;
 
 pub use domain::{Boundary, Cell, Domain, Patch};
 pub use error::Error;
 pub use field::SensorField;
-pub use flow::{Divergence, Flow, PotentialFlow};
+pub use flow::Flow;
 pub use grid::Grid;
 pub use plan::Plan;
 pub use steady::{Source, Steady};
 pub use transient::{Method, Release, Snapshot, StepControl, Transient};
 pub use transport::{Budget, PerCell, Scheme, Transport};
+pub use wind::{Divergence, PotentialFlow};

@@ -1,8 +1,7 @@
 //! Floor plans as text.
 
 use crate::{Boundary, Cell, Domain, Error, Grid};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{at_least_one, positive};
+use fewbits_numerics::error::{at_least_one, positive, refuse};
 
 /// A floor plan: one character per square.
 ///
@@ -26,9 +25,8 @@ use fewbits_numerics::error::{at_least_one, positive};
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Plan {
-    columns: usize,
-    /// Characters of the table, line by line.
-    squares: Vec<char>,
+    /// Characters of the table; lines have one length.
+    lines: Vec<Vec<char>>,
 }
 
 impl Plan {
@@ -37,32 +35,12 @@ impl Plan {
     /// # Errors
     /// If a character has no meaning or lines differ in length; [`Error::NoFreeCell`] if there is no line.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-        let indent = lines
-            .iter()
-            .map(|line| line.len() - line.trim_start().len())
-            .min()
-            .unwrap_or(0);
-        let (mut squares, mut columns) = (Vec::new(), None);
-        for (line, text) in lines.iter().enumerate() {
-            let before = squares.len();
-            for (column, character) in text.chars().skip(indent).enumerate() {
-                match character {
-                    ' ' => squares.push('.'),
-                    '.' | '#' | 'L' | 'A' | 'I' | 'O' => squares.push(character),
-                    '\r' => {}
-                    _ => return Err(without_meaning(character, [column, line])),
-                }
-            }
-            let found = squares.len() - before;
-            let expected = *columns.get_or_insert(found);
-            if found != expected {
-                let shown = format!("{found} squares in line {line}");
-                return Err(ArgumentError::new("plan", shown, format!("{expected}, as in line 0")).into());
-            }
-        }
-        let columns = columns.ok_or(Error::NoFreeCell)?;
-        Ok(Self { columns, squares })
+        let lines = || text.lines().filter(|line| !line.trim().is_empty());
+        let indents = lines().map(|line| line.len() - line.trim_start().len());
+        let indent = indents.min().ok_or(Error::NoFreeCell)?;
+        let air = |character| if character == ' ' { '.' } else { character };
+        let lines = lines().map(|line| line.chars().skip(indent).map(air).collect());
+        Self { lines: lines.collect() }.checked()
     }
 
     /// Reads a plain PBM picture (`P1`, width, height, then pixels; `#` begins a comment): 1 (black) is wall, 0 (white) is air. Air on
@@ -72,18 +50,19 @@ impl Plan {
     /// If the text is no such picture.
     pub fn from_pbm(text: &str) -> Result<Self, Error> {
         let uncommented = text.lines().map(|line| line.split('#').next().unwrap_or(""));
-        let words: Vec<&str> = uncommented.flat_map(str::split_ascii_whitespace).collect();
-        let size = |i: usize| words.get(i)?.parse::<usize>().ok().filter(|n| *n > 0);
-        let (Some(columns), Some(lines), Some(&"P1")) = (size(1), size(2), words.first()) else {
-            return Err(ArgumentError::new("picture", "no plain PBM", "`P1`, width and height").into());
+        let mut words = uncommented.flat_map(str::split_ascii_whitespace);
+        let magic = words.next();
+        let mut size = || words.next()?.parse::<usize>().ok().filter(|n| *n > 0);
+        let (Some("P1"), Some(columns), Some(lines)) = (magic, size(), size()) else {
+            return refuse("picture", "no plain PBM", "`P1`, width and height");
         };
-        let pixels = || words[3..].iter().flat_map(|word| word.chars());
-        if columns.checked_mul(lines) != Some(pixels().count()) || pixels().any(|pixel| !matches!(pixel, '0' | '1')) {
-            let shown = format!("{} pixels", pixels().count());
-            return Err(ArgumentError::new("picture", shown, format!("{columns} times {lines} of 0 or 1")).into());
+        let pixels: Vec<char> = words.flat_map(str::chars).collect();
+        if columns.checked_mul(lines) != Some(pixels.len()) || pixels.iter().any(|pixel| !"01".contains(*pixel)) {
+            return refuse("picture", format!("{} pixels", pixels.len()), format!("{columns} times {lines} of 0 or 1"));
         }
-        let squares = pixels().map(|pixel| if pixel == '1' { '#' } else { '.' }).collect();
-        Ok(Self { columns, squares })
+        let square = |pixel: &char| if *pixel == '1' { '#' } else { '.' };
+        let lines = pixels.chunks(columns).map(|line| line.iter().map(square).collect());
+        Ok(Self { lines: lines.collect() })
     }
 
     /// The plan with another character in some squares, given by column and line.
@@ -92,22 +71,27 @@ impl Plan {
     /// If it has no meaning or a square is outside the plan.
     pub fn with(mut self, character: char, squares: impl IntoIterator<Item = [usize; 2]>) -> Result<Self, Error> {
         for [column, line] in squares {
-            if column >= self.columns || line >= self.lines() || !".#LAIO".contains(character) {
-                return Err(without_meaning(character, [column, line]));
+            match self.lines.get_mut(line).and_then(|line| line.get_mut(column)) {
+                Some(square) => *square = character,
+                None => return refuse("squares", format!("line {line}, column {column}"), "a square of the plan"),
             }
-            self.squares[line * self.columns + column] = character;
+        }
+        self.checked()
+    }
+
+    fn checked(self) -> Result<Self, Error> {
+        let expected = self.lines[0].len();
+        for (r, line) in self.lines.iter().enumerate() {
+            if line.len() != expected {
+                let shown = format!("{} squares in line {r}", line.len());
+                return refuse("plan", shown, format!("{expected}, as in line 0"));
+            }
+            if let Some(column) = line.iter().position(|character| !".#LAIO".contains(*character)) {
+                let shown = format!("{:?} in line {r}, column {column}", line[column]);
+                return refuse("plan", shown, "one of . # L A I O");
+            }
         }
         Ok(self)
-    }
-
-    /// Number of squares in a line.
-    pub fn columns(&self) -> usize {
-        self.columns
-    }
-
-    /// Number of lines.
-    pub fn lines(&self) -> usize {
-        self.squares.len() / self.columns
     }
 
     /// The plan's domain: squares of `width` metres in `split` by `split` cells each; leaking walls take `leak` m/s.
@@ -128,11 +112,11 @@ impl Plan {
 
     fn on(&self, width: f64, split: usize, leak: f64, layers: &[usize]) -> Result<Domain, Error> {
         at_least_one("split", split)?;
-        let counts = [[self.columns * split, self.lines() * split].as_slice(), layers].concat();
+        let counts = [&[self.lines[0].len() * split, self.lines.len() * split], layers].concat();
         let grid = Grid::uniform(&counts, positive("width", width)? / split as f64)?;
         let cell = |cell: usize| {
             let [column, line, _] = grid.place(cell);
-            match self.squares[line / split * self.columns + column / split] {
+            match self.lines[line / split][column / split] {
                 '#' => Cell::Blocked(Boundary::Closed),
                 'L' => Cell::Blocked(Boundary::Leaking(leak)),
                 'A' => Cell::Blocked(Boundary::Absorbing),
@@ -144,9 +128,4 @@ impl Plan {
         let cells: Vec<Cell> = (0..grid.cells()).map(cell).collect();
         Domain::new(grid, &cells, [[Boundary::Closed; 2]; 3])
     }
-}
-
-fn without_meaning(character: char, [column, line]: [usize; 2]) -> Error {
-    let shown = format!("{character:?} in line {line}, column {column}");
-    ArgumentError::new("plan", shown, "one of . # L A I O in a square of the plan").into()
 }

@@ -2,7 +2,7 @@
 
 use crate::solver::{Direction, Factor};
 use crate::{Error, Transport};
-use faer::Mat;
+use faer::{Mat, Scale};
 
 /// How a step in time is made. Both methods damp what a sudden start excites.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -53,58 +53,45 @@ impl<'a> Stepper<'a> {
         source: &Mat<f64>,
         step: f64,
     ) -> Result<(Mat<f64>, Mat<f64>, f64), Error> {
-        let (rows, columns) = (now.nrows(), now.ncols());
         let transport = self.transport;
-        let volumes = &transport.volumes;
+        let amounts = |c: &Mat<f64>| Mat::from_fn(c.nrows(), c.ncols(), |i, j| transport.volumes[i] * c[(i, j)]);
+        let solved = |factor: &Factor<'_>, mut columns: Mat<f64>| {
+            factor.solve(direction, &mut columns);
+            columns
+        };
         match self.method {
             Method::ImplicitEuler => {
                 let euler = |from: &Mat<f64>, step: f64, factor: &Factor<'_>| {
-                    let mut next =
-                        Mat::from_fn(rows, columns, |i, j| volumes[i] * from[(i, j)] + step * source[(i, j)]);
-                    factor.solve(direction, &mut next);
-                    next
+                    solved(factor, amounts(from) + Scale(step) * source)
                 };
                 let whole = euler(now, step, self.factor(step)?);
                 let half_factor = self.factor(0.5 * step)?;
                 let middle = euler(now, 0.5 * step, half_factor);
                 let next = euler(&middle, 0.5 * step, half_factor);
-                let dose = Mat::from_fn(rows, columns, |i, j| 0.5 * step * (middle[(i, j)] + next[(i, j)]));
-                let error = relative_error(&(&next - &whole), &next);
+                let dose = Scale(0.5 * step) * (middle + &next);
+                let error = relative_error(&(&next - whole), &next);
                 Ok((next, dose, error))
             }
             Method::TrBdf2 => {
                 let weight = HALF_GAMMA * step;
                 let factor = self.factor(weight)?;
                 let slope = |c: &Mat<f64>| {
-                    let mut out = Mat::zeros(rows, columns);
-                    for j in 0..columns {
+                    let mut out = Mat::zeros(c.nrows(), c.ncols());
+                    for j in 0..c.ncols() {
                         transport.apply(direction, c.col_as_slice(j), out.col_as_slice_mut(j));
-                        let pairs = out.col_as_slice_mut(j).iter_mut().zip(source.col_as_slice(j));
-                        pairs.for_each(|(out, s)| *out = s - *out);
                     }
-                    out
+                    source - out
                 };
                 let first = slope(now);
-                let mut middle = Mat::from_fn(rows, columns, |i, j| {
-                    volumes[i] * now[(i, j)] + weight * (first[(i, j)] + source[(i, j)])
-                });
-                factor.solve(direction, &mut middle);
+                let middle = solved(factor, amounts(now) + Scale(weight) * (&first + source));
                 let second = slope(&middle);
-                let mut next = Mat::from_fn(rows, columns, |i, j| {
-                    volumes[i] * now[(i, j)]
-                        + step * WEIGHT * (first[(i, j)] + second[(i, j)])
-                        + weight * source[(i, j)]
-                });
-                factor.solve(direction, &mut next);
+                let slopes = Scale(step * WEIGHT) * (&first + &second) + Scale(weight) * source;
+                let next = solved(factor, amounts(now) + slopes);
                 let third = slope(&next);
                 // Solving with the matrix once more keeps the estimate bounded for stiff parts.
-                let mut error = Mat::from_fn(rows, columns, |i, j| {
-                    step * (ERROR[0] * first[(i, j)] + ERROR[1] * second[(i, j)] + ERROR[2] * third[(i, j)])
-                });
-                factor.solve(direction, &mut error);
-                let dose = Mat::from_fn(rows, columns, |i, j| {
-                    step * WEIGHT * (now[(i, j)] + middle[(i, j)]) + weight * next[(i, j)]
-                });
+                let error = Scale(ERROR[0]) * first + Scale(ERROR[1]) * second + Scale(ERROR[2]) * third;
+                let error = solved(factor, Scale(step) * error);
+                let dose = Scale(step * WEIGHT) * (now + middle) + Scale(weight) * &next;
                 let error = relative_error(&error, &next);
                 Ok((next, dose, error))
             }
@@ -116,16 +103,10 @@ impl<'a> Stepper<'a> {
         match self.factors.iter().position(|(known, _)| *known == weight) {
             Some(at) => self.factors[at..].rotate_left(1),
             None => {
-                let diagonal = self.transport.volumes.iter().zip(&self.transport.diagonal);
-                let diagonal: Vec<f64> = diagonal.map(|(volume, rate)| volume + weight * rate).collect();
                 if self.factors.len() == MAX_FACTORS {
                     self.factors.remove(0);
                 }
-                let factor = self
-                    .transport
-                    .solver()?
-                    .factor(&diagonal, &self.transport.rates, weight)?;
-                self.factors.push((weight, factor));
+                self.factors.push((weight, self.transport.factor(1.0, weight)?));
             }
         }
         Ok(&self.factors[self.factors.len() - 1].1)

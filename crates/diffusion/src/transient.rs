@@ -6,8 +6,7 @@ use crate::solver::Direction;
 use crate::stepper::{State, Stepper};
 use crate::{Error, Patch, Transport};
 use faer::Mat;
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, at_least_one, finite, positive};
+use fewbits_numerics::error::{all_finite, at_least_one, positive, refuse};
 
 /// How long steps are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,51 +106,50 @@ impl<'a> Transient<'a> {
     /// If `initial` has not one number for each free cell, instants do not increase from above 0, a rate is not finite, a release stops
     /// before it starts or starts before 0, a patch is of another domain, a concentration is not, [`Error::Factorisation`] or [`Error::StepTooSmall`].
     pub fn run(&mut self, initial: &[f64], releases: &[Release], times: &[f64]) -> Result<Vec<Snapshot>, Error> {
-        // Checks number and finiteness.
-        self.stepper.transport.net_outflow(initial)?;
+        let transport = self.stepper.transport;
+        transport.check_field("initial", initial)?;
         check_instants("times", times)?;
         let last = times.last().copied().unwrap_or(0.0);
         let mut instants = times.to_vec();
-        for release in releases {
-            finite("rate", release.rate)?;
-            self.stepper.transport.check_patch(&release.patch)?;
-            if !(release.start >= 0.0 && release.start <= release.stop) {
-                let shown = format!("{} to {}", release.start, release.stop);
-                return Err(ArgumentError::new("start, stop", shown, "0 <= start <= stop").into());
+        for Release {
+            patch,
+            rate,
+            start,
+            stop,
+        } in releases
+        {
+            // Checks rate and patch.
+            transport.release(patch, *rate, &mut vec![0.0; initial.len()])?;
+            if !(*start >= 0.0 && start <= stop) {
+                return refuse("start, stop", format!("{start} to {stop}"), "0 <= start <= stop");
             }
-            instants.extend([release.start, release.stop].iter().filter(|t| **t > 0.0 && **t < last));
+            instants.extend([*start, *stop].iter().filter(|t| **t > 0.0 && **t < last));
         }
         instants.sort_by(f64::total_cmp);
         instants.dedup();
-        let mut state = State::new(Mat::from_fn(initial.len(), 1, |i, _| initial[i]));
-        let unit = common_unit(&instants);
-        let (mut now, mut active, mut snapshots) = (0.0, vec![false; releases.len()], Vec::new());
-        for (k, end) in instants.into_iter().enumerate() {
-            let before = active;
-            active = releases.iter().map(|r| r.start <= now && now < r.stop).collect();
-            let mut source = Mat::zeros(initial.len(), 1);
-            for (release, _) in releases.iter().zip(&active).filter(|pair| *pair.1) {
-                for (cell, share) in &release.patch.shares {
-                    source[(*cell, 0)] += share * release.rate;
-                }
+        let source = |now: f64| {
+            let mut amounts = Mat::zeros(initial.len(), 1);
+            for release in releases
+                .iter()
+                .filter(|release| release.start <= now && now < release.stop)
+            {
+                transport.release(&release.patch, release.rate, amounts.col_as_slice_mut(0))?;
             }
-            if k == 0 || before != active {
-                state.wanted = self.first_step(&state.concentration, &source);
-            }
-            self.advance(Direction::Forward, &mut state, &source, end - now, unit)?;
-            now = end;
-            if times.contains(&now) {
-                all_finite("concentration", state.concentration.col_as_slice(0))?;
-                all_finite("dose", state.dose.col_as_slice(0))?;
+            Ok(amounts)
+        };
+        let initial = Mat::from_fn(initial.len(), 1, |i, _| initial[i]);
+        let mut snapshots = Vec::with_capacity(times.len());
+        self.march(Direction::Forward, initial, &instants, source, |time, state| {
+            if times.contains(&time) {
                 snapshots.push(Snapshot {
-                    time: now,
+                    time,
                     concentration: state.concentration.col_as_slice(0).to_vec(),
                     dose: state.dose.col_as_slice(0).to_vec(),
                     lowest: state.lowest,
                     steps: state.steps,
                 });
             }
-        }
+        })?;
         Ok(snapshots)
     }
 
@@ -165,26 +163,47 @@ impl<'a> Transient<'a> {
     /// If ages do not increase from above 0, a patch is of another domain, [`Error::Factorisation`] or [`Error::StepTooSmall`].
     pub fn step_responses(&mut self, sensors: &[Patch], ages: &[f64]) -> Result<Vec<Vec<Vec<f64>>>, Error> {
         check_instants("ages", ages)?;
-        let count = self.stepper.transport.volumes.len();
-        let mut source = Mat::zeros(count, sensors.len());
-        for (j, sensor) in sensors.iter().enumerate() {
-            self.stepper.transport.check_patch(sensor)?;
-            for (cell, share) in &sensor.shares {
-                source[(*cell, j)] += share;
-            }
-        }
-        let mut state = State::new(Mat::zeros(count, sensors.len()));
-        state.wanted = self.first_step(&state.concentration, &source);
-        let (mut now, mut responses) = (0.0, Vec::with_capacity(ages.len()));
-        let unit = common_unit(ages);
-        for age in ages {
-            self.advance(Direction::Adjoint, &mut state, &source, age - now, unit)?;
-            now = *age;
-            let columns = || (0..sensors.len()).map(|j| state.concentration.col_as_slice(j));
-            columns().try_for_each(|column| all_finite("response", column))?;
-            responses.push(columns().map(<[f64]>::to_vec).collect());
-        }
+        let source = self.stepper.transport.columns(sensors)?;
+        let nothing = Mat::zeros(source.nrows(), source.ncols());
+        let mut responses = Vec::with_capacity(ages.len());
+        self.march(
+            Direction::Adjoint,
+            nothing,
+            ages,
+            |_| Ok(source.clone()),
+            |_, state| {
+                let columns = 0..sensors.len();
+                responses.push(columns.map(|j| state.concentration.col_as_slice(j).to_vec()).collect());
+            },
+        )?;
         Ok(responses)
+    }
+
+    /// Moves columns on from time 0; `source` from an instant to the next; calls `visit` at each instant.
+    fn march(
+        &mut self,
+        direction: Direction,
+        initial: Mat<f64>,
+        instants: &[f64],
+        source: impl Fn(f64) -> Result<Mat<f64>, Error>,
+        mut visit: impl FnMut(f64, &State),
+    ) -> Result<(), Error> {
+        let (mut state, mut before, mut now) = (State::new(initial), None, 0.0);
+        let unit = common_unit(instants);
+        for end in instants {
+            let source = source(now)?;
+            if before.as_ref() != Some(&source) {
+                state.wanted = self.first_step(&state.concentration, &source);
+            }
+            self.advance(direction, &mut state, &source, end - now, unit)?;
+            for j in 0..source.ncols() {
+                all_finite("concentration", state.concentration.col_as_slice(j))?;
+                all_finite("dose", state.dose.col_as_slice(j))?;
+            }
+            visit(*end, &state);
+            (before, now) = (Some(source), *end);
+        }
+        Ok(())
     }
 
     /// A small share of the time in which a cell that holds or receives something loses it.
@@ -223,20 +242,17 @@ impl<'a> Transient<'a> {
             }
         };
         // `left` steps of `base 2^level` make up what remains of the interval.
-        let (base, mut left) = match unit {
-            Some(unit) => (unit, (duration / unit).round() as u64),
-            None => (duration, 1),
-        };
-        let mut level = 0_i32;
+        let base = unit.unwrap_or(duration);
+        let (mut left, mut level) = ((duration / base).round() as u64, 0_i32);
         let length = |level: i32| base * 2.0_f64.powi(level);
-        while left % 2 == 0 && length(level + 1) <= state.wanted {
-            (left, level) = (left / 2, level + 1);
-        }
-        while length(level) > state.wanted && level > MIN_SHARE_EXPONENT {
-            (left, level) = (left * 2, level - 1);
-        }
         let first = state.steps;
         while left > 0 {
+            while left % 2 == 0 && length(level + 1) <= state.wanted {
+                (left, level) = (left / 2, level + 1);
+            }
+            while length(level) > state.wanted && level > MIN_SHARE_EXPONENT {
+                (left, level) = (left * 2, level - 1);
+            }
             let step = length(level);
             if state.steps - first > MAX_STEPS {
                 return Err(Error::StepTooSmall { step });
@@ -246,20 +262,13 @@ impl<'a> Transient<'a> {
                 if level <= MIN_SHARE_EXPONENT {
                     return Err(Error::StepTooSmall { step });
                 }
-                (left, level) = (left * 2, level - 1);
-                state.wanted = length(level);
+                state.wanted = 0.5 * step;
                 continue;
             }
             state.accept(next, dose);
             left -= 1;
-            state.wanted = if error < tolerance / DOUBLING_MARGIN {
-                2.0 * step
-            } else {
-                step
-            };
-            if left > 0 && left % 2 == 0 && length(level + 1) <= state.wanted {
-                (left, level) = (left / 2, level + 1);
-            }
+            let doubled = error < tolerance / DOUBLING_MARGIN;
+            state.wanted = if doubled { 2.0 * step } else { step };
         }
         Ok(())
     }
@@ -270,22 +279,18 @@ fn check_instants(name: &'static str, instants: &[f64]) -> Result<(), Error> {
     let increasing = instants.windows(2).all(|pair| pair[0] < pair[1]);
     match instants.first() {
         Some(first) if *first > 0.0 && increasing => Ok(()),
-        _ => Err(ArgumentError::new(name, format!("{instants:?}"), "one or more increasing instants after 0").into()),
+        _ => refuse(name, format!("{instants:?}"), "one or more increasing instants after 0"),
     }
 }
 
-/// The longest time of which all intervals are multiples, if the shortest interval has at most 64 of
-/// them and all have at most [`MAX_UNITS`]: steps then have few lengths.
+/// The longest time of which all intervals are multiples, if the shortest interval has at most 64 of them and all have at most
+/// [`MAX_UNITS`]: steps then have few lengths.
 fn common_unit(instants: &[f64]) -> Option<f64> {
-    let intervals = || {
-        instants
-            .iter()
-            .scan(0.0, |before, t| Some(t - std::mem::replace(before, *t)))
-    };
     let last = *instants.last()?;
-    let mut unit = 0.0_f64;
-    for interval in intervals() {
-        let mut other = interval;
+    let (mut unit, mut shortest, mut before) = (0.0_f64, f64::INFINITY, 0.0);
+    for end in instants {
+        let mut other = end - before;
+        (shortest, before) = (shortest.min(other), *end);
         // Euclid's algorithm, with rounding taken as zero.
         while other > 1e-9 * last {
             (unit, other) = (other, unit % other);
@@ -294,7 +299,6 @@ fn common_unit(instants: &[f64]) -> Option<f64> {
             }
         }
     }
-    let shortest = intervals().fold(f64::INFINITY, f64::min);
     // An interval that counts as zero has no multiple.
     (unit > shortest / 64.0 && unit < 1.5 * shortest && last < MAX_UNITS * unit).then_some(unit)
 }

@@ -1,10 +1,11 @@
 //! Diffusion, wind and decay on a domain: the matrix.
 
+use crate::domain::{Face, OUTSIDE};
 use crate::grid::LARGEST;
-use crate::solver::{Direction, Solver};
+use crate::solver::{Direction, Factor, Solver};
 use crate::{Boundary, Domain, Error, Flow, Patch};
-use fewbits_numerics::ArgumentError;
-use fewbits_numerics::error::{all_finite, within};
+use faer::Mat;
+use fewbits_numerics::error::{all_finite, finite, refuse, within};
 use std::sync::{Arc, OnceLock};
 
 /// How the flux through a face depends on the concentrations beside it.
@@ -71,13 +72,11 @@ impl From<Vec<f64>> for PerCell {
 /// Columns of `A` sum to what leaves the domain and decays: mass is kept to rounding. Off-diagonals are not positive and column sums
 /// not negative, so that steady solutions and implicit Euler steps are never negative.
 pub struct Transport {
-    pub(crate) domain: Arc<Domain>,
+    domain: Arc<Domain>,
     pub(crate) volumes: Vec<f64>,
     decay: Vec<f64>,
-    /// Amount per concentration through each face, upwards and downwards.
-    pub(crate) rates: Vec<[f64; 2]>,
-    /// Amount per concentration out of each face at the edge, and in per concentration outside (inflows only).
-    edge_rates: Vec<[f64; 2]>,
+    /// Amount per concentration through each face of the domain, upwards and downwards.
+    rates: Vec<[f64; 2]>,
     pub(crate) diagonal: Vec<f64>,
     solver: OnceLock<Solver>,
 }
@@ -121,48 +120,45 @@ impl Transport {
     ) -> Result<Self, Error> {
         let domain = domain.into();
         flow.check(&domain)?;
-        let diffusivity = values("diffusivity", diffusivity.into(), domain.free().len(), LARGEST.recip())?;
-        let decay = values("decay", decay.into(), domain.free().len(), 0.0)?;
+        let mut diffusivity = values("diffusivity", diffusivity.into(), &domain, LARGEST.recip())?;
+        let decay = values("decay", decay.into(), &domain, 0.0)?;
         let volumes = domain.volumes();
         let mut diagonal: Vec<f64> = decay.iter().zip(&volumes).map(|(decay, v)| decay * v).collect();
-        let mut rates = Vec::with_capacity(domain.faces.len());
-        for (face, flow) in domain.faces.iter().zip(&flow.inside) {
-            let [low, high] = face.cells;
+        // Outside there is no half cell, whatever its diffusivity.
+        diffusivity.extend([1.0; OUTSIDE]);
+        diagonal.extend([0.0; OUTSIDE]);
+        let (largest, mut rates) = (flow.largest(), Vec::with_capacity(domain.faces.len()));
+        for (face, flow) in domain.faces.iter().zip(&flow.upwards) {
             // Two half cells in series.
-            let conductance = face.area / (face.halves[0] / diffusivity[low] + face.halves[1] / diffusivity[high]);
-            let rate = scheme.weights(flow / conductance).map(|weight| conductance * weight);
-            diagonal[low] += rate[0];
-            diagonal[high] += rate[1];
-            rates.push(rate);
-        }
-        let (largest, mut edge_rates) = (flow.largest(), Vec::with_capacity(domain.edge_faces.len()));
-        for (face, flow) in domain.edge_faces.iter().zip(&flow.edge) {
-            let half_resistance = face.half / diffusivity[face.cell];
-            let conductance = face.area / half_resistance;
+            let [below, above] = [0, 1].map(|side| face.halves[side] / diffusivity[face.cells[side]]);
+            let conductance = face.area / (below + above);
+            let outwards = if face.side() == 0 { *flow } else { -flow };
             let rate = match face.boundary {
-                Boundary::Closed | Boundary::Leaking(0.0) => [0.0; 2],
-                Boundary::Absorbing => [conductance, 0.0],
-                Boundary::Leaking(leak) => [face.area / (leak.recip() + half_resistance), 0.0],
-                Boundary::Inflow => scheme.weights(flow / conductance).map(|weight| conductance * weight),
-                Boundary::Outflow if largest == 0.0 => [conductance, 0.0],
+                None | Some(Boundary::Inflow) => scheme.weights(flow / conductance).map(|weight| conductance * weight),
+                Some(Boundary::Closed | Boundary::Leaking(0.0)) => [0.0; 2],
+                Some(Boundary::Leaking(leak)) => [face.area / (leak.recip() + (below + above)); 2],
+                Some(Boundary::Absorbing) => [conductance; 2],
+                Some(Boundary::Outflow) if largest == 0.0 => [conductance; 2],
                 // Rounding may leave a flow just below zero.
-                Boundary::Outflow if *flow >= -1e-10 * largest => [flow.max(0.0), 0.0],
-                Boundary::Outflow => {
-                    let cell = domain.grid().place(domain.free()[face.cell]);
-                    return Err(Error::Backflow { cell, flow: *flow });
+                Some(Boundary::Outflow) if outwards >= -1e-10 * largest => [outwards.max(0.0); 2],
+                Some(Boundary::Outflow) => {
+                    let cell = domain.place(face.cell());
+                    return Err(Error::Backflow { cell, flow: outwards });
                 }
             };
-            diagonal[face.cell] += rate[0];
-            edge_rates.push(rate);
+            diagonal[face.cells[0]] += rate[0];
+            diagonal[face.cells[1]] += rate[1];
+            rates.push(rate);
         }
+        diagonal.truncate(volumes.len());
+        let solver = OnceLock::new();
         Ok(Self {
             domain,
             volumes,
             decay,
             rates,
-            edge_rates,
             diagonal,
-            solver: OnceLock::new(),
+            solver,
         })
     }
 
@@ -172,12 +168,20 @@ impl Transport {
     }
 
     /// The ordering of the matrix, made when it is first needed.
-    pub(crate) fn solver(&self) -> Result<&Solver, Error> {
+    fn solver(&self) -> Result<&Solver, Error> {
         if let Some(solver) = self.solver.get() {
             return Ok(solver);
         }
-        let solver = Solver::new(self.diagonal.len(), &self.domain.faces, &self.rates)?;
+        let solver = Solver::new(&self.domain, &self.rates)?;
         Ok(self.solver.get_or_init(|| solver))
+    }
+
+    /// The factor of `share V + weight A`.
+    pub(crate) fn factor(&self, share: f64, weight: f64) -> Result<Factor<'_>, Error> {
+        let pairs = self.volumes.iter().zip(&self.diagonal);
+        let diagonal = pairs.map(|(volume, rate)| share * volume + weight * rate).collect();
+        self.solver()?
+            .factor(diagonal, &self.rates[..self.domain.inner], weight)
     }
 
     /// Whether the matrix is symmetric after scaling (no wind, or potential flow with one diffusivity), so that Cholesky serves.
@@ -193,7 +197,8 @@ impl Transport {
         for ((out, x), diagonal) in out.iter_mut().zip(x).zip(&self.diagonal) {
             *out = diagonal * x;
         }
-        for (face, rate) in self.domain.faces.iter().zip(&self.rates) {
+        let inner = &self.domain.faces[..self.domain.inner];
+        for (face, rate) in inner.iter().zip(&self.rates) {
             let [low, high] = face.cells;
             let forward = direction == Direction::Forward;
             let [up, down] = if forward { *rate } else { [rate[1], rate[0]] };
@@ -205,9 +210,9 @@ impl Transport {
     /// `A x`, kg/s: what leaves each free cell at the concentrations `x`.
     ///
     /// # Errors
-    /// If there is not one concentration for each free cell.
+    /// If there is not one concentration for each free cell, or one is not finite.
     pub fn net_outflow(&self, concentration: &[f64]) -> Result<Vec<f64>, Error> {
-        self.check_field(concentration)?;
+        self.check_field("concentration", concentration)?;
         let mut out = vec![0.0; concentration.len()];
         self.apply(Direction::Forward, concentration, &mut out);
         Ok(out)
@@ -216,93 +221,92 @@ impl Transport {
     /// What the inflows bring into each free cell if the air outside has the given concentration, kg/s.
     pub fn inflow(&self, outside: f64) -> Vec<f64> {
         let mut source = vec![0.0; self.diagonal.len()];
-        for (face, rate) in self.domain.edge_faces.iter().zip(&self.edge_rates) {
-            source[face.cell] += rate[1] * outside;
+        for (face, rate) in self.edge().filter(|edge| edge.0.boundary == Some(Boundary::Inflow)) {
+            source[face.cell()] += rate[1 - face.side()] * outside;
         }
         source
+    }
+
+    /// Faces that lead out, with their rates upwards and downwards.
+    fn edge(&self) -> impl Iterator<Item = (&Face, &[f64; 2])> {
+        self.domain.faces.iter().zip(&self.rates).skip(self.domain.inner)
     }
 
     /// Mass, and what leaves per second, of a concentration; or of a dose (kg s/m^3), all that has left.
     ///
     /// # Errors
-    /// If there is not one number for each free cell, or a part of the budget is beyond the range of numbers.
+    /// If there is not one number for each free cell, or mass or the sum of what leaves is beyond the range of numbers.
     pub fn budget(&self, concentration: &[f64]) -> Result<Budget, Error> {
-        self.check_field(concentration)?;
+        self.check_field("concentration", concentration)?;
         let contents = || self.volumes.iter().zip(concentration).map(|(volume, c)| volume * c);
         let mut budget = Budget {
             mass: contents().sum(),
             decayed: contents().zip(&self.decay).map(|(amount, decay)| amount * decay).sum(),
             ..Budget::default()
         };
-        for (face, rate) in self.domain.edge_faces.iter().zip(&self.edge_rates) {
-            let leaves = rate[0] * concentration[face.cell];
-            match face.boundary {
-                Boundary::Closed => {}
-                Boundary::Absorbing => budget.absorbed += leaves,
-                Boundary::Leaking(_) => budget.leaked += leaves,
-                Boundary::Inflow => budget.inflow += leaves,
-                Boundary::Outflow => budget.outflow += leaves,
-            }
+        for (face, rate) in self.edge() {
+            let part = match face.boundary {
+                None | Some(Boundary::Closed) => continue,
+                Some(Boundary::Absorbing) => &mut budget.absorbed,
+                Some(Boundary::Leaking(_)) => &mut budget.leaked,
+                Some(Boundary::Inflow) => &mut budget.inflow,
+                Some(Boundary::Outflow) => &mut budget.outflow,
+            };
+            *part += rate[face.side()] * concentration[face.cell()];
         }
-        let Budget {
-            mass,
-            decayed,
-            absorbed,
-            leaked,
-            inflow,
-            outflow,
-        } = budget;
-        all_finite("budget", &[mass, decayed, absorbed, leaked, inflow, outflow])?;
+        all_finite("budget", &[budget.mass, budget.removed()])?;
         Ok(budget)
     }
 
-    fn check_field(&self, field: &[f64]) -> Result<(), Error> {
-        if field.len() != self.volumes.len() {
-            let expected = format!("{}, one for each free cell", self.volumes.len());
-            return Err(ArgumentError::new("concentration", field.len(), expected).into());
-        }
-        Ok(all_finite("concentration", field)?)
+    /// Refuses a field that has not one finite number for each free cell.
+    pub(crate) fn check_field(&self, name: &'static str, field: &[f64]) -> Result<(), Error> {
+        self.domain.check_count(name, field.len())?;
+        Ok(all_finite(name, field)?)
     }
 
     /// Refuses a domain with a part that nothing leaves and where nothing decays.
     pub(crate) fn check_sinks(&self) -> Result<(), Error> {
-        let (part, parts) = self.domain.parts();
-        let mut drained = vec![false; parts];
-        for (cell, decay) in self.decay.iter().enumerate() {
-            drained[part[cell]] |= *decay > 0.0;
+        let mut drained: Vec<bool> = self.decay.iter().map(|decay| *decay > 0.0).collect();
+        for (face, rate) in self.edge() {
+            drained[face.cell()] |= rate[face.side()] > 0.0;
         }
-        for (face, rate) in self.domain.edge_faces.iter().zip(&self.edge_rates) {
-            drained[part[face.cell]] |= rate[0] > 0.0;
-        }
-        match part.iter().position(|part| !drained[*part]) {
-            None => Ok(()),
-            Some(cell) => Err(Error::NoSink {
-                cell: self.domain.grid().place(self.domain.free()[cell]),
-            }),
-        }
-    }
-
-    /// Checks that a patch is of this domain.
-    pub(crate) fn check_patch(&self, patch: &Patch) -> Result<(), Error> {
-        match patch.shares.iter().find(|share| share.0 >= self.volumes.len()) {
-            None => Ok(()),
-            Some((cell, _)) => {
-                let expected = format!("cells below {}: the patch is of another domain", self.volumes.len());
-                Err(ArgumentError::new("patch", cell, expected).into())
+        for part in self.domain.walk() {
+            if !part.iter().any(|(cell, _)| drained[*cell]) {
+                let cell = self.domain.place(part[0].0);
+                return Err(Error::NoSink { cell });
             }
         }
+        Ok(())
+    }
+
+    /// Adds a release of `rate` in a patch to the amounts in the cells.
+    pub(crate) fn release(&self, patch: &Patch, rate: f64, amounts: &mut [f64]) -> Result<(), Error> {
+        finite("rate", rate)?;
+        for (cell, share) in &patch.shares {
+            match amounts.get_mut(*cell) {
+                Some(amount) => *amount += share * rate,
+                None => return refuse("patch", format!("of cell {cell}"), "a patch of this domain"),
+            }
+        }
+        Ok(())
+    }
+
+    /// A column of shares for each sensor.
+    pub(crate) fn columns(&self, sensors: &[Patch]) -> Result<Mat<f64>, Error> {
+        let mut columns = Mat::zeros(self.volumes.len(), sensors.len());
+        for (j, sensor) in sensors.iter().enumerate() {
+            self.release(sensor, 1.0, columns.col_as_slice_mut(j))?;
+        }
+        Ok(columns)
     }
 }
 
-fn values(name: &'static str, given: PerCell, count: usize, least: f64) -> Result<Vec<f64>, Error> {
+fn values(name: &'static str, given: PerCell, domain: &Domain, least: f64) -> Result<Vec<f64>, Error> {
     let values = match given {
-        PerCell::Constant(value) => vec![value; count],
+        PerCell::Constant(value) => vec![value; domain.free().len()],
         PerCell::Each(values) => values,
     };
-    if values.len() != count {
-        let (given, expected) = (format!("{} values", values.len()), format!("{count}, one for each free cell"));
-        return Err(ArgumentError::new(name, given, expected).into());
-    }
+    domain.check_count(name, values.len())?;
     for value in &values {
         within(name, *value, least, LARGEST)?;
     }

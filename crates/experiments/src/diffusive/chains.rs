@@ -205,8 +205,15 @@ impl Figure for Chains {
             let (name, range) = (s.name, s.range);
             rows.curves.iter().filter(move |c| c.scheme == name && c.range == range)
         };
-        // A second range has the same colours, and other dashes.
-        let colour = |s: &Scheme| s.place() + if s.range == schemes[0].range { 0 } else { 8 };
+        // Of two ranges the first is solid and the second dashed, in one colour per scheme.
+        let curve = |s: &Scheme, points| {
+            let line = match (several, s.range == schemes[0].range) {
+                (false, _) => Layer::line(label(s), points),
+                (true, true) => Layer::unbroken(label(s), points),
+                (true, false) => Layer::dashed(label(s), points),
+            };
+            line.coloured(s.place())
+        };
         let threshold = schemes[0].example.threshold.log10();
         let last = rows.curves.iter().map(|c| c.step).max().unwrap_or(1) as f64;
         let limit = || Layer::dashed("threshold", vec![(1.0, threshold), (last, threshold)]).coloured(7);
@@ -215,7 +222,7 @@ impl Figure for Chains {
             let panel = Panel::new(title, Axis::linear("nodes"), axis).with(limit());
             let line = |scheme: &Scheme| {
                 let line = points(of(scheme), |c| (c.step as f64, c.log10det_med.map_or(f64::NAN, |m| m.value)));
-                Layer::line(label(scheme), line).coloured(colour(scheme))
+                curve(scheme, line)
             };
             panel.with_all(schemes.iter().filter(|s| chosen(s)).map(line))
         };
@@ -230,10 +237,10 @@ impl Figure for Chains {
         }
         let mut errors = Panel::semilog("Error", "nodes", "distance to the source / m").without_legend();
         let band = of(&schemes[0]).map(|c| (c.step as f64, c.err_q10, c.err_q90)).collect();
-        errors = errors.with(Layer::band("", band).coloured(colour(&schemes[0])));
+        errors = errors.with(Layer::band("", band).coloured(schemes[0].place()));
         for scheme in &schemes {
             let line = points(of(scheme), |c| (c.step as f64, c.err_med));
-            errors = errors.with(Layer::line(label(scheme), line).coloured(colour(scheme)));
+            errors = errors.with(curve(scheme, line));
         }
         let determinants = determinants("Determinant", &|_| true);
         Plot::grid(2, vec![errors, determinants])

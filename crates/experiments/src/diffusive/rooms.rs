@@ -184,21 +184,25 @@ impl Figure for Rooms {
         let places = |chosen: fn(&Square) -> bool| -> Vec<(f64, f64)> {
             rows.map.iter().filter(|s| chosen(s)).map(|s| (s.x, s.y)).collect()
         };
+        // Runs of wall along lines and along columns: where they overlap no seam between cells shows.
+        let wall = |column: usize, line: usize| rows.map.get(line * columns + column).is_some_and(|s| s.wall);
+        let along = runs(columns, lines, wall).map(|(line, from, to)| [from, to, line, line + 1]);
+        let across = runs(lines, columns, |line, column| wall(column, line))
+            .map(|(column, from, to)| [column, column + 1, from, to]);
+        let walls: Vec<(f64, f64, f64, f64)> = along
+            .chain(across)
+            .map(|sides| sides.map(|side| CELL * side as f64))
+            .map(|[left, right, bottom, top]| (left, right, bottom, top))
+            .collect();
         let panel = |title: &str, belief: fn(&Square) -> f64| {
             let values = rows
                 .map
                 .chunks(columns)
                 .map(|line| line.iter().map(belief).collect())
                 .collect();
-            let walls = places(|s| s.wall);
-            let half = 0.5 * CELL;
-            let boxes = walls
-                .into_iter()
-                .map(|(x, y)| (x - half, x + half, y - half, y + half))
-                .collect();
             Panel::new(title, Axis::linear("x / m").between(0.0, 15.0), Axis::linear("y / m").between(0.0, 10.0))
                 .with(Layer::heat("share of the largest", centres(columns), centres(lines), values))
-                .with(Layer::boxes("wall", boxes).coloured(7))
+                .with(Layer::boxes("wall", walls.clone()).coloured(7))
                 .with(Layer::points("sensors", places(|s| s.sensor)).styled(1, Marker::Circle))
                 .with(Layer::points("source", places(|s| s.source)).styled(3, Marker::Triangle))
         };
@@ -267,6 +271,19 @@ impl Rooms {
         };
         Ok((0..domain.grid().cells()).map(square).collect())
     }
+}
+
+/// In each of `lines` lines of `length` squares, the first and one past the last square of every run that holds `chosen`.
+fn runs(
+    length: usize,
+    lines: usize,
+    chosen: impl Fn(usize, usize) -> bool + Copy,
+) -> impl Iterator<Item = (usize, usize, usize)> {
+    (0..lines).flat_map(move |line| {
+        let at = move |i: usize| i < length && chosen(i, line);
+        let starts = (0..length).filter(move |i| at(*i) && (*i == 0 || !at(i - 1)));
+        starts.map(move |from| (line, from, (from..length).find(|i| !at(*i)).unwrap_or(length)))
+    })
 }
 
 fn summary(case: &'static str, all: &[Trialled]) -> Found {
