@@ -55,11 +55,6 @@ const OTHERS_FOLLOW: u8 = 0x40;
 const DESCRIPTOR_BITS: u8 = 15 | BOUND_FOLLOWS | OTHERS_FOLLOW;
 const PLAIN: u8 = CodecId::Adaptive as u8;
 
-/// The next smaller double of 12 bits of mantissa, as stored in three bytes.
-pub(crate) fn rounded_down(bound: f64) -> f64 {
-    f64::from_bits(bound.to_bits() & !0xff_ffff_ffff)
-}
-
 struct CodedColumn {
     descriptor: u8,
     /// Bound and others.
@@ -125,7 +120,7 @@ fn encode_column(
         descriptor,
         head,
         bytes: coded.bytes,
-        restored: merged(&specials, &coded.restored),
+        restored: specials::merged(&specials, &coded.restored),
         specials,
     }
 }
@@ -373,7 +368,7 @@ impl Section<'_> {
         let target = header.target(before.len(), self.own);
         let start = header.start(before.len(), self.own);
         let values = codec::decode(self.id, self.bytes, count, &target, start.as_ref(), &others)?;
-        Ok(merged(&self.specials, &values))
+        Ok(specials::merged(&self.specials, &values))
     }
 
     fn share_bound(&self, header: &Header, column: usize) -> Option<f64> {
@@ -390,22 +385,4 @@ fn read_bound(body: &mut Bytes<'_>) -> Result<f64, Damage> {
     } else {
         Err(Damage::Content("bound"))
     }
-}
-
-/// Values with the special cells between them; an empty list stands for none.
-fn merged(specials: &[Option<Special>], values: &[f64]) -> Cells {
-    if specials.is_empty() {
-        return values.iter().copied().map(Some).collect();
-    }
-    let mut values = values.iter().copied();
-    let cell = |special: &Option<Special>| match special {
-        Some(special) => {
-            if special.has_value() {
-                values.next();
-            }
-            special.cell()
-        }
-        None => values.next(),
-    };
-    specials.iter().map(cell).collect()
 }

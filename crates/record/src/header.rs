@@ -1,6 +1,5 @@
 //! The header: what every block of a recording is decoded with.
 
-use crate::block::{Cells, rounded_down};
 use crate::bound::{Bound, TENS};
 use crate::codec::{Target, adaptive};
 use crate::error::{Damage, Error};
@@ -57,8 +56,8 @@ impl Header {
     }
 
     /// The same header with starts of columns like these.
-    pub(crate) fn with_starts(mut self, columns: &[Cells]) -> Self {
-        let start = |(column, cells): (usize, &Cells)| {
+    pub(crate) fn with_starts(mut self, columns: &[Vec<Option<f64>>]) -> Self {
+        let start = |(column, cells): (usize, &Vec<Option<f64>>)| {
             let finite: Vec<f64> = cells.iter().flatten().copied().filter(|x| x.is_finite()).collect();
             let start = adaptive::start(&finite, &self.target(column, None))?;
             (start.to_bytes().len() <= MAX_START).then_some(start)
@@ -199,6 +198,11 @@ impl Header {
             check,
         })
     }
+}
+
+/// The next smaller double of 12 bits of mantissa, as stored in three bytes.
+pub(crate) fn rounded_down(bound: f64) -> f64 {
+    f64::from_bits(bound.to_bits() & !0xff_ffff_ffff)
 }
 
 /// Flags beside the kind of a bound: a period follows, a start follows.

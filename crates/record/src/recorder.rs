@@ -3,7 +3,7 @@
 use crate::block::{self, Cells};
 use crate::bound::Bound;
 use crate::error::Error;
-use crate::header::Header;
+use crate::header::{Header, rounded_down};
 use crate::index::{self, BLOCKS_PER_SEGMENT, Entry, Segment};
 use crate::resume;
 use crate::schema::{Schema, TimeBase};
@@ -25,7 +25,7 @@ pub(crate) fn share_of(share: f64, range: f64) -> f64 {
 
 /// The bound that a block states itself, if the header's is much smaller.
 pub(crate) fn own_bound(bound: f64, of_header: f64) -> Option<f64> {
-    let bound = block::rounded_down(bound);
+    let bound = rounded_down(bound);
     (bound > WIDER * of_header).then_some(bound)
 }
 

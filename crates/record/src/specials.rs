@@ -183,6 +183,24 @@ pub(crate) fn decode(bytes: &[u8], columns: usize, rows: usize) -> Result<Vec<Sp
     Ok(specials)
 }
 
+/// Values with the special cells between them; an empty list stands for none.
+pub(crate) fn merged(specials: &[Option<Special>], values: &[f64]) -> Vec<Option<f64>> {
+    if specials.is_empty() {
+        return values.iter().copied().map(Some).collect();
+    }
+    let mut values = values.iter().copied();
+    let cell = |special: &Option<Special>| match special {
+        Some(special) => {
+            if special.has_value() {
+                values.next();
+            }
+            special.cell()
+        }
+        None => values.next(),
+    };
+    specials.iter().map(cell).collect()
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
